@@ -1,0 +1,2 @@
+//! The worker that reads what only OpenImageIO can.
+fn main() {}

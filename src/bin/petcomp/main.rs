@@ -1,0 +1,2 @@
+//! The `petcomp` program.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Label files: what a person says of a photo of a surface (`NAME.label.json`).

@@ -1,0 +1,126 @@
+//! The pinhole camera.
+
+use crate::geom::{Homography, Point2, Point3, Pose, Ray, Vector2, Vector3};
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+/// A pinhole camera without distortion: where it stands and how it maps the world to pixels.
+///
+/// Axes are x right, y down, z forward; `camera_from_world` maps world metres into that frame. Pixel conventions are
+/// those of [`geom`](crate::geom).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Width and height of the picture, pixels.
+    pub image: [u32; 2],
+    /// Focal lengths along x and y, pixels; equal for square pixels.
+    pub focal_px: Vector2<f64>,
+    /// Principal point, pixels from the picture's top-left corner.
+    pub principal_px: Point2<f64>,
+    /// Pose of the world in the camera's frame.
+    pub camera_from_world: Pose,
+}
+
+impl Camera {
+    /// The camera's centre in the world.
+    pub fn center(&self) -> Point3<f64> {
+        self.camera_from_world.inverse_transform_point(&Point3::origin())
+    }
+
+    /// Pixel position and depth (metres along the optical axis) of a world point; none at or behind the camera.
+    pub fn project(&self, world: Point3<f64>) -> Option<(Point2<f64>, f64)> {
+        let c = self.camera_from_world * world;
+        let px = Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y) + self.principal_px.coords;
+        (c.z > 0.0).then_some((px, c.z))
+    }
+
+    /// The ray through a pixel position. Its parameter *is* the depth along the optical axis, in metres.
+    pub fn ray(&self, px: Point2<f64>) -> Ray {
+        let d = (px - self.principal_px).component_div(&self.focal_px);
+        let direction = self.camera_from_world.rotation.inverse() * Vector3::new(d.x, d.y, 1.0);
+        Ray { origin: self.center(), direction }
+    }
+
+    /// Angle between the optical axis and the normal of the surface `z = 0`, radians; 0 looks straight down.
+    pub fn tilt(&self) -> f64 {
+        let axis = self.camera_from_world.rotation.inverse() * Vector3::z();
+        libm::acos((-axis.z).clamp(-1.0, 1.0))
+    }
+
+    /// The matrix K of focal lengths and principal point.
+    pub fn intrinsics(&self) -> Matrix3<f64> {
+        let (f, c) = (self.focal_px, self.principal_px);
+        Matrix3::new(f.x, 0.0, c.x, 0.0, f.y, c.y, 0.0, 0.0, 1.0)
+    }
+
+    /// Surface metres (`z = 0`) to pixels.
+    pub fn pixel_from_surface(&self) -> Homography {
+        let r = self.camera_from_world.rotation.to_rotation_matrix();
+        let (r, t) = (r.matrix(), self.camera_from_world.translation.vector);
+        let plane = Matrix3::from_columns(&[r.column(0).into(), r.column(1).into(), t]);
+        Homography(self.intrinsics() * plane)
+    }
+
+    /// The same view taken at another picture size: what the camera becomes when its picture is resized.
+    pub fn resized(&self, image: [u32; 2]) -> Self {
+        let k = Vector2::new(
+            f64::from(image[0]) / f64::from(self.image[0]),
+            f64::from(image[1]) / f64::from(self.image[1]),
+        );
+        Self {
+            image,
+            focal_px: self.focal_px.component_mul(&k),
+            principal_px: self.principal_px.coords.component_mul(&k).into(),
+            ..*self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Plane, UnitQuaternion};
+
+    fn looking_down() -> Camera {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let tilt = UnitQuaternion::from_euler_angles(0.2, -0.1, 0.7);
+        Camera {
+            image: [640, 480],
+            focal_px: Vector2::new(700.0, 710.0),
+            principal_px: Point2::new(320.0, 236.0),
+            camera_from_world: Pose::from_parts(Vector3::new(0.02, -0.03, 1.1).into(), tilt * down),
+        }
+    }
+
+    #[test]
+    fn a_pixel_s_ray_projects_back_to_it() {
+        let cam = looking_down();
+        let px = Point2::new(123.4, 321.0);
+        let (back, depth) = cam.project(cam.ray(px).at(0.8)).expect("in front");
+        assert!((back - px).norm() < 1e-10 && (depth - 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_homography_agrees_with_projection() {
+        let cam = looking_down();
+        let (px, _) = cam.project(Point3::new(0.2, -0.1, 0.0)).expect("in front");
+        assert!((cam.pixel_from_surface().map(Point2::new(0.2, -0.1)) - px).norm() < 1e-10);
+    }
+
+    #[test]
+    fn resizing_keeps_the_view() {
+        let (cam, p) = (looking_down(), Point3::new(0.1, 0.05, 0.02));
+        let half = cam.resized([320, 240]);
+        let (a, b) = (cam.project(p).expect("in front").0, half.project(p).expect("in front").0);
+        assert!((a / 2.0 - b).norm() < 1e-10);
+    }
+
+    #[test]
+    fn tilt_is_measured_from_straight_down() {
+        let cam = looking_down();
+        let ray = cam.ray(cam.principal_px);
+        assert!(Plane::surface().intersect(&ray).is_some());
+        let cos = ray.direction.normalize().dot(&-Vector3::z());
+        assert!((cam.tilt() - cos.acos()).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,1 @@
+//! Colour: transfer curves, primaries, hue and saturation, exactly.

@@ -1,0 +1,1 @@
+//! Composite: deep samples over a shadowed plate.

@@ -1,0 +1,1 @@
+//! Dataset: images and labels in the layouts that trainers read.

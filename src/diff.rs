@@ -1,0 +1,1 @@
+//! Comparing two pictures the way `idiff` does.

@@ -1,0 +1,150 @@
+//! Geometry, and every axis and pixel convention of the project, stated once.
+//!
+//! * **Lengths** are metres, angles radians, everything `f64`.
+//! * **World**: right-handed, `+z` up. The labelled rectangle is the plane `z = 0`, centred on the origin, `+x` along its
+//!   width, `+y` towards the top of the picture that it was labelled in.
+//! * **Camera**: x right, y down, z forward (OpenCV).
+//! * **Pixels**: origin at the top-left *corner* of the top-left pixel, x right, y down; pixel `(i, j)` has its centre at
+//!   `(i + 0.5, j + 0.5)`, the picture covers `[0, width] x [0, height]`.
+//! * **Card**: the plane `z = 0` of its own frame, centred, `+x` along the texture's columns, texture row 0 at `+y`.
+//!   Texture coordinates `u, v` run from 0 to 1, right and *down*.
+//! * **Names**: a transform is called `target_from_source`, so that `camera_from_world * world_from_card` reads and cancels.
+
+pub use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
+
+/// A rigid placement: rotation, then translation in metres. Names say which frames it joins (`world_from_card`).
+///
+/// In files: `{ rotation = [i, j, k, w], translation = [x, y, z] }` with a unit quaternion.
+pub type Pose = nalgebra::Isometry3<f64>;
+
+/// A half line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Point3<f64>,
+    /// Where it goes; its length sets the unit of the ray parameter.
+    pub direction: Vector3<f64>,
+}
+
+impl Ray {
+    /// The point at parameter `t`.
+    pub fn at(&self, t: f64) -> Point3<f64> {
+        self.origin + self.direction * t
+    }
+}
+
+/// A plane: the points `p` with `normal . p = offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Unit normal.
+    pub normal: Vector3<f64>,
+    /// Signed distance from the origin along the normal.
+    pub offset: f64,
+}
+
+impl Plane {
+    /// The labelled surface, `z = 0`.
+    pub fn surface() -> Self {
+        Self { normal: Vector3::z(), offset: 0.0 }
+    }
+
+    /// Ray parameter where `ray` meets the plane in front of its origin; none for a parallel ray or a plane behind.
+    pub fn intersect(&self, ray: &Ray) -> Option<f64> {
+        let slope = self.normal.dot(&ray.direction);
+        let t = (self.offset - self.normal.dot(&ray.origin.coords)) / slope;
+        (t.is_finite() && t > 0.0).then_some(t)
+    }
+}
+
+/// A rectangle in space: the shape of a card.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quad {
+    /// Where it lies; the rectangle is the plane `z = 0` of this frame, centred.
+    pub world_from_card: Pose,
+    /// Width and height, metres.
+    pub size: [f64; 2],
+}
+
+impl Quad {
+    /// The corners in the order of the texture's: top left, top right, bottom right, bottom left.
+    pub fn corners(&self) -> [Point3<f64>; 4] {
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[u, v]| self.point(u, v))
+    }
+
+    /// The point at texture coordinates `u` (right) and `v` (down), 0 to 1.
+    pub fn point(&self, u: f64, v: f64) -> Point3<f64> {
+        self.world_from_card * Point3::new((u - 0.5) * self.size[0], (0.5 - v) * self.size[1], 0.0)
+    }
+
+    /// The plane it lies in, normal along the card's `+z`.
+    pub fn plane(&self) -> Plane {
+        let normal = self.world_from_card.rotation * Vector3::z();
+        Plane { normal, offset: normal.dot(&self.world_from_card.translation.vector) }
+    }
+
+    /// Ray parameter and texture coordinates of the hit; none where the ray misses.
+    pub fn intersect(&self, ray: &Ray) -> Option<(f64, Point2<f64>)> {
+        let t = self.plane().intersect(ray)?;
+        let local = self.world_from_card.inverse_transform_point(&ray.at(t));
+        let uv = Point2::new(local.x / self.size[0] + 0.5, 0.5 - local.y / self.size[1]);
+        let inside = (0.0..=1.0).contains(&uv.x) && (0.0..=1.0).contains(&uv.y);
+        inside.then_some((t, uv))
+    }
+}
+
+/// A projective map from one plane to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Homography(pub nalgebra::Matrix3<f64>);
+
+impl Homography {
+    /// The image of a point; not finite where it goes to infinity.
+    pub fn map(&self, p: Point2<f64>) -> Point2<f64> {
+        let q = self.0 * p.to_homogeneous();
+        Point2::new(q.x / q.z, q.y / q.z)
+    }
+
+    /// The way back; none for a map that squeezes the plane into a line.
+    pub fn inverse(&self) -> Option<Self> {
+        self.0.try_inverse().map(Self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tilted() -> Quad {
+        let rotation = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1);
+        Quad { world_from_card: Pose::from_parts(Vector3::new(0.1, 0.2, 0.3).into(), rotation), size: [0.25, 0.1] }
+    }
+
+    #[test]
+    fn texture_row_zero_is_at_plus_y() {
+        let quad = Quad { world_from_card: Pose::identity(), size: [2.0, 4.0] };
+        assert_eq!(quad.corners()[0], Point3::new(-1.0, 2.0, 0.0));
+        assert_eq!(quad.corners()[2], Point3::new(1.0, -2.0, 0.0));
+    }
+
+    #[test]
+    fn a_ray_aimed_at_a_texture_coordinate_hits_it() {
+        let quad = tilted();
+        let eye = Point3::new(-0.4, 0.1, 2.0);
+        let ray = Ray { origin: eye, direction: quad.point(0.3, 0.8) - eye };
+        let (t, uv) = quad.intersect(&ray).expect("aimed at the inside");
+        assert!((t - 1.0).abs() < 1e-12 && (uv - Point2::new(0.3, 0.8)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_parallel_ray_misses() {
+        let ray = Ray { origin: Point3::new(0.0, 0.0, 1.0), direction: Vector3::x() };
+        assert_eq!(Plane::surface().intersect(&ray), None);
+    }
+
+    #[test]
+    fn a_homography_and_its_inverse_cancel() {
+        let h = Homography(nalgebra::Matrix3::new(1.0, 0.2, 3.0, -0.1, 0.9, 5.0, 1e-3, 2e-3, 1.0));
+        let p = Point2::new(7.0, -2.0);
+        let back = h.inverse().expect("regular").map(h.map(p));
+        assert!((back - p).norm() < 1e-12);
+    }
+}

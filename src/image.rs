@@ -1,0 +1,252 @@
+//! A rectangle of pixels of one kind.
+//!
+//! Row 0 is the top row, pixel `(x, y)` covers `[x, x+1) x [y, y+1)` and has its centre at `+0.5`. Pixels lie row by
+//! row in one allocation without padding; work goes over whole rows so that the compiler can vectorise it.
+
+use rayon::prelude::*;
+
+/// A rectangle of pixels `P`, row by row from the top.
+#[derive(Clone, PartialEq, Default)]
+pub struct Image<P> {
+    width: usize,
+    height: usize,
+    pixels: Vec<P>,
+}
+
+/// A region of interest: a half-open rectangle of whole pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Roi {
+    /// First column.
+    pub x: usize,
+    /// First row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
+
+impl Roi {
+    /// The rectangle from the columns and rows it spans, both half open; empty where they are reversed.
+    pub fn spanning(xs: std::ops::Range<usize>, ys: std::ops::Range<usize>) -> Self {
+        Self { x: xs.start, y: ys.start, width: xs.len(), height: ys.len() }
+    }
+
+    /// Grown by `by` pixels on every side, kept inside a picture of `width` x `height`.
+    pub fn grown(self, by: usize, width: usize, height: usize) -> Self {
+        let x0 = self.x.saturating_sub(by);
+        let y0 = self.y.saturating_sub(by);
+        let x1 = (self.x + self.width + by).min(width);
+        let y1 = (self.y + self.height + by).min(height);
+        Self::spanning(x0..x1, y0..y1)
+    }
+
+    /// Number of pixels.
+    pub fn area(self) -> usize {
+        self.width * self.height
+    }
+}
+
+impl<P: Copy + Default> Image<P> {
+    /// An image of default pixels (black, transparent, nothing).
+    ///
+    /// # Panics
+    /// When `width * height` does not fit in memory arithmetic.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self::filled(width, height, P::default())
+    }
+}
+
+impl<P: Copy> Image<P> {
+    /// An image of one value.
+    pub fn filled(width: usize, height: usize, pixel: P) -> Self {
+        let len = width.checked_mul(height).expect("image area overflows");
+        Self { width, height, pixels: vec![pixel; len] }
+    }
+
+    /// An image over pixels that are already in memory, row by row.
+    ///
+    /// # Panics
+    /// When `pixels.len() != width * height`.
+    pub fn from_vec(width: usize, height: usize, pixels: Vec<P>) -> Self {
+        assert_eq!(pixels.len(), width * height, "pixel count does not match {width} x {height}");
+        Self { width, height, pixels }
+    }
+
+    /// An image computed pixel by pixel from `(x, y)`, rows in parallel.
+    pub fn from_fn(width: usize, height: usize, f: impl Fn(usize, usize) -> P + Sync) -> Self
+    where
+        P: Send + Sync,
+    {
+        let pixels = (0..width * height).into_par_iter().with_min_len(width.max(1)).map(|i| f(i % width, i / width));
+        Self { width, height, pixels: pixels.collect() }
+    }
+
+    /// Number of columns.
+    #[inline(always)]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of rows.
+    #[inline(always)]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// `(width, height)`.
+    #[inline(always)]
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// There is no pixel.
+    pub fn is_empty(&self) -> bool {
+        self.pixels.is_empty()
+    }
+
+    /// All pixels, row by row.
+    #[inline(always)]
+    pub fn pixels(&self) -> &[P] {
+        &self.pixels
+    }
+
+    /// All pixels, row by row, to change.
+    #[inline(always)]
+    pub fn pixels_mut(&mut self) -> &mut [P] {
+        &mut self.pixels
+    }
+
+    /// The pixels without the picture.
+    pub fn into_vec(self) -> Vec<P> {
+        self.pixels
+    }
+
+    /// One row.
+    ///
+    /// # Panics
+    /// When `y >= height`.
+    #[inline(always)]
+    pub fn row(&self, y: usize) -> &[P] {
+        &self.pixels[y * self.width..][..self.width]
+    }
+
+    /// One row, to change.
+    ///
+    /// # Panics
+    /// When `y >= height`.
+    #[inline(always)]
+    pub fn row_mut(&mut self, y: usize) -> &mut [P] {
+        &mut self.pixels[y * self.width..][..self.width]
+    }
+
+    /// The rows from the top.
+    pub fn rows(&self) -> impl DoubleEndedIterator<Item = &[P]> + ExactSizeIterator {
+        self.pixels.chunks_exact(self.width.max(1))
+    }
+
+    /// The rows from the top, to change, in parallel.
+    pub fn par_rows_mut(&mut self) -> impl IndexedParallelIterator<Item = &mut [P]>
+    where
+        P: Send,
+    {
+        self.pixels.par_chunks_exact_mut(self.width.max(1))
+    }
+
+    /// A picture of the same size, pixel by pixel, rows in parallel.
+    pub fn map<Q: Copy + Send>(&self, f: impl Fn(P) -> Q + Sync) -> Image<Q>
+    where
+        P: Sync,
+    {
+        let pixels = self.pixels.par_iter().with_min_len(self.width.max(1)).map(|&p| f(p)).collect();
+        Image { width: self.width, height: self.height, pixels }
+    }
+
+    /// A picture of the same size from two, pixel by pixel, rows in parallel.
+    ///
+    /// # Panics
+    /// When the sizes differ.
+    pub fn zip_map<Q: Copy + Sync, R: Copy + Send>(&self, other: &Image<Q>, f: impl Fn(P, Q) -> R + Sync) -> Image<R>
+    where
+        P: Sync,
+    {
+        assert_eq!(self.size(), other.size(), "images of different size");
+        let pairs = self.pixels.par_iter().with_min_len(self.width.max(1)).zip(other.pixels.par_iter());
+        Image { width: self.width, height: self.height, pixels: pairs.map(|(&p, &q)| f(p, q)).collect() }
+    }
+
+    /// A copy of a part.
+    ///
+    /// # Panics
+    /// When `roi` reaches outside the picture.
+    pub fn crop(&self, roi: Roi) -> Self {
+        let mut pixels = Vec::with_capacity(roi.area());
+        for y in roi.y..roi.y + roi.height {
+            pixels.extend_from_slice(&self.row(y)[roi.x..roi.x + roi.width]);
+        }
+        Self { width: roi.width, height: roi.height, pixels }
+    }
+
+    /// The nearest pixel inside the picture.
+    ///
+    /// # Panics
+    /// When the picture is empty.
+    #[inline(always)]
+    pub fn nearest(&self, x: isize, y: isize) -> P {
+        let x = x.clamp(0, self.width as isize - 1) as usize;
+        let y = y.clamp(0, self.height as isize - 1) as usize;
+        self[(x, y)]
+    }
+}
+
+impl<P> std::ops::Index<(usize, usize)> for Image<P> {
+    type Output = P;
+    #[inline(always)]
+    fn index(&self, (x, y): (usize, usize)) -> &P {
+        debug_assert!(x < self.width);
+        &self.pixels[y * self.width + x]
+    }
+}
+
+impl<P> std::ops::IndexMut<(usize, usize)> for Image<P> {
+    #[inline(always)]
+    fn index_mut(&mut self, (x, y): (usize, usize)) -> &mut P {
+        debug_assert!(x < self.width);
+        &mut self.pixels[y * self.width + x]
+    }
+}
+
+impl<P> std::fmt::Debug for Image<P> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Image<{}>({} x {})", std::any::type_name::<P>(), self.width, self.height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_lie_from_the_top() {
+        let img = Image::from_fn(3, 2, |x, y| 10 * y + x);
+        assert_eq!(img.rows().collect::<Vec<_>>(), [&[0, 1, 2][..], &[10, 11, 12]]);
+    }
+
+    #[test]
+    fn crop_takes_the_named_pixels() {
+        let img = Image::from_fn(4, 4, |x, y| 10 * y + x);
+        assert_eq!(img.crop(Roi { x: 1, y: 2, width: 2, height: 2 }).pixels(), [21, 22, 31, 32]);
+    }
+
+    #[test]
+    fn an_empty_image_has_no_rows() {
+        assert_eq!(Image::<u8>::new(0, 5).rows().count(), 0);
+        assert_eq!(Image::<u8>::new(5, 0).rows().count(), 0);
+    }
+
+    #[test]
+    fn a_region_grows_only_inside() {
+        let roi = Roi { x: 1, y: 5, width: 3, height: 3 };
+        assert_eq!(roi.grown(2, 10, 9), Roi { x: 0, y: 3, width: 6, height: 6 });
+    }
+}

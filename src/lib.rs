@@ -1,0 +1,27 @@
+#![doc = include_str!("../README.md")]
+
+pub mod asset;
+pub mod camera;
+pub mod color;
+pub mod composite;
+pub mod dataset;
+pub mod diff;
+mod error;
+pub mod filter;
+pub mod geom;
+mod image;
+pub mod io;
+pub mod label;
+pub mod light;
+pub mod matte;
+mod pixel;
+pub mod render;
+pub mod scene;
+#[cfg(feature = "settle")]
+pub mod settle;
+
+pub use camera::Camera;
+pub use error::{Error, Result};
+pub use image::{Image, Roi};
+pub use pixel::{Coverage, Depth, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba};
+pub use scene::{Scene, Shot};

@@ -1,0 +1,1 @@
+//! Matte: a photo on a screen becomes a cut-out.

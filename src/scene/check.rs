@@ -1,0 +1,1 @@
+//! Is a scene possible? Asked once, before any work.

@@ -1,0 +1,63 @@
+//! Lights and exposure as a scene tells them.
+
+use crate::pixel::LinearRgb;
+use serde::{Deserialize, Serialize};
+
+/// A flat light that emits from one side with the same radiance everywhere, `power * color / (pi * area)`.
+///
+/// Its size is its softness: an occluder at height `z` under a light at distance `D` and of size `s` has a penumbra of
+/// about `z s / (D - z)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AreaLight {
+    /// Outline. Default: `rectangle`.
+    #[serde(default)]
+    pub shape: LightShape,
+    /// Centre, metres.
+    pub position: [f64; 3],
+    /// The point its face is turned to. Default: the origin.
+    #[serde(default)]
+    pub target: [f64; 3],
+    /// Side lengths (diameters of an ellipse), metres.
+    pub size: [f64; 2],
+    /// Power, watts.
+    pub power: f64,
+    /// Colour, scene-linear. Default: white.
+    #[serde(default = "white")]
+    pub color: LinearRgb,
+}
+
+/// Outline of an area light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LightShape {
+    /// A rectangle (or square).
+    #[default]
+    Rectangle,
+    /// An ellipse (or disk).
+    Ellipse,
+}
+
+/// Factor from rendered radiance to plate values.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Exposure {
+    /// `2^ev`.
+    Ev(f64),
+    /// Found by the `light` stage: a matte white card on the surface becomes as bright as the plate's own white, times
+    /// `2^gain_ev`.
+    MatchPlate {
+        /// Brighter (positive) or darker than the match.
+        gain_ev: f64,
+    },
+}
+
+impl Default for Exposure {
+    fn default() -> Self {
+        Self::Ev(0.0)
+    }
+}
+
+fn white() -> LinearRgb {
+    LinearRgb::WHITE
+}

@@ -1,0 +1,72 @@
+//! Scene: everything an author says of one picture, unknowns included.
+//!
+//! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and enter the pipeline
+//! here. What is not known yet is an enum variant ([`CameraSource::Rectangle`], [`Placement::Drop`],
+//! [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each turn their own unknown into the known one
+//! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns.
+
+mod check;
+mod light;
+mod placement;
+mod shot;
+
+pub use light::{AreaLight, Exposure, LightShape};
+pub use placement::{Grade, Object, Placement};
+pub use shot::{Card, Shot};
+
+use crate::camera::Camera;
+use crate::pixel::LinearRgb;
+use serde::{Deserialize, Serialize};
+
+/// One picture to make: what is in it, where, seen by which camera, under which light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Width and height of the picture, pixels.
+    pub image: [u32; 2],
+    /// Name of the background photo; empty for a transparent background.
+    #[serde(default)]
+    pub plate: String,
+    /// The camera, or what it can be found from.
+    pub camera: CameraSource,
+    /// The surface `z = 0` that objects lie on.
+    pub surface: Surface,
+    /// Objects; the first has id 1.
+    #[serde(default)]
+    pub objects: Vec<Object>,
+    /// Area lights; none is a scene without shadows.
+    #[serde(default)]
+    pub lights: Vec<AreaLight>,
+    /// Radiance of a constant environment, scene-linear.
+    #[serde(default)]
+    pub ambient: LinearRgb,
+    /// How bright rendered light is on the plate.
+    #[serde(default)]
+    pub exposure: Exposure,
+}
+
+/// A labelled rectangle of known size: the plane `z = 0`, centred on the world's origin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Surface {
+    /// Width (along x) and height (along y), metres.
+    pub size: [f64; 2],
+}
+
+/// The camera, or the labelled rectangle it can be solved from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum CameraSource {
+    /// A camera that is known.
+    Known(Camera),
+    /// Corners of the scene's surface in a photo.
+    Rectangle {
+        /// Top left, top right, bottom right, bottom left; pixels of the photo.
+        corners_px: [[f64; 2]; 4],
+        /// Width and height of the photo, pixels.
+        photo: [u32; 2],
+        /// Focal length in pixels of the photo, where it is known from elsewhere.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        focal_px: Option<f64>,
+    },
+}

@@ -1,0 +1,61 @@
+//! Objects and where they are.
+
+use crate::geom::{Pose, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+/// One occurrence of an asset in a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Object {
+    /// Name of the asset.
+    pub asset: String,
+    /// Which of the asset's photos, from 0.
+    #[serde(default)]
+    pub photo: usize,
+    /// Width and height of the card, metres.
+    pub size: [f64; 2],
+    /// Thickness of the body that falls, metres.
+    pub thickness: f64,
+    /// Mass, kilograms.
+    pub mass: f64,
+    /// Where the card is, or from where it falls.
+    pub placement: Placement,
+    /// Change of its colours.
+    #[serde(default)]
+    pub grade: Grade,
+}
+
+/// Where an object is, or how it gets there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Placement {
+    /// At rest at this pose (`world_from_card`).
+    At(Pose),
+    /// Falls from here under gravity.
+    Drop {
+        /// Point of the surface it starts above, metres.
+        above: [f64; 2],
+        /// Height of its centre over the surface, metres.
+        height: f64,
+        /// Its orientation at the start.
+        rotation: UnitQuaternion<f64>,
+    },
+}
+
+/// A change of colour in hue, saturation and value of the linear colour; the default changes nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Grade {
+    /// Hue turned by this many degrees. Default: 0.
+    pub hue_deg: f32,
+    /// Saturation times this, then clamped to 0..1. Default: 1.
+    pub saturation: f32,
+    /// Value times this. Default: 1.
+    pub value: f32,
+}
+
+impl Default for Grade {
+    fn default() -> Self {
+        Self { hue_deg: 0.0, saturation: 1.0, value: 1.0 }
+    }
+}

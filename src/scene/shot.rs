@@ -1,0 +1,92 @@
+//! A scene with nothing left to find out: what the renderer takes.
+
+use crate::camera::Camera;
+use crate::filter::Pyramid;
+use crate::geom::{Point2, Quad};
+use crate::image::Image;
+use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+use crate::scene::{AreaLight, Grade};
+use std::sync::Arc;
+
+/// Everything a picture is made of, in memory and known.
+///
+/// A generator that does not want files may build one in code:
+/// `Shot::new(camera).with_plate(plate).with_card(card).with_light(light)`.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// The camera; its `image` is the size of the picture.
+    pub camera: Camera,
+    /// Background, of the picture's size; none is transparent.
+    pub plate: Option<Arc<Image<LinearRgb>>>,
+    /// Width and height of the part of `z = 0` that receives shadows, metres, centred.
+    pub catcher: [f64; 2],
+    /// Cards, in any order.
+    pub cards: Vec<Card>,
+    /// Area lights.
+    pub lights: Vec<AreaLight>,
+    /// Radiance of a constant environment.
+    pub ambient: LinearRgb,
+    /// Factor from rendered radiance to plate values.
+    pub exposure: f32,
+}
+
+/// A flat, textured, see-through object in space.
+#[derive(Clone, Debug)]
+pub struct Card {
+    /// Its name in labels; not 0.
+    pub id: ObjectId,
+    /// Index into the class list.
+    pub class: u32,
+    /// Where it lies and how large it is.
+    pub quad: Quad,
+    /// The cut-out, premultiplied, scene-linear.
+    pub texture: Arc<Pyramid<PremulRgba>>,
+    /// Its outline in texture coordinates (0 to 1, right and down), in order.
+    pub outline_uv: Arc<[Point2<f64>]>,
+    /// Change of its colours.
+    pub grade: Grade,
+}
+
+impl Shot {
+    /// An empty shot: no plate, no card, no light, black ambient.
+    pub fn new(camera: Camera) -> Self {
+        Self {
+            camera,
+            plate: None,
+            catcher: [f64::INFINITY; 2],
+            cards: Vec::new(),
+            lights: Vec::new(),
+            ambient: LinearRgb::BLACK,
+            exposure: 1.0,
+        }
+    }
+
+    /// With a background.
+    ///
+    /// # Panics
+    /// When its size is not the camera's.
+    pub fn with_plate(mut self, plate: Arc<Image<LinearRgb>>) -> Self {
+        let size = (self.camera.image[0] as usize, self.camera.image[1] as usize);
+        assert_eq!(plate.size(), size, "plate and camera differ in size");
+        self.plate = Some(plate);
+        self
+    }
+
+    /// With one more card.
+    pub fn with_card(mut self, card: Card) -> Self {
+        self.cards.push(card);
+        self
+    }
+
+    /// With one more light.
+    pub fn with_light(mut self, light: AreaLight) -> Self {
+        self.lights.push(light);
+        self
+    }
+
+    /// With a constant environment of this radiance.
+    pub fn with_ambient(mut self, ambient: LinearRgb) -> Self {
+        self.ambient = ambient;
+        self
+    }
+}

@@ -1,0 +1,1 @@
+//! Settle: dropped objects come to rest.

@@ -1,0 +1,26 @@
+//! Golden cases: every folder `golden/<stage>/<case>/` with a `case.toml` is one named test.
+
+mod case;
+
+use case::Case;
+use libtest_mimic::{Arguments, Trial};
+use std::path::Path;
+
+/// A stage's way to run one of its cases.
+type Run = fn(&Case) -> Result<(), String>;
+
+/// The stages that have golden cases: folder name and runner.
+const STAGES: &[(&str, Run)] = &[];
+
+fn main() {
+    let args = Arguments::from_args();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden");
+    let trials = STAGES.iter().flat_map(|&(stage, run)| {
+        let cases = Case::all(&root.join(stage));
+        cases.into_iter().map(move |case| {
+            let name = format!("{stage}/{}", case.name);
+            Trial::test(name, move || run(&case).map_err(Into::into))
+        })
+    });
+    libtest_mimic::run(&args, trials.collect()).exit();
+}
