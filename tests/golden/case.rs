@@ -3,18 +3,18 @@
 use std::path::{Path, PathBuf};
 
 /// A folder with a `case.toml`, its inputs and its references.
-pub struct Case {
+pub(crate) struct Case {
     /// The folder's name.
-    pub name: String,
+    pub(crate) name: String,
     /// The folder.
-    pub dir: PathBuf,
+    pub(crate) dir: PathBuf,
     /// What `case.toml` says.
-    pub table: toml::Table,
+    pub(crate) table: toml::Table,
 }
 
 impl Case {
     /// The cases of a stage, in order of name; none where the folder does not exist.
-    pub fn all(stage: &Path) -> Vec<Self> {
+    pub(crate) fn all(stage: &Path) -> Vec<Self> {
         let Ok(entries) = std::fs::read_dir(stage) else { return Vec::new() };
         let mut dirs: Vec<_> = entries.flatten().map(|e| e.path()).filter(|p| p.join("case.toml").exists()).collect();
         dirs.sort();
