@@ -1,1 +1,5 @@
 //! Matte: a photo on a screen becomes a cut-out.
+
+mod segment;
+
+pub use segment::{SegmentOptions, Segmentation, Step, Threshold, segment};
