@@ -15,7 +15,6 @@
 //! not at all.
 
 mod atomic;
-mod curve;
 mod document;
 mod exif;
 pub mod exr;

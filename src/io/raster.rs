@@ -3,8 +3,8 @@
 //! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples are scene-linear, unless
 //! the file says otherwise. A matte or a depth is never display-encoded.
 
-use super::curve::{DECODE_8, DECODE_16, srgb_to_linear};
-use crate::{Coverage, Depth, Image, LinearRgb, PremulRgba, StraightRgba};
+use crate::color::{decode_srgb8, decode_srgb16, srgb_to_linear};
+use crate::{Coverage, Depth, Image, LinearRgb, PremulRgba, Srgb8, StraightRgba};
 use rayon::prelude::*;
 
 /// Samples of a picture, channels interleaved, rows from the top.
@@ -207,12 +207,9 @@ impl Raster {
         let [r, g, b] = [picked[0], picked[1], picked[2]];
         let alpha = picked.get(3).copied();
         Ok(match &self.samples {
-            Samples::U8(v) => self.decoded(v, [r, g, b], alpha, 255.0, |code| DECODE_8[usize::from(code)]),
-            Samples::U16(v) => {
-                let table = &*DECODE_16;
-                self.decoded(v, [r, g, b], alpha, 65_535.0, |code| table[usize::from(code)])
-            }
-            Samples::F32(v) => self.decoded(v, [r, g, b], alpha, 1.0, |x| srgb_to_linear(f64::from(x)) as f32),
+            Samples::U8(v) => self.decoded(v, [r, g, b], alpha, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into()),
+            Samples::U16(v) => self.decoded(v, [r, g, b], alpha, 65_535.0, |codes| codes.map(decode_srgb16)),
+            Samples::F32(v) => self.decoded(v, [r, g, b], alpha, 1.0, |values| values.map(srgb_to_linear)),
         })
     }
 
@@ -223,12 +220,12 @@ impl Raster {
         [r, g, b]: [usize; 3],
         alpha: Option<usize>,
         full: f32,
-        decode: impl Fn(T) -> f32 + Sync,
+        decode: impl Fn([T; 3]) -> [f32; 3] + Sync,
     ) -> Image<P> {
         let a = |px: &[T]| alpha.map_or(1.0, |i| px[i].into() / full);
         let plain = |px: &[T]| [r, g, b].map(|i| px[i].into() / full);
         match (self.display_encoded, self.premultiplied && alpha.is_some()) {
-            (true, false) => self.each(samples, |px| P::straight([r, g, b].map(|i| decode(px[i])), a(px))),
+            (true, false) => self.each(samples, |px| P::straight(decode([px[r], px[g], px[b]]), a(px))),
             (false, false) => self.each(samples, |px| P::straight(plain(px), a(px))),
             (false, true) => self.each(samples, |px| P::premultiplied(plain(px), a(px))),
             (true, true) => self.each(samples, |px| P::straight(unassociated(plain(px), a(px)), a(px))),
@@ -258,7 +255,7 @@ impl Raster {
 /// Linear straight colour from display codes that somebody multiplied by alpha as they were.
 fn unassociated(encoded: [f32; 3], alpha: f32) -> [f32; 3] {
     let k = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
-    encoded.map(|v| srgb_to_linear(f64::from((v * k).min(1.0))) as f32)
+    encoded.map(|v| srgb_to_linear((v * k).min(1.0)))
 }
 
 /// Names of the channels of a picture of `count` channels without names of its own.
@@ -293,7 +290,7 @@ mod tests {
     fn premultiplied_display_codes_are_divided_before_they_are_decoded() {
         let grey = raster(Samples::U8(vec![64, 64, 64, 128]), "R G B A", true, true);
         let p = PremulRgba::from_raster(&Opaque(&grey)).unwrap()[(0, 0)];
-        let expected = srgb_to_linear(0.5) as f32 * 128.0 / 255.0;
+        let expected = srgb_to_linear(0.5) * 128.0 / 255.0;
         assert!((p.r - expected).abs() < 1e-6, "{p:?}");
     }
 

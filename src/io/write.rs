@@ -1,8 +1,8 @@
 //! Typed pictures to files: the format by the extension, the encoding by the pixel type.
 
 use super::atomic::write_bytes;
-use super::curve::{code8, code16, linear_to_srgb};
 use super::{Format, exr, jpeg, png, tiff};
+use crate::color::{decode_srgb8, encode_srgb8, encode_srgb16};
 use crate::{Coverage, Depth, Error, Image, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba};
 use rayon::prelude::*;
 use std::path::Path;
@@ -72,26 +72,37 @@ pub trait ToFile: Copy + Send + Sync {
     /// It means something in integers of 0 to 1.
     #[doc(hidden)]
     const CODED: bool = true;
-    /// Display-encoded straight channels of 0 to 1 (a matte: as it is); as many as there are names count.
+    /// Display-encoded straight 8-bit codes (a matte: as it is); as many as there are names count.
     #[doc(hidden)]
-    fn display(self) -> [f32; 4];
+    fn codes8(self) -> [u8; 4];
+    /// The same in 16 bits.
+    #[doc(hidden)]
+    fn codes16(self) -> [u16; 4];
     /// Scene-linear channels, colours multiplied by alpha.
     #[doc(hidden)]
     fn linear(self) -> [f32; 4];
-    /// 8-bit codes.
-    #[doc(hidden)]
-    fn codes(self) -> [u8; 4] {
-        self.display().map(code8)
-    }
 }
 
 const COLOR: &[&str] = &["R", "G", "B"];
 const COLOR_ALPHA: &[&str] = &["R", "G", "B", "A"];
 
+/// The 8-bit code of 0 to 1 as it is; what is outside is clipped, NaN is 0.
+fn plain8(v: f32) -> u8 {
+    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+/// The 16-bit code of 0 to 1 as it is; what is outside is clipped, NaN is 0.
+fn plain16(v: f32) -> u16 {
+    (v.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16
+}
+
 impl ToFile for LinearRgb {
     const NAMES: &'static [&'static str] = COLOR;
-    fn display(self) -> [f32; 4] {
-        [linear_to_srgb(self.r), linear_to_srgb(self.g), linear_to_srgb(self.b), 1.0]
+    fn codes8(self) -> [u8; 4] {
+        encode_srgb8(self).codes8()
+    }
+    fn codes16(self) -> [u16; 4] {
+        [encode_srgb16(self.r), encode_srgb16(self.g), encode_srgb16(self.b), u16::MAX]
     }
     fn linear(self) -> [f32; 4] {
         [self.r, self.g, self.b, 1.0]
@@ -100,8 +111,13 @@ impl ToFile for LinearRgb {
 
 impl ToFile for StraightRgba {
     const NAMES: &'static [&'static str] = COLOR_ALPHA;
-    fn display(self) -> [f32; 4] {
-        [linear_to_srgb(self.r), linear_to_srgb(self.g), linear_to_srgb(self.b), self.a]
+    fn codes8(self) -> [u8; 4] {
+        let [r, g, b, _] = LinearRgb::new(self.r, self.g, self.b).codes8();
+        [r, g, b, plain8(self.a)]
+    }
+    fn codes16(self) -> [u16; 4] {
+        let [r, g, b, _] = LinearRgb::new(self.r, self.g, self.b).codes16();
+        [r, g, b, plain16(self.a)]
     }
     fn linear(self) -> [f32; 4] {
         self.to_premul().linear()
@@ -110,8 +126,11 @@ impl ToFile for StraightRgba {
 
 impl ToFile for PremulRgba {
     const NAMES: &'static [&'static str] = COLOR_ALPHA;
-    fn display(self) -> [f32; 4] {
-        self.to_straight().display()
+    fn codes8(self) -> [u8; 4] {
+        self.to_straight().codes8()
+    }
+    fn codes16(self) -> [u16; 4] {
+        self.to_straight().codes16()
     }
     fn linear(self) -> [f32; 4] {
         [self.r, self.g, self.b, self.a]
@@ -120,8 +139,11 @@ impl ToFile for PremulRgba {
 
 impl ToFile for Coverage {
     const NAMES: &'static [&'static str] = &["Y"];
-    fn display(self) -> [f32; 4] {
-        [self.0; 4]
+    fn codes8(self) -> [u8; 4] {
+        [plain8(self.0); 4]
+    }
+    fn codes16(self) -> [u16; 4] {
+        [plain16(self.0); 4]
     }
     fn linear(self) -> [f32; 4] {
         [self.0; 4]
@@ -131,8 +153,11 @@ impl ToFile for Coverage {
 impl ToFile for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
     const CODED: bool = false;
-    fn display(self) -> [f32; 4] {
-        [self.0; 4]
+    fn codes8(self) -> [u8; 4] {
+        [plain8(self.0); 4]
+    }
+    fn codes16(self) -> [u16; 4] {
+        [plain16(self.0); 4]
     }
     fn linear(self) -> [f32; 4] {
         [self.0; 4]
@@ -141,29 +166,28 @@ impl ToFile for Depth {
 
 impl ToFile for Srgb8 {
     const NAMES: &'static [&'static str] = COLOR;
-    fn display(self) -> [f32; 4] {
-        self.codes().map(|code| f32::from(code) / 255.0)
+    fn codes8(self) -> [u8; 4] {
+        [self.r, self.g, self.b, u8::MAX]
+    }
+    fn codes16(self) -> [u16; 4] {
+        self.codes8().map(|code| u16::from(code) * 257)
     }
     fn linear(self) -> [f32; 4] {
-        let [r, g, b, _] = self.codes().map(|code| super::curve::DECODE_8[usize::from(code)]);
-        [r, g, b, 1.0]
-    }
-    fn codes(self) -> [u8; 4] {
-        [self.r, self.g, self.b, 255]
+        decode_srgb8(self).linear()
     }
 }
 
 impl ToFile for Srgba8 {
     const NAMES: &'static [&'static str] = COLOR_ALPHA;
-    fn display(self) -> [f32; 4] {
-        self.codes().map(|code| f32::from(code) / 255.0)
+    fn codes8(self) -> [u8; 4] {
+        [self.r, self.g, self.b, self.a]
+    }
+    fn codes16(self) -> [u16; 4] {
+        self.codes8().map(|code| u16::from(code) * 257)
     }
     fn linear(self) -> [f32; 4] {
-        let [r, g, b, _] = self.codes().map(|code| super::curve::DECODE_8[usize::from(code)]);
+        let LinearRgb { r, g, b } = decode_srgb8(Srgb8 { r: self.r, g: self.g, b: self.b });
         StraightRgba { r, g, b, a: f32::from(self.a) / 255.0 }.linear()
-    }
-    fn codes(self) -> [u8; 4] {
-        [self.r, self.g, self.b, self.a]
     }
 }
 
@@ -195,8 +219,8 @@ fn flat<P: ToFile, T: Copy + Default + Send>(image: &Image<P>, f: impl Fn(P) -> 
 fn coded<P: ToFile>(image: &Image<P>, bits: Bits) -> Coded<'static> {
     let (width, height) = image.size();
     let codes = match bits {
-        Bits::Sixteen => Codes::U16(flat(image, |p| p.display().map(code16))),
-        _ => Codes::U8(flat(image, P::codes)),
+        Bits::Sixteen => Codes::U16(flat(image, P::codes16)),
+        _ => Codes::U8(flat(image, P::codes8)),
     };
     Coded { width, height, names: P::NAMES, codes }
 }
@@ -267,7 +291,7 @@ fn encode_jpeg<P: ToFile>(image: &Image<P>, options: &WriteOptions) -> std::resu
     if !(1..=100).contains(&options.jpeg_quality) {
         return Err(format!("jpeg quality {}, expected 1 to 100", options.jpeg_quality));
     }
-    let mut codes = flat(image, P::codes);
+    let mut codes = flat(image, P::codes8);
     if P::NAMES.len() == 4 {
         if codes.iter().skip(3).step_by(4).any(|&a| a != 255) {
             return Err("transparent pixels, and JPEG has no alpha: expected .png or .exr".into());
