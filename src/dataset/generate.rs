@@ -1,7 +1,7 @@
 //! Makes a dataset, many samples at a time, in a folder that survives any interruption.
 
 use crate::dataset::journal::{Journal, Line};
-use crate::dataset::{folder, Entry, Obstructed, Report, Sample, Split, Writer};
+use crate::dataset::{Entry, Obstructed, Report, Sample, Split, Writer, folder};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -152,7 +152,9 @@ impl<F: Fn(u64) -> Result<Sample> + Sync> Run<'_, F> {
         }
         if (lines.len() as u64) < plan.count {
             let (done, count, folder) = (lines.len(), plan.count, plan.folder.display());
-            return Err(Error::Interrupted { what: format!("{done} of {count} samples are in {folder}; the same command goes on") });
+            return Err(Error::Interrupted {
+                what: format!("{done} of {count} samples are in {folder}; the same command goes on"),
+            });
         }
         Ok(Report::of(&lines, &plan.classes, plan.count, books.made))
     }

@@ -65,7 +65,10 @@ impl Writer for Yolo {
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let [w, h] = entry.sample.labels.image;
         if w.min(h) < LEAST_SIDE_PX {
-            return Err(Error::value("image", format!("{w} x {h} pixels, expected at least {LEAST_SIDE_PX} a side for YOLO")));
+            return Err(Error::value(
+                "image",
+                format!("{w} x {h} pixels, expected at least {LEAST_SIDE_PX} a side for YOLO"),
+            ));
         }
         let path = entry.path("labels", "txt");
         io::write_text(folder.join(&path), &self.rows(entry))?;
