@@ -1,5 +1,6 @@
 //! Golden cases: every folder `golden/<stage>/<case>/` with a `case.toml` is one named test.
 
+mod camera;
 mod case;
 
 use case::Case;
@@ -10,7 +11,7 @@ use std::path::Path;
 type Run = fn(&Case) -> Result<(), String>;
 
 /// The stages that have golden cases: folder name and runner.
-const STAGES: &[(&str, Run)] = &[];
+const STAGES: &[(&str, Run)] = &[("camera", camera::run)];
 
 fn main() {
     let args = Arguments::from_args();
