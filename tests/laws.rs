@@ -160,7 +160,7 @@ fn of_ten_thousand_drops_none_escapes() {
         .into_par_iter()
         .map(|k| {
             let end = settle::settle(scene(Range::new(5.0, 30.0), 3, k), &options).unwrap();
-            (end.verdict, end.attempts, end.overlap, end.scene.objects.len(), end.seconds)
+            (end.verdict, end.rejected, end.overlap, end.scene.objects.len())
         })
         .collect();
     let mut overlaps: Vec<f64> = all.iter().map(|end| end.2).collect();
@@ -169,8 +169,9 @@ fn of_ten_thousand_drops_none_escapes() {
     let cards: usize = all.iter().map(|end| end.3).sum();
     println!("{} drops of {cards} cards: {bad} without rest", all.len());
     for tries in 1..=options.attempts {
-        println!("{tries} tries: {}", all.iter().filter(|end| end.1 == tries).count());
+        println!("{tries} tries: {}", all.iter().filter(|end| end.1.len() + 1 == tries as usize).count());
     }
+    all.iter().flat_map(|end| &end.1).for_each(|verdict| println!("rejected: {verdict:?}"));
     println!("overlap: 99 % below {:.3} mm, worst {:.3} mm", overlaps[9900] * 1e3, overlaps[9999] * 1e3);
     assert_eq!(bad, 0);
 }
