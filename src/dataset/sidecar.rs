@@ -42,7 +42,7 @@ impl Writer for Sidecar {
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         for dir in Part::ALL.map(|part| folder.join("scenes").join(part.name())) {
-            std::fs::create_dir_all(&dir).map_err(|e| Error::file(&dir, e))?;
+            io::create_folder(&dir)?;
         }
         Ok(())
     }

@@ -57,7 +57,7 @@ impl Writer for Yolo {
     fn begin(&self, folder: &Path, classes: &[String]) -> Result<()> {
         for part in Part::ALL {
             let dir = folder.join("labels").join(part.name());
-            std::fs::create_dir_all(&dir).map_err(|e| Error::file(&dir, e))?;
+            io::create_folder(&dir)?;
         }
         io::write_text(folder.join("data.yaml"), &data_yaml(classes))
     }
