@@ -66,16 +66,7 @@ pub(super) struct Stream<'a, P> {
 }
 
 impl<'a, P: Photo> Stream<'a, P> {
-    /// Which of the keyer's planes is asked for.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Plane {
-    /// The finished matte.
-    Matte,
-    /// The edges that the levels leave alone.
-    Edges,
-}
-
-/// A keying whose primary channel is given where it does not follow each pixel's own key.
+    /// A keying whose primary channel is given where it does not follow each pixel's own key.
     pub(super) fn new(keying: Keying<'a, P>, channel: Option<usize>, opts: &'a KeyOptions) -> Self {
         Self { keying, channel, opts, clamped: AtomicUsize::new(0) }
     }
