@@ -90,10 +90,6 @@ impl Stance {
         self.center.push(focal) / self.scale
     }
 
-    /// Height of the camera over the surface.
-    pub(crate) fn height(&self, focal: f64) -> f64 {
-        -self.rotation.column(2).dot(&self.translation(focal))
-    }
 
     /// The other pose from which a small or distant rectangle looks almost the same: mirrored at the line of sight.
     pub(crate) fn mirrored(&self, focal: f64) -> Self {
