@@ -4,4 +4,4 @@ pub mod key;
 mod segment;
 
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
-pub use segment::{SegmentOptions, Segmentation, Step, Threshold, segment};
+pub use segment::{SegmentOptions, Segmentation, Step, Threshold, Tone, segment};

@@ -125,7 +125,7 @@ fn judge(scene: &Scene, options: &SettleOptions, end: &world::End) -> (Verdict, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Background, Choice, Recipe, Range};
+    use crate::scene::{Background, Choice, Range, Recipe};
 
     pub(super) fn dropped(k: u64, count: usize) -> Scene {
         let tray = Background {
@@ -151,11 +151,16 @@ mod tests {
         for count in [1, 5, 10, 20, 30, 60, 120] {
             let n = if count > 30 { 8 } else { 24 };
             let t = std::time::Instant::now();
-            let all: Vec<Settled> = (0..n).map(|k| settle(dropped(k, count), &SettleOptions::default()).unwrap()).collect();
+            let all: Vec<Settled> =
+                (0..n).map(|k| settle(dropped(k, count), &SettleOptions::default()).unwrap()).collect();
             let ms = t.elapsed().as_secs_f64() * 1e3 / n as f64;
             let worst = all.iter().map(|s| s.overlap).fold(0.0, f64::max) * 1e3;
             let secs = all.iter().map(|s| s.seconds).sum::<f64>() / n as f64;
-            let bad: Vec<_> = all.iter().filter(|s| s.verdict != Verdict::Rested || s.attempts > 1).map(|s| (&s.verdict, s.attempts)).collect();
+            let bad: Vec<_> = all
+                .iter()
+                .filter(|s| s.verdict != Verdict::Rested || s.attempts > 1)
+                .map(|s| (&s.verdict, s.attempts))
+                .collect();
             println!("{count:4} {ms:8.1} ms  {secs:.2} s  worst {worst:.3} mm  bad {bad:?}");
         }
     }
