@@ -95,7 +95,7 @@ mod tests {
             assert_eq!(sample_bilinear_clamped(&img, 1.0, x), Coverage(0.0));
         }
         assert_eq!(sample_bilinear(&img, -1e300, 0.0), Coverage(0.0));
-        assert_eq!(sample_bilinear_clamped(&Image::new(0, 0), 1.0, 1.0), Coverage(0.0));
+        assert_eq!(sample_bilinear_clamped(&Image::<Coverage>::new(0, 0), 1.0, 1.0), Coverage(0.0));
     }
 
     #[test]

@@ -17,6 +17,8 @@ mod shot;
 mod stack;
 
 pub use draw::Draws;
+#[cfg(feature = "settle")]
+pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
 pub use light::{AreaLight, Exposure, LightShape};
 pub use placement::{Grade, Object, Placement};

@@ -1,6 +1,7 @@
 //! Do boxes overlap, and how deep? In `f64`, independent of the physics engine, to judge its result.
 
 use crate::geom::{Pose, Vector3};
+use crate::scene::half_extent;
 
 /// A box in the world.
 #[derive(Clone, Copy, Debug)]
@@ -14,13 +15,18 @@ pub(super) struct Solid {
 }
 
 impl Solid {
-    fn center(&self) -> Vector3<f64> {
+    pub(super) fn center(&self) -> Vector3<f64> {
         self.world_from_body.translation.vector
     }
 
     fn axes(&self) -> [Vector3<f64>; 3] {
         let r = self.world_from_body.rotation.to_rotation_matrix();
         [0, 1, 2].map(|i| r.matrix().column(i).into())
+    }
+
+    /// Half lengths of the upright box around it.
+    pub(super) fn extent(&self) -> Vector3<f64> {
+        half_extent(&self.world_from_body.rotation, &self.half)
     }
 
     /// Half length of its shadow on a unit direction.
@@ -40,18 +46,22 @@ pub(super) fn outside(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
 /// metres; 0 when nothing overlaps.
 pub(super) fn deepest(solids: &[Solid], surface: [f64; 2]) -> f64 {
     let falling = solids.iter().filter(|s| s.falls);
-    let edges = falling.map(|s| depth_in_box(s, surface)).fold(0.0, f64::max);
+    let edges = falling.map(|s| depth_in_room(s, surface)).fold(0.0, f64::max);
     let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let pairs = pairs.filter(|&(i, j)| solids[i].falls || solids[j].falls);
     pairs.map(|(i, j)| depth(&solids[i], &solids[j])).fold(edges, f64::max)
 }
 
 /// How far a box reaches through the floor or a wall, whichever is most; 0 inside.
-fn depth_in_box(solid: &Solid, surface: [f64; 2]) -> f64 {
-    let (axes, c) = (solid.axes(), solid.center());
-    let reach = [Vector3::x(), Vector3::y(), Vector3::z()].map(|d| solid.reach(&axes, &d));
-    let through = [c.x.abs() + reach[0] - surface[0] / 2.0, c.y.abs() + reach[1] - surface[1] / 2.0, reach[2] - c.z];
-    through.into_iter().fold(0.0, f64::max)
+fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
+    let below = solid.extent().z - solid.center().z;
+    past_walls(solid, surface).into_iter().fold(below.max(0.0), f64::max)
+}
+
+/// How far a box reaches beyond the walls along x and along y; negative inside.
+pub(super) fn past_walls(solid: &Solid, surface: [f64; 2]) -> [f64; 2] {
+    let (center, extent) = (solid.center(), solid.extent());
+    [0, 1].map(|axis| center[axis].abs() + extent[axis] - surface[axis] / 2.0)
 }
 
 /// Shortest way to move one box out of another, metres; 0 when they are apart.
@@ -62,7 +72,7 @@ fn depth_in_box(solid: &Solid, surface: [f64; 2]) -> f64 {
 /// shadows is the depth.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
-fn depth(a: &Solid, b: &Solid) -> f64 {
+pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
     let apart = b.center() - a.center();
     if apart.norm() >= a.half.norm() + b.half.norm() {
         return 0.0;

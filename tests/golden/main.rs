@@ -2,6 +2,7 @@
 
 mod camera;
 mod case;
+mod color;
 
 use case::Case;
 use libtest_mimic::{Arguments, Trial};
@@ -11,7 +12,10 @@ use std::path::Path;
 type Run = fn(&Case) -> Result<(), String>;
 
 /// The stages that have golden cases: folder name and runner.
-const STAGES: &[(&str, Run)] = &[("camera", camera::run)];
+const STAGES: &[(&str, Run)] = &[
+    ("camera", camera::run),
+    ("color", color::run),
+];
 
 fn main() {
     let args = Arguments::from_args();
