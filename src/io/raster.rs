@@ -207,7 +207,9 @@ impl Raster {
         let [r, g, b] = [picked[0], picked[1], picked[2]];
         let alpha = picked.get(3).copied();
         Ok(match &self.samples {
-            Samples::U8(v) => self.decoded(v, [r, g, b], alpha, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into()),
+            Samples::U8(v) => {
+                self.decoded(v, [r, g, b], alpha, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into())
+            }
             Samples::U16(v) => self.decoded(v, [r, g, b], alpha, 65_535.0, |codes| codes.map(decode_srgb16)),
             Samples::F32(v) => self.decoded(v, [r, g, b], alpha, 1.0, |values| values.map(srgb_to_linear)),
         })
