@@ -3,28 +3,44 @@
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::pixel::Coverage;
-use geo::{ConvexHull, MultiPoint, Point};
+use geo::{Area, ConvexHull, MultiPoint, Point};
+use rayon::prelude::*;
 
-/// Convex hull of the corners of the pixels of a set, in order, clockwise as seen; empty for an empty set.
-pub(super) fn convex_hull(set: &Image<bool>) -> Vec<Point2<f64>> {
-    let ends = set.rows().enumerate().filter_map(|(y, row)| {
+/// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where there is no area.
+///
+/// It goes through the pixels' centres: an edge marks the pixel on either side of it, so that the outer one's centre is
+/// nearer to the edge than its outer corner. Where a pixel lies on the border of the picture, so does the hull.
+pub(super) fn convex_hull(edges: &Image<bool>) -> Vec<Point2<f64>> {
+    let ends = edges.rows().enumerate().filter_map(|(y, row)| {
         let first = row.iter().position(|p| *p)?;
         let last = row.iter().rposition(|p| *p)?;
-        Some((y as f64, first as f64, (last + 1) as f64))
+        Some([(first, y), (last, y)])
     });
-    let corners = ends.flat_map(|(y, x0, x1)| [(x0, y), (x1, y), (x0, y + 1.0), (x1, y + 1.0)]);
-    let corners: MultiPoint = corners.map(Point::from).collect();
-    let ring = corners.convex_hull().exterior().clone().into_inner();
+    let (w, h) = edges.size();
+    let point = |(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h));
+    let hull = ends.flatten().map(point).collect::<MultiPoint>().convex_hull();
+    if hull.unsigned_area() <= 0.0 {
+        return Vec::new();
+    }
     // geo goes counter-clockwise with y up, which is clockwise as seen, and repeats the first point.
-    ring.iter().take(ring.len().saturating_sub(1)).map(|c| Point2::new(c.x, c.y)).collect()
+    let (ring, _) = hull.into_inner();
+    let closed = ring.into_inner();
+    closed.iter().skip(1).map(|c| Point2::new(c.x, c.y)).collect()
+}
+
+fn center_or_border(i: usize, len: usize) -> f64 {
+    match i {
+        0 => 0.0,
+        _ if i + 1 == len => len as f64,
+        _ => i as f64 + 0.5,
+    }
 }
 
 /// Scan lines per row of pixels; each contributes exact spans, so only slanted edges are approximated.
 const LINES: usize = 8;
 
 /// The share of every pixel that lies inside a convex polygon (pixel-corner coordinates).
-pub fn coverage(polygon: &[Point2<f64>], width: usize, height: usize) -> Image<Coverage> {
-    use rayon::prelude::*;
+pub(super) fn coverage(polygon: &[Point2<f64>], width: usize, height: usize) -> Image<Coverage> {
     let mut image = Image::new(width, height);
     image.par_rows_mut().enumerate().for_each(|(y, row)| {
         for line in 0..LINES {
@@ -62,16 +78,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_hull_of_one_pixel_is_its_square() {
-        let set = Image::from_fn(5, 5, |x, y| (x, y) == (2, 3));
-        let hull = convex_hull(&set);
-        assert_eq!(hull.len(), 4);
-        assert!(hull.iter().all(|p| (2.0..=3.0).contains(&p.x) && (3.0..=4.0).contains(&p.y)));
+    fn the_hull_goes_through_centres_and_clockwise() {
+        let set = Image::from_fn(8, 8, |x, y| matches!((x, y), (2, 1) | (5, 1) | (2, 4) | (5, 4) | (3, 2)));
+        let mut hull = convex_hull(&set);
+        let start = hull.iter().position(|p| *p == Point2::new(2.5, 1.5)).unwrap();
+        hull.rotate_left(start);
+        assert_eq!(hull, [[2.5, 1.5], [5.5, 1.5], [5.5, 4.5], [2.5, 4.5]].map(Point2::from));
     }
 
     #[test]
-    fn an_empty_set_has_no_hull() {
+    fn the_hull_reaches_a_border_that_the_object_reaches() {
+        let hull = convex_hull(&Image::filled(8, 6, true));
+        let mut corners: Vec<_> = hull.iter().map(|p| (p.x as i32, p.y as i32)).collect();
+        corners.sort_unstable();
+        assert_eq!(corners, [(0, 0), (0, 6), (8, 0), (8, 6)]);
+    }
+
+    #[test]
+    fn what_has_no_area_has_no_hull() {
         assert!(convex_hull(&Image::filled(4, 4, false)).is_empty());
+        assert!(convex_hull(&Image::from_fn(9, 9, |x, y| x == y && x > 2)).is_empty());
     }
 
     #[test]

@@ -4,25 +4,23 @@ use crate::image::Image;
 use crate::pixel::Coverage;
 use serde::{Deserialize, Serialize};
 
-/// How a picture of magnitudes is binarised.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// How a band is binarised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Threshold {
-    /// The value that best separates the histogram into two groups (Otsu).
+    /// The value that best separates the histogram of the logarithms into two groups (Otsu).
+    #[default]
     Otsu,
-    /// This many times the noise of the picture, see [`noise`].
+    /// This many times the noise.
     Noise(f32),
-    /// This value.
-    Value(f32),
 }
 
 impl Threshold {
-    /// The value to cut at.
-    pub(super) fn of(self, magnitudes: &Image<Coverage>) -> f32 {
+    /// The value to cut a band at, in units of noise.
+    pub(super) fn of(self, band: &Image<Coverage>) -> f32 {
         match self {
-            Self::Otsu => otsu(magnitudes),
-            Self::Noise(times) => times * noise(magnitudes),
-            Self::Value(value) => value,
+            Self::Otsu => otsu(band),
+            Self::Noise(times) => times,
         }
     }
 }
@@ -30,30 +28,32 @@ impl Threshold {
 /// Bins of the histogram that Otsu's threshold is found in.
 const BINS: usize = 256;
 
-/// The value that maximises the variance between the two groups it makes.
+/// The value that maximises the variance between the two groups it makes; the largest one where all is noise.
 ///
 /// # Method
-/// [Otsu 1979], on 256 equal bins from 0 to the largest magnitude.
+/// [Otsu 1979], on 256 equal bins of the *logarithm*, from the noise (1) to the largest magnitude. Edges of clear
+/// plastic and highlights differ by a factor of a hundred; on a linear scale the threshold falls between those two
+/// instead of between edges and background.
 ///
 /// [Otsu 1979]: https://doi.org/10.1109/TSMC.1979.4310076
-fn otsu(magnitudes: &Image<Coverage>) -> f32 {
-    let largest = magnitudes.pixels().iter().map(|c| c.0).fold(0.0, f32::max);
-    if largest <= 0.0 {
-        return 0.0;
+fn otsu(band: &Image<Coverage>) -> f32 {
+    let largest = band.pixels().iter().map(|c| c.0).fold(0.0, f32::max);
+    let span = libm::logf(largest.max(1.0));
+    if span <= 0.0 {
+        return largest;
     }
     let mut histogram = [0u64; BINS];
-    for c in magnitudes.pixels() {
-        let bin = (c.0 / largest * BINS as f32) as usize;
+    for c in band.pixels() {
+        let bin = (libm::logf(c.0.max(1.0)) / span * BINS as f32) as usize;
         histogram[bin.min(BINS - 1)] += 1;
     }
-    (best_split(&histogram) + 1) as f32 / BINS as f32 * largest
+    libm::expf((best_split(&histogram) + 1) as f32 / BINS as f32 * span)
 }
 
 /// Last bin of the lower group.
 fn best_split(histogram: &[u64; BINS]) -> usize {
-    let moment = |(i, n): (usize, &u64)| i as u64 * n;
     let count: u64 = histogram.iter().sum();
-    let total: u64 = histogram.iter().enumerate().map(moment).sum();
+    let total: u64 = histogram.iter().zip(0..).map(|(n, bin): (_, u64)| n * bin).sum();
     let (mut below, mut sum, mut best) = (0, 0, (0, -1.0));
     for (bin, &n) in histogram.iter().enumerate() {
         below += n;
@@ -71,49 +71,30 @@ fn best_split(histogram: &[u64; BINS]) -> usize {
     best.0
 }
 
-/// Share of the magnitudes that the noise is read from: an object may cover almost three quarters of the picture.
-const QUIET: f64 = 0.25;
-/// The magnitude below which a quarter of a normal variate of deviation 1 lies.
-const QUIET_OF_NORMAL: f32 = 0.318_64;
-/// Least noise: the rounding of an 8-bit picture, one step over the square root of 12.
-const ROUNDING: f32 = 1.0 / 255.0 / 3.464;
-
-/// Standard deviation of the noise in a band, robust against the object in the picture.
-///
-/// # Method
-/// As the median absolute deviation, but from the lower quartile: `quartile / 0.3186` for normal noise.
-pub(super) fn noise(magnitudes: &Image<Coverage>) -> f32 {
-    let mut values: Vec<f32> = magnitudes.pixels().iter().map(|c| c.0).collect();
-    let rank = (values.len() as f64 * QUIET) as usize;
-    if rank >= values.len() {
-        return ROUNDING;
-    }
-    let (_, quartile, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    (*quartile / QUIET_OF_NORMAL).max(ROUNDING)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn otsu_cuts_between_two_groups() {
-        let img = Image::from_fn(40, 10, |x, _| Coverage(if x < 30 { 0.1 } else { 0.8 }));
+        let img = Image::from_fn(40, 10, |x, _| Coverage(if x < 30 { 2.0 } else { 80.0 }));
         let cut = Threshold::Otsu.of(&img);
-        assert!(cut > 0.1 && cut <= 0.8, "{cut}");
+        assert!(cut > 2.0 && cut < 80.0, "{cut}");
     }
 
     #[test]
-    fn otsu_of_nothing_is_nothing() {
-        assert_eq!(Threshold::Otsu.of(&Image::new(4, 4)), 0.0);
+    fn highlights_do_not_hide_faint_edges() {
+        let img =
+            Image::from_fn(100, 10, |x, _| Coverage([2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)]));
+        let cut = Threshold::Otsu.of(&img);
+        assert!(cut > 2.0 && cut < 20.0, "{cut}");
+    }
+
+    #[test]
+    fn nothing_is_above_the_cut_of_noise() {
+        for level in [0.0, 0.5, 1.0] {
+            assert!(Threshold::Otsu.of(&Image::filled(4, 4, Coverage(level))) >= level);
+        }
         assert_eq!(Threshold::Otsu.of(&Image::new(0, 4)), 0.0);
-    }
-
-    #[test]
-    fn noise_does_not_see_an_object() {
-        let flat = |x: usize, y: usize| ((x * 7919 + y * 104_729) % 1000) as f32 * 1e-5;
-        let quiet = noise(&Image::from_fn(100, 100, |x, y| Coverage(flat(x, y))));
-        let busy = noise(&Image::from_fn(100, 100, |x, y| Coverage(if x < 40 { 0.5 } else { flat(x, y) })));
-        assert!(busy < 2.0 * quiet, "{busy} against {quiet}");
     }
 }
