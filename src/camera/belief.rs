@@ -1,6 +1,6 @@
 //! What is believed before the picture is looked at: a mean and a standard deviation per unknown.
 
-use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, UNKNOWNS, Unknowns};
+use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, Square, State, Unknowns};
 
 /// A normal distribution; without width it is a fact, with infinite width it says nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,13 +48,15 @@ impl Beliefs {
         ]
     }
 
-    /// Which unknowns may move.
-    pub(crate) fn free(&self) -> [bool; UNKNOWNS] {
-        let mut free = [true; UNKNOWNS];
+    /// Takes the unknowns that may not move out of the normal equations.
+    pub(crate) fn forget_facts(&self, information: &mut Square, slope: &mut Unknowns) {
         for (i, belief) in self.each() {
-            free[i] = !belief.is_fact();
+            if belief.is_fact() {
+                information.row_mut(i).fill(0.0);
+                information.column_mut(i).fill(0.0);
+                slope[i] = 0.0;
+            }
         }
-        free
     }
 
     /// Number of unknowns of which nothing is believed, beyond the six of the pose.

@@ -27,7 +27,9 @@ mod warning;
 
 pub use error::SolveError;
 pub use focal::{FocalSource, focal_from_equivalent};
-pub use label::{Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin};
+pub use label::{
+    Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
+};
 pub use locate::locate;
 pub use options::{CornerOrder, Priors, SolveOptions};
 pub use pinhole::Camera;

@@ -11,7 +11,7 @@ pub struct SolveOptions {
     pub unit_scale: bool,
     /// Height of the objects that will stand on the surface, metres. Default: a tenth of the shorter side.
     pub reference_height: Option<f64>,
-    /// Warn where a point at that height is surer than this to nobody, pixels. Default: never.
+    /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015 picture diagonals.
     pub max_height_sigma_px: Option<f64>,
 }
 

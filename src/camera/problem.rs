@@ -82,12 +82,12 @@ impl Problem {
             ln_height: camera_height(label, &frame),
         };
         let elastic = sides.elastic();
-        let corner_sights = corner_points(size).into_iter().zip(corners_px).map(|(p, px)| (p, px, sigma_px, elastic));
-        let rigid = if elastic == Elastic::BOTH { elastic } else { Elastic::RIGID };
+        let corner_sights = corner_points(size).into_iter().zip(corners_px).map(|(p, px)| (p, px, sigma_px, false));
+        // Where both sides were measured, so was the point, with the same tape.
+        let rigid = elastic != Elastic::BOTH;
         let points = label.points.iter();
-        let further =
-            points.map(|p| (p.xyz_m.into(), label.pixel(p.px), p.sigma_px.unwrap_or(sigma_px), rigid));
-        let sights = corner_sights.chain(further).map(|(p, px, sigma, elastic)| frame.sight(p, px, sigma, elastic));
+        let further = points.map(|p| (p.xyz_m.into(), label.pixel(p.px), p.sigma_px.unwrap_or(sigma_px), rigid));
+        let sights = corner_sights.chain(further).map(|(p, px, sigma, rigid)| frame.sight(p, px, sigma, rigid));
         let ln_focal_range = [1.0 / LONGEST_FOCAL, LONGEST_FOCAL].map(|f| libm::log(f * usual));
         let evidence = Evidence { sights: sights.collect(), beliefs, ln_focal_range };
         Ok(Self { image, frame, corners_px, view, size, elastic, evidence, witness, warnings })
@@ -95,8 +95,13 @@ impl Problem {
 
     /// The closed-form camera for a focal length.
     pub(crate) fn start(&self, focal: f64) -> State {
-        let stance = self.view.stance(focal, self.size.map(|s| s / self.frame.unit));
-        State::new(stance, focal, self.evidence.beliefs.kappa.mean)
+        let stance = self.view.stance(focal, self.unit_size());
+        State::new(stance, focal, self.evidence.beliefs.kappa.mean, self.elastic)
+    }
+
+    /// The sides before they give, in the solver's unit.
+    pub(crate) fn unit_size(&self) -> [f64; 2] {
+        self.size.map(|s| s / self.frame.unit)
     }
 
     /// The focal length that the corners give in closed form, where they give one that can be followed.
@@ -112,9 +117,8 @@ impl Problem {
     }
 
     /// The sides in a state, metres.
-    pub(crate) fn fitted_size(&self, stretch: f64) -> [f64; 2] {
-        let Elastic([x, y]) = self.elastic;
-        [self.size[0] * libm::exp(x * stretch), self.size[1] * libm::exp(y * stretch)]
+    pub(crate) fn fitted_size(&self, state: &State) -> [f64; 2] {
+        [self.size[0] * state.sides[0], self.size[1] * state.sides[1]]
     }
 }
 
@@ -123,9 +127,9 @@ impl Frame {
         (px - self.principal_px) / self.unit_px
     }
 
-    fn sight(&self, point: Point3<f64>, px: Point2<f64>, sigma_px: f64, elastic: Elastic) -> Sight {
+    fn sight(&self, point: Point3<f64>, px: Point2<f64>, sigma_px: f64, rigid: bool) -> Sight {
         let point: Vector3<f64> = point.coords / self.unit;
-        Sight { point, elastic, seen: self.picture(px), weight: self.unit_px / sigma_px }
+        Sight { point, rigid, seen: self.picture(px), weight: self.unit_px / sigma_px }
     }
 }
 

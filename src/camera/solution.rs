@@ -21,7 +21,7 @@ const GRAZING_DEG: f64 = 80.0;
 const REFERENCE_HEIGHT: f64 = 0.1;
 /// Error of objects worth a warning where none is given, in picture diagonals: more than a usual EXIF value leaves, less
 /// than knowing nothing from above does.
-const HEIGHT_SIGMA: f64 = 0.002;
+const HEIGHT_SIGMA: f64 = 0.0015;
 /// Fits less probable than these are warned of, and severe.
 const IMPROBABLE: f64 = 0.01;
 const IMPOSSIBLE: f64 = 1e-4;
@@ -114,7 +114,7 @@ impl Problem {
         let believed = self.evidence.beliefs.ln_focal;
         let uncertainty = Uncertainty::new(minimum, believed);
         let camera = self.camera(minimum);
-        let size = self.fitted_size(state.stretch);
+        let size = self.fitted_size(state);
         let seen = self.seen_corners(minimum);
         let per_corner_px = [0, 1, 2, 3].map(|i| (seen[i] - self.corners_px[i]).norm());
         let rms_px = (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt();
@@ -152,7 +152,7 @@ impl Problem {
         let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
         Camera {
             image: self.image,
-            focal_px: Vector2::repeat(state.focal() * frame.unit_px),
+            focal_px: Vector2::repeat(state.focal * frame.unit_px),
             principal_px: frame.principal_px + state.principal * frame.unit_px,
             camera_from_world: Pose::from_parts((state.translation() * frame.unit).into(), rotation),
         }
@@ -161,7 +161,7 @@ impl Problem {
     /// Where the rectangle's corners are seen, pixels, distortion included.
     fn seen_corners(&self, minimum: &Minimum) -> [Point2<f64>; 4] {
         corner_points(self.size).map(|corner| {
-            let seen = minimum.state.project(&(corner.coords / self.frame.unit), self.elastic);
+            let seen = minimum.state.project(&(corner.coords / self.frame.unit), false);
             seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| self.frame.principal_px + u * self.frame.unit_px)
         })
     }
@@ -170,7 +170,7 @@ impl Problem {
         let evidence = &self.evidence;
         let seen = 2 * evidence.sights.len() + usize::from(evidence.beliefs.ln_height.is_some());
         let dof = seen.saturating_sub(6 + evidence.beliefs.unknown());
-        let depths = corner_points(self.fitted_size(minimum.state.stretch)).map(|c| depth(camera, c));
+        let depths = corner_points(self.fitted_size(&minimum.state)).map(|c| depth(camera, c));
         let (near, far) = (depths.into_iter().fold(f64::MAX, f64::min), depths.into_iter().fold(0.0, f64::max));
         Fit {
             chi2: minimum.cost,

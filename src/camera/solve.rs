@@ -6,12 +6,11 @@ use super::label::Label;
 use super::options::{CornerOrder, SolveOptions};
 use super::problem::Problem;
 use super::refine::Minimum;
+use super::search::{TELLING, degrees_apart};
 use super::solution::Solution;
 use super::uncertainty::Uncertainty;
 use super::warning::Warning;
 
-/// Another explanation counts where its chi squared is no worse, or better, by this: 1 % of two degrees of freedom.
-const TELLING: f64 = 9.2;
 /// Picture and belief contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
 
@@ -46,8 +45,7 @@ fn as_labelled(label: &Label, options: &SolveOptions) -> Result<(Solution, Probl
     let found = problem.search().ok_or(SolveError::NoPose)?;
     let mut solution = problem.solution(&found.best, options);
     if let Some(other) = found.other.filter(|other| other.cost < found.best.cost + TELLING) {
-        let normals = [&found.best, &other].map(|m| m.state.stance.rotation.column(2).into_owned());
-        let apart_deg = libm::atan2(normals[0].cross(&normals[1]).norm(), normals[0].dot(&normals[1])).to_degrees();
+        let apart_deg = degrees_apart(&found.best.state.stance, &other.state.stance);
         solution.warnings.push(Warning::PoseAmbiguous { apart_deg });
         solution.alternative = Some(Box::new(problem.solution(&other, options)));
     }

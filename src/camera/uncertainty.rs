@@ -78,8 +78,8 @@ impl Uncertainty {
 
     /// Covariance of where a point of the rectangle's frame is seen; none behind the camera.
     fn seen(&self, problem: &Problem, state: &State, point: Vector3<f64>) -> Option<Matrix2<f64>> {
-        let (_, slope) = state.slope(&(point / problem.frame.unit), problem.elastic)?;
-        Some(slope * self.covariance * slope.transpose() * (problem.frame.unit_px * problem.frame.unit_px))
+        let (_, slope) = state.slope(&(point / problem.frame.unit), false)?;
+        Some(slope.transpose() * self.covariance * slope * (problem.frame.unit_px * problem.frame.unit_px))
     }
 
     /// The same at the rectangle's corners, squared pixels.
@@ -163,6 +163,15 @@ fn condition(information: &Square, believed: Belief) -> f64 {
 
 /// Names of the unknowns, in the order of the covariance.
 pub const UNKNOWN_NAMES: [&str; KAPPA + 1] = [
-    "rotation_x", "rotation_y", "rotation_z", "center_u", "center_v", "ln_scale", "ln_focal", "stretch", "principal_x",
-    "principal_y", "kappa",
+    "rotation_x",
+    "rotation_y",
+    "rotation_z",
+    "center_u",
+    "center_v",
+    "ln_scale",
+    "ln_focal",
+    "stretch",
+    "principal_x",
+    "principal_y",
+    "kappa",
 ];

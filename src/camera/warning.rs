@@ -32,7 +32,9 @@ pub enum Warning {
         tilt_deg: f64,
     },
     /// Nothing was known of the focal length and the corners look like seen from infinitely far.
-    #[error("the corners show no perspective and nothing is known of the focal length: {focal_px:.0} px is a bound, not a value")]
+    #[error(
+        "the corners show no perspective and nothing is known of the focal length: {focal_px:.0} px is a bound, not a value"
+    )]
     FocalUnbounded {
         /// The focal length used, pixels.
         focal_px: f64,
