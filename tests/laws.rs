@@ -41,7 +41,7 @@ fn scene(objects: Range, seed: u64, k: u64) -> Scene {
 }
 
 fn settled(scene: Scene) -> Scene {
-    settle::settle(scene, &SettleOptions::default()).unwrap().into_scene().unwrap()
+    settle::settle(scene, &SettleOptions::default()).and_then(settle::Settled::into_scene).expect("it comes to rest")
 }
 
 proptest! {

@@ -5,7 +5,7 @@
 //! ([`SettleOptions::half_body`]), between walls that stand on the edges of the surface and have no top. A card lies in
 //! the *middle* plane of its box. Objects that already are at rest are obstacles that do not move.
 //!
-//! The result is judged by an overlap test of its own ([`overlap`]), which shares nothing with the physics engine, and a
+//! The result is judged by an overlap test of its own, which shares nothing with the physics engine, and a
 //! bad end is tried again from a higher start. Same scene, same bits: on every machine, at any thread count.
 
 #[cfg(test)]
@@ -136,12 +136,13 @@ fn judge(scene: &Scene, options: &SettleOptions, end: &End) -> (Verdict, f64) {
         return (Verdict::Escaped(escaped), f64::INFINITY);
     }
     let depth = overlap::deepest(&bodies, scene.surface.size);
-    let verdict = match () {
-        () if !end.asleep => Verdict::TimedOut,
-        () if depth > options.max_overlap * world::typical_length(scene) => Verdict::Penetrating(depth),
-        () => Verdict::Rested,
-    };
-    (verdict, depth)
+    if !end.asleep {
+        (Verdict::TimedOut, depth)
+    } else if depth > options.max_overlap * world::typical_length(scene) {
+        (Verdict::Penetrating(depth), depth)
+    } else {
+        (Verdict::Rested, depth)
+    }
 }
 
 /// The boxes that stand for the objects at these poses.
