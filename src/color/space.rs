@@ -17,8 +17,7 @@ pub struct RgbSpace {
 
 impl RgbSpace {
     /// Rec. 709 primaries and D65, which sRGB shares (ITU-R BT.709-6, IEC 61966-2-1): the library's working space.
-    pub const REC709: Self =
-        Self { primaries: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]], white: [0.3127, 0.3290] };
+    pub const REC709: Self = Self { primaries: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]], white: [0.3127, 0.3290] };
     /// Rec. 2020 primaries and D65 (ITU-R BT.2020-2).
     pub const REC2020: Self =
         Self { primaries: [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]], white: [0.3127, 0.3290] };
@@ -167,7 +166,8 @@ mod tests {
     fn acescg_agrees_with_the_color_crate() {
         let ours = ColorMatrix::acescg_from_linear();
         for c in [[0.18, 0.5, 0.9], [1.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0], [-0.2, 0.1, 7.0]] {
-            let theirs = color::AlphaColor::<color::LinearSrgb>::new([c[0], c[1], c[2], 1.0]).convert::<color::AcesCg>();
+            let theirs =
+                color::AlphaColor::<color::LinearSrgb>::new([c[0], c[1], c[2], 1.0]).convert::<color::AcesCg>();
             for (a, b) in ours.apply(c).iter().zip(theirs.components) {
                 assert!((a - b).abs() < 1e-6 * c.iter().map(|x| x.abs()).fold(1.0, f32::max), "{a} {b}");
             }

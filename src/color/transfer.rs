@@ -103,12 +103,15 @@ mod tests {
         (0..4000).map(|i| i as f32 * 1e-3).chain([f32::MIN_POSITIVE, 1e-6, 0.003_130_8, 0.018, 1e4])
     }
 
+    /// The two parts of sRGB, with the rounded constants of its standard, miss each other by as much at the knee.
+    const GAP: f32 = 3e-9;
+
     #[test]
     fn decoding_undoes_encoding() {
         for curve in CURVES {
             for x in samples() {
                 let back = curve.decode(curve.encode(x));
-                assert!((back - x).abs() <= 4.0 * f32::EPSILON * x.max(1e-3), "{curve:?}: {x} became {back}");
+                assert!((back - x).abs() <= 4.0 * f32::EPSILON * x + GAP, "{curve:?}: {x} became {back}");
             }
         }
     }
