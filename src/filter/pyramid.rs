@@ -34,10 +34,14 @@ impl<P: Mix> Pyramid<P> {
 
     /// The picture halved `level` times; the smallest there is for a larger `level`.
     pub fn level(&self, level: usize) -> &Image<P> {
-        match level.min(self.halves.len()) {
-            0 => &self.base,
-            n => self.halves[n - 1].get_or_init(|| halve(self.level(n - 1))),
+        let Some(n) = level.min(self.halves.len()).checked_sub(1) else { return &self.base };
+        if let Some(half) = self.halves[n].get() {
+            return half;
         }
+        // Halved before the cell is locked: the work is parallel, and a thread that waits for its parts may be handed
+        // a task that asks for this very level.
+        let half = halve(self.level(n));
+        self.halves[n].get_or_init(|| half)
     }
 }
 
