@@ -13,6 +13,8 @@
 //! index.jsonl                    one line for each finished sample
 //! ```
 
+mod check;
+mod contact_sheet;
 mod folder;
 mod generate;
 mod journal;
@@ -20,7 +22,10 @@ mod pictures;
 mod sidecar;
 mod split;
 mod yolo;
+mod yolo_yaml;
 
+pub use check::{Checked, Fault, check};
+pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use generate::{Plan, Progress, generate};
 pub use journal::{ClassCount, Report};
 pub use pictures::{PictureFormat, Pictures};
