@@ -59,7 +59,8 @@ impl std::fmt::Display for Refusal {
 }
 
 /// Which channels a kind of pixel is made from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Wanted {
     /// `R G B`, or `Y` for grey; `A` where it is there.
     Color,
@@ -207,7 +208,9 @@ impl Raster {
         let [r, g, b] = [picked[0], picked[1], picked[2]];
         let alpha = picked.get(3).copied();
         Ok(match &self.samples {
-            Samples::U8(v) => self.decoded(v, [r, g, b], alpha, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into()),
+            Samples::U8(v) => {
+                self.decoded(v, [r, g, b], alpha, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into())
+            }
             Samples::U16(v) => self.decoded(v, [r, g, b], alpha, 65_535.0, |codes| codes.map(decode_srgb16)),
             Samples::F32(v) => self.decoded(v, [r, g, b], alpha, 1.0, |values| values.map(srgb_to_linear)),
         })
