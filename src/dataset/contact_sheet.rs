@@ -171,11 +171,13 @@ impl Layout {
     }
 }
 
-/// The number of columns with which a sheet comes closest to a square.
+/// The number of columns with which a sheet comes closest to a square; an empty place at its end weighs as much as being
+/// wider than high by two pictures.
 fn square_columns(count: usize, [w, h]: [usize; 2]) -> usize {
     let off = |columns: &usize| {
         let rows = count.div_ceil(*columns);
-        (columns * (w + GAP)).abs_diff(rows * (h + GAP))
+        let empty = columns * rows - count;
+        (columns * (w + GAP)).abs_diff(rows * (h + GAP)) + 2 * empty * (w + GAP)
     };
     (1..=count.max(1)).min_by_key(off).unwrap_or(1)
 }
@@ -229,5 +231,39 @@ fn legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
         let down = ((TextSize::Small.height() - MARK) / 2) as isize;
         draw::fill(sheet, [x, y + down], [MARK, MARK], entry.color);
         draw::text(sheet, [x + MARK as isize + 8, y], &entry.text, INK, TextSize::Small);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_is_about_square_and_has_no_hole_where_that_is_possible() {
+        assert_eq!(square_columns(24, [320, 260]), 6);
+        assert_eq!(square_columns(16, [320, 260]), 4);
+        assert_eq!(square_columns(1, [320, 260]), 1);
+        assert_eq!(square_columns(0, [0, 0]), 1);
+    }
+
+    #[test]
+    fn a_sheet_without_pictures_still_has_its_legend() {
+        let sheet = contact_sheet(&[], &["cap".into()], &SheetOptions::default());
+        assert!(sheet.pixels().contains(&draw::class_color(0)));
+    }
+
+    #[test]
+    fn a_small_picture_is_not_made_larger() {
+        let picture = Image::filled(40, 30, LinearRgb::WHITE);
+        let tile = |width| Tile::new(&picture, Labels::default(), Vec::new(), String::new(), width).picture;
+        assert_eq!((tile(320).size(), tile(20).size()), ((40, 30), (20, 15)));
+    }
+
+    #[test]
+    fn a_narrow_legend_goes_on_in_the_next_line() {
+        let classes = ["cap_label", "cap", "label", "none"].map(String::from);
+        let narrow = entries(&classes, &[], 250);
+        assert!(narrow.iter().all(|e| e.x == 0 || e.x + e.width() <= 250));
+        assert!(narrow.last().expect("five entries").line >= 2);
     }
 }
