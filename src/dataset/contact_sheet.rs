@@ -35,7 +35,7 @@ pub struct SheetOptions {
     pub title: String,
     /// Widest a picture may be, pixels; larger ones are made smaller. Default: 320.
     pub picture_width: usize,
-    /// Pictures beside each other; 0 lets the sheet become about as wide as high. Default: 0.
+    /// Pictures beside each other; 0 lets the sheet become about 3:2. Default: 0.
     pub columns: usize,
 }
 
@@ -149,7 +149,7 @@ impl Layout {
         let highest = tiles.iter().map(|t| t.picture.height()).max().unwrap_or(0);
         let cell = [widest, highest + CAPTION_GAP + text.height()];
         let columns = match options.columns {
-            0 => square_columns(tiles.len(), cell),
+            0 => pleasing_columns(tiles.len(), cell),
             n => n.min(tiles.len().max(1)),
         };
         let row = (columns * (cell[0] + GAP)).saturating_sub(GAP);
@@ -171,13 +171,13 @@ impl Layout {
     }
 }
 
-/// The number of columns with which a sheet comes closest to a square; an empty place at its end weighs as much as being
-/// wider than high by two pictures.
-fn square_columns(count: usize, [w, h]: [usize; 2]) -> usize {
+/// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty place at its end weighs
+/// as much as being too wide by two pictures.
+fn pleasing_columns(count: usize, [w, h]: [usize; 2]) -> usize {
     let off = |columns: &usize| {
         let rows = count.div_ceil(*columns);
         let empty = columns * rows - count;
-        (columns * (w + GAP)).abs_diff(rows * (h + GAP)) + 2 * empty * (w + GAP)
+        (2 * columns * (w + GAP)).abs_diff(3 * rows * (h + GAP)) + 4 * empty * (w + GAP)
     };
     (1..=count.max(1)).min_by_key(off).unwrap_or(1)
 }
@@ -239,11 +239,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sheet_is_about_square_and_has_no_hole_where_that_is_possible() {
-        assert_eq!(square_columns(24, [320, 260]), 6);
-        assert_eq!(square_columns(16, [320, 260]), 4);
-        assert_eq!(square_columns(1, [320, 260]), 1);
-        assert_eq!(square_columns(0, [0, 0]), 1);
+    fn a_sheet_is_wider_than_high_and_has_no_hole_where_that_is_possible() {
+        assert_eq!(pleasing_columns(24, [320, 260]), 6);
+        assert_eq!(pleasing_columns(16, [320, 260]), 4);
+        assert_eq!(pleasing_columns(1, [320, 260]), 1);
+        assert_eq!(pleasing_columns(0, [0, 0]), 1);
     }
 
     #[test]
