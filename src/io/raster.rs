@@ -53,9 +53,15 @@ impl From<&str> for Refusal {
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Unsupported(what) | Self::Broken(what) => f.write_str(what),
+            // Decoders write messages of several lines; ours have one.
+            Self::Unsupported(what) | Self::Broken(what) => f.write_str(&one_line(what)),
         }
     }
+}
+
+/// A text of any form on one line.
+pub(super) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Which channels a kind of pixel is made from.
