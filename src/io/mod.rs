@@ -8,7 +8,8 @@
 //! | half and float (EXR, TIFF, HDR) | taken as scene-linear Rec. 709 | EXR premultiplied, TIFF as it says | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
-//! padded with zeros from its data window to its display window. Embedded ICC profiles are not applied.
+//! padded with zeros from its data window to its display window. An EXR that names other primaries is converted; embedded ICC profiles are not
+//! applied.
 //!
 //! Sizes are checked against [`Limits`] before anything is allocated, decoders that panic are caught, and truncated JPEGs,
 //! which decoders take for grey pictures, are refused. Files are written beside their place and moved there: whole or
