@@ -1,1 +1,150 @@
-//! Input and output: the only place that opens pictures.
+//! Input and output: the only place that opens pictures, and the only one that sees C++.
+//!
+//! A picture is read by what it *is*, not by what it is called, and becomes the pixel type that the caller asks for:
+//!
+//! | samples of the file | colour becomes | alpha | [`Coverage`](crate::Coverage) |
+//! | --- | --- | --- | --- |
+//! | integers (PNG, JPEG, TIFF) | decoded with the exact sRGB curve, unless a PNG states gamma 1 | straight unless a TIFF says otherwise | code / full scale, never decoded |
+//! | half and float (EXR, TIFF, HDR) | taken as scene-linear Rec. 709 | EXR premultiplied, TIFF as it says | as it is |
+//!
+//! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
+//! padded with zeros from its data window to its display window. Embedded ICC profiles are not applied.
+//!
+//! Sizes are checked against [`Limits`] before anything is allocated, decoders that panic are caught, and truncated JPEGs,
+//! which decoders take for grey pictures, are refused. Files are written beside their place and moved there: whole or
+//! not at all.
+
+mod atomic;
+mod document;
+mod exif;
+pub mod exr;
+#[cfg(feature = "oiio")]
+mod ffi;
+mod format;
+mod hdr;
+mod header;
+mod jpeg;
+mod limits;
+#[cfg(feature = "oiio")]
+pub mod oiio;
+mod orient;
+mod png;
+mod raster;
+mod tiff;
+#[cfg(feature = "oiio")]
+mod worker;
+mod write;
+
+pub use atomic::create_folder;
+pub use document::{read_json, read_text, read_toml, write_json, write_text, write_toml};
+pub use format::Format;
+pub use header::Header;
+pub use limits::Limits;
+pub use raster::FromFile;
+#[cfg(feature = "oiio")]
+#[doc(hidden)]
+pub use worker::serve as serve_worker;
+pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
+
+use crate::{Error, Image, Result};
+use exif::CameraNotes;
+use format::Source;
+use raster::{Opaque, Raster, Refusal, Wanted};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// Reads a picture as the pixels asked for, with the default [`Limits`].
+///
+/// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is dropped. `PremulRgba` and
+/// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or its `A`, or its
+/// `Y`; `Depth` the only one, or `Z`, in float.
+///
+/// # Errors
+/// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the
+/// channels asked for.
+pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
+    read_with(path, &Limits::default())
+}
+
+/// Reads a picture as [`read`] does, under limits of the caller's.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with<P: FromFile>(path: impl AsRef<Path>, limits: &Limits) -> Result<Image<P>> {
+    let path = path.as_ref();
+    let source = Source::open(path, limits)?;
+    let raster = match caught(|| decode(&source, limits, P::WANTED)) {
+        Err(Refusal::Unsupported(what)) => elsewhere(path, &source, what, limits, P::WANTED)?,
+        decoded => decoded.map_err(|e| Error::file(path, e))?,
+    };
+    upright(&raster, &source).map_err(|e| Error::file(path, e))
+}
+
+/// Gives samples their meaning and turns the picture the way the camera was held.
+fn upright<P: FromFile>(raster: &Raster, source: &Source) -> std::result::Result<Image<P>, String> {
+    Ok(camera_notes(source).orientation.apply(P::from_raster(&Opaque(raster))?))
+}
+
+/// Reads what a file says about its picture, without the pixels.
+///
+/// # Errors
+/// [`Error::File`] as [`read`].
+pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
+    let (path, limits) = (path.as_ref(), Limits::default());
+    let source = Source::open(path, &limits)?;
+    let mut header = caught(|| header(&source, &limits)).map_err(|e| Error::file(path, e))?;
+    let notes = camera_notes(&source);
+    (header.width, header.height) = notes.orientation.size((header.width, header.height));
+    header.focal_35mm = notes.focal_35mm;
+    Ok(header)
+}
+
+/// What the camera noted; EXR and HDR have no place for it.
+fn camera_notes(source: &Source) -> CameraNotes {
+    match source.format {
+        Format::Jpeg | Format::Tiff | Format::Png => {
+            caught(|| Ok(CameraNotes::of_file(&source.bytes))).unwrap_or_default()
+        }
+        _ => CameraNotes::default(),
+    }
+}
+
+fn header(source: &Source, limits: &Limits) -> std::result::Result<Header, Refusal> {
+    match source.format {
+        Format::Exr => exr::header(&source.bytes, limits),
+        Format::Png => png::header(&source.bytes, limits),
+        Format::Jpeg => jpeg::header(&source.bytes, limits),
+        Format::Tiff => tiff::header(&source.bytes, limits),
+        Format::Hdr => hdr::header(&source.bytes, limits),
+        other => Err(Refusal::Unsupported(format!("{} headers are not read", other.name()))),
+    }
+}
+
+fn decode(source: &Source, limits: &Limits, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+    match source.format {
+        Format::Exr => exr::decode(&source.bytes, limits, wanted),
+        Format::Png => png::decode(&source.bytes, limits),
+        Format::Jpeg => jpeg::decode(&source.bytes, limits),
+        Format::Tiff => tiff::decode(&source.bytes, limits),
+        Format::Hdr => hdr::decode(&source.bytes, limits),
+        other => Err(Refusal::Unsupported(format!("{} needs OpenImageIO", other.name()))),
+    }
+}
+
+/// The last defence: a decoder that panics has met a damaged file.
+fn caught<T>(f: impl FnOnce() -> std::result::Result<T, Refusal>) -> std::result::Result<T, Refusal> {
+    catch_unwind(AssertUnwindSafe(f)).unwrap_or_else(|_| Err("damaged: the decoder gave up".into()))
+}
+
+/// Another decoder for what ours do not know.
+#[cfg(feature = "oiio")]
+fn elsewhere(path: &Path, source: &Source, _: String, limits: &Limits, wanted: Wanted) -> Result<Raster> {
+    let raster = worker::decode(path, source, limits, wanted).map_err(|e| Error::file(path, e))?;
+    Ok(oiio::associated(raster, source))
+}
+
+/// Without OpenImageIO there is no other decoder.
+#[cfg(not(feature = "oiio"))]
+fn elsewhere(path: &Path, _: &Source, what: String, _: &Limits, _: Wanted) -> Result<Raster> {
+    Err(Error::file(path, format!("{what} (petcomp was built without OpenImageIO)")))
+}

@@ -1,6 +1,8 @@
 //! Golden cases: every folder `golden/<stage>/<case>/` with a `case.toml` is one named test.
 
+mod camera;
 mod case;
+mod color;
 
 use case::Case;
 use libtest_mimic::{Arguments, Trial};
@@ -10,7 +12,10 @@ use std::path::Path;
 type Run = fn(&Case) -> Result<(), String>;
 
 /// The stages that have golden cases: folder name and runner.
-const STAGES: &[(&str, Run)] = &[];
+const STAGES: &[(&str, Run)] = &[
+    ("camera", camera::run),
+    ("color", color::run),
+];
 
 fn main() {
     let args = Arguments::from_args();

@@ -1,0 +1,142 @@
+//! Many photos into an asset folder, from a list.
+
+use super::folder::{AddPhoto, Scale, asset_of, read_or_new, write_photo};
+use super::manifest::under;
+use super::{DEFAULT_MASS, DEFAULT_THICKNESS, Manifest};
+use crate::error::{Error, Result};
+use crate::io;
+use crate::matte::CutOutOptions;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A list of photos: `photos.toml`.
+///
+/// ```toml
+/// [[photos]]
+/// file = "IMG_0001.jpg"       # relative to the list
+/// asset = "bottle_01"
+/// class = "cap"
+/// px_per_metre = 1966.7       # or: length = 0.265
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct List {
+    /// Names of the classes, where they are not the [default](super::default_classes) ones.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub classes: Vec<String>,
+    /// How the objects are cut out.
+    #[serde(default)]
+    pub cut_out: CutOutOptions,
+    /// The photos.
+    pub photos: Vec<ListedPhoto>,
+}
+
+/// A photo of a [`List`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ListedPhoto {
+    /// The photo, relative to the list.
+    pub file: String,
+    /// Name of the object.
+    pub asset: String,
+    /// Name of its class.
+    pub class: String,
+    /// Pixels of the photo for a metre.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub px_per_metre: Option<f64>,
+    /// Or: length of the object along its longest side, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<f64>,
+    /// Thickness, metres. Default: 0.005.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f64>,
+    /// Mass, kilograms. Default: 0.025.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+}
+
+/// What [`build`] did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Built {
+    /// Photos that were cut out.
+    pub photos: usize,
+    /// Assets in the folder.
+    pub assets: usize,
+}
+
+/// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is not there.
+///
+/// `progress` is called with the photos done and their number, at the start and after each photo, from several threads.
+/// What the folder already had stays; a photo that is there already is replaced. The manifest is written last, once all
+/// photos have succeeded, and does not depend on threads.
+///
+/// # Errors
+/// A list that cannot be read or be right (before any work, naming the entry); the first photo of the list that fails.
+pub fn build(
+    list: impl AsRef<Path>,
+    folder: impl AsRef<Path>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Built> {
+    let (path, folder) = (list.as_ref(), folder.as_ref());
+    let list: List = io::read_toml(path)?;
+    let mut manifest = read_or_new(folder)?;
+    let adds = list.adds(&mut manifest).map_err(|e| e.in_file(path))?;
+    let count = adds.len();
+    let done = AtomicUsize::new(0);
+    progress(0, count);
+    let at = path.parent().unwrap_or(Path::new(""));
+    let work = list.photos.par_iter().zip(&adds).map(|(photo, add)| {
+        let record = write_photo(folder, &at.join(&photo.file), add);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
+        record
+    });
+    let records: Vec<Result<_>> = work.collect();
+    for (i, (record, add)) in records.into_iter().zip(&adds).enumerate() {
+        let inserted = manifest.insert(asset_of(add, record?));
+        inserted.map_err(|e| under(e, &format!("photos[{i}]")).in_file(path))?;
+    }
+    manifest.write(folder)?;
+    Ok(Built { photos: count, assets: manifest.assets.len() })
+}
+
+impl List {
+    /// The photos with all that is known of them, checked against the folder's manifest.
+    fn adds(&self, manifest: &mut Manifest) -> Result<Vec<AddPhoto>> {
+        if !self.classes.is_empty() {
+            if !manifest.assets.is_empty() && manifest.classes != self.classes {
+                let what = format!("{:?}, but the folder has {:?}", self.classes, manifest.classes);
+                return Err(Error::value("classes", what));
+            }
+            manifest.classes.clone_from(&self.classes);
+        }
+        if self.photos.is_empty() {
+            return Err(Error::value("photos", "empty, expected at least one"));
+        }
+        let adds = self.photos.iter().enumerate().map(|(i, photo)| {
+            let add = photo.add(&self.cut_out).and_then(|add| add.check(manifest).map(|()| add));
+            add.map_err(|e| under(e, &format!("photos[{i}]")))
+        });
+        adds.collect()
+    }
+}
+
+impl ListedPhoto {
+    fn add(&self, options: &CutOutOptions) -> Result<AddPhoto> {
+        let scale = match (self.px_per_metre, self.length) {
+            (Some(scale), None) => Scale::PxPerMetre(scale),
+            (None, Some(length)) => Scale::Length(length),
+            (None, None) => return Err(Error::value("px_per_metre", "missing; expected it, or length")),
+            (Some(_), Some(_)) => return Err(Error::value("length", "expected either it or px_per_metre, not both")),
+        };
+        Ok(AddPhoto {
+            asset: self.asset.clone(),
+            class: self.class.clone(),
+            scale,
+            thickness: self.thickness.unwrap_or(DEFAULT_THICKNESS),
+            mass: self.mass.unwrap_or(DEFAULT_MASS),
+            options: options.clone(),
+        })
+    }
+}

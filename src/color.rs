@@ -1,1 +1,0 @@
-//! Colour: transfer curves, primaries, hue and saturation, exactly.

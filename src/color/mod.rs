@@ -1,0 +1,36 @@
+//! Colour: transfer curves, primaries, hue and saturation, exactly.
+//!
+//! The library works in scene-linear light with Rec. 709 primaries and white D65 ([`LinearRgb`]). Everything else is
+//! met at a border and converted there, once: display values by [`decode_srgb8`] and [`encode_srgb8`], other
+//! primaries by a [`ColorMatrix`], video by [`Ycbcr`].
+//!
+//! Curves are computed through the `libm` crate in `f64` and rounded once, never through the system's own `powf`: the
+//! same input gives the same bytes on every machine. Matrices are derived in `f64` from primaries and white points and
+//! stored as `f32`.
+
+mod hsv;
+mod quantize;
+mod space;
+mod transfer;
+mod ycbcr;
+
+pub use hsv::{Hsv, hsv_to_rgb, rgb_to_hsv, shift_hsv};
+pub use quantize::{
+    decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16, from_srgb8, to_srgb8,
+};
+pub use space::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, xyz_from_rgb};
+pub use transfer::{Curve, linear_to_srgb, srgb_to_linear};
+pub use ycbcr::{CodeRange, Ycbcr};
+
+use crate::pixel::LinearRgb;
+
+/// The colour `stops` exposure values brighter: times 2^stops.
+///
+/// ```
+/// use petcomp::{LinearRgb, color};
+/// assert_eq!(color::expose(LinearRgb::grey(0.25), 2.0), LinearRgb::WHITE);
+/// ```
+#[inline]
+pub fn expose(color: LinearRgb, stops: f32) -> LinearRgb {
+    color.scale(libm::exp2f(stops))
+}

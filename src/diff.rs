@@ -1,1 +1,0 @@
-//! Comparing two pictures the way `idiff` does.

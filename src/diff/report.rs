@@ -1,0 +1,278 @@
+//! What a comparison found, and what follows from it.
+
+use super::{Channels, Thresholds};
+use std::fmt;
+
+/// The outcome of a comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// No difference that matters.
+    Match,
+    /// Differences above the warning thresholds.
+    Warning,
+    /// Differences above the failure thresholds.
+    Failure,
+    /// Not pictures of the same size.
+    Incomparable,
+    /// A file could not be read; never the outcome of a comparison, here so that all exit codes stand in one place.
+    Unreadable,
+}
+
+impl Verdict {
+    /// The exit status of `idiff`: 0, 1, 2, 3, 4 in the order of the variants.
+    pub fn exit_code(self) -> u8 {
+        self as u8
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Match => "PASS",
+            Self::Warning => "WARNING",
+            Self::Failure => "FAILURE",
+            Self::Incomparable => "FAILURE: the pictures differ in size",
+            Self::Unreadable => "FAILURE: a picture cannot be read",
+        })
+    }
+}
+
+/// The statistics of a comparison and its verdict; [`Display`](fmt::Display) gives the lines that `idiff` prints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// What follows.
+    pub verdict: Verdict,
+    /// Mean absolute difference of all channels of all pixels; non-finite differences are left out.
+    pub mean_error: f64,
+    /// Root of the mean squared difference, likewise.
+    pub rms_error: f64,
+    /// Peak signal to noise ratio in decibels; the peak is the largest value of both pictures, at least 1.
+    pub psnr: f64,
+    /// The largest difference; infinite where a value is not finite in one picture only.
+    pub max_error: f64,
+    /// Where it is; `None` where nothing differs.
+    pub largest: Option<Largest>,
+    /// Number of pixels over the warning threshold.
+    pub warned: usize,
+    /// Number of pixels over the failure threshold.
+    pub failed: usize,
+    /// Number of pixels.
+    pub pixels: usize,
+    /// What it was held against.
+    pub thresholds: Thresholds,
+}
+
+/// The place of the largest difference, the first in reading order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Largest {
+    /// Column.
+    pub x: usize,
+    /// Row.
+    pub y: usize,
+    /// Name of the channel.
+    pub channel: &'static str,
+    /// All channels of the pixel in the first picture and in the second.
+    pub values: [Vec<f32>; 2],
+}
+
+impl Report {
+    /// Of pictures that differ in size.
+    pub(super) fn incomparable() -> Self {
+        let nothing = Self::from_tally(Tally::default(), &[], 0, &Thresholds::default());
+        Self { verdict: Verdict::Incomparable, ..nothing }
+    }
+
+    pub(super) fn new<P: Channels>(tally: Tally, pixels: usize, thresholds: &Thresholds) -> Self {
+        Self::from_tally(tally, P::NAMES, pixels, thresholds)
+    }
+
+    fn from_tally(tally: Tally, names: &[&'static str], pixels: usize, thresholds: &Thresholds) -> Self {
+        let values = (pixels * names.len()).max(1) as f64;
+        let rms_error = (tally.squares / values).sqrt();
+        Self {
+            verdict: tally.verdict(pixels, thresholds),
+            mean_error: tally.errors / values,
+            rms_error,
+            psnr: 20.0 * libm::log10(f64::from(tally.peak) / rms_error),
+            max_error: tally.max_error,
+            warned: tally.warned,
+            failed: tally.failed,
+            pixels,
+            thresholds: *thresholds,
+            largest: tally.largest.map(|[x, y, c]| Largest { x, y, channel: names[c], values: tally.values }),
+        }
+    }
+}
+
+/// Sums over a part of the pictures.
+#[derive(Debug)]
+pub(super) struct Tally {
+    errors: f64,
+    squares: f64,
+    peak: f32,
+    max_error: f64,
+    /// Column, row, channel.
+    largest: Option<[usize; 3]>,
+    values: [Vec<f32>; 2],
+    warned: usize,
+    failed: usize,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self {
+            errors: 0.0,
+            squares: 0.0,
+            peak: 1.0,
+            max_error: 0.0,
+            largest: None,
+            values: Default::default(),
+            warned: 0,
+            failed: 0,
+        }
+    }
+}
+
+impl Tally {
+    /// Adds the channels of one pixel of both pictures.
+    #[inline]
+    pub(super) fn add_pixel(&mut self, a: &[f32], b: &[f32], [x, y]: [usize; 2], thresholds: &Thresholds) {
+        let (mut warned, mut failed) = (false, false);
+        for (channel, (&u, &v)) in a.iter().zip(b).enumerate() {
+            let error = self.add_error(u, v);
+            if error > self.max_error {
+                self.max_error = error;
+                self.largest = Some([x, y, channel]);
+                self.values = [a.to_vec(), b.to_vec()];
+            }
+            // An infinite error has no magnitude to be a part of.
+            let relative = if error < f64::INFINITY { error / mean_magnitude(u, v) } else { error };
+            warned |= error > thresholds.warn.into() && relative > thresholds.warn_relative.into();
+            failed |= error > thresholds.fail.into() && relative > thresholds.fail_relative.into();
+        }
+        self.warned += usize::from(warned);
+        self.failed += usize::from(failed);
+    }
+
+    /// Adds one value of both pictures and gives their distance.
+    #[inline(always)]
+    fn add_error(&mut self, u: f32, v: f32) -> f64 {
+        if u == v || (u.is_nan() && v.is_nan()) {
+            if u.is_finite() {
+                self.peak = self.peak.max(u);
+            }
+            return 0.0;
+        }
+        if !(u.is_finite() && v.is_finite()) {
+            return f64::INFINITY;
+        }
+        self.peak = self.peak.max(u).max(v);
+        let error = f64::from((u - v).abs());
+        self.errors += error;
+        self.squares += error * error;
+        error
+    }
+
+    /// This part followed by the next in reading order.
+    pub(super) fn then(self, next: Self) -> Self {
+        let (largest, values, max_error) = if next.max_error > self.max_error {
+            (next.largest, next.values, next.max_error)
+        } else {
+            (self.largest, self.values, self.max_error)
+        };
+        Self {
+            errors: self.errors + next.errors,
+            squares: self.squares + next.squares,
+            peak: self.peak.max(next.peak),
+            warned: self.warned + next.warned,
+            failed: self.failed + next.failed,
+            max_error,
+            largest,
+            values,
+        }
+    }
+
+    fn verdict(&self, pixels: usize, t: &Thresholds) -> Verdict {
+        let over = |count: usize, percent: f32| count as f64 > f64::from(percent) / 100.0 * pixels as f64;
+        if self.failed <= t.allow_failures {
+            Verdict::Match
+        } else if over(self.failed, t.fail_percent) || self.max_error > t.hard_fail.into() {
+            Verdict::Failure
+        } else if over(self.warned, t.warn_percent) || self.max_error > t.hard_warn.into() {
+            Verdict::Warning
+        } else {
+            Verdict::Match
+        }
+    }
+}
+
+fn mean_magnitude(u: f32, v: f32) -> f64 {
+    0.5 * (f64::from(u.abs()) + f64::from(v.abs()))
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.verdict == Verdict::Incomparable {
+            return write!(f, "{}", self.verdict);
+        }
+        let short = |x| general(x, 6);
+        writeln!(f, "  Mean error = {}", short(self.mean_error))?;
+        writeln!(f, "  RMS error = {}", short(self.rms_error))?;
+        writeln!(f, "  Peak SNR = {}", short(self.psnr))?;
+        write!(f, "  Max error  = {}", short(self.max_error))?;
+        if let Some(at) = &self.largest {
+            let [a, b] = at.values.each_ref().map(|v| v.iter().map(f32::to_string).collect::<Vec<_>>().join(", "));
+            write!(f, " @ ({}, {}, {})  values are {a} vs {b}", at.x, at.y, at.channel)?;
+        }
+        writeln!(f)?;
+        for (count, threshold) in [(self.warned, self.thresholds.warn), (self.failed, self.thresholds.fail)] {
+            let percent = 100.0 * count as f64 / self.pixels.max(1) as f64;
+            writeln!(f, "  {count} pixels ({}%) over {}", general(percent, 3), short(threshold.into()))?;
+        }
+        write!(f, "{}", self.verdict)
+    }
+}
+
+/// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent where it is short.
+fn general(x: f64, digits: usize) -> String {
+    let scientific = format!("{x:.*e}", digits - 1);
+    let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific.to_lowercase() };
+    let exponent: i32 = exponent.parse().unwrap_or_default();
+    let trimmed =
+        |s: &str| if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').into() } else { s.to_string() };
+    if (-4..digits as i32).contains(&exponent) {
+        return trimmed(&format!("{x:.*}", (digits as i32 - 1 - exponent) as usize));
+    }
+    let sign = if exponent < 0 { '-' } else { '+' };
+    format!("{}e{sign}{:02}", trimmed(mantissa), exponent.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_c_writes_them() {
+        for (x, text) in [
+            (0.0, "0"),
+            (1e-6, "1e-06"),
+            (0.008_333_333, "0.00833333"),
+            (28.573_32, "28.5733"),
+            (120.0, "120"),
+            (1_234_567.0, "1.23457e+06"),
+            (-0.2, "-0.2"),
+            (999_999.7, "1e+06"),
+            (f64::INFINITY, "inf"),
+            (f64::NAN, "nan"),
+        ] {
+            assert_eq!(general(x, 6), text);
+        }
+        assert_eq!((general(16.6667, 3), general(100.0, 3)), ("16.7".into(), "100".into()));
+    }
+
+    #[test]
+    fn exit_codes_are_those_of_idiff() {
+        let all = [Verdict::Match, Verdict::Warning, Verdict::Failure, Verdict::Incomparable, Verdict::Unreadable];
+        assert_eq!(all.map(Verdict::exit_code), [0, 1, 2, 3, 4]);
+    }
+}

@@ -1,0 +1,133 @@
+//! Differences to look at.
+
+use super::Channels;
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+
+/// How much [`triple`] makes of a difference.
+const MAGNIFICATION: f32 = 16.0;
+/// Light behind a transparent pixel in [`triple`]: photographic middle grey, so that neither black nor white hides.
+const BACKDROP: f32 = 0.18;
+
+/// `(a - b) * scale` of every channel.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<P> {
+    combined(a, b, |u, v| (u - v) * scale)
+}
+
+/// `|a - b| * scale` of every channel, alpha too: a difference in colour alone is transparent.
+///
+/// # Panics
+/// When the sizes differ.
+pub fn absolute_difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<P> {
+    combined(a, b, |u, v| (u - v).abs() * scale)
+}
+
+fn combined<P: Channels>(a: &Image<P>, b: &Image<P>, f: impl Fn(f32, f32) -> f32 + Sync) -> Image<P> {
+    a.zip_map(b, |mut p, q| {
+        let values = bytemuck::cast_slice_mut::<P, f32>(std::slice::from_mut(&mut p));
+        for (u, &v) in values.iter_mut().zip(channels(&q)) {
+            *u = f(*u, v);
+        }
+        p
+    })
+}
+
+/// `expected | 16 times the difference | actual`, side by side, to be looked at as one picture.
+///
+/// Transparent pixels show middle grey. Differences of alpha are grey; where one picture is not a number and the other
+/// is, the difference is white. The sizes may differ: what one picture does not have is black.
+pub fn triple<P: Channels>(expected: &Image<P>, actual: &Image<P>) -> Image<LinearRgb> {
+    let width = expected.width().max(actual.width());
+    let height = expected.height().max(actual.height());
+    Image::from_fn(3 * width, height, |x, y| {
+        let [left, right] = [expected, actual].map(|image| pixel(image, x % width, y));
+        match x / width {
+            0 => left.as_ref().map_or(LinearRgb::BLACK, |p| shown(channels(p))),
+            1 => shown_difference(left.as_ref().map_or(&[], channels), right.as_ref().map_or(&[], channels)),
+            _ => right.as_ref().map_or(LinearRgb::BLACK, |p| shown(channels(p))),
+        }
+    })
+}
+
+fn pixel<P: Copy>(image: &Image<P>, x: usize, y: usize) -> Option<P> {
+    (x < image.width() && y < image.height()).then(|| image[(x, y)])
+}
+
+fn channels<P: Channels>(pixel: &P) -> &[f32] {
+    bytemuck::cast_slice(std::slice::from_ref(pixel))
+}
+
+/// A pixel over the backdrop.
+fn shown(values: &[f32]) -> LinearRgb {
+    match *values {
+        [r, g, b, a] => LinearRgb::new(r, g, b) + LinearRgb::grey(BACKDROP * (1.0 - a)),
+        [r, g, b] => LinearRgb::new(r, g, b),
+        [v] => LinearRgb::grey(v),
+        _ => LinearRgb::BLACK,
+    }
+}
+
+/// Colour by colour what differs; a missing pixel counts as zeros.
+fn shown_difference(a: &[f32], b: &[f32]) -> LinearRgb {
+    let value = |values: &[f32], c: usize| values.get(c).copied().unwrap_or(0.0);
+    let count = a.len().max(b.len());
+    let error = |c: usize| {
+        let (u, v) = (value(a, c), value(b, c));
+        let same = u == v || (u.is_nan() && v.is_nan());
+        if same {
+            0.0
+        } else if (u - v).is_nan() {
+            1.0
+        } else {
+            MAGNIFICATION * (u - v).abs()
+        }
+    };
+    match count {
+        0 => LinearRgb::BLACK,
+        1 => LinearRgb::grey(error(0)),
+        _ => LinearRgb::new(error(0), error(1), error(2)) + LinearRgb::grey(if count > 3 { error(3) } else { 0.0 }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::{Coverage, PremulRgba};
+
+    #[test]
+    fn a_difference_has_the_sign_of_the_first() {
+        let [a, b] = [0.25, 0.5].map(|v| Image::filled(2, 1, Coverage(v)));
+        assert_eq!(difference(&a, &b, 2.0), Image::filled(2, 1, Coverage(-0.5)));
+        assert_eq!(absolute_difference(&a, &b, 2.0), Image::filled(2, 1, Coverage(0.5)));
+    }
+
+    #[test]
+    fn three_pictures_stand_side_by_side() {
+        let [a, b] = [0.25, 0.375].map(|v| Image::filled(2, 1, Coverage(v)));
+        assert_eq!(triple(&a, &b).pixels(), [0.25, 0.25, 2.0, 2.0, 0.375, 0.375].map(LinearRgb::grey));
+    }
+
+    #[test]
+    fn a_difference_of_alpha_alone_is_seen() {
+        let [a, b] = [0.5, 0.25].map(|alpha| Image::filled(1, 1, PremulRgba::new(0.0, 0.0, 0.0, alpha)));
+        assert_eq!(triple(&a, &b)[(1, 0)], LinearRgb::grey(4.0));
+    }
+
+    #[test]
+    fn nan_in_one_picture_is_white_and_in_both_black() {
+        let [a, b] = [f32::NAN, 0.5].map(|v| Image::filled(1, 1, Coverage(v)));
+        assert_eq!(triple(&a, &b)[(1, 0)], LinearRgb::WHITE);
+        assert_eq!(triple(&a, &a)[(1, 0)], LinearRgb::BLACK);
+    }
+
+    #[test]
+    fn pictures_of_different_size_are_shown_all_the_same() {
+        let out = triple(&Image::filled(1, 2, Coverage(1.0)), &Image::filled(2, 1, Coverage(1.0)));
+        assert_eq!(out.size(), (6, 2));
+        assert_eq!((out[(0, 1)], out[(2, 1)]), (LinearRgb::WHITE, LinearRgb::grey(16.0)));
+        assert!(triple(&Image::<Coverage>::new(0, 0), &Image::new(0, 0)).is_empty());
+    }
+}

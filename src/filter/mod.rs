@@ -1,0 +1,20 @@
+//! Filters on pictures whose pixels may be averaged ([`Mix`](crate::Mix)), and on masks.
+//!
+//! One border rule for all: the window is cut off at the border and what is left of it is averaged (or, of a mask,
+//! looked at). No filter invents pixels outside the picture, so a constant picture stays constant. The exception is
+//! named for it: [`sample_bilinear`], which takes the outside for empty.
+//!
+//! Every filter takes a picture of any size, the empty one included, and gives the same bits at any thread count.
+
+mod blur;
+mod morphology;
+mod pyramid;
+mod resize;
+mod sample;
+mod separable;
+
+pub use blur::{box_blur, gaussian_blur};
+pub use morphology::{dilate, erode};
+pub use pyramid::{Pyramid, expand, halve, reduce};
+pub use resize::resize;
+pub use sample::{sample_bilinear, sample_bilinear_clamped, sample_nearest};

@@ -1,0 +1,177 @@
+//! Pictures at half the size, and half of that: plain averages, and the binomial kernel of Laplacian pyramids.
+
+use super::separable::{Taps, filter};
+use crate::image::Image;
+use crate::pixel::Mix;
+use std::sync::OnceLock;
+
+/// A picture at half the size, and half of that, down to one pixel; levels are made when they are first asked for.
+///
+/// Each level is the 2 x 2 average of the one before ([`halve`]).
+#[derive(Debug, Default)]
+pub struct Pyramid<P> {
+    base: Image<P>,
+    halves: Vec<OnceLock<Image<P>>>,
+}
+
+impl<P: Mix> Pyramid<P> {
+    /// A pyramid over a picture; no level but the first exists yet.
+    pub fn new(base: Image<P>) -> Self {
+        let longest = base.width().max(base.height()).max(1);
+        let count = longest.next_power_of_two().trailing_zeros() as usize;
+        Self { base, halves: (0..count).map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The full picture.
+    pub fn base(&self) -> &Image<P> {
+        &self.base
+    }
+
+    /// Number of levels, the full picture included.
+    pub fn levels(&self) -> usize {
+        self.halves.len() + 1
+    }
+
+    /// The picture halved `level` times; the smallest there is for a larger `level`.
+    pub fn level(&self, level: usize) -> &Image<P> {
+        let Some(n) = level.min(self.halves.len()).checked_sub(1) else { return &self.base };
+        if let Some(half) = self.halves[n].get() {
+            return half;
+        }
+        // Halved before the cell is locked: the work is parallel, and a thread that waits for its parts may be handed
+        // a task that asks for this very level.
+        let half = halve(self.level(n));
+        self.halves[n].get_or_init(|| half)
+    }
+}
+
+/// A picture of half the size, each pixel the mean of the (up to) four it covers; odd sizes round up.
+pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
+    let taps = |len: usize| lines(len.div_ceil(2), |i| Taps::new(2 * i..2 * i + 2, len, |_| 1.0));
+    filter(image, &taps(image.width()), &taps(image.height()))
+}
+
+/// A picture of half the size, smoothed by the binomial kernel (1 4 6 4 1)/16; odd sizes round up.
+///
+/// Pixel `i` of the small picture lies on pixel `2 i` of the large one: sample positions, unlike those of [`halve`],
+/// do not lie in the middle of what they cover.
+///
+/// # Method
+/// REDUCE of [Burt and Adelson 1983] with a = 3/8. Departs from it at the border, where the window is cut off.
+///
+/// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
+pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
+    let taps = |len: usize| lines(len.div_ceil(2), |i| Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i)));
+    filter(image, &taps(image.width()), &taps(image.height()))
+}
+
+/// The way back from [`reduce`]: a smooth picture of `width` x `height` through the pixels of one of half that size.
+///
+/// A picture minus the expansion of its reduction is a level of its Laplacian pyramid.
+///
+/// # Method
+/// EXPAND of [Burt and Adelson 1983] with a = 3/8: the small picture's pixels set apart by zeros and smoothed.
+///
+/// # Panics
+/// When `width` x `height` is not a size that [`reduce`] takes to that of `image`.
+///
+/// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
+pub fn expand<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P> {
+    let half = (width.div_ceil(2), height.div_ceil(2));
+    assert_eq!(image.size(), half, "not half of {width} x {height}");
+    let taps = |from, to| lines(to, |i| Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i)));
+    filter(image, &taps(half.0, width), &taps(half.1, height))
+}
+
+/// The taps of every sample of a line.
+fn lines(len: usize, taps: impl Fn(isize) -> Taps) -> Vec<Taps> {
+    (0..len as isize).map(taps).collect()
+}
+
+/// (1 4 6 4 1), 0 outside.
+fn binomial(offset: isize) -> f64 {
+    match offset.unsigned_abs() {
+        0 => 6.0,
+        1 => 4.0,
+        2 => 1.0,
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::Coverage;
+
+    fn noise(width: usize, height: usize) -> Image<Coverage> {
+        Image::from_fn(width, height, |x, y| Coverage(((x * 7919 + y * 104_729) % 101) as f32 / 100.0))
+    }
+
+    #[test]
+    fn halving_keeps_a_constant() {
+        let half = halve(&Image::filled(7, 5, Coverage(0.25)));
+        assert_eq!(half, Image::filled(4, 3, Coverage(0.25)));
+    }
+
+    #[test]
+    fn halving_averages_what_is_there() {
+        let img = Image::from_vec(3, 1, [1.0, 3.0, 8.0].map(Coverage).to_vec());
+        assert_eq!(halve(&img).pixels(), [Coverage(2.0), Coverage(8.0)]);
+    }
+
+    #[test]
+    fn a_pyramid_ends_in_one_pixel() {
+        let pyramid = Pyramid::new(Image::filled(9, 4, Coverage(1.0)));
+        assert_eq!(pyramid.level(pyramid.levels() - 1).size(), (1, 1));
+        assert_eq!(pyramid.level(99).size(), (1, 1));
+    }
+
+    #[test]
+    fn an_empty_pyramid_has_one_empty_level() {
+        let pyramid = Pyramid::new(Image::<Coverage>::new(0, 0));
+        assert!(pyramid.levels() == 1 && pyramid.level(5).is_empty());
+    }
+
+    #[test]
+    fn reducing_weighs_by_the_binomial_kernel() {
+        let dot = Image::from_fn(9, 1, |x, _| Coverage(if x == 4 { 16.0 } else { 0.0 }));
+        let near = |a: f32, b: f32| (a - b).abs() < 1e-6;
+        let out = reduce(&dot);
+        assert!(near(out[(1, 0)].0, 1.0) && near(out[(2, 0)].0, 6.0) && near(out[(3, 0)].0, 1.0));
+    }
+
+    #[test]
+    fn reducing_and_expanding_keep_a_constant() {
+        for (w, h) in [(1, 1), (2, 3), (9, 6), (16, 16)] {
+            let img = Image::filled(w, h, Coverage(0.7));
+            let back = expand(&reduce(&img), w, h);
+            assert!(back.pixels().iter().all(|c| (c.0 - 0.7).abs() < 1e-6), "{w} x {h}");
+        }
+    }
+
+    #[test]
+    fn expanding_keeps_a_ramp_away_from_the_border() {
+        let ramp = Image::from_fn(20, 1, |x, _| Coverage(x as f32));
+        let out = expand(&ramp, 40, 1);
+        assert!((2..38).all(|x| (out[(x, 0)].0 - 0.5 * x as f32).abs() < 1e-5));
+    }
+
+    #[test]
+    fn a_laplacian_level_holds_the_detail_and_only_that() {
+        let detail = |img: &Image<Coverage>| {
+            let smooth = expand(&reduce(img), img.width(), img.height());
+            img.zip_map(&smooth, |a, b| a.0 - b.0)
+        };
+        let mean = |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>() / values.len() as f32;
+        let wave = Image::from_fn(64, 48, |x, y| Coverage(libm::sinf(0.05 * x as f32) * libm::cosf(0.07 * y as f32)));
+        assert!(mean(detail(&wave).pixels()) < 0.01, "a smooth picture has hardly any");
+        assert!(mean(detail(&noise(64, 48)).pixels()) > 0.1, "noise is little else");
+    }
+
+    #[test]
+    fn empty_pictures_survive() {
+        let empty = Image::<Coverage>::new(0, 5);
+        assert_eq!((halve(&empty).size(), reduce(&empty).size()), ((0, 3), (0, 3)));
+        assert!(expand(&reduce(&empty), 0, 5).is_empty());
+    }
+}

@@ -1,0 +1,108 @@
+//! Values between pixels.
+
+use crate::image::Image;
+use crate::pixel::Mix;
+
+/// The bilinear value at `(x, y)` in pixels, taking everything outside the picture for empty (black and transparent).
+///
+/// Pixel `(i, j)` has its centre at `(i + 0.5, j + 0.5)`, where its own value is returned. Towards the outside the
+/// outermost half pixel fades, and half a pixel further out all is 0. A position that is not finite gives 0.
+#[inline]
+pub fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
+    let at = |i: isize, j: isize| {
+        let inside = (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j);
+        if inside { image[(i as usize, j as usize)] } else { P::default() }
+    };
+    bilinear(at, x, y)
+}
+
+/// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel inside; 0 in an empty
+/// picture and at a position that is not finite.
+#[inline]
+pub fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
+    if image.is_empty() {
+        return P::default();
+    }
+    bilinear(|i, j| image.nearest(i, j), x, y)
+}
+
+/// The pixel whose square holds `(x, y)`, for pixels of any kind; `None` outside the picture.
+#[inline]
+pub fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Option<P> {
+    let inside = (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
+    inside.then(|| image[(x as usize, y as usize)])
+}
+
+#[inline(always)]
+fn bilinear<P: Mix>(at: impl Fn(isize, isize) -> P, x: f64, y: f64) -> P {
+    if !(x.is_finite() && y.is_finite()) {
+        return P::default();
+    }
+    let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
+    let (u, v) = ((x - 0.5 - left) as f32, (y - 0.5 - top) as f32);
+    // Far beyond any picture, so that the next pixel still has a number.
+    let [i, j] = [left, top].map(|edge| edge.clamp(-1e15, 1e15) as isize);
+    P::default()
+        .add_scaled((1.0 - u) * (1.0 - v), at(i, j))
+        .add_scaled(u * (1.0 - v), at(i + 1, j))
+        .add_scaled((1.0 - u) * v, at(i, j + 1))
+        .add_scaled(u * v, at(i + 1, j + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::{Coverage, ObjectId};
+
+    fn plane() -> Image<Coverage> {
+        Image::from_fn(6, 4, |x, y| Coverage(x as f32 + 10.0 * y as f32))
+    }
+
+    #[test]
+    fn a_pixel_centre_gives_the_pixel() {
+        let img = plane();
+        assert_eq!(sample_bilinear(&img, 2.5, 1.5), img[(2, 1)]);
+        assert_eq!(sample_bilinear_clamped(&img, 5.5, 3.5), img[(5, 3)]);
+    }
+
+    #[test]
+    fn a_plane_is_sampled_exactly() {
+        let value = sample_bilinear(&plane(), 2.75, 2.0).0;
+        assert!((value - (2.25 + 15.0)).abs() < 1e-5, "{value}");
+    }
+
+    #[test]
+    fn the_outside_is_empty_and_the_border_fades() {
+        let img = Image::filled(3, 3, Coverage(1.0));
+        assert_eq!(sample_bilinear(&img, 0.0, 1.5), Coverage(0.5));
+        assert_eq!(sample_bilinear(&img, 0.0, 0.0), Coverage(0.25));
+        assert_eq!(sample_bilinear(&img, -0.5, 1.5), Coverage(0.0));
+        assert_eq!(sample_bilinear(&img, 3.5, 1.5), Coverage(0.0));
+    }
+
+    #[test]
+    fn clamped_the_border_goes_on() {
+        let img = plane();
+        assert_eq!(sample_bilinear_clamped(&img, -7.0, 1.5), img[(0, 1)]);
+        assert_eq!(sample_bilinear_clamped(&img, 1e300, 1e300), img[(5, 3)]);
+    }
+
+    #[test]
+    fn strange_positions_and_empty_pictures_give_nothing() {
+        let img = plane();
+        for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(sample_bilinear(&img, x, 1.0), Coverage(0.0));
+            assert_eq!(sample_bilinear_clamped(&img, 1.0, x), Coverage(0.0));
+        }
+        assert_eq!(sample_bilinear(&img, -1e300, 0.0), Coverage(0.0));
+        assert_eq!(sample_bilinear_clamped(&Image::<Coverage>::new(0, 0), 1.0, 1.0), Coverage(0.0));
+    }
+
+    #[test]
+    fn identifiers_are_picked_never_mixed() {
+        let ids = Image::from_fn(2, 1, |x, _| ObjectId(x as u32 + 1));
+        assert_eq!(sample_nearest(&ids, 0.99, 0.5), Some(ObjectId(1)));
+        assert_eq!(sample_nearest(&ids, 1.0, 0.5), Some(ObjectId(2)));
+        assert_eq!(sample_nearest(&ids, 2.0, 0.5), None);
+    }
+}

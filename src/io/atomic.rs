@@ -1,0 +1,74 @@
+//! Whole files or none: everything is written beside its place and then moved there.
+
+use super::format::reason;
+use crate::{Error, Result};
+use std::fs::Permissions;
+use std::io::Write;
+use std::path::Path;
+
+/// Writes a file in one step: readers see the old one or the new one, never a part.
+pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = |e: std::io::Error| Error::file(path, format!("cannot be written: {}", reason(&e)));
+    if path.is_dir() {
+        return Err(Error::file(path, "cannot be written: is a folder"));
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = new_beside(folder).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::file(path, format!("cannot be written: no folder {}", folder.display())),
+        _ => failed(e),
+    })?;
+    file.write_all(bytes).map_err(failed)?;
+    file.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
+/// A new file that vanishes if it is not moved to its place, readable like any other file of the user.
+fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".petcomp-").suffix(".tmp");
+    #[cfg(unix)]
+    builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// Makes a folder, and those above it; one that is there already is fine.
+///
+/// # Errors
+/// [`Error::File`] where a file is in the way or the folder may not be made.
+pub fn create_folder(path: impl AsRef<Path>) -> Result<()> {
+    let path = path.as_ref();
+    if let Some(file) = path.ancestors().find(|p| p.is_file()) {
+        return Err(Error::file(file, "is a file, expected a folder"));
+    }
+    std::fs::create_dir_all(path).map_err(|e| Error::file(path, format!("cannot be made: {}", reason(&e))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = dir.path().join("folder");
+        create_folder(&place).unwrap();
+        assert!(write_bytes(&place, b"x").unwrap_err().to_string().contains("is a folder"));
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_file_in_the_way_of_a_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("out");
+        write_bytes(&file, b"x").unwrap();
+        let e = create_folder(file.join("labels")).unwrap_err().to_string();
+        assert!(e.ends_with("out: is a file, expected a folder"), "{e}");
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let e = write_bytes(&dir.path().join("no/x.png"), b"x").unwrap_err().to_string();
+        assert!(e.contains("no folder"), "{e}");
+    }
+}

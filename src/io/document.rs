@@ -1,0 +1,232 @@
+//! Documents: TOML and JSON in, with the place of a mistake; text out, whole or not at all.
+
+use super::atomic::write_bytes;
+use super::format::read_regular;
+use crate::{Error, Result};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// Larger documents are not written by hand nor by petcomp.
+const MOST_BYTES: u64 = 64 << 20;
+
+/// Reads a TOML document.
+///
+/// # Errors
+/// [`Error::File`] for a file that cannot be read or is not TOML; [`Error::Field`] for a value that does not fit, with
+/// the key that was probably meant where one is unknown.
+pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
+}
+
+/// Reads a JSON document.
+///
+/// # Errors
+/// As [`read_toml`].
+pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    parse_json(&read_text(path)?).map_err(|e| e.in_file(path))
+}
+
+/// Reads a text file.
+///
+/// # Errors
+/// [`Error::File`] for a file that is missing, not regular, larger than 64 MiB or not UTF-8.
+pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
+    let path = path.as_ref();
+    let bytes = read_regular(path, MOST_BYTES, "text file")?;
+    String::from_utf8(bytes).map_err(|_| Error::file(path, "not text (UTF-8)"))
+}
+
+/// Writes a document as TOML.
+///
+/// # Errors
+/// [`Error::File`] where TOML cannot say it or the file cannot be written.
+pub fn write_toml<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
+    let path = path.as_ref();
+    write_text(path, &toml::to_string_pretty(value).map_err(|e| Error::file(path, one_line(&e.to_string())))?)
+}
+
+/// Writes a document as indented JSON.
+///
+/// # Errors
+/// [`Error::File`] where JSON cannot say it or the file cannot be written.
+pub fn write_json<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
+    let path = path.as_ref();
+    let text = serde_json::to_string_pretty(value).map_err(|e| Error::file(path, e))?;
+    write_text(path, &(text + "\n"))
+}
+
+/// Writes a text file.
+///
+/// # Errors
+/// [`Error::File`] where it cannot be written.
+pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
+    write_bytes(path.as_ref(), text.as_bytes())
+}
+
+fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+    let mistake = |e: toml::de::Error, at: String| {
+        let line = e.span().map(|span| line_of(text, span.start));
+        Mistake { at, line, what: e.message().into() }.into_error()
+    };
+    let document = toml::Deserializer::parse(text).map_err(|e| mistake(e, String::new()))?;
+    serde_path_to_error::deserialize(document).map_err(|e| {
+        let at = e.path().to_string();
+        mistake(e.into_inner(), at)
+    })
+}
+
+fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+    let mistake = |e: &serde_json::Error, at: String| {
+        let said = e.to_string();
+        let what = said.split(" at line ").next().unwrap_or_default().into();
+        Mistake { at, line: Some(e.line()), what }.into_error()
+    };
+    let mut document = serde_json::Deserializer::from_str(text);
+    let value =
+        serde_path_to_error::deserialize(&mut document).map_err(|e| mistake(e.inner(), e.path().to_string()))?;
+    document.end().map_err(|e| mistake(&e, String::new()))?;
+    Ok(value)
+}
+
+fn line_of(text: &str, byte: usize) -> usize {
+    text.bytes().take(byte).filter(|&b| b == b'\n').count() + 1
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// What a parser did not like, and where.
+struct Mistake {
+    /// Path of the field; empty or `.` for the document itself.
+    at: String,
+    line: Option<usize>,
+    what: String,
+}
+
+impl Mistake {
+    fn into_error(self) -> Error {
+        let unknown = unknown_key(&self.what);
+        let what = match (&unknown, missing_key(&self.what)) {
+            (Some((_, what)), _) => what.clone(),
+            (None, Some(key)) => format!("missing key \"{key}\""),
+            (None, None) => one_line(&self.what),
+        };
+        let mut at = self.at.as_str();
+        if let Some((key, _)) = &unknown {
+            // The path of an unknown key ends with the key itself, which the message names anyway.
+            at = at.strip_suffix(key.as_str()).map_or(at, |front| front.trim_end_matches('.'));
+        }
+        let line = self.line.map_or(String::new(), |n| format!("line {n}"));
+        match (at, line.as_str()) {
+            ("" | "." | "?", "") => Error::value("document", what),
+            ("" | "." | "?", line) => Error::value(line, what),
+            (at, _) => Error::value(at, what),
+        }
+    }
+}
+
+/// The key and our message, from serde's "unknown field `cuont`, expected one of `count`, `size`".
+fn unknown_key(said: &str) -> Option<(String, String)> {
+    let rest = said.strip_prefix("unknown field ")?;
+    let mut quoted = rest.split('`').skip(1).step_by(2);
+    let key = quoted.next()?;
+    let known: Vec<&str> = quoted.collect();
+    Some((key.into(), format!("unknown key \"{key}\", {}", suggestion(key, &known))))
+}
+
+fn missing_key(said: &str) -> Option<&str> {
+    said.strip_prefix("missing field `")?.strip_suffix('`')
+}
+
+/// Share of letters that agree from which a key is taken for a slip of the finger.
+const SIMILAR: f64 = 0.5;
+
+fn suggestion(key: &str, known: &[&str]) -> String {
+    let likeness = |candidate: &&&str| strsim::damerau_levenshtein(key, candidate);
+    let nearest = known.iter().min_by_key(likeness);
+    match nearest {
+        None => "expected none".into(),
+        Some(near) if strsim::normalized_damerau_levenshtein(key, near) >= SIMILAR => {
+            format!("did you mean \"{near}\"?")
+        }
+        Some(_) => format!("expected one of {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "only read by serde")]
+    struct Recipe {
+        seed: u64,
+        objects: Objects,
+        #[serde(default)]
+        lights: Vec<Objects>,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "only read by serde")]
+    struct Objects {
+        count: u32,
+        size_m: Option<f64>,
+    }
+
+    fn toml(text: &str) -> String {
+        parse_toml::<Recipe>(text).unwrap_err().in_file("recipe.toml").to_string()
+    }
+
+    fn json(text: &str) -> String {
+        parse_json::<Recipe>(text).unwrap_err().in_file("recipe.json").to_string()
+    }
+
+    #[test]
+    fn an_unknown_key_is_met_with_the_one_that_was_meant() {
+        let expected = "objects: unknown key \"cuont\", did you mean \"count\"?";
+        assert_eq!(toml("seed = 1\n[objects]\ncuont = 3\n"), format!("recipe.toml: {expected}"));
+        assert_eq!(json(r#"{"seed": 1, "objects": {"cuont": 3}}"#), format!("recipe.json: {expected}"));
+        assert_eq!(
+            toml("seed = 1\n[objects]\ncount = 3\n[[lights]]\ncount = 1\ncolour = 2"),
+            "recipe.toml: lights[0]: unknown key \"colour\", expected one of count, size_m"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_at_the_top_names_its_line() {
+        assert_eq!(toml("\nseeed = 1\n"), "recipe.toml: line 2: unknown key \"seeed\", did you mean \"seed\"?");
+    }
+
+    #[test]
+    fn a_value_of_the_wrong_kind_is_named_with_its_field() {
+        let expected = "objects.count: invalid type: string \"three\", expected u32";
+        assert_eq!(toml("seed = 1\n[objects]\ncount = \"three\""), format!("recipe.toml: {expected}"));
+        assert_eq!(json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}"), format!("recipe.json: {expected}"));
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        assert_eq!(toml("seed = 1\n[objects]\n"), "recipe.toml: objects: missing key \"count\"");
+    }
+
+    #[test]
+    fn broken_syntax_is_one_line_with_a_line_number() {
+        let e = toml("seed = 1\nobjects = [");
+        assert!(e.starts_with("recipe.toml: line 2: ") && !e.contains('\n'), "{e}");
+        let e = json("{\"seed\": 1,\n x}");
+        assert!(e.starts_with("recipe.json: line 2: ") && !e.contains('\n'), "{e}");
+        assert!(json("{} {}").contains("missing key") || json("{} {}").contains("line"));
+    }
+
+    #[test]
+    fn a_missing_document_says_so() {
+        assert_eq!(read_toml::<Recipe>("no/x.toml").unwrap_err().to_string(), "no/x.toml: no such file");
+    }
+}

@@ -1,0 +1,332 @@
+//! OpenEXR: scene-linear half or float in named channels, premultiplied alpha, text attributes.
+//!
+//! The header is read and checked first: the decoder allocates what a header asks for, and an allocation that fails
+//! cannot be caught.
+
+use super::atomic::write_bytes;
+use super::header::{Header, Notes};
+use super::limits::{Demand, Limits, at_most};
+use super::raster::{Raster, Refusal, Samples, Wanted};
+use super::{Compression, Format, Source};
+use crate::{Error, Result};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, IntegerBounds, Layer, LayerAttributes, MetaData, ReadChannels,
+    ReadLayers, Text, Vec2, WritableImage, f16,
+};
+use half::slice::HalfFloatSliceExt;
+use std::io::Cursor;
+use std::path::Path;
+
+type Part = Layer<AnyChannels<FlatSamples>>;
+
+impl From<exr::error::Error> for Refusal {
+    fn from(e: exr::error::Error) -> Self {
+        match e {
+            exr::error::Error::NotSupported(what) => Self::Unsupported(format!("unsupported EXR: {what}")),
+            exr::error::Error::Io(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+                Self::Broken("truncated EXR".into())
+            }
+            e => Self::Broken(format!("damaged EXR: {e}")),
+        }
+    }
+}
+
+/// A channel of an EXR file by its full name, cropped or padded to the display window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// `R`, `diffuse.G`, `Z`, ...
+    pub name: String,
+    /// Samples row by row from the top, as many as the picture has pixels.
+    pub samples: Vec<f32>,
+}
+
+/// Writes float channels under names of their own, zip-compressed, with text attributes.
+///
+/// `size` is width and height; every channel has `width * height` samples, row by row from the top. Names may hold a
+/// layer: `diffuse.R`.
+///
+/// # Errors
+/// [`Error::File`] for a channel of another size, a name twice, or a file that cannot be written.
+pub fn write_channels(
+    path: impl AsRef<Path>,
+    size: (usize, usize),
+    channels: &[(&str, &[f32])],
+    metadata: &[(String, String)],
+) -> Result<()> {
+    let path = path.as_ref();
+    let planes = channels.iter().map(|&(name, samples)| (name, FlatSamples::F32(samples.to_vec()))).collect();
+    let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
+    write_bytes(path, &bytes)
+}
+
+/// Reads every channel of the first part of an EXR file, and the picture's size.
+///
+/// # Errors
+/// [`Error::File`] for a file that cannot be opened, is not an EXR, is damaged or goes beyond the default [`Limits`].
+pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Channel>)> {
+    let (path, limits) = (path.as_ref(), Limits::default());
+    let source = Source::open(path, &limits)?;
+    if source.format != Format::Exr {
+        return Err(Error::file(path, format!("is {}, expected an EXR", source.format.name())));
+    }
+    let read = || -> std::result::Result<_, Refusal> {
+        let file = read_parts(&source.bytes, &limits)?;
+        let part = file.parts.first().ok_or("no part with pixels")?;
+        let channels = part.channel_data.list.iter().map(|c| {
+            let names = vec![c.name.to_string()];
+            let samples = interleaved(part, &[&c.sample_data], file.window);
+            Channel { name: names[0].clone(), samples }
+        });
+        Ok((size_of(file.window), channels.collect()))
+    };
+    super::caught(read).map_err(|e| Error::file(path, e))
+}
+
+/// The parts that hold flat pixels, and the window they are all shown in.
+struct Parts {
+    parts: Vec<Part>,
+    window: IntegerBounds,
+}
+
+fn size_of(window: IntegerBounds) -> (usize, usize) {
+    (window.size.x(), window.size.y())
+}
+
+/// The headers alone, checked against the limits: data and display window of every part, and their sum.
+fn check(bytes: &[u8], limits: &Limits) -> std::result::Result<MetaData, Refusal> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+    at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
+    let mut total = 0_u64;
+    for header in &meta.headers {
+        let channels = header.channels.list.len() as u64;
+        let bytes_per_pixel = header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample() as u64).sum();
+        for size in [header.layer_size, header.shared_attributes.display_window.size] {
+            let (width, height, file_bytes) = (size.x() as u64, size.y() as u64, bytes.len() as u64);
+            limits.check(Demand { width, height, channels, bytes_per_pixel, file_bytes })?;
+        }
+        total += header.layer_size.area() as u64 * bytes_per_pixel;
+    }
+    at_most(total, limits.decoded_bytes, "decoded bytes", "decoded_bytes")?;
+    if meta.headers.iter().any(|h| h.deep) {
+        return Err(Refusal::Unsupported("deep EXR, expected flat pixels".into()));
+    }
+    Ok(meta)
+}
+
+fn read_parts(bytes: &[u8], limits: &Limits) -> std::result::Result<Parts, Refusal> {
+    check(bytes, limits)?;
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))?;
+    Ok(Parts { parts: image.layer_data.into_vec(), window: image.attributes.display_window })
+}
+
+pub(super) fn header(bytes: &[u8], limits: &Limits) -> std::result::Result<Header, Refusal> {
+    let meta = check(bytes, limits)?;
+    let first = meta.headers.first().ok_or("no part with pixels")?;
+    let (width, height) = size_of(first.shared_attributes.display_window);
+    let list = &first.channels.list;
+    Ok(Header {
+        format: Format::Exr,
+        width,
+        height,
+        channels: in_usual_order(list.iter().map(|c| c.name.to_string()).collect()),
+        bits: list.iter().map(|c| 8 * c.sample_type.bytes_per_sample() as u32).max().unwrap_or(0),
+        focal_35mm: None,
+        metadata: texts(first),
+    })
+}
+
+/// `R G B A` first, the rest by name.
+fn in_usual_order(mut names: Vec<String>) -> Vec<String> {
+    names.sort_by_key(|n| ("RGBA".find(n.as_str()).filter(|_| n.len() == 1).unwrap_or(4), n.clone()));
+    names
+}
+
+fn texts(header: &exr::meta::header::Header) -> Notes {
+    use exr::meta::attribute::AttributeValue;
+    let all = header.own_attributes.other.iter().chain(&header.shared_attributes.other);
+    let mut notes: Notes = all
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+            _ => None,
+        })
+        .collect();
+    notes.sort();
+    notes
+}
+
+/// The wanted channels of the first part that has them.
+pub(super) fn decode(bytes: &[u8], limits: &Limits, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+    let Parts { parts, window } = read_parts(bytes, limits)?;
+    let mut refused = "no part with pixels".to_string();
+    for part in &parts {
+        let names: Vec<String> = part.channel_data.list.iter().map(|c| c.name.to_string()).collect();
+        let picked = match wanted.pick(&names) {
+            Ok(mut picked) => {
+                picked.dedup();
+                picked
+            }
+            Err(e) => {
+                refused = e;
+                continue;
+            }
+        };
+        let planes: Vec<_> = picked.iter().map(|&i| &part.channel_data.list[i].sample_data).collect();
+        let (width, height) = size_of(window);
+        return Ok(Raster {
+            width,
+            height,
+            names: picked.iter().map(|&i| names[i].clone()).collect(),
+            samples: Samples::F32(interleaved(part, &planes, window)),
+            display_encoded: false,
+            premultiplied: true,
+        });
+    }
+    Err(Refusal::Broken(refused))
+}
+
+/// Planes of a part side by side, cut or padded with zeros from its data window to the display window.
+fn interleaved(part: &Part, planes: &[&FlatSamples], window: IntegerBounds) -> Vec<f32> {
+    let ((width, height), n) = (size_of(window), planes.len());
+    let mut out = vec![0.0; width * height * n];
+    let shift = |at: i32, origin: i32| i64::from(at) - i64::from(origin);
+    let (left, top) = (
+        shift(part.attributes.layer_position.x(), window.position.x()),
+        shift(part.attributes.layer_position.y(), window.position.y()),
+    );
+    let columns = overlap(left, part.size.x(), width);
+    for (c, plane) in planes.iter().enumerate() {
+        let samples = to_f32(plane);
+        for y in overlap(top, part.size.y(), height) {
+            let row = &samples[(y as i64 - top) as usize * part.size.x()..][..part.size.x()];
+            for x in columns.clone() {
+                out[(y * width + x) * n + c] = row[(x as i64 - left) as usize];
+            }
+        }
+    }
+    out
+}
+
+/// The part of `0..shown` that a run of `length` samples starting at `start` covers.
+pub(super) fn overlap(start: i64, length: usize, shown: usize) -> std::ops::Range<usize> {
+    let clip = |v: i64| v.clamp(0, shown as i64) as usize;
+    clip(start)..clip(start + length as i64)
+}
+
+/// Halves are converted here: asking the decoder for floats takes five times as long.
+fn to_f32(plane: &FlatSamples) -> Vec<f32> {
+    match plane {
+        FlatSamples::F16(v) => v.to_f32_vec(),
+        FlatSamples::F32(v) => v.clone(),
+        FlatSamples::U32(v) => v.iter().map(|&x| x as f32).collect(),
+    }
+}
+
+/// Floats as halves, rounded to nearest.
+pub(super) fn halves(samples: &[f32]) -> FlatSamples {
+    let mut out = vec![f16::ZERO; samples.len()];
+    half::slice::HalfFloatSliceExt::convert_from_f32_slice(out.as_mut_slice(), samples);
+    FlatSamples::F16(out)
+}
+
+pub(super) fn floats(samples: Vec<f32>) -> FlatSamples {
+    FlatSamples::F32(samples)
+}
+
+/// A whole file; the same input gives the same bytes.
+pub(super) fn encode(
+    (width, height): (usize, usize),
+    planes: Vec<(&str, FlatSamples)>,
+    compression: Compression,
+    metadata: &[(String, String)],
+) -> std::result::Result<Vec<u8>, String> {
+    let text = |s: &str| Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"));
+    let mut list = exr::prelude::SmallVec::new();
+    for (name, samples) in planes {
+        if samples.len() != width * height {
+            return Err(format!("channel {name}: {} samples, expected {width} x {height}", samples.len()));
+        }
+        list.push(AnyChannel::new(text(name)?, samples));
+    }
+    let mut attributes = LayerAttributes::default();
+    for (key, value) in metadata {
+        attributes.other.insert(text(key)?, exr::meta::attribute::AttributeValue::Text(text(value)?));
+    }
+    let encoding = Encoding { compression: compression.of_exr(), ..Encoding::SMALL_LOSSLESS };
+    let layer = Layer::new(Vec2(width, height), attributes, encoding, AnyChannels::sort(list));
+    let mut out = Cursor::new(Vec::new());
+    exr::prelude::Image::from_layer(layer).write().to_buffered(&mut out).map_err(|e| e.to_string())?;
+    let mut bytes = out.into_inner();
+    sort_attributes(&mut bytes).ok_or("header of an unknown kind")?;
+    Ok(bytes)
+}
+
+/// Start of the first attribute: behind the magic number and the version.
+const HEADER: usize = 8;
+
+/// Puts the attributes of a one-part header in the order of their names, as OpenEXR's own library does: the `exr` crate
+/// keeps them in a hash map, whose order differs from run to run.
+fn sort_attributes(file: &mut [u8]) -> Option<()> {
+    let mut attributes = Vec::new();
+    let mut at = HEADER;
+    while *file.get(at)? != 0 {
+        let kind = at + file[at..].iter().position(|&b| b == 0)? + 1;
+        let size = kind + file.get(kind..)?.iter().position(|&b| b == 0)? + 1;
+        let length = u32::from_le_bytes(*file.get(size..)?.first_chunk()?);
+        let end = size + 4 + usize::try_from(length).ok()?;
+        attributes.push(file.get(at..end)?.to_vec());
+        at = end;
+    }
+    attributes.sort();
+    file[HEADER..at].copy_from_slice(&attributes.concat());
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn notes(n: usize) -> Notes {
+        (0..n).map(|i| (format!("petcomp:{i}"), format!("value {i}"))).collect()
+    }
+
+    #[test]
+    fn attributes_are_in_the_order_of_their_names() {
+        let file = || encode((2, 1), vec![("Z", floats(vec![1.0, 2.0]))], Compression::Zip, &notes(12)).unwrap();
+        assert_eq!(file(), file());
+        let meta = header(&file(), &Limits::default()).unwrap();
+        assert_eq!(meta.metadata.len(), 12);
+        let text = String::from_utf8_lossy(&file()).into_owned();
+        assert!(text.find("channels").unwrap() < text.find("compression").unwrap());
+        assert!(text.find("petcomp:3").unwrap() < text.find("petcomp:4").unwrap());
+    }
+
+    #[test]
+    fn names_come_in_the_usual_order() {
+        let names = ["A", "B", "G", "N.X", "R", "Z"].map(String::from).to_vec();
+        assert_eq!(in_usual_order(names), ["R", "G", "B", "A", "N.X", "Z"]);
+    }
+
+    #[test]
+    fn a_data_window_is_cut_and_padded_to_the_display_window() {
+        let mut layer = Layer::new(
+            Vec2(2, 2),
+            LayerAttributes::default(),
+            Encoding::UNCOMPRESSED,
+            AnyChannels::sort([AnyChannel::new("Y", floats(vec![1.0, 2.0, 3.0, 4.0]))].into_iter().collect()),
+        );
+        layer.attributes.layer_position = Vec2(-1, 1);
+        let mut image = exr::prelude::Image::from_layer(layer);
+        image.attributes.display_window = IntegerBounds::from_dimensions(Vec2(2, 3));
+        let mut out = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut out).unwrap();
+        let raster = decode(out.get_ref(), &Limits::default(), Wanted::Coverage).unwrap();
+        assert_eq!((raster.width, raster.height), (2, 3));
+        assert_eq!(raster.samples, Samples::F32(vec![0.0, 0.0, 2.0, 0.0, 4.0, 0.0]));
+    }
+}

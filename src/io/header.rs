@@ -1,0 +1,40 @@
+//! What a file says about its picture before the pixels.
+
+use super::Format;
+
+/// What a picture file says about itself; reading it decodes no pixel.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// The kind of file, by its content.
+    pub format: Format,
+    /// Columns of the upright picture: the camera's orientation is applied.
+    pub width: usize,
+    /// Rows of the upright picture.
+    pub height: usize,
+    /// Names of the channels, `R G B A` first where they are there.
+    pub channels: Vec<String>,
+    /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is float.
+    pub bits: u32,
+    /// Focal length that gives the same view on 36 x 24 mm film, millimetres, where the camera noted it.
+    pub focal_35mm: Option<f64>,
+    /// Texts that the file carries, by name.
+    pub metadata: Vec<(String, String)>,
+}
+
+/// Named texts.
+pub(super) type Notes = Vec<(String, String)>;
+
+pub(super) fn note(key: &str, value: &str) -> (String, String) {
+    (key.into(), value.into())
+}
+
+/// Notes for formats that keep a single text: a line `key=value` each.
+pub(super) fn lines_of_notes(notes: &Notes) -> String {
+    notes.iter().map(|(key, value)| format!("{key}={}\n", value.replace('\n', " "))).collect()
+}
+
+/// The inverse of [`lines_of_notes`]; other lines are left out.
+pub(super) fn notes_of_lines(text: &str) -> Notes {
+    text.lines().filter_map(|line| line.split_once('=')).map(|(key, value)| note(key, value)).collect()
+}

@@ -1,0 +1,153 @@
+//! JPEG: 8 bits, display-encoded, no alpha.
+
+use super::header::{Header, Notes, lines_of_notes, notes_of_lines};
+use super::limits::{Demand, Limits};
+use super::raster::{Raster, Refusal, Samples, usual_names};
+use crate::io::Format;
+use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
+use image::{ExtendedColorType, ImageDecoder, ImageError};
+use std::io::Cursor;
+
+const EOI: u8 = 0xd9;
+const SOS: u8 = 0xda;
+const COM: u8 = 0xfe;
+
+impl From<ImageError> for Refusal {
+    fn from(e: ImageError) -> Self {
+        match e {
+            ImageError::Unsupported(_) => Self::Unsupported(e.to_string()),
+            _ => Self::Broken(format!("damaged: {e}")),
+        }
+    }
+}
+
+fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
+    let decoder = JpegDecoder::new(Cursor::new(bytes))?;
+    let (width, height) = decoder.dimensions();
+    let channels = u64::from(decoder.color_type().channel_count());
+    let (width, height, file_bytes) = (width.into(), height.into(), bytes.len() as u64);
+    limits.check(Demand { width, height, channels, bytes_per_pixel: channels, file_bytes })?;
+    Ok(decoder)
+}
+
+pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
+    let decoder = open(bytes, limits)?;
+    let (width, height) = decoder.dimensions();
+    let comments = segments(bytes).filter(|s| s.marker == COM).map(|s| String::from_utf8_lossy(s.data).into_owned());
+    Ok(Header {
+        format: Format::Jpeg,
+        width: width as usize,
+        height: height as usize,
+        channels: usual_names(decoder.color_type().channel_count().into()).unwrap_or_default(),
+        bits: 8,
+        focal_35mm: None,
+        metadata: comments.flat_map(|text| notes_of_lines(&text)).collect(),
+    })
+}
+
+/// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is looked at first.
+pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
+    let decoder = open(bytes, limits)?;
+    if !segments(bytes).any(|s| s.marker == EOI) {
+        return Err("truncated JPEG (no end marker)".into());
+    }
+    let (width, height) = decoder.dimensions();
+    let names = usual_names(decoder.color_type().channel_count().into()).ok_or("channels of an unknown kind")?;
+    let mut data = vec![0; usize::try_from(decoder.total_bytes()).map_err(|_| "size overflows")?];
+    decoder.read_image(&mut data)?;
+    Ok(Raster {
+        width: width as usize,
+        height: height as usize,
+        names,
+        samples: Samples::U8(data),
+        display_encoded: true,
+        premultiplied: false,
+    })
+}
+
+/// A marker segment of a JPEG file.
+struct Segment<'a> {
+    marker: u8,
+    data: &'a [u8],
+}
+
+/// The segments in order, scans skipped; ends early where the file does. An EXIF thumbnail, a JPEG in itself, lies inside
+/// a segment and so does not end the file.
+fn segments(bytes: &[u8]) -> impl Iterator<Item = Segment<'_>> {
+    let mut rest = bytes.get(2..).unwrap_or_default();
+    let mut after_scan = false;
+    std::iter::from_fn(move || {
+        if after_scan {
+            rest = &rest[end_of_scan(rest)..];
+        }
+        while rest.first() == Some(&0xff) && rest.get(1) == Some(&0xff) {
+            rest = &rest[1..];
+        }
+        let (&[0xff, marker], tail) = rest.split_first_chunk()? else { return None };
+        if marker == EOI {
+            rest = &[];
+            return Some(Segment { marker, data: &[] });
+        }
+        let length = usize::from(u16::from_be_bytes(*tail.first_chunk()?));
+        let data = tail.get(2..length)?;
+        rest = &tail[length..];
+        after_scan = marker == SOS;
+        Some(Segment { marker, data })
+    })
+}
+
+/// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor padding.
+fn end_of_scan(bytes: &[u8]) -> usize {
+    let is_end = |pair: &[u8]| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7);
+    bytes.windows(2).position(is_end).unwrap_or(bytes.len())
+}
+
+/// A whole file from 8-bit codes of one or three channels.
+pub(super) fn encode(
+    (width, height): (usize, usize),
+    codes: &[u8],
+    quality: u8,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
+    let color = if codes.len() == width * height { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
+    let (width, height) = u32::try_from(width).ok().zip(u32::try_from(height).ok()).ok_or("size overflows")?;
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, quality)
+        .encode(codes, width, height, color)
+        .map_err(|e| e.to_string())?;
+    insert_comment(&mut bytes, &metadata.to_vec())?;
+    Ok(bytes)
+}
+
+/// Puts the notes into a comment segment right behind the start marker.
+fn insert_comment(jpeg: &mut Vec<u8>, notes: &Notes) -> Result<(), String> {
+    if notes.is_empty() {
+        return Ok(());
+    }
+    let text = lines_of_notes(notes);
+    let length = u16::try_from(text.len() + 2).map_err(|_| "metadata of more than 65,533 bytes does not fit a JPEG")?;
+    let segment = [0xff, COM].into_iter().chain(length.to_be_bytes()).chain(text.into_bytes());
+    jpeg.splice(2..2, segment);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thumbnail_does_not_end_the_file() {
+        let thumbnail = b"\xff\xd8\xff\xe1\x00\x06\xff\xd8\xff\xd9\xff\xda\x00\x02\x12\xff\x00\x34\xff\xd0\x56";
+        assert!(!segments(thumbnail).any(|s| s.marker == EOI));
+        let whole = [thumbnail.as_slice(), b"\xff\xd9"].concat();
+        assert!(segments(&whole).any(|s| s.marker == EOI));
+    }
+
+    #[test]
+    fn comments_come_back() {
+        let notes = vec![("petcomp:seed".to_string(), "17".to_string())];
+        let bytes = encode((8, 8), &[90; 8 * 8 * 3], 90, &notes).unwrap();
+        assert_eq!(header(&bytes, &Limits::default()).unwrap().metadata, notes);
+        assert!(decode(&bytes, &Limits::default()).is_ok());
+    }
+}

@@ -1,0 +1,258 @@
+//! What a keyer can be told: one struct, one TOML table, Blender's own names.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Which keyer to be: one of the three that Blender has shipped, or the careful one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Profile {
+    /// Blender 3.4.1, bit for bit.
+    #[default]
+    #[serde(rename = "blender-3.4")]
+    Blender34,
+    /// Blender 4.2 and 4.3, bit for bit.
+    #[serde(rename = "blender-4.2")]
+    Blender42,
+    /// Blender 4.5 and 5.0, bit for bit.
+    #[serde(rename = "blender-4.5")]
+    Blender45,
+    /// Blender 3.4 made safe: refuses keys that cannot work, gives defined output for every input, and counts what it
+    /// changed (see [`Deviations`](super::Deviations)).
+    #[serde(rename = "robust")]
+    Robust,
+}
+
+impl Profile {
+    /// Every profile with its name.
+    pub const ALL: [(&'static str, Self); 4] = [
+        ("blender-3.4", Self::Blender34),
+        ("blender-4.2", Self::Blender42),
+        ("blender-4.5", Self::Blender45),
+        ("robust", Self::Robust),
+    ];
+}
+
+impl std::str::FromStr for Profile {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let names = Self::ALL.map(|(n, _)| n).join(", ");
+        let found = Self::ALL.iter().find(|(n, _)| *n == name);
+        found.map(|&(_, p)| p).ok_or_else(|| Error::value("profile", format!("\"{name}\", expected one of {names}")))
+    }
+}
+
+/// How a feathered edge falls off with the distance `u` from its far end (1) to its near end (0).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
+pub enum Falloff {
+    /// `3u^2 - 2u^3`.
+    #[default]
+    Smooth,
+    /// `sqrt(2u - u^2)`.
+    Sphere,
+    /// `sqrt(u)`.
+    Root,
+    /// `u (2 - u)`.
+    InverseSquare,
+    /// `u^2`.
+    Sharp,
+    /// `u`.
+    Linear,
+}
+
+/// How the box blurs add up their samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BlurSum {
+    /// Sample by sample in Blender's order: its bits, at a cost that grows with the size.
+    #[default]
+    Exact,
+    /// Running sums in double precision: the same cost at any size, within a few 1e-7 on values of 0 to 1.
+    Running,
+}
+
+/// Settings of the [keyer](super), under the names that Blender 3.4 gives its Keying node.
+///
+/// The ranges are Blender's. [`Keying::run`](super::Keying::run) refuses values outside them, [`key`](super::key) moves
+/// them to the nearest end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct KeyOptions {
+    /// Which keyer to be. Default: `blender-3.4`.
+    pub profile: Profile,
+    /// Size of the blur of the chroma before keying, 0 to 2048 pixels; against noise and chroma subsampling. Default: 0.
+    pub blur_pre: u32,
+    /// Which of the two other channels the key is weighed against: 0 = the later one, 1 = the earlier one. Default: 0.5.
+    pub screen_balance: f32,
+    /// Raw matte at or below this becomes 0, in 0..1. Default: 0.
+    pub clip_black: f32,
+    /// Raw matte at or above this becomes 1, in 0..1. Default: 1.
+    pub clip_white: f32,
+    /// Half-size of the window that tells edges, which are not clipped, 0 to 100 pixels. Default: 3.
+    pub edge_kernel_radius: u32,
+    /// Matte values closer than this are alike for the edge search, in 0..1. Default: 0.1.
+    pub edge_kernel_tolerance: f32,
+    /// Size of the blur of the finished matte, 0 to 2048 pixels. Default: 0.
+    pub blur_post: u32,
+    /// Pixels by which the matte grows, or shrinks where negative, -100 to 100. Default: 0.
+    pub dilate_distance: i32,
+    /// Pixels over which the matte is feathered, outwards or, where negative, inwards, -100 to 100. Default: 0.
+    pub feather_distance: i32,
+    /// Shape of the feathered edge. Default: `SMOOTH`.
+    pub feather_falloff: Falloff,
+    /// How much of the screen's colour that exceeds the other channels is taken away, in 0..1. Default: 1.
+    pub despill_factor: f32,
+    /// Which of the two other channels the despill compares with, as `screen_balance`. Default: 0.5.
+    pub despill_balance: f32,
+    /// Leaves out the factor `|1 - v|` that ties the matte to brightness. Not Blender's matte. Default: false.
+    pub ignore_brightness: bool,
+    /// The picture loses what is left of the screen, `max(0, I - (1 - M) K)`, instead of being multiplied by its matte
+    /// and despilled. Not Blender's picture. Default: false.
+    pub subtract_screen: bool,
+    /// Lets the `robust` profile key against a screen too grey to be told from the foreground. Default: false.
+    pub accept_weak_key: bool,
+    /// How the box blurs add up. Default: `exact`.
+    pub blur_sum: BlurSum,
+}
+
+impl Default for KeyOptions {
+    fn default() -> Self {
+        Self {
+            profile: Profile::default(),
+            blur_pre: 0,
+            screen_balance: 0.5,
+            clip_black: 0.0,
+            clip_white: 1.0,
+            edge_kernel_radius: 3,
+            edge_kernel_tolerance: 0.1,
+            blur_post: 0,
+            dilate_distance: 0,
+            feather_distance: 0,
+            feather_falloff: Falloff::default(),
+            despill_factor: 1.0,
+            despill_balance: 0.5,
+            ignore_brightness: false,
+            subtract_screen: false,
+            accept_weak_key: false,
+            blur_sum: BlurSum::default(),
+        }
+    }
+}
+
+/// Largest blur size of Blender's node.
+const BLUR_MAX: u32 = 2048;
+/// Largest edge radius, dilate and feather distance of Blender's node.
+const DISTANCE_MAX: i32 = 100;
+
+impl KeyOptions {
+    /// The default settings of another profile.
+    pub fn of(profile: Profile) -> Self {
+        Self { profile, ..Self::default() }
+    }
+
+    /// Whether every setting lies in its range and the robust profile can keep its promise.
+    ///
+    /// # Errors
+    /// [`Error::Value`] with the setting's name, its value and what was expected.
+    pub fn check(&self) -> Result<()> {
+        let near = self.clamped();
+        self.fractions().iter().zip(near.fractions()).try_for_each(|(&(at, v), (_, n))| inside(at, v, n, "0 to 1"))?;
+        self.sizes().iter().zip(near.sizes()).try_for_each(|(&(at, v, range), (_, n, _))| inside(at, v, n, range))?;
+        if self.profile == Profile::Robust && self.clip_white <= self.clip_black {
+            let what = format!("{}, expected more than clip_black ({})", self.clip_white, self.clip_black);
+            return Err(Error::value("key.clip_white", what));
+        }
+        Ok(())
+    }
+
+    /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is no number becomes 0.
+    pub fn clamped(&self) -> Self {
+        let unit = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
+        Self {
+            blur_pre: self.blur_pre.min(BLUR_MAX),
+            screen_balance: unit(self.screen_balance),
+            clip_black: unit(self.clip_black),
+            clip_white: unit(self.clip_white),
+            edge_kernel_radius: self.edge_kernel_radius.min(DISTANCE_MAX.unsigned_abs()),
+            edge_kernel_tolerance: unit(self.edge_kernel_tolerance),
+            blur_post: self.blur_post.min(BLUR_MAX),
+            dilate_distance: self.dilate_distance.clamp(-DISTANCE_MAX, DISTANCE_MAX),
+            feather_distance: self.feather_distance.clamp(-DISTANCE_MAX, DISTANCE_MAX),
+            despill_factor: unit(self.despill_factor),
+            despill_balance: unit(self.despill_balance),
+            ..self.clone()
+        }
+    }
+
+    fn fractions(&self) -> [(&'static str, f32); 6] {
+        [
+            ("key.screen_balance", self.screen_balance),
+            ("key.clip_black", self.clip_black),
+            ("key.clip_white", self.clip_white),
+            ("key.edge_kernel_tolerance", self.edge_kernel_tolerance),
+            ("key.despill_factor", self.despill_factor),
+            ("key.despill_balance", self.despill_balance),
+        ]
+    }
+
+    fn sizes(&self) -> [(&'static str, i64, &'static str); 5] {
+        [
+            ("key.blur_pre", self.blur_pre.into(), "0 to 2048"),
+            ("key.edge_kernel_radius", self.edge_kernel_radius.into(), "0 to 100"),
+            ("key.blur_post", self.blur_post.into(), "0 to 2048"),
+            ("key.dilate_distance", self.dilate_distance.into(), "-100 to 100"),
+            ("key.feather_distance", self.feather_distance.into(), "-100 to 100"),
+        ]
+    }
+}
+
+fn inside<T: PartialEq + std::fmt::Display>(at: &str, value: T, nearest: T, range: &str) -> Result<()> {
+    if value == nearest { Ok(()) } else { Err(Error::value(at, format!("{value}, expected {range}"))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_toml_table_is_the_struct() {
+        let text = "profile = \"blender-4.5\"\nclip_black = 0.25\nfeather_falloff = \"INVERSE_SQUARE\"\n";
+        let opts: KeyOptions = toml::from_str(text).unwrap();
+        let want = KeyOptions {
+            clip_black: 0.25,
+            feather_falloff: Falloff::InverseSquare,
+            ..KeyOptions::of(Profile::Blender45)
+        };
+        assert_eq!(opts, want);
+    }
+
+    #[test]
+    fn an_unknown_setting_is_refused() {
+        let error = toml::from_str::<KeyOptions>("clip_blak = 0.1").unwrap_err();
+        assert!(error.to_string().contains("clip_blak"), "{error}");
+    }
+
+    #[test]
+    fn a_setting_out_of_range_is_named() {
+        let opts = KeyOptions { feather_distance: -101, ..KeyOptions::default() };
+        assert_eq!(opts.check().unwrap_err().to_string(), "key.feather_distance: -101, expected -100 to 100");
+        let opts = KeyOptions { screen_balance: f32::NAN, ..KeyOptions::default() };
+        assert_eq!(opts.check().unwrap_err().to_string(), "key.screen_balance: NaN, expected 0 to 1");
+    }
+
+    #[test]
+    fn only_the_robust_profile_refuses_levels_in_the_wrong_order() {
+        let levels = |profile| KeyOptions { clip_black: 0.5, clip_white: 0.5, ..KeyOptions::of(profile) };
+        assert!(levels(Profile::Blender34).check().is_ok());
+        assert!(levels(Profile::Robust).check().is_err());
+    }
+
+    #[test]
+    fn profiles_are_known_by_their_names() {
+        for (name, profile) in Profile::ALL {
+            assert_eq!(name.parse::<Profile>().unwrap(), profile);
+        }
+        assert!("blender-5".parse::<Profile>().is_err());
+    }
+}

@@ -1,0 +1,165 @@
+//! The first rows of the chain: a photo's pixels and the raw matte made of them.
+
+use super::Screen;
+use super::cutout::Despill;
+use super::model::{Model, Robust, V34, V42, V45, primary};
+use super::options::{KeyOptions, Profile};
+use super::raw::{Terms, matte_against};
+use crate::pixel::{Coverage, LinearRgb, PremulRgba};
+
+/// Pixels that can be keyed: opaque scene-linear colour, or colour premultiplied by its alpha.
+pub trait Photo: Copy + Default + Send + Sync + 'static {
+    /// The pixel with its alpha.
+    fn premul(self) -> PremulRgba;
+}
+
+impl Photo for LinearRgb {
+    #[inline(always)]
+    fn premul(self) -> PremulRgba {
+        self.opaque()
+    }
+}
+
+impl Photo for PremulRgba {
+    #[inline(always)]
+    fn premul(self) -> PremulRgba {
+        self
+    }
+}
+
+/// A row of the raw matte from a row of pixels, all against one key.
+type MatteRow<P> = fn(&[P], &mut [f32], Terms);
+/// A row of the raw matte, every pixel against its own key.
+type MatteRowAgainst<P> = fn(&[P], &[LinearRgb], Option<usize>, &mut [f32], Terms);
+/// A row of the cut-out from rows of pixels and matte.
+type CutoutRow<P> = fn(&[P], &[Coverage], LinearRgb, &mut [PremulRgba], Despill);
+/// A row of the cut-out, every pixel against its own key.
+type CutoutRowAgainst<P> = fn(&[P], &[Coverage], &[LinearRgb], Option<usize>, &mut [PremulRgba], Despill);
+
+/// The row loops of one profile for one kind of pixel.
+#[derive(Clone, Copy)]
+struct Loops<P> {
+    terms: [fn(LinearRgb, f32, bool) -> Terms; 3],
+    matte: [MatteRow<P>; 3],
+    matte_against: MatteRowAgainst<P>,
+    cutout: [CutoutRow<P>; 3],
+    cutout_against: CutoutRowAgainst<P>,
+}
+
+impl<P: Photo> Loops<P> {
+    fn of(profile: Profile) -> Self {
+        match profile {
+            Profile::Blender34 => Self::of_model::<V34>(),
+            Profile::Blender42 => Self::of_model::<V42>(),
+            Profile::Blender45 => Self::of_model::<V45>(),
+            Profile::Robust => Self::of_model::<Robust>(),
+        }
+    }
+
+    fn of_model<M: Model>() -> Self {
+        Self {
+            terms: [Terms::of::<M, 0>, Terms::of::<M, 1>, Terms::of::<M, 2>],
+            matte: [matte_row::<P, M, 0>, matte_row::<P, M, 1>, matte_row::<P, M, 2>],
+            matte_against: matte_row_against::<P, M>,
+            cutout: [cutout_row::<P, M, 0>, cutout_row::<P, M, 1>, cutout_row::<P, M, 2>],
+            cutout_against: cutout_row_against::<P, M>,
+        }
+    }
+}
+
+/// How pixels become matte and cut-out: a screen, a profile, and all that follows from them.
+#[derive(Clone, Copy)]
+pub(super) struct Keyer<'a, P> {
+    screen: Screen<'a>,
+    /// The primary channel of every pixel, where it does not follow each pixel's own key.
+    channel: Option<usize>,
+    terms: Terms,
+    despill: Despill,
+    loops: Loops<P>,
+}
+
+impl<'a, P: Photo> Keyer<'a, P> {
+    pub(super) fn new(screen: Screen<'a>, channel: Option<usize>, opts: &KeyOptions) -> Self {
+        let loops = Loops::of(opts.profile);
+        let (screen, color) = match screen {
+            Screen::Color(c) => (Screen::Color(socket(c)), socket(c)),
+            Screen::Plate(_) => (screen, LinearRgb::BLACK),
+        };
+        let terms = loops.terms[primary(color)](color, opts.screen_balance, opts.ignore_brightness);
+        let (factor, balance, subtract) = (opts.despill_factor, opts.despill_balance, opts.subtract_screen);
+        Self { screen, channel, terms, despill: Despill { factor, balance, subtract }, loops }
+    }
+
+    /// Saturation of the key; 0 for a plate.
+    pub(super) fn saturation(&self) -> f32 {
+        self.terms.saturation
+    }
+
+    /// Row `y` of the raw matte.
+    pub(super) fn matte_row(&self, y: usize, pixels: &[P], out: &mut [f32]) {
+        match self.screen {
+            Screen::Color(c) => self.loops.matte[primary(c)](pixels, out, self.terms),
+            Screen::Plate(plate) => (self.loops.matte_against)(pixels, plate.row(y), self.channel, out, self.terms),
+        }
+    }
+
+    /// Row `y` of the cut-out.
+    pub(super) fn cutout_row(&self, y: usize, pixels: &[P], matte: &[Coverage], out: &mut [PremulRgba]) {
+        match self.screen {
+            Screen::Color(c) => self.loops.cutout[primary(c)](pixels, matte, c, out, self.despill),
+            Screen::Plate(plate) => {
+                (self.loops.cutout_against)(pixels, matte, plate.row(y), self.channel, out, self.despill);
+            }
+        }
+    }
+}
+
+/// A key colour as Blender's colour socket holds it: never negative.
+pub(super) fn socket(key: LinearRgb) -> LinearRgb {
+    key.map(|v| if v > 0.0 { v } else { 0.0 })
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn matte_row<P: Photo, M: Model, const PRIMARY: usize>(pixels: &[P], out: &mut [f32], terms: Terms) {
+    for (p, m) in pixels.iter().zip(out) {
+        *m = terms.matte::<M, PRIMARY>(p.premul());
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn cutout_row<P: Photo, M: Model, const PRIMARY: usize>(
+    pixels: &[P],
+    matte: &[Coverage],
+    key: LinearRgb,
+    out: &mut [PremulRgba],
+    despill: Despill,
+) {
+    for ((p, m), c) in pixels.iter().zip(matte).zip(out) {
+        *c = despill.cutout::<M, PRIMARY>(p.premul(), m.0, key);
+    }
+}
+
+fn matte_row_against<P: Photo, M: Model>(
+    pixels: &[P],
+    keys: &[LinearRgb],
+    channel: Option<usize>,
+    out: &mut [f32],
+    terms: Terms,
+) {
+    for ((p, &key), m) in pixels.iter().zip(keys).zip(out) {
+        *m = matte_against::<M>(p.premul(), key, channel, terms);
+    }
+}
+
+fn cutout_row_against<P: Photo, M: Model>(
+    pixels: &[P],
+    matte: &[Coverage],
+    keys: &[LinearRgb],
+    channel: Option<usize>,
+    out: &mut [PremulRgba],
+    despill: Despill,
+) {
+    for (((p, m), &key), c) in pixels.iter().zip(matte).zip(keys).zip(out) {
+        *c = despill.cutout_against::<M>(p.premul(), m.0, key, channel);
+    }
+}
