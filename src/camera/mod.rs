@@ -9,6 +9,8 @@ mod belief;
 mod chi;
 mod corners;
 mod error;
+mod exchange;
+mod file;
 mod focal;
 mod label;
 mod locate;
@@ -26,6 +28,8 @@ mod uncertainty;
 mod warning;
 
 pub use error::SolveError;
+pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
+pub use file::{CameraFile, CameraFormat, FittedSurface, FitRecord, FocalPrior, FoundCamera, Model, SigmaRecord};
 pub use focal::{FocalSource, focal_from_equivalent};
 pub use label::{
     Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
