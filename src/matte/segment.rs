@@ -117,7 +117,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let hull = scaled(&hull::convex_hull(&object), small.size(), photo.size());
     let touches = touches(&object);
     check_object(&hull, touches, photo.size())?;
-    let tight = shown(&closed(&object, join_px));
+    let tight = shown(&enclosed(&object, join_px));
     let steps = [
         ("grey", band::root(&small, [1.0; 3])),
         ("first_band", first),
@@ -253,9 +253,28 @@ fn place(set: &Image<bool>) -> String {
     format!("at {x} % of the width and {y} % of the height")
 }
 
-/// The area that the edges enclose, gaps up to twice `join_px` bridged.
-fn closed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
-    filter::erode(&cluster::filled(&filter::dilate(edges, join_px)), join_px)
+/// The area may grow by this factor when twice the gap is bridged; by more, and it had leaked.
+const LEAK: f64 = 1.1;
+
+/// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
+/// area jump, for then the outline had a gap through which the inside leaked out.
+fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
+    let hull = hull::coverage(&hull::convex_hull(edges), edges.width(), edges.height()).map(|c| c.0 > 0.5);
+    let area = |set: &Image<bool>| set.pixels().iter().filter(|p| **p).count() as f64;
+    let mut narrow = closed(edges, &hull, join_px / 2.0);
+    for times in [1.0, 2.0, 4.0] {
+        let wide = closed(edges, &hull, times * join_px);
+        if area(&wide) <= LEAK * area(&narrow) {
+            return wide;
+        }
+        narrow = wide;
+    }
+    hull
+}
+
+fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool> {
+    let whole = filter::erode(&cluster::filled(&filter::dilate(edges, radius_px)), radius_px);
+    whole.zip_map(hull, |inside, hull| inside && hull)
 }
 
 fn scaled(polygon: &[Point2<f64>], from: (usize, usize), to: (usize, usize)) -> Vec<Point2<f64>> {
