@@ -1,6 +1,7 @@
 //! Four labelled corners, checked and put in order.
 
-use super::solve::{CornerOrder, SolveError};
+use super::error::SolveError;
+use super::options::CornerOrder;
 use super::warning::Warning;
 use crate::geom::{Point2, Vector2};
 
@@ -16,8 +17,6 @@ const SMALL_QUAD_PX: f64 = 50.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Checked {
     pub(crate) corners: [Point2<f64>; 4],
-    /// Which labelled corner stands at each place.
-    pub(crate) order: [usize; 4],
     pub(crate) warnings: Vec<Warning>,
 }
 
@@ -43,8 +42,8 @@ pub(crate) fn check(
     if longest_px < SMALL_QUAD_PX {
         warnings.push(Warning::SmallQuad { longest_px });
     }
-    warnings.extend(far_outside(&labelled, image));
-    Ok(Checked { corners, order, warnings })
+    warnings.extend(far_outside(&corners, image));
+    Ok(Checked { corners, warnings })
 }
 
 /// Twice the signed areas of the triangles that leave out one corner each; in a picture of a rectangle the one without

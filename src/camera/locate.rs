@@ -1,7 +1,8 @@
 //! The pipeline stage: a scene's camera becomes known.
 
 use super::label::Label;
-use super::solve::{SolveOptions, solve};
+use super::options::SolveOptions;
+use super::solve::solve;
 use crate::error::Result;
 use crate::scene::{CameraSource, Scene};
 

@@ -5,18 +5,35 @@
 //! The solver works in units of its own, in which everything is of order one: pixels relative to the principal point
 //! over half the picture's diagonal, lengths over the geometric mean of the rectangle's sides.
 
+mod belief;
+mod chi;
 mod corners;
+mod error;
 mod focal;
 mod label;
 mod locate;
+mod model;
+mod options;
 mod pinhole;
+mod problem;
 mod rectangle;
+mod refine;
+mod search;
+pub mod simulate;
+mod solution;
 mod solve;
+mod uncertainty;
 mod warning;
 
-pub use focal::FocalSource;
-pub use label::{Label, LabelCamera, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin};
+pub use error::SolveError;
+pub use focal::{FocalSource, focal_from_equivalent};
+pub use label::{
+    Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
+};
 pub use locate::locate;
+pub use options::{CornerOrder, Priors, SolveOptions};
 pub use pinhole::Camera;
-pub use solve::{CornerOrder, Solution, SolveError, SolveOptions, solve};
+pub use solution::{Fit, FocalFinding, Sigma, Solution};
+pub use solve::solve;
+pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;
 pub use warning::Warning;

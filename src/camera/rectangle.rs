@@ -84,17 +84,29 @@ impl View {
     }
 }
 
+impl View {
+    /// The two poses from which the rectangle looks like this from so far that perspective is lost in the noise.
+    ///
+    /// Its picture is then a parallelogram, and [`stance`](Self::stance) sees no tilt in it: a saddle of the cost. The
+    /// foreshortening tells the tilt, up to its sign.
+    pub(crate) fn distant_stances(&self, size: [f64; 2]) -> [Stance; 2] {
+        let along = self.along.0 / (size[0] * self.center.z);
+        let up = -self.down.0 / (size[1] * self.center.z);
+        let (n1, n2, dot) = (along.norm_squared(), up.norm_squared(), along.dot(&up));
+        let squared = (n1 + n2 + libm::hypot(n1 - n2, 2.0 * dot)) / 2.0;
+        let lean = |n: f64| (1.0 - n / squared).max(0.0).sqrt();
+        let (z1, z2) = (lean(n1), if dot > 0.0 { -lean(n2) } else { lean(n2) });
+        let (scale, center) = (squared.sqrt(), self.center.xy() / self.center.z);
+        [1.0, -1.0].map(|sign| {
+            let x = (along / scale).push(sign * z1).normalize();
+            let y = (up / scale).push(sign * z2);
+            let y = (y - x * x.dot(&y)).normalize();
+            Stance { rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]), center, scale }
+        })
+    }
+}
+
 impl Stance {
-    /// Position of the rectangle's centre in the camera's frame.
-    pub(crate) fn translation(&self, focal: f64) -> Vector3<f64> {
-        self.center.push(focal) / self.scale
-    }
-
-    /// Height of the camera over the surface.
-    pub(crate) fn height(&self, focal: f64) -> f64 {
-        -self.rotation.column(2).dot(&self.translation(focal))
-    }
-
     /// The other pose from which a small or distant rectangle looks almost the same: mirrored at the line of sight.
     pub(crate) fn mirrored(&self, focal: f64) -> Self {
         let sight = self.center.push(focal).normalize();
@@ -115,6 +127,13 @@ fn shortest_rotation_to_z(v: &Vector3<f64>) -> Matrix3<f64> {
 mod tests {
     use super::*;
     use crate::geom::UnitQuaternion;
+
+    impl Stance {
+        /// Position of the rectangle's centre in the camera's frame.
+        fn translation(&self, focal: f64) -> Vector3<f64> {
+            self.center.push(focal) / self.scale
+        }
+    }
 
     const SIZE: [f64; 2] = [1.2, 1.0 / 1.2];
     const FOCAL: f64 = 1.4;

@@ -173,4 +173,16 @@ mod tests {
             }
         }
     }
+
+    /// It rounds its white point: its XYZ is off by up to 2e-4.
+    #[test]
+    fn xyz_agrees_with_the_palette_crate() {
+        use palette::{FromColor, LinSrgb, Xyz};
+        let ours = ColorMatrix::xyz_from_linear();
+        for c in [[0.18, 0.5, 0.9], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]] {
+            let theirs = Xyz::from_color(LinSrgb::<f32>::from(c));
+            let [x, y, z] = ours.apply(c);
+            assert!((x - theirs.x).abs() < 3e-4 && (y - theirs.y).abs() < 3e-4 && (z - theirs.z).abs() < 3e-4);
+        }
+    }
 }

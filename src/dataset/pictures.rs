@@ -1,7 +1,7 @@
 //! The images of a dataset.
 
 use crate::dataset::{Entry, Part, Writer};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ impl Writer for Pictures {
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         let kinds = if self.exr { &["images", "exr"][..] } else { &["images"] };
         for dir in kinds.iter().flat_map(|kind| Part::ALL.map(|part| folder.join(kind).join(part.name()))) {
-            std::fs::create_dir_all(&dir).map_err(|e| Error::file(&dir, e))?;
+            io::create_folder(&dir)?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Everything known of a sample, one JSON file beside each image.
 
 use crate::dataset::{Entry, Part, Writer};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
 use crate::label::Labels;
 use crate::pixel::ObjectId;
@@ -42,7 +42,7 @@ impl Writer for Sidecar {
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         for dir in Part::ALL.map(|part| folder.join("scenes").join(part.name())) {
-            std::fs::create_dir_all(&dir).map_err(|e| Error::file(&dir, e))?;
+            io::create_folder(&dir)?;
         }
         Ok(())
     }

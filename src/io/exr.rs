@@ -213,7 +213,7 @@ fn interleaved(part: &Part, planes: &[&FlatSamples], window: IntegerBounds) -> V
 }
 
 /// The part of `0..shown` that a run of `length` samples starting at `start` covers.
-fn overlap(start: i64, length: usize, shown: usize) -> std::ops::Range<usize> {
+pub(super) fn overlap(start: i64, length: usize, shown: usize) -> std::ops::Range<usize> {
     let clip = |v: i64| v.clamp(0, shown as i64) as usize;
     clip(start)..clip(start + length as i64)
 }

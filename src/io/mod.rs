@@ -18,23 +18,36 @@ mod atomic;
 mod document;
 mod exif;
 pub mod exr;
+#[cfg(feature = "oiio")]
+mod ffi;
 mod format;
 mod hdr;
 mod header;
 mod jpeg;
 mod limits;
+#[cfg(feature = "oiio")]
+pub mod oiio;
 mod orient;
+mod overrides;
 mod png;
 mod raster;
 mod tiff;
+#[cfg(feature = "oiio")]
+mod worker;
 mod write;
 
 pub use atomic::create_folder;
-pub use document::{read_json, read_text, read_toml, write_json, write_text, write_toml};
+pub use document::{
+    read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
+};
 pub use format::Format;
 pub use header::Header;
 pub use limits::Limits;
+pub use overrides::Override;
 pub use raster::FromFile;
+#[cfg(feature = "oiio")]
+#[doc(hidden)]
+pub use worker::serve as serve_worker;
 pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
 
 use crate::{Error, Image, Result};
@@ -65,7 +78,7 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, limits: &Limits) -> Result
     let path = path.as_ref();
     let source = Source::open(path, limits)?;
     let raster = match caught(|| decode(&source, limits, P::WANTED)) {
-        Err(Refusal::Unsupported(what)) => elsewhere(path, source.format, what, limits)?,
+        Err(Refusal::Unsupported(what)) => elsewhere(path, &source, what, limits, P::WANTED)?,
         decoded => decoded.map_err(|e| Error::file(path, e))?,
     };
     upright(&raster, &source).map_err(|e| Error::file(path, e))
@@ -128,6 +141,14 @@ fn caught<T>(f: impl FnOnce() -> std::result::Result<T, Refusal>) -> std::result
 }
 
 /// Another decoder for what ours do not know.
-fn elsewhere(path: &Path, _format: Format, what: String, _limits: &Limits) -> Result<Raster> {
-    Err(Error::file(path, what))
+#[cfg(feature = "oiio")]
+fn elsewhere(path: &Path, source: &Source, _: String, limits: &Limits, wanted: Wanted) -> Result<Raster> {
+    let raster = worker::decode(path, source, limits, wanted).map_err(|e| Error::file(path, e))?;
+    Ok(oiio::associated(raster, source))
+}
+
+/// Without OpenImageIO there is no other decoder.
+#[cfg(not(feature = "oiio"))]
+fn elsewhere(path: &Path, _: &Source, what: String, _: &Limits, _: Wanted) -> Result<Raster> {
+    Err(Error::file(path, format!("{what} (petcomp was built without OpenImageIO)")))
 }

@@ -59,7 +59,8 @@ impl std::fmt::Display for Refusal {
 }
 
 /// Which channels a kind of pixel is made from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Wanted {
     /// `R G B`, or `Y` for grey; `A` where it is there.
     Color,

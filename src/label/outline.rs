@@ -11,7 +11,7 @@ use crate::geom::{Point2, Vector3};
 use crate::label::BBox;
 use crate::scene::Card;
 use geo::bool_ops::FillRule;
-use geo::{Area, BooleanOps, BoundingRect, Coord, LineString, MultiPolygon, Polygon};
+use geo::{Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon};
 
 /// Least distance from the camera that is projected, metres: closer than any lens focuses, far above rounding.
 const NEAR: f64 = 1e-4;
@@ -29,7 +29,9 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     }
     let outline = Polygon::new(LineString(px), Vec::new());
     let parts = outline.intersection_with_fill_rule(&picture(camera), FillRule::NonZero);
-    parts.into_iter().filter(|part| part.unsigned_area() > SLIVER_PX).collect()
+    let [w, h] = camera.image.map(f64::from);
+    let inside = |c: Coord<f64>| Coord { x: c.x.clamp(0.0, w), y: c.y.clamp(0.0, h) };
+    parts.into_iter().filter(|part| part.unsigned_area() > SLIVER_PX).map(|part| part.map_coords(inside)).collect()
 }
 
 /// What two outlines share, slivers left out.

@@ -1,40 +1,39 @@
 //! The exposure that puts rendered light and a photographed plate on one scale.
 
-use crate::geom::{Point2, Point3, Vector3};
+use crate::geom::{Point3, Vector3};
 use crate::image::Image;
 use crate::light::irradiance;
 use crate::pixel::LinearRgb;
-use crate::scene::{CameraSource, Exposure, Scene};
+use crate::scene::{Exposure, Scene};
 use std::f64::consts::PI;
 
-/// Share of the surface's pixels that are darker than what counts as the plate's white.
+/// Share of the plate's pixels that are darker than what counts as its white.
 ///
 /// High, since white is the bright end; not the maximum, since a highlight or a dead pixel is not paper.
-const WHITE_PERCENTILE: f64 = 0.95;
+const WHITE_PERCENTILE: f64 = 0.99;
 
 /// Turns [`Exposure::MatchPlate`] into [`Exposure::Ev`]; a scene whose exposure is known comes back as it is.
 ///
 /// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with nothing in their way, gets
 /// the luminance of [`plate_white`], times `2^gain_ev`.
 ///
-/// This is an assumption, not a measurement: one photograph does not tell how white its brightest part is. On a plate
-/// whose surface is grey the cards come out too dark by that grey; `gain_ev` is there to say so. Without any light in
-/// the scene, or on a black plate, the exposure is `gain_ev` alone.
+/// This is an assumption, not a measurement: one photograph does not tell which of its pixels are white paper. It holds
+/// where the photo was exposed for the place and shows something bright; the surface itself is not asked, since a tray
+/// may be of any grey. `gain_ev` is there to say otherwise. Without any light in the scene, or on a black plate, the
+/// exposure is `gain_ev` alone.
 pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     let Exposure::MatchPlate { gain_ev } = scene.exposure else { return scene };
-    let white = f64::from(plate_white(plate, surface_px(&scene, plate)));
-    let card = f64::from(white_card(&scene));
-    let ratio = white / card;
+    let ratio = f64::from(plate_white(plate)) / f64::from(white_card(&scene));
     let match_ev = if ratio > 0.0 && ratio.is_finite() { libm::log2(ratio) } else { 0.0 };
     Scene { exposure: Exposure::Ev(match_ev + gain_ev), ..scene }
 }
 
-/// Luminance of the plate's white: the 95th percentile inside a convex polygon of pixel positions.
+/// Luminance of the plate's white: the 99th percentile over all pixels.
 ///
-/// Pixels that are not finite do not count; a polygon without a pixel stands for the whole plate; 0 for an empty plate.
-pub fn plate_white(plate: &Image<LinearRgb>, polygon_px: [Point2<f64>; 4]) -> f32 {
-    let inside = luminances(plate, |p| contains(&polygon_px, p));
-    let mut values = if inside.is_empty() { luminances(plate, |_| true) } else { inside };
+/// Pixels that are not finite do not count; 0 for a plate without any other.
+pub fn plate_white(plate: &Image<LinearRgb>) -> f32 {
+    let finite = plate.pixels().iter().filter(|c| c.is_finite());
+    let mut values: Vec<_> = finite.map(|c| c.luminance()).collect();
     if values.is_empty() {
         return 0.0;
     }
@@ -48,49 +47,11 @@ fn white_card(scene: &Scene) -> f32 {
     scene.lights.iter().map(at_center).sum::<f32>() / PI as f32 + scene.ambient.luminance()
 }
 
-/// The surface's corners in pixels of `plate`; the whole plate where the camera does not see all of them.
-fn surface_px(scene: &Scene, plate: &Image<LinearRgb>) -> [Point2<f64>; 4] {
-    let (w, h) = (plate.width() as f64, plate.height() as f64);
-    let whole = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]].map(Point2::from);
-    match &scene.camera {
-        CameraSource::Rectangle { corners_px, photo, .. } => {
-            corners_px.map(|[x, y]| Point2::new(x * w / f64::from(photo[0]), y * h / f64::from(photo[1])))
-        }
-        CameraSource::Known(camera) => {
-            let camera = camera.resized([plate.width() as u32, plate.height() as u32]);
-            let [a, b] = scene.surface.size.map(|s| 0.5 * s);
-            let seen = [[-a, b], [a, b], [a, -b], [-a, -b]].map(|[x, y]| camera.project(Point3::new(x, y, 0.0)));
-            if seen.iter().all(Option::is_some) {
-                seen.map(|c| c.map_or(Point2::origin(), |(px, _)| px))
-            } else {
-                whole
-            }
-        }
-    }
-}
-
-fn luminances(plate: &Image<LinearRgb>, keep: impl Fn(Point2<f64>) -> bool) -> Vec<f32> {
-    let rows = plate.rows().enumerate();
-    let pixels = rows.flat_map(|(y, row)| row.iter().enumerate().map(move |(x, c)| (x, y, c)));
-    let kept = pixels.filter(|&(x, y, c)| c.is_finite() && keep(Point2::new(x as f64 + 0.5, y as f64 + 0.5)));
-    kept.map(|(_, _, c)| c.luminance()).collect()
-}
-
-/// Is a point on the same side of all edges?
-fn contains(polygon: &[Point2<f64>; 4], p: Point2<f64>) -> bool {
-    let side = |i: usize| {
-        let (a, b) = (polygon[i], polygon[(i + 1) % 4]);
-        (b - a).perp(&(p - a))
-    };
-    let sides = [side(0), side(1), side(2), side(3)];
-    sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::light::area::tests::square;
-    use crate::scene::Surface;
+    use crate::scene::{CameraSource, Surface};
 
     fn scene(exposure: Exposure) -> Scene {
         Scene {
@@ -109,10 +70,18 @@ mod tests {
         }
     }
 
-    /// 0.5 inside the surface, 4 outside of it.
+    /// Grey 0.2, a fiftieth of it paper of 0.5, one highlight of 40.
     fn plate() -> Image<LinearRgb> {
-        let inside = |x, y| (10..30).contains(&x) && (10..20).contains(&y);
-        Image::from_fn(40, 30, |x, y| LinearRgb::grey(if inside(x, y) { 0.5 } else { 4.0 }))
+        let value = |i: usize| {
+            if i == 7 {
+                40.0
+            } else if i.is_multiple_of(50) {
+                0.5
+            } else {
+                0.2
+            }
+        };
+        Image::from_fn(40, 30, |x, y| LinearRgb::grey(value(40 * y + x)))
     }
 
     #[test]
@@ -122,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_white_card_gets_the_surface_s_white() {
+    fn a_white_card_gets_the_plate_s_white() {
         let Exposure::Ev(ev) = expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate()).exposure else {
             panic!("still unknown")
         };

@@ -10,20 +10,23 @@
 //! to unshadowed irradiance of the surface `z = 0`; a pixel is the average under a Blackman-Harris window three pixels
 //! wide.
 
+mod cast;
 mod check;
 mod deep;
+mod four;
+mod half_plane;
+mod irradiance;
+mod layers;
 mod options;
 mod pixel_filter;
 mod reference;
+mod shadow;
 mod source;
+mod texture;
 mod view;
 
+pub use cast::cast;
 pub use check::check;
 pub use deep::{DeepImage, DeepSample};
 pub use options::{Quality, RenderOptions};
 pub use reference::reference;
-
-/// Renders a shot.
-pub fn cast(shot: &crate::scene::Shot, options: &RenderOptions) -> DeepImage {
-    reference(shot, options)
-}

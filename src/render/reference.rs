@@ -45,11 +45,11 @@ struct World<'a> {
 impl<'a> World<'a> {
     fn of(shot: &'a Shot, options: &RenderOptions) -> Self {
         let view = View::of(&shot.camera);
-        let lit = |normal: &Vector3<f64>| lamps(shot, options.light_samples, options.ambient_samples, normal);
-        let facing = |(i, sheet): (usize, Sheet)| {
+        let lit = |normal: &Vector3<f64>| lamps(shot, options, normal);
+        let facing = |(card, sheet): (&'a Card, Sheet)| {
             let seen = Seen::of(&sheet, &view);
             let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));
-            Facing { card: &shot.cards[i], sheet, seen, lamps }
+            Facing { card, sheet, seen, lamps }
         };
         let surface = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
         let cards = sheets(shot).into_iter().map(facing).collect();

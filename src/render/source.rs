@@ -3,6 +3,7 @@
 use crate::geom::Vector3;
 use crate::light;
 use crate::pixel::LinearRgb;
+use crate::render::RenderOptions;
 use crate::scene::Shot;
 use nalgebra::{Matrix3, Vector4};
 
@@ -42,7 +43,8 @@ pub(super) struct Lamp {
 }
 
 /// The lamps that light a receiver with this unit normal: area lights in their order, then the environment.
-pub(super) fn lamps(shot: &Shot, light_samples: usize, ambient_samples: usize, normal: &Vector3<f64>) -> Vec<Lamp> {
+pub(super) fn lamps(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
+    let RenderOptions { light_samples, ambient_samples, .. } = *options;
     let faces = shot.lights.iter().map(|l| {
         let face = light::frame(l).normal;
         let source =

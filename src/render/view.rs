@@ -1,12 +1,15 @@
 //! Cards and the surface as the eye sees them: every map is a row of three numbers times `(x, y, 1)`.
 
 use crate::camera::Camera;
-use crate::geom::{Point3, Vector3};
+use crate::geom::Vector3;
 use crate::scene::{Card, Shot};
 use nalgebra::Matrix3;
 
 /// Areas below this (square metres) and angles below this (sine) are nothing to look at.
 const VANISHING: f64 = 1e-12;
+
+/// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen past its own edge.
+pub(super) const HORIZON: f64 = 1e6;
 
 /// A card or the surface as a plane in the world.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +75,12 @@ impl View {
             height: camera.image[1] as usize,
         }
     }
+
+    /// Picture position `(x, y, 1)` of a world point; none at or behind the eye.
+    pub(super) fn project(&self, world: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let p = self.ray.try_inverse()? * (world - self.eye);
+        (p.z > VANISHING && p.iter().all(|c| c.is_finite())).then(|| p / p.z)
+    }
 }
 
 /// How a sheet lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and `v.p / w.p`.
@@ -102,6 +111,17 @@ impl Seen {
         (height > VANISHING).then_some(Self { u, v, w, height, point, normal })
     }
 
+    /// Side of the square that a pixel (or lattice cell) covers on the sheet's plane, metres, where it shows `target`; in
+    /// the middle of the picture where that is behind the eye.
+    pub(super) fn cell_metres(&self, view: &View, target: &Vector3<f64>) -> f64 {
+        let middle = Vector3::new(0.5 * view.width as f64, 0.5 * view.height as f64, 1.0);
+        let p = view.project(target).unwrap_or(middle);
+        let w = self.w.dot(&p).max(self.height / HORIZON);
+        let point = self.point * p / w;
+        let along = |k: usize| (self.point.column(k) - point * self.w[k]) / w;
+        along(0).cross(&along(1)).norm().sqrt()
+    }
+
     /// Texture coordinates and depth at a pixel position; none outside the sheet or behind the eye.
     pub(super) fn hit(&self, x: f64, y: f64) -> Option<([f64; 2], f64)> {
         let p = Vector3::new(x, y, 1.0);
@@ -124,19 +144,12 @@ pub(super) fn texture_rows(sheet: &Sheet, point: &Matrix3<f64>, w: &Vector3<f64>
     }
 }
 
-/// The cards of a shot that are there at all, each with its index.
-pub(super) fn sheets(shot: &Shot) -> Vec<(usize, Sheet)> {
-    let numbered = shot.cards.iter().enumerate();
-    numbered.filter_map(|(i, card)| Some((i, Sheet::of(card)?))).filter(|&(i, _)| has_texels(&shot.cards[i])).collect()
-}
-
-fn has_texels(card: &Card) -> bool {
-    !card.texture.base().is_empty()
-}
-
-/// A world point from its coordinates.
-pub(super) fn point(v: Vector3<f64>) -> Point3<f64> {
-    v.into()
+/// The cards of a shot that are there at all, in the order of their ids.
+pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, Sheet)> {
+    let there = shot.cards.iter().filter(|card| !card.texture.base().is_empty());
+    let mut sheets: Vec<_> = there.filter_map(|card| Some((card, Sheet::of(card)?))).collect();
+    sheets.sort_by_key(|(card, _)| card.id);
+    sheets
 }
 
 #[cfg(test)]

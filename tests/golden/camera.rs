@@ -3,7 +3,7 @@
 use crate::case::Case;
 use nalgebra::{Matrix3, Vector3};
 use petcomp::Camera;
-use petcomp::camera::{self, FocalSource, Label, SolveOptions};
+use petcomp::camera::{self, FocalSource, Label, Priors, SolveOptions};
 use petcomp::geom::{Point2, Point3};
 use serde::Deserialize;
 
@@ -84,7 +84,8 @@ impl View {
         label.camera.principal_point_px = Some(self.principal_px);
         label.camera.focal_px = focal_px;
         label.camera.focal_fixed = focal_px.is_some();
-        let solution = camera::solve(&label, &SolveOptions::default()).map_err(|e| e.to_string())?;
+        let options = SolveOptions { priors: Priors::ideal().with_free_focal(), ..Default::default() };
+        let solution = camera::solve(&label, &options).map_err(|e| e.to_string())?;
         let expected = if focal_px.is_some() { FocalSource::Fixed } else { FocalSource::Measured };
         match solution.focal_source == expected {
             true => Ok(solution.camera),

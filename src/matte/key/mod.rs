@@ -1,10 +1,17 @@
 //! The keyer: a photo before a coloured screen becomes a matte and a cut-out.
 
+mod box_blur;
+mod chroma;
 mod cutout;
+mod dilate;
+mod edge;
+mod feather;
+mod limits;
 mod model;
 mod options;
 mod photo;
 mod raw;
+mod robust;
 mod rows;
 mod stream;
 
@@ -14,6 +21,7 @@ pub use photo::Photo;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
+use stream::{Plane, Stream, fit};
 
 /// What the photo was taken against.
 #[derive(Clone, Copy, Debug)]
@@ -56,8 +64,10 @@ pub struct Deviations {
 /// their range are moved to its nearest end, and nothing is refused: [`Keying::run`] is the call that checks, and that
 /// takes plates, garbage and core mattes, and photos with alpha.
 pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, opts: &KeyOptions) -> Keyed {
-    let mut keyed = Keyed::default();
-    Keying::new(photo, Screen::Color(screen)).compute(&opts.clamped(), &mut keyed);
+    let opts = opts.clamped();
+    let mut keyed = Keyed { cutout: Image::new(photo.width(), photo.height()), ..Keyed::default() };
+    let stream = Stream::new(Keying::new(photo, Screen::Color(screen)), None, &opts);
+    keyed.deviations = stream.compute(Plane::Matte, &mut keyed.matte, &mut keyed.cutout);
     keyed
 }
 
@@ -97,18 +107,63 @@ impl<'a, P: Photo> Keying<'a, P> {
         Ok(keyed)
     }
 
-    /// As [`run`](Self::run), into pictures that are already there: in a loop over frames nothing is allocated.
+    /// As [`run`](Self::run), into pictures that are already there: in a loop over frames no picture is allocated.
     ///
     /// # Errors
     /// As [`run`](Self::run).
     pub fn run_into(&self, opts: &KeyOptions, keyed: &mut Keyed) -> Result<()> {
-        self.check(opts)?;
-        self.compute(opts, keyed);
+        let (width, height) = self.photo.size();
+        fit(&mut keyed.cutout, width, height);
+        keyed.deviations = self.plane(opts, Plane::Matte, &mut keyed.matte, &mut keyed.cutout)?;
         Ok(())
+    }
+
+    /// The matte alone, in half the time.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn matte(&self, opts: &KeyOptions) -> Result<Image<Coverage>> {
+        let mut matte = Image::default();
+        self.matte_into(opts, &mut matte)?;
+        Ok(matte)
+    }
+
+    /// As [`matte`](Self::matte), into a picture that is already there.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn matte_into(&self, opts: &KeyOptions, matte: &mut Image<Coverage>) -> Result<Deviations> {
+        self.plane(opts, Plane::Matte, matte, &mut Image::default())
+    }
+
+    /// The edges that the levels leave alone: 1 at edges, 0 elsewhere.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn edges(&self, opts: &KeyOptions) -> Result<Image<Coverage>> {
+        let mut edges = Image::default();
+        self.plane(opts, Plane::Edges, &mut edges, &mut Image::default())?;
+        Ok(edges)
+    }
+
+    fn plane(
+        &self,
+        opts: &KeyOptions,
+        plane: Plane,
+        matte: &mut Image<Coverage>,
+        cutout: &mut Image<PremulRgba>,
+    ) -> Result<Deviations> {
+        self.check(opts)?;
+        let filled = robust::settle(self.screen, opts)?;
+        let screen = filled.as_ref().map_or(self.screen, |f| Screen::Plate(&f.plate));
+        let stream = Stream::new(Keying { screen, ..*self }, filled.as_ref().map(|f| f.channel), opts);
+        let deviations = stream.compute(plane, matte, cutout);
+        Ok(Deviations { filled_plate: filled.as_ref().map_or(0, |f| f.count), ..deviations })
     }
 
     fn check(&self, opts: &KeyOptions) -> Result<()> {
         opts.check()?;
+        robust::warn(opts);
         let plate = if let Screen::Plate(p) = self.screen { Some(p.size()) } else { None };
         let others =
             [("plate", plate), ("garbage", self.garbage.map(Image::size)), ("core", self.core.map(Image::size))];
@@ -122,7 +177,19 @@ impl<'a, P: Photo> Keying<'a, P> {
             Screen::Color(c) if !c.is_finite() => {
                 Err(Error::value("screen", format!("{:?}, expected finite numbers", <[f32; 3]>::from(c))))
             }
-            _ => Ok(()),
+            Screen::Color(c) => robust::check_color(c, opts),
+            Screen::Plate(_) => Ok(()),
         }
+    }
+}
+
+impl std::iter::Sum for Deviations {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |a, b| Self {
+            unusable_pixels: a.unusable_pixels + b.unusable_pixels,
+            filled_plate: a.filled_plate + b.filled_plate,
+            unusable_mattes: a.unusable_mattes + b.unusable_mattes,
+            clamped: a.clamped + b.clamped,
+        })
     }
 }

@@ -66,6 +66,19 @@ pub(super) fn around(y: usize, radius: usize, height: usize) -> Range<usize> {
     y.saturating_sub(radius)..y.saturating_add(radius).saturating_add(1).min(height)
 }
 
+/// The rows that a window of that radius looks at, from the top: cut off at the border, or repeating it.
+pub(super) fn looked_at(
+    y: usize,
+    radius: usize,
+    height: usize,
+    repeat: bool,
+) -> impl DoubleEndedIterator<Item = usize> {
+    let (y, radius, last) = (y as isize, radius as isize, height as isize - 1);
+    let (first, end) = (y - radius, y + radius);
+    let rows = if repeat { first..=end } else { first.max(0)..=end.min(last) };
+    rows.map(move |row| row.clamp(0, last) as usize)
+}
+
 /// Rows a window must hold for that radius.
 pub(super) fn window_rows(radius: usize, height: usize) -> usize {
     radius.saturating_mul(2).saturating_add(1).min(height).max(1)
@@ -119,6 +132,12 @@ mod tests {
         window.cover(around(10, 1, 20), |y, row| row[0] = y as f32);
         assert_eq!(window.row(9), [9.0]);
         assert_eq!(window.next, 12);
+    }
+
+    #[test]
+    fn a_window_is_cut_off_or_repeats_the_border() {
+        assert_eq!(looked_at(0, 2, 2, false).collect::<Vec<_>>(), [0, 1]);
+        assert_eq!(looked_at(0, 2, 2, true).collect::<Vec<_>>(), [0, 0, 0, 1, 1]);
     }
 
     #[test]

@@ -1,11 +1,26 @@
 //! The stages in their order, and the bands of rows that run them side by side.
 
-use super::options::KeyOptions;
+use super::box_blur::BoxBlur;
+use super::chroma::ChromaBlur;
+use super::dilate::Dilate;
+use super::edge::{Clip, Edges};
+use super::feather::Feather;
+use super::limits::{Clamp, Core, Garbage};
+use super::model::Behaviour;
+use super::options::{KeyOptions, Profile};
 use super::photo::{Keyer, Photo};
+use super::robust;
 use super::rows::{Rows, Source};
-use super::{Keyed, Keying};
+use super::{Deviations, Keying};
 use crate::image::Image;
+use crate::pixel::{Coverage, PremulRgba};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Rows a band has at least, where there are as many.
+const BAND_MIN: usize = 16;
+/// Rows a band has for every row that it must compute beyond itself.
+const BAND_PER_HALO: usize = 12;
 
 /// Rows of the raw matte.
 struct RawMatte<'a, P> {
@@ -19,36 +34,173 @@ impl<P: Photo> Rows for RawMatte<'_, P> {
     }
 }
 
-impl<'a, P: Photo> Keying<'a, P> {
-    /// Keys with settings that are in range.
-    pub(super) fn compute(&self, opts: &KeyOptions, keyed: &mut Keyed) {
-        let (width, height) = self.photo.size();
-        fit(&mut keyed.matte, width, height);
-        fit(&mut keyed.cutout, width, height);
-        if self.photo.is_empty() {
-            return;
-        }
-        let keyer = Keyer::new(self.screen, None, opts);
-        let rows = 32;
-        let matte = keyed.matte.pixels_mut().par_chunks_mut(width * rows);
-        let cutout = keyed.cutout.pixels_mut().par_chunks_mut(width * rows);
-        matte.zip(cutout).enumerate().for_each(|(band, (matte, cutout))| {
-            let mut source = self.source(keyer, opts);
-            let lines = matte.chunks_exact_mut(width).zip(cutout.chunks_exact_mut(width));
-            for (y, (matte, cutout)) in (band * rows..).zip(lines) {
-                source.row(y, bytemuck::cast_slice_mut(matte));
-                keyer.cutout_row(y, self.photo.row(y), matte, cutout);
-            }
-        });
-    }
+/// Rows of the raw matte of a photo whose chroma is blurred.
+struct BlurredMatte<'a, P> {
+    blur: ChromaBlur<'a, P>,
+    keyer: Keyer<'a, PremulRgba>,
+    pixels: Vec<PremulRgba>,
+}
 
-    fn source(&self, keyer: Keyer<'a, P>, _opts: &KeyOptions) -> Source<'a> {
-        Box::new(RawMatte { photo: self.photo, keyer })
+impl<P: Photo> Rows for BlurredMatte<'_, P> {
+    fn row(&mut self, y: usize, out: &mut [f32]) {
+        self.blur.row(y, &mut self.pixels);
+        self.keyer.matte_row(y, &self.pixels, out);
     }
 }
 
-fn fit<Q: Copy + Default>(image: &mut Image<Q>, width: usize, height: usize) {
+/// Which of the keyer's planes is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Plane {
+    /// The finished matte.
+    Matte,
+    /// The edges that the levels leave alone.
+    Edges,
+}
+
+/// A keying whose screen is settled: all that the bands share.
+pub(super) struct Stream<'a, P> {
+    keying: Keying<'a, P>,
+    channel: Option<usize>,
+    opts: &'a KeyOptions,
+    clamped: AtomicUsize,
+}
+
+impl<'a, P: Photo> Stream<'a, P> {
+    /// A keying whose primary channel is given where it does not follow each pixel's own key.
+    pub(super) fn new(keying: Keying<'a, P>, channel: Option<usize>, opts: &'a KeyOptions) -> Self {
+        Self { keying, channel, opts, clamped: AtomicUsize::new(0) }
+    }
+
+    /// Computes a plane, and the cut-out that it makes unless the picture for it is empty.
+    pub(super) fn compute(
+        &self,
+        plane: Plane,
+        matte: &mut Image<Coverage>,
+        cutout: &mut Image<PremulRgba>,
+    ) -> Deviations {
+        let (width, height) = self.keying.photo.size();
+        fit(matte, width, height);
+        if matte.is_empty() {
+            return Deviations::default();
+        }
+        let rows = self.band_rows(height);
+        let bands = matte.pixels_mut().par_chunks_mut(width * rows).enumerate();
+        let cutouts = bands_of(cutout, width * rows, height.div_ceil(rows));
+        let seen = bands.zip(cutouts).map(|((band, matte), cutout)| {
+            let first = band * rows;
+            self.band(&mut *self.source(plane), first, matte, cutout);
+            robust::unusable(&self.keying, self.opts, first..first + matte.len() / width)
+        });
+        Deviations { clamped: self.clamped.load(Ordering::Relaxed), ..seen.sum() }
+    }
+
+    fn band(&self, plane: &mut dyn Rows, first: usize, matte: &mut [Coverage], cutout: &mut [PremulRgba]) {
+        let width = self.keying.photo.width();
+        let keyer = self.keyer();
+        let mut cutout = cutout.chunks_exact_mut(width);
+        for (y, matte) in (first..).zip(matte.chunks_exact_mut(width)) {
+            plane.row(y, bytemuck::cast_slice_mut(matte));
+            if let Some(cutout) = cutout.next() {
+                keyer.cutout_row(y, self.keying.photo.row(y), matte, cutout);
+            }
+        }
+    }
+
+    /// A band starts by computing the rows above it that its windows reach; longer bands do so less often.
+    fn band_rows(&self, height: usize) -> usize {
+        let o = self.opts;
+        let distances = o.dilate_distance.unsigned_abs() + o.feather_distance.unsigned_abs();
+        let halo = (o.blur_pre + o.edge_kernel_radius + o.blur_post + distances) as usize;
+        let threads = rayon::current_num_threads();
+        let rounds = height / (threads * (halo * BAND_PER_HALO).max(BAND_MIN));
+        height.div_ceil(threads * rounds.max(1)).max(1)
+    }
+
+    fn source(&self, plane: Plane) -> Source<'_> {
+        match plane {
+            Plane::Matte => self.matte(),
+            Plane::Edges => self.edges(),
+        }
+    }
+
+    fn keyer<Q: Photo>(&self) -> Keyer<'a, Q> {
+        Keyer::new(self.keying.screen, self.channel, self.opts)
+    }
+
+    fn raw(&self) -> Source<'_> {
+        let photo = self.keying.photo;
+        if self.opts.blur_pre == 0 {
+            return Box::new(RawMatte { photo, keyer: self.keyer() });
+        }
+        let pixels = vec![PremulRgba::default(); photo.width()];
+        Box::new(BlurredMatte { blur: ChromaBlur::new(photo, self.opts), keyer: self.keyer(), pixels })
+    }
+
+    fn clipped(&self) -> Source<'_> {
+        let raw = self.raw();
+        if Clip::is_wanted(self.opts) { Box::new(Clip::new(raw, self.size(), self.opts)) } else { raw }
+    }
+
+    /// The edges: Blender up to 4.3 looks for them in the clipped matte, later ones in the raw one.
+    fn edges(&self) -> Source<'_> {
+        let searched = if self.behaviour() == Behaviour::V45 { self.raw() } else { self.clipped() };
+        Box::new(Edges::new(searched, self.size(), self.opts))
+    }
+
+    fn limited(&self) -> Source<'_> {
+        let Keying { garbage, core, .. } = self.keying;
+        let (behaviour, careful) = (self.behaviour(), self.opts.profile == Profile::Robust);
+        let mut source = self.clipped();
+        if let Some(garbage) = garbage {
+            source = Box::new(Garbage { source, garbage, behaviour, careful });
+        }
+        // Blender 4.5 applies a core matte of 0 where none is given, which matters below a garbage matte above 1.
+        if core.is_some() || (garbage.is_some() && behaviour == Behaviour::V45) {
+            source = Box::new(Core { source, core, behaviour, careful });
+        }
+        source
+    }
+
+    /// The finished matte.
+    fn matte(&self) -> Source<'_> {
+        let (o, size) = (self.opts, self.size());
+        let mut source = self.limited();
+        if o.blur_post > 0 {
+            source = Box::new(BoxBlur::new(source, self.behaviour(), o.blur_post as usize, size));
+        }
+        if o.dilate_distance != 0 {
+            source = Box::new(Dilate::new(source, size, o));
+        }
+        if o.feather_distance != 0 {
+            source = Box::new(Feather::new(source, size, o));
+        }
+        if o.profile == Profile::Robust {
+            source = Box::new(Clamp { source, clamped: &self.clamped });
+        }
+        source
+    }
+
+    fn behaviour(&self) -> Behaviour {
+        self.opts.profile.behaviour()
+    }
+
+    fn size(&self) -> (usize, usize) {
+        self.keying.photo.size()
+    }
+}
+
+/// Makes a picture that size, keeping it where it is.
+pub(super) fn fit<Q: Copy + Default>(image: &mut Image<Q>, width: usize, height: usize) {
     if image.size() != (width, height) {
         *image = Image::new(width, height);
+    }
+}
+
+/// A picture in bands of that many pixels; empty bands for an empty picture.
+fn bands_of(image: &mut Image<PremulRgba>, pixels: usize, count: usize) -> Vec<&mut [PremulRgba]> {
+    if image.is_empty() {
+        (0..count).map(|_| <&mut [PremulRgba]>::default()).collect()
+    } else {
+        image.pixels_mut().chunks_mut(pixels).collect()
     }
 }

@@ -1,0 +1,109 @@
+//! Chroma pre-blur: the colour difference signals of a photo blurred, its brightness left sharp.
+//!
+//! The signals are those of ITU-R BT.709 with studio swing, in the rounding of Blender's own table. Its two matrices are
+//! not exact inverses of each other: even without blurring, colours move by up to 7e-4 per unit.
+
+use super::box_blur::BoxBlur;
+use super::model::{Behaviour, Model, Robust};
+use super::options::{KeyOptions, Profile};
+use super::photo::Photo;
+use super::rows::Rows;
+use crate::image::Image;
+use crate::pixel::PremulRgba;
+
+/// Code value 1.0.
+const FULL: f32 = 255.0;
+/// Blender multiplies by this float or divides by 255, depending on its version.
+const PER_FULL: f32 = 1.0 / 255.0;
+/// Offset of brightness, code values.
+const FOOT: f32 = 16.0;
+/// Zero of the colour differences, code values.
+const NEUTRAL: f32 = 128.0;
+/// Weights of R, G, B in brightness.
+const LUMA: [f32; 3] = [0.183, 0.614, 0.062];
+/// Weights of R, G, B in the blue and the red difference.
+const DIFFERENCES: [[f32; 3]; 2] = [[-0.101, -0.338, 0.439], [0.439, -0.399, -0.040]];
+
+/// One signal in code values.
+#[inline(always)]
+fn signal(p: PremulRgba, w: [f32; 3], offset: f32) -> f32 {
+    w[0] * (p.r * FULL) + w[1] * (p.g * FULL) + w[2] * (p.b * FULL) + offset
+}
+
+/// Code values to unit scale.
+#[inline(always)]
+fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
+    if behaviour == Behaviour::V45 { code / FULL } else { code * PER_FULL }
+}
+
+/// Blue and red difference of a colour in unit scale, 128/255 being neutral.
+pub(crate) fn differences(p: PremulRgba, divided: bool) -> [f32; 2] {
+    let behaviour = if divided { Behaviour::V45 } else { Behaviour::V34 };
+    DIFFERENCES.map(|w| to_unit(signal(p, w, NEUTRAL), behaviour))
+}
+
+/// The colour of three signals in code values.
+#[inline(always)]
+fn color(y: f32, cb: f32, cr: f32, alpha: f32) -> PremulRgba {
+    let (l, cb, cr) = (1.164 * (y - FOOT), cb - NEUTRAL, cr - NEUTRAL);
+    let (r, g, b) = (l + 1.793 * cr, l - 0.534 * cr - 0.213 * cb, l + 2.115 * cb);
+    PremulRgba::new(r / FULL, g / FULL, b / FULL, alpha)
+}
+
+/// The pixel as the profile is willing to see it.
+#[inline(always)]
+fn seen(p: PremulRgba, careful: bool) -> PremulRgba {
+    if careful { Robust::seen(p) } else { p }
+}
+
+/// Rows of one colour difference, unit scale.
+struct Difference<'a, P> {
+    photo: &'a Image<P>,
+    careful: bool,
+    weights: [f32; 3],
+    behaviour: Behaviour,
+}
+
+impl<P: Photo> Rows for Difference<'_, P> {
+    fn row(&mut self, y: usize, out: &mut [f32]) {
+        for (p, d) in self.photo.row(y).iter().zip(out) {
+            *d = to_unit(signal(seen(p.premul(), self.careful), self.weights, NEUTRAL), self.behaviour);
+        }
+    }
+}
+
+/// Rows of a photo whose chroma is blurred.
+pub(super) struct ChromaBlur<'a, P> {
+    photo: &'a Image<P>,
+    careful: bool,
+    behaviour: Behaviour,
+    blurred: [BoxBlur<Difference<'a, P>>; 2],
+    rows: [Vec<f32>; 2],
+}
+
+impl<'a, P: Photo> ChromaBlur<'a, P> {
+    pub(super) fn new(photo: &'a Image<P>, opts: &KeyOptions) -> Self {
+        let (behaviour, careful) = (opts.profile.behaviour(), opts.profile == Profile::Robust);
+        let blurred = DIFFERENCES.map(|weights| {
+            let plane = Difference { photo, careful, weights, behaviour };
+            BoxBlur::new(plane, behaviour, opts.blur_pre as usize, photo.size())
+        });
+        let rows = [vec![0.0; photo.width()], vec![0.0; photo.width()]];
+        Self { photo, careful, behaviour, blurred, rows }
+    }
+
+    /// Writes row `y`.
+    pub(super) fn row(&mut self, y: usize, out: &mut [PremulRgba]) {
+        for (blurred, row) in self.blurred.iter_mut().zip(&mut self.rows) {
+            blurred.row(y, row);
+        }
+        let [cb, cr] = &self.rows;
+        for (((p, cb), cr), o) in self.photo.row(y).iter().zip(cb).zip(cr).zip(out) {
+            let p = seen(p.premul(), self.careful);
+            let luma = signal(p, LUMA, FOOT);
+            // Blender 4.5 alone leaves brightness out of the journey to unit scale and back.
+            let luma = if self.behaviour == Behaviour::V45 { luma } else { luma * PER_FULL * FULL };
+            *o = color(luma, cb * FULL, cr * FULL, p.a);
+        }
+    }
+}

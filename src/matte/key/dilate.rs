@@ -1,0 +1,166 @@
+//! Dilate and erode: the largest or smallest value within a disc.
+//!
+//! A row of the disc is a run of samples, and the extreme of a run is that of two shorter runs that overlap. So every row
+//! of the source is kept with the extremes of all runs of 1, 2, 4, ... samples, and a disc of any size takes two
+//! look-ups a row instead of a sum over its area.
+
+use super::model::Behaviour;
+use super::options::{KeyOptions, Profile};
+use super::rows::{Pad, Rows, Source, Window, around, window_rows};
+
+/// Blender up to 4.3 offers the disc no more than a window of this half-size, one short to the right and upwards.
+const LEAST_LOPSIDED: usize = 3;
+
+/// A matte grown or shrunk by a disc.
+pub(super) struct Dilate<'a> {
+    source: Source<'a>,
+    shape: Disc,
+    extreme: Extreme,
+    height: usize,
+    /// For every row its runs of 1, 2, 4, ... samples, one after the other.
+    window: Window,
+    width: usize,
+}
+
+/// Which samples of a disc are looked at.
+#[derive(Clone, Copy, Debug)]
+struct Disc {
+    distance: usize,
+    /// The right and the top tip are missing.
+    lopsided: bool,
+}
+
+impl Disc {
+    /// How far the disc reaches to the left and to the right, `dy` rows from its centre (upwards positive).
+    fn reach(self, dy: isize) -> Option<(usize, usize)> {
+        let d = self.distance;
+        let cut = self.lopsided && d >= LEAST_LOPSIDED;
+        let half = (d * d).checked_sub(dy.unsigned_abs().pow(2))?.isqrt();
+        let above = cut && dy == d as isize;
+        (!above).then(|| (half, if cut { half.min(d - 1) } else { half }))
+    }
+}
+
+/// Which extreme is sought, and from where.
+#[derive(Clone, Copy, Debug)]
+struct Extreme {
+    largest: bool,
+    start: f32,
+}
+
+impl Extreme {
+    /// The extreme of two samples; the first stays where they are equal or one is no number.
+    #[inline(always)]
+    fn of(self, a: f32, b: f32) -> f32 {
+        let replaces = if self.largest { b > a } else { b < a };
+        if replaces { b } else { a }
+    }
+}
+
+impl<'a> Dilate<'a> {
+    pub(super) fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
+        let distance = opts.dilate_distance.unsigned_abs() as usize;
+        let unlimited = opts.profile.behaviour() == Behaviour::V45;
+        let shape = Disc { distance, lopsided: !unlimited && opts.profile != Profile::Robust };
+        let largest = opts.dilate_distance > 0;
+        let start = match (unlimited, largest) {
+            (true, true) => f32::MIN,
+            (true, false) => f32::MAX,
+            (false, true) => 0.0,
+            (false, false) => 1.0,
+        };
+        let runs = (2 * distance + 1).ilog2() as usize + 1;
+        let window = Window::new((width + 2 * distance) * runs, window_rows(distance, height));
+        Self { source, shape, extreme: Extreme { largest, start }, height, window, width }
+    }
+}
+
+impl Rows for Dilate<'_> {
+    fn row(&mut self, y: usize, out: &mut [f32]) {
+        let Self { source, shape, extreme, height, window, width } = self;
+        let margin = shape.distance;
+        let stride = *width + 2 * margin;
+        window.cover(around(y, margin, *height), |y, runs| {
+            let row = &mut runs[..stride];
+            source.row(y, &mut row[margin..margin + *width]);
+            row[margin..margin + *width].iter_mut().for_each(|v| *v = extreme.of(extreme.start, *v));
+            Pad::Value(extreme.start).fill(row, margin);
+            double_runs(runs, stride, *extreme);
+        });
+        out.fill(extreme.start);
+        for near in around(y, margin, *height) {
+            let Some((left, right)) = shape.reach(y as isize - near as isize) else { continue };
+            let length = left + right + 1;
+            let level = length.ilog2() as usize;
+            let runs = &window.row(near)[level * stride..][..stride];
+            let (first, second) = (margin - left, margin + right + 1 - (1 << level));
+            widen(out, &runs[first..first + *width], &runs[second..second + *width], *extreme);
+        }
+    }
+}
+
+/// Fills the runs of 2, 4, ... samples from the run of 1.
+fn double_runs(runs: &mut [f32], stride: usize, extreme: Extreme) {
+    for level in 1..runs.len() / stride {
+        let (shorter, longer) = runs.split_at_mut(level * stride);
+        let shorter = &shorter[(level - 1) * stride..];
+        let half = 1 << (level - 1);
+        pair(&mut longer[..stride - half], &shorter[..stride - half], &shorter[half..], extreme);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn pair(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
+    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
+        *o = extreme.of(*a, *b);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn widen(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
+    for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
+        *o = extreme.of(*o, extreme.of(*a, *b));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Dot;
+    impl Rows for Dot {
+        fn row(&mut self, y: usize, out: &mut [f32]) {
+            out.fill(0.0);
+            out[5] = if y == 5 { 1.0 } else { 0.0 };
+        }
+    }
+
+    fn dilated_dot(profile: Profile, distance: i32) -> Vec<String> {
+        let opts = KeyOptions { dilate_distance: distance, ..KeyOptions::of(profile) };
+        let mut dilate = Dilate::new(Box::new(Dot), (11, 11), &opts);
+        let mut row = [0.0; 11];
+        let picture = |y| {
+            dilate.row(y, &mut row);
+            row.map(|v| if v > 0.0 { '#' } else { '.' }).iter().collect()
+        };
+        (0..11).map(picture).collect()
+    }
+
+    #[test]
+    fn a_dilated_dot_lacks_its_left_and_bottom_tip_in_old_profiles() {
+        let dot = dilated_dot(Profile::Blender34, 3);
+        assert_eq!(dot[2], ".....#.....");
+        assert_eq!(dot[5], "...######..");
+        assert_eq!(dot[8], "...........");
+    }
+
+    #[test]
+    fn a_dilated_dot_is_a_disc_in_the_others() {
+        for profile in [Profile::Blender45, Profile::Robust] {
+            let dot = dilated_dot(profile, 3);
+            assert_eq!(dot[2], ".....#.....");
+            assert_eq!(dot[5], "..#######..");
+            assert_eq!(dot[8], ".....#.....");
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! Edges of the matte, and the levels that clip everything but them.
+
+use super::model::Behaviour;
+use super::options::KeyOptions;
+use super::rows::{Pad, Rows, Source, Window, around, looked_at, window_rows};
+
+/// Share of a pixel's neighbours that must be alike for it not to be an edge; Blender's constant.
+const ALIKE_SHARE: f32 = 0.9;
+
+/// How far a profile looks for edges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Reach {
+    /// Nowhere: every pixel gets this answer.
+    Nowhere(f32),
+    /// In a square window of this half-size.
+    Window(usize),
+}
+
+impl Reach {
+    fn of(behaviour: Behaviour, radius: usize) -> Self {
+        match (behaviour, radius) {
+            (Behaviour::V34 | Behaviour::V42, 0) => Self::Nowhere(0.0),
+            (Behaviour::V34, 1) => Self::Nowhere(1.0),
+            (Behaviour::V34, _) => Self::Window(radius - 1),
+            (Behaviour::V42 | Behaviour::V45, _) => Self::Window(radius),
+        }
+    }
+}
+
+/// Searches a matte for edges: pixels too few of whose neighbours are like them.
+struct EdgeSearch<'a> {
+    source: Source<'a>,
+    behaviour: Behaviour,
+    tolerance: f32,
+    reach: Reach,
+    height: usize,
+    window: Window,
+    /// How many columns of the search window lie inside the picture.
+    columns: Vec<f32>,
+}
+
+impl<'a> EdgeSearch<'a> {
+    fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
+        let behaviour = opts.profile.behaviour();
+        let reach = Reach::of(behaviour, opts.edge_kernel_radius as usize);
+        let half = if let Reach::Window(half) = reach { half } else { 0 };
+        let columns = (0..width).map(|x| around(x, half, width).len() as f32).collect();
+        let window = Window::new(width + 2 * half, window_rows(half, height));
+        Self { source, behaviour, tolerance: opts.edge_kernel_tolerance, reach, height, window, columns }
+    }
+
+    /// Writes row `y` of the searched matte, and 1 at its edges, 0 elsewhere.
+    fn row(&mut self, y: usize, matte: &mut [f32], edges: &mut [f32]) {
+        match self.reach {
+            Reach::Window(half) => self.search(y, half, matte, edges),
+            Reach::Nowhere(answer) => {
+                self.source.row(y, matte);
+                edges.fill(answer);
+            }
+        }
+    }
+
+    fn search(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
+        let (width, repeat) = (matte.len(), self.behaviour.repeats_border());
+        let pad = if repeat { Pad::Repeat } else { Pad::Value(f32::NAN) };
+        self.window.cover(around(y, half, self.height), |y, row| {
+            self.source.row(y, &mut row[half..half + width]);
+            pad.fill(row, half);
+        });
+        matte.copy_from_slice(&self.window.row(y)[half..half + width]);
+        edges.fill(0.0);
+        for near in looked_at(y, half, self.height, repeat) {
+            count_alike(edges, matte, self.window.row(near), self.tolerance);
+        }
+        let rows = around(y, half, self.height).len() as f32;
+        self.judge(half, rows, matte, edges);
+    }
+
+    /// Turns numbers of alike samples into 1 at edges and 0 elsewhere.
+    fn judge(&self, half: usize, rows: f32, matte: &[f32], counts: &mut [f32]) {
+        let pixels = counts.iter_mut().zip(matte).zip(&self.columns);
+        let all = ((2 * half + 1) * (2 * half + 1)) as f32;
+        match self.behaviour {
+            Behaviour::V34 => pixels.for_each(|((c, m), columns)| {
+                let others = *c - alike(*m, *m, self.tolerance);
+                let samples = columns * rows - 1.0;
+                *c = edge((others < (ALIKE_SHARE * samples).ceil()) | (samples == 0.0));
+            }),
+            Behaviour::V42 => pixels.for_each(|((c, _), columns)| {
+                *c = edge(*c < (ALIKE_SHARE * (columns * rows)).ceil());
+            }),
+            Behaviour::V45 => pixels.for_each(|((c, _), _)| *c = edge(*c < ALIKE_SHARE * all)),
+        }
+    }
+}
+
+fn edge(found: bool) -> f32 {
+    if found { 1.0 } else { 0.0 }
+}
+
+#[inline(always)]
+fn alike(a: f32, b: f32, tolerance: f32) -> f32 {
+    if (a - b).abs() < tolerance { 1.0 } else { 0.0 }
+}
+
+/// Counts, for every pixel of a row, the samples of a padded row that lie in its window and are like it.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32) {
+    for samples in padded.windows(matte.len()) {
+        for ((count, m), s) in counts.iter_mut().zip(matte).zip(samples) {
+            *count += alike(*s, *m, tolerance);
+        }
+    }
+}
+
+/// The matte with everything but its edges clipped to the black and white level.
+pub(super) struct Clip<'a> {
+    search: EdgeSearch<'a>,
+    black: f32,
+    white: f32,
+    edges: Vec<f32>,
+}
+
+impl<'a> Clip<'a> {
+    /// Whether the levels can change anything.
+    pub(super) fn is_wanted(opts: &KeyOptions) -> bool {
+        let levels_differ = opts.profile.behaviour() != Behaviour::V45 || opts.clip_black != opts.clip_white;
+        (opts.clip_black > 0.0 || opts.clip_white < 1.0) && levels_differ
+    }
+
+    pub(super) fn new(source: Source<'a>, size: (usize, usize), opts: &KeyOptions) -> Self {
+        let search = EdgeSearch::new(source, size, opts);
+        Self { search, black: opts.clip_black, white: opts.clip_white, edges: vec![0.0; size.0] }
+    }
+}
+
+impl Rows for Clip<'_> {
+    fn row(&mut self, y: usize, out: &mut [f32]) {
+        self.search.row(y, out, &mut self.edges);
+        let (black, white) = (self.black, self.white);
+        let pixels = out.iter_mut().zip(&self.edges);
+        if self.search.behaviour == Behaviour::V45 {
+            pixels.for_each(|(m, &e)| *m = if e > 0.0 { *m } else { remapped(*m, black, white) });
+        } else {
+            pixels.for_each(|(m, &e)| *m = if e > 0.0 { *m } else { levelled(*m, black, white) });
+        }
+    }
+}
+
+/// 0 below black, 1 from white on, linear between; a threshold where white is not above black.
+fn levelled(m: f32, black: f32, white: f32) -> f32 {
+    let between = (m - black) / (white - black);
+    let bright = if m >= white { 1.0 } else { between };
+    if m < black { 0.0 } else { bright }
+}
+
+/// Black to 0 and white to 1, whichever is larger, held between.
+fn remapped(m: f32, black: f32, white: f32) -> f32 {
+    let v = (m - black) / (white - black);
+    let v = if v < 0.0 { 0.0 } else { v };
+    if v > 1.0 { 1.0 } else { v }
+}
+
+/// The edges themselves: 1 at edges, 0 elsewhere.
+pub(super) struct Edges<'a> {
+    search: EdgeSearch<'a>,
+    searched: Vec<f32>,
+}
+
+impl<'a> Edges<'a> {
+    pub(super) fn new(source: Source<'a>, size: (usize, usize), opts: &KeyOptions) -> Self {
+        Self { search: EdgeSearch::new(source, size, opts), searched: vec![0.0; size.0] }
+    }
+}
+
+impl Rows for Edges<'_> {
+    fn row(&mut self, y: usize, out: &mut [f32]) {
+        self.search.row(y, &mut self.searched, out);
+    }
+}

@@ -1,0 +1,172 @@
+//! What the robust profile adds: keys that cannot work are refused, holes in plates are filled, and all is counted.
+
+use super::model::{is_usable, primary};
+use super::options::{KeyOptions, Profile};
+use super::photo::{Photo, socket};
+use super::{Deviations, Keying, Screen};
+use crate::error::{Error, Result};
+use crate::filter::Pyramid;
+use crate::image::Image;
+use crate::pixel::{Coverage, LinearRgb, PremulRgba};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Least excess of a key's primary channel over the other two, and least saturation: below, noise of half a percent
+/// becomes matte noise of a quarter.
+const LEAST_STRENGTH: f32 = 0.02;
+
+/// Channel names for messages.
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and saturation.
+fn strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
+    let c = <[f32; 3]>::from(key);
+    let (lo, hi) = [(c[1], c[2]), (c[0], c[2]), (c[0], c[1])][channel];
+    let v = balance * lo + (1.0 - balance) * hi;
+    let excess = c[channel] - v;
+    excess.min(excess * (1.0 - v).abs())
+}
+
+/// Refuses a key colour from which no matte but noise can be made.
+pub(super) fn check_color(key: LinearRgb, opts: &KeyOptions) -> Result<()> {
+    let (key, channel) = (socket(key), primary(socket(key)));
+    let found = strength(key, channel, opts.screen_balance);
+    if opts.profile != Profile::Robust || opts.accept_weak_key || found >= LEAST_STRENGTH {
+        return Ok(());
+    }
+    let LinearRgb { r, g, b } = key;
+    let name = CHANNELS[channel];
+    Err(Error::value(
+        "screen",
+        format!(
+            "{r},{g},{b} is too grey to key: its {name} stands out by {found:.4}, expected at least {LEAST_STRENGTH}; \
+             give a more saturated screen colour, or set key.accept_weak_key = true"
+        ),
+    ))
+}
+
+/// Warns of settings that switch the edge search into something hardly wanted.
+pub(super) fn warn(opts: &KeyOptions) {
+    if opts.profile != Profile::Robust || (opts.clip_black <= 0.0 && opts.clip_white >= 1.0) {
+        return;
+    }
+    if opts.edge_kernel_radius == 1 {
+        log::warn!("key.edge_kernel_radius: 1 makes every pixel an edge, so the levels do nothing; 0 clips all pixels");
+    } else if opts.edge_kernel_radius > 0 && opts.edge_kernel_tolerance == 0.0 {
+        log::warn!("key.edge_kernel_tolerance: 0 makes every pixel an edge, so the levels do nothing");
+    }
+}
+
+/// A plate without holes.
+pub(super) struct Filled {
+    pub(super) plate: Image<LinearRgb>,
+    /// The primary channel of the plate's mean.
+    pub(super) channel: usize,
+    /// How many pixels were filled.
+    pub(super) count: usize,
+}
+
+/// Fills the pixels of a plate that are no usable key from those around them.
+///
+/// # Method
+/// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the finest level that has one.
+/// # Errors
+/// [`Error::Value`] where no pixel of the plate is usable.
+pub(super) fn fill(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled> {
+    let channel = primary(mean(plate));
+    let is_strong = |c: LinearRgb| {
+        is_usable(c.opaque()) && (opts.accept_weak_key || strength(c, channel, opts.screen_balance) >= LEAST_STRENGTH)
+    };
+    let known = plate.map(|c| if is_strong(c) { c.opaque() } else { PremulRgba::TRANSPARENT });
+    let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
+    if count == plate.pixels().len() && count > 0 {
+        let what = format!(
+            "no pixel's {} stands out by {LEAST_STRENGTH} or more; give a plate of the screen alone, or set \
+             key.accept_weak_key = true",
+            CHANNELS[channel]
+        );
+        return Err(Error::value("plate", what));
+    }
+    let levels = Pyramid::new(known);
+    let plate = Image::from_fn(plate.width(), plate.height(), |x, y| nearest_known(&levels, x, y));
+    Ok(Filled { plate, channel, count })
+}
+
+fn nearest_known(levels: &Pyramid<PremulRgba>, x: usize, y: usize) -> LinearRgb {
+    let at = |level| levels.level(level)[(x >> level, y >> level)];
+    let known = (0..levels.levels()).map(at).find(|p| p.a > 0.0).unwrap_or_default();
+    if known.a == 1.0 { known.color() } else { known.color().scale(1.0 / known.a) }
+}
+
+/// Mean of the usable pixels; black where there is none.
+fn mean(plate: &Image<LinearRgb>) -> LinearRgb {
+    let usable = plate.pixels().iter().filter(|c| is_usable(c.opaque()));
+    let (sum, count) = usable.fold(([0.0f64; 3], 0.0), |(sum, count), c| {
+        ([sum[0] + f64::from(c.r), sum[1] + f64::from(c.g), sum[2] + f64::from(c.b)], count + 1.0)
+    });
+    LinearRgb::from(sum.map(|s| (s / f64::max(count, 1.0)) as f32))
+}
+
+/// A value of a garbage or core matte that the robust profile takes as it is.
+pub(super) fn is_usable_matte(m: Coverage) -> bool {
+    is_usable(PremulRgba::new(m.0, 0.0, 0.0, 0.0))
+}
+
+/// Counts what the robust profile replaces in some rows of the photo and its mattes.
+pub(super) fn unusable<P: Photo>(keying: &Keying<'_, P>, opts: &KeyOptions, rows: Range<usize>) -> Deviations {
+    if opts.profile != Profile::Robust {
+        return Deviations::default();
+    }
+    let pixels = |y| keying.photo.row(y).iter().filter(|p| !is_usable(p.premul())).count();
+    let mattes = |y| {
+        let given = [keying.garbage, keying.core].into_iter().flatten();
+        given.map(|m| m.row(y).iter().filter(|&&m| !is_usable_matte(m)).count()).sum::<usize>()
+    };
+    Deviations {
+        unusable_pixels: rows.clone().map(pixels).sum(),
+        unusable_mattes: rows.map(mattes).sum(),
+        ..Deviations::default()
+    }
+}
+
+/// The screen as the robust profile keys against it: a plate without holes, its mean's primary channel.
+pub(super) fn settle(screen: Screen<'_>, opts: &KeyOptions) -> Result<Option<Filled>> {
+    match screen {
+        Screen::Plate(plate) if opts.profile == Profile::Robust => fill(plate, opts).map(Some),
+        _ => Ok(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREEN: LinearRgb = LinearRgb::new(0.1, 0.7, 0.2);
+
+    #[test]
+    fn a_hole_in_a_plate_takes_the_colour_around_it() {
+        let mut plate = Image::filled(8, 8, GREEN);
+        plate[(3, 3)] = LinearRgb::new(f32::NAN, 0.0, 0.0);
+        plate[(4, 3)] = LinearRgb::grey(0.5);
+        let filled = fill(&plate, &KeyOptions::of(Profile::Robust)).unwrap();
+        assert_eq!((filled.count, filled.channel), (2, 1));
+        for c in filled.plate.pixels() {
+            assert!((c.g - 0.7).abs() < 1e-6 && (c.r - 0.1).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_plate_without_colour_is_refused() {
+        let plate = Image::filled(4, 4, LinearRgb::grey(0.5));
+        assert!(fill(&plate, &KeyOptions::of(Profile::Robust)).is_err());
+    }
+
+    #[test]
+    fn a_grey_key_is_refused_with_advice() {
+        let opts = KeyOptions::of(Profile::Robust);
+        let message = check_color(LinearRgb::grey(0.5), &opts).unwrap_err().to_string();
+        assert!(message.starts_with("screen: 0.5,0.5,0.5 is too grey") && message.contains("accept_weak_key"));
+        assert!(check_color(GREEN, &opts).is_ok());
+        assert!(check_color(LinearRgb::grey(0.5), &KeyOptions { accept_weak_key: true, ..opts }).is_ok());
+    }
+}

@@ -1,0 +1,9 @@
+//! Pictures in and out: what they mean, that both decoders agree, and that bad files are met with one clear line.
+
+mod bad;
+#[cfg(feature = "oiio")]
+mod both_paths;
+mod make;
+mod meaning;
+#[cfg(feature = "oiio")]
+mod worker;
