@@ -355,7 +355,12 @@ mod tests {
     fn bounds(hull: &[Point2<f64>]) -> [f64; 4] {
         let xs = || hull.iter().map(|p| p.x);
         let ys = || hull.iter().map(|p| p.y);
-        [xs().fold(f64::MAX, f64::min), ys().fold(f64::MAX, f64::min), xs().fold(0.0, f64::max), ys().fold(0.0, f64::max)]
+        [
+            xs().fold(f64::MAX, f64::min),
+            ys().fold(f64::MAX, f64::min),
+            xs().fold(0.0, f64::max),
+            ys().fold(0.0, f64::max),
+        ]
     }
 
     /// The hull's box is within 2 pixels of `truth`, the accuracy that is promised of photos.
@@ -394,7 +399,11 @@ mod tests {
     fn a_soft_shadow_is_not_the_object() {
         let shadow = |x: f64, y: f64| (((x - 220.0).powi(2) + (y - 100.0).powi(2)) / 2000.0).min(10.0) as f32;
         let found = find(&photo(300, 200, WHITE, |x, y| {
-            if disc(x, y, [110.0, 100.0, 50.0]) { Some(LinearRgb::new(0.1, 0.2, 0.5)) } else { Some(WHITE.scale(1.0 - 0.3 * libm::expf(-shadow(x, y)))) }
+            if disc(x, y, [110.0, 100.0, 50.0]) {
+                Some(LinearRgb::new(0.1, 0.2, 0.5))
+            } else {
+                Some(WHITE.scale(1.0 - 0.3 * libm::expf(-shadow(x, y))))
+            }
         }));
         assert_box(&found.unwrap(), [60.0, 50.0, 160.0, 150.0]);
     }
@@ -434,7 +443,7 @@ mod tests {
     #[test]
     fn large_photos_are_searched_small_and_told_in_their_own_pixels() {
         let found = find(&photo(2000, 1500, GREEN, |x, y| disc(x, y, [900.0, 700.0, 400.0]).then_some(WHITE))).unwrap();
-        let worst = bounds(&found.hull).iter().zip([500.0, 300.0, 1300.0, 1100.0]).map(|(a, b)| (a - b).abs());
+        let worst = bounds(&found.hull).into_iter().zip([500.0, 300.0, 1300.0, 1100.0]).map(|(a, b)| (a - b).abs());
         assert!(worst.fold(0.0, f64::max) <= 4.0, "2 pixels of the search are 4 of the photo");
         assert_eq!((found.mask.size(), found.tight.size()), ((2000, 1500), (2000, 1500)));
         assert_eq!(found.steps[0].image.size(), (1024, 768));
