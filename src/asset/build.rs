@@ -1,6 +1,6 @@
 //! Many photos into an asset folder, from a list.
 
-use super::folder::{AddPhoto, Scale, asset_of, read_or_new, write_photo};
+use super::folder::{AddPhoto, Scale, asset_of, cut_out_file, read_or_new, write_photo};
 use super::manifest::under;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS, Manifest};
 use crate::error::{Error, Result};
@@ -118,7 +118,21 @@ impl List {
             let add = photo.add(&self.cut_out).and_then(|add| add.check(manifest).map(|()| add));
             add.map_err(|e| under(e, &format!("photos[{i}]")))
         });
-        adds.collect()
+        let adds: Vec<AddPhoto> = adds.collect::<Result<_>>()?;
+        self.check_files(&adds)?;
+        Ok(adds)
+    }
+
+    /// No two photos become the same file.
+    fn check_files(&self, adds: &[AddPhoto]) -> Result<()> {
+        let mut seen = std::collections::BTreeMap::new();
+        for (i, (photo, add)) in self.photos.iter().zip(adds).enumerate() {
+            if let Some(first) = seen.insert(cut_out_file(Path::new(&photo.file), add), i) {
+                let what = format!("\"{}\", would become the same cut-out as photos[{first}]", photo.file);
+                return Err(Error::value(format!("photos[{i}].file"), what));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -138,5 +152,85 @@ impl ListedPhoto {
             mass: self.mass.unwrap_or(DEFAULT_MASS),
             options: options.clone(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Library, MANIFEST};
+    use super::*;
+    use crate::image::Image;
+    use crate::pixel::LinearRgb;
+
+    /// A red slab of 60 x 30 pixels on a green screen.
+    fn slab() -> Image<LinearRgb> {
+        Image::from_fn(120, 80, |x, y| {
+            let inside = (30..90).contains(&x) && (25..55).contains(&y);
+            if inside { LinearRgb::new(0.6, 0.05, 0.05) } else { LinearRgb::new(0.04, 0.4, 0.08) }
+        })
+    }
+
+    fn folder_with(list: &str) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["one.png", "two.png"] {
+            io::write(folder.path().join(name), &slab()).unwrap();
+        }
+        std::fs::write(folder.path().join("photos.toml"), list).unwrap();
+        folder
+    }
+
+    fn built(list: &str) -> Result<Library> {
+        let folder = folder_with(list);
+        build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ())?;
+        Library::open(folder.path().join("out"))
+    }
+
+    const TWO: &str = "[[photos]]\nfile = \"one.png\"\nasset = \"a\"\nclass = \"cap\"\nlength = 0.3\n\
+                       [[photos]]\nfile = \"two.png\"\nasset = \"a\"\nclass = \"cap\"\npx_per_metre = 100.0\n";
+
+    #[test]
+    fn a_list_becomes_a_library_of_the_right_size() {
+        let library = built(TWO).unwrap();
+        let [asset] = &library.assets[..] else { panic!("one asset") };
+        assert_eq!((asset.class, asset.photos.len()), (1, 2));
+        // One pixel: what an edge pixel is worth.
+        assert!((asset.photos[0].record.px_per_metre - 200.0).abs() < 1.0 / 0.3);
+        assert!((asset.photos[1].record.object_m[0] - 0.6).abs() < 0.01);
+        assert!((asset.photos[1].record.object_m[1] - 0.3).abs() < 0.01);
+        assert_eq!(asset.photos[1].record.source, "two.png");
+    }
+
+    #[test]
+    fn building_twice_changes_nothing() {
+        let folder = folder_with(TWO);
+        let manifest = || {
+            build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap();
+            std::fs::read(folder.path().join("out").join(MANIFEST)).unwrap()
+        };
+        assert_eq!(manifest(), manifest());
+    }
+
+    #[test]
+    fn mistakes_in_a_list_are_named_before_any_work() {
+        let said = |list: &str| {
+            let folder = folder_with(list);
+            let error = build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap_err();
+            assert!(!folder.path().join("out").exists());
+            error.to_string()
+        };
+        assert!(said(&TWO.replace("\"cap\"", "\"cup\"")).contains("photos[0].class: \"cup\", expected one of"));
+        assert!(said(&TWO.replace("length = 0.3", "")).contains("photos[0].px_per_metre: missing"));
+        assert!(said(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1"));
+        assert!(said(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
+        assert!(said(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));
+        assert!(said("photos = []\n").contains("photos: empty"));
+    }
+
+    #[test]
+    fn a_photo_that_is_missing_leaves_no_manifest() {
+        let folder = folder_with(&TWO.replace("two.png", "three.png"));
+        let out = folder.path().join("out");
+        let error = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap_err();
+        assert!(error.to_string().contains("three.png") && !out.join(MANIFEST).exists());
     }
 }

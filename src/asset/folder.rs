@@ -109,11 +109,16 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
         Error::Photo { .. } => e.in_file(photo),
         other => other,
     })?;
-    let file = format!("{}/{}.exr", add.asset, stem(photo));
+    let file = cut_out_file(photo, add);
     io::create_folder(folder.join(&add.asset))?;
     io::write(folder.join(&file), &cut.image)?;
     io::write(folder.join(&file).with_extension("png"), &thumbnail(&cut.image))?;
     Ok(record(&cut, add, file, photo))
+}
+
+/// Where the cut-out of a photo goes.
+pub(super) fn cut_out_file(photo: &Path, add: &AddPhoto) -> String {
+    format!("{}/{}.exr", add.asset, stem(photo))
 }
 
 /// The photo's name without ending, safe as a name anywhere.
