@@ -3,6 +3,7 @@
 mod camera;
 mod case;
 mod color;
+mod render;
 
 use case::Case;
 use libtest_mimic::{Arguments, Trial};
@@ -15,6 +16,7 @@ type Run = fn(&Case) -> Result<(), String>;
 const STAGES: &[(&str, Run)] = &[
     ("camera", camera::run),
     ("color", color::run),
+    ("render", render::run),
 ];
 
 fn main() {
