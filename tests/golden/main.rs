@@ -2,6 +2,7 @@
 
 mod case;
 mod color;
+mod matte;
 
 use case::Case;
 use libtest_mimic::{Arguments, Trial};
@@ -11,7 +12,7 @@ use std::path::Path;
 type Run = fn(&Case) -> Result<(), String>;
 
 /// The stages that have golden cases: folder name and runner.
-const STAGES: &[(&str, Run)] = &[("color", color::run)];
+const STAGES: &[(&str, Run)] = &[("color", color::run), ("matte", matte::run)];
 
 fn main() {
     let args = Arguments::from_args();
