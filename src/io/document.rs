@@ -2,6 +2,7 @@
 
 use super::atomic::write_bytes;
 use super::format::read_regular;
+use super::raster::one_line;
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -93,10 +94,6 @@ fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
 
 fn line_of(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|&b| b == b'\n').count() + 1
-}
-
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// What a parser did not like, and where.
