@@ -3,6 +3,7 @@
 mod camera;
 mod case;
 mod color;
+mod matte;
 mod render;
 
 use case::Case;
@@ -16,6 +17,7 @@ type Run = fn(&Case) -> Result<(), String>;
 const STAGES: &[(&str, Run)] = &[
     ("camera", camera::run),
     ("color", color::run),
+    ("matte", matte::run),
     ("render", render::run),
 ];
 
