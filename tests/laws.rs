@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use petcomp::Scene;
-use petcomp::scene::{Background, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface};
+use petcomp::scene::{Background, CameraSource, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface};
 use petcomp::settle::{self, Verdict};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -12,9 +12,11 @@ fn tray() -> Background {
     Background {
         name: "tray".into(),
         size: [0.6, 0.4],
-        corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-        photo: [60, 40],
-        focal_px: None,
+        camera: CameraSource::Rectangle {
+            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+            photo: [60, 40],
+            focal_px: None,
+        },
     }
 }
 
