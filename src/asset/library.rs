@@ -116,8 +116,7 @@ mod tests {
     fn folder_with(picture: Option<(usize, usize)>) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let photos = vec![photo("a.exr")];
-        let record =
-            AssetRecord { name: "a".into(), class: "label".into(), thickness: 0.01, mass: 0.02, photos };
+        let record = AssetRecord { name: "a".into(), class: "label".into(), thickness: 0.01, mass: 0.02, photos };
         Manifest { assets: vec![record], ..Manifest::default() }.write(folder.path()).unwrap();
         if let Some((w, h)) = picture {
             let image = Image::filled(w, h, PremulRgba::new(0.25, 0.5, 0.125, 0.75));

@@ -127,9 +127,9 @@ impl Manifest {
     /// [`Error::Value`] (`class`) with the name that was probably meant.
     pub fn class(&self, name: &str) -> Result<u32> {
         let place = self.classes.iter().position(|class| class == name);
-        place.and_then(|i| u32::try_from(i).ok()).ok_or_else(|| {
-            Error::value("class", format!("\"{name}\", expected one of {}", self.classes.join(", ")))
-        })
+        place
+            .and_then(|i| u32::try_from(i).ok())
+            .ok_or_else(|| Error::value("class", format!("\"{name}\", expected one of {}", self.classes.join(", "))))
     }
 
     fn check(&self) -> Result<()> {

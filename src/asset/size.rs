@@ -18,9 +18,8 @@ pub fn oriented_size(hull: &[Point2<f64>]) -> [f64; 2] {
 }
 
 fn extent(points: &[Point2<f64>], along: Vector2<f64>) -> f64 {
-    let (low, high) = points.iter().map(|p| p.coords.dot(&along)).fold((f64::MAX, f64::MIN), |(l, h), v| {
-        (l.min(v), h.max(v))
-    });
+    let (low, high) =
+        points.iter().map(|p| p.coords.dot(&along)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
     high - low
 }
 
