@@ -51,9 +51,7 @@ pub fn rgb_from_rgb(target: &RgbSpace, source: &RgbSpace) -> Matrix3<f64> {
 /// XYZ under one white (chromaticity x, y) of what had been seen under another.
 ///
 /// # Method
-/// Linear Bradford adaptation: von Kries scaling in sharpened cone responses ([Lam 1985]; ICC.1 Annex E).
-///
-/// [Lam 1985]: https://www.color.org/chadtag.xalter
+/// Linear Bradford adaptation: von Kries scaling in sharpened cone responses (K. M. Lam 1985; ICC.1:2022, Annex E).
 pub fn bradford(target_white: [f64; 2], source_white: [f64; 2]) -> Matrix3<f64> {
     let [target, source] = [target_white, source_white].map(|white| CONES_FROM_XYZ * xyz_of(white));
     inverse(&CONES_FROM_XYZ) * Matrix3::from_diagonal(&target.component_div(&source)) * CONES_FROM_XYZ

@@ -35,7 +35,7 @@ pub struct SheetOptions {
     pub title: String,
     /// Widest a picture may be, pixels; larger ones are made smaller. Default: 320.
     pub picture_width: usize,
-    /// Pictures beside each other; 0 lets the sheet become about as wide as high. Default: 0.
+    /// Pictures beside each other; 0 lets the sheet become about 3:2. Default: 0.
     pub columns: usize,
 }
 
@@ -149,7 +149,7 @@ impl Layout {
         let highest = tiles.iter().map(|t| t.picture.height()).max().unwrap_or(0);
         let cell = [widest, highest + CAPTION_GAP + text.height()];
         let columns = match options.columns {
-            0 => square_columns(tiles.len(), cell),
+            0 => pleasing_columns(tiles.len(), cell),
             n => n.min(tiles.len().max(1)),
         };
         let row = (columns * (cell[0] + GAP)).saturating_sub(GAP);
@@ -171,11 +171,13 @@ impl Layout {
     }
 }
 
-/// The number of columns with which a sheet comes closest to a square.
-fn square_columns(count: usize, [w, h]: [usize; 2]) -> usize {
+/// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty place at its end weighs
+/// as much as being too wide by two pictures.
+fn pleasing_columns(count: usize, [w, h]: [usize; 2]) -> usize {
     let off = |columns: &usize| {
         let rows = count.div_ceil(*columns);
-        (columns * (w + GAP)).abs_diff(rows * (h + GAP))
+        let empty = columns * rows - count;
+        (2 * columns * (w + GAP)).abs_diff(3 * rows * (h + GAP)) + 4 * empty * (w + GAP)
     };
     (1..=count.max(1)).min_by_key(off).unwrap_or(1)
 }
@@ -229,5 +231,39 @@ fn legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
         let down = ((TextSize::Small.height() - MARK) / 2) as isize;
         draw::fill(sheet, [x, y + down], [MARK, MARK], entry.color);
         draw::text(sheet, [x + MARK as isize + 8, y], &entry.text, INK, TextSize::Small);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_is_wider_than_high_and_has_no_hole_where_that_is_possible() {
+        assert_eq!(pleasing_columns(24, [320, 260]), 6);
+        assert_eq!(pleasing_columns(16, [320, 260]), 4);
+        assert_eq!(pleasing_columns(1, [320, 260]), 1);
+        assert_eq!(pleasing_columns(0, [0, 0]), 1);
+    }
+
+    #[test]
+    fn a_sheet_without_pictures_still_has_its_legend() {
+        let sheet = contact_sheet(&[], &["cap".into()], &SheetOptions::default());
+        assert!(sheet.pixels().contains(&draw::class_color(0)));
+    }
+
+    #[test]
+    fn a_small_picture_is_not_made_larger() {
+        let picture = Image::filled(40, 30, LinearRgb::WHITE);
+        let tile = |width| Tile::new(&picture, Labels::default(), Vec::new(), String::new(), width).picture;
+        assert_eq!((tile(320).size(), tile(20).size()), ((40, 30), (20, 15)));
+    }
+
+    #[test]
+    fn a_narrow_legend_goes_on_in_the_next_line() {
+        let classes = ["cap_label", "cap", "label", "none"].map(String::from);
+        let narrow = entries(&classes, &[], 250);
+        assert!(narrow.iter().all(|e| e.x == 0 || e.x + e.width() <= 250));
+        assert!(narrow.last().expect("five entries").line >= 2);
     }
 }
