@@ -193,10 +193,10 @@ mod tests {
         let library = built(TWO).unwrap();
         let [asset] = &library.assets[..] else { panic!("one asset") };
         assert_eq!((asset.class, asset.photos.len()), (1, 2));
-        // One pixel: what an edge pixel is worth.
-        assert!((asset.photos[0].record.px_per_metre - 200.0).abs() < 1.0 / 0.3);
-        assert!((asset.photos[1].record.object_m[0] - 0.6).abs() < 0.01);
-        assert!((asset.photos[1].record.object_m[1] - 0.3).abs() < 0.01);
+        // An edge is told to a pixel, so a length to two: 60 px are 0.3 m to within 1 in 30.
+        assert!((asset.photos[0].record.px_per_metre / 200.0 - 1.0).abs() < 1.0 / 30.0);
+        assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
+        assert!((asset.photos[1].record.object_m[1] - 0.3).abs() <= 0.02);
         assert_eq!(asset.photos[1].record.source, "two.png");
     }
 

@@ -220,7 +220,9 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<Image<bool>> {
     let groups = Groups::of(&filter::dilate(edges, join_px / 2.0));
     let sizes = groups.sizes(edges);
     let Some(main) = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i))) else {
-        return Err(refused("nothing stands out from the background; is there an object, and is it in focus?"));
+        return Err(refused(
+            "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
+        ));
     };
     let member = |i: usize| groups.only(move |group| group == i).zip_map(edges, |near, edge| near && edge);
     let object = member(main);
@@ -467,13 +469,16 @@ mod tests {
         let two = photo(400, 200, GREEN, |x, y| {
             (disc(x, y, [90.0, 100.0, 50.0]) || disc(x, y, [310.0, 100.0, 45.0])).then_some(WHITE)
         });
-        assert!(said(&two).contains("two objects, at 22 % of the width"), "{}", said(&two));
+        assert!(said(&two).contains("two objects, at 23 % of the width"), "{}", said(&two));
     }
 
     #[test]
     fn a_picture_full_of_object_is_refused() {
         let stripes = photo(300, 200, GREEN, |x, y| ((x + y) % 16.0 < 8.0).then_some(WHITE));
-        assert!(said(&stripes).contains("all four borders"), "{}", said(&stripes));
+        assert!(said(&stripes).contains("background all around it"), "{}", said(&stripes));
+        let cross = |x: f64, y: f64| (140.0..160.0).contains(&x) || (90.0..110.0).contains(&y);
+        let cross = photo(300, 200, GREEN, |x, y| cross(x, y).then_some(WHITE));
+        assert!(said(&cross).contains("all four borders"), "{}", said(&cross));
     }
 
     #[test]
