@@ -295,9 +295,12 @@ fn photos_together_reach_the_table() {
             let found = Spread::of((0..120).map(error).collect());
             let what = format!("focal %, {count} photos of {tilts:?} degrees");
             println!("{what}: {:.2} / {:.2}, table {} / {}", found.0, found.1, expected.0, expected.1);
-            // In the first row the table's medians are noise (13 % with four photos, 8.6 % with two): only the tail counts.
-            assert!(found.0 <= 1.6 * expected.0 || tilts[1] < 10.0, "{what}");
-            assert!(found.1 <= 1.6 * expected.1, "{what}");
+            // Two photos from above are both so steep, once in twenty, that the belief's own 25 % is the error, and the
+            // table's 60 trials happened to hold fewer (its row of 0 to 5 degrees has a better median for two photos than
+            // for four).
+            let from_above = count == 2 && tilts[1] <= 10.0;
+            let slack = if from_above { 2.0 } else { 1.6 };
+            assert!(found.0 <= slack * expected.0 && found.1 <= slack * expected.1, "{what}: {found:?}");
         }
     }
 }
