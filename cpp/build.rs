@@ -2,4 +2,38 @@
 
 fn main() {
     println!("cargo:rerun-if-changed=cpp/build.rs");
+    #[cfg(feature = "oiio")]
+    shim();
+}
+
+/// Oldest OpenImageIO that the shim was tried with (Debian 12).
+#[cfg(feature = "oiio")]
+const OLDEST: &str = "2.4";
+
+#[cfg(feature = "oiio")]
+fn shim() {
+    for file in ["cpp/oiio_shim.h", "cpp/oiio_shim.cpp", "src/io/ffi.rs"] {
+        println!("cargo:rerun-if-changed={file}");
+    }
+    let oiio = pkg_config::Config::new().atleast_version(OLDEST).cargo_metadata(false).probe("OpenImageIO");
+    let oiio = oiio.unwrap_or_else(|_| {
+        println!(
+            "cargo:error=the feature `oiio` needs OpenImageIO {OLDEST} or newer, a C++ compiler and pkg-config: \
+             `apt-get install g++ pkg-config libopenimageio-dev`, or build with `--no-default-features`"
+        );
+        std::process::exit(1)
+    });
+    cxx_build::bridge("src/io/ffi.rs")
+        .file("cpp/oiio_shim.cpp")
+        .std("c++17")
+        .includes(&oiio.include_paths)
+        .flag_if_supported("-Wno-deprecated-declarations")
+        .compile("petcomp_oiio");
+    for path in &oiio.link_paths {
+        println!("cargo:rustc-link-search=native={}", path.display());
+    }
+    // Behind compile(): the linker looks for what the shim lacks in what follows it, and leaves out what nobody calls.
+    for lib in &oiio.libs {
+        println!("cargo:rustc-link-lib=dylib={lib}");
+    }
 }

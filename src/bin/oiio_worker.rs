@@ -1,2 +1,5 @@
-//! The worker that reads what only OpenImageIO can.
-fn main() {}
+//! The worker that reads what only OpenImageIO can; petcomp starts it, people do not.
+
+fn main() -> std::process::ExitCode {
+    petcomp::io::serve_worker(std::env::args_os().skip(1))
+}

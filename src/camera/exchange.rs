@@ -122,10 +122,8 @@ impl Camera {
         let [w, h] = image.map(f64::from);
         let view = blender.view([w, h]);
         let fx = blender.lens / blender.sensor() * view;
-        let principal_px = Point2::new(
-            w / 2.0 - blender.shift_x * view,
-            h / 2.0 + blender.shift_y * view / blender.pixel_aspect,
-        );
+        let principal_px =
+            Point2::new(w / 2.0 - blender.shift_x * view, h / 2.0 + blender.shift_y * view / blender.pixel_aspect);
         let m = &blender.matrix_world;
         let rotation = blender_flip() * Matrix3::from_fn(|i, j| m[i][j]).transpose();
         let center = Vector3::new(m[0][3], m[1][3], m[2][3]);

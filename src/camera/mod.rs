@@ -30,7 +30,7 @@ mod warning;
 
 pub use error::SolveError;
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
-pub use file::{CameraFile, CameraFormat, FittedSurface, FitRecord, FocalPrior, FoundCamera, Model, SigmaRecord};
+pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord};
 pub use focal::{FocalSource, focal_from_equivalent};
 pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{

@@ -146,4 +146,15 @@ mod tests {
             assert!(out.r >= 0.0 && out.g >= 0.0 && out.b >= 0.0, "{c:?} became {out:?}");
         }
     }
+
+    #[test]
+    fn colours_without_negative_channels_agree_with_the_palette_crate() {
+        use palette::{FromColor, Hsv as Theirs, LinSrgb, encoding::Linear, encoding::Srgb};
+        for c in colors().filter(|c| c.r.min(c.g).min(c.b) >= 0.0 && largest(*c) <= 1.0) {
+            let theirs = Theirs::<Linear<Srgb>>::from_color(LinSrgb::new(c.r, c.g, c.b));
+            let ours = rgb_to_hsv(c);
+            assert!((360.0 * ours.h - theirs.hue.into_positive_degrees()).abs() < 1e-3, "{c:?}");
+            assert!((ours.s - theirs.saturation).abs() < 1e-6 && (ours.v - theirs.value).abs() < 1e-6, "{c:?}");
+        }
+    }
 }

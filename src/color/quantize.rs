@@ -130,8 +130,8 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
 
     /// The code nearest to an amount of light.
     #[inline(always)]
+    #[expect(clippy::manual_clamp, reason = "`max` and then `min` take NaN to 0, `clamp` keeps it")]
     fn code(&self, light: f32) -> u16 {
-        // `max` and `min` in this order take NaN to 0.
         let light = light.max(0.0).min(1.0);
         let number = (light.to_bits() >> Self::REST_BITS).saturating_sub(self.first);
         let cell = &self.cells[number as usize];

@@ -28,19 +28,20 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     if before.is_none() && holds_something(folder)? {
         return Err(Error::file(folder, format!("is not empty and has no {IDENTITY}, expected a new or empty folder")));
     }
-    std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, e))?;
+    io::create_folder(folder)?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
         same(&before, &now, "").map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))?;
     }
+    sweep(folder)?;
     io::write_json(folder.join(IDENTITY), &now)?;
     plan.writers.iter().try_for_each(|writer| writer.begin(folder, &plan.classes))?;
     Ok(Claim { _lock: lock })
 }
 
 /// What a folder was made from; none where it is no dataset yet.
-fn identity(folder: &Path) -> Result<Option<Value>> {
+pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
     let path = folder.join(IDENTITY);
     if path.exists() { io::read_json(&path).map(Some) } else { Ok(None) }
 }
@@ -55,12 +56,28 @@ fn holds_something(folder: &Path) -> Result<bool> {
 
 fn lock(folder: &Path) -> Result<File> {
     let path = folder.join(LOCK);
+    // The file stays: a lock on a file that another run is about to delete would lock nothing.
     let file = File::create(&path).map_err(|e| Error::file(&path, e))?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(Error::file(folder, "another run is writing this dataset")),
         Err(TryLockError::Error(e)) => Err(Error::file(&path, e)),
     }
+}
+
+/// Deletes what a killed run left half-written.
+fn sweep(folder: &Path) -> Result<()> {
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?.flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        match entry.file_type() {
+            Ok(kind) if kind.is_dir() => sweep(&entry.path())?,
+            Ok(kind) if kind.is_file() && name.starts_with(".petcomp-") && name.ends_with(".tmp") => {
+                std::fs::remove_file(entry.path()).map_err(|e| Error::file(entry.path(), e))?;
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Everything that decides the bytes of a dataset's samples, as it reads back from a file.

@@ -133,6 +133,14 @@ impl Journal {
     }
 }
 
+/// The lines of a folder's journal, in order of number.
+pub(crate) fn lines_of(folder: &Path) -> Result<Vec<Line>> {
+    let path = folder.join(JOURNAL);
+    let text = std::fs::read(&path).map_err(|e| Error::file(&path, e))?;
+    let lines: BTreeMap<u64, Line> = read(&text).map(|line| (line.k, line)).collect();
+    Ok(lines.into_values().collect())
+}
+
 /// The whole lines of a journal.
 pub(crate) fn read(text: &[u8]) -> impl Iterator<Item = Line> {
     text.split(|&b| b == b'\n').filter_map(|line| serde_json::from_slice(line).ok())

@@ -1,5 +1,8 @@
 //! Dataset: images and labels in the layouts that trainers read.
 //!
+//! A [`Studio`] opens what a recipe file ([`Setup`]) names and makes sample `k` of it: draws the scene, lets it settle,
+//! lights, renders and labels it.
+//!
 //! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Yolo`]
 //! the labels, [`Sidecar`] everything that was drawn. Sample `k` has the same files, to the byte, whatever the number of
 //! threads, and after any interruption:
@@ -13,19 +16,29 @@
 //! index.jsonl                    one line for each finished sample
 //! ```
 
+mod check;
+mod contact_sheet;
 mod folder;
 mod generate;
 mod journal;
 mod pictures;
+mod place;
+mod setup;
 mod sidecar;
 mod split;
+mod studio;
 mod yolo;
+mod yolo_yaml;
 
+pub use check::{Checked, Fault, check};
+pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use generate::{Plan, Progress, generate};
 pub use journal::{ClassCount, Report};
 pub use pictures::{PictureFormat, Pictures};
+pub use setup::Setup;
 pub use sidecar::{Record, Sidecar};
 pub use split::{Part, Split, SplitOrder};
+pub use studio::Studio;
 pub use yolo::{Yolo, YoloBox, YoloTask};
 
 use crate::error::Result;

@@ -1,7 +1,7 @@
 //! The images of a dataset.
 
 use crate::dataset::{Entry, Part, Writer};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

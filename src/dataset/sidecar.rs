@@ -1,7 +1,7 @@
 //! Everything known of a sample, one JSON file beside each image.
 
 use crate::dataset::{Entry, Part, Writer};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::io;
 use crate::label::Labels;
 use crate::pixel::ObjectId;

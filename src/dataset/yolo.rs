@@ -1,7 +1,9 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
+use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Entry, Part, Writer};
 use crate::error::{Error, Result};
+use crate::geom::Point2;
 use crate::io;
 use crate::label::{BBox, ObjectLabel};
 use serde::{Deserialize, Serialize};
@@ -59,7 +61,7 @@ impl Writer for Yolo {
             let dir = folder.join("labels").join(part.name());
             io::create_folder(&dir)?;
         }
-        io::write_text(folder.join("data.yaml"), &data_yaml(classes))
+        io::write_text(folder.join("data.yaml"), &DataYaml::write(classes))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -107,7 +109,7 @@ fn box_row(class: u32, b: &BBox, [w, h]: [f64; 2]) -> String {
     row(class, [center.x / w, center.y / h, b.width() / w, b.height() / h])
 }
 
-fn ring_row(class: u32, ring: &[crate::geom::Point2<f64>], [w, h]: [f64; 2]) -> String {
+fn ring_row(class: u32, ring: &[Point2<f64>], [w, h]: [f64; 2]) -> String {
     row(class, ring.iter().flat_map(|p| [p.x / w, p.y / h]))
 }
 
@@ -118,17 +120,4 @@ fn row(class: u32, shares: impl IntoIterator<Item = f64>) -> String {
     }
     row.push('\n');
     row
-}
-
-fn data_yaml(classes: &[String]) -> String {
-    let mut yaml = String::from("# Folders are relative to this file. YOLOv5: add a line `path: <this folder>`.\n");
-    for part in Part::ALL {
-        yaml += &format!("{0}: images/{0}\n", part.name());
-    }
-    yaml += &format!("nc: {}\nnames:\n", classes.len());
-    for (i, name) in classes.iter().enumerate() {
-        // A JSON string is a YAML string, whatever is in it.
-        yaml += &format!("  {i}: {}\n", serde_json::Value::from(name.as_str()));
-    }
-    yaml
 }

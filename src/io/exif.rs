@@ -27,6 +27,15 @@ impl CameraNotes {
         }
     }
 
+    /// A TIFF says that its colours are multiplied by alpha (TIFF 6.0, `ExtraSamples` = 1).
+    #[cfg(feature = "oiio")]
+    pub(super) fn has_associated_alpha(tiff: &[u8]) -> bool {
+        const EXTRA_SAMPLES: Tag = Tag(exif::Context::Tiff, 338);
+        let exif = exif::Reader::new().read_from_container(&mut std::io::Cursor::new(tiff));
+        let extra = exif.ok().and_then(|e| e.get_field(EXTRA_SAMPLES, In::PRIMARY)?.value.get_uint(0));
+        extra == Some(1)
+    }
+
     fn of(exif: &Exif) -> Self {
         let number = |tag| exif.get_field(tag, In::PRIMARY).and_then(|f| f.value.get_uint(0));
         let orientation = number(Tag::Orientation).and_then(|v| u8::try_from(v).ok()).unwrap_or(1);

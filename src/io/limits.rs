@@ -4,7 +4,8 @@
 //! are checked first, in arithmetic that cannot wrap.
 
 /// Bounds on what a picture file may ask for; a file beyond them is refused before its pixels are touched.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Limits {
     /// Pixels along one side. Default: 32,768.
     pub side: u64,

@@ -8,7 +8,8 @@
 //! | half and float (EXR, TIFF, HDR) | taken as scene-linear Rec. 709 | EXR premultiplied, TIFF as it says | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
-//! padded with zeros from its data window to its display window. Embedded ICC profiles are not applied.
+//! padded with zeros from its data window to its display window. An EXR that names other primaries is converted; embedded ICC profiles are not
+//! applied.
 //!
 //! Sizes are checked against [`Limits`] before anything is allocated, decoders that panic are caught, and truncated JPEGs,
 //! which decoders take for grey pictures, are refused. Files are written beside their place and moved there: whole or
@@ -18,23 +19,36 @@ mod atomic;
 mod document;
 mod exif;
 pub mod exr;
+#[cfg(feature = "oiio")]
+mod ffi;
 mod format;
 mod hdr;
 mod header;
 mod jpeg;
 mod limits;
+#[cfg(feature = "oiio")]
+pub mod oiio;
 mod orient;
+mod overrides;
 mod png;
 mod raster;
 mod tiff;
+#[cfg(feature = "oiio")]
+mod worker;
 mod write;
 
 pub use atomic::create_folder;
-pub use document::{read_json, read_text, read_toml, write_json, write_text, write_toml};
+pub use document::{
+    read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
+};
 pub use format::Format;
 pub use header::Header;
 pub use limits::Limits;
+pub use overrides::Override;
 pub use raster::FromFile;
+#[cfg(feature = "oiio")]
+#[doc(hidden)]
+pub use worker::serve as serve_worker;
 pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
 
 use crate::{Error, Image, Result};
@@ -54,18 +68,39 @@ use std::path::Path;
 /// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the
 /// channels asked for.
 pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
-    read_with(path, &Limits::default())
+    read_with(path, &ReadOptions::default())
 }
 
-/// Reads a picture as [`read`] does, under limits of the caller's.
+/// What reads the kinds of file that the Rust decoders do not know.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fallback {
+    /// Nothing: such files are refused.
+    Nothing,
+    /// OpenImageIO in a process of its own, where petcomp was built with the feature `oiio`.
+    #[default]
+    Worker,
+}
+
+/// How a picture is read.
+#[derive(Clone, Debug, Default)]
+pub struct ReadOptions {
+    /// What a file may ask for. Default: [`Limits::default`].
+    pub limits: Limits,
+    /// What reads other kinds of file. Default: [`Fallback::Worker`].
+    pub fallback: Fallback,
+}
+
+/// Reads a picture as [`read`] does, under conditions of the caller's.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_with<P: FromFile>(path: impl AsRef<Path>, limits: &Limits) -> Result<Image<P>> {
-    let path = path.as_ref();
+pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
+    let (path, limits) = (path.as_ref(), &options.limits);
     let source = Source::open(path, limits)?;
     let raster = match caught(|| decode(&source, limits, P::WANTED)) {
-        Err(Refusal::Unsupported(what)) => elsewhere(path, source.format, what, limits)?,
+        Err(Refusal::Unsupported(what)) if options.fallback == Fallback::Worker => {
+            elsewhere(path, &source, what, limits, P::WANTED)?
+        }
         decoded => decoded.map_err(|e| Error::file(path, e))?,
     };
     upright(&raster, &source).map_err(|e| Error::file(path, e))
@@ -128,6 +163,14 @@ fn caught<T>(f: impl FnOnce() -> std::result::Result<T, Refusal>) -> std::result
 }
 
 /// Another decoder for what ours do not know.
-fn elsewhere(path: &Path, _format: Format, what: String, _limits: &Limits) -> Result<Raster> {
-    Err(Error::file(path, what))
+#[cfg(feature = "oiio")]
+fn elsewhere(path: &Path, source: &Source, _: String, limits: &Limits, wanted: Wanted) -> Result<Raster> {
+    let raster = worker::decode(path, source, limits, wanted).map_err(|e| Error::file(path, e))?;
+    Ok(oiio::associated(raster, source))
+}
+
+/// Without OpenImageIO there is no other decoder.
+#[cfg(not(feature = "oiio"))]
+fn elsewhere(path: &Path, _: &Source, what: String, _: &Limits, _: Wanted) -> Result<Raster> {
+    Err(Error::file(path, format!("{what} (petcomp was built without OpenImageIO)")))
 }

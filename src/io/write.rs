@@ -206,7 +206,7 @@ pub(super) enum Codes {
 }
 
 /// Channels side by side, pixel after pixel, rows in parallel.
-fn flat<P: ToFile, T: Copy + Default + Send>(image: &Image<P>, f: impl Fn(P) -> [T; 4] + Sync) -> Vec<T> {
+pub(super) fn flat<P: ToFile, T: Copy + Default + Send>(image: &Image<P>, f: impl Fn(P) -> [T; 4] + Sync) -> Vec<T> {
     let n = P::NAMES.len();
     let mut out = vec![T::default(); image.pixels().len() * n];
     let rows = image.width().max(1);
@@ -265,7 +265,7 @@ fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> s
 }
 
 /// The storage of a sample: as asked, or the format's own.
-fn stored_as<P: ToFile>(format: Option<Format>, asked: Option<Bits>) -> std::result::Result<Bits, String> {
+pub(super) fn stored_as<P: ToFile>(format: Option<Format>, asked: Option<Bits>) -> std::result::Result<Bits, String> {
     let possible: &[Bits] = match format {
         Some(Format::Exr) if P::CODED => &[Bits::Half, Bits::Float],
         Some(Format::Exr) => &[Bits::Float, Bits::Half],

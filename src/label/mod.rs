@@ -4,11 +4,14 @@
 //! topmost rule are geometry: the cards' outlines as the camera sees them.
 
 mod bbox;
+pub(crate) mod draw;
 mod outline;
+pub(crate) mod overlay;
 mod topmost;
 mod visibility;
 
 pub use bbox::BBox;
+pub use overlay::overlay;
 pub use topmost::knotted;
 
 use crate::geom::Point2;

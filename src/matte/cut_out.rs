@@ -203,3 +203,62 @@ fn reduced(image: Image<PremulRgba>, longest: usize) -> (Image<PremulRgba>, f64)
     let side = |len: usize| ((len as f64 * scale).round() as usize).max(1);
     (filter::resize(&image, side(w), side(h)), scale)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
+
+    /// A slab of 60 x 30 pixels with its corner at (30, 25).
+    fn slab(screen: LinearRgb) -> Image<LinearRgb> {
+        Image::from_fn(120, 80, |x, y| {
+            let inside = (30..90).contains(&x) && (25..55).contains(&y);
+            if inside { LinearRgb::new(0.5, 0.05, 0.05) } else { screen }
+        })
+    }
+
+    #[test]
+    fn a_coloured_screen_is_keyed_and_gone() {
+        let cut = cut_out(&slab(GREEN), &CutOutOptions::default()).unwrap();
+        assert_eq!(cut.method, MatteMethod::Key);
+        assert!((cut.screen.g - GREEN.g).abs() < 1e-6 && cut.residue < 1e-6);
+        let (w, h) = cut.image.size();
+        assert_eq!(cut.image[(0, 0)], PremulRgba::TRANSPARENT);
+        assert!((cut.image[(w / 2, h / 2)].a - 1.0).abs() < 1e-5);
+        assert!(w.abs_diff(68) <= 2 && h.abs_diff(38) <= 2, "{w} x {h}: the slab and 4 pixels around it");
+    }
+
+    #[test]
+    fn a_white_board_gives_an_opaque_object() {
+        let cut = cut_out(&slab(LinearRgb::new(0.6, 0.62, 0.7)), &CutOutOptions::default()).unwrap();
+        assert_eq!(cut.method, MatteMethod::Outline);
+        let centre = cut.image[(cut.image.width() / 2, cut.image.height() / 2)];
+        assert!((centre.a - 1.0).abs() < 1e-5 && (centre.r - 0.5).abs() < 1e-5);
+        assert_eq!(cut.image[(0, 0)].a, 0.0);
+    }
+
+    #[test]
+    fn the_hull_is_told_in_pixels_of_the_cut_out() {
+        let whole = cut_out(&slab(GREEN), &CutOutOptions::default()).unwrap();
+        let left = |cut: &CutOut| cut.hull.iter().map(|p| p.x).fold(f64::MAX, f64::min);
+        assert!((left(&whole) + whole.roi.x as f64 - 30.0).abs() <= 1.0);
+        let half = CutOutOptions { longest_side: whole.image.width() / 2, ..Default::default() };
+        let half = cut_out(&slab(GREEN), &half).unwrap();
+        assert!((left(&half) - 0.5 * left(&whole)).abs() < 0.1 && (half.scale - 0.5).abs() < 0.01);
+    }
+
+    #[test]
+    fn options_are_a_toml_table_and_named_where_they_are_wrong() {
+        let opts: CutOutOptions = toml::from_str(
+            "method = \"key\"\nwithin = \"hull\"\n[segment]\nlevels = 5\nfirst_threshold = { noise = 8.0 }\n[key]\nclip_black = 0.1\n",
+        )
+        .unwrap();
+        assert_eq!((opts.within, opts.segment.first_threshold), (Within::Hull, super::super::Threshold::Noise(8.0)));
+        let back: CutOutOptions = toml::from_str(&toml::to_string(&opts).unwrap()).unwrap();
+        assert_eq!(back, opts);
+        let wrong = CutOutOptions { segment: SegmentOptions { levels: 99, ..Default::default() }, ..opts };
+        let said = cut_out(&slab(GREEN), &wrong).unwrap_err().to_string();
+        assert_eq!(said, "segment.levels: 99, expected 2 to 8");
+    }
+}

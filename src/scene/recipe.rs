@@ -135,12 +135,8 @@ pub struct Background {
     pub name: String,
     /// Width and height of the labelled rectangle, metres.
     pub size: [f64; 2],
-    /// Its corners: top left, top right, bottom right, bottom left; pixels of the photo.
-    pub corners_px: [[f64; 2]; 4],
-    /// Width and height of the photo, pixels.
-    pub photo: [u32; 2],
-    /// Focal length in pixels of the photo, where it is known from elsewhere.
-    pub focal_px: Option<f64>,
+    /// The camera that took it, or what that can be found from.
+    pub camera: CameraSource,
 }
 
 impl Default for Recipe {
@@ -207,11 +203,7 @@ impl Recipe {
         let scene = Scene {
             image: self.image,
             plate: background.name.clone(),
-            camera: CameraSource::Rectangle {
-                corners_px: background.corners_px,
-                photo: background.photo,
-                focal_px: background.focal_px,
-            },
+            camera: background.camera,
             surface,
             objects,
             ambient: ambient(&lights, self.ambient.draw(&draws, "ambient")),
@@ -354,9 +346,11 @@ mod tests {
         Background {
             name: name.into(),
             size: [0.6, 0.4],
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: Some(55.0),
+            camera: CameraSource::Rectangle {
+                corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+                photo: [60, 40],
+                focal_px: Some(55.0),
+            },
         }
     }
 

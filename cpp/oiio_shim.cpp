@@ -1,0 +1,148 @@
+#include "petcomp/cpp/oiio_shim.h"
+
+#include <OpenImageIO/imageio.h>
+#include <stdexcept>
+#include <string>
+
+#include "petcomp/src/io/ffi.rs.h"
+
+namespace petcomp {
+namespace {
+
+using OIIO::ImageInput;
+using OIIO::ImageOutput;
+using OIIO::ImageSpec;
+using OIIO::TypeDesc;
+
+// The library's own words, which can be missing.
+[[noreturn]] void fail(std::string said, const char *otherwise) {
+    throw std::runtime_error(said.empty() ? otherwise : said);
+}
+
+// Integers up to 16 bits stay as they are, everything else becomes float.
+TypeDesc handed_over(const ImageSpec &spec) {
+    switch (spec.format.basetype) {
+    case TypeDesc::UINT8: return TypeDesc::UINT8;
+    case TypeDesc::UINT16: return TypeDesc::UINT16;
+    default: return TypeDesc::FLOAT;
+    }
+}
+
+TypeDesc of_bytes(int bytes) {
+    switch (bytes) {
+    case 1: return TypeDesc::UINT8;
+    case 2: return TypeDesc::UINT16;
+    case 4: return TypeDesc::FLOAT;
+    default: throw std::invalid_argument("samples of 1, 2 or 4 bytes expected");
+    }
+}
+
+// Alpha is handed over as the file has it: the library would multiply display-encoded values.
+ImageSpec as_it_is() {
+    ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1);
+    return config;
+}
+
+size_t bytes_of(const ImageSpec &spec, TypeDesc type) {
+    return size_t(spec.width) * size_t(spec.height) * size_t(spec.nchannels) * type.size();
+}
+
+// OpenImageIO 2.4 crashes on damaged TIFF strips that it reads several at a time.
+bool row_by_row(const ImageInput &input, const ImageSpec &spec) {
+    return std::string(input.format_name()) == "tiff" && spec.tile_width == 0;
+}
+
+} // namespace
+
+Reader::Reader(std::unique_ptr<ImageInput> input) : input_(std::move(input)) {}
+Reader::~Reader() = default;
+
+void start() {
+    OIIO::attribute("threads", 1);
+    OIIO::attribute("exr_threads", -1);
+    OIIO::attribute("try_all_readers", 0);
+}
+
+rust::String version() { return rust::String(OIIO_VERSION_STRING); }
+
+std::unique_ptr<Reader> open(rust::Str path, rust::Str format) {
+    auto input = ImageInput::create(std::string(format));
+    if (!input)
+        fail(OIIO::geterror(), "no reader for this format");
+    input->threads(1);
+    ImageSpec spec;
+    if (!input->open(std::string(path), spec, as_it_is()))
+        fail(input->geterror(), "cannot be opened");
+    return std::make_unique<Reader>(std::move(input));
+}
+
+Layout layout(const Reader &reader) {
+    const ImageSpec spec = reader.input().spec(0, 0);
+    if (spec.format == TypeDesc::UNKNOWN)
+        fail(reader.input().geterror(), "no picture in it");
+    if (spec.deep || spec.depth > 1 || spec.full_depth > 1)
+        throw std::runtime_error("deep or volume data, expected flat pixels");
+    Layout out;
+    out.width = spec.full_width;
+    out.height = spec.full_height;
+    out.x = int64_t(spec.x) - spec.full_x;
+    out.y = int64_t(spec.y) - spec.full_y;
+    out.data_width = spec.width;
+    out.data_height = spec.height;
+    for (int c = 0; c < spec.nchannels; ++c)
+        out.channels.push_back(std::string(spec.channel_name(c)));
+    out.bytes = int32_t(handed_over(spec).size());
+    out.color_space = std::string(spec.get_string_attribute("oiio:ColorSpace"));
+    return out;
+}
+
+void read(const Reader &reader, rust::Slice<uint8_t> samples) {
+    ImageInput &input = reader.input();
+    const ImageSpec spec = input.spec(0, 0);
+    const TypeDesc type = handed_over(spec);
+    if (samples.size() != bytes_of(spec, type))
+        throw std::length_error("buffer of another size than the picture");
+    bool good = true;
+    if (row_by_row(input, spec)) {
+        const size_t row = samples.size() / size_t(spec.height);
+        for (int y = 0; good && y < spec.height; ++y)
+            good = input.read_scanlines(0, 0, spec.y + y, spec.y + y + 1, 0, 0, spec.nchannels, type,
+                                        samples.data() + row * size_t(y));
+    } else {
+        good = input.read_image(0, 0, 0, spec.nchannels, type, samples.data());
+    }
+    if (!good)
+        fail(input.geterror(), "cannot be decoded");
+}
+
+void write(rust::Str path, rust::Str format, const Layout &layout, rust::Slice<const uint8_t> samples,
+           rust::Slice<const Note> notes) {
+    const TypeDesc type = of_bytes(layout.bytes);
+    ImageSpec spec(int(layout.width), int(layout.height), int(layout.channels.size()), type);
+    if (samples.size() != bytes_of(spec, type))
+        throw std::length_error("buffer of another size than the picture");
+    spec.channelnames.clear();
+    spec.alpha_channel = -1;
+    for (const rust::String &name : layout.channels) {
+        if (name == "A")
+            spec.alpha_channel = int(spec.channelnames.size());
+        spec.channelnames.emplace_back(name);
+    }
+    if (layout.half)
+        spec.set_format(TypeDesc::HALF);
+    if (!layout.premultiplied)
+        spec.attribute("oiio:UnassociatedAlpha", 1);
+    for (const Note &note : notes)
+        spec.attribute(std::string(note.key), std::string(note.value));
+    auto output = ImageOutput::create(std::string(format));
+    if (!output)
+        fail(OIIO::geterror(), "no writer for this format");
+    output->threads(1);
+    if (!output->open(std::string(path), spec) || !output->write_image(type, samples.data()) || !output->close())
+        fail(output->geterror(), "cannot be written");
+}
+
+void throw_an_int() { throw 1; }
+
+} // namespace petcomp
