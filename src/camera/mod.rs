@@ -11,6 +11,7 @@ mod corners;
 mod error;
 mod exchange;
 mod file;
+mod joint;
 mod focal;
 mod label;
 mod locate;
@@ -31,6 +32,7 @@ pub use error::SolveError;
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
 pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord};
 pub use focal::{FocalSource, focal_from_equivalent};
+pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
     Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
 };
