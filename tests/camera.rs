@@ -280,8 +280,7 @@ fn photos_together_reach_the_table() {
         ([10.0, 30.0], [Spread(1.2, 4.8), Spread(0.5, 2.0), Spread(0.3, 1.1), Spread(0.2, 0.5)]),
         ([25.0, 40.0], [Spread(0.5, 1.9), Spread(0.3, 0.7), Spread(0.15, 0.4), Spread(0.08, 0.3)]),
     ];
-    let options =
-        SolveOptions { priors: Priors { kappa_sigma: 0.01, ..Priors::default() }, ..Default::default() };
+    let options = SolveOptions { priors: Priors { kappa_sigma: 0.01, ..Priors::default() }, ..Default::default() };
     for (tilts, row) in table {
         for (count, expected) in [2, 4, 8, 16].into_iter().zip(row) {
             let error = |k: u64| {

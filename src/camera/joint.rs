@@ -284,7 +284,8 @@ impl Bundle {
     /// Every photo's solution, with the covariance that the others give it.
     fn solutions(&self, arrow: &Arrow, options: &SolveOptions) -> Vec<Solution> {
         let reduced = self.reduced(arrow, 0.0);
-        let inverse = reduced.and_then(|(system, _, photos)| Some((self.without_facts(system.cholesky()?.inverse()), photos)));
+        let inverse =
+            reduced.and_then(|(system, _, photos)| Some((self.without_facts(system.cholesky()?.inverse()), photos)));
         let solution = |(index, problem): (usize, &Problem)| {
             let state = arrow.states[index];
             let normal = &arrow.normals[index];
@@ -402,7 +403,8 @@ mod tests {
     fn one_photo_alone_is_solved_as_alone() {
         let (labels, _) = labels(2, 1, [20.0, 20.0]);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
-        let (a, b) = (joint.photos[0].as_ref().unwrap(), super::super::solve(&labels[0], &SolveOptions::default()).unwrap());
+        let (a, b) =
+            (joint.photos[0].as_ref().unwrap(), super::super::solve(&labels[0], &SolveOptions::default()).unwrap());
         assert!((a.camera.focal_px.x / b.camera.focal_px.x - 1.0).abs() < 1e-6);
         assert!((a.sigma.ln_focal / b.sigma.ln_focal - 1.0).abs() < 1e-4);
         assert!((a.sigma.height_px / b.sigma.height_px - 1.0).abs() < 1e-3);

@@ -71,7 +71,11 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
 
 impl View {
     fn check(&self, limit: &Tolerance) -> Result<(), String> {
-        within("check points by Blender's own values", self.worst_check_px(&self.blender()), limit.blender_camera_check_px)?;
+        within(
+            "check points by Blender's own values",
+            self.worst_check_px(&self.blender()),
+            limit.blender_camera_check_px,
+        )?;
         let known = self.solve(self.corners_px, Some(self.focal_px))?;
         within("position with a known focal length", self.position_error(&known), limit.known_position)?;
         within("angle with a known focal length", self.angle_deg(&known), limit.known_angle_deg)?;
