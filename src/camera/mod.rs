@@ -8,18 +8,22 @@
 mod belief;
 mod chi;
 mod corners;
+mod doctor;
 mod error;
 mod exchange;
 mod file;
 mod focal;
 mod joint;
 mod label;
+mod labelme;
 mod locate;
 mod model;
 mod options;
+mod overlay;
 mod pinhole;
 mod problem;
 mod rectangle;
+mod rectify;
 mod refine;
 mod search;
 pub mod simulate;
@@ -28,6 +32,7 @@ mod solve;
 mod uncertainty;
 mod warning;
 
+pub use doctor::doctor;
 pub use error::SolveError;
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
 pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord};
@@ -36,9 +41,12 @@ pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
     Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
 };
+pub use labelme::from_labelme;
 pub use locate::locate;
 pub use options::{CornerOrder, Priors, SolveOptions};
+pub use overlay::overlay;
 pub use pinhole::Camera;
+pub use rectify::{project_picture, rectify, warp};
 pub use solution::{Fit, FocalFinding, Sigma, Solution};
 pub use solve::solve;
 pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;

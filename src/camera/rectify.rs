@@ -1,0 +1,169 @@
+//! The surface as a map: photo to metric top view, and a picture on the surface to the photo.
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::filter::{Pyramid, sample_bilinear};
+use crate::geom::{Homography, Point2, Vector2};
+use crate::image::Image;
+use crate::pixel::Mix;
+use nalgebra::{Matrix2, Matrix3};
+
+/// No pixel is the mean of more samples along its longer axis than this; beyond, it is blurred instead.
+const MOST_SAMPLES: f64 = 32.0;
+/// Larger pictures are a typing error.
+const MOST_PIXELS: f64 = 1e9;
+
+/// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its top left corner first.
+///
+/// Takes a photo in any pixels that may be averaged (scene-linear), of the camera's size; what the photo does not show is
+/// empty.
+///
+/// # Errors
+/// [`Error::Value`] for a map without pixels or of more than a thousand million.
+pub fn rectify<P: Mix>(photo: &Pyramid<P>, camera: &Camera, size: [f64; 2], px_per_metre: f64) -> Result<Image<P>> {
+    let [width, height] = size.map(|metres| (metres * px_per_metre).round());
+    if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
+        return Err(Error::value("px_per_metre", format!("{px_per_metre} makes a map of {width} x {height} pixels")));
+    }
+    let photo_from_map = Homography(camera.pixel_from_surface().0 * surface_from_map(size, [width, height]).0);
+    Ok(warp(photo, &photo_from_map, width as usize, height as usize))
+}
+
+/// The photo that the camera takes of a picture lying on the rectangle of `size` metres; empty beside it.
+pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64; 2]) -> Image<P> {
+    let (w, h) = picture.base().size();
+    let photo_from_picture = camera.pixel_from_surface().0 * surface_from_map(size, [w as f64, h as f64]).0;
+    let [width, height] = camera.image.map(|n| n as usize);
+    let Some(inverse) = photo_from_picture.try_inverse() else { return Image::new(width, height) };
+    // In front of the camera the last coordinate is one over the depth: positive.
+    let center = inverse * photo_from_picture * nalgebra::Vector3::new(w as f64 / 2.0, h as f64 / 2.0, 1.0);
+    warp(picture, &Homography(inverse * center.z.signum()), width, height)
+}
+
+/// Surface metres from the pixels of a map of so many.
+fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
+    let [x, y] = [size[0] / pixels[0], size[1] / pixels[1]];
+    Homography(Matrix3::new(x, 0.0, -size[0] / 2.0, 0.0, -y, size[1] / 2.0, 0.0, 0.0, 1.0))
+}
+
+/// A picture seen through a projective map: the value of each target pixel is the mean over what it covers of the source.
+///
+/// Empty where the map comes from behind (its last coordinate is not positive) or from outside the source.
+///
+/// # Method
+/// The footprint of a pixel is an ellipse, from the map's derivative. Its short axis chooses the levels of the pyramid, its
+/// long axis the number of samples along it (Heckbert's elliptical footprint, sampled as graphics hardware does).
+pub fn warp<P: Mix>(source: &Pyramid<P>, source_from_target: &Homography, width: usize, height: usize) -> Image<P> {
+    let m = source_from_target.0;
+    Image::from_fn(width, height, |x, y| {
+        let q = m * Point2::new(x as f64 + 0.5, y as f64 + 0.5).to_homogeneous();
+        if q.z.is_nan() || q.z <= 0.0 {
+            return P::default();
+        }
+        let at = q.xy() / q.z;
+        let slope = (m.fixed_view::<2, 2>(0, 0) - at * m.fixed_view::<1, 2>(2, 0)) / q.z;
+        footprint_mean(source, at, &slope)
+    })
+}
+
+fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2<f64>) -> P {
+    let (long, short) = axes(slope);
+    let length = long.norm();
+    let blur = short.max(1.0).max(length / MOST_SAMPLES);
+    let count = (length / blur).ceil().max(1.0);
+    let mut sum = P::default();
+    for i in 0..count as usize {
+        let along = (i as f64 + 0.5) / count - 0.5;
+        sum = sum.add_scaled((1.0 / count) as f32, between_levels(source, at + long * along, blur));
+    }
+    sum
+}
+
+/// The long axis of a footprint and the length of its short one, pixels of the source.
+fn axes(slope: &Matrix2<f64>) -> (Vector2<f64>, f64) {
+    let square = slope * slope.transpose();
+    let (mean, half) = (square.trace() / 2.0, (square[(0, 0)] - square[(1, 1)]) / 2.0);
+    let spread = libm::hypot(half, square[(0, 1)]);
+    let angle = libm::atan2(square[(0, 1)], half) / 2.0;
+    let long = Vector2::new(libm::cos(angle), libm::sin(angle)) * (mean + spread).sqrt();
+    (long, (mean - spread).max(0.0).sqrt())
+}
+
+/// The value at a position of the full picture, averaged over a width of `blur` pixels.
+fn between_levels<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, blur: f64) -> P {
+    let level = libm::log2(blur).clamp(0.0, source.levels() as f64 - 1.0);
+    let (fine, part) = (level as usize, level - level.floor());
+    let sample = |level: usize| {
+        let scale = f64::from(1u32 << level.min(31));
+        sample_bilinear(source.level(level), at.x / scale, at.y / scale)
+    };
+    let mut value = P::default().add_scaled((1.0 - part) as f32, sample(fine));
+    if part > 0.0 {
+        value = value.add_scaled(part as f32, sample(fine + 1));
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::simulate::Scenario;
+    use crate::pixel::Coverage;
+
+    fn camera() -> Camera {
+        let scenario = Scenario { image: [400, 300], focal_px: 320.0, ..Scenario::default() };
+        scenario.tilted(35.0).view(1, 0).camera
+    }
+
+    fn waves(width: usize, height: usize) -> Image<Coverage> {
+        let wave = |x: usize, y: usize| 0.5 + 0.25 * (libm::sin(x as f64 / 15.0) + libm::cos(y as f64 / 11.0));
+        Image::from_fn(width, height, |x, y| Coverage(wave(x, y) as f32))
+    }
+
+    #[test]
+    fn onto_the_surface_and_back_is_the_picture() {
+        let (camera, size) = (camera(), [0.6, 0.4]);
+        let picture = waves(240, 160);
+        let photo = project_picture(&Pyramid::new(picture.clone()), &camera, size);
+        let back = rectify(&Pyramid::new(photo), &camera, size, 400.0).unwrap();
+        assert_eq!(back.size(), picture.size());
+        for y in 10..150 {
+            for x in 10..230 {
+                let (a, b) = (back[(x, y)].0, picture[(x, y)].0);
+                assert!((a - b).abs() < 0.03, "{x} {y}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_identity_changes_nothing() {
+        let picture = waves(31, 17);
+        let same = warp(&Pyramid::new(picture.clone()), &Homography(Matrix3::identity()), 31, 17);
+        let worst = same.pixels().iter().zip(picture.pixels()).map(|(a, b)| (a.0 - b.0).abs()).fold(0.0, f32::max);
+        assert!(worst < 1e-6, "{worst}");
+    }
+
+    #[test]
+    fn a_fine_board_made_small_is_grey() {
+        let board = Image::from_fn(256, 256, |x, y| Coverage(((x / 2 + y / 2) % 2) as f32));
+        for (x, y) in [(10.0, 10.0), (16.0, 1.0), (1.0, 30.0)] {
+            let shrink = Homography(Matrix3::from_diagonal(&nalgebra::Vector3::new(x, y, 1.0)));
+            let (w, h) = ((256.0 / x) as usize, (256.0 / y) as usize);
+            let small = warp(&Pyramid::new(board.clone()), &shrink, w, h);
+            let inner = (2..w - 2).flat_map(|i| (2..h - 2).map(move |j| (i, j)));
+            for p in inner {
+                // Half in one direction only, a row of the board keeps its two-pixel squares.
+                let slack = if x > 2.0 && y > 2.0 { 0.05 } else { 0.2 };
+                assert!((small[p].0 - 0.5).abs() < slack, "{x} {y} {p:?}: {}", small[p].0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_map_without_pixels_is_an_error() {
+        let photo = Pyramid::new(waves(40, 30));
+        for px_per_metre in [0.0, f64::NAN, -3.0, 1e9] {
+            assert!(rectify(&photo, &camera(), [0.6, 0.4], px_per_metre).is_err(), "{px_per_metre}");
+        }
+    }
+}
