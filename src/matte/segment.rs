@@ -476,7 +476,7 @@ mod tests {
     fn a_picture_full_of_object_is_refused() {
         let stripes = photo(300, 200, GREEN, |x, y| ((x + y) % 16.0 < 8.0).then_some(WHITE));
         assert!(said(&stripes).contains("background all around it"), "{}", said(&stripes));
-        let cross = |x: f64, y: f64| (140.0..160.0).contains(&x) || (90.0..110.0).contains(&y);
+        let cross = |x: f64, y: f64| (146.0..154.0).contains(&x) || (96.0..104.0).contains(&y);
         let cross = photo(300, 200, GREEN, |x, y| cross(x, y).then_some(WHITE));
         assert!(said(&cross).contains("all four borders"), "{}", said(&cross));
     }
