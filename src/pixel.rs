@@ -251,6 +251,12 @@ impl PremulRgba {
         StraightRgba { r: self.r * k, g: self.g * k, b: self.b * k, a: self.a }
     }
 
+    /// Every channel is finite and alpha is between 0 and 1: what a texture may hold.
+    #[inline(always)]
+    pub fn is_sound(self) -> bool {
+        self.color().is_finite() && (0.0..=1.0).contains(&self.a)
+    }
+
     /// All four channels times `k`: the pixel seen through a matte.
     #[inline(always)]
     pub fn masked(self, Coverage(k): Coverage) -> Self {

@@ -53,7 +53,8 @@ impl Library {
     /// Opens an asset folder: checks its manifest and loads its cut-outs, several at a time.
     ///
     /// # Errors
-    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read; [`Error::Field`] (`size_m`) for
+    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read or holds values that no
+    /// picture has; [`Error::Field`] (`size_m`) for
     /// one of another size than the manifest says. Of several the first in the manifest's order.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
@@ -99,6 +100,11 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
         let what = format!("{:.1} x {:.1} pixels, but {} has {w} x {h}", told[0], told[1], record.file);
         return Err(under(Error::value("size_m", what), at).in_file(folder.join(MANIFEST)));
+    }
+    if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
+        let (x, y) = (i % image.width(), i / image.width());
+        let what = format!("{:?} at ({x}, {y}), expected finite colour and alpha from 0 to 1", image.pixels()[i]);
+        return Err(Error::file(folder.join(&record.file), what));
     }
     Ok(Photo {
         size: record.size_m,

@@ -213,7 +213,13 @@ impl Label {
 impl<'de> Deserialize<'de> for Label {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = without_remarks(Value::deserialize(deserializer)?);
-        Self::deserialize(value).map_err(D::Error::custom)
+        let mut track = serde_path_to_error::Track::new();
+        let tracked = serde_path_to_error::Deserializer::new(value, &mut track);
+        Self::deserialize(tracked).map_err(|e| {
+            let (what, at) = (e.to_string(), track.path().to_string());
+            // A message on a key names it; the reader of the file adds what was probably meant.
+            D::Error::custom(if what.contains(" field `") { what } else { format!("{at}: {what}") })
+        })
     }
 }
 
@@ -289,7 +295,8 @@ mod tests {
         assert!(message(&TRAY.replace("\"id\": \"tray\",", "")).contains("id"));
         assert!(message(&TRAY.replace("\"version\": 1", "\"version\": 2")).contains("expected 1"));
         assert!(message(&TRAY.replace("plane-label", "plain-label")).contains("plane-label"));
-        assert!(message(&TRAY.replace(", [498.9, 2622.2]]", "]")).contains("length 3"));
+        let three = message(&TRAY.replace(", [498.9, 2622.2]]", "]"));
+        assert!(three.contains("surface.corners_px: invalid length 3"), "{three}");
     }
 
     #[test]

@@ -9,7 +9,10 @@ mod belief;
 mod chi;
 mod corners;
 mod error;
+mod exchange;
+mod file;
 mod focal;
+mod joint;
 mod label;
 mod locate;
 mod model;
@@ -26,7 +29,10 @@ mod uncertainty;
 mod warning;
 
 pub use error::SolveError;
+pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
+pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord};
 pub use focal::{FocalSource, focal_from_equivalent};
+pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
     Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
 };

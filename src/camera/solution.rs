@@ -110,9 +110,19 @@ pub struct Sigma {
 impl Problem {
     /// What a minimum means, in metres and pixels.
     pub(crate) fn solution(&self, minimum: &Minimum, options: &SolveOptions) -> Solution {
+        let uncertainty = Uncertainty::new(minimum, self.evidence.beliefs.ln_focal);
+        self.solution_with(minimum, &uncertainty, options)
+    }
+
+    /// The same, where more is known of the uncertainty.
+    pub(crate) fn solution_with(
+        &self,
+        minimum: &Minimum,
+        uncertainty: &Uncertainty,
+        options: &SolveOptions,
+    ) -> Solution {
         let state = &minimum.state;
         let believed = self.evidence.beliefs.ln_focal;
-        let uncertainty = Uncertainty::new(minimum, believed);
         let camera = self.camera(minimum);
         let size = self.fitted_size(state);
         let seen = self.seen_corners(minimum);
@@ -120,7 +130,7 @@ impl Problem {
         let rms_px = (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt();
         let height = options.reference_height.unwrap_or(REFERENCE_HEIGHT * size[0].min(size[1]));
         let fit = self.fit(minimum, &camera, per_corner_px, uncertainty.condition);
-        let sigma = self.sigma(minimum, &uncertainty, height);
+        let sigma = self.sigma(minimum, uncertainty, height);
         let to_px = |ln_focal: f64| libm::exp(ln_focal) * self.frame.unit_px;
         let focal = FocalFinding {
             share: uncertainty.focal.share,

@@ -138,7 +138,8 @@ fn scaled(information: &Square, scale: &Unknowns) -> Square {
     scaled
 }
 
-fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> FocalShare {
+/// What is known of the focal length, from the information left on its logarithm.
+pub(crate) fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> FocalShare {
     if believed.is_fact() {
         return FocalShare { sigma: 0.0, share: 0.0, from_data: None };
     }

@@ -18,6 +18,8 @@ const LABEL_SUFFIX: &str = ".label.json";
 pub(crate) struct Place {
     /// What a recipe sees of it.
     pub(crate) background: Background,
+    /// Of the label and the photo's length: another one is another place.
+    pub(crate) checksum: u32,
     photo: PathBuf,
     photo_size: [u32; 2],
     kept: Roi,
@@ -48,7 +50,9 @@ impl Place {
         let camera = cropped(solution.camera, kept).resized(image);
         let background = Background { name: name(path), size: solution.size, camera: CameraSource::Known(camera) };
         let photo = path.with_file_name(&label.image.file);
-        Ok(Self { background, photo, photo_size, kept, image, plate: OnceLock::new() })
+        let length = std::fs::metadata(&photo).map_err(|e| Error::file(&photo, e))?.len();
+        let checksum = crc32fast::hash(format!("{length} {}", io::read_text(path)?).as_bytes());
+        Ok(Self { background, checksum, photo, photo_size, kept, image, plate: OnceLock::new() })
     }
 
     /// The photo at the picture's size, scene-linear; read once.

@@ -64,9 +64,4 @@ impl Setup {
         setup.backgrounds = folder.join(&setup.backgrounds);
         Ok(setup)
     }
-
-    /// Everything in it that decides what a picture or its labels are: not where the folders lie.
-    pub fn fingerprint(&self) -> serde_json::Value {
-        serde_json::json!({ "scene": self.scene, "render": self.render, "label": self.label })
-    }
 }

@@ -1,17 +1,19 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
-use crate::asset::{Asset, Library};
+use crate::asset::{Asset, Library, Photo};
 use crate::camera;
 use crate::composite;
 use crate::dataset::place::Place;
-use crate::dataset::{Sample, Setup};
+use crate::dataset::{Plan, Sample, Setup, Sidecar};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label;
 use crate::light;
 use crate::pixel::LinearRgb;
 use crate::render;
-use crate::scene::{Background, Choice, Draws, Look, Object, Scene, Shot};
+use crate::scene::{Background, Choice, Draws, Look, Scene, Shot, stock};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Everything that pictures are made from, opened once: assets, labelled photos, options.
@@ -36,7 +38,7 @@ impl Studio {
         let library = Library::open(&setup.assets)?;
         let places = Place::all(&setup.backgrounds, setup.scene.image)?;
         let backgrounds = places.iter().map(|place| place.background.clone()).collect();
-        let stock = library.assets.iter().map(choice).collect();
+        let stock = stock(&library);
         Ok(Self { setup, library, places, backgrounds, stock })
     }
 
@@ -48,6 +50,30 @@ impl Studio {
     /// The assets.
     pub fn library(&self) -> &Library {
         &self.library
+    }
+
+    /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
+    pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Plan {
+        Plan {
+            folder: folder.into(),
+            count,
+            seed,
+            recipe: self.fingerprint(),
+            classes: self.library.classes.clone(),
+            split: self.setup.split,
+            obstructed: self.setup.obstructed,
+            writers: vec![Box::new(self.setup.pictures), Box::new(self.setup.yolo), Box::new(Sidecar)],
+        }
+    }
+
+    /// Everything that decides what a picture or its labels are, cut-outs and labels by checksum; not where folders lie.
+    fn fingerprint(&self) -> serde_json::Value {
+        let assets: BTreeMap<&str, Vec<u32>> =
+            self.library.assets.iter().map(|a| (a.name.as_str(), checksums(a))).collect();
+        let places: BTreeMap<&str, u32> =
+            self.places.iter().map(|place| (place.background.name.as_str(), place.checksum)).collect();
+        let Setup { scene, render, label, .. } = &self.setup;
+        serde_json::json!({ "scene": scene, "render": render, "label": label, "assets": assets, "backgrounds": places })
     }
 
     /// Scene `k` as the recipe draws it: objects still in the air, exposure still open.
@@ -99,8 +125,7 @@ impl Studio {
         if let Some(plate) = &plate {
             scene = light::expose(scene, plate);
         }
-        let shot = scene.resolve(|object| self.look(object), plate)?;
-        render::check(&shot)?;
+        let shot = scene.resolve(|object| Look::of(&self.library, object), plate)?;
         Ok((scene, shot))
     }
 
@@ -112,14 +137,6 @@ impl Studio {
     #[cfg(not(feature = "settle"))]
     fn rest(&self, scene: Scene) -> Result<Scene> {
         Ok(scene)
-    }
-
-    fn look(&self, object: &Object) -> Option<Look> {
-        let photo = |asset: &Asset| {
-            let photo = asset.photos.get(object.photo)?;
-            Some(Look { class: asset.class, texture: photo.texture.clone(), outline_uv: photo.outline_uv.clone() })
-        };
-        self.library.find(&object.asset).and_then(photo)
     }
 
     fn plate(&self, name: &str) -> Result<Option<Arc<Image<LinearRgb>>>> {
@@ -136,14 +153,10 @@ impl Studio {
     }
 }
 
-/// An asset as a recipe sees it.
-fn choice(asset: &Asset) -> Choice {
-    Choice {
-        asset: asset.name.clone(),
-        photo_sizes: asset.photos.iter().map(|photo| photo.size).collect(),
-        thickness: asset.thickness,
-        mass: asset.mass,
-    }
+/// One checksum for each photo's cut-out.
+fn checksums(asset: &Asset) -> Vec<u32> {
+    let of = |photo: &Photo| crc32fast::hash(bytemuck::cast_slice(photo.texture.base().pixels()));
+    asset.photos.iter().map(of).collect()
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

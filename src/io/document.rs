@@ -3,6 +3,7 @@
 use super::atomic::write_bytes;
 use super::format::read_regular;
 use super::overrides::Override;
+use super::raster::one_line;
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -129,10 +130,6 @@ fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
 
 fn line_of(text: &str, byte: usize) -> usize {
     text.bytes().take(byte).filter(|&b| b == b'\n').count() + 1
-}
-
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// What a parser did not like, and where.

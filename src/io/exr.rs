@@ -8,7 +8,9 @@ use super::header::{Header, Notes};
 use super::limits::{Demand, Limits, at_most};
 use super::raster::{Raster, Refusal, Samples, Wanted};
 use super::{Compression, Format, Source};
+use crate::color::{ColorMatrix, RgbSpace, rgb_from_rgb};
 use crate::{Error, Result};
+use exr::meta::attribute::Chromaticities;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, IntegerBounds, Layer, LayerAttributes, MetaData, ReadChannels,
     ReadLayers, Text, Vec2, WritableImage, f16,
@@ -72,11 +74,11 @@ pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Chan
     let read = || -> std::result::Result<_, Refusal> {
         let file = read_parts(&source.bytes, &limits)?;
         let part = file.parts.first().ok_or("no part with pixels")?;
-        let channels = part.channel_data.list.iter().map(|c| {
-            let names = vec![c.name.to_string()];
-            let samples = interleaved(part, &[&c.sample_data], file.window);
-            Channel { name: names[0].clone(), samples }
-        });
+        let channels = part
+            .channel_data
+            .list
+            .iter()
+            .map(|c| Channel { name: c.name.to_string(), samples: interleaved(part, &[&c.sample_data], file.window) });
         Ok((size_of(file.window), channels.collect()))
     };
     super::caught(read).map_err(|e| Error::file(path, e))
@@ -86,6 +88,8 @@ pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Chan
 struct Parts {
     parts: Vec<Part>,
     window: IntegerBounds,
+    /// To the library's primaries, where the file names others.
+    to_rec709: Option<ColorMatrix>,
 }
 
 fn size_of(window: IntegerBounds) -> (usize, usize) {
@@ -122,7 +126,30 @@ fn read_parts(bytes: &[u8], limits: &Limits) -> std::result::Result<Parts, Refus
         .all_layers()
         .all_attributes()
         .from_buffered(Cursor::new(bytes))?;
-    Ok(Parts { parts: image.layer_data.into_vec(), window: image.attributes.display_window })
+    let to_rec709 = image.attributes.chromaticities.map(to_rec709).transpose()?.flatten();
+    Ok(Parts { parts: image.layer_data.into_vec(), window: image.attributes.display_window, to_rec709 })
+}
+
+/// Chromaticities that differ by less are the same, written with fewer digits.
+const SAME_CHROMATICITY: f64 = 1e-3;
+/// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
+const SMALLEST_GAMUT: f64 = 1e-3;
+
+/// The way to the library's primaries from those that a file names; none where they are the same.
+fn to_rec709(named: Chromaticities) -> std::result::Result<Option<ColorMatrix>, Refusal> {
+    let xy = |v: Vec2<f32>| [f64::from(v.x()), f64::from(v.y())];
+    let space = RgbSpace { primaries: [named.red, named.green, named.blue].map(xy), white: xy(named.white) };
+    let [r, g, b] = space.primaries;
+    let area = ((g[0] - r[0]) * (b[1] - r[1]) - (b[0] - r[0]) * (g[1] - r[1])).abs() / 2.0;
+    let real = |[x, y]: &[f64; 2]| x.abs() <= 2.0 && (1e-6..=2.0).contains(&y.abs());
+    let all_real = space.primaries.iter().chain([&space.white]).all(real);
+    if !all_real || area < SMALLEST_GAMUT || space.white[1] < SMALLEST_GAMUT {
+        return Err(format!("chromaticities {named:?}, expected those of a colour space").into());
+    }
+    let ours = RgbSpace::REC709;
+    let pairs = |a: &RgbSpace| a.primaries.into_iter().chain([a.white]).flatten().collect::<Vec<_>>();
+    let same = pairs(&space).iter().zip(pairs(&ours)).all(|(v, w)| (v - w).abs() < SAME_CHROMATICITY);
+    Ok((!same).then(|| rgb_from_rgb(&ours, &space).into()))
 }
 
 pub(super) fn header(bytes: &[u8], limits: &Limits) -> std::result::Result<Header, Refusal> {
@@ -162,7 +189,7 @@ fn texts(header: &exr::meta::header::Header) -> Notes {
 
 /// The wanted channels of the first part that has them.
 pub(super) fn decode(bytes: &[u8], limits: &Limits, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
-    let Parts { parts, window } = read_parts(bytes, limits)?;
+    let Parts { parts, window, to_rec709 } = read_parts(bytes, limits)?;
     let mut refused = "no part with pixels".to_string();
     for part in &parts {
         let names: Vec<String> = part.channel_data.list.iter().map(|c| c.name.to_string()).collect();
@@ -178,16 +205,28 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits, wanted: Wanted) -> std::resu
         };
         let planes: Vec<_> = picked.iter().map(|&i| &part.channel_data.list[i].sample_data).collect();
         let (width, height) = size_of(window);
+        let mut samples = interleaved(part, &planes, window);
+        if let (Wanted::Color, 3.., Some(matrix)) = (wanted, planes.len(), &to_rec709) {
+            convert(&mut samples, planes.len(), matrix);
+        }
         return Ok(Raster {
             width,
             height,
             names: picked.iter().map(|&i| names[i].clone()).collect(),
-            samples: Samples::F32(interleaved(part, &planes, window)),
+            samples: Samples::F32(samples),
             display_encoded: false,
             premultiplied: true,
         });
     }
     Err(Refusal::Broken(refused))
+}
+
+/// The first three of `n` interleaved channels in other primaries; alpha does not mind.
+fn convert(samples: &mut [f32], n: usize, matrix: &ColorMatrix) {
+    for px in samples.chunks_exact_mut(n) {
+        let color = matrix.apply([px[0], px[1], px[2]]);
+        px[..3].copy_from_slice(&color);
+    }
 }
 
 /// Planes of a part side by side, cut or padded with zeros from its data window to the display window.
@@ -310,6 +349,34 @@ mod tests {
     fn names_come_in_the_usual_order() {
         let names = ["A", "B", "G", "N.X", "R", "Z"].map(String::from).to_vec();
         assert_eq!(in_usual_order(names), ["R", "G", "B", "A", "N.X", "Z"]);
+    }
+
+    /// ACEScg (0.322761, 0.482919, 0.841329) is Rec. 709 (0.18, 0.5, 0.9), by colour-science.
+    #[test]
+    fn other_primaries_become_ours() {
+        let plane = |name, v: f32| AnyChannel::new(name, floats(vec![v]));
+        let list = [plane("R", 0.322_761), plane("G", 0.482_919), plane("B", 0.841_329)].into_iter().collect();
+        let mut image = exr::prelude::Image::from_channels(Vec2(1, 1), AnyChannels::sort(list));
+        let xy = |x, y| Vec2(x, y);
+        image.attributes.chromaticities = Some(Chromaticities {
+            red: xy(0.713, 0.293),
+            green: xy(0.165, 0.830),
+            blue: xy(0.128, 0.044),
+            white: xy(0.32168, 0.33767),
+        });
+        let read = |image: &exr::prelude::Image<_>| {
+            let mut out = Cursor::new(Vec::new());
+            WritableImage::write(image).to_buffered(&mut out).unwrap();
+            decode(out.get_ref(), &Limits::default(), Wanted::Color)
+        };
+        let Samples::F32(rgb) = read(&image).unwrap().samples else { panic!("not floats") };
+        for (v, expected) in rgb.iter().zip([0.18, 0.5, 0.9]) {
+            assert!((v - expected).abs() < 1e-4, "{rgb:?}");
+        }
+        image.attributes.chromaticities =
+            Some(Chromaticities { red: xy(0.0, 0.0), ..image.attributes.chromaticities.unwrap() });
+        image.attributes.chromaticities.as_mut().unwrap().white = xy(0.3, 0.0);
+        assert!(read(&image).unwrap_err().to_string().contains("expected those of a colour space"));
     }
 
     #[test]

@@ -8,7 +8,8 @@
 //! | half and float (EXR, TIFF, HDR) | taken as scene-linear Rec. 709 | EXR premultiplied, TIFF as it says | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
-//! padded with zeros from its data window to its display window. Embedded ICC profiles are not applied.
+//! padded with zeros from its data window to its display window. An EXR that names other primaries is converted; embedded ICC profiles are not
+//! applied.
 //!
 //! Sizes are checked against [`Limits`] before anything is allocated, decoders that panic are caught, and truncated JPEGs,
 //! which decoders take for grey pictures, are refused. Files are written beside their place and moved there: whole or
@@ -67,18 +68,39 @@ use std::path::Path;
 /// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the
 /// channels asked for.
 pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
-    read_with(path, &Limits::default())
+    read_with(path, &ReadOptions::default())
 }
 
-/// Reads a picture as [`read`] does, under limits of the caller's.
+/// What reads the kinds of file that the Rust decoders do not know.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Fallback {
+    /// Nothing: such files are refused.
+    Nothing,
+    /// OpenImageIO in a process of its own, where petcomp was built with the feature `oiio`.
+    #[default]
+    Worker,
+}
+
+/// How a picture is read.
+#[derive(Clone, Debug, Default)]
+pub struct ReadOptions {
+    /// What a file may ask for. Default: [`Limits::default`].
+    pub limits: Limits,
+    /// What reads other kinds of file. Default: [`Fallback::Worker`].
+    pub fallback: Fallback,
+}
+
+/// Reads a picture as [`read`] does, under conditions of the caller's.
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_with<P: FromFile>(path: impl AsRef<Path>, limits: &Limits) -> Result<Image<P>> {
-    let path = path.as_ref();
+pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
+    let (path, limits) = (path.as_ref(), &options.limits);
     let source = Source::open(path, limits)?;
     let raster = match caught(|| decode(&source, limits, P::WANTED)) {
-        Err(Refusal::Unsupported(what)) => elsewhere(path, &source, what, limits, P::WANTED)?,
+        Err(Refusal::Unsupported(what)) if options.fallback == Fallback::Worker => {
+            elsewhere(path, &source, what, limits, P::WANTED)?
+        }
         decoded => decoded.map_err(|e| Error::file(path, e))?,
     };
     upright(&raster, &source).map_err(|e| Error::file(path, e))

@@ -85,10 +85,8 @@ fn start() -> std::result::Result<(), Refusal> {
     outcome.map_err(said)
 }
 
-/// OpenImageIO's message on one line.
 fn said(e: cxx::Exception) -> Refusal {
-    let words: Vec<&str> = e.what().split_whitespace().collect();
-    Refusal::Broken(format!("OpenImageIO: {}", words.join(" ")))
+    Refusal::Broken(format!("OpenImageIO: {}", e.what()))
 }
 
 fn check(layout: &Layout, file_bytes: u64, limits: &Limits) -> std::result::Result<(), Refusal> {

@@ -53,9 +53,15 @@ impl From<&str> for Refusal {
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Unsupported(what) | Self::Broken(what) => f.write_str(what),
+            // Decoders write messages of several lines; ours have one.
+            Self::Unsupported(what) | Self::Broken(what) => f.write_str(&one_line(what)),
         }
     }
+}
+
+/// A text of any form on one line.
+pub(super) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Which channels a kind of pixel is made from.
@@ -223,7 +229,7 @@ impl Raster {
         [r, g, b]: [usize; 3],
         alpha: Option<usize>,
         full: f32,
-        decode: impl Fn([T; 3]) -> [f32; 3] + Sync,
+        decode: impl Fn([T; 3]) -> [f32; 3] + Sync + Send,
     ) -> Image<P> {
         let a = |px: &[T]| alpha.map_or(1.0, |i| px[i].into() / full);
         let plain = |px: &[T]| [r, g, b].map(|i| px[i].into() / full);
@@ -235,12 +241,16 @@ impl Raster {
         }
     }
 
-    fn single<P: Copy + Send>(&self, wanted: Wanted, make: impl Fn(f32) -> P + Sync) -> Result<Image<P>, String> {
+    fn single<P: Copy + Send>(
+        &self,
+        wanted: Wanted,
+        make: impl Fn(f32) -> P + Sync + Send,
+    ) -> Result<Image<P>, String> {
         Ok(self.plane(wanted.pick(&self.names)?[0], make))
     }
 
     /// One channel as plain numbers, full scale 1.
-    fn plane<P: Copy + Send>(&self, i: usize, make: impl Fn(f32) -> P + Sync) -> Image<P> {
+    fn plane<P: Copy + Send>(&self, i: usize, make: impl Fn(f32) -> P + Sync + Send) -> Image<P> {
         match &self.samples {
             Samples::U8(v) => self.each(v, |px| make(f32::from(px[i]) / 255.0)),
             Samples::U16(v) => self.each(v, |px| make(f32::from(px[i]) / 65_535.0)),
@@ -248,9 +258,8 @@ impl Raster {
         }
     }
 
-    fn each<T: Sync, P: Copy + Send>(&self, samples: &[T], f: impl Fn(&[T]) -> P + Sync) -> Image<P> {
-        let pixels =
-            samples.par_chunks_exact(self.names.len()).with_min_len(self.width.max(1)).map(|px| f(px)).collect();
+    fn each<T: Sync, P: Copy + Send>(&self, samples: &[T], f: impl Fn(&[T]) -> P + Sync + Send) -> Image<P> {
+        let pixels = samples.par_chunks_exact(self.names.len()).with_min_len(self.width.max(1)).map(f).collect();
         Image::from_vec(self.width, self.height, pixels)
     }
 }

@@ -13,6 +13,8 @@
 mod cast;
 mod check;
 mod deep;
+#[cfg(test)]
+mod definition;
 mod four;
 mod half_plane;
 mod irradiance;

@@ -15,6 +15,7 @@ mod recipe;
 mod resolve;
 mod shot;
 mod stack;
+mod stock;
 
 pub use draw::Draws;
 #[cfg(feature = "settle")]
@@ -27,6 +28,7 @@ pub use recipe::{Background, Choice, GradeRanges, LightRanges, Recipe, Selection
 pub use resolve::Look;
 pub use shot::{Card, Shot};
 pub use stack::Start;
+pub use stock::stock;
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;

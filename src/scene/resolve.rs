@@ -23,7 +23,7 @@ pub struct Look {
 impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
-    /// `look` finds an object's asset and photo in a library, or nothing. `plate` is the background at the picture's
+    /// `look` finds an object's asset and photo, or nothing; for a library that is [`Look::of`]. `plate` is the background at the picture's
     /// size; none leaves it transparent. Object `i` gets id `i + 1`; the shadow catcher is the labelled surface.
     ///
     /// # Errors

@@ -159,15 +159,17 @@ fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> Vec<Solid> 
 mod tests {
     use super::*;
     use crate::geom::{UnitQuaternion, Vector3};
-    use crate::scene::{Background, Choice, Range, Recipe};
+    use crate::scene::{Background, CameraSource, Choice, Range, Recipe};
 
     pub(super) fn dropped(k: u64, count: usize) -> Scene {
         let tray = Background {
             name: "tray".into(),
             size: [0.6, 0.4],
-            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-            photo: [60, 40],
-            focal_px: None,
+            camera: CameraSource::Rectangle {
+                corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+                photo: [60, 40],
+                focal_px: None,
+            },
         };
         let choice = |i: usize| Choice {
             asset: format!("b{i}"),

@@ -19,5 +19,12 @@ fn solve(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, solve);
+fn joint(c: &mut Criterion) {
+    let views = Scenario::realistic().views(1, 0, 16, [0.0, 30.0]);
+    let labels: Vec<_> = views.into_iter().map(|v| v.label).collect();
+    let options = SolveOptions::default();
+    c.bench_function("camera/joint/16 photos", |b| b.iter(|| camera::solve_joint(black_box(&labels), &options)));
+}
+
+criterion_group!(benches, solve, joint);
 criterion_main!(benches);

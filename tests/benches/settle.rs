@@ -2,16 +2,18 @@
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use petcomp::Scene;
-use petcomp::scene::{Background, Choice, Range, Recipe, SettleOptions};
+use petcomp::scene::{Background, CameraSource, Choice, Range, Recipe, SettleOptions};
 use petcomp::settle;
 
 fn scene(cards: u32, k: u64) -> Scene {
     let tray = Background {
         name: "tray".into(),
         size: [0.6, 0.4],
-        corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-        photo: [60, 40],
-        focal_px: None,
+        camera: CameraSource::Rectangle {
+            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+            photo: [60, 40],
+            focal_px: None,
+        },
     };
     let bottle = Choice { asset: "b".into(), photo_sizes: vec![[0.2, 0.08]], thickness: 0.006, mass: 0.03 };
     let recipe = Recipe { objects: Range::fixed(cards.into()), ..Recipe::default() };

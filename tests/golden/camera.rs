@@ -3,7 +3,7 @@
 use crate::case::Case;
 use nalgebra::{Matrix3, Vector3};
 use petcomp::Camera;
-use petcomp::camera::{self, FocalSource, Label, Priors, SolveOptions};
+use petcomp::camera::{self, BlenderCamera, FocalSource, Label, Priors, SensorFit, SolveOptions};
 use petcomp::geom::{Point2, Point3};
 use serde::Deserialize;
 
@@ -26,6 +26,17 @@ struct View {
     rotation: [[f64; 3]; 3],
     #[serde(rename = "t")]
     translation: [f64; 3],
+    blender: Blender,
+}
+
+/// The values that Blender was given, and the pose it made of them in 32 bits.
+#[derive(Deserialize)]
+struct Blender {
+    sensor_fit: SensorFit,
+    sensor: [f64; 2],
+    lens: f64,
+    shift: [f64; 2],
+    matrix_world: [[f64; 4]; 3],
 }
 
 /// A point above the surface and where it is seen.
@@ -41,6 +52,7 @@ struct Tolerance {
     known_angle_deg: f64,
     known_check_px: f64,
     known_blender_check_px: f64,
+    blender_camera_check_px: f64,
     flat_focal: Option<f64>,
     flat_check_px: Option<f64>,
     flat_blender_check_px: Option<f64>,
@@ -59,6 +71,11 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
 
 impl View {
     fn check(&self, limit: &Tolerance) -> Result<(), String> {
+        within(
+            "check points by Blender's own values",
+            self.worst_check_px(&self.blender()),
+            limit.blender_camera_check_px,
+        )?;
         let known = self.solve(self.corners_px, Some(self.focal_px))?;
         within("position with a known focal length", self.position_error(&known), limit.known_position)?;
         within("angle with a known focal length", self.angle_deg(&known), limit.known_angle_deg)?;
@@ -91,6 +108,23 @@ impl View {
             true => Ok(solution.camera),
             false => Err(format!("focal length is {:?}, expected {expected:?}", solution.focal_source)),
         }
+    }
+
+    /// The camera that the values given to Blender stand for.
+    fn blender(&self) -> Camera {
+        let blender = &self.blender;
+        let [a, b, c] = blender.matrix_world;
+        let values = BlenderCamera {
+            sensor_fit: blender.sensor_fit,
+            sensor_width: blender.sensor[0],
+            sensor_height: blender.sensor[1],
+            lens: blender.lens,
+            shift_x: blender.shift[0],
+            shift_y: blender.shift[1],
+            pixel_aspect: 1.0,
+            matrix_world: [a, b, c, [0.0, 0.0, 0.0, 1.0]],
+        };
+        Camera::from_blender(&values, self.image)
     }
 
     fn rotation(&self) -> Matrix3<f64> {

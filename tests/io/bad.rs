@@ -1,7 +1,7 @@
 //! Bad files: one clear line each, quickly, and nothing half-written.
 
 use crate::make::{Folder, behind, codes, light, opaque_codes, tiff};
-use petcomp::io::{self, Bits, Limits, WriteOptions};
+use petcomp::io::{self, Bits, Fallback, Limits, ReadOptions, WriteOptions};
 use petcomp::{Coverage, Depth, LinearRgb, PremulRgba, StraightRgba};
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -134,11 +134,13 @@ fn headers_that_ask_for_too_much_are_refused_by_name() {
 fn limits_are_the_callers() {
     let folder = Folder::new();
     io::write(folder.file("a.png"), &codes(20, 14)).unwrap();
-    let narrow = Limits { side: 19, ..Default::default() };
-    let e = io::read_with::<PremulRgba>(folder.file("a.png"), &narrow).unwrap_err().to_string();
+    let under = |limits: Limits| {
+        let options = ReadOptions { limits, ..Default::default() };
+        io::read_with::<PremulRgba>(folder.file("a.png"), &options).unwrap_err().to_string()
+    };
+    let e = under(Limits { side: 19, ..Default::default() });
     assert!(e.ends_with("20 pixels along a side, over the limit of 19 (Limits::side)"), "{e}");
-    let e = io::read_with::<PremulRgba>(folder.file("a.png"), &Limits { file_bytes: 9, ..Default::default() });
-    assert!(e.unwrap_err().to_string().contains("Limits::file_bytes"));
+    assert!(under(Limits { file_bytes: 9, ..Default::default() }).contains("Limits::file_bytes"));
 }
 
 /// Seeded changes of a few bytes: whatever comes out, it is a picture or a line, and no decoder had to be stopped.
@@ -151,6 +153,7 @@ fn damaged_bytes_never_panic() {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as usize % below
     };
+    let alone = ReadOptions { fallback: Fallback::Nothing, ..Default::default() };
     let mut stopped = Vec::new();
     for (name, whole) in valid(&folder) {
         for _ in 0..300 {
@@ -160,9 +163,11 @@ fn damaged_bytes_never_panic() {
                 bytes[at] = [0, 255, 127, 128, random(256) as u8][random(5)];
             }
             let path = folder.with(name, &bytes);
-            for outcome in
-                [io::read::<StraightRgba>(&path).err(), io::read::<Depth>(&path).err(), io::read_header(&path).err()]
-            {
+            for outcome in [
+                io::read_with::<StraightRgba>(&path, &alone).err(),
+                io::read_with::<Depth>(&path, &alone).err(),
+                io::read_header(&path).err(),
+            ] {
                 stopped.extend(outcome.map(|e| e.to_string()).filter(|e| e.contains("gave up")));
             }
         }

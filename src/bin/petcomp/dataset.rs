@@ -1,7 +1,7 @@
 //! `petcomp dataset`: recipe -> images with labels, ready to train on.
 
 use crate::common::{Common, RecipeArgs, interruption};
-use petcomp::dataset::{self, Checked, Plan, Report, Sidecar, Studio, contact_sheet_of};
+use petcomp::dataset::{self, Checked, Report, Studio, contact_sheet_of};
 use petcomp::io;
 use std::path::{Path, PathBuf};
 
@@ -72,17 +72,7 @@ pub(crate) fn generate(
     folder: &Path,
     common: &Common,
 ) -> anyhow::Result<Report> {
-    let setup = studio.setup();
-    let plan = Plan {
-        folder: folder.to_owned(),
-        count,
-        seed,
-        recipe: setup.fingerprint(),
-        classes: studio.library().classes.clone(),
-        split: setup.split,
-        obstructed: setup.obstructed,
-        writers: vec![Box::new(setup.pictures), Box::new(setup.yolo), Box::new(Sidecar)],
-    };
+    let plan = studio.plan(count, seed, folder);
     let progress = common.progress("pictures");
     let report =
         dataset::generate(&plan, |k| studio.sample(seed, k), &|p| progress.at(p.done, p.count), interruption())?;

@@ -91,11 +91,11 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
     };
     let report = compare(&a, &b, &args.thresholds());
     let different = report.max_error > 0.0 && report.verdict != Verdict::Incomparable;
-    if let Some(path) = args.output.as_ref().filter(|_| different || !args.only_different) {
-        if report.verdict != Verdict::Incomparable {
-            let difference = absolute_difference(&a, &b, args.scale);
-            io::write(path, &difference.map(|[r, g, b, _]| LinearRgb::new(r, g, b)))?;
-        }
+    if let Some(path) = args.output.as_ref().filter(|_| different || !args.only_different)
+        && report.verdict != Verdict::Incomparable
+    {
+        let difference = absolute_difference(&a, &b, args.scale);
+        io::write(path, &difference.map(|[r, g, b, _]| LinearRgb::new(r, g, b)))?;
     }
     common.say(format_args!("Comparing \"{}\" and \"{}\"", args.a.display(), args.b.display()));
     common.say(format_args!("{report}"));

@@ -1,5 +1,5 @@
 //! The `petcomp` program: reads arguments, calls the library, writes results.
-#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program talks to its user")]
+#![warn(clippy::unwrap_used)]
 
 mod asset;
 mod camera;

@@ -183,6 +183,17 @@ impl<'a, P: Photo> Keying<'a, P> {
     }
 }
 
+impl std::fmt::Display for Deviations {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { unusable_pixels, filled_plate, unusable_mattes, clamped } = self;
+        write!(
+            f,
+            "{unusable_pixels} unusable pixels made transparent, {filled_plate} pixels of the plate filled, \
+             {unusable_mattes} unusable values of garbage and core matte taken as 0, {clamped} matte values clamped"
+        )
+    }
+}
+
 impl std::iter::Sum for Deviations {
     fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
         all.fold(Self::default(), |a, b| Self {

@@ -1,0 +1,110 @@
+//! The keyer against Blender: every bit of every output.
+
+use crate::case::Case;
+use petcomp::io::exr::read_channels;
+use petcomp::matte::key::{KeyOptions, Keying, Photo, Screen};
+use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
+use serde::de::DeserializeOwned;
+
+/// Runs one case: keys its input and compares with what Blender made of it.
+pub(crate) fn run(case: &Case) -> Result<(), String> {
+    match text(case, "node")? {
+        "keying" => keying(case),
+        other => Err(format!("node: \"{other}\" is not known")),
+    }
+}
+
+fn keying(case: &Case) -> Result<(), String> {
+    let opts: KeyOptions = options(case)?;
+    let photo = input(case, "input")?.ok_or("input: missing")?;
+    let [plate, garbage, core] = ["plate", "garbage", "core"].map(|name| input(case, name));
+    let (plate, garbage, core) = (plate?, garbage?, core?);
+    let plate = plate.map(|p| p.map(PremulRgba::color));
+    let [garbage, core] = [garbage, core].map(|m| m.map(|m| m.map(|p| Coverage(p.r))));
+    let screen = match &plate {
+        Some(plate) => Screen::Plate(plate),
+        None => Screen::Color(color(case, "screen")?),
+    };
+    let mut job = Keying::new(&photo, screen);
+    job = garbage.iter().fold(job, |job, m| job.with_garbage(m));
+    job = core.iter().fold(job, |job, m| job.with_core(m));
+    check(case, &job, &opts)
+}
+
+fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, opts: &KeyOptions) -> Result<(), String> {
+    let keyed = job.run(opts).map_err(|e| e.to_string())?;
+    let edges = job.edges(opts).map_err(|e| e.to_string())?;
+    let alone = job.matte(opts).map_err(|e| e.to_string())?;
+    let results = [
+        same_matte(case, "reference_matte.exr", &keyed.matte),
+        same_matte(case, "reference_edges.exr", &edges),
+        same_image(case, "reference.exr", &keyed.cutout),
+        same_matte(case, "reference_matte.exr", &alone),
+    ];
+    let wrong: Vec<String> = results.into_iter().filter_map(Result::err).collect();
+    if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
+}
+
+fn same_matte(case: &Case, file: &str, got: &Image<Coverage>) -> Result<(), String> {
+    let want = channels(case, file)?;
+    same_bits(file, got.width(), &[("matte", got.pixels().iter().map(|m| m.0).collect(), &want[0])])
+}
+
+fn same_image(case: &Case, file: &str, got: &Image<PremulRgba>) -> Result<(), String> {
+    let [r, g, b, a] = rgba(case, file)?;
+    let of = |channel: fn(&PremulRgba) -> f32| got.pixels().iter().map(channel).collect();
+    let pairs = [("R", of(|p| p.r), &r), ("G", of(|p| p.g), &g), ("B", of(|p| p.b), &b), ("A", of(|p| p.a), &a)];
+    same_bits(file, got.width(), &pairs)
+}
+
+/// Equal as numbers, bit by bit; of NaN only that it is one, for which NaN it is differs between processors.
+fn same(a: f32, b: f32) -> bool {
+    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+}
+
+fn same_bits(file: &str, width: usize, pairs: &[(&str, Vec<f32>, &Vec<f32>)]) -> Result<(), String> {
+    let (mut differing, mut first) = (0, String::new());
+    for (name, got, want) in pairs {
+        if got.len() != want.len() {
+            return Err(format!("{file}: {} values of {name}, expected {}", got.len(), want.len()));
+        }
+        let wrong = got.iter().zip(*want).enumerate().filter(|(_, (a, b))| !same(**a, **b));
+        for (i, (a, b)) in wrong {
+            if differing == 0 {
+                first = format!("{name} at ({}, {}) is {a:?}, expected {b:?}", i % width, i / width);
+            }
+            differing += 1;
+        }
+    }
+    if differing == 0 { Ok(()) } else { Err(format!("{file}: {differing} floats differ; first {first}")) }
+}
+
+fn options<T: DeserializeOwned>(case: &Case) -> Result<T, String> {
+    case.table.get("options").ok_or("options: missing")?.clone().try_into().map_err(|e| format!("options: {e}"))
+}
+
+fn text<'c>(case: &'c Case, key: &str) -> Result<&'c str, String> {
+    case.table.get(key).and_then(toml::Value::as_str).ok_or_else(|| format!("{key}: missing"))
+}
+
+fn color(case: &Case, key: &str) -> Result<LinearRgb, String> {
+    let value = case.table.get(key).ok_or_else(|| format!("{key}: missing"))?;
+    value.clone().try_into().map_err(|e| format!("{key}: {e}"))
+}
+
+/// A picture that the case names, if it does.
+fn input(case: &Case, key: &str) -> Result<Option<Image<PremulRgba>>, String> {
+    let Some(path) = case.table.get(key).and_then(toml::Value::as_str) else { return Ok(None) };
+    petcomp::io::read(case.dir.join(path)).map(Some).map_err(|e| e.to_string())
+}
+
+/// The float channels of a reference in the order of their names.
+fn channels(case: &Case, file: &str) -> Result<Vec<Vec<f32>>, String> {
+    let (_, channels) = read_channels(case.dir.join(file)).map_err(|e| e.to_string())?;
+    Ok(channels.into_iter().map(|c| c.samples).collect())
+}
+
+fn rgba(case: &Case, file: &str) -> Result<[Vec<f32>; 4], String> {
+    let [a, b, g, r] = channels(case, file)?.try_into().map_err(|_| format!("{file}: expected A, B, G, R"))?;
+    Ok([r, g, b, a])
+}
