@@ -151,8 +151,8 @@ impl SegmentOptions {
         share("ridge", f64::from(self.ridge))?;
         share("join", self.join)?;
         let weights = if let Tone::Grey(weights) = self.tone { weights } else { [1.0; 3] };
-        if !weights.iter().all(|w| *w >= 0.0) || !(weights.iter().sum::<f32>() > 0.0) {
-            return Err(Error::value("tone.grey", format!("{weights:?}, expected weights of 0 or more, not all 0")));
+        if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
+            return Err(Error::value("tone.grey", format!("{weights:?}, expected weights of 0 to 1e6, not all 0")));
         }
         if self.working_size < SMALLEST {
             return Err(Error::value("working_size", format!("{}, expected at least {SMALLEST}", self.working_size)));
