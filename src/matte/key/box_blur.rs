@@ -107,8 +107,7 @@ impl Kernel {
                 let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
                 match self {
                     Self::CutOff { columns: counts, .. } => {
-                        sum(out, 2 * radius + 1, at);
-                        out.iter_mut().zip(&counts[columns.clone()]).for_each(|(v, n)| *v /= n);
+                        mean(out, 2 * radius + 1, at, &counts[columns.clone()]);
                     }
                     Self::Repeat { weights, .. } => {
                         weigh(out, weights, at(radius), |i| [at(radius + i), at(radius - i)]);
@@ -129,9 +128,8 @@ impl Kernel {
                 let at = |row: usize| &window.row(row)[columns.clone()];
                 match self {
                     Self::CutOff { .. } => {
-                        sum(out, rows.len(), |i| at(rows.end - 1 - i));
-                        let count = rows.len() as f32;
-                        out.iter_mut().for_each(|v| *v /= count);
+                        let counts = [rows.len() as f32; RUN];
+                        mean(out, rows.len(), |i| at(rows.end - 1 - i), &counts[..columns.len()]);
                     }
                     Self::Repeat { weights, .. } => {
                         weigh(out, weights, at(y), |i| [at(y.saturating_sub(i)), at((y + i).min(height - 1))]);
