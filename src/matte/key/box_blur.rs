@@ -1,5 +1,6 @@
 //! Box blur with Blender's two windows, sums in Blender's order.
 
+use super::calm::{Calm, Extremes, RUN};
 use super::model::Behaviour;
 use super::rows::{Pad, Rows, Window, around, window_rows};
 
@@ -10,20 +11,26 @@ pub(super) struct BoxBlur<S> {
     height: usize,
     padded: Vec<f32>,
     window: Window,
+    /// Extremes of the source's latest row, and of the rows blurred along x.
+    calm_source: Calm,
+    calm: Calm,
 }
 
 /// The window of a blur.
 enum Kernel {
     /// Cut off at the border: the mean of the samples inside, `radius` to each side.
     CutOff { radius: usize, columns: Vec<f32> },
-    /// Repeating the border: the weights of the centre and of the samples at distance 1, 2, ...
-    Repeat { weights: Vec<f32> },
+    /// Repeating the border: the weights of the centre and of the samples at distance 1, 2, ..., and what they make of a
+    /// plane of 1.
+    Repeat { weights: Vec<f32>, of_ones: f32 },
 }
 
 impl Kernel {
     fn new(behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
         if behaviour.repeats_border() {
-            return Self::Repeat { weights: weights(size) };
+            let weights = weights(size);
+            let of_ones = weights[1..].iter().fold(weights[0], |sum, w| sum + w + w);
+            return Self::Repeat { weights, of_ones };
         }
         // Beyond the picture's own size a window that is cut off at the border finds nothing more.
         let radius = (size - 1).min(width.max(height) - 1);
@@ -33,7 +40,7 @@ impl Kernel {
     fn radius(&self) -> usize {
         match self {
             Self::CutOff { radius, .. } => *radius,
-            Self::Repeat { weights } => weights.len() - 1,
+            Self::Repeat { weights, .. } => weights.len() - 1,
         }
     }
 }
@@ -53,76 +60,115 @@ impl<S: Rows> BoxBlur<S> {
     /// A blur of `size` (at least 1) over a plane of that width and height.
     pub(super) fn new(source: S, behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
         let kernel = Kernel::new(behaviour, size, (width, height));
-        let radius = kernel.radius();
-        let padded = vec![0.0; width + 2 * radius];
-        Self { source, kernel, height, padded, window: Window::new(width, window_rows(radius, height)) }
+        let capacity = window_rows(kernel.radius(), height);
+        Self {
+            source,
+            height,
+            padded: vec![0.0; width + 2 * kernel.radius()],
+            window: Window::new(width, capacity),
+            calm_source: Calm::new(width, 1),
+            calm: Calm::new(width, capacity),
+            kernel,
+        }
     }
 }
 
 impl<S: Rows> Rows for BoxBlur<S> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        let Self { source, kernel, height, padded, window } = self;
+        let Self { source, kernel, height, padded, window, calm_source, calm } = self;
         window.cover(around(y, kernel.radius(), *height), |y, row| {
-            let radius = kernel.radius();
-            source.row(y, &mut padded[radius..radius + row.len()]);
-            kernel.along_x(padded, row);
+            let inside = kernel.radius()..kernel.radius() + row.len();
+            source.row(y, &mut padded[inside.clone()]);
+            calm_source.note(0, &padded[inside]);
+            kernel.along_x(padded, calm_source, row);
+            calm.note(y, row);
         });
-        kernel.along_y(window, y, *height, out);
+        kernel.along_y(window, calm, (y, *height), out);
     }
 }
 
 impl Kernel {
-    fn along_x(&self, padded: &mut [f32], out: &mut [f32]) {
-        let (radius, width) = (self.radius(), out.len());
-        match self {
-            Self::CutOff { columns, .. } => {
-                Pad::Value(0.0).fill(padded, radius);
-                sum(out, 2 * radius + 1, |i| &padded[i..i + width]);
-                out.iter_mut().zip(columns).for_each(|(v, n)| *v /= n);
-            }
-            Self::Repeat { weights } => {
-                Pad::Repeat.fill(padded, radius);
-                let at = |offset: usize| &padded[offset..offset + width];
-                weigh(out, weights, at(radius), |i| (at(radius + i), at(radius - i)));
-            }
-        }
+    /// A plane of 0 stays what it is, and so nearly does a plane of 1.
+    fn settled(&self, near: Extremes) -> Option<f32> {
+        let is = |v: f32| near.least.to_bits() == v.to_bits() && near.greatest.to_bits() == v.to_bits();
+        let of_ones = if let Self::Repeat { of_ones, .. } = self { *of_ones } else { 1.0 };
+        if is(0.0) { Some(0.0) } else { is(1.0).then_some(of_ones) }
+    }
+
+    fn along_x(&self, padded: &mut [f32], calm: &mut Calm, out: &mut [f32]) {
+        let radius = self.radius();
+        let pad = if let Self::CutOff { .. } = self { Pad::Value(0.0) } else { Pad::Repeat };
+        pad.fill(padded, radius);
+        calm.fill(
+            out,
+            (0, 0..1, radius),
+            |_, near| self.settled(near),
+            |columns, out| {
+                let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
+                match self {
+                    Self::CutOff { columns: counts, .. } => {
+                        mean(out, 2 * radius + 1, at, &counts[columns.clone()]);
+                    }
+                    Self::Repeat { weights, .. } => {
+                        weigh(out, weights, at(radius), |i| [at(radius + i), at(radius - i)]);
+                    }
+                }
+            },
+        );
     }
 
     /// Blender counts rows from the bottom, so sums run upwards.
-    fn along_y(&self, window: &Window, y: usize, height: usize, out: &mut [f32]) {
-        match self {
-            Self::CutOff { radius, .. } => {
-                let rows = around(y, *radius, height);
-                sum(out, rows.len(), |i| window.row(rows.end - 1 - i));
-                let count = rows.len() as f32;
-                out.iter_mut().for_each(|v| *v /= count);
-            }
-            Self::Repeat { weights } => {
-                let below = |i: usize| window.row((y + i).min(height - 1));
-                weigh(out, weights, window.row(y), |i| (window.row(y.saturating_sub(i)), below(i)));
-            }
-        }
+    fn along_y(&self, window: &Window, calm: &mut Calm, (y, height): (usize, usize), out: &mut [f32]) {
+        let rows = around(y, self.radius(), height);
+        calm.fill(
+            out,
+            (y, rows.clone(), 0),
+            |_, near| self.settled(near),
+            |columns, out| {
+                let at = |row: usize| &window.row(row)[columns.clone()];
+                match self {
+                    Self::CutOff { .. } => {
+                        let counts = [rows.len() as f32; RUN];
+                        mean(out, rows.len(), |i| at(rows.end - 1 - i), &counts[..columns.len()]);
+                    }
+                    Self::Repeat { weights, .. } => {
+                        weigh(out, weights, at(y), |i| [at(y.saturating_sub(i)), at((y + i).min(height - 1))]);
+                    }
+                }
+            },
+        );
     }
 }
 
-/// Adds up `count` rows in order.
+/// Rows added in one go, so that sums stay in registers; the order is that of one at a time.
+const AT_ONCE: usize = 4;
+
+/// Adds up `count` rows in order, over how many samples of each sum lie inside the picture.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn sum<'a, F: Fn(usize) -> &'a [f32]>(out: &mut [f32], count: usize, row: F) {
+fn mean<'a, F: Fn(usize) -> &'a [f32]>(out: &mut [f32], count: usize, row: F, inside: &[f32]) {
     out.fill(0.0);
-    for i in 0..count {
+    let whole = count - count % AT_ONCE;
+    for i in (0..whole).step_by(AT_ONCE) {
+        let rows = row(i).iter().zip(row(i + 1)).zip(row(i + 2)).zip(row(i + 3));
+        for (o, (((a, b), c), d)) in out.iter_mut().zip(rows) {
+            *o = *o + a + b + c + d;
+        }
+    }
+    for i in whole..count {
         for (o, s) in out.iter_mut().zip(row(i)) {
             *o += s;
         }
     }
+    out.iter_mut().zip(inside).for_each(|(o, n)| *o /= n);
 }
 
 /// Adds up weighted rows: the centre, then at each distance the one ahead and the one behind.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn weigh<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])>(out: &mut [f32], weights: &[f32], centre: &[f32], pair: F) {
+fn weigh<'a, F: Fn(usize) -> [&'a [f32]; 2]>(out: &mut [f32], weights: &[f32], centre: &[f32], pair: F) {
     let w = weights[0];
     out.iter_mut().zip(centre).for_each(|(o, c)| *o = w * c);
     for (i, &w) in weights.iter().enumerate().skip(1) {
-        let (ahead, behind) = pair(i);
+        let [ahead, behind] = pair(i);
         for ((o, a), b) in out.iter_mut().zip(ahead).zip(behind) {
             *o = *o + w * a + w * b;
         }

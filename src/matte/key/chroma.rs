@@ -66,9 +66,32 @@ struct Difference<'a, P> {
 
 impl<P: Photo> Rows for Difference<'_, P> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        for (p, d) in self.photo.row(y).iter().zip(out) {
-            *d = to_unit(signal(seen(p.premul(), self.careful), self.weights, NEUTRAL), self.behaviour);
-        }
+        difference_row(self.photo.row(y), out, self.weights, self.behaviour, self.careful);
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn difference_row<P: Photo>(pixels: &[P], out: &mut [f32], weights: [f32; 3], behaviour: Behaviour, careful: bool) {
+    for (p, d) in pixels.iter().zip(out) {
+        *d = to_unit(signal(seen(p.premul(), careful), weights, NEUTRAL), behaviour);
+    }
+}
+
+/// The pixels of a row with other colour differences.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn recolored_row<P: Photo>(
+    pixels: &[P],
+    [cb, cr]: [&[f32]; 2],
+    out: &mut [PremulRgba],
+    behaviour: Behaviour,
+    careful: bool,
+) {
+    for (((p, cb), cr), o) in pixels.iter().zip(cb).zip(cr).zip(out) {
+        let p = seen(p.premul(), careful);
+        let luma = signal(p, LUMA, FOOT);
+        // Blender 4.5 alone leaves brightness out of the journey to unit scale and back.
+        let luma = if behaviour == Behaviour::V45 { luma } else { luma * PER_FULL * FULL };
+        *o = color(luma, cb * FULL, cr * FULL, p.a);
     }
 }
 
@@ -98,12 +121,6 @@ impl<'a, P: Photo> ChromaBlur<'a, P> {
             blurred.row(y, row);
         }
         let [cb, cr] = &self.rows;
-        for (((p, cb), cr), o) in self.photo.row(y).iter().zip(cb).zip(cr).zip(out) {
-            let p = seen(p.premul(), self.careful);
-            let luma = signal(p, LUMA, FOOT);
-            // Blender 4.5 alone leaves brightness out of the journey to unit scale and back.
-            let luma = if self.behaviour == Behaviour::V45 { luma } else { luma * PER_FULL * FULL };
-            *o = color(luma, cb * FULL, cr * FULL, p.a);
-        }
+        recolored_row(self.photo.row(y), [cb, cr], out, self.behaviour, self.careful);
     }
 }

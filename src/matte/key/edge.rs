@@ -1,5 +1,6 @@
 //! Edges of the matte, and the levels that clip everything but them.
 
+use super::calm::{Calm, Extremes};
 use super::model::Behaviour;
 use super::options::KeyOptions;
 use super::rows::{Pad, Rows, Source, Window, around, looked_at, window_rows};
@@ -35,6 +36,7 @@ struct EdgeSearch<'a> {
     reach: Reach,
     height: usize,
     window: Window,
+    calm: Calm,
     /// How many columns of the search window lie inside the picture.
     columns: Vec<f32>,
 }
@@ -45,8 +47,10 @@ impl<'a> EdgeSearch<'a> {
         let reach = Reach::of(behaviour, opts.edge_kernel_radius as usize);
         let half = if let Reach::Window(half) = reach { half } else { 0 };
         let columns = (0..width).map(|x| around(x, half, width).len() as f32).collect();
-        let window = Window::new(width + 2 * half, window_rows(half, height));
-        Self { source, behaviour, tolerance: opts.edge_kernel_tolerance, reach, height, window, columns }
+        let capacity = window_rows(half, height);
+        let window = Window::new(width + 2 * half, capacity);
+        let calm = Calm::new(width, capacity);
+        Self { source, behaviour, tolerance: opts.edge_kernel_tolerance, reach, height, window, calm, columns }
     }
 
     /// Writes row `y` of the searched matte, and 1 at its edges, 0 elsewhere.
@@ -61,39 +65,39 @@ impl<'a> EdgeSearch<'a> {
     }
 
     fn search(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
-        let (width, repeat) = (matte.len(), self.behaviour.repeats_border());
+        let (width, height, repeat) = (matte.len(), self.height, self.behaviour.repeats_border());
         let pad = if repeat { Pad::Repeat } else { Pad::Value(f32::NAN) };
-        self.window.cover(around(y, half, self.height), |y, row| {
+        self.window.cover(around(y, half, height), |y, row| {
             self.source.row(y, &mut row[half..half + width]);
+            self.calm.note(y, &row[half..half + width]);
             pad.fill(row, half);
         });
         matte.copy_from_slice(&self.window.row(y)[half..half + width]);
-        edges.fill(0.0);
-        for near in looked_at(y, half, self.height, repeat) {
-            count_alike(edges, matte, self.window.row(near), self.tolerance);
-        }
-        let rows = around(y, half, self.height).len() as f32;
-        self.judge(half, rows, matte, edges);
-    }
-
-    /// Turns numbers of alike samples into 1 at edges and 0 elsewhere.
-    fn judge(&self, half: usize, rows: f32, matte: &[f32], counts: &mut [f32]) {
-        let pixels = counts.iter_mut().zip(matte).zip(&self.columns);
-        let all = ((2 * half + 1) * (2 * half + 1)) as f32;
-        match self.behaviour {
-            Behaviour::V34 => pixels.for_each(|((c, m), columns)| {
-                let others = *c - alike(*m, *m, self.tolerance);
-                let samples = columns * rows - 1.0;
-                *c = edge((others < (ALIKE_SHARE * samples).ceil()) | (samples == 0.0));
-            }),
-            Behaviour::V42 => pixels.for_each(|((c, _), columns)| {
-                *c = edge(*c < (ALIKE_SHARE * (columns * rows)).ceil());
-            }),
-            Behaviour::V45 => pixels.for_each(|((c, _), _)| *c = edge(*c < ALIKE_SHARE * all)),
-        }
+        let rows = around(y, half, height);
+        // Where the whole window is alike no pixel is an edge; a lone pixel has no neighbours to be like.
+        let alike =
+            |_, near: Extremes| (near.greatest - near.least < self.tolerance && width * height > 1).then_some(0.0);
+        let seen = rows.len() as f32;
+        self.calm.fill(edges, (y, rows, half), alike, |columns, edges| {
+            edges.fill(0.0);
+            for near in looked_at(y, half, height, repeat) {
+                let samples = &self.window.row(near)[columns.start..columns.end + 2 * half];
+                count_alike(edges, &matte[columns.clone()], samples, self.tolerance);
+            }
+            let window = Seen { rows: seen, columns: &self.columns[columns.clone()], half };
+            judge(edges, &matte[columns], &window, self.tolerance, self.behaviour);
+        });
     }
 }
 
+/// How much of a search window lies inside the picture.
+struct Seen<'a> {
+    rows: f32,
+    columns: &'a [f32],
+    half: usize,
+}
+
+#[inline(always)]
 fn edge(found: bool) -> f32 {
     if found { 1.0 } else { 0.0 }
 }
@@ -110,6 +114,24 @@ fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32
         for ((count, m), s) in counts.iter_mut().zip(matte).zip(samples) {
             *count += alike(*s, *m, tolerance);
         }
+    }
+}
+
+/// Turns numbers of alike samples into 1 at edges and 0 elsewhere.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn judge(counts: &mut [f32], matte: &[f32], seen: &Seen<'_>, tolerance: f32, behaviour: Behaviour) {
+    let pixels = counts.iter_mut().zip(matte).zip(seen.columns);
+    let all = ((2 * seen.half + 1) * (2 * seen.half + 1)) as f32;
+    match behaviour {
+        Behaviour::V34 => pixels.for_each(|((count, m), columns)| {
+            let others = *count - alike(*m, *m, tolerance);
+            let samples = columns * seen.rows - 1.0;
+            *count = edge((others < (ALIKE_SHARE * samples).ceil()) | (samples == 0.0));
+        }),
+        Behaviour::V42 => pixels.for_each(|((count, _), columns)| {
+            *count = edge(*count < (ALIKE_SHARE * (columns * seen.rows)).ceil());
+        }),
+        Behaviour::V45 => pixels.for_each(|((count, _), _)| *count = edge(*count < ALIKE_SHARE * all)),
     }
 }
 
@@ -137,17 +159,23 @@ impl<'a> Clip<'a> {
 impl Rows for Clip<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         self.search.row(y, out, &mut self.edges);
-        let (black, white) = (self.black, self.white);
-        let pixels = out.iter_mut().zip(&self.edges);
-        if self.search.behaviour == Behaviour::V45 {
-            pixels.for_each(|(m, &e)| *m = if e > 0.0 { *m } else { remapped(*m, black, white) });
-        } else {
-            pixels.for_each(|(m, &e)| *m = if e > 0.0 { *m } else { levelled(*m, black, white) });
-        }
+        clip_row(out, &self.edges, [self.black, self.white], self.search.behaviour);
+    }
+}
+
+/// Clips all pixels of a row that are not edges.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn clip_row(matte: &mut [f32], edges: &[f32], [black, white]: [f32; 2], behaviour: Behaviour) {
+    let pixels = matte.iter_mut().zip(edges);
+    if behaviour == Behaviour::V45 {
+        pixels.for_each(|(m, e)| *m = if *e > 0.0 { *m } else { remapped(*m, black, white) });
+    } else {
+        pixels.for_each(|(m, e)| *m = if *e > 0.0 { *m } else { levelled(*m, black, white) });
     }
 }
 
 /// 0 below black, 1 from white on, linear between; a threshold where white is not above black.
+#[inline(always)]
 fn levelled(m: f32, black: f32, white: f32) -> f32 {
     let between = (m - black) / (white - black);
     let bright = if m >= white { 1.0 } else { between };
@@ -155,6 +183,7 @@ fn levelled(m: f32, black: f32, white: f32) -> f32 {
 }
 
 /// Black to 0 and white to 1, whichever is larger, held between.
+#[inline(always)]
 fn remapped(m: f32, black: f32, white: f32) -> f32 {
     let v = (m - black) / (white - black);
     let v = if v < 0.0 { 0.0 } else { v };

@@ -1,5 +1,6 @@
 //! Feather: the matte grows along a falloff, and blends into a Gaussian blur of itself where it does.
 
+use super::calm::{Calm, Extremes, RUN};
 use super::model::Behaviour;
 use super::options::{Falloff, KeyOptions};
 use super::rows::{Pad, Rows, Source, Window, around, window_rows};
@@ -18,26 +19,22 @@ pub(super) struct Feather<'a> {
     candidates: Vec<f32>,
     /// The row with margins that add nothing to a sum.
     samples: Vec<f32>,
-    sums: Sums,
     /// Total Gaussian weight inside the picture, for every column.
     columns: Vec<f32>,
     window: Window,
+    /// Extremes of the source's latest row, and of the rows feathered along x.
+    calm_source: Calm,
+    calm: Calm,
 }
 
 /// The two tables, by distance, and what the profile does with them.
 struct Kernel {
     gauss: Vec<f32>,
     falloff: Vec<f32>,
+    /// Offsets in the order in which samples are visited.
+    order: Vec<isize>,
     behaviour: Behaviour,
     inward: bool,
-}
-
-/// What a row of pixels has found so far.
-#[derive(Default)]
-struct Sums {
-    best: Vec<f32>,
-    weight: Vec<f32>,
-    blur: Vec<f32>,
 }
 
 impl Kernel {
@@ -52,7 +49,12 @@ impl Kernel {
             Behaviour::V34 | Behaviour::V42 => gauss.iter_mut().for_each(|g| *g *= 1.0 / total),
         }
         let falloff = (0..=distance).map(|i| fall(opts.feather_falloff, 1.0 - i as f32 * step)).collect();
-        Self { gauss, falloff, behaviour, inward: opts.feather_distance < 0 }
+        let radius = distance as isize;
+        let order = match behaviour {
+            Behaviour::V45 => std::iter::once(0).chain((1..=radius).flat_map(|i| [-i, i])).collect(),
+            Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
+        };
+        Self { gauss, falloff, order, behaviour, inward: opts.feather_distance < 0 }
     }
 
     fn radius(&self) -> usize {
@@ -90,47 +92,44 @@ fn fall(curve: Falloff, u: f32) -> f32 {
 impl<'a> Feather<'a> {
     pub(super) fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
         let kernel = Kernel::new(opts);
-        let radius = kernel.radius();
-        let columns = (0..width).map(|x| kernel.weight_inside(x, width)).collect();
-        let sums = Sums { best: vec![0.0; width], weight: vec![0.0; width], blur: vec![0.0; width] };
-        let margined = vec![0.0; width + 2 * radius];
-        let window = Window::new(width, window_rows(radius, height));
-        Self { source, kernel, height, candidates: margined.clone(), samples: margined, sums, columns, window }
+        let margined = vec![0.0; width + 2 * kernel.radius()];
+        let capacity = window_rows(kernel.radius(), height);
+        Self {
+            source,
+            height,
+            candidates: margined.clone(),
+            samples: margined,
+            columns: (0..width).map(|x| kernel.weight_inside(x, width)).collect(),
+            window: Window::new(width, capacity),
+            calm_source: Calm::new(width, 1),
+            calm: Calm::new(width, capacity),
+            kernel,
+        }
     }
 }
 
 impl Rows for Feather<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        let Self { source, kernel, height, candidates, samples, sums, columns, window } = self;
+        let Self { source, kernel, height, candidates, samples, columns, window, calm_source, calm } = self;
         let radius = kernel.radius();
         window.cover(around(y, radius, *height), |y, row| {
-            let width = row.len();
             source.row(y, row);
             kernel.turn(row);
-            candidates[radius..radius + width].copy_from_slice(row);
-            samples[radius..radius + width].copy_from_slice(row);
-            let repeat = kernel.behaviour.repeats_border();
-            let pad = |value| if repeat { Pad::Repeat } else { Pad::Value(value) };
-            pad(f32::NAN).fill(candidates, radius);
-            pad(0.0).fill(samples, radius);
-            let at = |offset: usize| (&candidates[offset..offset + width], &samples[offset..offset + width]);
-            kernel.gather(sums, row, |side| at(radius.wrapping_add_signed(side)));
-            kernel.blend(sums, |x| columns[x], row);
-            // The pass along x is done and its result turned back; the pass along y turns it again.
+            calm_source.note(0, row);
+            kernel.pad(row, candidates, samples);
+            kernel.along_x([candidates, samples], columns, calm_source, row);
+            // The pass along x ends by turning its result back, the pass along y begins by turning it again.
             kernel.turn(row);
             kernel.turn(row);
+            calm.note(y, row);
         });
-        // Blender counts rows from the bottom, so the sample at `side` is `side` rows further up.
-        let at = |side: isize| {
-            let row = window.row(y.saturating_add_signed(-side).min(*height - 1));
-            (row, row)
-        };
-        kernel.gather_inside(sums, window.row(y), (*height - 1 - y, *height), at);
-        let total = kernel.weight_inside(*height - 1 - y, *height);
-        kernel.blend(sums, |_| total, out);
+        kernel.along_y(window, calm, (y, *height), out);
         kernel.turn(out);
     }
 }
+
+/// A row of candidates and the same row as samples of a sum, with the falloff and the Gaussian weight at its distance.
+type Tap<'r> = ([&'r [f32]; 2], [f32; 2]);
 
 impl Kernel {
     /// Feathering inwards is feathering the background outwards.
@@ -140,81 +139,126 @@ impl Kernel {
         }
     }
 
+    /// Copies a row between margins.
+    fn pad(&self, row: &[f32], candidates: &mut [f32], samples: &mut [f32]) {
+        let (radius, repeat) = (self.radius(), self.behaviour.repeats_border());
+        for (padded, value) in [(candidates, f32::NAN), (samples, 0.0)] {
+            padded[radius..radius + row.len()].copy_from_slice(row);
+            let pad = if repeat { Pad::Repeat } else { Pad::Value(value) };
+            pad.fill(padded, radius);
+        }
+    }
+
     /// The Gaussian weights whose samples lie inside the picture, added up in the order of the visit.
     fn weight_inside(&self, at: usize, length: usize) -> f32 {
         around(at, self.radius(), length).fold(0.0, |sum, other| sum + self.gauss[other.abs_diff(at)])
     }
 
-    /// Visits every sample of the window, in the profile's order.
-    fn gather<'r>(&self, sums: &mut Sums, centre: &[f32], at: impl Fn(isize) -> (&'r [f32], &'r [f32])) {
-        self.gather_inside(sums, centre, (self.radius(), 2 * self.radius() + 1), at);
+    /// Nothing can beat a block that is all at the greatest value of its window.
+    fn settled(own: Extremes, near: Extremes) -> Option<f32> {
+        (own.least >= near.greatest && near.least >= 0.0 && near.greatest < f32::INFINITY).then_some(own.least + 0.0)
     }
 
-    /// As [`gather`](Self::gather), for the position `at` of a picture that is `length` long.
-    fn gather_inside<'r>(
-        &self,
-        sums: &mut Sums,
-        centre: &[f32],
-        (position, length): (usize, usize),
-        at: impl Fn(isize) -> (&'r [f32], &'r [f32]),
-    ) {
-        sums.best.copy_from_slice(centre);
-        sums.weight.fill(1.0);
-        sums.blur.fill(0.0);
-        let radius = self.radius() as isize;
-        let mut visit = |side: isize| {
-            let (candidates, samples) = at(side);
-            let i = side.unsigned_abs();
-            let (falloff, gauss) = (self.falloff[i], self.gauss[i]);
-            if self.behaviour == Behaviour::V45 {
-                sums.visit::<false>(candidates, samples, falloff, gauss);
-            } else {
-                sums.visit::<true>(candidates, samples, falloff, gauss);
-            }
+    fn along_x(&self, [candidates, samples]: [&[f32]; 2], totals: &[f32], calm: &mut Calm, out: &mut [f32]) {
+        let radius = self.radius();
+        calm.fill(out, (0, 0..1, radius), Self::settled, |columns, out| {
+            let shifted = |side: isize| {
+                let offset = radius.wrapping_add_signed(side);
+                let at = columns.start + offset..columns.end + offset;
+                [&candidates[at.clone()], &samples[at]]
+            };
+            self.visit(&self.order, shifted, &totals[columns.clone()], out);
+        });
+    }
+
+    /// Blender counts rows from the bottom, so an offset of 1 is one row up.
+    fn along_y(&self, window: &Window, calm: &mut Calm, (y, height): (usize, usize), out: &mut [f32]) {
+        let up = height - 1 - y;
+        let total = self.weight_inside(up, height);
+        // Windows that are cut off keep the middle of the order, which runs upwards for them.
+        let order = match self.behaviour {
+            Behaviour::V45 => &self.order[..],
+            _ => &self.order[self.radius().saturating_sub(up)..][..around(up, self.radius(), height).len()],
         };
+        calm.fill(out, (y, around(y, self.radius(), height), 0), Self::settled, |columns, out| {
+            let row = |side: isize| {
+                let row = &window.row(y.saturating_add_signed(-side).min(height - 1))[columns.clone()];
+                [row, row]
+            };
+            self.visit(order, row, &[total; RUN][..columns.len()], out);
+        });
+    }
+
+    /// Visits every sample of the window in order, and blends: the best candidate where there was one, elsewhere more and
+    /// more of the Gaussian mean.
+    fn visit<'r>(&self, order: &[isize], row: impl Fn(isize) -> [&'r [f32]; 2], totals: &[f32], out: &mut [f32]) {
+        let tap = |side: isize| -> Tap<'r> {
+            let i = side.unsigned_abs();
+            (row(side), [self.falloff[i], self.gauss[i]])
+        };
+        let len = out.len();
+        let mut found = ([0.0; RUN], [1.0; RUN], [0.0; RUN]);
+        let (best, weight, blur) = (&mut found.0[..len], &mut found.1[..len], &mut found.2[..len]);
+        best.copy_from_slice(row(0)[0]);
+        let state = [best, weight, blur];
         if self.behaviour == Behaviour::V45 {
-            visit(0);
-            (1..=radius).for_each(|i| [-i, i].into_iter().for_each(&mut visit));
+            offer_all::<false, _>(state, order, tap);
+            blend(&found, &[1.0; RUN][..len], out);
         } else {
-            let position = position as isize;
-            (-radius..=radius).filter(|side| (0..length as isize).contains(&(position + side))).for_each(visit);
-        }
-    }
-
-    /// The best candidate where there was one, elsewhere more and more of the blur.
-    fn blend(&self, sums: &Sums, total: impl Fn(usize) -> f32, out: &mut [f32]) {
-        let plain = self.behaviour == Behaviour::V45;
-        let pixels = out.iter_mut().zip(&sums.best).zip(&sums.weight).zip(&sums.blur);
-        for (x, (((o, best), weight), blur)) in pixels.enumerate() {
-            let blur = if plain { *blur } else { blur / total(x) };
-            *o = best * weight + blur * (1.0 - weight);
+            offer_all::<true, _>(state, order, tap);
+            blend(&found, totals, out);
         }
     }
 }
 
-impl Sums {
-    fn visit<const LIMITED: bool>(&mut self, candidates: &[f32], samples: &[f32], falloff: f32, gauss: f32) {
-        visit_row::<LIMITED>(&mut self.best, &mut self.weight, &mut self.blur, candidates, samples, [falloff, gauss]);
-    }
-}
-
-/// Offers a row of samples to the pixels of a row. `LIMITED` ones must beat the best even before they fall off.
+/// `best weight + blur (1 - weight)`, the blur being a sum over the total of its weights.
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn visit_row<const LIMITED: bool>(
+fn blend((best, weight, blur): &([f32; RUN], [f32; RUN], [f32; RUN]), totals: &[f32], out: &mut [f32]) {
+    for ((((o, best), weight), blur), total) in out.iter_mut().zip(best).zip(weight).zip(blur).zip(totals) {
+        *o = best * weight + blur / total * (1.0 - weight);
+    }
+}
+
+/// Taps offered in one go, so that what was found stays in registers; the order is that of one at a time.
+const AT_ONCE: usize = 4;
+
+/// Offers all taps in order to the pixels of a row: best candidate, its weight, sum of the blur.
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn offer_all<'r, const LIMITED: bool, F: Fn(isize) -> Tap<'r>>(state: [&mut [f32]; 3], order: &[isize], tap: F) {
+    let [best, weight, blur] = state;
+    let groups = order.chunks_exact(AT_ONCE);
+    let rest = groups.remainder();
+    for group in groups {
+        let taps = [tap(group[0]), tap(group[1]), tap(group[2]), tap(group[3])];
+        offer::<LIMITED, AT_ONCE>(best, weight, blur, taps);
+    }
+    for side in rest {
+        offer::<LIMITED, 1>(best, weight, blur, [tap(*side)]);
+    }
+}
+
+/// `LIMITED` candidates must beat the best even before they fall off.
+#[inline(always)]
+fn offer<const LIMITED: bool, const N: usize>(
     best: &mut [f32],
     weight: &mut [f32],
     blur: &mut [f32],
-    candidates: &[f32],
-    samples: &[f32],
-    [falloff, gauss]: [f32; 2],
+    taps: [Tap<'_>; N],
 ) {
-    let state = best.iter_mut().zip(weight).zip(blur);
-    for ((((best, weight), blur), c), s) in state.zip(candidates).zip(samples) {
-        let offer = c * falloff;
-        let wins = (offer > *best) & (!LIMITED | (c > best));
-        *best = if wins { offer } else { *best };
-        *weight = if wins { falloff } else { *weight };
-        *blur += s * gauss;
+    let len = best.len();
+    let (weight, blur) = (&mut weight[..len], &mut blur[..len]);
+    let rows = taps.map(|([candidates, samples], _)| (&candidates[..len], &samples[..len]));
+    for x in 0..len {
+        let (mut b, mut w, mut sum) = (best[x], weight[x], blur[x]);
+        for (&(candidates, samples), (_, [falloff, gauss])) in rows.iter().zip(&taps) {
+            let candidate = candidates[x];
+            let offer = candidate * falloff;
+            let wins = (offer > b) & (!LIMITED | (candidate > b));
+            b = if wins { offer } else { b };
+            w = if wins { *falloff } else { w };
+            sum += samples[x] * gauss;
+        }
+        (best[x], weight[x], blur[x]) = (b, w, sum);
     }
 }
 

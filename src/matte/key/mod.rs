@@ -1,6 +1,7 @@
 //! The keyer: a photo before a coloured screen becomes a matte and a cut-out.
 
 mod box_blur;
+mod calm;
 mod chroma;
 mod cutout;
 mod dilate;

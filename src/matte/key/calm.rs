@@ -1,0 +1,167 @@
+//! Where a plane is calm: extremes of its values, block by block of a row.
+//!
+//! Most of a matte is exactly 0 or 1, and a window that sees one value only has nothing to compute. The extremes of every
+//! block of a row are noted once, when the row is made; what the many windows over it then ask is cheap. The shortcuts
+//! taken on that account give the same bits as the computation that they replace.
+
+use super::rows::around;
+use std::ops::Range;
+
+/// Columns of a block: a few vectors wide, narrow enough to fit between the edges of a subject.
+const BLOCK: usize = 64;
+/// Columns computed at once where a plane is not calm: what the computation keeps fits the first cache.
+pub(super) const RUN: usize = 512;
+
+/// The least and the greatest value of some part of a plane, in the total order of floats: a NaN is an extreme, so that
+/// no comparison with it holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Extremes {
+    pub(super) least: f32,
+    pub(super) greatest: f32,
+}
+
+/// Extremes of the last few rows of a plane.
+pub(super) struct Calm {
+    width: usize,
+    capacity: usize,
+    count: usize,
+    /// For every row the keys of the least and the greatest value of its blocks.
+    least: Vec<i32>,
+    greatest: Vec<i32>,
+    /// The same over some rows, for the moment.
+    over: [Vec<i32>; 2],
+}
+
+impl Calm {
+    /// Room for `capacity` rows of `width` values.
+    pub(super) fn new(width: usize, capacity: usize) -> Self {
+        let count = width.div_ceil(BLOCK);
+        let rows = vec![0; count * capacity];
+        Self { width, capacity, count, least: rows.clone(), greatest: rows, over: [vec![0; count], vec![0; count]] }
+    }
+
+    /// Notes the extremes of row `y`.
+    pub(super) fn note(&mut self, y: usize, row: &[f32]) {
+        let slot = self.slot(y);
+        note_blocks(row, &mut self.least[slot.clone()], &mut self.greatest[slot]);
+    }
+
+    fn slot(&self, y: usize) -> Range<usize> {
+        let start = y % self.capacity * self.count;
+        start..start + self.count
+    }
+
+    /// Gathers the extremes of every block over some rows.
+    fn gather(&mut self, rows: Range<usize>) {
+        let [mut least, mut greatest] = std::mem::take(&mut self.over);
+        least.fill(i32::MAX);
+        greatest.fill(i32::MIN);
+        for y in rows {
+            let slot = self.slot(y);
+            least.iter_mut().zip(&self.least[slot.clone()]).for_each(|(a, b)| *a = (*a).min(*b));
+            greatest.iter_mut().zip(&self.greatest[slot]).for_each(|(a, b)| *a = (*a).max(*b));
+        }
+        self.over = [least, greatest];
+    }
+
+    /// Extremes of the gathered rows over the columns within `reach` of a block.
+    fn near(&self, block: usize, reach: usize) -> Extremes {
+        let columns = around(block, reach.div_ceil(BLOCK), self.count);
+        let [least, greatest] = &self.over;
+        let least = least[columns.clone()].iter().min();
+        let greatest = greatest[columns].iter().max();
+        Extremes { least: value(*least.unwrap_or(&0)), greatest: value(*greatest.unwrap_or(&0)) }
+    }
+
+    /// Fills row `y` of a result. `settled` is told the extremes of every block and of the window `rows` x `reach` around
+    /// it, and may know the one value that the block becomes; all other columns go to `compute`, at most [`RUN`] at once.
+    pub(super) fn fill(
+        &mut self,
+        out: &mut [f32],
+        (y, rows, reach): (usize, Range<usize>, usize),
+        settled: impl Fn(Extremes, Extremes) -> Option<f32>,
+        mut compute: impl FnMut(Range<usize>, &mut [f32]),
+    ) {
+        let mut compute = |columns: Range<usize>, out: &mut [f32]| {
+            if !columns.is_empty() {
+                compute(columns.clone(), &mut out[columns]);
+            }
+        };
+        self.gather(rows);
+        let row = self.slot(y).start;
+        let mut open = 0..0;
+        for (block, start) in (0..self.width).step_by(BLOCK).enumerate() {
+            let columns = start..(start + BLOCK).min(self.width);
+            let own = Extremes { least: value(self.least[row + block]), greatest: value(self.greatest[row + block]) };
+            let known = settled(own, self.near(block, reach));
+            if known.is_none() && open.end == start && open.len() + BLOCK <= RUN {
+                open.end = columns.end;
+                continue;
+            }
+            compute(open, out);
+            open = if known.is_some() { columns.end..columns.end } else { columns.clone() };
+            known.into_iter().for_each(|v| out[columns.clone()].fill(v));
+        }
+        compute(open, out);
+    }
+}
+
+/// A float as an integer of the same order.
+#[inline(always)]
+fn key(v: f32) -> i32 {
+    let bits = v.to_bits() as i32;
+    bits ^ ((bits >> 31) & i32::MAX)
+}
+
+/// The float of a key.
+fn value(key: i32) -> f32 {
+    f32::from_bits((key ^ ((key >> 31) & i32::MAX)) as u32)
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn note_blocks(row: &[f32], least: &mut [i32], greatest: &mut [i32]) {
+    for ((values, least), greatest) in row.chunks(BLOCK).zip(least).zip(greatest) {
+        (*least, *greatest) = (i32::MAX, i32::MIN);
+        for v in values {
+            *least = (*least).min(key(*v));
+            *greatest = (*greatest).max(key(*v));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_keep_the_order_of_floats() {
+        let rising = [-f32::NAN, f32::NEG_INFINITY, -1.0, -1e-42, -0.0, 0.0, 1e-42, 1.0, f32::INFINITY, f32::NAN];
+        assert!(rising.windows(2).all(|p| key(p[0]) < key(p[1])));
+        assert!(rising.iter().all(|&v| value(key(v)).to_bits() == v.to_bits()));
+    }
+
+    #[test]
+    fn every_column_is_either_settled_or_computed_once() {
+        let width = 1500;
+        let mut calm = Calm::new(width, 1);
+        let row: Vec<f32> = (0..width).map(|x| if (x / 100) % 5 == 2 { x as f32 } else { 1.0 }).collect();
+        calm.note(0, &row);
+        let mut out = vec![0.0; width];
+        let flat = |own: Extremes, _| (own.least == own.greatest).then_some(7.0);
+        calm.fill(&mut out, (0, 0..1, 0), flat, |columns, part| {
+            assert!(columns.len() <= RUN && columns.len() == part.len());
+            part.iter_mut().for_each(|v| *v += 1.0);
+        });
+        assert!(out.iter().all(|v| *v == 1.0 || *v == 7.0));
+        assert!(out.contains(&1.0) && out.contains(&7.0));
+    }
+
+    #[test]
+    fn a_nan_is_an_extreme() {
+        let mut calm = Calm::new(3, 1);
+        calm.note(0, &[0.0, f32::NAN, 1.0]);
+        calm.gather(0..1);
+        let Extremes { least, greatest } = calm.near(0, 0);
+        assert!(least == 0.0 && greatest.is_nan());
+    }
+}

@@ -1,0 +1,101 @@
+//! The keyer against a plain copy of the same buffers.
+//!
+//! `cargo bench --bench matte`: every line is one 4K frame on all cores, into pictures that are already allocated.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use petcomp::matte::key::{BlurSum, KeyOptions, Keyed, Keying, Profile, Screen};
+use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
+use rayon::prelude::*;
+use std::hint::black_box;
+use std::time::Duration;
+
+const WIDTH: usize = 3840;
+const HEIGHT: usize = 2160;
+const SCREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
+/// Rows a copying task takes at once.
+const COPY_ROWS: usize = 32;
+
+/// A striped, soft-edged disc before a noisy, unevenly lit screen.
+fn studio() -> Image<PremulRgba> {
+    let radius = HEIGHT as f32 * 0.35;
+    Image::from_fn(WIDTH, HEIGHT, |x, y| {
+        let (dx, dy) = (x as f32 - WIDTH as f32 * 0.5, y as f32 - HEIGHT as f32 * 0.5);
+        let cover = ((radius - dx.hypot(dy)) / 8.0 + 0.5).clamp(0.0, 1.0);
+        let front = if (x / 40 + y / 40) % 2 == 0 { [0.6, 0.3, 0.2] } else { [0.75, 0.72, 0.7] };
+        let light = 0.95 + 0.1 * x as f32 / WIDTH as f32;
+        let channel = |k: usize, screen: f32| light * (cover * front[k] + (1.0 - cover) * screen) + noise(x, y, k);
+        PremulRgba::new(channel(0, SCREEN.r), channel(1, SCREEN.g), channel(2, SCREEN.b), 1.0)
+    })
+}
+
+/// Grain of about half a percent, a fixed function of the place.
+fn noise(x: usize, y: usize, k: usize) -> f32 {
+    let mut h = (x as u32).wrapping_mul(0x9e37_79b9)
+        ^ (y as u32).wrapping_mul(0x85eb_ca6b)
+        ^ (k as u32).wrapping_mul(0xc2b2_ae35);
+    h = (h ^ (h >> 15)).wrapping_mul(0x2c1b_3c6d);
+    h = (h ^ (h >> 12)).wrapping_mul(0x297a_2d39);
+    ((h >> 8) as f32 / (1 << 24) as f32 - 0.5) * 0.02
+}
+
+/// All stages on, as issue and README quote it.
+fn all_stages(profile: Profile) -> KeyOptions {
+    KeyOptions {
+        blur_pre: 6,
+        clip_black: 0.1,
+        clip_white: 0.9,
+        edge_kernel_radius: 3,
+        blur_post: 4,
+        dilate_distance: 3,
+        feather_distance: 8,
+        ..KeyOptions::of(profile)
+    }
+}
+
+/// What no keyer can beat: colours read, colours and a matte written.
+fn copy(photo: &Image<PremulRgba>, keyed: &mut Keyed) {
+    let rows = WIDTH * COPY_ROWS;
+    let cutout = keyed.cutout.pixels_mut().par_chunks_mut(rows);
+    let matte = keyed.matte.pixels_mut().par_chunks_mut(rows);
+    photo.pixels().par_chunks(rows).zip(cutout).zip(matte).for_each(|((from, to), matte)| {
+        to.copy_from_slice(from);
+        matte.fill(Coverage(1.0));
+    });
+}
+
+/// What no matte can beat: colours read, a matte written.
+fn read(photo: &Image<PremulRgba>, matte: &mut Image<Coverage>) {
+    let rows = WIDTH * COPY_ROWS;
+    let matte = matte.pixels_mut().par_chunks_mut(rows);
+    photo.pixels().par_chunks(rows).zip(matte).for_each(|(from, to)| {
+        from.iter().zip(to).for_each(|(p, m)| m.0 = p.r + p.g + p.b + p.a);
+    });
+}
+
+fn bench(c: &mut Criterion) {
+    let photo = studio();
+    let job = Keying::new(&photo, Screen::Color(SCREEN));
+    let mut keyed = job.run(&KeyOptions::default()).unwrap();
+    let mut group = c.benchmark_group("matte/3840x2160");
+    group.throughput(Throughput::Elements((WIDTH * HEIGHT) as u64));
+    group.sample_size(20).measurement_time(Duration::from_secs(4));
+    group.bench_function("copy", |b| b.iter(|| copy(black_box(&photo), &mut keyed)));
+    group.bench_function("key/defaults", |b| b.iter(|| job.run_into(&KeyOptions::default(), &mut keyed).unwrap()));
+    group.bench_function("key/defaults, new pictures", |b| b.iter(|| job.run(&KeyOptions::default()).unwrap()));
+    let mut matte = keyed.matte.clone();
+    group.bench_function("read", |b| b.iter(|| read(black_box(&photo), &mut matte)));
+    group.bench_function("key/matte only", |b| {
+        b.iter(|| job.matte_into(&KeyOptions::default(), &mut matte).unwrap());
+    });
+    for (name, profile) in Profile::ALL {
+        let opts = all_stages(profile);
+        group
+            .bench_function(format!("key/all stages, {name}"), |b| b.iter(|| job.run_into(&opts, &mut keyed).unwrap()));
+    }
+    let opts = KeyOptions { blur_sum: BlurSum::Running, ..all_stages(Profile::Blender34) };
+    group.bench_function("key/all stages, running sums", |b| b.iter(|| job.run_into(&opts, &mut keyed).unwrap()));
+    group.finish();
+}
+
+criterion_group!(benches, bench);
+criterion_main!(benches);
