@@ -166,7 +166,7 @@ fn crossed_corners_are_put_in_order_and_said() {
     desk.write("a.label.json", label("[[100, 100], [510, 400], [500, 110], [90, 390]]"));
     let output = desk.run(&["camera", "solve", "a.label.json"]);
     let said = text(&output.stdout) + &text(&output.stderr);
-    assert!(output.status.success() && said.contains("order"), "{said}");
+    assert!(output.status.success() && said.contains("sorted clockwise"), "{said}");
 }
 
 #[test]

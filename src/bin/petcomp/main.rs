@@ -10,6 +10,7 @@ mod diff;
 mod doctor;
 mod label;
 mod matte;
+mod matte_key;
 mod render;
 mod scene;
 mod settle;

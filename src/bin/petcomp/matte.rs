@@ -18,6 +18,8 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         options: Option<PathBuf>,
     },
+    /// Key a picture as Blender's Keying node does
+    Key(crate::matte_key::Args),
     /// Find the object, key it, and write it without its background
     Cut {
         /// Photo of one object on a uniform screen or board
@@ -43,6 +45,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
                 common.say(path.display());
             }
         }
+        Command::Key(args) => crate::matte_key::run(args)?,
         Command::Cut { photo, output, options } => {
             let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
