@@ -71,6 +71,14 @@ impl Error {
         Self::Value { at: at.into(), what: what.to_string() }
     }
 
+    /// The same error, its field path told from one level further out: `count` within `scene` is `scene.count`.
+    pub fn within(self, outer: &str) -> Self {
+        match self {
+            Self::Value { at, what } => Self::Value { at: format!("{outer}.{at}"), what },
+            other => other,
+        }
+    }
+
     /// The same error, told of the document that the value stands in.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         let path = path.as_ref().to_path_buf();

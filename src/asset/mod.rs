@@ -1,1 +1,31 @@
 //! Asset: a cut-out with its real size, outline and class, kept in a folder with one manifest.
+//!
+//! An asset folder holds `assets.toml` ([`Manifest`]) and, in a folder for each asset, its cut-outs (half-float EXR,
+//! premultiplied, scene-linear) with a thumbnail PNG beside each. The manifest is written last and whole, so that a
+//! folder never names a picture that is not there.
+//!
+//! ```text
+//! photos.toml -build-> folder -Library::open-> Library        photo -add_photo-> the same folder
+//! ```
+
+mod build;
+mod folder;
+mod library;
+mod manifest;
+mod size;
+mod thumbnail;
+
+pub use build::{Built, List, ListedPhoto, build};
+pub use folder::{AddPhoto, Scale, add_photo};
+pub use library::{Asset, Library, Photo};
+pub use manifest::{AssetRecord, Manifest, PhotoRecord, default_classes};
+pub use size::oriented_size;
+
+/// Name of the manifest in an asset folder.
+pub const MANIFEST: &str = "assets.toml";
+
+/// Thickness of an asset where none is given, metres: the thin box of the paper's colliders.
+pub const DEFAULT_THICKNESS: f64 = 0.005;
+
+/// Mass of an asset where none is given, kilograms: a PET bottle of half a litre to a litre.
+pub const DEFAULT_MASS: f64 = 0.025;

@@ -1,1 +1,307 @@
 //! Label files: what a person says of a photo of a surface (`NAME.label.json`).
+
+use crate::geom::{Point2, Vector2};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::Value;
+
+/// The corners of a flat rectangle of known size in a photo, and what is known of the camera that took it.
+///
+/// In files an unknown key is an error, except where it starts with `_`: those are remarks. Values are as a person
+/// wrote them; [`solve`](super::solve) checks them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(remote = "Self", deny_unknown_fields)]
+pub struct Label {
+    /// What kind of file this is.
+    pub format: LabelFormat,
+    /// Version of the format: 1.
+    #[serde(deserialize_with = "version_one")]
+    pub version: u32,
+    /// The photo.
+    pub image: LabelImage,
+    /// Where pixel (0, 0) is. Default: `corner`.
+    #[serde(default)]
+    pub pixel_origin: PixelOrigin,
+    /// The rectangle.
+    pub surface: LabelSurface,
+    /// What is known of the camera.
+    #[serde(default)]
+    pub camera: LabelCamera,
+    /// Further points of the same photo.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<LabelPoint>,
+    /// Printed markers on the surface.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub markers: Option<MarkerMap>,
+}
+
+/// The one word of [`Label::format`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LabelFormat {
+    /// `plane-label`.
+    #[default]
+    #[serde(rename = "plane-label")]
+    PlaneLabel,
+}
+
+/// The photo of a label.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LabelImage {
+    /// Name of the picture file, relative to the label.
+    pub file: String,
+    /// Width of the upright picture, pixels.
+    pub width: u32,
+    /// Height of the upright picture, pixels.
+    pub height: u32,
+    /// A part was cut away, so that the lens need not look at the picture's centre. Default: false.
+    #[serde(default)]
+    pub cropped: bool,
+}
+
+/// Where the origin of pixel coordinates is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PixelOrigin {
+    /// The top-left corner of the top-left pixel (ours).
+    #[default]
+    Corner,
+    /// The centre of the top-left pixel (OpenCV).
+    Center,
+}
+
+/// The rectangle of a label.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LabelSurface {
+    /// Its name; photos of one surface share it.
+    pub id: String,
+    /// Length of the sides from the first to the second corner, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_m: Option<f64>,
+    /// Length of the other sides, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// Standard deviation of both lengths, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimension_sigma_m: Option<f64>,
+    /// Top left, top right, bottom right, bottom left, pixels. May be missing where there are markers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corners_px: Option<[[f64; 2]; 4]>,
+    /// Standard deviation of a corner's coordinates, pixels. Default: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub corner_sigma_px: Option<f64>,
+    /// Who found the corners: `manual`, a program's name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+}
+
+/// What is known of the camera of a label.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LabelCamera {
+    /// Its name; photos that share name and picture size share a lens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub id: Option<String>,
+    /// Focal length, pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal_px: Option<f64>,
+    /// Focal length as a 35 mm camera's, millimetres, as EXIF tells it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal_35mm: Option<f64>,
+    /// Relative standard deviation of the focal length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal_sigma: Option<f64>,
+    /// The focal length is exact. Default: false.
+    pub focal_fixed: bool,
+    /// Principal point, pixels. Default: the picture's centre.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub principal_point_px: Option<[f64; 2]>,
+    /// Standard deviation of the principal point's coordinates, pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub principal_point_sigma_px: Option<f64>,
+    /// OpenCV's first radial distortion coefficient.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub k1: Option<f64>,
+    /// Height of the lens above the surface, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// Standard deviation of that height, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_sigma_m: Option<f64>,
+}
+
+/// A point of known place on or above the surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LabelPoint {
+    /// Where it is, metres.
+    pub xyz_m: [f64; 3],
+    /// Where it is seen, pixels.
+    pub px: [f64; 2],
+    /// Standard deviation of its pixel coordinates. Default: the corners'.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_px: Option<f64>,
+    /// What it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
+}
+
+/// Printed markers and where they lie on the surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MarkerMap {
+    /// Dictionary of the markers: `tag36h11`, `DICT_4X4_50`.
+    pub family: String,
+    /// Whose pictures were printed. Default: `apriltag`.
+    #[serde(default)]
+    pub artwork: Artwork,
+    /// Side of a marker's black square, metres.
+    pub size_m: f64,
+    /// Centre of each marker by its number, metres.
+    pub map: std::collections::BTreeMap<u32, [f64; 3]>,
+}
+
+/// Whose marker pictures were printed; OpenCV turns AprilTags by 180 degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Artwork {
+    /// The official pictures.
+    #[default]
+    Apriltag,
+    /// `generateImageMarker`.
+    Opencv,
+}
+
+impl Label {
+    /// A label of a rectangle of `size` metres, seen at `corners_px` (from the top left, clockwise) in a picture of
+    /// `image` pixels; nothing else is known.
+    pub fn new(image: [u32; 2], corners_px: [[f64; 2]; 4], size: [f64; 2]) -> Self {
+        let [width, height] = image;
+        Self {
+            format: LabelFormat::PlaneLabel,
+            version: 1,
+            image: LabelImage { width, height, ..Default::default() },
+            pixel_origin: PixelOrigin::Corner,
+            surface: LabelSurface {
+                width_m: Some(size[0]),
+                height_m: Some(size[1]),
+                corners_px: Some(corners_px),
+                ..Default::default()
+            },
+            camera: LabelCamera::default(),
+            points: Vec::new(),
+            markers: None,
+        }
+    }
+
+    /// Width and height of the picture, pixels.
+    pub fn image_size(&self) -> [u32; 2] {
+        [self.image.width, self.image.height]
+    }
+
+    /// A labelled pixel position in our convention.
+    pub(crate) fn pixel(&self, px: [f64; 2]) -> Point2<f64> {
+        let offset = match self.pixel_origin {
+            PixelOrigin::Corner => 0.0,
+            PixelOrigin::Center => 0.5,
+        };
+        Point2::from(px) + Vector2::repeat(offset)
+    }
+}
+
+impl<'de> Deserialize<'de> for Label {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = without_remarks(Value::deserialize(deserializer)?);
+        let mut track = serde_path_to_error::Track::new();
+        let tracked = serde_path_to_error::Deserializer::new(value, &mut track);
+        Self::deserialize(tracked).map_err(|e| {
+            let (what, at) = (e.to_string(), track.path().to_string());
+            // A message on a key names it; the reader of the file adds what was probably meant.
+            D::Error::custom(if what.contains(" field `") { what } else { format!("{at}: {what}") })
+        })
+    }
+}
+
+impl Serialize for Label {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, serializer)
+    }
+}
+
+fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    match u32::deserialize(deserializer)? {
+        1 => Ok(1),
+        other => Err(D::Error::custom(format!("version: {other}, expected 1"))),
+    }
+}
+
+/// Without the keys that start with `_`.
+fn without_remarks(value: Value) -> Value {
+    match value {
+        Value::Object(map) => {
+            let kept = map.into_iter().filter(|(key, _)| !key.starts_with('_'));
+            Value::Object(kept.map(|(key, v)| (key, without_remarks(v))).collect())
+        }
+        Value::Array(items) => Value::Array(items.into_iter().map(without_remarks).collect()),
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRAY: &str = r#"{
+        "format": "plane-label", "version": 1, "_by": "hand",
+        "image": { "file": "bg_0001.jpg", "width": 4000, "height": 3000, "cropped": false },
+        "pixel_origin": "center",
+        "surface": {
+            "id": "tray", "width_m": 0.600, "height_m": 0.400, "dimension_sigma_m": 0.002, "_made_of": "steel",
+            "corners_px": [[612.3, 402.8], [3391.0, 398.1], [3502.4, 2610.7], [498.9, 2622.2]],
+            "corner_sigma_px": 1.0, "source": "manual"
+        },
+        "camera": {
+            "id": "phone-1", "focal_px": null, "focal_35mm": 26, "focal_sigma": 0.05, "focal_fixed": false,
+            "principal_point_px": null, "principal_point_sigma_px": null, "k1": null,
+            "height_m": 1.12, "height_sigma_m": 0.03
+        },
+        "points": [{ "xyz_m": [0.30, 0.20, 0.08], "px": [3433.0, 371.5], "sigma_px": 1.0, "note": "rim" }],
+        "markers": { "family": "tag36h11", "artwork": "apriltag", "size_m": 0.06,
+                     "map": { "0": [-0.27, 0.17, 0], "1": [0.27, 0.17, 0] } }
+    }"#;
+
+    fn message(text: &str) -> String {
+        serde_json::from_str::<Label>(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_full_label_reads_and_round_trips() {
+        let label: Label = serde_json::from_str(TRAY).unwrap();
+        assert_eq!(label.camera.focal_35mm, Some(26.0));
+        assert_eq!(label.markers.as_ref().unwrap().map[&1], [0.27, 0.17, 0.0]);
+        let text = serde_json::to_string(&label).unwrap();
+        assert_eq!(serde_json::from_str::<Label>(&text).unwrap(), label);
+    }
+
+    #[test]
+    fn an_unknown_key_is_an_error_that_names_it_and_a_remark_is_not() {
+        let typo = TRAY.replace("\"focal_sigma\"", "\"focal_sgima\"");
+        assert!(message(&typo).contains("focal_sgima"), "{}", message(&typo));
+    }
+
+    #[test]
+    fn a_missing_or_wrong_field_is_named() {
+        assert!(message(&TRAY.replace("\"id\": \"tray\",", "")).contains("id"));
+        assert!(message(&TRAY.replace("\"version\": 1", "\"version\": 2")).contains("expected 1"));
+        assert!(message(&TRAY.replace("plane-label", "plain-label")).contains("plane-label"));
+        let three = message(&TRAY.replace(", [498.9, 2622.2]]", "]"));
+        assert!(three.contains("surface.corners_px: invalid length 3"), "{three}");
+    }
+
+    #[test]
+    fn pixel_centres_become_pixel_corners() {
+        let label: Label = serde_json::from_str(TRAY).unwrap();
+        assert_eq!(label.pixel([0.0, 10.0]), Point2::new(0.5, 10.5));
+    }
+}

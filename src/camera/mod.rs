@@ -1,8 +1,45 @@
 //! Camera: a pinhole model, and the camera that sees a rectangle of known size at four labelled corners.
+//!
+//! [`solve`] turns a [`Label`] into a [`Solution`]; [`locate`] is the pipeline stage that does so inside a scene.
+//!
+//! The solver works in units of its own, in which everything is of order one: pixels relative to the principal point
+//! over half the picture's diagonal, lengths over the geometric mean of the rectangle's sides.
 
+mod belief;
+mod chi;
+mod corners;
+mod error;
+mod exchange;
+mod file;
+mod focal;
+mod joint;
 mod label;
+mod locate;
+mod model;
+mod options;
 mod pinhole;
+mod problem;
 mod rectangle;
+mod refine;
+mod search;
+pub mod simulate;
+mod solution;
+mod solve;
+mod uncertainty;
+mod warning;
 
+pub use error::SolveError;
+pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
+pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord};
+pub use focal::{FocalSource, focal_from_equivalent};
+pub use joint::{Joint, one_camera, solve_joint};
+pub use label::{
+    Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
+};
+pub use locate::locate;
+pub use options::{CornerOrder, Priors, SolveOptions};
 pub use pinhole::Camera;
-pub use rectangle::SolveError;
+pub use solution::{Fit, FocalFinding, Sigma, Solution};
+pub use solve::solve;
+pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;
+pub use warning::Warning;

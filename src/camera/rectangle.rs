@@ -1,10 +1,205 @@
-//! The camera from one rectangle of known size, in closed form.
+//! Focal length and pose from the picture of a rectangle, in closed form.
+//!
+//! # Method
+//! The depth of a corner is the area of the triangle of the other three (both parallelogram identities in homogeneous
+//! coordinates); with depths the sides' directions follow without intersecting any lines, so parallel sides are nothing
+//! special. Two equations are linear in the squared focal length: the sides are at right angles, and their ratio is
+//! known. They are the imaginary and the real part of one complex equation, which gives them their weights.
 
-/// Why no camera could be found.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SolveError {
-    /// A number is NaN or infinite.
-    #[error("{0} is not finite")]
-    NonFinite(&'static str),
+use super::corners::triangle_areas;
+use crate::geom::Vector2;
+use nalgebra::{Matrix3, Vector3};
+
+/// The picture of a rectangle in homogeneous coordinates; units as in [`camera`](super).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    /// Direction of +x: its picture, and its change of depth.
+    along: (Vector2<f64>, f64),
+    /// Direction of -y, likewise.
+    down: (Vector2<f64>, f64),
+    /// The rectangle's centre.
+    center: Vector3<f64>,
+}
+
+/// A pose in the parameters that stay well conditioned from every side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stance {
+    /// Camera axes from world axes.
+    pub(crate) rotation: Matrix3<f64>,
+    /// Picture of the rectangle's centre, relative to the principal point.
+    pub(crate) center: Vector2<f64>,
+    /// Picture lengths per length, at the centre: focal length over depth.
+    pub(crate) scale: f64,
+}
+
+impl View {
+    /// From corners in the order top left, top right, bottom right, bottom left, relative to the principal point.
+    pub(crate) fn new(corners: &[Vector2<f64>; 4]) -> Self {
+        let areas = triangle_areas(corners);
+        let mean = areas.iter().sum::<f64>() / 4.0;
+        let [c0, c1, c2, c3] = [0, 1, 2, 3].map(|i| corners[i].push(1.0) * (areas[i] / mean));
+        let split = |e: Vector3<f64>| (e.xy(), e.z);
+        Self { along: split(c1 - c0), down: split(c3 - c0), center: (c0 + c2) / 2.0 }
+    }
+
+    /// The squared focal length, for a rectangle whose width is `ratio` times its height.
+    ///
+    /// Zero, negative or not finite where the picture shows no perspective: from exactly above, or in the noise.
+    pub(crate) fn focal_squared(&self, ratio: f64) -> f64 {
+        let ((a, dw), (b, dh)) = (self.along, self.down);
+        let r2 = ratio * ratio;
+        let right_angle = dw * dh;
+        let sides = dw * dw - r2 * dh * dh;
+        let weight = dw * dw + r2 * dh * dh;
+        -(sides * (a.norm_squared() - r2 * b.norm_squared()) + 4.0 * r2 * right_angle * a.dot(&b)) / (weight * weight)
+    }
+
+    /// The squared focal length from the right angle alone, for a rectangle of unknown sides.
+    pub(crate) fn focal_squared_any_ratio(&self) -> f64 {
+        let ((a, dw), (b, dh)) = (self.along, self.down);
+        -a.dot(&b) / (dw * dh)
+    }
+
+    /// Width over height of the rectangle, for a known focal length.
+    pub(crate) fn ratio(&self, focal: f64) -> f64 {
+        let ((a, dw), (b, dh)) = (self.along, self.down);
+        let f2 = focal * focal;
+        ((a.norm_squared() + f2 * dw * dw) / (b.norm_squared() + f2 * dh * dh)).sqrt()
+    }
+
+    /// The pose for a known focal length and size; the sides are made orthogonal symmetrically.
+    pub(crate) fn stance(&self, focal: f64, size: [f64; 2]) -> Stance {
+        let ((a, dw), (b, dh)) = (self.along, self.down);
+        let along = a.push(focal * dw);
+        let up = -b.push(focal * dh);
+        let (x, y) = (along.normalize(), up.normalize());
+        let (sum, difference) = ((x + y).normalize(), (x - y).normalize());
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let (x, y) = ((sum + difference) * half, (sum - difference) * half);
+        Stance {
+            rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]),
+            center: self.center.xy() / self.center.z,
+            scale: (along.norm() / size[0] + up.norm() / size[1]) / (2.0 * self.center.z),
+        }
+    }
+}
+
+impl View {
+    /// The two poses from which the rectangle looks like this from so far that perspective is lost in the noise.
+    ///
+    /// Its picture is then a parallelogram, and [`stance`](Self::stance) sees no tilt in it: a saddle of the cost. The
+    /// foreshortening tells the tilt, up to its sign.
+    pub(crate) fn distant_stances(&self, size: [f64; 2]) -> [Stance; 2] {
+        let along = self.along.0 / (size[0] * self.center.z);
+        let up = -self.down.0 / (size[1] * self.center.z);
+        let (n1, n2, dot) = (along.norm_squared(), up.norm_squared(), along.dot(&up));
+        let squared = (n1 + n2 + libm::hypot(n1 - n2, 2.0 * dot)) / 2.0;
+        let lean = |n: f64| (1.0 - n / squared).max(0.0).sqrt();
+        let (z1, z2) = (lean(n1), if dot > 0.0 { -lean(n2) } else { lean(n2) });
+        let (scale, center) = (squared.sqrt(), self.center.xy() / self.center.z);
+        [1.0, -1.0].map(|sign| {
+            let x = (along / scale).push(sign * z1).normalize();
+            let y = (up / scale).push(sign * z2);
+            let y = (y - x * x.dot(&y)).normalize();
+            Stance { rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]), center, scale }
+        })
+    }
+}
+
+impl Stance {
+    /// The other pose from which a small or distant rectangle looks almost the same: mirrored at the line of sight.
+    pub(crate) fn mirrored(&self, focal: f64) -> Self {
+        let sight = self.center.push(focal).normalize();
+        let upright = shortest_rotation_to_z(&sight);
+        let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -1.0));
+        let rotation = upright.transpose() * mirror * upright * self.rotation * mirror;
+        Self { rotation, ..*self }
+    }
+}
+
+/// Rodrigues' formula for the shortest turn of a unit vector in front of the camera (`z > 0`) to +z.
+fn shortest_rotation_to_z(v: &Vector3<f64>) -> Matrix3<f64> {
+    let cross = v.cross(&Vector3::z()).cross_matrix();
+    Matrix3::identity() + cross + cross * cross / (1.0 + v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::UnitQuaternion;
+
+    impl Stance {
+        /// Position of the rectangle's centre in the camera's frame.
+        fn translation(&self, focal: f64) -> Vector3<f64> {
+            self.center.push(focal) / self.scale
+        }
+    }
+
+    const SIZE: [f64; 2] = [1.2, 1.0 / 1.2];
+    const FOCAL: f64 = 1.4;
+
+    fn seen(tilt: f64) -> (Stance, View) {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt)
+            * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.4);
+        let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
+        let rotation = turn.to_rotation_matrix().into_inner() * flip;
+        let stance = Stance { rotation, center: Vector2::new(0.1, -0.2), scale: 0.5 };
+        (stance, View::new(&project(&stance)))
+    }
+
+    fn project(stance: &Stance) -> [Vector2<f64>; 4] {
+        let [x, y] = SIZE.map(|s| s / 2.0);
+        [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| {
+            let c = stance.rotation * Vector3::new(x, y, 0.0) + stance.translation(FOCAL);
+            c.xy() * FOCAL / c.z
+        })
+    }
+
+    #[test]
+    fn focal_length_and_pose_come_back() {
+        for tilt in [0.05, 0.3, 0.9] {
+            let (truth, view) = seen(tilt);
+            let focal = view.focal_squared(SIZE[0] / SIZE[1]).sqrt();
+            assert!((focal - FOCAL).abs() < 1e-10, "{tilt}: {focal}");
+            let found = view.stance(focal, SIZE);
+            assert!((found.rotation - truth.rotation).norm() < 1e-10);
+            assert!((found.translation(focal) - truth.translation(FOCAL)).norm() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_ratio_comes_back_from_the_right_angle() {
+        let (_, view) = seen(0.3);
+        let focal = view.focal_squared_any_ratio().sqrt();
+        assert!((focal - FOCAL).abs() < 1e-10 && (view.ratio(focal) - SIZE[0] / SIZE[1]).abs() < 1e-10);
+    }
+
+    #[test]
+    fn from_straight_above_there_is_no_focal_length_but_a_pose() {
+        let [x, y] = SIZE.map(|s| s / 4.0);
+        let view = View::new(&[[-x, -y], [x, -y], [x, y], [-x, y]].map(Vector2::from));
+        assert!(!view.focal_squared(SIZE[0] / SIZE[1]).is_finite());
+        let stance = view.stance(2.0, SIZE);
+        assert!((stance.translation(2.0) - Vector3::new(0.0, 0.0, 4.0)).norm() < 1e-12);
+        assert!((stance.rotation - Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))).norm() < 1e-12);
+    }
+
+    #[test]
+    fn mirroring_twice_is_the_same_pose() {
+        let (truth, _) = seen(0.3);
+        let other = truth.mirrored(FOCAL);
+        assert!((other.rotation.determinant() - 1.0).abs() < 1e-12);
+        assert!((other.rotation - truth.rotation).norm() > 0.1);
+        assert!((other.mirrored(FOCAL).rotation - truth.rotation).norm() < 1e-12);
+    }
+
+    #[test]
+    fn the_mirrored_pose_looks_alike_from_far_away() {
+        let (mut truth, _) = seen(0.3);
+        truth.scale = 1e-3;
+        let difference = |a: &Stance, b: &Stance| {
+            project(a).iter().zip(&project(b)).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
+        };
+        assert!(difference(&truth, &truth.mirrored(FOCAL)) < 1e-3 * truth.scale);
+    }
 }

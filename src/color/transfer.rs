@@ -156,4 +156,18 @@ mod tests {
     fn the_knee_of_rec709_is_where_its_power_part_starts() {
         assert!((Curve::Rec709.encode_f64(REC709_KNEE) - REC709_KNEE_VALUE).abs() < 1e-16);
     }
+
+    #[test]
+    fn srgb_and_rec709_agree_with_the_palette_crate() {
+        use palette::encoding::{FromLinear, IntoLinear, RecOetf, Srgb};
+        for x in samples().take(1000).map(f64::from) {
+            let theirs: f64 = Srgb::from_linear(x);
+            assert!((Curve::Srgb.encode_f64(x) - theirs).abs() < 1e-7, "{x}");
+            let theirs: f64 = Srgb::into_linear(x);
+            assert!((Curve::Srgb.decode_f64(x) - theirs).abs() < 1e-7, "{x}");
+            // It has the unrounded constants of BT.2020, which differ in the fourth digit.
+            let theirs: f64 = RecOetf::from_linear(x);
+            assert!((Curve::Rec709.encode_f64(x) - theirs).abs() < 3e-4, "{x}");
+        }
+    }
 }

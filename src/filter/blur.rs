@@ -12,7 +12,7 @@ const GAUSSIAN_REACH: f64 = 4.0;
 /// # Method
 /// The Gaussian at pixel centres, ended at 4 sigma and made to add up to 1.
 pub fn gaussian_blur<P: Mix>(image: &Image<P>, sigma_px: f32) -> Image<P> {
-    if !(sigma_px > 0.0) {
+    if sigma_px.is_nan() || sigma_px <= 0.0 {
         return image.clone();
     }
     let sigma = f64::from(sigma_px);

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 ///
 /// [Felzenszwalb and Huttenlocher 2012]: https://doi.org/10.4086/toc.2012.v008a019
 pub fn dilate(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
-    if !(radius_px >= 1.0) {
+    if radius_px.is_nan() || radius_px < 1.0 {
         return mask.clone();
     }
     let reach = reach_by_distance(mask, radius_px);
@@ -67,16 +67,16 @@ fn one_farther(neighbors: &[u32], distances: &mut [u32]) {
 
 /// Sets what the columns' nearest pixels reach along one row: from the left what lies right of them, then the rest.
 fn mark(row: &mut [bool], distances: &[u32], reach: &[usize]) {
-    let sideways = |x: usize| reach.get(distances[x] as usize);
+    let sideways = |distance: u32| reach.get(distance as usize);
     let mut end = 0;
-    for x in 0..row.len() {
-        end = sideways(x).map_or(end, |s| end.max(x + s + 1));
-        row[x] = x < end;
+    for (x, (pixel, &distance)) in row.iter_mut().zip(distances).enumerate() {
+        end = sideways(distance).map_or(end, |s| end.max(x + s + 1));
+        *pixel = x < end;
     }
     let mut start = row.len();
-    for x in (0..row.len()).rev() {
-        start = sideways(x).map_or(start, |s| start.min(x.saturating_sub(*s)));
-        row[x] |= x >= start;
+    for (x, (pixel, &distance)) in row.iter_mut().zip(distances).enumerate().rev() {
+        start = sideways(distance).map_or(start, |s| start.min(x.saturating_sub(*s)));
+        *pixel |= x >= start;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::atomic::write_bytes;
 use super::format::read_regular;
+use super::overrides::Override;
 use super::raster::one_line;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -19,6 +20,41 @@ const MOST_BYTES: u64 = 64 << 20;
 pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
+}
+
+/// Reads a TOML document, some of its values replaced.
+///
+/// # Errors
+/// As [`read_toml`]; an override that leads nowhere.
+pub fn read_toml_with<T: DeserializeOwned>(path: impl AsRef<Path>, overrides: &[Override]) -> Result<T> {
+    let path = path.as_ref();
+    if overrides.is_empty() {
+        return read_toml(path);
+    }
+    let mut document: toml::Table = read_toml(path)?;
+    overrides.iter().try_for_each(|o| o.apply(&mut document)).map_err(|e| e.in_file(path))?;
+    let text = toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
+    parse_toml(&text).map_err(|e| e.in_file(path))
+}
+
+/// Reads a document that says by its extension whether it is JSON (`.json`) or TOML (any other).
+///
+/// # Errors
+/// As [`read_toml`].
+pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    if is_json(path.as_ref()) { read_json(path) } else { read_toml(path) }
+}
+
+/// Writes a document in the format of its extension: JSON (`.json`) or TOML (any other).
+///
+/// # Errors
+/// As [`write_toml`].
+pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
+    if is_json(path.as_ref()) { write_json(path, value) } else { write_toml(path, value) }
+}
+
+fn is_json(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }
 
 /// Reads a JSON document.

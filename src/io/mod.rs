@@ -29,6 +29,7 @@ mod limits;
 #[cfg(feature = "oiio")]
 pub mod oiio;
 mod orient;
+mod overrides;
 mod png;
 mod raster;
 mod tiff;
@@ -37,10 +38,13 @@ mod worker;
 mod write;
 
 pub use atomic::create_folder;
-pub use document::{read_json, read_text, read_toml, write_json, write_text, write_toml};
+pub use document::{
+    read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
+};
 pub use format::Format;
 pub use header::Header;
 pub use limits::Limits;
+pub use overrides::Override;
 pub use raster::FromFile;
 #[cfg(feature = "oiio")]
 #[doc(hidden)]

@@ -1,11 +1,29 @@
 //! Label: what is where in a picture, read from the same deep samples as the picture itself.
+//!
+//! Boxes and visibility are folds over the deep samples, so a label cannot disagree with its picture. Outlines and the
+//! topmost rule are geometry: the cards' outlines as the camera sees them.
+
+mod bbox;
+pub(crate) mod draw;
+mod outline;
+pub(crate) mod overlay;
+mod topmost;
+mod visibility;
+
+pub use bbox::BBox;
+pub use overlay::overlay;
+pub use topmost::knotted;
 
 use crate::geom::Point2;
 use crate::pixel::ObjectId;
+use crate::render::DeepImage;
+use crate::scene::{Card, Shot};
+use geo::MultiPolygon;
 use serde::{Deserialize, Serialize};
+use visibility::Seen;
 
 /// Everything known of the objects in one picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Labels {
     /// Width and height of the picture, pixels.
     pub image: [u32; 2],
@@ -20,8 +38,9 @@ pub struct ObjectLabel {
     pub id: ObjectId,
     /// Index into the class list.
     pub class: u32,
-    /// Outline projected into the picture and clipped to it, pixels.
-    pub outline_px: Vec<Point2<f64>>,
+    /// Outline projected into the picture and clipped to it, pixels: one ring per part that the clipping leaves (a
+    /// convex outline leaves one), none for a card seen edge-on.
+    pub outline_px: Vec<Vec<Point2<f64>>>,
     /// Box around the whole object as far as it lies in the picture.
     pub amodal_box: BBox,
     /// Box around what is seen of it; empty when nothing is.
@@ -39,15 +58,73 @@ impl ObjectLabel {
     }
 }
 
-/// An axis-parallel box in pixels, `[x0, x1) x [y0, y1)`; the default is empty.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct BBox {
-    /// Left edge.
-    pub x0: f64,
-    /// Top edge.
-    pub y0: f64,
-    /// Right edge.
-    pub x1: f64,
-    /// Bottom edge.
-    pub y1: f64,
+/// How [`label()`] decides.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LabelOptions {
+    /// What the amodal box is drawn around. Default: `mask`.
+    pub amodal: AmodalBox,
+    /// A pixel belongs to an object when more than this share of it is covered; counts for masks, not for sums of
+    /// coverage. Default: 0.1, under which thin film and the noise of a matte look alike.
+    pub alpha_threshold: f32,
+    /// Outlines are a pair of the topmost rule when their intersection over union is above this. Default: 0, any overlap.
+    pub overlap_iou: f64,
+}
+
+impl Default for LabelOptions {
+    fn default() -> Self {
+        Self { amodal: AmodalBox::Mask, alpha_threshold: 0.1, overlap_iou: 0.0 }
+    }
+}
+
+/// What an amodal box is drawn around.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AmodalBox {
+    /// The pixels that the object covers, as if alone.
+    #[default]
+    Mask,
+    /// The projected outline, which may be wider than what can be seen of a transparent object.
+    Outline,
+}
+
+/// A card as the camera sees it.
+struct Silhouette<'a> {
+    card: &'a Card,
+    region: MultiPolygon<f64>,
+    seen: Seen,
+}
+
+/// Labels the picture `deep` of `shot`: every object with a box in the picture, in order of id.
+///
+/// # Panics
+/// When `deep` does not have the size of the shot's camera.
+pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
+    let image = shot.camera.image;
+    assert_eq!((deep.width(), deep.height()), (image[0] as usize, image[1] as usize), "deep picture and camera differ");
+    let mut cards: Vec<&Card> = shot.cards.iter().collect();
+    cards.sort_by_key(|card| card.id);
+    let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
+    let seen = visibility::fold(deep, &ids, options);
+    let regions = cards.iter().map(|card| outline::region(card, &shot.camera));
+    let all = cards.iter().zip(regions).zip(seen).map(|((&card, region), seen)| Silhouette { card, region, seen });
+    let touching: Vec<_> = all.filter(|s| !amodal_box(s, options.amodal).is_empty()).collect();
+    let covers = topmost::covers(&touching, &shot.camera, options.overlap_iou);
+    let objects = touching.iter().zip(covers).map(|(silhouette, covered_by)| ObjectLabel {
+        id: silhouette.card.id,
+        class: silhouette.card.class,
+        outline_px: outline::rings(&silhouette.region),
+        amodal_box: amodal_box(silhouette, options.amodal),
+        visible_box: silhouette.seen.visible_box,
+        visible_fraction: silhouette.seen.fraction(),
+        covered_by,
+    });
+    Labels { image, objects: objects.collect() }
+}
+
+fn amodal_box(silhouette: &Silhouette<'_>, around: AmodalBox) -> BBox {
+    match around {
+        AmodalBox::Mask => silhouette.seen.amodal_box,
+        AmodalBox::Outline => outline::bounds(&silhouette.region),
+    }
 }

@@ -51,6 +51,34 @@ impl DeepImage {
         Self { width, height, starts, samples, shadow }
     }
 
+    /// Assembles a picture from samples in any order of pixels, each with its column and row; those of one pixel come
+    /// front to back.
+    ///
+    /// `shadow` has the picture's size.
+    ///
+    /// # Panics
+    /// When a sample lies outside the picture, or when there are more than `u32` can count.
+    pub(crate) fn from_samples(
+        shadow: Image<LinearRgb>,
+        samples: impl Iterator<Item = (u32, u32, DeepSample)> + Clone,
+    ) -> Self {
+        let (width, height) = shadow.size();
+        let pixel = |x: u32, y: u32| y as usize * width + x as usize;
+        // Counts become starts, then move to ends as each pixel's samples take their places.
+        let mut ends = vec![0u32; width * height + 1];
+        samples.clone().for_each(|(x, y, _)| ends[pixel(x, y) + 1] += 1);
+        (0..width * height).for_each(|i| ends[i + 1] += ends[i]);
+        let mut placed = vec![DeepSample::default(); ends.last().map_or(0, |&n| n as usize)];
+        for (x, y, sample) in samples {
+            let next = &mut ends[pixel(x, y)];
+            placed[*next as usize] = sample;
+            *next += 1;
+        }
+        ends.rotate_right(1);
+        ends[0] = 0;
+        Self { width, height, starts: ends, samples: placed, shadow }
+    }
+
     /// Number of columns.
     pub fn width(&self) -> usize {
         self.width

@@ -3,16 +3,32 @@
 //! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and enter the pipeline
 //! here. What is not known yet is an enum variant ([`CameraSource::Rectangle`], [`Placement::Drop`],
 //! [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each turn their own unknown into the known one
-//! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns.
+//! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
 
 mod check;
+mod draw;
+mod fall;
 mod light;
 mod placement;
+mod range;
+mod recipe;
+mod resolve;
 mod shot;
+mod stack;
+mod stock;
 
+pub use draw::Draws;
+#[cfg(feature = "settle")]
+pub(crate) use fall::half_extent;
+pub use fall::{SettleMode, SettleOptions};
 pub use light::{AreaLight, Exposure, LightShape};
 pub use placement::{Grade, Object, Placement};
+pub use range::Range;
+pub use recipe::{Background, Choice, GradeRanges, LightRanges, Recipe, Selections};
+pub use resolve::Look;
 pub use shot::{Card, Shot};
+pub use stack::Start;
+pub use stock::stock;
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;

@@ -14,6 +14,7 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
         "curves" => curves(case, &reference),
         "spaces" => spaces(case, &reference),
         "hsv" => hsv(case, &reference),
+        "shift_hsv" => shift_hsv(case, &reference),
         "ycbcr" => ycbcr(case, &reference),
         other => Err(format!("no runner for {other}")),
     }
@@ -108,6 +109,17 @@ fn hsv(case: &Case, reference: &Value) -> Result<(), String> {
     near.check("rgb_to_hsv", polar, &floats(&reference["hsv_of_rgb"]))?;
     let rgb = each_color(&reference["hsv"], |[h, s, v]| color::hsv_to_rgb(Hsv { h, s, v }).into());
     near.check("hsv_to_rgb", rgb, &floats(&reference["rgb_of_hsv"]))
+}
+
+fn shift_hsv(case: &Case, reference: &Value) -> Result<(), String> {
+    let near = Tolerance::of(case, "tolerance");
+    for shift in reference["shifts"].as_array().ok_or("shifts: not a list")? {
+        let [hue, saturation, value] =
+            ["hue_deg", "saturation", "value"].map(|key| shift[key].as_f64().unwrap_or(f64::NAN) as f32);
+        let ours = each_color(&reference["rgb"], |c| color::shift_hsv(c.into(), hue, saturation, value).into());
+        near.check(&format!("hue {hue}, saturation {saturation}, value {value}"), ours, &floats(&shift["rgb"]))?;
+    }
+    Ok(())
 }
 
 fn ycbcr(case: &Case, reference: &Value) -> Result<(), String> {

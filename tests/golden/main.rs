@@ -1,8 +1,10 @@
 //! Golden cases: every folder `golden/<stage>/<case>/` with a `case.toml` is one named test.
 
+mod camera;
 mod case;
 mod color;
 mod matte;
+mod render;
 
 use case::Case;
 use libtest_mimic::{Arguments, Trial};
@@ -12,7 +14,8 @@ use std::path::Path;
 type Run = fn(&Case) -> Result<(), String>;
 
 /// The stages that have golden cases: folder name and runner.
-const STAGES: &[(&str, Run)] = &[("color", color::run), ("matte", matte::run)];
+const STAGES: &[(&str, Run)] =
+    &[("camera", camera::run), ("color", color::run), ("matte", matte::run), ("render", render::run)];
 
 fn main() {
     let args = Arguments::from_args();

@@ -1,2 +1,89 @@
-//! The `petcomp` program.
-fn main() {}
+//! The `petcomp` program: reads arguments, calls the library, writes results.
+#![expect(clippy::print_stdout, clippy::print_stderr, reason = "a program talks to its user")]
+
+mod asset;
+mod camera;
+mod common;
+mod dataset;
+mod demo;
+mod diff;
+mod doctor;
+mod label;
+mod matte;
+mod render;
+mod scene;
+mod settle;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// From photographs to labelled training images.
+///
+/// Photos on a green or blue screen become cut-outs (matte, asset); a photo of a place with four marked corners becomes
+/// a camera (camera); a recipe becomes scenes (scene), which settle, are rendered over the photo and labelled (dataset).
+#[derive(Parser)]
+#[command(name = "petcomp", version, propagate_version = true, infer_subcommands = false)]
+struct Cli {
+    #[command(flatten)]
+    common: common::Common,
+    #[command(subcommand)]
+    stage: Stage,
+}
+
+#[derive(Subcommand)]
+enum Stage {
+    /// Make a sample dataset from the photographs in the repository
+    Demo(demo::Args),
+    /// Photo -> matte and cut-out
+    #[command(subcommand)]
+    Matte(matte::Command),
+    /// Cut-outs with real size and class, kept in a folder
+    #[command(subcommand)]
+    Asset(asset::Command),
+    /// Four labelled corners -> camera
+    #[command(subcommand)]
+    Camera(camera::Command),
+    /// Recipe -> scene
+    #[command(subcommand)]
+    Scene(scene::Command),
+    /// Let a scene's dropped objects come to rest
+    Settle(settle::Args),
+    /// Scene -> picture
+    Render(render::Args),
+    /// Scene -> outlines, boxes, visibility
+    Label(label::Args),
+    /// Recipe -> images with labels, ready to train on
+    #[command(subcommand)]
+    Dataset(dataset::Command),
+    /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
+    Diff(diff::Args),
+    /// What this machine has, and whether petcomp works on it
+    Doctor(doctor::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse_from(diff::accept_idiff_spelling(std::env::args()));
+    cli.common.apply();
+    match run(&cli) {
+        Ok(code) => code,
+        Err(error) => common::report(&error),
+    }
+}
+
+fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
+    let common = &cli.common;
+    match &cli.stage {
+        Stage::Demo(args) => demo::run(args, common)?,
+        Stage::Matte(command) => matte::run(command, common)?,
+        Stage::Asset(command) => asset::run(command, common)?,
+        Stage::Camera(command) => camera::run(command, common)?,
+        Stage::Scene(command) => scene::run(command, common)?,
+        Stage::Settle(args) => settle::run(args, common)?,
+        Stage::Render(args) => render::run(args, common)?,
+        Stage::Label(args) => label::run(args, common)?,
+        Stage::Dataset(command) => dataset::run(command, common)?,
+        Stage::Diff(args) => return diff::run(args, common),
+        Stage::Doctor(args) => return doctor::run(args),
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -16,6 +16,7 @@ mod robust;
 mod rows;
 mod stream;
 
+pub(super) use chroma::{differences, from_ycc, to_ycc};
 pub use options::{BlurSum, Falloff, KeyOptions, Profile};
 pub use photo::Photo;
 

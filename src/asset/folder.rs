@@ -1,0 +1,156 @@
+//! Putting photos into an asset folder.
+
+use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_name, check_positive};
+use super::size::oriented_size;
+use super::thumbnail::thumbnail;
+use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
+use crate::error::{Error, Result};
+use crate::geom::Point2;
+use crate::io;
+use crate::matte::{CutOut, CutOutOptions, cut_out};
+use std::path::Path;
+
+/// What is known of a photo that is not in the photo.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AddPhoto {
+    /// Name of the object: letters, digits, `_`, `-` and `.`.
+    pub asset: String,
+    /// Name of its class.
+    pub class: String,
+    /// Scale of the photo.
+    pub scale: Scale,
+    /// Thickness of the body that falls, metres.
+    pub thickness: f64,
+    /// Mass, kilograms.
+    pub mass: f64,
+    /// How it is cut out.
+    pub options: CutOutOptions,
+}
+
+/// How large the things in a photo are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// Pixels of the photo for a metre.
+    PxPerMetre(f64),
+    /// Length of the object along its longest side, metres.
+    Length(f64),
+}
+
+impl AddPhoto {
+    /// A photo with default thickness, mass and options.
+    pub fn new(asset: impl Into<String>, class: impl Into<String>, scale: Scale) -> Self {
+        Self {
+            asset: asset.into(),
+            class: class.into(),
+            scale,
+            thickness: DEFAULT_THICKNESS,
+            mass: DEFAULT_MASS,
+            options: CutOutOptions::default(),
+        }
+    }
+
+    /// # Errors
+    /// [`Error::Value`] for the first value that cannot be right.
+    pub(super) fn check(&self, manifest: &Manifest) -> Result<()> {
+        check_name(&self.asset).map_err(|e| match e {
+            Error::Value { what, .. } => Error::value("asset", what),
+            other => other,
+        })?;
+        manifest.class(&self.class)?;
+        match self.scale {
+            Scale::PxPerMetre(scale) => check_positive("px_per_metre", scale)?,
+            Scale::Length(length) => check_positive("length", length)?,
+        }
+        check_positive("thickness", self.thickness)?;
+        check_positive("mass", self.mass)
+    }
+}
+
+/// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
+///
+/// Adding the same photo to the same asset again replaces it. The manifest is written last, whole or not at all. Not for
+/// two processes at once: the later manifest wins.
+///
+/// # Errors
+/// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of [`cut_out`], naming the photo;
+/// those of writing.
+pub fn add_photo(folder: impl AsRef<Path>, photo: impl AsRef<Path>, add: &AddPhoto) -> Result<PhotoRecord> {
+    let folder = folder.as_ref();
+    let mut manifest = read_or_new(folder)?;
+    add.check(&manifest)?;
+    let record = write_photo(folder, photo.as_ref(), add)?;
+    manifest.insert(asset_of(add, record.clone()))?;
+    manifest.write(folder)?;
+    Ok(record)
+}
+
+/// The manifest of a folder; a new one where there is no manifest.
+pub(super) fn read_or_new(folder: &Path) -> Result<Manifest> {
+    match folder.join(MANIFEST).exists() {
+        true => Manifest::read(folder),
+        false => Ok(Manifest::default()),
+    }
+}
+
+pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
+    AssetRecord {
+        name: add.asset.clone(),
+        class: add.class.clone(),
+        thickness: add.thickness,
+        mass: add.mass,
+        photos: vec![photo],
+    }
+}
+
+/// Cuts the object out of a photo and writes cut-out and thumbnail.
+pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<PhotoRecord> {
+    let picture = io::read(photo)?;
+    let cut = cut_out(&picture, &add.options).map_err(|e| match e {
+        Error::Photo { .. } => e.in_file(photo),
+        other => other,
+    })?;
+    let file = cut_out_file(photo, add);
+    io::create_folder(folder.join(&add.asset))?;
+    io::write(folder.join(&file), &cut.image)?;
+    io::write(folder.join(&file).with_extension("png"), &thumbnail(&cut.image))?;
+    Ok(record(&cut, add, file, photo))
+}
+
+/// Where the cut-out of a photo goes.
+pub(super) fn cut_out_file(photo: &Path, add: &AddPhoto) -> String {
+    format!("{}/{}.exr", add.asset, stem(photo))
+}
+
+/// The photo's name without ending, safe as a name anywhere.
+fn stem(photo: &Path) -> String {
+    let stem = photo.file_stem().unwrap_or_default().to_string_lossy();
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    stem.chars().map(plain).collect()
+}
+
+fn record(cut: &CutOut, add: &AddPhoto, file: String, photo: &Path) -> PhotoRecord {
+    let px = oriented_size(&cut.hull);
+    let px_per_metre = match add.scale {
+        Scale::PxPerMetre(scale) => scale * cut.scale,
+        Scale::Length(length) => px[0] / length,
+    };
+    let (w, h) = cut.image.size();
+    let metres = |px: f64| px / px_per_metre;
+    PhotoRecord {
+        file,
+        source: photo.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        px_per_metre,
+        size_m: [w as f64, h as f64].map(metres),
+        object_m: px.map(metres),
+        screen: cut.screen,
+        matte: cut.method,
+        residue: f64::from(cut.residue),
+        truncated: cut.segmentation.touches.contains(&true),
+        outline_px: cut.hull.iter().map(|p: &Point2<f64>| [p.x, p.y].map(thousandths)).collect(),
+    }
+}
+
+/// As exact as a pixel coordinate needs to be in a file that people read.
+fn thousandths(px: f64) -> f64 {
+    (px * 1000.0).round() / 1000.0
+}

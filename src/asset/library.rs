@@ -1,0 +1,151 @@
+//! An asset folder in memory, ready to be put into scenes.
+
+use super::MANIFEST;
+use super::manifest::{AssetRecord, Manifest, PhotoRecord, under};
+use crate::error::{Error, Result};
+use crate::filter::Pyramid;
+use crate::geom::Point2;
+use crate::image::Image;
+use crate::io;
+use crate::pixel::PremulRgba;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Objects to put into scenes.
+#[derive(Clone, Debug)]
+pub struct Library {
+    /// Names of the classes; [`Asset::class`] is a place in this list.
+    pub classes: Vec<String>,
+    /// The assets, by name.
+    pub assets: Vec<Asset>,
+}
+
+/// One object.
+#[derive(Clone, Debug)]
+pub struct Asset {
+    /// Its name.
+    pub name: String,
+    /// Index into the class list.
+    pub class: u32,
+    /// Thickness of the body that falls, metres.
+    pub thickness: f64,
+    /// Mass, kilograms.
+    pub mass: f64,
+    /// Its photos; at least one.
+    pub photos: Vec<Photo>,
+}
+
+/// One cut-out of an object.
+#[derive(Clone, Debug)]
+pub struct Photo {
+    /// Width and height of the card that carries the whole cut-out, metres.
+    pub size: [f64; 2],
+    /// The cut-out, premultiplied, scene-linear.
+    pub texture: Arc<Pyramid<PremulRgba>>,
+    /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
+    pub outline_uv: Arc<[Point2<f64>]>,
+    /// What the manifest says of it.
+    pub record: PhotoRecord,
+}
+
+impl Library {
+    /// Opens an asset folder: checks its manifest and loads its cut-outs, several at a time.
+    ///
+    /// # Errors
+    /// Those of [`Manifest::read`]; [`Error::File`] for a cut-out that cannot be read; [`Error::Field`] (`size_m`) for
+    /// one of another size than the manifest says. Of several the first in the manifest's order.
+    pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
+        let folder = folder.as_ref();
+        let manifest = Manifest::read(folder)?;
+        let photos: Vec<(usize, usize)> = manifest.assets.iter().enumerate().flat_map(places).collect();
+        let load = |&(i, j): &(usize, usize)| {
+            let at = format!("assets[{i}].photos[{j}]");
+            load(folder, &manifest.assets[i].photos[j], &at)
+        };
+        let loaded: Vec<Result<Photo>> = photos.par_iter().map(load).collect();
+        let mut loaded = loaded.into_iter();
+        let mut assets = Vec::with_capacity(manifest.assets.len());
+        for record in &manifest.assets {
+            let photos = loaded.by_ref().take(record.photos.len()).collect::<Result<_>>()?;
+            assets.push(Asset {
+                name: record.name.clone(),
+                class: manifest.class(&record.class)?,
+                thickness: record.thickness,
+                mass: record.mass,
+                photos,
+            });
+        }
+        Ok(Self { classes: manifest.classes, assets })
+    }
+
+    /// The asset of a name.
+    pub fn find(&self, name: &str) -> Option<&Asset> {
+        self.assets.iter().find(|asset| asset.name == name)
+    }
+}
+
+fn places((i, asset): (usize, &AssetRecord)) -> impl Iterator<Item = (usize, usize)> + use<> {
+    (0..asset.photos.len()).map(move |j| (i, j))
+}
+
+/// By how many pixels a picture may differ from the size that its manifest gives in metres: rounding.
+const SLACK_PX: f64 = 0.5;
+
+fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
+    let image: Image<PremulRgba> = io::read(folder.join(&record.file))?;
+    let (w, h) = (image.width() as f64, image.height() as f64);
+    let told = record.size_m.map(|side| side * record.px_per_metre);
+    if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
+        let what = format!("{:.1} x {:.1} pixels, but {} has {w} x {h}", told[0], told[1], record.file);
+        return Err(under(Error::value("size_m", what), at).in_file(folder.join(MANIFEST)));
+    }
+    Ok(Photo {
+        size: record.size_m,
+        texture: Arc::new(Pyramid::new(image)),
+        outline_uv: record.outline_px.iter().map(|&[x, y]| Point2::new(x / w, y / h)).collect(),
+        record: record.clone(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::manifest::tests::photo;
+    use super::*;
+
+    fn folder_with(picture: Option<(usize, usize)>) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        let photos = vec![photo("a.exr")];
+        let record = AssetRecord { name: "a".into(), class: "label".into(), thickness: 0.01, mass: 0.02, photos };
+        Manifest { assets: vec![record], ..Manifest::default() }.write(folder.path()).unwrap();
+        if let Some((w, h)) = picture {
+            let image = Image::filled(w, h, PremulRgba::new(0.25, 0.5, 0.125, 0.75));
+            io::write(folder.path().join("a.exr"), &image).unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn a_library_opens_with_textures_and_outlines() {
+        let folder = folder_with(Some((40, 20)));
+        let library = Library::open(folder.path()).unwrap();
+        let asset = library.find("a").unwrap();
+        assert_eq!((asset.class, asset.photos.len()), (2, 1));
+        assert_eq!(asset.photos[0].texture.base()[(3, 3)], PremulRgba::new(0.25, 0.5, 0.125, 0.75));
+        assert_eq!(asset.photos[0].outline_uv[0], Point2::new(1.0 / 40.0, 1.0 / 20.0));
+    }
+
+    #[test]
+    fn a_missing_or_wrong_cut_out_is_named() {
+        let said = Library::open(folder_with(None).path()).unwrap_err().to_string();
+        assert!(said.contains("a.exr"), "{said}");
+        let said = Library::open(folder_with(Some((40, 22))).path()).unwrap_err().to_string();
+        assert!(said.contains("assets[0].photos[0].size_m") && said.contains("40 x 22"), "{said}");
+    }
+
+    #[test]
+    fn a_folder_without_a_manifest_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(Library::open(folder.path()).unwrap_err().to_string().contains(MANIFEST));
+    }
+}

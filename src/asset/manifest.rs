@@ -1,0 +1,307 @@
+//! The manifest of an asset folder: what is in it, as TOML.
+
+use super::MANIFEST;
+use crate::error::{Error, Result};
+use crate::io;
+use crate::matte::MatteMethod;
+use crate::pixel::LinearRgb;
+use serde::{Deserialize, Serialize};
+use std::path::{Component, Path};
+
+/// What is in an asset folder, without the pictures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Names of the classes; a label's number is the place in this list.
+    #[serde(default = "default_classes")]
+    pub classes: Vec<String>,
+    /// The assets, by name.
+    #[serde(default)]
+    pub assets: Vec<AssetRecord>,
+}
+
+/// One object, which may have been photographed several times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AssetRecord {
+    /// Its name: letters, digits, `_`, `-` and `.`.
+    pub name: String,
+    /// Name of its class.
+    pub class: String,
+    /// Thickness of the body that falls, metres.
+    pub thickness: f64,
+    /// Mass, kilograms.
+    pub mass: f64,
+    /// Its photos, by file name.
+    pub photos: Vec<PhotoRecord>,
+}
+
+/// One cut-out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhotoRecord {
+    /// The cut-out, relative to the folder.
+    pub file: String,
+    /// Name of the photo that it was cut from.
+    pub source: String,
+    /// Pixels of the cut-out for a metre.
+    pub px_per_metre: f64,
+    /// Width and height of the whole cut-out, metres.
+    pub size_m: [f64; 2],
+    /// Length and width of the object's hull, however it is turned, metres.
+    pub object_m: [f64; 2],
+    /// Colour of the screen, scene-linear.
+    pub screen: LinearRgb,
+    /// Where the matte came from.
+    pub matte: MatteMethod,
+    /// Mean matte that the key left on the screen, where it should be 0.
+    pub residue: f64,
+    /// The object reached a border of the photo: part of it is missing.
+    #[serde(default)]
+    pub truncated: bool,
+    /// Convex hull in pixels of the cut-out, clockwise as seen.
+    pub outline_px: Vec<[f64; 2]>,
+}
+
+/// The classes of bottles, in the order of the paper.
+pub fn default_classes() -> Vec<String> {
+    ["cap_label", "cap", "label", "none"].map(String::from).into()
+}
+
+impl Default for Manifest {
+    fn default() -> Self {
+        Self { classes: default_classes(), assets: Vec::new() }
+    }
+}
+
+impl Manifest {
+    /// Reads and checks the manifest of a folder.
+    ///
+    /// # Errors
+    /// [`Error::File`] where there is none; [`Error::Field`] for a value that cannot be right.
+    pub fn read(folder: impl AsRef<Path>) -> Result<Self> {
+        let path = folder.as_ref().join(MANIFEST);
+        let manifest: Self = io::read_toml(&path)?;
+        manifest.check().map_err(|e| e.in_file(&path))?;
+        Ok(manifest)
+    }
+
+    /// Writes the manifest of a folder, whole or not at all; assets by name, photos by file.
+    ///
+    /// # Errors
+    /// [`Error::Field`] for a value that cannot be right, [`Error::File`] where it cannot be written.
+    pub fn write(&mut self, folder: impl AsRef<Path>) -> Result<()> {
+        let path = folder.as_ref().join(MANIFEST);
+        self.assets.sort_by(|a, b| a.name.cmp(&b.name));
+        for asset in &mut self.assets {
+            asset.photos.sort_by(|a, b| a.file.cmp(&b.file));
+        }
+        self.check().map_err(|e| e.in_file(&path))?;
+        io::write_toml(path, self)
+    }
+
+    /// Adds a photo to an asset, which is made if it is not there; a photo of the same file is replaced.
+    ///
+    /// # Errors
+    /// [`Error::Value`] (`class`) when the asset is known as something else.
+    pub fn insert(&mut self, asset: AssetRecord) -> Result<()> {
+        let Some(known) = self.assets.iter_mut().find(|known| known.name == asset.name) else {
+            self.assets.push(asset);
+            return Ok(());
+        };
+        if known.class != asset.class {
+            let what = format!("\"{}\", but asset \"{}\" is \"{}\"", asset.class, asset.name, known.class);
+            return Err(Error::value("class", what));
+        }
+        (known.thickness, known.mass) = (asset.thickness, asset.mass);
+        for photo in asset.photos {
+            known.photos.retain(|old| old.file != photo.file);
+            known.photos.push(photo);
+        }
+        Ok(())
+    }
+
+    /// Place of a class in the list.
+    ///
+    /// # Errors
+    /// [`Error::Value`] (`class`) with the name that was probably meant.
+    pub fn class(&self, name: &str) -> Result<u32> {
+        let place = self.classes.iter().position(|class| class == name);
+        place
+            .and_then(|i| u32::try_from(i).ok())
+            .ok_or_else(|| Error::value("class", format!("\"{name}\", expected one of {}", self.classes.join(", "))))
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.classes.is_empty() {
+            return Err(Error::value("classes", "empty, expected at least one"));
+        }
+        unique("classes", self.classes.iter().map(String::as_str))?;
+        unique("assets", self.assets.iter().map(|asset| asset.name.as_str()))?;
+        for (i, asset) in self.assets.iter().enumerate() {
+            let inside = |e| under(e, &format!("assets[{i}]"));
+            asset.check().map_err(inside)?;
+            self.class(&asset.class).map_err(inside)?;
+        }
+        Ok(())
+    }
+}
+
+impl AssetRecord {
+    fn check(&self) -> Result<()> {
+        check_name(&self.name)?;
+        check_positive("thickness", self.thickness)?;
+        check_positive("mass", self.mass)?;
+        if self.photos.is_empty() {
+            return Err(Error::value("photos", "empty, expected at least one"));
+        }
+        unique("photos", self.photos.iter().map(|photo| photo.file.as_str()))?;
+        for (i, photo) in self.photos.iter().enumerate() {
+            photo.check().map_err(|e| under(e, &format!("photos[{i}]")))?;
+        }
+        Ok(())
+    }
+}
+
+impl PhotoRecord {
+    fn check(&self) -> Result<()> {
+        let inside = Path::new(&self.file).components().all(|part| matches!(part, Component::Normal(_)));
+        if !inside || self.file.is_empty() {
+            return Err(Error::value("file", format!("\"{}\", expected a path inside the folder", self.file)));
+        }
+        check_positive("px_per_metre", self.px_per_metre)?;
+        for (at, sides) in [("size_m", self.size_m), ("object_m", self.object_m)] {
+            sides.into_iter().try_for_each(|side| check_positive(at, side))?;
+        }
+        if self.outline_px.len() < 3 {
+            let what = format!("{} points, expected at least 3", self.outline_px.len());
+            return Err(Error::value("outline_px", what));
+        }
+        let [w, h] = self.size_m.map(|side| side * self.px_per_metre);
+        let outside = |&[x, y]: &[f64; 2]| !((-1.0..=w + 1.0).contains(&x) && (-1.0..=h + 1.0).contains(&y));
+        match self.outline_px.iter().position(outside) {
+            Some(i) => {
+                let [x, y] = self.outline_px[i];
+                let what = format!("({x}, {y}), expected a point inside {w:.0} x {h:.0} pixels");
+                Err(Error::value(format!("outline_px[{i}]"), what))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// A name that is safe as the name of a file anywhere.
+pub(super) fn check_name(name: &str) -> Result<()> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    if !name.is_empty() && name.chars().all(plain) && !name.starts_with('.') {
+        return Ok(());
+    }
+    Err(Error::value("name", format!("\"{name}\", expected letters, digits, _ and -")))
+}
+
+pub(super) fn check_positive(at: &str, value: f64) -> Result<()> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(Error::value(at, format!("{value}, expected a number above 0")))
+}
+
+/// The same error about a value inside something.
+pub(super) fn under(error: Error, place: &str) -> Error {
+    match error {
+        Error::Value { at, what } => Error::Value { at: format!("{place}.{at}"), what },
+        other => other,
+    }
+}
+
+fn unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
+    let mut seen = std::collections::BTreeSet::new();
+    for (i, name) in names.enumerate() {
+        if !seen.insert(name) {
+            return Err(Error::value(format!("{at}[{i}]"), format!("\"{name}\" is there twice")));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    pub(in super::super) fn photo(file: &str) -> PhotoRecord {
+        PhotoRecord {
+            file: file.into(),
+            source: "IMG_1.jpg".into(),
+            px_per_metre: 100.0,
+            size_m: [0.4, 0.2],
+            object_m: [0.35, 0.15],
+            screen: LinearRgb::new(0.1, 0.5, 0.1),
+            matte: MatteMethod::Key,
+            residue: 0.01,
+            truncated: false,
+            outline_px: vec![[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]],
+        }
+    }
+
+    fn asset(name: &str, class: &str) -> AssetRecord {
+        let photos = vec![photo(&format!("{name}/1.exr"))];
+        AssetRecord { name: name.into(), class: class.into(), thickness: 0.005, mass: 0.02, photos }
+    }
+
+    fn two() -> Manifest {
+        Manifest { assets: vec![asset("b", "cap"), asset("a", "none")], ..Manifest::default() }
+    }
+
+    #[test]
+    fn a_manifest_reads_back_as_it_was_written_in_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut manifest = two();
+        manifest.write(folder.path()).unwrap();
+        let back = Manifest::read(folder.path()).unwrap();
+        assert_eq!(back, manifest);
+        assert_eq!(back.assets.iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+    }
+
+    #[test]
+    fn the_default_classes_are_those_of_the_paper() {
+        assert_eq!(Manifest::default().classes, ["cap_label", "cap", "label", "none"]);
+        assert_eq!(Manifest::default().class("label").unwrap(), 2);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_place() {
+        let message = |spoil: fn(&mut Manifest)| {
+            let mut manifest = two();
+            spoil(&mut manifest);
+            manifest.check().unwrap_err().to_string()
+        };
+        let said = message(|m| m.assets[1].class = "cpa".into());
+        assert_eq!(said, "assets[1].class: \"cpa\", expected one of cap_label, cap, label, none");
+        assert_eq!(message(|m| m.assets[1].name = "b".into()), "assets[1]: \"b\" is there twice");
+        let said = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
+        assert_eq!(said, "assets[0].photos[0].px_per_metre: NaN, expected a number above 0");
+        assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("inside the folder"));
+        assert!(message(|m| m.assets[0].photos[0].outline_px[2] = [50.0, 2.0]).contains("outline_px[2]"));
+        assert!(message(|m| m.assets[0].photos.clear()).starts_with("assets[0].photos: empty"));
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_a_suggestion() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(MANIFEST), "classses = [\"a\"]\n").unwrap();
+        let said = Manifest::read(folder.path()).unwrap_err().to_string();
+        assert!(said.contains("did you mean \"classes\""), "{said}");
+    }
+
+    #[test]
+    fn inserting_again_replaces() {
+        let mut manifest = two();
+        let mut again = asset("a", "none");
+        again.photos[0].px_per_metre = 120.0;
+        manifest.insert(again).unwrap();
+        assert_eq!(manifest.assets.len(), 2);
+        assert_eq!(manifest.assets[1].photos.len(), 1);
+        assert_eq!(manifest.assets[1].photos[0].px_per_metre, 120.0);
+        assert!(manifest.insert(asset("a", "cap")).is_err());
+    }
+}

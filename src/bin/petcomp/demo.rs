@@ -1,0 +1,60 @@
+//! `petcomp demo`: a sample dataset from the photographs in the repository.
+
+use crate::common::Common;
+use crate::{asset, dataset};
+use petcomp::dataset::{Setup, Studio, contact_sheet_of};
+use petcomp::{Error, io};
+use std::path::{Path, PathBuf};
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder with bottles/photos.toml and labelled backgrounds/
+    #[arg(long, value_name = "FOLDER", default_value = "tests/samples")]
+    samples: PathBuf,
+    /// Folder to write into
+    #[arg(short, long, value_name = "FOLDER", default_value = "demo")]
+    output: PathBuf,
+    /// Number of pictures
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 24)]
+    count: u64,
+    /// Seed; the same one gives the same files
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    let list = args.samples.join("bottles/photos.toml");
+    if !list.exists() {
+        let what = "no such file; run in petcomp's repository, or say with --samples where its tests/samples folder is";
+        return Err(Error::file(list, what).into());
+    }
+    io::create_folder(&args.output)?;
+    let recipe = write_recipe(args)?;
+    asset::build(&list, &args.output.join("assets"), common)?;
+    let folder = args.output.join("dataset");
+    let report = dataset::generate(Studio::open(Setup::read(&recipe, &[])?)?, args.count, args.seed, &folder, common)?;
+    let sheet = args.output.join("contact_sheet.png");
+    io::write(&sheet, &contact_sheet_of(&folder, args.count as usize, &Default::default())?)?;
+    dataset::tell(&report, common);
+    common.say(format_args!("look at      {}", sheet.display()));
+    common.say(format_args!("train with   {}", folder.join("data.yaml").display()));
+    common.say(format_args!("change       {}", recipe.display()));
+    Ok(())
+}
+
+/// A recipe file that says nothing but where its folders are.
+fn write_recipe(args: &Args) -> anyhow::Result<PathBuf> {
+    let backgrounds = std::path::absolute(args.samples.join("backgrounds"))?;
+    let backgrounds = relative(&backgrounds, &std::path::absolute(&args.output)?);
+    let text = format!("assets = \"assets\"\nbackgrounds = {:?}\n", backgrounds.to_string_lossy());
+    let path = args.output.join("recipe.toml");
+    io::write_text(&path, &text)?;
+    Ok(path)
+}
+
+/// The way from one folder to another, both absolute.
+fn relative(to: &Path, from: &Path) -> PathBuf {
+    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| std::path::Component::ParentDir);
+    up.chain(to.components().skip(shared)).collect()
+}

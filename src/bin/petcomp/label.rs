@@ -1,0 +1,33 @@
+//! `petcomp label`: scene -> outlines, boxes, visibility.
+
+use crate::common::{Common, RecipeArgs};
+use petcomp::{Scene, io, label};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Scene, TOML or JSON; what is unknown in it is found out first
+    scene: PathBuf,
+    #[command(flatten)]
+    recipe: RecipeArgs,
+    /// Labels to write, JSON
+    #[arg(short, long, value_name = "LABELS")]
+    output: PathBuf,
+    /// Also write the picture with outlines and boxes drawn on it
+    #[arg(long, value_name = "PNG")]
+    overlay: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    let scene: Scene = io::read_document(&args.scene)?;
+    let studio = args.recipe.studio()?;
+    let sample = studio.take(scene).map_err(|e| e.in_file(&args.scene))?;
+    io::write_json(&args.output, &sample.labels)?;
+    if let Some(path) = &args.overlay {
+        io::write(path, &label::overlay(&sample.frame, &sample.labels, &studio.library().classes))?;
+    }
+    let objects = &sample.labels.objects;
+    let topmost = objects.iter().filter(|o| o.is_topmost()).count();
+    common.say(format_args!("{}: {} objects, {topmost} on top", args.output.display(), objects.len()));
+    Ok(())
+}

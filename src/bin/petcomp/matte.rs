@@ -1,0 +1,57 @@
+//! `petcomp matte`: photo -> matte and cut-out.
+
+use crate::common::Common;
+use petcomp::matte::{CutOutOptions, SegmentOptions, cut_out, segment};
+use petcomp::{LinearRgb, io};
+use std::path::PathBuf;
+
+#[derive(clap::Subcommand)]
+pub(crate) enum Command {
+    /// Find the object and write every intermediate picture
+    Segment {
+        /// Photo of one object on a uniform screen or board
+        photo: PathBuf,
+        /// Folder for the pictures
+        #[arg(short, long, value_name = "FOLDER")]
+        output: PathBuf,
+        /// Options to use instead of the defaults, as TOML
+        #[arg(long, value_name = "FILE")]
+        options: Option<PathBuf>,
+    },
+    /// Find the object, key it, and write it without its background
+    Cut {
+        /// Photo of one object on a uniform screen or board
+        photo: PathBuf,
+        /// Cut-out to write: .exr (scene-linear, premultiplied) or .png
+        #[arg(short, long, value_name = "PICTURE")]
+        output: PathBuf,
+        /// Options to use instead of the defaults, as TOML
+        #[arg(long, value_name = "FILE")]
+        options: Option<PathBuf>,
+    },
+}
+
+pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
+    match command {
+        Command::Segment { photo, output, options } => {
+            let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
+            let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
+            io::create_folder(output)?;
+            for (i, step) in found.steps.iter().enumerate() {
+                let path = output.join(format!("{i}_{}.png", step.name));
+                io::write(&path, &step.image)?;
+                common.say(path.display());
+            }
+        }
+        Command::Cut { photo, output, options } => {
+            let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
+            let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
+            io::write(output, &cut.image)?;
+            let (w, h) = cut.image.size();
+            common.say(
+                format_args!("{}: {w} x {h}, matte by {:?}", output.display(), cut.method).to_string().to_lowercase(),
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,189 @@
+//! Four labelled corners, checked and put in order.
+
+use super::error::SolveError;
+use super::options::CornerOrder;
+use super::warning::Warning;
+use crate::geom::{Point2, Vector2};
+
+/// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`] times their noise.
+const COINCIDENT_PX: f64 = 2.0;
+const COINCIDENT_SIGMAS: f64 = 4.0;
+/// A corner nearer than this many sigmas to the line of two others makes a triangle.
+const COLLINEAR_SIGMAS: f64 = 3.0;
+/// Below this length of the longest side corner noise is a large part of the picture.
+const SMALL_QUAD_PX: f64 = 50.0;
+
+/// Checked corners: convex, clockwise in the picture (y down), starting at the labelled first.
+#[derive(Clone, Debug)]
+pub(crate) struct Checked {
+    pub(crate) corners: [Point2<f64>; 4],
+    pub(crate) warnings: Vec<Warning>,
+}
+
+/// Checks four corners (pixels) labelled with noise `sigma` in a picture of size `image`, and repairs their order.
+///
+/// # Errors
+/// [`SolveError`] for corners that no rectangle in front of a camera can have.
+pub(crate) fn check(
+    labelled: [Point2<f64>; 4],
+    sigma: f64,
+    image: [u32; 2],
+    policy: CornerOrder,
+) -> Result<Checked, SolveError> {
+    refuse_coincident(&labelled, sigma)?;
+    let (order, repair) = clockwise(&labelled);
+    let corners = order.map(|i| labelled[i]);
+    refuse_folded(&corners, sigma)?;
+    if let (CornerOrder::Strict, Some(found)) = (policy, repair) {
+        return Err(SolveError::Order(found));
+    }
+    let mut warnings: Vec<_> = repair.into_iter().collect();
+    let longest_px = sides(&corners).into_iter().fold(0.0, f64::max);
+    if longest_px < SMALL_QUAD_PX {
+        warnings.push(Warning::SmallQuad { longest_px });
+    }
+    warnings.extend(far_outside(&corners, image));
+    Ok(Checked { corners, warnings })
+}
+
+/// Twice the signed areas of the triangles that leave out one corner each; in a picture of a rectangle the one without
+/// corner `i` is proportional to the depth of corner `i`.
+pub(crate) fn triangle_areas(c: &[Vector2<f64>; 4]) -> [f64; 4] {
+    let twice = |i: usize, j: usize, k: usize| (c[j] - c[i]).perp(&(c[k] - c[i]));
+    [twice(1, 2, 3), twice(0, 2, 3), twice(0, 1, 3), twice(0, 1, 2)]
+}
+
+fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
+    let limit_px = COINCIDENT_PX.max(COINCIDENT_SIGMAS * sigma);
+    for first in 0..4 {
+        for second in first + 1..4 {
+            let distance_px = (c[first] - c[second]).norm();
+            if distance_px < limit_px {
+                return Err(SolveError::Coincident { first, second, distance_px, limit_px });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The order in which the corners run clockwise, and what had to be repaired for that.
+fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Warning>) {
+    let areas = triangle_areas(&c.map(|p| p.coords));
+    if areas.iter().all(|&a| a > 0.0) {
+        ([0, 1, 2, 3], None)
+    } else if areas.iter().all(|&a| a < 0.0) {
+        ([0, 3, 2, 1], Some(Warning::Reversed))
+    } else {
+        (by_angle(c), Some(Warning::Reordered))
+    }
+}
+
+/// By angle around the mean (clockwise, as y runs down), rotated so that corner 0 stays first.
+fn by_angle(c: &[Point2<f64>; 4]) -> [usize; 4] {
+    let mean = c.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / 4.0;
+    let angle = |i: usize| libm::atan2(c[i].y - mean.y, c[i].x - mean.x);
+    let mut order = [0, 1, 2, 3];
+    order.sort_by(|&i, &j| angle(i).total_cmp(&angle(j)));
+    let first = order.iter().position(|&i| i == 0).unwrap_or(0);
+    order.rotate_left(first);
+    order
+}
+
+/// Ordered corners must be convex, and none within noise of the line of two others.
+fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
+    let areas = triangle_areas(&c.map(|p| p.coords));
+    let limit_px = COLLINEAR_SIGMAS * sigma;
+    for (left_out, area) in areas.into_iter().enumerate() {
+        let [i, j, k] = [1, 2, 3].map(|n| c[(left_out + n) % 4]);
+        let longest = (i - j).norm().max((j - k).norm()).max((k - i).norm());
+        let height_px = area / longest;
+        if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
+            return Err(SolveError::NotConvex);
+        }
+        if height_px < limit_px || area <= 0.0 {
+            return Err(SolveError::Collinear { corner: (left_out + 2) % 4, distance_px: height_px.abs(), limit_px });
+        }
+    }
+    Ok(())
+}
+
+fn sides(c: &[Point2<f64>; 4]) -> [f64; 4] {
+    [0, 1, 2, 3].map(|i| (c[(i + 1) % 4] - c[i]).norm())
+}
+
+fn far_outside(c: &[Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Warning> {
+    let size = Vector2::from(image.map(f64::from));
+    let diagonal = size.norm();
+    let c = *c;
+    (0..4).filter_map(move |corner| {
+        let inside = Vector2::new(c[corner].x.clamp(0.0, size.x), c[corner].y.clamp(0.0, size.y));
+        ((c[corner].coords - inside).norm() > diagonal).then_some(Warning::Outside { corner })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUAD: [[f64; 2]; 4] = [[100.0, 110.0], [600.0, 90.0], [620.0, 410.0], [90.0, 400.0]];
+
+    fn run(c: [[f64; 2]; 4]) -> Result<Checked, SolveError> {
+        check(c.map(Point2::from), 1.0, [640, 480], CornerOrder::Repair)
+    }
+
+    fn permutations() -> Vec<[usize; 4]> {
+        let all = (0..256).map(|n: usize| [n & 3, (n >> 2) & 3, (n >> 4) & 3, (n >> 6) & 3]);
+        all.filter(|p| (0..4).all(|v| p.contains(&v))).collect()
+    }
+
+    #[test]
+    fn every_order_becomes_the_same_cycle_from_the_labelled_first() {
+        let counts = permutations().into_iter().fold([0; 3], |mut counts, p| {
+            let checked = run(p.map(|i| QUAD[i])).unwrap();
+            let cycle = [0, 1, 2, 3].map(|n| Point2::from(QUAD[(p[0] + n) % 4]));
+            assert_eq!(checked.corners, cycle, "{p:?}");
+            counts[match checked.warnings.as_slice() {
+                [] => 0,
+                [Warning::Reversed] => 1,
+                other => 2 * usize::from(other == [Warning::Reordered]),
+            }] += 1;
+            counts
+        });
+        assert_eq!(counts, [4, 4, 16]);
+    }
+
+    #[test]
+    fn strict_order_refuses_what_repair_repairs() {
+        let crossed = [QUAD[0], QUAD[2], QUAD[1], QUAD[3]].map(Point2::from);
+        let strict = check(crossed, 1.0, [640, 480], CornerOrder::Strict);
+        assert_eq!(strict.unwrap_err(), SolveError::Order(Warning::Reordered));
+    }
+
+    #[test]
+    fn a_dent_is_not_convex() {
+        let dented = [QUAD[0], QUAD[1], [200.0, 180.0], QUAD[3]];
+        assert_eq!(run(dented).unwrap_err(), SolveError::NotConvex);
+    }
+
+    #[test]
+    fn a_corner_within_noise_of_a_side_is_collinear() {
+        for y in [255.0, 256.0, 254.2] {
+            let flat = [[100.0, 110.0], [600.0, 90.0], [350.0, y], [100.0, 420.0]];
+            assert!(matches!(run(flat), Err(SolveError::Collinear { corner: 2, .. })), "{y}: {:?}", run(flat));
+        }
+    }
+
+    #[test]
+    fn two_corners_at_one_place_are_coincident() {
+        let twice = [QUAD[0], [101.0, 110.5], QUAD[2], QUAD[3]];
+        assert!(matches!(run(twice), Err(SolveError::Coincident { first: 0, second: 1, .. })));
+    }
+
+    #[test]
+    fn small_and_far_quads_are_taken_with_a_warning() {
+        let small = run([[100.0, 100.0], [140.0, 100.0], [140.0, 130.0], [100.0, 130.0]]).unwrap();
+        assert_eq!(small.warnings, [Warning::SmallQuad { longest_px: 40.0 }]);
+        let far = run([QUAD[0], [1600.0, 90.0], [1620.0, 410.0], QUAD[3]]).unwrap();
+        assert_eq!(far.warnings, [Warning::Outside { corner: 1 }, Warning::Outside { corner: 2 }]);
+    }
+}

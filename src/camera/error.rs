@@ -1,0 +1,73 @@
+//! Why no camera could be found.
+
+use super::warning::Warning;
+
+/// Why no camera could be found.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// A number is NaN or infinite.
+    #[error("{0} is not finite")]
+    NonFinite(&'static str),
+    /// The picture has no pixels.
+    #[error("image: {} x {} pixels, expected at least 1 x 1", .0[0], .0[1])]
+    BadImage([u32; 2]),
+    /// The rectangle's sides cannot be right.
+    #[error("surface: sides of {} m and {} m, expected positive lengths with a ratio of at most 1000", .0[0], .0[1])]
+    BadDimensions([f64; 2]),
+    /// Neither side of the rectangle is known.
+    #[error("surface: width_m and height_m are both missing, expected at least one")]
+    NoScale,
+    /// There are no corners.
+    #[error("surface: corners_px is missing")]
+    NoCorners,
+    /// A value that must be positive is not.
+    #[error("{at}: {value}, expected a positive number")]
+    NotPositive {
+        /// Which value.
+        at: &'static str,
+        /// What it was.
+        value: f64,
+    },
+    /// Two corners are one.
+    #[error(
+        "surface.corners_px: corners {first} and {second} are {distance_px:.1} px apart, expected at least {limit_px:.1}"
+    )]
+    Coincident {
+        /// One of them, from 0.
+        first: usize,
+        /// The other.
+        second: usize,
+        /// How far apart they are.
+        distance_px: f64,
+        /// How far apart they have to be.
+        limit_px: f64,
+    },
+    /// One corner lies inside the triangle of the others.
+    #[error("surface.corners_px: not convex (one corner lies inside the triangle of the others)")]
+    NotConvex,
+    /// Three corners are on one line, within noise.
+    #[error(
+        "surface.corners_px: corner {corner} is {distance_px:.1} px from the line of two others, expected at least {limit_px:.1}"
+    )]
+    Collinear {
+        /// The corner, in clockwise order from the first.
+        corner: usize,
+        /// Its distance from the line.
+        distance_px: f64,
+        /// The distance it has to have.
+        limit_px: f64,
+    },
+    /// The corners are in another order than asked for ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
+    #[error("surface.corners_px: {0}, and the order was asked to be strict")]
+    Order(Warning),
+    /// Photos that should be of one camera differ in size.
+    #[error("photo {photo} differs in size from the first: not one camera")]
+    DifferentPictures {
+        /// Which photo, from 0.
+        photo: usize,
+    },
+    /// No pose has the camera above the surface with the whole rectangle in front of it.
+    #[error("surface.corners_px: no camera above the surface sees these corners")]
+    NoPose,
+}

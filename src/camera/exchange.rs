@@ -1,0 +1,278 @@
+//! Cameras as other programs say them: Blender, OpenCV, COLMAP.
+//!
+//! # Method
+//! Blender looks along -z with +y up, so its frame is ours turned by diag(1, -1, -1); its lens shifts are in units of the
+//! side that the sensor is fitted to. OpenCV's pixel centres are integers. COLMAP's pixels are ours.
+
+use crate::camera::Camera;
+use crate::geom::{Point2, Pose, UnitQuaternion, Vector2};
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write;
+
+/// Width of the sensor that cameras are given to Blender with, millimetres; any other would do.
+const SENSOR_WIDTH_MM: f64 = 36.0;
+
+/// A camera in Blender's terms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BlenderCamera {
+    /// Which side of the picture the sensor is fitted to.
+    pub sensor_fit: SensorFit,
+    /// Width of the sensor, millimetres.
+    pub sensor_width: f64,
+    /// Height of the sensor, millimetres; only [`SensorFit::Vertical`] reads it.
+    pub sensor_height: f64,
+    /// Focal length, millimetres.
+    pub lens: f64,
+    /// Horizontal lens shift, in sides of the fitted length.
+    pub shift_x: f64,
+    /// Vertical lens shift, in sides of the fitted length.
+    pub shift_y: f64,
+    /// Height over width of a pixel.
+    pub pixel_aspect: f64,
+    /// Pose of the camera object, row by row; the last row is 0 0 0 1.
+    pub matrix_world: [[f64; 4]; 4],
+}
+
+/// Which side of the picture Blender's sensor is fitted to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub enum SensorFit {
+    /// The longer one.
+    Auto,
+    /// The width.
+    Horizontal,
+    /// The height.
+    Vertical,
+}
+
+/// A camera in OpenCV's terms.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OpencvCamera {
+    /// Camera matrix; pixel centres are integers.
+    #[serde(rename = "K")]
+    pub k: [[f64; 3]; 3],
+    /// Rotation from the world to the camera.
+    #[serde(rename = "R")]
+    pub r: [[f64; 3]; 3],
+    /// Translation from the world to the camera, metres.
+    pub t: [f64; 3],
+}
+
+/// The three text files of a COLMAP model.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ColmapModel {
+    /// `cameras.txt`
+    pub cameras: String,
+    /// `images.txt`
+    pub images: String,
+    /// `points3D.txt`: no points.
+    pub points: String,
+}
+
+impl BlenderCamera {
+    /// The fitted side, pixels of the picture's width.
+    fn view(&self, [w, h]: [f64; 2]) -> f64 {
+        let tall = self.pixel_aspect * h;
+        match self.sensor_fit {
+            SensorFit::Horizontal => w,
+            SensorFit::Vertical => tall,
+            SensorFit::Auto => w.max(tall),
+        }
+    }
+
+    fn sensor(&self) -> f64 {
+        if self.sensor_fit == SensorFit::Vertical { self.sensor_height } else { self.sensor_width }
+    }
+}
+
+impl Camera {
+    /// The camera in Blender's terms: set these values and a resolution percentage of 100.
+    pub fn to_blender(&self) -> BlenderCamera {
+        let [w, h] = self.image.map(f64::from);
+        let pixel_aspect = self.focal_px.x / self.focal_px.y;
+        let mut camera = BlenderCamera {
+            sensor_fit: SensorFit::Auto,
+            sensor_width: SENSOR_WIDTH_MM,
+            sensor_height: SENSOR_WIDTH_MM,
+            lens: 0.0,
+            shift_x: 0.0,
+            shift_y: 0.0,
+            pixel_aspect,
+            matrix_world: self.matrix_world(),
+        };
+        let view = camera.view([w, h]);
+        camera.lens = self.focal_px.x * camera.sensor() / view;
+        camera.shift_x = (w / 2.0 - self.principal_px.x) / view;
+        camera.shift_y = (self.principal_px.y - h / 2.0) * pixel_aspect / view;
+        camera
+    }
+
+    fn matrix_world(&self) -> [[f64; 4]; 4] {
+        let turned = self.rotation().transpose() * blender_flip();
+        let (at, row) = (self.center(), |i: usize| turned.row(i).into_owned());
+        let line = |i: usize| [row(i)[0], row(i)[1], row(i)[2], at[i]];
+        [line(0), line(1), line(2), [0.0, 0.0, 0.0, 1.0]]
+    }
+
+    /// The camera that Blender renders a picture of this size with.
+    pub fn from_blender(blender: &BlenderCamera, image: [u32; 2]) -> Self {
+        let [w, h] = image.map(f64::from);
+        let view = blender.view([w, h]);
+        let fx = blender.lens / blender.sensor() * view;
+        let principal_px =
+            Point2::new(w / 2.0 - blender.shift_x * view, h / 2.0 + blender.shift_y * view / blender.pixel_aspect);
+        let m = &blender.matrix_world;
+        let rotation = blender_flip() * Matrix3::from_fn(|i, j| m[i][j]).transpose();
+        let center = Vector3::new(m[0][3], m[1][3], m[2][3]);
+        Self::posed(image, Vector2::new(fx, fx / blender.pixel_aspect), principal_px, rotation, -(rotation * center))
+    }
+
+    /// The camera in OpenCV's terms.
+    pub fn to_opencv(&self) -> OpencvCamera {
+        let mut k = self.intrinsics();
+        k[(0, 2)] -= 0.5;
+        k[(1, 2)] -= 0.5;
+        let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)]));
+        OpencvCamera { k: rows(k), r: rows(self.rotation()), t: self.camera_from_world.translation.vector.into() }
+    }
+
+    /// The camera that OpenCV means, for a picture of this size.
+    pub fn from_opencv(opencv: &OpencvCamera, image: [u32; 2]) -> Self {
+        let k = &opencv.k;
+        let principal_px = Point2::new(k[0][2] + 0.5, k[1][2] + 0.5);
+        let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
+        Self::posed(image, Vector2::new(k[0][0], k[1][1]), principal_px, rotation, opencv.t.into())
+    }
+
+    /// Lines of Python that make the camera in Blender.
+    pub fn to_blender_script(&self) -> String {
+        let blender = self.to_blender();
+        let rows: Vec<String> = blender.matrix_world.iter().map(|row| format!("{row:?}")).collect();
+        format!(
+            "import bpy\n\
+             from mathutils import Matrix\n\n\
+             camera = bpy.data.cameras.new('solved')\n\
+             camera.sensor_fit, camera.sensor_width = 'AUTO', {:?}\n\
+             camera.lens, camera.shift_x, camera.shift_y = {:?}, {:?}, {:?}\n\
+             camera.clip_start, camera.clip_end = {:?}, {:?}\n\
+             holder = bpy.data.objects.new('solved', camera)\n\
+             holder.matrix_world = Matrix(({}))\n\
+             scene = bpy.context.scene\n\
+             scene.collection.objects.link(holder)\n\
+             scene.camera = holder\n\
+             scene.render.resolution_x, scene.render.resolution_y = {}, {}\n\
+             scene.render.resolution_percentage = 100\n\
+             scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = 1.0, {:?}\n",
+            blender.sensor_width,
+            blender.lens,
+            blender.shift_x,
+            blender.shift_y,
+            1e-3 * self.center().z,
+            1e3 * self.center().z,
+            rows.join(", "),
+            self.image[0],
+            self.image[1],
+            blender.pixel_aspect,
+        )
+    }
+
+    fn rotation(&self) -> Matrix3<f64> {
+        self.camera_from_world.rotation.to_rotation_matrix().into_inner()
+    }
+
+    fn posed(
+        image: [u32; 2],
+        focal_px: Vector2<f64>,
+        principal_px: Point2<f64>,
+        rotation: Matrix3<f64>,
+        t: Vector3<f64>,
+    ) -> Self {
+        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Self { image, focal_px, principal_px, camera_from_world: Pose::from_parts(t.into(), rotation) }
+    }
+}
+
+impl ColmapModel {
+    /// A model of named pictures, each with a camera of its own.
+    pub fn new<'a>(views: impl IntoIterator<Item = (&'a str, &'a Camera)>) -> Self {
+        let mut model = Self::default();
+        for (i, (name, camera)) in views.into_iter().enumerate() {
+            let (id, [w, h]) = (i + 1, camera.image);
+            let (f, c) = (camera.focal_px, camera.principal_px);
+            // Writing to a string cannot fail.
+            let _ = writeln!(model.cameras, "{id} PINHOLE {w} {h} {:?} {:?} {:?} {:?}", f.x, f.y, c.x, c.y);
+            let (q, t) = (camera.camera_from_world.rotation, camera.camera_from_world.translation.vector);
+            let pose = [q.w, q.i, q.j, q.k, t.x, t.y, t.z].map(|v| format!("{v:?}")).join(" ");
+            let _ = writeln!(model.images, "{id} {pose} {id} {name}\n");
+        }
+        model
+    }
+}
+
+/// Our camera frame and Blender's: y and z point the other way.
+fn blender_flip() -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cameras() -> Vec<Camera> {
+        let sizes = [[640, 480], [480, 640], [1000, 1000]];
+        let pose = |k: f64| {
+            let turn = UnitQuaternion::from_euler_angles(3.0 + 0.3 * k, -0.4 * k, 1.1 * k);
+            Pose::from_parts(Vector3::new(0.02 * k, -0.03, 1.1 + k).into(), turn)
+        };
+        let one = |(k, image): (usize, [u32; 2])| Camera {
+            image,
+            focal_px: Vector2::new(700.0, 700.0 + 10.0 * k as f64),
+            principal_px: Point2::new(311.0, 250.5),
+            camera_from_world: pose(k as f64),
+        };
+        sizes.into_iter().enumerate().map(one).collect()
+    }
+
+    fn difference(a: &Camera, b: &Camera) -> f64 {
+        let pose = (a.rotation() - b.rotation()).norm()
+            + (a.camera_from_world.translation.vector - b.camera_from_world.translation.vector).norm();
+        let lens = (a.focal_px - b.focal_px).norm() + (a.principal_px - b.principal_px).norm();
+        pose + lens / a.focal_px.x
+    }
+
+    #[test]
+    fn blender_round_trips() {
+        for camera in cameras() {
+            let back = Camera::from_blender(&camera.to_blender(), camera.image);
+            assert!(difference(&camera, &back) < 1e-12, "{}", difference(&camera, &back));
+        }
+    }
+
+    #[test]
+    fn opencv_round_trips_and_has_integer_pixel_centres() {
+        for camera in cameras() {
+            let opencv = camera.to_opencv();
+            assert_eq!(opencv.k[0][2], camera.principal_px.x - 0.5);
+            assert!(difference(&camera, &Camera::from_opencv(&opencv, camera.image)) < 1e-12);
+        }
+    }
+
+    #[test]
+    fn colmap_names_every_picture() {
+        let cameras = cameras();
+        let model = ColmapModel::new([("a.png", &cameras[0]), ("b.png", &cameras[1])]);
+        assert!(model.cameras.starts_with("1 PINHOLE 640 480 700.0 700.0 311.0 250.5\n2 PINHOLE 480 640"));
+        assert_eq!(model.images.lines().count(), 4);
+        assert!(model.images.lines().nth(2).is_some_and(|line| line.ends_with(" 2 b.png")));
+    }
+
+    #[test]
+    fn the_script_says_what_the_values_are() {
+        let script = cameras()[0].to_blender_script();
+        assert!(script.contains("resolution_x, scene.render.resolution_y = 640, 480"));
+        assert!(script.contains(&format!("camera.lens, camera.shift_x, camera.shift_y = {:?}", 700.0 * 36.0 / 640.0)));
+    }
+}

@@ -1,0 +1,249 @@
+//! Solution files (`NAME.camera.json`): a solved camera with everything that is known of it.
+
+use super::exchange::{BlenderCamera, OpencvCamera};
+use super::focal::FocalSource;
+use super::label::{Label, LabelImage};
+use super::solution::Solution;
+use super::uncertainty::UNKNOWN_NAMES;
+use super::warning::Warning;
+use crate::camera::Camera;
+use crate::geom::{Point2, Vector2};
+use serde::{Deserialize, Serialize};
+
+/// A solved camera as a document; numbers read back to the same bits. What is infinite is `null`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraFile {
+    /// What kind of file this is.
+    pub format: CameraFormat,
+    /// Version of the format: 1.
+    pub version: u32,
+    /// The label's picture.
+    pub image: LabelImage,
+    /// The label's surface.
+    pub surface_id: String,
+    /// The camera and the doubts.
+    #[serde(flatten)]
+    pub found: FoundCamera,
+}
+
+/// The one word of [`CameraFile::format`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CameraFormat {
+    /// `plane-camera`.
+    #[default]
+    #[serde(rename = "plane-camera")]
+    PlaneCamera,
+}
+
+/// A camera, how far to trust it, and another one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundCamera {
+    /// Intrinsics in our pixels.
+    pub model: Model,
+    /// The camera in OpenCV's terms.
+    pub opencv: OpencvCamera,
+    /// The camera's centre, metres.
+    pub center_m: [f64; 3],
+    /// Angle between optical axis and surface normal, degrees.
+    pub tilt_deg: f64,
+    /// The camera in Blender's terms.
+    pub blender: BlenderCamera,
+    /// The rectangle as fitted.
+    pub surface: FittedSurface,
+    /// Surface metres to pixels, row by row.
+    pub homography: [[f64; 3]; 3],
+    /// Standard deviations.
+    pub sigma: SigmaRecord,
+    /// How well the label fits.
+    pub fit: FitRecord,
+    /// Where the focal length comes from.
+    pub focal_source: FocalSource,
+    /// Part of the information on the focal length that comes from the picture.
+    pub data_share: f64,
+    /// What the picture alone says of the focal length, pixels.
+    pub focal_from_data: Option<f64>,
+    /// What was believed of it.
+    pub focal_prior: FocalPrior,
+    /// What a person should look at.
+    pub warnings: Vec<Warning>,
+    /// Another camera that a person should know of.
+    pub alternative: Option<Box<FoundCamera>>,
+}
+
+/// Intrinsics in our pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+pub struct Model {
+    pub f_px: f64,
+    pub principal_point_px: [f64; 2],
+    pub kappa: f64,
+}
+
+/// Sides of the rectangle as fitted, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+pub struct FittedSurface {
+    pub width_m: f64,
+    pub height_m: f64,
+}
+
+/// What was believed of the focal length: pixels, and relative standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+pub struct FocalPrior {
+    pub px: f64,
+    pub sigma: Option<f64>,
+}
+
+/// Standard deviations; `null` where nothing is known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+pub struct SigmaRecord {
+    pub ln_f: Option<f64>,
+    pub tilt_deg: Option<f64>,
+    pub center_m: [Option<f64>; 3],
+    pub height_px: Option<f64>,
+    pub height_ref_m: f64,
+    /// Order of the rows and columns of the covariance.
+    pub unknowns: Vec<String>,
+    pub covariance: Vec<Vec<Option<f64>>>,
+}
+
+/// How well the label fits.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+pub struct FitRecord {
+    pub chi2: f64,
+    pub dof: usize,
+    pub p_value: Option<f64>,
+    pub rms_px: f64,
+    pub per_corner_px: [f64; 4],
+    pub iterations: usize,
+    pub condition: f64,
+    pub depth_ratio: f64,
+    pub px_per_m: f64,
+}
+
+impl CameraFile {
+    /// What to write beside a label.
+    pub fn new(label: &Label, solution: &Solution) -> Self {
+        Self {
+            format: CameraFormat::PlaneCamera,
+            version: 1,
+            image: label.image.clone(),
+            surface_id: label.surface.id.clone(),
+            found: FoundCamera::new(solution),
+        }
+    }
+
+    /// The camera of the file.
+    pub fn camera(&self) -> Camera {
+        let (model, image) = (&self.found.model, [self.image.width, self.image.height]);
+        Camera {
+            focal_px: Vector2::repeat(model.f_px),
+            principal_px: Point2::from(model.principal_point_px),
+            ..Camera::from_opencv(&self.found.opencv, image)
+        }
+    }
+
+    /// Width and height of the rectangle as fitted, metres.
+    pub fn size(&self) -> [f64; 2] {
+        [self.found.surface.width_m, self.found.surface.height_m]
+    }
+}
+
+impl FoundCamera {
+    fn new(solution: &Solution) -> Self {
+        let camera = &solution.camera;
+        let homography = camera.pixel_from_surface().0;
+        Self {
+            model: Model {
+                f_px: camera.focal_px.x,
+                principal_point_px: camera.principal_px.into(),
+                kappa: solution.kappa,
+            },
+            opencv: camera.to_opencv(),
+            center_m: camera.center().into(),
+            tilt_deg: camera.tilt().to_degrees(),
+            blender: camera.to_blender(),
+            surface: FittedSurface { width_m: solution.size[0], height_m: solution.size[1] },
+            homography: [0, 1, 2].map(|i| [0, 1, 2].map(|j| homography[(i, j)])),
+            sigma: SigmaRecord::new(solution),
+            fit: FitRecord::new(solution),
+            focal_source: solution.focal_source,
+            data_share: solution.focal.share,
+            focal_from_data: solution.focal.from_data_px,
+            focal_prior: FocalPrior { px: solution.focal.prior_px, sigma: finite(solution.focal.prior_sigma) },
+            warnings: solution.warnings.clone(),
+            alternative: solution.alternative.as_deref().map(|other| Box::new(Self::new(other))),
+        }
+    }
+}
+
+impl SigmaRecord {
+    fn new(solution: &Solution) -> Self {
+        let sigma = &solution.sigma;
+        let row = |i: usize| sigma.covariance.row(i).iter().map(|&v| finite(v)).collect();
+        Self {
+            ln_f: finite(sigma.ln_focal),
+            tilt_deg: finite(sigma.tilt.to_degrees()),
+            center_m: [0, 1, 2].map(|i| finite(sigma.center[(i, i)].max(0.0).sqrt())),
+            height_px: finite(sigma.height_px),
+            height_ref_m: sigma.reference_height,
+            unknowns: UNKNOWN_NAMES.map(String::from).into(),
+            covariance: (0..UNKNOWN_NAMES.len()).map(row).collect(),
+        }
+    }
+}
+
+impl FitRecord {
+    fn new(solution: &Solution) -> Self {
+        let fit = &solution.fit;
+        Self {
+            chi2: fit.chi2,
+            dof: fit.dof,
+            p_value: fit.p_value,
+            rms_px: solution.rms_px,
+            per_corner_px: fit.per_corner_px,
+            iterations: fit.steps,
+            condition: fit.condition,
+            depth_ratio: fit.depth_ratio,
+            px_per_m: fit.px_per_metre,
+        }
+    }
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::simulate::Scenario;
+    use crate::camera::{Priors, SolveOptions, solve};
+
+    #[test]
+    fn a_file_reads_back_to_the_same_bits() {
+        for (k, tilt) in [0.0, 3.0, 20.0, 60.0].into_iter().enumerate() {
+            let view = Scenario::realistic().tilted(tilt).view(21, k as u64);
+            for priors in [Priors::default(), Priors::ideal().with_free_focal()] {
+                let solution = solve(&view.label, &SolveOptions { priors, ..Default::default() }).unwrap();
+                let file = CameraFile::new(&view.label, &solution);
+                let text = serde_json::to_string_pretty(&file).unwrap();
+                let back: CameraFile = serde_json::from_str(&text).unwrap();
+                assert_eq!(serde_json::to_string_pretty(&back).unwrap(), text);
+                assert_eq!(back, file);
+                let p = crate::geom::Point3::new(0.1, 0.1, 0.05);
+                let (a, b) = (back.camera().project(p).unwrap().0, solution.camera.project(p).unwrap().0);
+                assert!((a - b).norm() < 1e-9);
+            }
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! The pipeline stage: a scene's camera becomes known.
+
+use super::label::Label;
+use super::options::SolveOptions;
+use super::solve::solve;
+use crate::error::Result;
+use crate::scene::{CameraSource, Scene};
+
+/// Solves a scene's camera where it is still a labelled rectangle, and brings it to the scene's picture size.
+///
+/// A scene whose camera is known stays as it is: `locate(locate(s)) == locate(s)`.
+///
+/// # Errors
+/// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen.
+pub fn locate(scene: Scene) -> Result<Scene> {
+    let CameraSource::Rectangle { corners_px, photo, focal_px } = scene.camera else { return Ok(scene) };
+    let mut label = Label::new(photo, corners_px, scene.surface.size);
+    label.camera.focal_px = focal_px;
+    let solution = solve(&label, &SolveOptions::default())?;
+    for warning in &solution.warnings {
+        log::warn!("{}: {warning}", scene.plate);
+    }
+    Ok(Scene { camera: CameraSource::Known(solution.camera.resized(scene.image)), ..scene })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::LinearRgb;
+    use crate::scene::{Exposure, Surface};
+
+    fn scene() -> Scene {
+        let corners_px = [[199.713, 223.218], [1003.21, 207.639], [1008.381, 733.319], [216.899, 750.414]];
+        Scene {
+            image: [640, 480],
+            plate: "bg0000".into(),
+            camera: CameraSource::Rectangle { corners_px, photo: [1280, 960], focal_px: Some(1374.852) },
+            surface: Surface { size: [0.56, 0.37] },
+            objects: Vec::new(),
+            lights: Vec::new(),
+            ambient: LinearRgb::BLACK,
+            exposure: Exposure::default(),
+        }
+    }
+
+    #[test]
+    fn the_camera_is_known_at_the_scene_s_size_and_stays_so() {
+        let once = locate(scene()).unwrap();
+        let CameraSource::Known(camera) = once.camera else { panic!("still unknown") };
+        assert_eq!(camera.image, [640, 480]);
+        assert!((camera.focal_px.x - 1374.852 / 2.0).abs() < 10.0);
+        assert_eq!(locate(once.clone()).unwrap(), once);
+    }
+
+    #[test]
+    fn impossible_corners_are_an_error() {
+        let CameraSource::Rectangle { photo, focal_px, .. } = scene().camera else { unreachable!() };
+        let corners_px = [[0.0, 0.0]; 4];
+        let flat = Scene { camera: CameraSource::Rectangle { corners_px, photo, focal_px }, ..scene() };
+        assert!(locate(flat).unwrap_err().to_string().contains("corners 0 and 1 are 0.0 px apart"));
+    }
+}

@@ -1,0 +1,251 @@
+//! What a camera sees of a point, and how that changes with everything the solver may turn.
+//!
+//! # Method
+//! The eleven unknowns are chosen so that the one weak direction stands alone: from straight above the focal length (and
+//! the principal point) has no influence on any residual while all else stays well conditioned. Focal length and distance
+//! would be almost perfectly correlated; the logarithm of the scale, focal length over distance, is not.
+
+use super::rectangle::Stance;
+use crate::geom::Vector2;
+use nalgebra::{Matrix2, Rotation3, SMatrix, SVector, Vector3};
+
+/// Number of unknowns.
+pub(crate) const UNKNOWNS: usize = 11;
+/// Indices of the unknowns; rotation is 0, 1, 2.
+pub(crate) const CENTER: usize = 3;
+pub(crate) const LN_SCALE: usize = 5;
+pub(crate) const LN_FOCAL: usize = 6;
+pub(crate) const STRETCH: usize = 7;
+pub(crate) const PRINCIPAL: usize = 8;
+pub(crate) const KAPPA: usize = 10;
+/// Points nearer to the camera's plane than this part of the rectangle's distance are not seen.
+const NEAREST: f64 = 1e-6;
+
+/// A value per unknown.
+pub(crate) type Unknowns = SVector<f64, UNKNOWNS>;
+/// A value per pair of unknowns: information or covariance.
+pub(crate) type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+/// Change of a picture position (a column each for x and y) per unknown.
+pub(crate) type Slope = SMatrix<f64, UNKNOWNS, 2>;
+
+/// A camera over a rectangle; units as in [`camera`](super).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State {
+    pub(crate) stance: Stance,
+    pub(crate) ln_focal: f64,
+    pub(crate) focal: f64,
+    /// Logarithm of what the ratio of the sides has to be multiplied by.
+    pub(crate) stretch: f64,
+    /// How the rectangle gives to that.
+    pub(crate) elastic: Elastic,
+    /// What its sides become.
+    pub(crate) sides: [f64; 2],
+    /// Principal point, relative to where it is expected.
+    pub(crate) principal: Vector2<f64>,
+    /// Radial distortion.
+    pub(crate) kappa: f64,
+}
+
+/// Which part of the stretch goes into x and which into y; tells what stays exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Elastic([f64; 2]);
+
+impl Elastic {
+    /// The area stays: both sides are measured.
+    pub(crate) const BOTH: Self = Self([0.5, -0.5]);
+    /// The width stays: only it is measured.
+    pub(crate) const HEIGHT: Self = Self([0.0, -1.0]);
+    /// The height stays: only it is measured.
+    pub(crate) const WIDTH: Self = Self([1.0, 0.0]);
+}
+
+/// A point of known place, and where it was seen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sight {
+    pub(crate) point: Vector3<f64>,
+    /// It was measured on its own and does not give with the rectangle.
+    pub(crate) rigid: bool,
+    pub(crate) seen: Vector2<f64>,
+    /// One over the noise.
+    pub(crate) weight: f64,
+}
+
+impl State {
+    /// A camera over a rectangle that is as measured.
+    pub(crate) fn new(stance: Stance, focal: f64, kappa: f64, elastic: Elastic) -> Self {
+        let (ln_focal, principal) = (libm::log(focal), Vector2::zeros());
+        Self { stance, ln_focal, focal, stretch: 0.0, elastic, sides: [1.0; 2], principal, kappa }
+    }
+
+    /// The unknown at an index from [`LN_FOCAL`] on.
+    pub(crate) fn value(&self, unknown: usize) -> f64 {
+        match unknown {
+            LN_FOCAL => self.ln_focal,
+            STRETCH => self.stretch,
+            KAPPA => self.kappa,
+            _ => self.principal[unknown - PRINCIPAL],
+        }
+    }
+
+    pub(crate) fn with_ln_focal(self, ln_focal: f64) -> Self {
+        Self { ln_focal, focal: libm::exp(ln_focal), ..self }
+    }
+
+    fn with_stretch(self, stretch: f64) -> Self {
+        let Elastic(shares) = self.elastic;
+        Self { stretch, sides: shares.map(|share| libm::exp(share * stretch)), ..self }
+    }
+
+    /// Position of the rectangle's centre in the camera's frame.
+    pub(crate) fn translation(&self) -> Vector3<f64> {
+        (self.stance.center - self.principal).push(self.focal) / self.stance.scale
+    }
+
+    /// The camera's place over the rectangle.
+    pub(crate) fn camera_center(&self) -> Vector3<f64> {
+        -(self.stance.rotation.transpose() * self.translation())
+    }
+
+    /// After a small step in every unknown.
+    pub(crate) fn stepped(&self, step: &Unknowns) -> Self {
+        let turn = Rotation3::new(step.fixed_rows::<3>(0));
+        let moved = Self {
+            stance: Stance {
+                rotation: turn.matrix() * self.stance.rotation,
+                center: self.stance.center + step.fixed_rows::<2>(CENTER),
+                scale: self.stance.scale * libm::exp(step[LN_SCALE]),
+            },
+            principal: self.principal + step.fixed_rows::<2>(PRINCIPAL),
+            kappa: self.kappa + step[KAPPA],
+            ..*self
+        };
+        moved.with_ln_focal(self.ln_focal + step[LN_FOCAL]).with_stretch(self.stretch + step[STRETCH])
+    }
+
+    /// A point of the rectangle's frame as stretched.
+    fn stretched(&self, point: &Vector3<f64>, rigid: bool) -> Vector3<f64> {
+        let [x, y] = if rigid { [1.0; 2] } else { self.sides };
+        Vector3::new(point.x * x, point.y * y, point.z)
+    }
+
+    /// Where a point is seen; none at or behind the camera.
+    pub(crate) fn project(&self, point: &Vector3<f64>, rigid: bool) -> Option<Vector2<f64>> {
+        let turned = self.stance.rotation * self.stretched(point, rigid);
+        let w = 1.0 + self.stance.scale / self.focal * turned.z;
+        let n = turned.xy() * self.stance.scale + self.stance.center - self.principal;
+        let straight = n / w;
+        (w > NEAREST).then(|| self.principal + straight * (1.0 + self.kappa * straight.norm_squared()))
+    }
+
+    /// Where a point is seen and how that changes with the unknowns; none at or behind the camera.
+    pub(crate) fn slope(&self, point: &Vector3<f64>, rigid: bool) -> Option<(Vector2<f64>, Slope)> {
+        let Stance { rotation, center, scale } = self.stance;
+        let nearness = scale / self.focal;
+        let stretched = self.stretched(point, rigid);
+        let q = rotation * stretched;
+        let w = 1.0 + nearness * q.z;
+        if w <= NEAREST {
+            return None;
+        }
+        let straight = (q.xy() * scale + center - self.principal) / w;
+        let Elastic([ex, ey]) = if rigid { Elastic([0.0; 2]) } else { self.elastic };
+        let pull = rotation * Vector3::new(ex * stretched.x, ey * stretched.y, 0.0);
+        let (near, far) = (scale / w, nearness / w);
+
+        let mut slope = Slope::zeros();
+        for axis in 0..2 {
+            // The change of the position along this axis per change of q.
+            let mut per_q = Vector3::new(0.0, 0.0, -straight[axis] * far);
+            per_q[axis] = near;
+            let mut column = slope.column_mut(axis);
+            column.fixed_rows_mut::<3>(0).copy_from(&q.cross(&per_q));
+            column[CENTER + axis] = 1.0 / w;
+            column[LN_SCALE] = per_q.dot(&q);
+            column[LN_FOCAL] = straight[axis] * far * q.z;
+            column[STRETCH] = per_q.dot(&pull);
+            column[PRINCIPAL + axis] = -1.0 / w;
+        }
+        let r2 = straight.norm_squared();
+        if self.kappa != 0.0 {
+            let bent =
+                Matrix2::identity() * (1.0 + self.kappa * r2) + straight * straight.transpose() * (2.0 * self.kappa);
+            slope *= bent;
+        }
+        for axis in 0..2 {
+            slope[(PRINCIPAL + axis, axis)] += 1.0;
+            slope[(KAPPA, axis)] = straight[axis] * r2;
+        }
+        Some((self.principal + straight * (1.0 + self.kappa * r2), slope))
+    }
+
+    /// Logarithm of the camera's height over the surface and how it changes with the unknowns; none below it.
+    pub(crate) fn ln_height(&self) -> Option<(f64, Unknowns)> {
+        let t = self.translation();
+        let normal: Vector3<f64> = self.stance.rotation.column(2).into();
+        let height = -normal.dot(&t);
+        let mut slope = Unknowns::zeros();
+        slope.fixed_rows_mut::<3>(0).copy_from(&-normal.cross(&t));
+        for axis in 0..2 {
+            slope[CENTER + axis] = -normal[axis] / self.stance.scale;
+            slope[PRINCIPAL + axis] = normal[axis] / self.stance.scale;
+        }
+        slope[LN_SCALE] = -height;
+        slope[LN_FOCAL] = -normal.z * t.z;
+        (height > 0.0).then(|| (libm::log(height), slope / height))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    fn state(elastic: Elastic) -> State {
+        let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
+        let rotation = Rotation3::from_euler_angles(0.4, -0.3, 0.8).into_inner() * flip;
+        let stance = Stance { rotation, center: Vector2::new(0.2, -0.1), scale: 0.6 };
+        let state = State::new(stance, 1.3, 0.02, elastic).with_stretch(0.03);
+        State { principal: Vector2::new(0.01, -0.02), ..state }
+    }
+
+    /// The change of a value per unknown, by central differences.
+    fn differences<const N: usize>(
+        state: State,
+        value: impl Fn(&State) -> SVector<f64, N>,
+    ) -> SMatrix<f64, UNKNOWNS, N> {
+        const H: f64 = 1e-6;
+        let step = |i: usize, h: f64| {
+            let mut step = Unknowns::zeros();
+            step[i] = h;
+            value(&state.stepped(&step)).transpose()
+        };
+        SMatrix::from_rows(&std::array::from_fn::<_, UNKNOWNS, _>(|i| (step(i, H) - step(i, -H)) / (2.0 * H)))
+    }
+
+    #[test]
+    fn slopes_agree_with_differences() {
+        for (elastic, rigid) in
+            [(Elastic::BOTH, false), (Elastic::HEIGHT, false), (Elastic::WIDTH, false), (Elastic::WIDTH, true)]
+        {
+            let (state, point) = (state(elastic), Vector3::new(0.5, -0.4, 0.2));
+            let (seen, slope) = state.slope(&point, rigid).unwrap();
+            assert!((seen - state.project(&point, rigid).unwrap()).norm() < 1e-15);
+            let expected = differences(state, |s| s.project(&point, rigid).unwrap());
+            assert!((slope - expected).abs().max() < 1e-9, "{}", slope - expected);
+        }
+    }
+
+    #[test]
+    fn the_slope_of_the_height_agrees_with_differences() {
+        let state = state(Elastic::BOTH);
+        let expected = differences(state, |s| SVector::<f64, 1>::new(s.ln_height().unwrap().0));
+        let (_, slope) = state.ln_height().unwrap();
+        assert!((slope - expected).abs().max() < 1e-9);
+    }
+
+    #[test]
+    fn a_point_behind_the_camera_is_not_seen() {
+        let (state, behind) = (state(Elastic::BOTH), Vector3::new(0.0, 0.0, 1e3));
+        assert!(state.project(&behind, true).is_none() && state.slope(&behind, true).is_none());
+    }
+}

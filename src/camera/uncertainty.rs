@@ -1,0 +1,178 @@
+//! How well a camera is known.
+
+use super::belief::Belief;
+use super::model::{CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns};
+use super::problem::Problem;
+use super::refine::{Minimum, unit_diagonal};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
+
+/// Information on the logarithm of the focal length below this part of its diagonal is rounding.
+const ROUNDING: f64 = 1e-13;
+/// Points of the grid, per side, at which the height error is taken.
+const GRID: usize = 4;
+
+/// Covariance of the unknowns, and what it says of the focal length.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Uncertainty {
+    pub(crate) covariance: Square,
+    pub(crate) focal: FocalShare,
+    /// Condition number of the information from the picture alone.
+    pub(crate) condition: f64,
+}
+
+/// How much of what is known of the focal length was known before.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FocalShare {
+    /// Standard deviation of its logarithm; infinite where nothing is known.
+    pub(crate) sigma: f64,
+    /// Part of the information that comes from the picture, 0 to 1.
+    pub(crate) share: f64,
+    /// What the picture alone says of its logarithm: the value and its standard deviation.
+    pub(crate) from_data: Option<Belief>,
+}
+
+impl FocalShare {
+    /// Difference between the picture and what was believed, in standard deviations of the difference.
+    pub(crate) fn conflict(&self, believed: Belief) -> Option<f64> {
+        let data = self.from_data?;
+        (!believed.is_fact() && !believed.says_nothing())
+            .then(|| (data.mean - believed.mean) / libm::hypot(data.sigma, believed.sigma))
+    }
+}
+
+impl Uncertainty {
+    pub(crate) fn new(minimum: &Minimum, believed: Belief) -> Self {
+        let (covariance, information) = covariance(&minimum.information);
+        let condition = condition(&minimum.information, believed);
+        let focal = focal_share(minimum.state.ln_focal, information, believed);
+        Self { covariance, focal, condition }
+    }
+
+    /// Standard deviation of the tilt, radians.
+    pub(crate) fn tilt(&self, state: &State) -> f64 {
+        let normal = state.stance.rotation.column(2);
+        let sin = libm::hypot(normal.x, normal.y);
+        let c = &self.covariance;
+        if sin < 1e-9 {
+            return ((c[(0, 0)] + c[(1, 1)]) / 2.0).sqrt();
+        }
+        let (x, y) = (normal.y / sin, -normal.x / sin);
+        (x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)]).max(0.0).sqrt()
+    }
+
+    /// Covariance of the camera's place over the rectangle.
+    pub(crate) fn camera_center(&self, state: &State) -> Matrix3<f64> {
+        let t = state.translation();
+        let back = state.stance.rotation.transpose();
+        let mut slope = SMatrix::<f64, 3, UNKNOWNS>::zeros();
+        slope.fixed_columns_mut::<3>(0).copy_from(&-t.cross_matrix());
+        for axis in 0..2 {
+            slope[(axis, CENTER + axis)] = -1.0 / state.stance.scale;
+            slope[(axis, PRINCIPAL + axis)] = 1.0 / state.stance.scale;
+        }
+        slope.set_column(LN_SCALE, &t);
+        slope[(2, LN_FOCAL)] = -t.z;
+        let slope = back * slope;
+        slope * self.covariance * slope.transpose()
+    }
+
+    /// Covariance of where a point of the rectangle's frame is seen; none behind the camera.
+    fn seen(&self, problem: &Problem, state: &State, point: Vector3<f64>) -> Option<Matrix2<f64>> {
+        let (_, slope) = state.slope(&(point / problem.frame.unit), false)?;
+        Some(slope.transpose() * self.covariance * slope * (problem.frame.unit_px * problem.frame.unit_px))
+    }
+
+    /// The same at the rectangle's corners, squared pixels.
+    pub(crate) fn corners_px(&self, problem: &Problem, state: &State) -> [Matrix2<f64>; 4] {
+        let corners = super::problem::corner_points(problem.size);
+        corners.map(|c| self.seen(problem, state, c.coords).unwrap_or(Matrix2::repeat(f64::INFINITY)))
+    }
+
+    /// Root mean square error, pixels, of points over the rectangle at a height of `height` metres.
+    pub(crate) fn height_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
+        let [w, h] = problem.size;
+        let part = |i: usize| i as f64 / (GRID - 1) as f64 - 0.5;
+        let mut sum = 0.0;
+        for i in 0..GRID * GRID {
+            let point = Vector3::new(part(i % GRID) * w, part(i / GRID) * h, height);
+            sum += self.seen(problem, state, point).map_or(f64::INFINITY, |c| c.trace());
+        }
+        (sum / (GRID * GRID) as f64).sqrt()
+    }
+}
+
+/// Inverse of the information, and the information left on the focal length when all else is free.
+///
+/// The focal length is split off first (its Schur complement): it is the one unknown that may have no information at
+/// all, and then its variance is huge while the rest stays as it is. Facts have no information and get no variance.
+fn covariance(information: &Square) -> (Square, f64) {
+    let scale = unit_diagonal(information);
+    let mut rest = scaled(information, &scale);
+    let mut coupling: Unknowns = rest.column(LN_FOCAL).into();
+    coupling[LN_FOCAL] = 0.0;
+    rest.row_mut(LN_FOCAL).fill(0.0);
+    rest.column_mut(LN_FOCAL).fill(0.0);
+    rest[(LN_FOCAL, LN_FOCAL)] = 1.0;
+    let inverse = rest.cholesky().or_else(|| (rest + Square::identity() * ROUNDING).cholesky());
+    let Some(mut inverse) = inverse.map(|c| c.inverse()) else { return (Square::repeat(f64::INFINITY), 0.0) };
+    inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
+    let mut response = -(inverse * coupling);
+    let own = if information[(LN_FOCAL, LN_FOCAL)] > 0.0 { 1.0 } else { 0.0 };
+    let left = (own + coupling.dot(&response)).max(0.0);
+    response[LN_FOCAL] = 1.0;
+    if own > 0.0 {
+        inverse += response * response.transpose() / left.max(ROUNDING);
+    }
+    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
+        inverse.row_mut(i).fill(0.0);
+        inverse.column_mut(i).fill(0.0);
+    }
+    let left = if left > ROUNDING { left / (scale[LN_FOCAL] * scale[LN_FOCAL]) } else { 0.0 };
+    (inverse.component_mul(&(scale * scale.transpose())), left)
+}
+
+/// With a unit diagonal, also where there is no information.
+fn scaled(information: &Square, scale: &Unknowns) -> Square {
+    let mut scaled = information.component_mul(&(scale * scale.transpose()));
+    scaled.fill_diagonal(1.0);
+    scaled
+}
+
+/// What is known of the focal length, from the information left on its logarithm.
+pub(crate) fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> FocalShare {
+    if believed.is_fact() {
+        return FocalShare { sigma: 0.0, share: 0.0, from_data: None };
+    }
+    let from_data = (information - believed.information()).max(0.0);
+    let share = if information > 0.0 { from_data / information } else { 0.0 };
+    let start = if believed.says_nothing() { ln_focal } else { believed.mean };
+    let alone = Belief { mean: start + (ln_focal - start) / share, sigma: 1.0 / from_data.sqrt() };
+    FocalShare {
+        sigma: 1.0 / information.sqrt(),
+        share,
+        from_data: (alone.mean.is_finite() && alone.sigma.is_finite()).then_some(alone),
+    }
+}
+
+/// Condition number of the information with a unit diagonal, without what was believed of the focal length.
+fn condition(information: &Square, believed: Belief) -> f64 {
+    let mut data = *information;
+    data[(LN_FOCAL, LN_FOCAL)] -= believed.information();
+    let values = scaled(&data, &unit_diagonal(&data)).symmetric_eigenvalues();
+    values.max() / values.min().max(f64::EPSILON)
+}
+
+/// Names of the unknowns, in the order of the covariance.
+pub const UNKNOWN_NAMES: [&str; KAPPA + 1] = [
+    "rotation_x",
+    "rotation_y",
+    "rotation_z",
+    "center_u",
+    "center_v",
+    "ln_scale",
+    "ln_focal",
+    "stretch",
+    "principal_x",
+    "principal_y",
+    "kappa",
+];

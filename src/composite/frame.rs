@@ -1,0 +1,76 @@
+//! The finished frame: what objects add, over what their shadows leave of the plate.
+
+use crate::image::Image;
+use crate::pixel::{LinearRgb, PremulRgba};
+use crate::render::{DeepImage, DeepSample};
+
+/// Folds deep samples into a picture, over `plate` where there is one.
+///
+/// Scene-linear, premultiplied, of the deep picture's size. With a plate every pixel is opaque,
+/// `light + (1 - coverage) * shadow * plate`, and the plate's own bits where there is neither card nor shadow. Without,
+/// pixels are the objects' light and coverage; shadows need something to fall on and are left out.
+///
+/// # Panics
+/// When the plate's size is not the picture's.
+pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
+    let size = (deep.width(), deep.height());
+    match plate {
+        None => Image::from_fn(size.0, size.1, |x, y| flatten(deep.at(x, y))),
+        Some(plate) => {
+            assert_eq!(plate.size(), size, "plate and picture differ in size");
+            Image::from_fn(size.0, size.1, |x, y| {
+                let behind = deep.shadow()[(x, y)] * plate[(x, y)];
+                flatten(deep.at(x, y)).over(behind.opaque()).color().opaque()
+            })
+        }
+    }
+}
+
+/// Light and coverage of one pixel's objects.
+fn flatten(samples: &[DeepSample]) -> PremulRgba {
+    let mut sum = PremulRgba::TRANSPARENT;
+    for s in samples {
+        sum = sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible));
+    }
+    // A sum of shares that make up a whole may miss it by a rounding.
+    PremulRgba { a: sum.a.min(1.0), ..sum }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::{Depth, ObjectId};
+
+    fn sample(light: f32, visible: f32) -> DeepSample {
+        DeepSample { object: ObjectId(1), depth: Depth(1.0), light: LinearRgb::grey(light), alpha: 0.5, visible }
+    }
+
+    /// One bare pixel, one in shadow, one behind two samples.
+    fn deep() -> DeepImage {
+        let shadow = Image::from_vec(3, 1, [1.0, 0.5, 1.0].map(LinearRgb::grey).to_vec());
+        DeepImage::from_pixels(shadow, [vec![], vec![], vec![sample(0.2, 0.5), sample(0.1, 0.25)]])
+    }
+
+    #[test]
+    fn the_plate_shines_through_what_is_left() {
+        let plate = Image::filled(3, 1, LinearRgb::grey(0.8));
+        let out = frame(&deep(), Some(&plate));
+        assert_eq!(out[(1, 0)].r, 0.4);
+        assert!((out[(2, 0)].r - (0.3 + 0.25 * 0.8)).abs() < 1e-6);
+        assert!(out.pixels().iter().all(|p| p.a == 1.0));
+    }
+
+    #[test]
+    fn an_untouched_plate_keeps_its_bits() {
+        let odd = LinearRgb::new(0.1, f32::MIN_POSITIVE, 7.3);
+        let out = frame(&deep(), Some(&Image::filled(3, 1, odd)));
+        assert_eq!(out[(0, 0)], odd.opaque());
+    }
+
+    #[test]
+    fn without_a_plate_the_picture_is_premultiplied() {
+        let out = frame(&deep(), None);
+        assert_eq!(out[(0, 0)], PremulRgba::TRANSPARENT);
+        assert_eq!(out[(2, 0)].a, 0.75);
+    }
+}

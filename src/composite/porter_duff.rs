@@ -1,0 +1,103 @@
+//! The operators of Porter and Duff on premultiplied pixels.
+//!
+//! # Method
+//! [Porter and Duff 1984]: each operator keeps a share of either picture that depends on the other's alpha alone.
+//!
+//! [Porter and Duff 1984]: https://doi.org/10.1145/800031.808606
+
+use crate::pixel::{Coverage, Mix, PremulRgba};
+
+impl PremulRgba {
+    /// `self` in front of `behind`.
+    #[inline(always)]
+    pub fn over(self, behind: Self) -> Self {
+        self.add_scaled(1.0 - self.a, behind)
+    }
+
+    /// `self` where `matte` is: the operator `in`.
+    #[inline(always)]
+    pub fn inside(self, matte: Self) -> Self {
+        self.masked(Coverage(matte.a))
+    }
+
+    /// `self` where `holdout` is not: the operator `out`.
+    #[inline(always)]
+    pub fn outside(self, holdout: Self) -> Self {
+        self.masked(Coverage(1.0 - holdout.a))
+    }
+
+    /// `self` on `base`, with the coverage of `base`.
+    #[inline(always)]
+    pub fn atop(self, base: Self) -> Self {
+        self.inside(base).add_scaled(1.0 - self.a, base)
+    }
+
+    /// Where exactly one of the two is.
+    #[inline(always)]
+    pub fn xor(self, other: Self) -> Self {
+        self.outside(other).plus(other.outside(self))
+    }
+
+    /// The sum of two pixels that share a place without hiding each other.
+    #[inline(always)]
+    pub fn plus(self, other: Self) -> Self {
+        self.add_scaled(1.0, other)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn pixel() -> impl Strategy<Value = PremulRgba> {
+        let channel = 0.0f32..=1.0;
+        (channel.clone(), channel.clone(), channel.clone(), channel)
+            .prop_map(|(r, g, b, a)| PremulRgba::new(r * a, g * a, b * a, a))
+    }
+
+    fn close(a: PremulRgba, b: PremulRgba) -> bool {
+        let d = a.add_scaled(-1.0, b);
+        [d.r, d.g, d.b, d.a].iter().all(|v| v.abs() < 1e-6)
+    }
+
+    proptest! {
+        #[test]
+        fn over_is_associative(a in pixel(), b in pixel(), c in pixel()) {
+            prop_assert!(close(a.over(b).over(c), a.over(b.over(c))));
+        }
+
+        #[test]
+        fn nothing_is_neutral_for_over(a in pixel()) {
+            prop_assert_eq!(a.over(PremulRgba::TRANSPARENT), a);
+            prop_assert_eq!(PremulRgba::TRANSPARENT.over(a), a);
+        }
+
+        #[test]
+        fn inside_and_outside_share_a_picture(a in pixel(), b in pixel()) {
+            prop_assert!(close(a.inside(b).plus(a.outside(b)), a));
+        }
+
+        #[test]
+        fn over_is_a_plus_what_is_left_of_b(a in pixel(), b in pixel()) {
+            prop_assert!(close(a.over(b), a.plus(b.outside(a))));
+        }
+
+        #[test]
+        fn atop_keeps_the_base_s_coverage(a in pixel(), b in pixel()) {
+            prop_assert!((a.atop(b).a - b.a).abs() < 1e-6);
+            prop_assert!(close(a.atop(b), a.inside(b).plus(b.outside(a))));
+        }
+
+        #[test]
+        fn xor_is_symmetric(a in pixel(), b in pixel()) {
+            prop_assert!(close(a.xor(b), b.xor(a)));
+        }
+    }
+
+    #[test]
+    fn an_opaque_pixel_hides_what_is_behind() {
+        let front = PremulRgba::new(0.1, 0.2, 0.3, 1.0);
+        assert_eq!(front.over(PremulRgba::new(0.9, 0.9, 0.9, 1.0)), front);
+    }
+}

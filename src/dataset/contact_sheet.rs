@@ -1,0 +1,269 @@
+//! A sheet of small pictures with their labels: the first look at a dataset.
+
+use crate::color::to_srgb8;
+use crate::dataset::folder::{self, IDENTITY};
+use crate::dataset::journal::{Line, lines_of};
+use crate::dataset::{Part, Record};
+use crate::error::{Error, Result};
+use crate::filter::resize;
+use crate::image::Image;
+use crate::io;
+use crate::label::draw::{self, TextSize};
+use crate::label::overlay::{UNLABELLED, draw_labels};
+use crate::label::{Labels, ObjectLabel};
+use crate::pixel::{LinearRgb, ObjectId, Srgb8};
+use rayon::prelude::*;
+use std::path::Path;
+
+const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
+const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
+const PALE_INK: Srgb8 = draw::rgb(0xA8, 0xAD, 0xB5);
+
+/// Pixels around the sheet.
+const MARGIN: usize = 28;
+
+/// Pixels between pictures.
+const GAP: usize = 16;
+
+/// Pixels between a picture and its caption.
+const CAPTION_GAP: usize = 4;
+
+/// How a sheet is laid out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SheetOptions {
+    /// A line at the top. Default: none.
+    pub title: String,
+    /// Widest a picture may be, pixels; larger ones are made smaller. Default: 320.
+    pub picture_width: usize,
+    /// Pictures beside each other; 0 lets the sheet become about 3:2. Default: 0.
+    pub columns: usize,
+}
+
+impl Default for SheetOptions {
+    fn default() -> Self {
+        Self { title: String::new(), picture_width: 320, columns: 0 }
+    }
+}
+
+/// A picture of a sheet.
+#[derive(Clone, Debug)]
+pub struct Tile {
+    /// The picture, of any size.
+    pub picture: Image<LinearRgb>,
+    /// What is where in it, in pixels of the size that the labels name.
+    pub labels: Labels,
+    /// Objects that are drawn with a box; the others get a thin grey outline.
+    pub labelled: Vec<ObjectId>,
+    /// A line below the picture.
+    pub caption: String,
+}
+
+impl Tile {
+    /// A tile no wider than `width`, made smaller in linear light.
+    pub fn new(
+        picture: &Image<LinearRgb>,
+        labels: Labels,
+        labelled: Vec<ObjectId>,
+        caption: String,
+        width: usize,
+    ) -> Self {
+        let (w, h) = picture.size();
+        let width = width.clamp(1, w.max(1));
+        let height = (h * width).div_ceil(w.max(1)).max(1);
+        let picture = if width < w { resize(picture, width, height) } else { picture.clone() };
+        Self { picture, labels, labelled, caption }
+    }
+
+    fn drawn(&self) -> Image<Srgb8> {
+        let mut canvas = to_srgb8(&self.picture);
+        draw_labels(&mut canvas, &self.labels, |object: &ObjectLabel| self.labelled.contains(&object.id));
+        canvas
+    }
+}
+
+/// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the classes.
+pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Image<Srgb8> {
+    let layout = Layout::of(tiles, classes, options);
+    let mut sheet = Image::filled(layout.width, layout.height, PAPER);
+    let mut y = MARGIN as isize;
+    if !options.title.is_empty() {
+        draw::text(&mut sheet, [MARGIN as isize, y], &options.title, INK, TextSize::Large);
+        y += (TextSize::Large.height() + GAP / 2) as isize;
+    }
+    legend(&mut sheet, y, &layout.legend);
+    for (i, tile) in tiles.iter().enumerate() {
+        let [x, y] = layout.place(i);
+        draw::paste(&mut sheet, [x, y], &tile.drawn());
+        let below = y + layout.cell[1] - TextSize::Small.height();
+        draw::text(&mut sheet, [x as isize, below as isize], &tile.caption, PALE_INK, TextSize::Small);
+    }
+    sheet
+}
+
+/// The contact sheet of a dataset on disk: at most `most` of its pictures, evenly spread.
+///
+/// # Errors
+/// When the folder is no dataset, or was written without the [`Pictures`](crate::dataset::Pictures) or the
+/// [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
+pub fn contact_sheet_of(folder: &Path, most: usize, options: &SheetOptions) -> Result<Image<Srgb8>> {
+    let identity = folder::identity(folder)?;
+    let identity = identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
+    let classes: Vec<String> = serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
+    let lines = lines_of(folder)?;
+    let shown = most.min(lines.len());
+    let chosen: Vec<&Line> = (0..shown).map(|i| &lines[i * lines.len() / shown]).collect();
+    let tiles: Result<Vec<_>> = chosen.par_iter().map(|line| tile(folder, line, options)).collect();
+    Ok(contact_sheet(&tiles?, &classes, options))
+}
+
+fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
+    let file = |kind: &str| {
+        let file = line.files.iter().find(|file| file.path.starts_with(kind));
+        file.map(|f| folder.join(&f.path))
+            .ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
+    };
+    let picture = io::read::<LinearRgb>(file("images/")?)?;
+    let record: Record = io::read_json(file("scenes/")?)?;
+    let part = if line.part == Part::Val { "val  " } else { "train" };
+    let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
+    let caption = format!("{:06} {part} {labelled}/{all} labelled", line.k);
+    Ok(Tile::new(&picture, record.labels, record.labelled, caption, options.picture_width))
+}
+
+/// Where everything is on a sheet, pixels.
+struct Layout {
+    width: usize,
+    height: usize,
+    columns: usize,
+    /// Size of a picture with its caption.
+    cell: [usize; 2],
+    /// Top of the first row.
+    top: usize,
+    legend: Vec<LegendEntry>,
+}
+
+impl Layout {
+    fn of(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Self {
+        let text = TextSize::Small;
+        let widest = tiles.iter().map(|t| t.picture.width().max(text.width(&t.caption))).max().unwrap_or(0);
+        let highest = tiles.iter().map(|t| t.picture.height()).max().unwrap_or(0);
+        let cell = [widest, highest + CAPTION_GAP + text.height()];
+        let columns = match options.columns {
+            0 => pleasing_columns(tiles.len(), cell),
+            n => n.min(tiles.len().max(1)),
+        };
+        let row = (columns * (cell[0] + GAP)).saturating_sub(GAP);
+        let title = TextSize::Large.width(&options.title);
+        let legend = entries(classes, tiles, row.max(title));
+        let wide = legend.iter().map(|e| e.x + e.width()).max().unwrap_or(0);
+        let title_height = if options.title.is_empty() { 0 } else { TextSize::Large.height() + GAP / 2 };
+        let legend_lines = legend.last().map_or(0, |e| e.line + 1);
+        let top = MARGIN + title_height + legend_lines * LEGEND_LINE + GAP;
+        let rows = tiles.len().div_ceil(columns);
+        let height = top + rows * (cell[1] + GAP) + MARGIN - GAP;
+        Self { width: row.max(title).max(wide) + 2 * MARGIN, height, columns, cell, top, legend }
+    }
+
+    /// Top left corner of a picture.
+    fn place(&self, i: usize) -> [usize; 2] {
+        let [column, row] = [i % self.columns, i / self.columns];
+        [MARGIN + column * (self.cell[0] + GAP), self.top + row * (self.cell[1] + GAP)]
+    }
+}
+
+/// The number of columns with which a sheet comes closest to 3:2, the shape of screens; an empty place at its end weighs
+/// as much as being too wide by two pictures.
+fn pleasing_columns(count: usize, [w, h]: [usize; 2]) -> usize {
+    let off = |columns: &usize| {
+        let rows = count.div_ceil(*columns);
+        let empty = columns * rows - count;
+        (2 * columns * (w + GAP)).abs_diff(3 * rows * (h + GAP)) + 4 * empty * (w + GAP)
+    };
+    (1..=count.max(1)).min_by_key(off).unwrap_or(1)
+}
+
+/// Height of a line of the legend, and of its colour mark.
+const LEGEND_LINE: usize = 24;
+const MARK: usize = 12;
+
+struct LegendEntry {
+    color: Srgb8,
+    text: String,
+    /// Pixels from the margin.
+    x: usize,
+    line: usize,
+}
+
+impl LegendEntry {
+    fn width(&self) -> usize {
+        MARK + 8 + TextSize::Small.width(&self.text)
+    }
+}
+
+/// The legend's entries, in as many lines as they need within a width.
+fn entries(classes: &[String], tiles: &[Tile], width: usize) -> Vec<LegendEntry> {
+    let count = |keep: &dyn Fn(&ObjectLabel, bool) -> bool| {
+        let objects = tiles.iter().flat_map(|t| t.labels.objects.iter().map(|o| (o, t.labelled.contains(&o.id))));
+        objects.filter(|&(o, has)| keep(o, has)).count()
+    };
+    let class = |(i, name): (usize, &String)| {
+        let n = count(&|o, has| has && o.class as usize == i);
+        (draw::class_color(i as u32), format!("{name} ({n})"))
+    };
+    let unlabelled = count(&|_, has| !has);
+    let last = (UNLABELLED, format!("no label, another lies over it ({unlabelled})"));
+    let mut placed: Vec<LegendEntry> = Vec::new();
+    for (color, text) in classes.iter().enumerate().map(class).chain([last]) {
+        let next = placed.last().map_or((0, 0), |e| (e.x + e.width() + 2 * GAP, e.line));
+        let mut entry = LegendEntry { color, text, x: next.0, line: next.1 };
+        if entry.x > 0 && entry.x + entry.width() > width {
+            (entry.x, entry.line) = (0, next.1 + 1);
+        }
+        placed.push(entry);
+    }
+    placed
+}
+
+fn legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
+    for entry in entries {
+        let x = (MARGIN + entry.x) as isize;
+        let y = top + (entry.line * LEGEND_LINE) as isize;
+        let down = ((TextSize::Small.height() - MARK) / 2) as isize;
+        draw::fill(sheet, [x, y + down], [MARK, MARK], entry.color);
+        draw::text(sheet, [x + MARK as isize + 8, y], &entry.text, INK, TextSize::Small);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_is_wider_than_high_and_has_no_hole_where_that_is_possible() {
+        assert_eq!(pleasing_columns(24, [320, 260]), 6);
+        assert_eq!(pleasing_columns(16, [320, 260]), 4);
+        assert_eq!(pleasing_columns(1, [320, 260]), 1);
+        assert_eq!(pleasing_columns(0, [0, 0]), 1);
+    }
+
+    #[test]
+    fn a_sheet_without_pictures_still_has_its_legend() {
+        let sheet = contact_sheet(&[], &["cap".into()], &SheetOptions::default());
+        assert!(sheet.pixels().contains(&draw::class_color(0)));
+    }
+
+    #[test]
+    fn a_small_picture_is_not_made_larger() {
+        let picture = Image::filled(40, 30, LinearRgb::WHITE);
+        let tile = |width| Tile::new(&picture, Labels::default(), Vec::new(), String::new(), width).picture;
+        assert_eq!((tile(320).size(), tile(20).size()), ((40, 30), (20, 15)));
+    }
+
+    #[test]
+    fn a_narrow_legend_goes_on_in_the_next_line() {
+        let classes = ["cap_label", "cap", "label", "none"].map(String::from);
+        let narrow = entries(&classes, &[], 250);
+        assert!(narrow.iter().all(|e| e.x == 0 || e.x + e.width() <= 250));
+        assert!(narrow.last().expect("five entries").line >= 2);
+    }
+}

@@ -1,0 +1,63 @@
+//! The images of a dataset.
+
+use crate::dataset::{Entry, Part, Writer};
+use crate::error::Result;
+use crate::io;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind the objects, and on
+/// request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Pictures {
+    /// Format. Default: `png`.
+    pub format: PictureFormat,
+    /// Also write the scene-linear picture with its alpha. Default: no.
+    pub exr: bool,
+}
+
+/// Format of the images that trainers read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PictureFormat {
+    /// Without loss.
+    #[default]
+    Png,
+    /// Smaller.
+    Jpg,
+}
+
+impl PictureFormat {
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Png => "png",
+            Self::Jpg => "jpg",
+        }
+    }
+}
+
+impl Writer for Pictures {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "pictures": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        let kinds = if self.exr { &["images", "exr"][..] } else { &["images"] };
+        for dir in kinds.iter().flat_map(|kind| Part::ALL.map(|part| folder.join(kind).join(part.name()))) {
+            io::create_folder(&dir)?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let mut paths = vec![entry.path("images", self.format.extension())];
+        io::write(folder.join(&paths[0]), &entry.sample.frame.map(|p| p.color()))?;
+        if self.exr {
+            let exr = entry.path("exr", "exr");
+            io::write(folder.join(&exr), &entry.sample.frame)?;
+            paths.push(exr);
+        }
+        Ok(paths)
+    }
+}

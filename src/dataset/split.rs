@@ -1,0 +1,104 @@
+//! Which samples are for training and which for validation.
+
+use serde::{Deserialize, Serialize};
+
+/// A part of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// For training.
+    Train,
+    /// For validation.
+    Val,
+}
+
+impl Part {
+    /// Both parts.
+    pub const ALL: [Self; 2] = [Self::Train, Self::Val];
+
+    /// The name of its folders.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Val => "val",
+        }
+    }
+}
+
+/// How samples are shared out: by number alone, so the split is the same on every machine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Split {
+    /// Samples for validation, percent. Default: 20.
+    pub val_percent: u8,
+    /// Which ones those are. Default: `interleaved`.
+    pub order: SplitOrder,
+}
+
+impl Default for Split {
+    fn default() -> Self {
+        Self { val_percent: 20, order: SplitOrder::Interleaved }
+    }
+}
+
+/// Which samples are for validation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SplitOrder {
+    /// Evenly spread: at 20 percent every fifth, 0, 5, 10, ...; does not depend on how many samples there are.
+    #[default]
+    Interleaved,
+    /// The last ones, as the paper splits its series of real photos.
+    Consecutive,
+}
+
+impl Split {
+    /// The part of sample `k` of `count`.
+    pub fn part(&self, k: u64, count: u64) -> Part {
+        let percent = 100 - u128::from(self.val_percent.min(100));
+        let train_before = |n: u64| u128::from(n) * percent / 100;
+        let is_val = match self.order {
+            SplitOrder::Interleaved => train_before(k.saturating_add(1)) == train_before(k),
+            SplitOrder::Consecutive => u128::from(k) >= train_before(count),
+        };
+        if is_val { Part::Val } else { Part::Train }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn count(split: Split, n: u64) -> usize {
+        (0..n).filter(|&k| split.part(k, n) == Part::Val).count()
+    }
+
+    #[test]
+    fn five_thousand_samples_give_four_thousand_to_train_on() {
+        for order in [SplitOrder::Interleaved, SplitOrder::Consecutive] {
+            assert_eq!(count(Split { val_percent: 20, order }, 5000), 1000);
+        }
+    }
+
+    #[test]
+    fn every_fifth_sample_is_for_validation() {
+        let val: Vec<_> = (0..20).filter(|&k| Split::default().part(k, 20) == Part::Val).collect();
+        assert_eq!(val, [0, 5, 10, 15]);
+    }
+
+    #[test]
+    fn a_consecutive_split_cuts_once_and_like_the_paper() {
+        let split = Split { val_percent: 20, order: SplitOrder::Consecutive };
+        let parts: Vec<_> = (0..2031).map(|k| split.part(k, 2031)).collect();
+        assert_eq!(parts.iter().filter(|&&p| p == Part::Val).count(), 407);
+        assert!(parts.is_sorted_by_key(|p| p.name()));
+    }
+
+    #[test]
+    fn none_or_all_may_be_for_validation() {
+        for order in [SplitOrder::Interleaved, SplitOrder::Consecutive] {
+            assert_eq!(count(Split { val_percent: 0, order }, 7), 0);
+            assert_eq!(count(Split { val_percent: 100, order }, 7), 7);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The pipeline: recipe and number in, labelled picture out.
+
+use crate::asset::{Asset, Library};
+use crate::camera;
+use crate::composite;
+use crate::dataset::place::Place;
+use crate::dataset::{Sample, Setup};
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::label;
+use crate::light;
+use crate::pixel::LinearRgb;
+use crate::render;
+use crate::scene::{Background, Choice, Draws, Look, Object, Scene, Shot};
+use std::sync::Arc;
+
+/// Everything that pictures are made from, opened once: assets, labelled photos, options.
+#[derive(Debug)]
+pub struct Studio {
+    setup: Setup,
+    library: Library,
+    places: Vec<Place>,
+    backgrounds: Vec<Background>,
+    stock: Vec<Choice>,
+}
+
+/// Scenes that will not settle are drawn again this often.
+const REDRAWS: u32 = 8;
+
+impl Studio {
+    /// Opens the folders that a setup names.
+    ///
+    /// # Errors
+    /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
+    pub fn open(setup: Setup) -> Result<Self> {
+        let library = Library::open(&setup.assets)?;
+        let places = Place::all(&setup.backgrounds, setup.scene.image)?;
+        let backgrounds = places.iter().map(|place| place.background.clone()).collect();
+        let stock = library.assets.iter().map(choice).collect();
+        Ok(Self { setup, library, places, backgrounds, stock })
+    }
+
+    /// What it was opened from.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// The assets.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// Scene `k` as the recipe draws it: objects still in the air, exposure still open.
+    ///
+    /// # Errors
+    /// As [`Recipe::scene`](crate::scene::Recipe::scene).
+    pub fn draw(&self, seed: u64, k: u64) -> Result<Scene> {
+        self.setup.scene.scene(seed, k, &self.backgrounds, &self.stock)
+    }
+
+    /// Sample `k`: a pure function of what was opened, `seed` and `k`.
+    ///
+    /// # Errors
+    /// Files that cannot be read; objects that would not come to rest in any of several scenes.
+    pub fn sample(&self, seed: u64, k: u64) -> Result<Sample> {
+        let mut retries = 0;
+        loop {
+            let scene = self.draw(redraw_seed(seed, k, retries), k)?;
+            match self.take(scene) {
+                Ok(sample) => return Ok(Sample { retries, ..sample }),
+                Err(Error::Unsettled { what }) if retries < REDRAWS => {
+                    log::info!("scene {k} is drawn again: {what}");
+                    retries += 1;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Finds out what is unknown in a scene, renders it and labels it.
+    ///
+    /// # Errors
+    /// As the stages: no camera, no rest, a name that is not in the folders.
+    pub fn take(&self, scene: Scene) -> Result<Sample> {
+        let (scene, shot) = self.resolve(scene)?;
+        let deep = render::cast(&shot, &self.setup.render);
+        let frame = composite::frame(&deep, shot.plate.as_deref());
+        let labels = label::label(&deep, &shot, &self.setup.label);
+        Ok(Sample { frame, labels, scene, retries: 0 })
+    }
+
+    /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its exposure.
+    ///
+    /// # Errors
+    /// As [`take`](Self::take).
+    pub fn resolve(&self, scene: Scene) -> Result<(Scene, Shot)> {
+        let plate = self.plate(&scene.plate)?;
+        let mut scene = self.rest(camera::locate(scene)?)?;
+        if let Some(plate) = &plate {
+            scene = light::expose(scene, plate);
+        }
+        let shot = scene.resolve(|object| self.look(object), plate)?;
+        render::check(&shot)?;
+        Ok((scene, shot))
+    }
+
+    #[cfg(feature = "settle")]
+    fn rest(&self, scene: Scene) -> Result<Scene> {
+        crate::settle::settle(scene, &self.setup.scene.settle)?.into_scene()
+    }
+
+    #[cfg(not(feature = "settle"))]
+    fn rest(&self, scene: Scene) -> Result<Scene> {
+        Ok(scene)
+    }
+
+    fn look(&self, object: &Object) -> Option<Look> {
+        let photo = |asset: &Asset| {
+            let photo = asset.photos.get(object.photo)?;
+            Some(Look { class: asset.class, texture: photo.texture.clone(), outline_uv: photo.outline_uv.clone() })
+        };
+        self.library.find(&object.asset).and_then(photo)
+    }
+
+    fn plate(&self, name: &str) -> Result<Option<Arc<Image<LinearRgb>>>> {
+        if name.is_empty() {
+            return Ok(None);
+        }
+        match self.places.iter().find(|place| place.background.name == name) {
+            Some(place) => place.plate().map(Some),
+            None => {
+                let known: Vec<&str> = self.backgrounds.iter().map(|b| b.name.as_str()).collect();
+                Err(Error::value("plate", format!("\"{name}\", expected one of {}", known.join(", "))))
+            }
+        }
+    }
+}
+
+/// An asset as a recipe sees it.
+fn choice(asset: &Asset) -> Choice {
+    Choice {
+        asset: asset.name.clone(),
+        photo_sizes: asset.photos.iter().map(|photo| photo.size).collect(),
+        thickness: asset.thickness,
+        mass: asset.mass,
+    }
+}
+
+/// The seed of the `n`-th try of scene `k`: the first is the dataset's own.
+fn redraw_seed(seed: u64, k: u64, n: u32) -> u64 {
+    match n {
+        0 => seed,
+        n => Draws::new(seed, k).bits(&format!("redraw[{n}]")),
+    }
+}

@@ -1,0 +1,123 @@
+//! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
+
+use crate::dataset::yolo_yaml::DataYaml;
+use crate::dataset::{Entry, Part, Writer};
+use crate::error::{Error, Result};
+use crate::geom::Point2;
+use crate::io;
+use crate::label::{BBox, ObjectLabel};
+use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Least side of an image, pixels: trainers refuse smaller ones.
+pub(crate) const LEAST_SIDE_PX: u32 = 10;
+
+/// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
+///
+/// Rows of `detect` are `class cx cy w h`, of `segment` `class x1 y1 x2 y2 ...`; positions are shares of the image's
+/// width and height, 0 to 1, six decimals. An image without objects has an empty file; equal rows are written once.
+///
+/// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks for them beside the
+/// file; YOLOv5 wants `path:` added, or to be started with the dataset as its working folder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Yolo {
+    /// What is learned. Default: `detect`.
+    pub task: YoloTask,
+    /// Which box a row of `detect` holds. Default: `amodal`.
+    pub boxes: YoloBox,
+}
+
+/// What a row tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum YoloTask {
+    /// A box.
+    #[default]
+    Detect,
+    /// The outline; one row per part, where the picture's edge cuts an object into several.
+    Segment,
+}
+
+/// Which box a row holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum YoloBox {
+    /// Around the whole object as far as it lies in the picture.
+    #[default]
+    Amodal,
+    /// Around what is seen of it; an object of which nothing is seen has no row.
+    Visible,
+}
+
+impl Writer for Yolo {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "yolo": self })
+    }
+
+    fn begin(&self, folder: &Path, classes: &[String]) -> Result<()> {
+        for part in Part::ALL {
+            let dir = folder.join("labels").join(part.name());
+            io::create_folder(&dir)?;
+        }
+        io::write_text(folder.join("data.yaml"), &DataYaml::write(classes))
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let [w, h] = entry.sample.labels.image;
+        if w.min(h) < LEAST_SIDE_PX {
+            return Err(Error::value(
+                "image",
+                format!("{w} x {h} pixels, expected at least {LEAST_SIDE_PX} a side for YOLO"),
+            ));
+        }
+        let path = entry.path("labels", "txt");
+        io::write_text(folder.join(&path), &self.rows(entry))?;
+        Ok(vec![path])
+    }
+}
+
+impl Yolo {
+    /// The label file of one image.
+    fn rows(&self, entry: &Entry<'_>) -> String {
+        let image = entry.sample.labels.image.map(f64::from);
+        let mut rows: Vec<String> = Vec::new();
+        for row in entry.labelled.iter().flat_map(|object| self.rows_of(object, image)) {
+            if !rows.contains(&row) {
+                rows.push(row);
+            }
+        }
+        rows.concat()
+    }
+
+    fn rows_of(&self, object: &ObjectLabel, image: [f64; 2]) -> Vec<String> {
+        let chosen = match self.boxes {
+            YoloBox::Amodal => object.amodal_box,
+            YoloBox::Visible => object.visible_box,
+        };
+        match self.task {
+            _ if chosen.is_empty() => Vec::new(),
+            YoloTask::Detect => vec![box_row(object.class, &chosen, image)],
+            YoloTask::Segment => object.outline_px.iter().map(|ring| ring_row(object.class, ring, image)).collect(),
+        }
+    }
+}
+
+fn box_row(class: u32, b: &BBox, [w, h]: [f64; 2]) -> String {
+    let center = b.center();
+    row(class, [center.x / w, center.y / h, b.width() / w, b.height() / h])
+}
+
+fn ring_row(class: u32, ring: &[Point2<f64>], [w, h]: [f64; 2]) -> String {
+    row(class, ring.iter().flat_map(|p| [p.x / w, p.y / h]))
+}
+
+fn row(class: u32, shares: impl IntoIterator<Item = f64>) -> String {
+    let mut row = class.to_string();
+    for share in shares {
+        write!(row, " {:.6}", share.clamp(0.0, 1.0)).expect("a string takes all that is written");
+    }
+    row.push('\n');
+    row
+}

@@ -1,0 +1,116 @@
+//! The exposure that puts rendered light and a photographed plate on one scale.
+
+use crate::geom::{Point3, Vector3};
+use crate::image::Image;
+use crate::light::irradiance;
+use crate::pixel::LinearRgb;
+use crate::scene::{Exposure, Scene};
+use std::f64::consts::PI;
+
+/// Share of the plate's pixels that are darker than what counts as its white.
+///
+/// High, since white is the bright end; not the maximum, since a highlight or a dead pixel is not paper.
+const WHITE_PERCENTILE: f64 = 0.99;
+
+/// Turns [`Exposure::MatchPlate`] into [`Exposure::Ev`]; a scene whose exposure is known comes back as it is.
+///
+/// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with nothing in their way, gets
+/// the luminance of [`plate_white`], times `2^gain_ev`.
+///
+/// This is an assumption, not a measurement: one photograph does not tell which of its pixels are white paper. It holds
+/// where the photo was exposed for the place and shows something bright; the surface itself is not asked, since a tray
+/// may be of any grey. `gain_ev` is there to say otherwise. Without any light in the scene, or on a black plate, the
+/// exposure is `gain_ev` alone.
+pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    let Exposure::MatchPlate { gain_ev } = scene.exposure else { return scene };
+    let ratio = f64::from(plate_white(plate)) / f64::from(white_card(&scene));
+    let match_ev = if ratio > 0.0 && ratio.is_finite() { libm::log2(ratio) } else { 0.0 };
+    Scene { exposure: Exposure::Ev(match_ev + gain_ev), ..scene }
+}
+
+/// Luminance of the plate's white: the 99th percentile over all pixels.
+///
+/// Pixels that are not finite do not count; 0 for a plate without any other.
+pub fn plate_white(plate: &Image<LinearRgb>) -> f32 {
+    let finite = plate.pixels().iter().filter(|c| c.is_finite());
+    let mut values: Vec<_> = finite.map(|c| c.luminance()).collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let rank = ((values.len() - 1) as f64 * WHITE_PERCENTILE).round() as usize;
+    *values.select_nth_unstable_by(rank, f32::total_cmp).1
+}
+
+/// Luminance of a white card in the middle of the surface.
+fn white_card(scene: &Scene) -> f32 {
+    let at_center = |light| irradiance(light, Point3::origin(), Vector3::z()).luminance();
+    scene.lights.iter().map(at_center).sum::<f32>() / PI as f32 + scene.ambient.luminance()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::light::area::tests::square;
+    use crate::scene::{CameraSource, Surface};
+
+    fn scene(exposure: Exposure) -> Scene {
+        Scene {
+            image: [40, 30],
+            plate: "tray".into(),
+            camera: CameraSource::Rectangle {
+                corners_px: [[20.0, 20.0], [60.0, 20.0], [60.0, 40.0], [20.0, 40.0]],
+                photo: [80, 60],
+                focal_px: None,
+            },
+            surface: Surface { size: [0.4, 0.3] },
+            objects: Vec::new(),
+            lights: vec![square()],
+            ambient: LinearRgb::grey(0.1),
+            exposure,
+        }
+    }
+
+    /// Grey 0.2, a fiftieth of it paper of 0.5, one highlight of 40.
+    fn plate() -> Image<LinearRgb> {
+        let value = |i: usize| {
+            if i == 7 {
+                40.0
+            } else if i.is_multiple_of(50) {
+                0.5
+            } else {
+                0.2
+            }
+        };
+        Image::from_fn(40, 30, |x, y| LinearRgb::grey(value(40 * y + x)))
+    }
+
+    #[test]
+    fn a_known_exposure_stays() {
+        let known = scene(Exposure::Ev(1.5));
+        assert_eq!(expose(known.clone(), &plate()), known);
+    }
+
+    #[test]
+    fn a_white_card_gets_the_plate_s_white() {
+        let Exposure::Ev(ev) = expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate()).exposure else {
+            panic!("still unknown")
+        };
+        let card = 2.975061 / PI + 0.1;
+        assert!((card * libm::exp2(ev) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn exposing_twice_changes_nothing() {
+        let once = expose(scene(Exposure::MatchPlate { gain_ev: 0.0 }), &plate());
+        assert_eq!(expose(once.clone(), &plate()), once);
+    }
+
+    #[test]
+    fn darkness_and_broken_pixels_leave_the_gain_alone() {
+        let dark =
+            Scene { lights: Vec::new(), ambient: LinearRgb::BLACK, ..scene(Exposure::MatchPlate { gain_ev: 0.5 }) };
+        assert_eq!(expose(dark, &plate()).exposure, Exposure::Ev(0.5));
+        let broken = Image::filled(40, 30, LinearRgb::grey(f32::NAN));
+        assert_eq!(expose(scene(Exposure::MatchPlate { gain_ev: 0.5 }), &broken).exposure, Exposure::Ev(0.5));
+    }
+}

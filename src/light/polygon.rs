@@ -1,0 +1,67 @@
+//! Irradiance from a uniform polygon in closed form.
+
+use crate::geom::{Point3, Vector3};
+
+/// Irradiance at `point` with unit `normal` from a polygon of unit radiance: pi times the form factor.
+///
+/// `corners` in either order, of a flat convex polygon; the part below the receiver's horizon is cut off. Which side
+/// the polygon shines to is the caller's question.
+///
+/// # Method
+/// Lambert's formula: half the sum over edges of the angle that the edge subtends, times the cosine between the
+/// receiver's normal and the normal of the edge's fan triangle.
+pub fn polygon_irradiance(corners: &[Point3<f64>], point: Point3<f64>, normal: Vector3<f64>) -> f64 {
+    let rays = above_horizon(corners.iter().map(|c| c - point).collect(), normal);
+    let edges = rays.iter().zip(rays.iter().cycle().skip(1));
+    0.5 * edges.map(|(a, b)| edge(a, b, normal)).sum::<f64>().abs()
+}
+
+fn edge(a: &Vector3<f64>, b: &Vector3<f64>, normal: Vector3<f64>) -> f64 {
+    let cross = a.cross(b);
+    let length = cross.norm();
+    // An edge seen end on subtends nothing.
+    if length > 0.0 { libm::atan2(length, a.dot(b)) * normal.dot(&cross) / length } else { 0.0 }
+}
+
+/// Sutherland-Hodgman against the plane through the origin.
+fn above_horizon(rays: Vec<Vector3<f64>>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
+    let mut kept = Vec::with_capacity(rays.len() + 1);
+    for (i, a) in rays.iter().enumerate() {
+        let b = &rays[(i + 1) % rays.len()];
+        let (ha, hb) = (normal.dot(a), normal.dot(b));
+        if ha >= 0.0 {
+            kept.push(*a);
+        }
+        if (ha > 0.0 && hb < 0.0) || (ha < 0.0 && hb > 0.0) {
+            kept.push(a.lerp(b, ha / (ha - hb)));
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(half: f64, z: f64) -> [Point3<f64>; 4] {
+        [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| Point3::new(x, y, z))
+    }
+
+    #[test]
+    fn an_endless_ceiling_gives_pi() {
+        let e = polygon_irradiance(&square(1e6, 1.0), Point3::origin(), Vector3::z());
+        assert!((e - std::f64::consts::PI).abs() < 1e-5);
+    }
+
+    #[test]
+    fn half_of_the_ceiling_lights_a_wall() {
+        let e = polygon_irradiance(&square(1e6, 1.0), Point3::origin(), Vector3::x());
+        assert!((e - std::f64::consts::FRAC_PI_2).abs() < 1e-5);
+    }
+
+    #[test]
+    fn nothing_comes_from_below_the_horizon() {
+        assert_eq!(polygon_irradiance(&square(1.0, -1.0), Point3::origin(), Vector3::z()), 0.0);
+        assert_eq!(polygon_irradiance(&[], Point3::origin(), Vector3::z()), 0.0);
+    }
+}

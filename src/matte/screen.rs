@@ -1,0 +1,82 @@
+//! The colour of the screen, from what the object leaves free of it.
+
+use crate::error::{Error, Result};
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::{Coverage, LinearRgb};
+
+/// Width of the zone around the object that is not asked, as a share of the longer side: contact shadows and spill.
+const MARGIN: f64 = 0.02;
+
+/// Mean scene-linear colour of a photo outside a mask and a margin around it (2 % of the longer side).
+///
+/// Where the margin leaves nothing, the mask alone is left out.
+///
+/// # Errors
+/// [`Error::Photo`] when the mask leaves no background.
+/// # Panics
+/// When the sizes differ.
+pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<LinearRgb> {
+    let far = background(mask, MARGIN);
+    let found = mean(photo, &far).or_else(|| mean(photo, &background(mask, 0.0)));
+    found.ok_or_else(|| Error::Photo { what: "the object leaves no background to take the screen colour from".into() })
+}
+
+/// The pixels outside a mask and a margin around it.
+pub(super) fn screen_pixels(mask: &Image<Coverage>) -> Image<bool> {
+    background(mask, MARGIN)
+}
+
+fn background(mask: &Image<Coverage>, margin: f64) -> Image<bool> {
+    let margin_px = margin * mask.width().max(mask.height()) as f64;
+    filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).map(|near| !near)
+}
+
+/// Sums in double precision and in the order of the pixels: the same at any thread count.
+fn mean(photo: &Image<LinearRgb>, set: &Image<bool>) -> Option<LinearRgb> {
+    assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
+    let (mut sum, mut count) = ([0.0; 3], 0u64);
+    for (p, _) in photo.pixels().iter().zip(set.pixels()).filter(|(_, inside)| **inside) {
+        let channels: [f32; 3] = (*p).into();
+        for (s, c) in sum.iter_mut().zip(channels) {
+            *s += f64::from(c);
+        }
+        count += 1;
+    }
+    (count > 0).then(|| sum.map(|s| (s / count as f64) as f32).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREEN: LinearRgb = LinearRgb::new(0.05, 0.4, 0.1);
+
+    fn disc(size: usize, radius: usize) -> Image<Coverage> {
+        let half = size / 2;
+        let inside = |x: usize, y: usize| x.abs_diff(half).pow(2) + y.abs_diff(half).pow(2) <= radius * radius;
+        Image::from_fn(size, size, |x, y| Coverage(f32::from(u8::from(inside(x, y)))))
+    }
+
+    #[test]
+    fn the_object_and_what_is_near_it_are_not_asked() {
+        let mask = disc(200, 50);
+        let spill = filter::dilate(&mask.map(|c| c.0 > 0.0), 3.0);
+        let photo = spill.map(|near| if near { LinearRgb::WHITE } else { GREEN });
+        let found = screen_color(&photo, &mask).unwrap();
+        assert!((found.g - GREEN.g).abs() < 1e-6 && (found.r - GREEN.r).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_thin_rim_of_background_is_enough() {
+        let mask = Image::from_fn(100, 100, |x, _| Coverage(if x == 0 { 0.0 } else { 1.0 }));
+        let photo = mask.map(|c| if c.0 > 0.0 { LinearRgb::WHITE } else { GREEN });
+        assert_eq!(screen_color(&photo, &mask).unwrap(), GREEN);
+    }
+
+    #[test]
+    fn no_background_is_an_error() {
+        let full = Image::filled(40, 40, Coverage(1.0));
+        assert!(screen_color(&Image::filled(40, 40, GREEN), &full).is_err());
+    }
+}

@@ -1,0 +1,117 @@
+//! The convex hull of a set of pixels, and the pixels under a convex polygon.
+
+use crate::geom::Point2;
+use crate::image::Image;
+use crate::pixel::Coverage;
+use geo::{Area, ConvexHull, MultiPoint, Point};
+use rayon::prelude::*;
+
+/// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where there is no area.
+///
+/// It goes through the pixels' centres: an edge marks the pixel on either side of it, so that the outer one's centre is
+/// nearer to the edge than its outer corner. Where a pixel lies on the border of the picture, so does the hull.
+pub(super) fn convex_hull(edges: &Image<bool>) -> Vec<Point2<f64>> {
+    let ends = edges.rows().enumerate().filter_map(|(y, row)| {
+        let first = row.iter().position(|p| *p)?;
+        let last = row.iter().rposition(|p| *p)?;
+        Some([(first, y), (last, y)])
+    });
+    let (w, h) = edges.size();
+    let point = |(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h));
+    let hull = ends.flatten().map(point).collect::<MultiPoint>().convex_hull();
+    if hull.unsigned_area() <= 0.0 {
+        return Vec::new();
+    }
+    // geo goes counter-clockwise with y up, which is clockwise as seen, and repeats the first point.
+    let (ring, _) = hull.into_inner();
+    let closed = ring.into_inner();
+    closed.iter().skip(1).map(|c| Point2::new(c.x, c.y)).collect()
+}
+
+fn center_or_border(i: usize, len: usize) -> f64 {
+    match i {
+        0 => 0.0,
+        _ if i + 1 == len => len as f64,
+        _ => i as f64 + 0.5,
+    }
+}
+
+/// Scan lines per row of pixels; each contributes exact spans, so only slanted edges are approximated.
+const LINES: usize = 8;
+
+/// The share of every pixel that lies inside a convex polygon (pixel-corner coordinates).
+pub(super) fn coverage(polygon: &[Point2<f64>], width: usize, height: usize) -> Image<Coverage> {
+    let mut image = Image::new(width, height);
+    image.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for line in 0..LINES {
+            let at = y as f64 + (line as f64 + 0.5) / LINES as f64;
+            if let Some((x0, x1)) = span(polygon, at) {
+                add_span(row, x0, x1);
+            }
+        }
+    });
+    image
+}
+
+fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
+    let first = (x0.max(0.0) as usize).min(row.len());
+    let end = (x1.max(0.0).ceil() as usize).min(row.len());
+    for (x, pixel) in row[..end].iter_mut().enumerate().skip(first) {
+        let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
+        pixel.0 += overlap.clamp(0.0, 1.0) as f32 / LINES as f32;
+    }
+}
+
+/// Where the horizontal line at `y` is inside a convex polygon.
+fn span(polygon: &[Point2<f64>], y: f64) -> Option<(f64, f64)> {
+    let next = polygon.iter().cycle().skip(1);
+    let crossings = polygon.iter().zip(next).filter(|(a, b)| (a.y <= y) != (b.y <= y));
+    let xs = crossings.map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x));
+    xs.fold(None, |span, x| match span {
+        None => Some((x, x)),
+        Some((low, high)) => Some((x.min(low), x.max(high))),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hull_goes_through_centres_and_clockwise() {
+        let set = Image::from_fn(8, 8, |x, y| matches!((x, y), (2, 1) | (5, 1) | (2, 4) | (5, 4) | (3, 2)));
+        let mut hull = convex_hull(&set);
+        let start = hull.iter().position(|p| *p == Point2::new(2.5, 1.5)).unwrap();
+        hull.rotate_left(start);
+        assert_eq!(hull, [[2.5, 1.5], [5.5, 1.5], [5.5, 4.5], [2.5, 4.5]].map(Point2::from));
+    }
+
+    #[test]
+    fn the_hull_reaches_a_border_that_the_object_reaches() {
+        let hull = convex_hull(&Image::filled(8, 6, true));
+        let mut corners: Vec<_> = hull.iter().map(|p| (p.x as i32, p.y as i32)).collect();
+        corners.sort_unstable();
+        assert_eq!(corners, [(0, 0), (0, 6), (8, 0), (8, 6)]);
+    }
+
+    #[test]
+    fn what_has_no_area_has_no_hull() {
+        assert!(convex_hull(&Image::filled(4, 4, false)).is_empty());
+        assert!(convex_hull(&Image::from_fn(9, 9, |x, y| x == y && x > 2)).is_empty());
+    }
+
+    #[test]
+    fn coverage_sums_to_the_area() {
+        let triangle = [Point2::new(1.0, 1.0), Point2::new(9.0, 2.5), Point2::new(3.0, 8.0)];
+        let sum: f32 = coverage(&triangle, 10, 10).pixels().iter().map(|c| c.0).sum();
+        let area = 0.5 * (8.0 * 7.0 - 2.0 * 1.5);
+        assert!((f64::from(sum) - area).abs() < 0.1, "{sum} against {area}");
+    }
+
+    #[test]
+    fn a_polygon_outside_the_picture_covers_its_inside_part() {
+        let square = [Point2::new(-5.0, -5.0), Point2::new(2.0, -5.0), Point2::new(2.0, 2.0), Point2::new(-5.0, 2.0)];
+        let sum: f32 = coverage(&square, 4, 4).pixels().iter().map(|c| c.0).sum();
+        assert_eq!(sum, 4.0);
+    }
+}

@@ -1,0 +1,123 @@
+//! A shot becomes deep samples, fast.
+
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use crate::render::irradiance::{Lattice, Map, Receiver, maps};
+use crate::render::layers::{Block, Ground, Layer, Painted, Samples, Stack};
+use crate::render::pixel_filter::{left_over_sigma, quantiles};
+use crate::render::shadow::{Casters, rows_and_columns};
+use crate::render::texture::Baked;
+use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::render::{DeepImage, RenderOptions};
+use crate::scene::{Card, Shot};
+use rayon::prelude::*;
+
+/// Side of the blocks that the picture is put together from, pixels.
+const TILE: usize = 16;
+
+/// Sub-samples a side from which on a sharper level of detail pays (rendering.md, section 7.2).
+const DENSE: usize = 4;
+
+/// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
+///
+/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are not, and
+/// numbers in `options` are brought into the range that works. Ask [`check`](super::check) about shots from outside.
+///
+/// # Method
+/// rendering.md, section 7. Departs from it by keeping irradiance on a lattice in the picture instead of one on each
+/// receiver, by mixing two texture levels once instead of at each reading, and by ordering cards block by block.
+pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    let options = options.clamped();
+    let view = View::of(&shot.camera);
+    let lattice = Lattice::new(&view, options.cell_px);
+    let offsets = quantiles(options.subsamples);
+    let cards = sheets(shot);
+    let casters = Casters::new(&cards, Sheet::surface(shot.catcher));
+
+    let looks: Vec<_> = cards.par_iter().map(|(card, sheet)| Look::of(card, sheet, &view, &offsets)).collect();
+    let receiver = |k: usize| match looks.get(k) {
+        Some(look) => Receiver::card(k, look.as_ref()?.texture.grid.reach, &lattice, &casters, shot, &options),
+        None => Receiver::surface(&lattice, &casters, shot, &options),
+    };
+    let receivers: Vec<_> = (0..=cards.len()).into_par_iter().map(receiver).collect();
+    let mut lights = maps(&receivers);
+
+    let share = lights.pop().flatten();
+    let together = cards.iter().zip(looks).zip(lights);
+    let layers = together.filter_map(|(((card, _), look), light)| Some(look?.layer(card, light?))).collect();
+    let ground = Ground { seen: Seen::of(&casters.surface, &view), share };
+    let samples =
+        Samples { columns: lattice.places(view.width, &offsets), rows: lattice.places(view.height, &offsets), offsets };
+    let stack = Stack { layers, ground, samples, exposure: shot.exposure };
+    assemble(&view, &tiles(&view).into_par_iter().map(|tile| stack.paint(tile)).collect::<Vec<_>>())
+}
+
+/// A card in the picture, before it is lit.
+struct Look {
+    seen: Seen,
+    texture: Baked,
+    columns: std::ops::Range<usize>,
+    rows: std::ops::Range<usize>,
+}
+
+impl Look {
+    /// None for a card that is edge-on or outside the picture.
+    fn of(card: &Card, sheet: &Sheet, view: &View, offsets: &[f64]) -> Option<Self> {
+        let seen = Seen::of(sheet, view)?;
+        let (rows, columns) = rows_and_columns(sheet, [0.0; 2], view);
+        if rows.is_empty() || columns.is_empty() {
+            return None;
+        }
+        let texture = Baked::new(card, level(card, sheet, &seen, view, offsets));
+        let (rows, columns) = rows_and_columns(sheet, texture.grid.reach, view);
+        Some(Self { seen, texture, columns, rows })
+    }
+
+    fn layer(self, card: &Card, light: Map) -> Layer {
+        let Self { seen, texture, columns, rows } = self;
+        Layer { id: card.id, seen, texture, light, columns, rows }
+    }
+}
+
+/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the texture's own filter covers.
+///
+/// A level read bilinearly has variance `4^level / 4` texels.
+fn level(card: &Card, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[f64]) -> f64 {
+    let image = card.texture.base();
+    let texels = (image.width() * image.height()) as f64;
+    let per_pixel = seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
+    let dense = if offsets.len() >= DENSE { 0.25 } else { 0.0 };
+    let level = libm::log2(2.0 * left_over_sigma(offsets) * per_pixel) - dense;
+    // A NaN from a card that fills the horizon reads the full texture.
+    level.clamp(0.0, 32.0).max(0.0)
+}
+
+fn tiles(view: &View) -> Vec<Block> {
+    let cuts = |len: usize| (0..len).step_by(TILE).map(move |a| a..(a + TILE).min(len));
+    cuts(view.height).flat_map(|y| cuts(view.width).map(move |x| Block { x, y: y.clone() })).collect()
+}
+
+/// Puts the tiles' pixels in order.
+fn assemble(view: &View, painted: &[Painted]) -> DeepImage {
+    let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
+    for p in painted {
+        let Some(values) = &p.shadow else { continue };
+        for (y, line) in p.block.y.clone().zip(values.chunks_exact(p.block.x.len())) {
+            shadow.row_mut(y)[p.block.x.clone()].copy_from_slice(line);
+        }
+    }
+    DeepImage::from_samples(shadow, painted.iter().flat_map(|p| &p.samples).copied())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Vector3;
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let view = View { eye: Vector3::zeros(), ray: nalgebra::Matrix3::identity(), width: 37, height: 17 };
+        let area: usize = tiles(&view).iter().map(|t| t.x.len() * t.y.len()).sum();
+        assert_eq!(area, 37 * 17);
+    }
+}

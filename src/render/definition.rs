@@ -1,0 +1,462 @@
+//! The definition's own tests: the numbers that both ways of rendering must hit.
+
+use crate::camera::Camera;
+use crate::composite;
+use crate::filter::Pyramid;
+use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use crate::image::Image;
+use crate::light;
+use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+use crate::render::{DeepImage, Quality, RenderOptions, cast, check, reference};
+use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// A camera at height 1 over the surface, looking straight down; picture up is world `+y`.
+fn above(width: u32, height: u32, focal_px: f64) -> Camera {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    Camera {
+        image: [width, height],
+        focal_px: Vector2::repeat(focal_px),
+        principal_px: Point2::new(0.5 * f64::from(width), 0.5 * f64::from(height)),
+        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+    }
+}
+
+/// The light of section 8, test 1.
+fn square_light() -> AreaLight {
+    AreaLight {
+        shape: LightShape::Rectangle,
+        position: [0.3, 0.2, 0.9],
+        target: [0.0; 3],
+        size: [0.4; 2],
+        power: 10.0,
+        color: LinearRgb::WHITE,
+    }
+}
+
+fn card(id: u32, center: [f64; 3], rotation: UnitQuaternion<f64>, size: [f64; 2], texture: Image<PremulRgba>) -> Card {
+    Card {
+        id: ObjectId(id),
+        class: 0,
+        quad: Quad { world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation), size },
+        texture: Arc::new(Pyramid::new(texture)),
+        outline_uv: Arc::new([]),
+        grade: Grade::default(),
+    }
+}
+
+/// A level card of one colour, with enough texels that the fade at its edge is nothing.
+fn level(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
+    card(id, center, UnitQuaternion::identity(), [size; 2], Image::filled(256, 256, texel))
+}
+
+fn grey(alpha: f32) -> PremulRgba {
+    PremulRgba::new(0.5 * alpha, 0.5 * alpha, 0.5 * alpha, alpha)
+}
+
+/// One ray per pixel, many light samples.
+fn sharp() -> RenderOptions {
+    RenderOptions { subsamples: 1, light_samples: 64, ambient_samples: 16, cell_px: 0.5 }
+}
+
+/// The factor at a point of the surface, looked at from right above.
+fn factor_at(shot: &Shot, options: &RenderOptions, way: fn(&Shot, &RenderOptions) -> DeepImage, x: f64, y: f64) -> f32 {
+    let mut camera = above(3, 3, 1e6);
+    camera.camera_from_world.translation.vector.x = -x;
+    camera.camera_from_world.translation.vector.y = y;
+    way(&Shot { camera, ..shot.clone() }, options).shadow()[(1, 1)].g
+}
+
+#[test]
+fn shadows_of_a_square_hit_the_published_numbers() {
+    let expected = [
+        ([0.0, 0.0], 0.0, 0.40000),
+        ([0.02, 0.03], 0.04667, 0.42800),
+        ([-0.05, 0.0], 0.92849, 0.95709),
+        ([0.05, 0.05], 0.42289, 0.65373),
+    ];
+    for ([x, y], opaque, translucent) in expected {
+        for (alpha, s) in [(1.0, opaque), (0.6, translucent)] {
+            let shot = Shot::new(above(3, 3, 100.0)).with_light(square_light());
+            let caster = level(1, [0.06, 0.02, 0.1], 0.1, grey(alpha));
+            // The card would hide the surface from above; looked at from a slant it is out of the way.
+            let shot = seen_from_the_side(shot.with_card(caster), x, y);
+            for way in [cast, reference] {
+                let found = way(&shot, &sharp()).shadow()[(1, 1)].g;
+                assert!((found - s).abs() < 0.01, "({x}, {y}), alpha {alpha}: {found} against {s}");
+            }
+        }
+    }
+}
+
+/// The same shot seen along a low ray from `-x`, `-y`, with the surface point in the middle pixel.
+fn seen_from_the_side(mut shot: Shot, x: f64, y: f64) -> Shot {
+    let target = Point3::new(x, y, 0.0);
+    let eye = target + Vector3::new(-1.0, -0.8, 0.35);
+    let world_from_camera = Pose::face_towards(&eye, &target, &Vector3::new(0.0, 0.0, -1.0));
+    shot.camera = Camera { camera_from_world: world_from_camera.inverse(), ..above(3, 3, 1e5) };
+    shot.camera.principal_px = Point2::new(1.5, 1.5);
+    shot
+}
+
+#[test]
+fn far_from_any_card_the_factor_is_exactly_one() {
+    let shot = Shot::new(above(3, 3, 100.0))
+        .with_light(square_light())
+        .with_ambient(LinearRgb::new(0.1, 0.2, 0.3))
+        .with_card(level(1, [0.06, 0.02, 0.1], 0.1, grey(1.0)));
+    let lit_only = Shot { ambient: LinearRgb::BLACK, ..shot };
+    assert_eq!(factor_at(&lit_only, &sharp(), cast, -0.6, -0.6), 1.0);
+    assert_eq!(factor_at(&lit_only, &sharp(), reference, -0.6, -0.6), 1.0);
+}
+
+#[test]
+fn each_layer_takes_its_share() {
+    for n in [1, 4, 10] {
+        let mut shot = Shot::new(above(5, 5, 50.0)).with_light(square_light());
+        for k in 0..n {
+            let z = 0.1 + 0.01 * f64::from(k);
+            shot = shot.with_card(level(k + 1, [0.0, 0.0, z], 4.0, grey(0.2)));
+        }
+        for way in [cast, reference] {
+            let deep = way(&shot, &RenderOptions::default());
+            let left = 0.8f32.powi(n as i32);
+            // All cards cover the whole light: the surface keeps the same share, the eye sees it through the same.
+            assert!((deep.shadow()[(2, 2)].r - left).abs() < 1e-5, "{n} layers, light");
+            let samples = deep.at(2, 2);
+            assert!((1.0 - samples.iter().map(|s| s.visible).sum::<f32>() - left).abs() < 1e-5, "{n} layers, eye");
+            let ids: Vec<_> = samples.iter().map(|s| s.object.0).collect();
+            assert_eq!(ids, (1..=n).rev().collect::<Vec<_>>());
+            for (above, s) in samples.iter().enumerate() {
+                assert!((s.visible - 0.2 * 0.8f32.powi(above as i32)).abs() < 1e-5 && (s.alpha - 0.2).abs() < 1e-5);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lit_card_is_as_bright_as_the_closed_form_says() {
+    let shot = Shot::new(above(5, 5, 400.0)).with_light(square_light()).with_card(level(
+        1,
+        [0.0, 0.0, 0.0],
+        1.0,
+        PremulRgba::new(0.4, 0.3, 0.2, 1.0),
+    ));
+    for way in [cast, reference] {
+        let c = way(&shot, &Quality::Fast.options()).at(2, 2)[0].light;
+        let e = 2.975061 / std::f32::consts::PI;
+        assert!((c.r - 0.4 * e).abs() < 2e-4 && (c.b - 0.2 * e).abs() < 2e-4, "{c:?}");
+    }
+}
+
+#[test]
+fn ambient_alone_lights_a_card_by_its_albedo() {
+    let shot = Shot::new(above(5, 5, 400.0)).with_ambient(LinearRgb::new(0.5, 1.0, 2.0)).with_card(level(
+        1,
+        [0.0, 0.0, 0.1],
+        1.0,
+        grey(1.0),
+    ));
+    for way in [cast, reference] {
+        let c = way(&shot, &Quality::Fast.options()).at(2, 2)[0].light;
+        assert!((c.r - 0.25).abs() < 1e-5 && (c.b - 1.0).abs() < 1e-5, "{c:?}");
+    }
+}
+
+/// A 4 x 4 texture of all different texels, one texel to 10 pixels, under even light that shows colours as they are.
+fn magnified() -> (Shot, Image<PremulRgba>) {
+    let texture = Image::from_fn(4, 4, |x, y| {
+        let v = 0.05 * (4 * y + x) as f32;
+        PremulRgba::new(v, 0.8 - v, 0.3, 1.0)
+    });
+    let quad = card(1, [0.0; 3], UnitQuaternion::identity(), [0.4; 2], texture.clone());
+    (Shot::new(above(41, 41, 100.0)).with_ambient(LinearRgb::WHITE).with_card(quad), texture)
+}
+
+#[test]
+fn textures_follow_the_convention() {
+    let (shot, texture) = magnified();
+    let one = RenderOptions { subsamples: 1, ..Quality::High.options() };
+    for way in [cast, reference] {
+        // The card spans 0.5 to 40.5: texel centres lie on pixel centres 5, 15, 25, 35.
+        let deep = way(&shot, &one);
+        let at = |x: usize, y: usize| deep.at(x, y)[0];
+        for (i, j) in [(0, 0), (3, 0), (1, 2), (3, 3)] {
+            let (s, t) = (at(5 + 10 * i, 5 + 10 * j), texture[(i, j)]);
+            assert!((s.light.r - t.r).abs() < 1e-5 && (s.light.g - t.g).abs() < 1e-5, "texel {i}, {j}: {s:?}");
+        }
+        let corner = at(0, 0);
+        assert!((corner.alpha - 0.25).abs() < 1e-4 && (corner.light.g - 0.25 * 0.8).abs() < 1e-4, "{corner:?}");
+        let between = at(10, 5).light.r;
+        assert!((between - 0.5 * (texture[(0, 0)].r + texture[(1, 0)].r)).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn an_edge_is_as_soft_as_the_window() {
+    let table = [
+        (-1.0, 0.00621),
+        (-0.75, 0.03510),
+        (-0.5, 0.11859),
+        (-0.25, 0.27949),
+        (0.0, 0.5),
+        (0.25, 0.72051),
+        (0.5, 0.88141),
+        (0.75, 0.96490),
+        (1.0, 0.99380),
+    ];
+    for (t, coverage) in table {
+        // The card's right edge lies t pixels right of the centre of pixel 4.
+        let size = 2.0;
+        // Texels of a hundredth of a pixel: the fade of the outermost half is nothing.
+        let texture = Image::filled(20_000, 4, grey(1.0));
+        let edge = card(1, [0.01 * t - 0.5 * size, 0.0, 0.0], UnitQuaternion::identity(), [size; 2], texture);
+        let shot = Shot::new(above(9, 9, 100.0)).with_card(edge);
+        let alpha = |deep: DeepImage| deep.at(4, 4).first().map_or(0.0, |s| s.alpha);
+        let fine = alpha(reference(&shot, &RenderOptions { subsamples: 64, ..sharp() }));
+        assert!((fine - coverage).abs() < 0.01, "{t}: {fine} against {coverage}");
+        let coarse = alpha(cast(&shot, &Quality::High.options()));
+        assert!((coarse - coverage).abs() < 0.17, "{t}: {coarse} against {coverage}");
+    }
+}
+
+fn plate(width: usize, height: usize) -> Image<LinearRgb> {
+    Image::from_fn(width, height, |x, y| LinearRgb::new(0.1 + 0.01 * x as f32, 0.3, 0.013 * y as f32))
+}
+
+#[test]
+fn without_cards_the_plate_is_the_picture_bit_for_bit() {
+    let plate = plate(33, 21);
+    let shot = Shot::new(above(33, 21, 30.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.2));
+    for way in [cast, reference] {
+        let out = composite::frame(&way(&shot, &Quality::Draft.options()), Some(&plate));
+        assert!(out.pixels().iter().zip(plate.pixels()).all(|(a, &b)| *a == b.opaque()));
+    }
+}
+
+#[test]
+fn pixels_that_no_card_can_shadow_keep_the_plate_s_bits() {
+    let plate = plate(64, 48);
+    let shot = Shot::new(above(64, 48, 60.0)).with_light(square_light()).with_card(level(
+        1,
+        [-0.1, -0.1, 0.05],
+        0.1,
+        grey(0.7),
+    ));
+    let deep = cast(&shot, &Quality::Fast.options());
+    let out = composite::frame(&deep, Some(&plate));
+    for (x, y) in [(0, 0), (63, 0), (63, 47), (40, 10)] {
+        assert_eq!(out[(x, y)], plate[(x, y)].opaque());
+    }
+    assert!(deep.shadow().pixels().iter().any(|s| s.r < 0.99), "there is a shadow to tell from");
+}
+
+#[test]
+fn ways_agree_on_a_pile() {
+    let shot = pile();
+    let exact = composite::frame(&reference(&shot, &Quality::High.options()), Some(&plate(64, 48)));
+    for (quality, limit) in [(Quality::Draft, 0.012), (Quality::Fast, 0.008), (Quality::High, 0.005)] {
+        let fast = composite::frame(&cast(&shot, &quality.options()), Some(&plate(64, 48)));
+        let squares = fast.pixels().iter().zip(exact.pixels()).map(|(a, b)| f64::from((a.g - b.g).powi(2)));
+        let rmse = (squares.sum::<f64>() / (64.0 * 48.0)).sqrt();
+        assert!(rmse < limit, "{quality:?}: {rmse}");
+    }
+}
+
+/// Five tilted cards of soft blobs that partly run through each other, partly over the picture's edge.
+fn pile() -> Shot {
+    let blob = |hue: f32| {
+        Image::from_fn(48, 32, move |x, y| {
+            let r = ((x as f32 - 23.5) / 24.0).hypot((y as f32 - 15.5) / 16.0);
+            let alpha = (3.0 * (1.0 - r)).clamp(0.0, 0.9);
+            PremulRgba::new(hue * alpha, 0.5 * alpha, (1.0 - hue) * alpha, alpha)
+        })
+    };
+    let mut shot = Shot::new(above(64, 48, 60.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.3));
+    for k in 0..5 {
+        let f = f64::from(k);
+        let rotation = UnitQuaternion::from_euler_angles(0.3 * (f - 2.0), 0.2 * f - 0.4, 1.3 * f);
+        let center = [0.2 * f - 0.45, 0.15 * (f - 2.0), 0.08 + 0.02 * f];
+        shot = shot.with_card(card(k + 1, center, rotation, [0.35, 0.25], blob(0.2 * k as f32)));
+    }
+    shot
+}
+
+fn same(a: &DeepImage, b: &DeepImage) -> bool {
+    let pixels = || (0..a.height()).flat_map(|y| (0..a.width()).map(move |x| (x, y)));
+    a.shadow() == b.shadow() && pixels().all(|(x, y)| a.at(x, y) == b.at(x, y))
+}
+
+#[test]
+fn the_order_of_cards_changes_nothing() {
+    let shot = pile();
+    let mut turned = shot.clone();
+    turned.cards.reverse();
+    assert!(same(&cast(&shot, &RenderOptions::default()), &cast(&turned, &RenderOptions::default())));
+}
+
+#[test]
+fn crossing_cards_swap_places_where_they_cross() {
+    let tilt = |angle: f64| UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
+    let whole = Image::filled(64, 64, grey(0.5));
+    let shot = Shot::new(above(40, 9, 40.0))
+        .with_card(card(1, [0.0, 0.0, 0.2], tilt(0.4), [0.6; 2], whole.clone()))
+        .with_card(card(2, [0.0, 0.0, 0.2], tilt(-0.4), [0.6; 2], whole));
+    for way in [cast, reference] {
+        let deep = way(&shot, &RenderOptions::default());
+        // Turned about +y by a positive angle, a card sinks towards +x.
+        for (x, front) in [(12, 1), (18, 1), (21, 2), (27, 2)] {
+            assert_eq!(deep.at(x, 4)[0].object, ObjectId(front), "column {x}");
+            assert!(deep.at(x, 4)[0].depth < deep.at(x, 4)[1].depth);
+        }
+    }
+}
+
+/// More than any card of a shot may show: whitest texel, nearest to the light, facing it.
+fn brightest(shot: &Shot, light: &AreaLight) -> f32 {
+    let corners = shot.cards.iter().flat_map(|c| c.quad.corners());
+    let nearest = corners.map(|c| (c - Point3::from(light.position)).norm()).fold(f64::INFINITY, f64::min);
+    let radius = 0.5 * light.size[0].hypot(light.size[1]);
+    let from_light = light.power / (PI * (nearest - radius).powi(2));
+    (from_light / PI) as f32 + shot.ambient.r
+}
+
+#[test]
+fn everything_stays_within_its_bounds() {
+    let shot = pile();
+    let most = brightest(&shot, &square_light());
+    for quality in [Quality::Draft, Quality::Fast, Quality::High] {
+        let deep = cast(&shot, &quality.options());
+        assert!(deep.shadow().pixels().iter().all(|s| (0.0..=1.0).contains(&s.r) && (0.0..=1.0).contains(&s.b)));
+        for p in composite::frame(&deep, None).pixels() {
+            assert!((0.0..=1.0).contains(&p.a) && (0.0..=most).contains(&p.r) && (0.0..=most).contains(&p.b));
+        }
+        let pixels = (0..48).flat_map(|y| (0..64).map(move |x| (x, y)));
+        for s in pixels.flat_map(|(x, y)| deep.at(x, y)) {
+            assert!(s.alpha > 0.0 && s.alpha <= 1.0 && s.visible >= 0.0 && s.visible <= s.alpha);
+        }
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let shot = pile();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| cast(&shot, &RenderOptions::default()))
+    };
+    assert!(same(&with(1), &with(4)));
+}
+
+#[test]
+fn exposure_scales_the_cards_alone() {
+    let shot = pile();
+    let bright = Shot { exposure: 2.0, ..shot.clone() };
+    let (a, b) = (cast(&shot, &RenderOptions::default()), cast(&bright, &RenderOptions::default()));
+    assert_eq!(a.shadow(), b.shadow());
+    assert_eq!(b.at(32, 24)[0].light, a.at(32, 24)[0].light.scale(2.0));
+}
+
+#[test]
+fn a_finite_catcher_ends_the_shadow() {
+    let mut shot = Shot::new(above(21, 21, 20.0)).with_light(AreaLight { position: [0.0, 0.0, 1.0], ..square_light() });
+    shot = shot.with_card(level(1, [0.0, 0.0, 0.3], 0.3, grey(0.5)));
+    shot.catcher = [0.1, 0.1];
+    for way in [cast, reference] {
+        let deep = way(&shot, &RenderOptions::default());
+        assert!(deep.shadow()[(10, 10)].r < 0.6);
+        assert_eq!(deep.shadow()[(13, 10)], LinearRgb::WHITE);
+    }
+}
+
+/// Cards and lights that are hard to look at, each alone in a shot.
+fn awkward() -> Vec<(&'static str, Shot)> {
+    let base = || Shot::new(above(16, 12, 20.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.1));
+    let quarter = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.5 * PI);
+    let gray = || Image::filled(8, 8, grey(0.8));
+    let one = |c: Card| base().with_card(c);
+    let flat = UnitQuaternion::identity();
+    vec![
+        ("edge-on", one(card(1, [0.0, 0.0, 0.1], quarter, [0.2; 2], gray()))),
+        ("behind the eye", one(level(1, [0.0, 0.0, 2.0], 0.3, grey(0.8)))),
+        (
+            "through the eye",
+            one(card(1, [0.01, 0.0, 1.0], UnitQuaternion::from_euler_angles(0.0, 1.2, 0.0), [0.5; 2], gray())),
+        ),
+        ("no area", one(card(1, [0.0, 0.0, 0.1], flat, [0.0, 0.2], gray()))),
+        ("negative size", one(card(1, [0.0, 0.0, 0.1], flat, [-0.1, 0.2], gray()))),
+        ("endless", one(card(1, [0.0, 0.0, 0.1], flat, [f64::INFINITY, 0.2], gray()))),
+        ("nowhere", one(card(1, [f64::NAN, 0.0, 0.1], flat, [0.1, 0.2], gray()))),
+        ("one column", one(card(1, [0.0, 0.0, 0.1], flat, [0.2; 2], Image::filled(1, 7, grey(0.8))))),
+        ("one texel", one(card(1, [0.0, 0.0, 0.1], flat, [0.2; 2], Image::filled(1, 1, grey(0.8))))),
+        ("no texel", one(card(1, [0.0, 0.0, 0.1], flat, [0.2; 2], Image::new(0, 0)))),
+        ("under the surface", one(level(1, [0.0, 0.0, -0.1], 0.2, grey(0.8)))),
+        ("on the surface", one(level(1, [0.0, 0.0, 0.0], 0.2, grey(0.8)))),
+        (
+            "in one place",
+            one(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))).with_card(level(2, [0.0, 0.0, 0.1], 0.2, grey(0.5))),
+        ),
+        ("light in the card's plane", one(card(1, [0.0, 0.0, 0.9], flat, [0.1; 2], gray()))),
+        (
+            "light below",
+            one(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8)))
+                .with_light(AreaLight { position: [0.0, 0.0, -1.0], ..square_light() }),
+        ),
+        (
+            "light without size",
+            one(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))).with_light(AreaLight { size: [0.0; 2], ..square_light() }),
+        ),
+        ("dark", Shot::new(above(16, 12, 20.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8)))),
+        ("no picture", Shot { camera: above(0, 0, 20.0), ..one(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))) }),
+    ]
+}
+
+#[test]
+fn awkward_shots_give_defined_pictures() {
+    for (name, shot) in awkward() {
+        for way in [cast, reference] {
+            let deep = way(&shot, &Quality::Fast.options());
+            let out = composite::frame(&deep, None);
+            assert!(out.pixels().iter().all(|p| p.color().is_finite() && (0.0..=1.0).contains(&p.a)), "{name}");
+            assert!(deep.shadow().pixels().iter().all(|s| (0.0..=1.0).contains(&s.g)), "{name}");
+        }
+    }
+}
+
+#[test]
+fn options_out_of_range_are_brought_into_it() {
+    let none = RenderOptions { subsamples: 0, light_samples: 0, ambient_samples: 0, cell_px: f64::NAN };
+    let deep = cast(&pile(), &none);
+    assert!(composite::frame(&deep, None).pixels().iter().all(|p| p.color().is_finite()));
+}
+
+#[test]
+fn what_cannot_be_rendered_is_refused_at_the_door() {
+    let message = |shot: &Shot| check(shot).unwrap_err().to_string();
+    let with = |texel: PremulRgba| Shot::new(above(4, 4, 9.0)).with_card(level(1, [0.0; 3], 0.2, texel));
+    assert!(check(&with(grey(1.0))).is_ok());
+    assert!(message(&with(PremulRgba::new(f32::NAN, 0.0, 0.0, 1.0))).starts_with("cards[0]: texture has a value"));
+    assert!(message(&with(PremulRgba::new(0.0, 0.0, 0.0, 1.5))).contains("alpha 1.5"));
+    let twice = with(grey(1.0)).with_card(level(1, [0.0; 3], 0.2, grey(1.0)));
+    assert!(message(&twice).contains("id 1 is used twice"));
+    let mut small = with(grey(1.0));
+    small.plate = Some(Arc::new(Image::new(3, 4)));
+    assert_eq!(message(&small), "plate: 3 x 4 pixels, expected 4 x 4");
+    let broken = with(grey(1.0)).with_light(AreaLight { power: f64::NAN, ..square_light() });
+    assert!(message(&broken).starts_with("lights[0]"));
+}
+
+#[test]
+fn the_closed_form_is_what_a_bare_surface_gets() {
+    // A card of albedo 1 on the surface shows the unshadowed irradiance over pi.
+    let shot = Shot::new(above(5, 5, 400.0)).with_light(square_light()).with_card(level(
+        1,
+        [0.0; 3],
+        1.0,
+        PremulRgba::new(1.0, 1.0, 1.0, 1.0),
+    ));
+    let e = light::irradiance(&square_light(), Point3::origin(), Vector3::z());
+    let c = cast(&shot, &Quality::High.options()).at(2, 2)[0].light;
+    assert!((c.g - e.g / std::f32::consts::PI).abs() < 1e-5);
+}

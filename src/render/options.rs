@@ -1,0 +1,76 @@
+//! How much work goes into a picture.
+
+use serde::{Deserialize, Serialize};
+
+/// A named point on the curve of error against time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// For a look.
+    Draft,
+    /// For training pictures.
+    #[default]
+    Fast,
+    /// For pictures that people look at.
+    Good,
+    /// For comparisons.
+    High,
+}
+
+/// How finely a picture is sampled; the same numbers give the same bits.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RenderOptions {
+    /// Samples along each side of a pixel. Default: 2.
+    pub subsamples: usize,
+    /// Samples along each side of a light. Default: 3.
+    pub light_samples: usize,
+    /// Directions that the environment is seen from. Default: 16.
+    pub ambient_samples: usize,
+    /// Distance of two samples of the irradiance, pixels. Default: 1.5.
+    pub cell_px: f64,
+}
+
+impl Quality {
+    /// The numbers behind the name: those of the table in rendering.md, section 7.3.
+    pub fn options(self) -> RenderOptions {
+        let [subsamples, light_samples, ambient_samples] = match self {
+            Self::Draft => [1, 2, 8],
+            Self::Fast => [2, 3, 16],
+            Self::Good => [2, 4, 36],
+            Self::High => [3, 6, 36],
+        };
+        let cell_px = match self {
+            Self::Draft => 2.0,
+            Self::Fast => 1.5,
+            Self::Good => 1.0,
+            Self::High => 0.66,
+        };
+        RenderOptions { subsamples, light_samples, ambient_samples, cell_px }
+    }
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Quality::Fast.options()
+    }
+}
+
+impl RenderOptions {
+    /// The same with every number inside the range that works: at least one sample, cells of 0.25 to 16 pixels.
+    pub(super) fn clamped(self) -> Self {
+        let cell_px = if self.cell_px.is_finite() { self.cell_px.clamp(0.25, 16.0) } else { 1.0 };
+        Self {
+            subsamples: self.subsamples.clamp(1, 64),
+            light_samples: self.light_samples.clamp(1, 64),
+            ambient_samples: self.ambient_samples.clamp(1, 4096),
+            cell_px,
+        }
+    }
+}
+
+impl From<Quality> for RenderOptions {
+    fn from(quality: Quality) -> Self {
+        quality.options()
+    }
+}

@@ -1,0 +1,68 @@
+//! The window that a pixel looks through.
+
+use std::f64::consts::TAU;
+
+/// Half of the window's width, pixels: Cycles' default filter is 1.5 wide to either side.
+const RADIUS: f64 = 1.5;
+
+/// Variance of the window, square pixels.
+const VARIANCE: f64 = 0.17266;
+
+/// Coefficients of the Blackman-Harris window (Harris 1978, four terms, 92 dB).
+const TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
+
+/// Positions, pixels from the centre, that split the window's weight into `count` equal parts at their middle.
+///
+/// All samples of a pixel have the same weight then.
+pub(super) fn quantiles(count: usize) -> Vec<f64> {
+    (0..count).map(|i| quantile((i as f64 + 0.5) / count as f64)).collect()
+}
+
+/// What the positions leave of the window's width: the standard deviation that the texture's own filter must add.
+pub(super) fn left_over_sigma(offsets: &[f64]) -> f64 {
+    let covered = offsets.iter().map(|o| o * o).sum::<f64>() / offsets.len() as f64;
+    (VARIANCE - covered).max(0.0).sqrt()
+}
+
+fn quantile(share: f64) -> f64 {
+    // The window is symmetric; bisection to the last bit of a position of order one.
+    let (mut low, mut high) = (-RADIUS, RADIUS);
+    for _ in 0..60 {
+        let mid = 0.5 * (low + high);
+        if cumulative(mid) < share {
+            low = mid;
+        } else {
+            high = mid;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Weight of the window left of `s`; 0 at its left end, 1 at its right end.
+fn cumulative(s: f64) -> f64 {
+    let t = s / (2.0 * RADIUS) + 0.5;
+    let wave = |k: usize| TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64);
+    t + (wave(1) + wave(2) + wave(3)) / TERMS[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// rendering.md, section 7.2: offsets and left-over sigma for r = 1, 2, 3, 4, 6.
+    #[test]
+    fn quantiles_are_the_published_ones() {
+        let table: [(&[f64], f64); 5] = [
+            (&[0.0], 0.4155),
+            (&[-0.28821, 0.28821], 0.2993),
+            (&[-0.41126, 0.0, 0.41126], 0.2448),
+            (&[-0.48698, -0.13667, 0.13667, 0.48697], 0.2115),
+            (&[-0.58171, -0.28821, -0.09031, 0.09031, 0.28821, 0.58171], 0.1716),
+        ];
+        for (offsets, sigma) in table {
+            let ours = quantiles(offsets.len());
+            assert!(ours.iter().zip(offsets).all(|(a, b)| (a - b).abs() < 2e-5), "{ours:?}");
+            assert!((left_over_sigma(&ours) - sigma).abs() < 1e-4);
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! The definition, sample by sample: slow and obviously right.
+
+use crate::filter::sample_bilinear;
+use crate::geom::Vector3;
+use crate::image::Image;
+use crate::pixel::{Depth, LinearRgb, Mix, PremulRgba};
+use crate::render::pixel_filter::quantiles;
+use crate::render::source::{Kind, Lamp, Source, lamps};
+use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::render::{DeepImage, DeepSample, RenderOptions};
+use crate::scene::{Card, Shot};
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// Renders a shot without any shortcut: every sub-sample of every pixel sends a ray to every light sample.
+///
+/// Textures are read at full size, colours are graded after interpolation, `cell_px` is not used. Takes minutes where
+/// [`cast`](super::cast) takes milliseconds; its error against the definition falls with the numbers in `options`.
+pub fn reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    let options = options.clamped();
+    let world = World::of(shot, &options);
+    let offsets = quantiles(options.subsamples);
+    let (width, height) = (world.view.width, world.view.height);
+    let pixel = |i: usize| world.pixel((i % width) as f64 + 0.5, (i / width) as f64 + 0.5, &offsets);
+    let (lists, shadow): (Vec<_>, Vec<_>) = (0..width * height).into_par_iter().map(pixel).unzip();
+    DeepImage::from_pixels(Image::from_vec(width, height, shadow), lists)
+}
+
+/// A card with everything that a ray asks of it.
+struct Facing<'a> {
+    card: &'a Card,
+    sheet: Sheet,
+    seen: Option<Seen>,
+    lamps: Vec<Lamp>,
+}
+
+struct World<'a> {
+    shot: &'a Shot,
+    view: View,
+    cards: Vec<Facing<'a>>,
+    surface: Option<Seen>,
+    surface_lamps: Vec<Lamp>,
+}
+
+impl<'a> World<'a> {
+    fn of(shot: &'a Shot, options: &RenderOptions) -> Self {
+        let view = View::of(&shot.camera);
+        let lit = |normal: &Vector3<f64>| lamps(shot, options, normal);
+        let facing = |(card, sheet): (&'a Card, Sheet)| {
+            let seen = Seen::of(&sheet, &view);
+            let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));
+            Facing { card, sheet, seen, lamps }
+        };
+        let surface = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
+        let cards = sheets(shot).into_iter().map(facing).collect();
+        Self { shot, view, cards, surface, surface_lamps: lit(&Vector3::z()) }
+    }
+
+    /// Samples of one pixel and the factor on its plate.
+    fn pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<DeepSample>, LinearRgb) {
+        let mut order: Vec<_> = (0..self.cards.len()).filter_map(|k| Some((k, self.depth(k, x, y)?))).collect();
+        order.sort_by(|a, b| a.1.total_cmp(&b.1).then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id)));
+        let mut samples: Vec<_> = order.iter().map(|&(k, depth)| self.empty_sample(k, depth)).collect();
+        let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
+        let mut shadow = Ratio::default();
+        for oy in offsets {
+            for ox in offsets {
+                let through = self.walk(x + ox, y + oy, &order, weight, &mut samples);
+                self.shade_surface(x + ox, y + oy, through * weight, &mut shadow);
+            }
+        }
+        samples.retain(|s| s.alpha > 0.0);
+        (samples, shadow.value())
+    }
+
+    fn empty_sample(&self, k: usize, depth: f64) -> DeepSample {
+        DeepSample { object: self.cards[k].card.id, depth: Depth(depth as f32), ..DeepSample::default() }
+    }
+
+    /// Depth of a card's plane at a pixel position; as far as can be where it is behind the eye.
+    fn depth(&self, k: usize, x: f64, y: f64) -> Option<f64> {
+        let seen = self.cards[k].seen.as_ref()?;
+        let w = seen.w.dot(&Vector3::new(x, y, 1.0));
+        Some(if w > 0.0 { seen.height / w } else { f64::from(f32::MAX) })
+    }
+
+    /// Adds what the cards do along one ray, front to back; returns what passes through all of them.
+    fn walk(&self, x: f64, y: f64, order: &[(usize, f64)], weight: f32, samples: &mut [DeepSample]) -> f32 {
+        let mut through = 1.0;
+        for (&(k, _), sample) in order.iter().zip(samples) {
+            let facing = &self.cards[k];
+            let Some((seen, (uv, depth))) = facing.seen.as_ref().and_then(|s| Some((s, s.hit(x, y)?))) else {
+                continue;
+            };
+            let texel = graded(texel(facing.card, uv), facing.card);
+            sample.alpha += weight * texel.a;
+            sample.visible += weight * through * texel.a;
+            let point = self.view.eye + self.view.ray * Vector3::new(x, y, 1.0) * depth;
+            let e = self.irradiance(&point, &seen.normal, &facing.lamps, Some(k)).1;
+            sample.light = sample.light.add_scaled(weight * through * self.shot.exposure / PI, texel.color() * e);
+            through *= 1.0 - texel.a;
+        }
+        through
+    }
+
+    fn shade_surface(&self, x: f64, y: f64, weight: f32, shadow: &mut Ratio) {
+        let hit = self.surface.as_ref().and_then(|s| s.hit(x, y));
+        let (open, shadowed) = match hit {
+            None => (LinearRgb::BLACK, LinearRgb::BLACK),
+            Some((_, depth)) => {
+                let point = self.view.eye + self.view.ray * Vector3::new(x, y, 1.0) * depth;
+                self.irradiance(&point, &Vector3::z(), &self.surface_lamps, None)
+            }
+        };
+        if hit.is_none() || open == LinearRgb::BLACK {
+            shadow.outside += weight;
+        }
+        shadow.weight += weight;
+        shadow.open = shadow.open.add_scaled(weight, open);
+        shadow.shadowed = shadow.shadowed.add_scaled(weight, shadowed);
+    }
+
+    /// Irradiance without and with the other cards in the way.
+    fn irradiance(
+        &self,
+        p: &Vector3<f64>,
+        n: &Vector3<f64>,
+        lamps: &[Lamp],
+        own: Option<usize>,
+    ) -> (LinearRgb, LinearRgb) {
+        let (mut open, mut shadowed) = (LinearRgb::BLACK, LinearRgb::BLACK);
+        for lamp in lamps {
+            for source in &lamp.sources {
+                let e = source.irradiance(p, n) as f32;
+                open = open.add_scaled(e, lamp.radiance);
+                shadowed = shadowed.add_scaled(e * self.passes(p, source, own), lamp.radiance);
+            }
+        }
+        (open, shadowed)
+    }
+
+    /// Share of a source's light that reaches a point.
+    fn passes(&self, p: &Vector3<f64>, source: &Source, own: Option<usize>) -> f32 {
+        if own.is_some() && matches!(source.kind, Kind::Sky { .. }) && self.surface_blocks(p, &source.at.xyz()) {
+            return 0.0;
+        }
+        let others = self.cards.iter().enumerate().filter(|&(k, _)| Some(k) != own);
+        others
+            .map(|(_, facing)| 1.0 - crossing(&facing.sheet, p, source).map_or(0.0, |uv| texel(facing.card, uv).a))
+            .product()
+    }
+
+    fn surface_blocks(&self, p: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
+        let foot = p - direction * (p.z / direction.z);
+        let [w, h] = self.shot.catcher.map(|s| 0.5 * s);
+        direction.z < 0.0 && foot.x.abs() <= w && foot.y.abs() <= h
+    }
+}
+
+/// Texture coordinates where the way from a point to a source crosses a sheet.
+fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]> {
+    let way = source.at.xyz() - p * source.at.w;
+    let s = sheet.normal.dot(&(sheet.center - p)) / sheet.normal.dot(&way);
+    let local = p + way * s - sheet.center;
+    let uv = [local.dot(&sheet.x) / sheet.size[0] + 0.5, 0.5 - local.dot(&sheet.y) / sheet.size[1]];
+    let end = if source.at.w > 0.0 { 1.0 } else { f64::INFINITY };
+    (s > 0.0 && s < end && uv.iter().all(|c| (0.0..=1.0).contains(c))).then_some(uv)
+}
+
+/// Bilinear texel of a card's full texture; what lies outside counts as nothing.
+fn texel(card: &Card, [u, v]: [f64; 2]) -> PremulRgba {
+    let image = card.texture.base();
+    sample_bilinear(image, u * image.width() as f64, v * image.height() as f64)
+}
+
+/// A ratio of averages, per channel; 1 where there is nothing to average.
+#[derive(Default)]
+struct Ratio {
+    open: LinearRgb,
+    shadowed: LinearRgb,
+    outside: f32,
+    weight: f32,
+}
+
+impl Ratio {
+    fn value(&self) -> LinearRgb {
+        let share = if self.weight > 0.0 { 1.0 - self.outside / self.weight } else { 0.0 };
+        let channel = |s: f32, o: f32| if o > 0.0 && s != o { 1.0 + share * (s / o - 1.0) } else { 1.0 };
+        let (s, o) = (self.shadowed, self.open);
+        LinearRgb::new(channel(s.r, o.r), channel(s.g, o.g), channel(s.b, o.b))
+    }
+}
+
+/// The card's colour change on one premultiplied colour.
+fn graded(p: PremulRgba, card: &Card) -> PremulRgba {
+    let g = card.grade;
+    let c = crate::color::shift_hsv(p.color(), g.hue_deg, g.saturation, g.value);
+    PremulRgba::new(c.r, c.g, c.b, p.a)
+}

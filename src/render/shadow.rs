@@ -1,0 +1,261 @@
+//! Which cards stand between a receiver and a light, and how much they let through.
+
+use crate::geom::Vector3;
+use crate::render::half_plane::{sides, span, whole};
+use crate::render::source::{Kind, Lamp, Source};
+use crate::render::texture::Shade;
+use crate::render::view::{Seen, Sheet, View, texture_rows};
+use crate::scene::Card;
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+/// Heights and distances below this (metres) are contact.
+const TOUCHING: f64 = 1e-9;
+
+/// A card as something that stops light.
+#[derive(Debug)]
+pub(super) struct Caster<'a> {
+    /// Where it lies.
+    pub(super) sheet: Sheet,
+    card: &'a Card,
+    /// Its alpha at each halving, made when first asked for.
+    shades: Vec<OnceLock<Arc<Shade>>>,
+}
+
+/// Everything that stops light: cards, and the surface for what comes from below.
+#[derive(Debug)]
+pub(super) struct Casters<'a> {
+    /// In the order of the cards.
+    pub(super) cards: Vec<Caster<'a>>,
+    /// The plane `z = 0` as far as it reaches.
+    pub(super) surface: Sheet,
+}
+
+/// One source as one receiver sees it.
+#[derive(Debug)]
+pub(super) struct Beam {
+    source: Source,
+    /// Of the source over the receiver's plane, metres (a cosine for a direction).
+    height: f64,
+    /// What may be in its way.
+    pub(super) blockers: Vec<Blocker>,
+}
+
+/// A caster's shadow on a receiver, in nodes of the lattice.
+#[derive(Debug)]
+pub(super) struct Blocker {
+    /// Rows that the shadow may touch.
+    pub(super) rows: Range<usize>,
+    /// Columns that the shadow may touch.
+    pub(super) columns: Range<usize>,
+    sides: Vec<Vector3<f64>>,
+    /// Position among the texels, `u/w` and `v/w`.
+    u: Vector3<f64>,
+    v: Vector3<f64>,
+    w: Vector3<f64>,
+    shade: Option<Arc<Shade>>,
+}
+
+/// Rows and columns of the lattice (or pixels of a picture) that a sheet is seen in, one more on each side.
+pub(super) fn rows_and_columns(sheet: &Sheet, reach: [f64; 2], view: &View) -> (Range<usize>, Range<usize>) {
+    let size = [sheet.size[0] * (1.0 + 2.0 * reach[0]), sheet.size[1] * (1.0 + 2.0 * reach[1])];
+    bounds(&Sheet { size, ..*sheet }.corners(), view)
+}
+
+/// Bounds of projected points; the whole view where one of them is not in front.
+fn bounds(points: &[Vector3<f64>; 4], view: &View) -> (Range<usize>, Range<usize>) {
+    let Some(px) = points.iter().map(|p| view.project(p)).collect::<Option<Vec<_>>>() else {
+        return (0..view.height, 0..view.width);
+    };
+    let range = |axis: usize, count: usize| {
+        let low = px.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+        let high = px.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
+        whole(low - 2.0, high + 2.0, &(0..count))
+    };
+    (range(1, view.height), range(0, view.width))
+}
+
+impl<'a> Casters<'a> {
+    /// What stops light in a shot.
+    pub(super) fn new(cards: &[(&'a Card, Sheet)], surface: Sheet) -> Self {
+        let caster = |&(card, sheet): &(&'a Card, Sheet)| {
+            let shades = (0..card.texture.levels()).map(|_| OnceLock::new()).collect();
+            Caster { sheet, card, shades }
+        };
+        Self { cards: cards.iter().map(caster).collect(), surface }
+    }
+
+    /// The beams of a lamp that reach a receiver from above, with what may be in their way.
+    ///
+    /// `own` is the receiver's place among the cards; none for the surface. `cell` is the distance of nodes on the
+    /// receiver, metres.
+    pub(super) fn beams(&self, seen: &Seen, view: &View, lamp: &Lamp, own: Option<usize>, cell: f64) -> Vec<Beam> {
+        let plane = seen.normal.dot(&view.eye) - seen.height;
+        let above = |k: usize| self.cards[k].sheet.corners().iter().any(|c| seen.normal.dot(c) - plane > TOUCHING);
+        let above: Vec<_> = (0..self.cards.len()).filter(|&k| Some(k) != own && above(k)).collect();
+        let beam = |source: &Source| {
+            let height = source.at.xyz().dot(&seen.normal) - source.at.w * plane;
+            let shadow = Shadow { seen, view, plane, height, source, cell };
+            let from_below = own.is_some() && source.at.w == 0.0 && source.at.z < 0.0;
+            let surface = from_below.then(|| shadow.of_surface(&self.surface));
+            let cards = above.iter().filter_map(|&k| shadow.of_card(&self.cards[k]));
+            (height > TOUCHING).then(|| Beam {
+                source: *source,
+                height,
+                blockers: surface.into_iter().chain(cards).collect(),
+            })
+        };
+        lamp.sources.iter().filter_map(beam).collect()
+    }
+}
+
+impl Caster<'_> {
+    /// The coarsest alpha whose texels are no larger than `cell` metres.
+    fn shade(&self, cell: f64) -> Arc<Shade> {
+        let texture = self.card.texture.base();
+        let texels = (texture.width() * texture.height()) as f64;
+        let texel = (self.sheet.size[0] * self.sheet.size[1] / texels).sqrt();
+        let level = (libm::log2((cell / texel).max(1.0)) as usize).min(self.shades.len() - 1);
+        // Asked for outside of the lock: a pyramid may halve in parallel, and whoever waits may come back here.
+        let image = self.card.texture.level(level);
+        self.shades[level].get_or_init(|| Arc::new(Shade::new(texture, image, level))).clone()
+    }
+}
+
+/// One receiver and one source.
+struct Shadow<'a> {
+    seen: &'a Seen,
+    view: &'a View,
+    /// Offset of the receiver's plane along its normal.
+    plane: f64,
+    /// Of the source over that plane.
+    height: f64,
+    source: &'a Source,
+    cell: f64,
+}
+
+impl Shadow<'_> {
+    /// The homography from the lattice over the receiver, through the source, to a card's texels.
+    fn of_card(&self, caster: &Caster<'_>) -> Option<Blocker> {
+        let sheet = &caster.sheet;
+        let (at, q) = (self.source.at.xyz(), self.source.at.w);
+        let toward = sheet.normal.dot(&at) - q * sheet.normal.dot(&sheet.center);
+        let (rows, columns) = self.bounds(sheet);
+        if toward.abs() <= TOUCHING || rows.len() < 2 || columns.len() < 2 {
+            return None;
+        }
+        let normal = sheet.normal * toward.signum();
+        // With p = (i, j, 1) the receiver's point is point p / depth; all of the following are rows times depth.
+        let (point, depth) = (&self.seen.point, &self.seen.w);
+        let below = depth * normal.dot(&sheet.center) - point.transpose() * normal;
+        let w = depth * normal.dot(&at) - point.transpose() * normal * q;
+        let hit = point * toward.abs() + at * below.transpose();
+        let [u, v] = texture_rows(sheet, &hit, &w);
+        let shade = caster.shade(self.cell);
+        let mut sides = sides(&u, &v, &w, shade.grid.reach).to_vec();
+        // Below the card, seen from the source; w is positive there.
+        sides[4] = below;
+        sides.push(*depth);
+        let [u, v] = shade.grid.rows(&u, &v, &w);
+        Some(Blocker { rows, columns, sides, u, v, w, shade: Some(shade) })
+    }
+
+    /// The surface stops what comes from below it.
+    fn of_surface(&self, sheet: &Sheet) -> Blocker {
+        let (point, depth) = (&self.seen.point, &self.seen.w);
+        let direction = self.source.at.xyz();
+        let height = point.transpose() * Vector3::z() / -direction.z;
+        let foot = point + direction * height.transpose();
+        let mut sides = vec![*depth];
+        for (axis, size) in [(0, sheet.size[0]), (1, sheet.size[1])] {
+            if size.is_finite() {
+                let row = foot.row(axis).transpose();
+                sides.extend([depth * (0.5 * size) - row, depth * (0.5 * size) + row]);
+            }
+        }
+        let zero = Vector3::zeros();
+        Blocker {
+            rows: 0..self.view.height,
+            columns: 0..self.view.width,
+            sides,
+            u: zero,
+            v: zero,
+            w: zero,
+            shade: None,
+        }
+    }
+
+    /// Part of the lattice that a shadow lies in: bounds of the four corners thrown onto the receiver.
+    fn bounds(&self, sheet: &Sheet) -> (Range<usize>, Range<usize>) {
+        let everything = (0..self.view.height, 0..self.view.width);
+        let mut thrown = sheet.corners();
+        for corner in &mut thrown {
+            let h = self.seen.normal.dot(corner) - self.plane;
+            let fall = self.height - self.source.at.w * h;
+            // A corner beside or above the light throws its shadow away from the receiver, the others without end.
+            if fall <= 1e-6 * self.height {
+                return everything;
+            }
+            *corner = (*corner * self.height - self.source.at.xyz() * h) / fall;
+        }
+        bounds(&thrown, self.view)
+    }
+}
+
+impl Blocker {
+    /// Nodes of a row that the shadow touches.
+    pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
+        let (low, high) = span(&self.sides, j as f64);
+        whole(low, high, within)
+    }
+
+    /// Multiplies what gets through to a row's nodes.
+    pub(super) fn darken(&self, j: usize, asked: &Range<usize>, through: &mut [f32]) {
+        let nodes = self.nodes(j, asked);
+        let through = &mut through[nodes.start - asked.start..][..nodes.len()];
+        let Some(shade) = &self.shade else { return through.fill(0.0) };
+        let first = Vector3::new(nodes.start as f64, j as f64, 1.0);
+        let [u, v, w] = [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32));
+        for (k, t) in through.iter_mut().enumerate() {
+            let k = k as f32;
+            let scale = 1.0 / (w.0 + k * w.1);
+            *t *= 1.0 - shade.at((u.0 + k * u.1) * scale, (v.0 + k * v.1) * scale).clamp(0.0, 1.0);
+        }
+    }
+}
+
+/// Irradiance by unit radiance of one source, at any point of a plane.
+pub(super) struct Strength {
+    at: [f32; 3],
+    face: [f32; 3],
+    scale: f32,
+    constant: f32,
+}
+
+impl Beam {
+    /// For the receiver it was made for.
+    pub(super) fn strength(&self) -> Strength {
+        let at = self.source.at.xyz();
+        match self.source.kind {
+            Kind::Sky { share } => Strength { at: [0.0; 3], face: [0.0; 3], scale: 0.0, constant: share as f32 },
+            // All points of a plane see a light from the same height.
+            Kind::Face { normal: face, area } => Strength {
+                at: at.map(|c| c as f32).into(),
+                face: face.map(|c| c as f32).into(),
+                scale: (area * self.height) as f32,
+                constant: 0.0,
+            },
+        }
+    }
+}
+
+impl Strength {
+    /// Cosines over squared distance times area.
+    #[inline(always)]
+    pub(super) fn at(&self, x: f32, y: f32, z: f32) -> f32 {
+        let (x, y, z) = (x - self.at[0], y - self.at[1], z - self.at[2]);
+        let r2 = x * x + y * y + z * z;
+        let face = (self.face[0] * x + self.face[1] * y + self.face[2] * z).max(0.0);
+        self.constant + self.scale * face / (r2 * r2).max(f32::MIN_POSITIVE)
+    }
+}

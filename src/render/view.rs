@@ -1,0 +1,192 @@
+//! Cards and the surface as the eye sees them: every map is a row of three numbers times `(x, y, 1)`.
+
+use crate::camera::Camera;
+use crate::geom::Vector3;
+use crate::scene::{Card, Shot};
+use nalgebra::Matrix3;
+
+/// Areas below this (square metres) and angles below this (sine) are nothing to look at.
+const VANISHING: f64 = 1e-12;
+
+/// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen past its own edge.
+pub(super) const HORIZON: f64 = 1e6;
+
+/// A card or the surface as a plane in the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sheet {
+    /// Centre.
+    pub(super) center: Vector3<f64>,
+    /// Unit vector along texture columns.
+    pub(super) x: Vector3<f64>,
+    /// Unit vector against texture rows.
+    pub(super) y: Vector3<f64>,
+    /// Unit normal.
+    pub(super) normal: Vector3<f64>,
+    /// Width and height, metres; may be infinite for the surface.
+    pub(super) size: [f64; 2],
+}
+
+impl Sheet {
+    /// A card's plane; none for a card without area or place.
+    pub(super) fn of(card: &Card) -> Option<Self> {
+        let pose = &card.quad.world_from_card;
+        let [w, h] = card.quad.size;
+        let center = pose.translation.vector;
+        let solid = w > 0.0 && h > 0.0 && w * h > VANISHING && (w * h).is_finite();
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
+        let placed = axes.iter().chain([&center]).all(|v| v.iter().all(|c| c.is_finite()));
+        (solid && placed).then_some(Self { center, x: axes[0], y: axes[1], normal: axes[2], size: [w, h] })
+    }
+
+    /// The plane `z = 0` as far as it receives shadows.
+    pub(super) fn surface(size: [f64; 2]) -> Self {
+        Self { center: Vector3::zeros(), x: Vector3::x(), y: Vector3::y(), normal: Vector3::z(), size }
+    }
+
+    /// The four corners, in turn.
+    pub(super) fn corners(&self) -> [Vector3<f64>; 4] {
+        let (a, b) = (self.x * (0.5 * self.size[0]), self.y * (0.5 * self.size[1]));
+        [self.center - a + b, self.center + a + b, self.center + a - b, self.center - a - b]
+    }
+}
+
+/// The camera as linear algebra.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    /// Centre of projection.
+    pub(super) eye: Vector3<f64>,
+    /// Ray direction from `(x, y, 1)`; its parameter is the depth.
+    pub(super) ray: Matrix3<f64>,
+    /// Columns.
+    pub(super) width: usize,
+    /// Rows.
+    pub(super) height: usize,
+}
+
+impl View {
+    pub(super) fn of(camera: &Camera) -> Self {
+        let (f, c) = (camera.focal_px, camera.principal_px);
+        let from_px = Matrix3::new(1.0 / f.x, 0.0, -c.x / f.x, 0.0, 1.0 / f.y, -c.y / f.y, 0.0, 0.0, 1.0);
+        let rotation = camera.camera_from_world.rotation.inverse().to_rotation_matrix();
+        Self {
+            eye: camera.center().coords,
+            ray: rotation.matrix() * from_px,
+            width: camera.image[0] as usize,
+            height: camera.image[1] as usize,
+        }
+    }
+
+    /// Picture position `(x, y, 1)` of a world point; none at or behind the eye.
+    pub(super) fn project(&self, world: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let p = self.ray.try_inverse()? * (world - self.eye);
+        (p.z > VANISHING && p.iter().all(|c| c.is_finite())).then(|| p / p.z)
+    }
+}
+
+/// How a sheet lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and `v.p / w.p`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Numerator of the texture coordinate to the right, 0 to 1.
+    pub(super) u: Vector3<f64>,
+    /// Numerator of the texture coordinate downwards, 0 to 1.
+    pub(super) v: Vector3<f64>,
+    /// Denominator; positive where the sheet is in front of the eye.
+    pub(super) w: Vector3<f64>,
+    /// Depth times `w.p`: the distance of the eye from the sheet's plane.
+    pub(super) height: f64,
+    /// The world point is `point * p / w.p`.
+    pub(super) point: Matrix3<f64>,
+    /// Unit normal on the side of the eye.
+    pub(super) normal: Vector3<f64>,
+}
+
+impl Seen {
+    /// None for a sheet seen edge-on.
+    pub(super) fn of(sheet: &Sheet, view: &View) -> Option<Self> {
+        let above = sheet.normal.dot(&(view.eye - sheet.center));
+        let (normal, height) = if above >= 0.0 { (sheet.normal, above) } else { (-sheet.normal, -above) };
+        let w = -(view.ray.transpose() * normal);
+        let point = view.eye * w.transpose() + view.ray * height;
+        let [u, v] = texture_rows(sheet, &point, &w);
+        (height > VANISHING).then_some(Self { u, v, w, height, point, normal })
+    }
+
+    /// Side of the square that a pixel (or lattice cell) covers on the sheet's plane, metres, where it shows `target`; in
+    /// the middle of the picture where that is behind the eye.
+    pub(super) fn cell_metres(&self, view: &View, target: &Vector3<f64>) -> f64 {
+        let middle = Vector3::new(0.5 * view.width as f64, 0.5 * view.height as f64, 1.0);
+        let p = view.project(target).unwrap_or(middle);
+        let w = self.w.dot(&p).max(self.height / HORIZON);
+        let point = self.point * p / w;
+        let along = |k: usize| (self.point.column(k) - point * self.w[k]) / w;
+        along(0).cross(&along(1)).norm().sqrt()
+    }
+
+    /// Texture coordinates and depth at a pixel position; none outside the sheet or behind the eye.
+    pub(super) fn hit(&self, x: f64, y: f64) -> Option<([f64; 2], f64)> {
+        let p = Vector3::new(x, y, 1.0);
+        let w = self.w.dot(&p);
+        let uv = [self.u.dot(&p) / w, self.v.dot(&p) / w];
+        let inside = uv.iter().all(|c| (0.0..=1.0).contains(c));
+        (w > 0.0 && inside).then_some((uv, self.height / w))
+    }
+}
+
+/// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a sheet's plane.
+pub(super) fn texture_rows(sheet: &Sheet, point: &Matrix3<f64>, w: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let along = |axis: &Vector3<f64>| point.transpose() * axis - w * axis.dot(&sheet.center);
+    let [a, b] = sheet.size;
+    if a.is_finite() && b.is_finite() {
+        [along(&sheet.x) / a + w * 0.5, w * 0.5 - along(&sheet.y) / b]
+    } else {
+        // An endless sheet has no edges: everything is its middle.
+        [w * 0.5, w * 0.5]
+    }
+}
+
+/// The cards of a shot that are there at all, in the order of their ids.
+pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, Sheet)> {
+    let there = shot.cards.iter().filter(|card| !card.texture.base().is_empty());
+    let mut sheets: Vec<_> = there.filter_map(|card| Some((card, Sheet::of(card)?))).collect();
+    sheets.sort_by_key(|(card, _)| card.id);
+    sheets
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2};
+
+    fn camera() -> Camera {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let tilt = UnitQuaternion::from_euler_angles(0.2, -0.1, 0.7);
+        Camera {
+            image: [640, 480],
+            focal_px: Vector2::new(700.0, 710.0),
+            principal_px: Point2::new(320.0, 236.0),
+            camera_from_world: Pose::from_parts(Vector3::new(0.02, -0.03, 1.1).into(), tilt * down),
+        }
+    }
+
+    #[test]
+    fn the_rows_agree_with_ray_and_plane() {
+        let camera = camera();
+        for flip in [0.0, std::f64::consts::PI] {
+            let rotation = UnitQuaternion::from_euler_angles(0.3 + flip, -0.2, 1.1);
+            let quad = Quad {
+                world_from_card: Pose::from_parts(Vector3::new(0.1, 0.0, 0.1).into(), rotation),
+                size: [0.3, 0.2],
+            };
+            let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|a| rotation * a);
+            let sheet =
+                Sheet { center: Vector3::new(0.1, 0.0, 0.1), x: axes[0], y: axes[1], normal: axes[2], size: quad.size };
+            let seen = Seen::of(&sheet, &View::of(&camera)).unwrap();
+            let (px, depth) = camera.project(quad.point(0.3, 0.8)).unwrap();
+            let ([u, v], t) = seen.hit(px.x, px.y).unwrap();
+            assert!((u - 0.3).abs() < 1e-12 && (v - 0.8).abs() < 1e-12 && (t - depth).abs() < 1e-12);
+            let p = seen.point * Vector3::new(px.x, px.y, 1.0) / seen.w.dot(&Vector3::new(px.x, px.y, 1.0));
+            assert!((p - quad.point(0.3, 0.8).coords).norm() < 1e-12);
+            assert!(seen.normal.dot(&(camera.center().coords - sheet.center)) > 0.0);
+        }
+    }
+}

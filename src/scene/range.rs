@@ -1,0 +1,148 @@
+//! What a recipe says instead of a number.
+
+use crate::error::{Error, Result};
+use crate::scene::Draws;
+use serde::{Deserialize, Serialize};
+
+/// A quantity that is drawn anew wherever it is used: uniform between two numbers.
+///
+/// In files `[min, max]`, or one number for a quantity that does not vary.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "Written", into = "Written")]
+pub struct Range {
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a number or [min, max]")]
+enum Written {
+    Fixed(f64),
+    Between([f64; 2]),
+}
+
+impl From<Written> for Range {
+    fn from(written: Written) -> Self {
+        match written {
+            Written::Fixed(x) => Self::fixed(x),
+            Written::Between([min, max]) => Self::new(min, max),
+        }
+    }
+}
+
+impl From<Range> for Written {
+    fn from(range: Range) -> Self {
+        if range.min == range.max { Self::Fixed(range.min) } else { Self::Between([range.min, range.max]) }
+    }
+}
+
+impl Range {
+    /// Uniform from `min` to `max`.
+    pub const fn new(min: f64, max: f64) -> Self {
+        Self { min, max }
+    }
+
+    /// Always `x`.
+    pub const fn fixed(x: f64) -> Self {
+        Self { min: x, max: x }
+    }
+
+    /// The value at a path.
+    pub fn draw(&self, draws: &Draws, path: &str) -> f64 {
+        self.min + (self.max - self.min) * draws.unit(path)
+    }
+
+    /// The whole number at a path, every one of `min..=max` equally likely.
+    pub fn draw_count(&self, draws: &Draws, path: &str) -> usize {
+        self.min as usize + draws.below(path, (self.max - self.min) as usize + 1)
+    }
+
+    /// Fails unless `lowest <= min <= max <= highest`, all finite.
+    pub(crate) fn check(&self, at: &str, lowest: f64, highest: f64) -> Result<()> {
+        let ordered = lowest <= self.min && self.min <= self.max && self.max <= highest;
+        if ordered && self.min.is_finite() && self.max.is_finite() {
+            return Ok(());
+        }
+        let bounds = match (lowest.is_finite(), highest.is_finite()) {
+            (true, true) => format!(" between {lowest} and {highest}"),
+            (true, false) => format!(" of at least {lowest}"),
+            (false, true) => format!(" of at most {highest}"),
+            (false, false) => String::new(),
+        };
+        Err(Error::value(at, format!("[{}, {}], expected [min, max]{bounds}", self.min, self.max)))
+    }
+
+    /// Fails unless `0 < min <= max`, both finite.
+    pub(crate) fn check_positive(&self, at: &str) -> Result<()> {
+        if self.min > 0.0 && self.min <= self.max && self.max.is_finite() {
+            return Ok(());
+        }
+        Err(Error::value(at, format!("[{}, {}], expected [min, max] above 0", self.min, self.max)))
+    }
+
+    /// Fails unless both ends are whole numbers from 0 to `highest`.
+    pub(crate) fn check_count(&self, at: &str, highest: usize) -> Result<()> {
+        self.check(at, 0.0, highest as f64)?;
+        if self.min.fract() == 0.0 && self.max.fract() == 0.0 {
+            return Ok(());
+        }
+        Err(Error::value(at, format!("[{}, {}], expected whole numbers", self.min, self.max)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, PartialEq, Serialize, Deserialize)]
+    struct File {
+        x: Range,
+    }
+
+    #[test]
+    fn a_file_says_a_number_or_two() {
+        let read = |text| toml::from_str::<File>(text).map(|f| f.x);
+        assert_eq!(read("x = 3").unwrap(), Range::fixed(3.0));
+        assert_eq!(read("x = [1, 2.5]").unwrap(), Range::new(1.0, 2.5));
+        let message = read("x = 'wide'").unwrap_err().to_string();
+        assert!(message.contains("expected a number or [min, max]"), "{message}");
+    }
+
+    #[test]
+    fn writing_and_reading_gives_the_same_range() {
+        for x in [Range::fixed(0.1), Range::new(-1.0, 2.0)] {
+            let text = toml::to_string(&File { x }).unwrap();
+            assert_eq!(toml::from_str::<File>(&text).unwrap().x, x);
+        }
+    }
+
+    #[test]
+    fn draws_stay_inside_and_reach_both_ends() {
+        let range = Range::new(-2.0, 3.0);
+        let all: Vec<f64> = (0..5000).map(|k| range.draw(&Draws::new(0, k), "x")).collect();
+        assert!(all.iter().all(|x| (-2.0..3.0).contains(x)));
+        assert!(all.iter().any(|x| *x < -1.98) && all.iter().any(|x| *x > 2.98));
+    }
+
+    #[test]
+    fn counts_include_both_ends() {
+        let counts: Vec<usize> = (0..200).map(|k| Range::new(2.0, 4.0).draw_count(&Draws::new(0, k), "n")).collect();
+        assert_eq!((counts.iter().min(), counts.iter().max()), (Some(&2), Some(&4)));
+    }
+
+    #[test]
+    fn a_range_that_cannot_be_right_is_told() {
+        let told = |e: Result<()>| e.unwrap_err().to_string();
+        assert_eq!(
+            told(Range::new(2.0, 1.0).check("scale", 0.0, 9.0)),
+            "scale: [2, 1], expected [min, max] between 0 and 9"
+        );
+        assert_eq!(
+            told(Range::fixed(f64::NAN).check_positive("scale")),
+            "scale: [NaN, NaN], expected [min, max] above 0"
+        );
+        assert_eq!(told(Range::new(1.0, 2.5).check_count("objects", 9)), "objects: [1, 2.5], expected whole numbers");
+    }
+}

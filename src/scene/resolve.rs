@@ -1,0 +1,193 @@
+//! From a scene with nothing unknown to a shot.
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::filter::Pyramid;
+use crate::geom::{Point2, Pose, Quad};
+use crate::image::Image;
+use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+use crate::scene::{CameraSource, Card, Exposure, Object, Placement, Scene, Shot};
+use std::sync::Arc;
+
+/// What an object looks like: all that a shot needs from its asset.
+#[derive(Clone, Debug)]
+pub struct Look {
+    /// Index into the class list.
+    pub class: u32,
+    /// The cut-out, premultiplied, scene-linear.
+    pub texture: Arc<Pyramid<PremulRgba>>,
+    /// Its outline in texture coordinates (0 to 1, right and down), in order.
+    pub outline_uv: Arc<[Point2<f64>]>,
+}
+
+impl Scene {
+    /// The shot that this scene describes, once nothing is unknown in it.
+    ///
+    /// `look` finds an object's asset and photo, or nothing; for a library that is [`Look::of`]. `plate` is the background at the picture's
+    /// size; none leaves it transparent. Object `i` gets id `i + 1`; the shadow catcher is the labelled surface.
+    ///
+    /// # Errors
+    /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an impossible value
+    /// ([`check`](Self::check)); an asset or photo that `look` does not find; a plate of another size.
+    pub fn resolve(
+        &self,
+        look: impl Fn(&Object) -> Option<Look>,
+        plate: Option<Arc<Image<LinearRgb>>>,
+    ) -> Result<Shot> {
+        self.check()?;
+        let camera = self.known_camera()?;
+        let exposure = self.known_exposure()?;
+        if let Some(plate) = &plate {
+            self.check_plate(plate)?;
+        }
+        let card = |(i, object): (usize, &Object)| {
+            let world_from_card = at_rest(i, object)?;
+            let look = look(object).ok_or_else(|| missing(i, object))?;
+            Ok(Card {
+                id: ObjectId(id(i)?),
+                class: look.class,
+                quad: Quad { world_from_card, size: object.size },
+                texture: look.texture,
+                outline_uv: look.outline_uv,
+                grade: object.grade,
+            })
+        };
+        let cards = self.objects.iter().enumerate().map(card).collect::<Result<_>>()?;
+        Ok(Shot {
+            camera,
+            plate,
+            catcher: self.surface.size,
+            cards,
+            lights: self.lights.clone(),
+            ambient: self.ambient,
+            exposure,
+        })
+    }
+
+    fn known_camera(&self) -> Result<Camera> {
+        let CameraSource::Known(camera) = self.camera else {
+            return Err(Error::value("camera", "still a rectangle in a photo; locate it first"));
+        };
+        if camera.image != self.image {
+            let what = format!("{:?}, expected the scene's image {:?}", camera.image, self.image);
+            return Err(Error::value("camera.known.image", what));
+        }
+        Ok(camera)
+    }
+
+    fn known_exposure(&self) -> Result<f32> {
+        match self.exposure {
+            Exposure::Ev(ev) => Ok(libm::exp2(ev) as f32),
+            Exposure::MatchPlate { .. } => {
+                Err(Error::value("exposure", "still to be matched to the plate; light it first"))
+            }
+        }
+    }
+
+    fn check_plate(&self, plate: &Image<LinearRgb>) -> Result<()> {
+        let (w, h) = plate.size();
+        if (w, h) == (self.image[0] as usize, self.image[1] as usize) {
+            return Ok(());
+        }
+        Err(Error::value("plate", format!("{w} x {h} pixels, expected {} x {}", self.image[0], self.image[1])))
+    }
+}
+
+fn at_rest(i: usize, object: &Object) -> Result<Pose> {
+    match object.placement {
+        Placement::At(pose) => Ok(pose),
+        Placement::Drop { .. } => {
+            Err(Error::value(format!("objects[{i}].placement"), "still falling; settle it first"))
+        }
+    }
+}
+
+fn missing(i: usize, object: &Object) -> Error {
+    let what = format!("\"{}\", photo {}, expected one that the library has", object.asset, object.photo);
+    Error::value(format!("objects[{i}].asset"), what)
+}
+
+fn id<T: TryFrom<usize>>(i: usize) -> Result<T> {
+    T::try_from(i + 1).map_err(|_| Error::value(format!("objects[{i}]"), "more objects than ids"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{UnitQuaternion, Vector2};
+    use crate::scene::{Grade, Surface};
+
+    fn camera() -> Camera {
+        Camera {
+            image: [8, 6],
+            focal_px: Vector2::new(10.0, 10.0),
+            principal_px: Point2::new(4.0, 3.0),
+            camera_from_world: Pose::translation(0.0, 0.0, 1.0),
+        }
+    }
+
+    fn scene() -> Scene {
+        let object = Object {
+            asset: "b1".into(),
+            photo: 0,
+            size: [0.2, 0.1],
+            thickness: 0.005,
+            mass: 0.03,
+            placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
+            grade: Grade::default(),
+        };
+        Scene {
+            image: [8, 6],
+            plate: String::new(),
+            camera: CameraSource::Known(camera()),
+            surface: Surface { size: [0.4, 0.3] },
+            objects: vec![object.clone(), object],
+            lights: vec![],
+            ambient: LinearRgb::WHITE,
+            exposure: Exposure::Ev(1.0),
+        }
+    }
+
+    fn look(object: &Object) -> Option<Look> {
+        let texture = Arc::new(Pyramid::new(Image::filled(2, 2, PremulRgba::default())));
+        let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
+        (object.asset == "b1").then_some(Look { class: 3, texture, outline_uv })
+    }
+
+    fn complaint(spoil: impl Fn(&mut Scene)) -> String {
+        let mut scene = scene();
+        spoil(&mut scene);
+        scene.resolve(look, None).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_known_scene_becomes_a_shot() {
+        let shot = scene().resolve(look, None).unwrap();
+        assert_eq!(shot.cards.iter().map(|c| c.id).collect::<Vec<_>>(), [ObjectId(1), ObjectId(2)]);
+        assert_eq!((shot.exposure, shot.catcher, shot.cards[0].class), (2.0, [0.4, 0.3], 3));
+    }
+
+    #[test]
+    fn an_unknown_is_told_with_the_stage_that_finds_it() {
+        let falling = Placement::Drop { above: [0.0; 2], height: 0.3, rotation: UnitQuaternion::identity() };
+        let told = complaint(|s| s.objects[1].placement = falling);
+        assert_eq!(told, "objects[1].placement: still falling; settle it first");
+        let told = complaint(|s| s.exposure = Exposure::MatchPlate { gain_ev: 0.0 });
+        assert_eq!(told, "exposure: still to be matched to the plate; light it first");
+        let rectangle = CameraSource::Rectangle { corners_px: [[0.0; 2]; 4], photo: [8, 6], focal_px: None };
+        assert_eq!(complaint(|s| s.camera = rectangle), "camera: still a rectangle in a photo; locate it first");
+    }
+
+    #[test]
+    fn an_asset_that_the_library_lacks_is_told() {
+        let told = complaint(|s| s.objects[1].asset = "b9".into());
+        assert_eq!(told, "objects[1].asset: \"b9\", photo 0, expected one that the library has");
+    }
+
+    #[test]
+    fn a_plate_of_another_size_is_told() {
+        let plate = Arc::new(Image::filled(3, 6, LinearRgb::BLACK));
+        let told = scene().resolve(look, Some(plate)).unwrap_err().to_string();
+        assert_eq!(told, "plate: 3 x 6 pixels, expected 8 x 6");
+    }
+}

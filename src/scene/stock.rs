@@ -1,0 +1,29 @@
+//! What a library of assets offers to recipes and to shots.
+
+use crate::asset::{Asset, Library};
+use crate::scene::{Choice, Look, Object};
+
+/// The assets of a library as a recipe sees them, in the library's order.
+pub fn stock(library: &Library) -> Vec<Choice> {
+    library.assets.iter().map(Choice::from).collect()
+}
+
+impl From<&Asset> for Choice {
+    fn from(asset: &Asset) -> Self {
+        Self {
+            asset: asset.name.clone(),
+            photo_sizes: asset.photos.iter().map(|photo| photo.size).collect(),
+            thickness: asset.thickness,
+            mass: asset.mass,
+        }
+    }
+}
+
+impl Look {
+    /// What an object looks like by a library; none where it lacks the asset or the photo.
+    pub fn of(library: &Library, object: &Object) -> Option<Self> {
+        let asset = library.find(&object.asset)?;
+        let photo = asset.photos.get(object.photo)?;
+        Some(Self { class: asset.class, texture: photo.texture.clone(), outline_uv: photo.outline_uv.clone() })
+    }
+}

@@ -1,0 +1,150 @@
+//! Rest without physics: cards that lie level.
+//!
+//! A card that falls alone onto the bare surface ends level where it began, turned as it was; that needs no
+//! simulation. The same closed form, each card on top of the highest one it meets, is the `flat` mode.
+
+use super::overlap::{Solid, depth, past_walls};
+use super::solids;
+use crate::geom::{Pose, UnitQuaternion};
+use crate::scene::{Object, Placement, Scene, SettleOptions};
+use nalgebra::{Quaternion, Vector3};
+
+/// Where everything comes to rest if every card falls alone: in a column that no other card can reach, clear of the
+/// walls. None if any may meet another or a wall.
+pub(super) fn alone(scene: &Scene, options: &SettleOptions) -> Option<Vec<Pose>> {
+    let bodies = leveled(scene, options);
+    let reach_each_other = |a: &Solid, b: &Solid| {
+        let apart = (a.center() - b.center()).xy().norm();
+        (a.falls || b.falls) && apart < a.half.norm() + b.half.norm()
+    };
+    let meet = (1..bodies.len()).any(|i| bodies[..i].iter().any(|other| reach_each_other(&bodies[i], other)));
+    let squeezed = bodies.iter().any(|s| s.falls && past_walls(s, scene.surface.size).iter().any(|&d| d > 0.0));
+    (!meet && !squeezed).then(|| bodies.iter().map(|solid| rested_on(solid, 0.0)).collect())
+}
+
+/// Everything level on the surface, in the order of the heights it starts from, each on top of the highest it meets.
+///
+/// Cards that already are at rest count as the upright boxes around them. A card that reaches through a wall is moved in.
+pub(super) fn flat(scene: &Scene, options: &SettleOptions) -> Vec<Pose> {
+    let mut bodies = leveled(scene, options);
+    let mut lying: Vec<Solid> = bodies.iter().filter(|solid| !solid.falls).map(upright_box).collect();
+    let mut order: Vec<usize> = (0..bodies.len()).filter(|&i| bodies[i].falls).collect();
+    order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
+    for i in order {
+        let solid = moved_in(&bodies[i], scene.surface.size);
+        let below = lying.iter().filter(|other| footprints_meet(&solid, other));
+        let bottom = below.map(|other| other.center().z + other.half.z).fold(0.0, f64::max);
+        bodies[i].world_from_body = rested_on(&solid, bottom);
+        lying.push(bodies[i]);
+    }
+    bodies.iter().map(|solid| solid.world_from_body).collect()
+}
+
+/// The bodies, those that fall turned level where they start.
+fn leveled(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
+    let pose = |object: &Object| match object.placement {
+        Placement::At(pose) => pose,
+        Placement::Drop { above: [x, y], height, rotation } => {
+            Pose::from_parts([x, y, height].into(), level(&rotation))
+        }
+    };
+    solids(scene, options, &scene.objects.iter().map(pose).collect::<Vec<_>>())
+}
+
+/// The nearest rotation that leaves a card level, on the side it already is nearer to.
+///
+/// # Method
+/// Every rotation is a turn about the vertical followed by a tilt about a horizontal axis; the quaternion of the turn is
+/// the part (w, z) of the whole, normalised. A card that faces down is first turned over about its own `x`.
+fn level(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let over = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
+    let faces_up = (rotation * Vector3::z()).z >= 0.0;
+    let upright = if faces_up { *rotation } else { rotation * over };
+    let turn = UnitQuaternion::from_quaternion(Quaternion::new(upright.w, 0.0, 0.0, upright.k));
+    if faces_up { turn } else { turn * over }
+}
+
+/// The pose with its underside at this height; that of a card at rest as it is.
+fn rested_on(solid: &Solid, bottom: f64) -> Pose {
+    let mut pose = solid.world_from_body;
+    if solid.falls {
+        pose.translation.z = bottom + solid.half.z;
+    }
+    pose
+}
+
+fn moved_in(solid: &Solid, surface: [f64; 2]) -> Solid {
+    let mut moved = *solid;
+    for (axis, past) in past_walls(solid, surface).into_iter().enumerate() {
+        let at = &mut moved.world_from_body.translation.vector[axis];
+        *at -= past.max(0.0).copysign(*at);
+    }
+    moved
+}
+
+fn upright_box(solid: &Solid) -> Solid {
+    let mut upright = *solid;
+    upright.half = solid.extent();
+    upright.world_from_body.rotation = UnitQuaternion::identity();
+    upright
+}
+
+/// Whether two level boxes overlap as seen from above.
+fn footprints_meet(a: &Solid, b: &Solid) -> bool {
+    let grounded = |solid: &Solid| {
+        let mut down = *solid;
+        down.world_from_body.translation.z = 0.0;
+        down
+    };
+    depth(&grounded(a), &grounded(b)) > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settle::tests::{dropped, falling};
+
+    #[test]
+    fn leveling_turns_the_normal_up_or_down_and_is_the_least_turn() {
+        let seen = |angles: [f64; 3]| {
+            let tilted = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
+            let (normal, flat) = (tilted * Vector3::z(), level(&tilted));
+            let expected = Vector3::z() * normal.z.signum();
+            assert!((flat * Vector3::z() - expected).norm() < 1e-12);
+            assert!((flat.angle_to(&tilted) - normal.angle(&expected)).abs() < 1e-7);
+        };
+        [[0.2, 0.1, 1.0], [3.0, 0.1, -2.0], [1.5, 0.0, 0.3], [-2.5, 0.4, 3.0]].into_iter().for_each(seen);
+    }
+
+    #[test]
+    fn a_card_alone_rests_level_where_it_fell() {
+        let scene = falling(&[([0.05, -0.02], 0.3)]);
+        let poses = alone(&scene, &SettleOptions::default()).unwrap();
+        let half = SettleOptions::default().half_body(&scene.objects[0]).z;
+        assert!((poses[0].translation.vector - Vector3::new(0.05, -0.02, half)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn cards_in_one_column_do_not_fall_alone() {
+        assert!(alone(&falling(&[([0.0, 0.0], 0.1), ([0.1, 0.0], 0.3)]), &SettleOptions::default()).is_none());
+        assert!(alone(&falling(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3)]), &SettleOptions::default()).is_some());
+        // Its middle is over the surface, but it would reach through a wall.
+        assert!(alone(&falling(&[([0.29, 0.0], 0.1)]), &SettleOptions::default()).is_none());
+    }
+
+    #[test]
+    fn flat_cards_are_level_and_only_touch() {
+        for k in 0..20 {
+            let (scene, options) = (dropped(k, 15), SettleOptions::default());
+            let lying = solids(&scene, &options, &flat(&scene, &options));
+            assert!(crate::settle::overlap::deepest(&lying, scene.surface.size) < 1e-12);
+            for (i, solid) in lying.iter().enumerate() {
+                assert!(((solid.world_from_body * Vector3::z()).z.abs() - 1.0).abs() < 1e-12);
+                let bottom = solid.center().z - solid.half.z;
+                let holds = |other: &Solid| (other.center().z + other.half.z - bottom).abs() < 1e-12;
+                let held = lying.iter().enumerate().any(|(j, o)| j != i && holds(o) && footprints_meet(solid, o));
+                assert!(bottom.abs() < 1e-12 || held, "card {i} hangs at {bottom}");
+            }
+        }
+    }
+}

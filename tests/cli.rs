@@ -1,0 +1,247 @@
+//! The real program in an empty folder, as a person types it.
+#![cfg(feature = "cli")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of its own for one test, and the program run in it.
+struct Desk(tempfile::TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().expect("inside the desk")).expect("a folder");
+        std::fs::write(&path, content).expect("a file");
+        path
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
+        command.args(args).current_dir(self.0.path()).output().expect("the program starts")
+    }
+
+    /// Runs what must succeed and returns what it printed.
+    fn ok(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        let (out, err) = (text(&output.stdout), text(&output.stderr));
+        assert!(output.status.success(), "petcomp {args:?}\n{out}{err}");
+        out
+    }
+
+    /// Runs what must fail and returns the one line that says why, having checked that nothing was left behind.
+    fn refused(&self, args: &[&str]) -> String {
+        let before = self.files();
+        let output = self.run(args);
+        let err = text(&output.stderr);
+        assert!(!output.status.success(), "petcomp {args:?} succeeded");
+        assert!(output.status.code().is_some_and(|code| code != 101), "petcomp {args:?} panicked: {err}");
+        let errors: Vec<&str> = err.lines().filter(|line| line.starts_with("error: ")).collect();
+        assert_eq!(errors.len(), 1, "petcomp {args:?} said:\n{err}");
+        assert_eq!(self.files(), before, "petcomp {args:?} left something behind");
+        errors[0].to_owned()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        walk(self.0.path(), &mut found);
+        found.sort();
+        found
+    }
+}
+
+fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        if entry.path().is_dir() {
+            walk(&entry.path(), found);
+        } else {
+            found.push(entry.path());
+        }
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn samples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples")
+}
+
+fn sample(name: &str) -> String {
+    samples().join(name).to_string_lossy().into_owned()
+}
+
+/// A label file with these corners for a picture that need not exist.
+fn label(corners: &str) -> String {
+    format!(
+        r#"{{"format": "plane-label", "version": 1, "image": {{"file": "a.jpg", "width": 640, "height": 480}},
+            "surface": {{"id": "tray", "width_m": 0.6, "height_m": 0.4, "corners_px": {corners}}}}}"#
+    )
+}
+
+const SQUARE: &str = "[[100, 100], [500, 110], [510, 400], [90, 390]]";
+
+#[test]
+fn every_subcommand_explains_itself() {
+    let desk = Desk::new();
+    let help = desk.ok(&["--help"]);
+    for stage in ["demo", "matte", "asset", "camera", "scene", "settle", "render", "label", "dataset", "diff", "doctor"]
+    {
+        assert!(help.contains(stage), "--help does not name {stage}");
+        assert!(desk.ok(&[stage, "--help"]).len() > 100, "{stage} --help says little");
+    }
+}
+
+#[test]
+fn the_program_does_not_load_openimageio() {
+    let Ok(ldd) = Command::new("ldd").arg(env!("CARGO_BIN_EXE_petcomp")).output() else { return };
+    assert!(!text(&ldd.stdout).contains("OpenImageIO"), "petcomp links OpenImageIO");
+}
+
+#[test]
+fn doctor_finds_nothing_wrong() {
+    Desk::new().ok(&["doctor"]);
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = Desk::new().refused(&["matte", "cut", "nowhere.png", "-o", "out.exr"]);
+    assert!(error.contains("nowhere.png: no such file"), "{error}");
+}
+
+#[test]
+fn text_named_png_is_not_a_picture() {
+    let desk = Desk::new();
+    desk.write("note.png", "this is a note");
+    let error = desk.refused(&["matte", "cut", "note.png", "-o", "out.exr"]);
+    assert!(error.contains("note.png") && error.contains("expected"), "{error}");
+}
+
+#[test]
+fn a_truncated_png_is_refused() {
+    let desk = Desk::new();
+    let whole = std::fs::read(samples().join("bottles/b0000_0.png")).expect("a sample");
+    desk.write("half.png", &whole[..whole.len() / 2]);
+    let error = desk.refused(&["matte", "cut", "half.png", "-o", "out.exr"]);
+    assert!(error.contains("half.png"), "{error}");
+}
+
+#[test]
+fn a_picture_without_pixels_is_refused() {
+    let desk = Desk::new();
+    let mut png = std::fs::read(samples().join("bottles/b0000_0.png")).expect("a sample");
+    png[16..24].fill(0);
+    desk.write("empty.png", png);
+    let error = desk.refused(&["matte", "cut", "empty.png", "-o", "out.exr"]);
+    assert!(error.contains("empty.png"), "{error}");
+}
+
+#[test]
+fn a_label_with_three_corners_is_refused() {
+    let desk = Desk::new();
+    desk.write("a.label.json", label("[[100, 100], [500, 110], [510, 400]]"));
+    let error = desk.refused(&["camera", "solve", "a.label.json"]);
+    assert!(error.contains("a.label.json") && error.contains("corners_px"), "{error}");
+}
+
+#[test]
+fn corners_that_are_not_convex_are_refused() {
+    let desk = Desk::new();
+    desk.write("a.label.json", label("[[100, 100], [500, 110], [200, 150], [90, 390]]"));
+    let error = desk.refused(&["camera", "solve", "a.label.json"]);
+    assert!(error.contains("not convex"), "{error}");
+}
+
+#[test]
+fn crossed_corners_are_put_in_order_and_said() {
+    let desk = Desk::new();
+    desk.write("a.label.json", label("[[100, 100], [510, 400], [500, 110], [90, 390]]"));
+    let output = desk.run(&["camera", "solve", "a.label.json"]);
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert!(output.status.success() && said.contains("order"), "{said}");
+}
+
+#[test]
+fn an_unknown_key_is_met_with_the_one_that_was_meant() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nobjcts = [1, 2]\n");
+    let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
+    assert!(error.contains("recipe.toml: scene: unknown key \"objcts\", did you mean \"objects\"?"), "{error}");
+}
+
+#[test]
+fn an_impossible_range_is_named() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nscale = [0.0, -1.0]\n");
+    let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
+    assert!(error.contains("recipe.toml: scene.scale"), "{error}");
+}
+
+#[test]
+fn an_output_folder_that_is_a_file_is_refused() {
+    let desk = Desk::new();
+    desk.write("taken", "a file");
+    let error = desk.refused(&["demo", "--samples", &sample(""), "-o", "taken"]);
+    assert!(error.contains("taken"), "{error}");
+}
+
+#[test]
+fn diff_speaks_like_idiff() {
+    let desk = Desk::new();
+    let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));
+    assert_eq!(desk.run(&["diff", &a, &a]).status.code(), Some(0));
+    assert_eq!(desk.run(&["diff", &a, &b]).status.code(), Some(3));
+    assert_eq!(desk.run(&["diff", "-fail", "0.1", &a, "nowhere.png"]).status.code(), Some(4));
+}
+
+#[test]
+fn the_demo_makes_the_same_files_at_any_thread_count() {
+    let desk = Desk::new();
+    let demo = |threads: &str, folder: &str| {
+        let args = ["demo", "--samples", &sample(""), "-n", "4", "--seed", "0", "-q", "-j", threads, "-o", folder];
+        desk.ok(&args);
+        let root = desk.path(folder);
+        let mut files = Vec::new();
+        walk(&root, &mut files);
+        files.sort();
+        let named = |f: &PathBuf| f.strip_prefix(&root).expect("below the root").to_owned();
+        files.iter().map(|f| (named(f), std::fs::read(f).expect("a file"))).collect::<Vec<_>>()
+    };
+    let (one, four) = (demo("1", "one"), demo("4", "four"));
+    assert!(one.len() > 20, "the demo wrote only {} files", one.len());
+    for ((name, a), (other, b)) in one.iter().zip(&four) {
+        assert_eq!(name, other);
+        assert!(a == b || name.ends_with("index.jsonl"), "{} depends on the thread count", name.display());
+    }
+    desk.ok(&["dataset", "check", "one/dataset"]);
+}
+
+#[test]
+fn a_scene_goes_through_the_stages_one_by_one() {
+    let desk = Desk::new();
+    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    desk.ok(&["scene", "draw", "demo/recipe.toml", "-k", "3", "--seed", "5", "-o", "scene.toml"]);
+    desk.ok(&["scene", "check", "scene.toml"]);
+    desk.ok(&["settle", "scene.toml", "-o", "rest.json"]);
+    desk.ok(&["render", "rest.json", "demo/recipe.toml", "-o", "frame.exr"]);
+    desk.ok(&["render", "scene.toml", "demo/recipe.toml", "-o", "again.exr"]);
+    desk.ok(&["diff", "frame.exr", "again.exr"]);
+    desk.ok(&["label", "rest.json", "demo/recipe.toml", "-o", "labels.json", "--overlay", "overlay.png"]);
+    assert!(desk.path("overlay.png").exists());
+}
+
+#[test]
+fn one_camera_solve_says_what_it_found() {
+    let desk = Desk::new();
+    desk.write("a.label.json", label(SQUARE));
+    let said = desk.ok(&["camera", "solve", "a.label.json"]);
+    assert!(said.contains("tilt") && desk.path("a.camera.json").exists(), "{said}");
+}

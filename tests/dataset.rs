@@ -1,0 +1,390 @@
+//! A dataset's folder: the same bytes whoever made it and however often they were stopped, and trainers accept it.
+
+use petcomp::camera::Camera;
+use petcomp::dataset::{
+    Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions, Sidecar, Split,
+    SplitOrder, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
+};
+use petcomp::geom::{Point2, Pose, Vector2};
+use petcomp::label::{BBox, Labels, ObjectLabel};
+use petcomp::scene::{CameraSource, Exposure, Surface};
+use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+const IMAGE: [u32; 2] = [64, 48];
+
+fn scene(k: u64) -> Scene {
+    let camera = Camera {
+        image: IMAGE,
+        focal_px: Vector2::new(100.0 / 3.0, 0.1 + k as f64),
+        principal_px: Point2::new(32.0, 24.0),
+        camera_from_world: Pose::identity(),
+    };
+    Scene {
+        image: IMAGE,
+        plate: "tray".into(),
+        camera: CameraSource::Known(camera),
+        surface: Surface { size: [0.4, 0.3] },
+        objects: Vec::new(),
+        lights: Vec::new(),
+        ambient: LinearRgb::grey(0.1),
+        exposure: Exposure::default(),
+    }
+}
+
+/// An object of 12 x 9 pixels at a place, under `covered_by`.
+fn object(id: u32, class: u32, [x, y]: [f64; 2], covered_by: &[u32]) -> ObjectLabel {
+    let b = BBox { x0: x, y0: y, x1: x + 12.0, y1: y + 9.0 };
+    let corners = [[b.x0, b.y0], [b.x1, b.y0], [b.x1, b.y1], [b.x0, b.y1]];
+    ObjectLabel {
+        id: ObjectId(id),
+        class,
+        outline_px: vec![corners.map(|[x, y]| Point2::new(x, y)).to_vec()],
+        amodal_box: b,
+        visible_box: b,
+        visible_fraction: 1.0,
+        covered_by: covered_by.iter().map(|&id| ObjectId(id)).collect(),
+    }
+}
+
+/// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the first.
+fn sample(k: u64) -> Result<Sample> {
+    let value = |x: usize, y: usize| ((x as u64 * 31 + y as u64 * 17 + k * 7919) % 97) as f32 / 97.0;
+    let frame = Image::from_fn(IMAGE[0] as usize, IMAGE[1] as usize, |x, y| LinearRgb::grey(value(x, y)).opaque());
+    let place = |i: u64| [(5 * i + k % 30) as f64, (10 * i) as f64];
+    let under = |i: u64| if i == 1 { &[1][..] } else { &[] };
+    let objects = (0..k % 4).map(|i| object(i as u32 + 1, (k + i) as u32 % 3, place(i), under(i)));
+    let labels = Labels { image: IMAGE, objects: objects.collect() };
+    Ok(Sample { frame, labels, scene: scene(k), retries: (k % 3) as u32 })
+}
+
+fn plan(folder: &Path, count: u64) -> Plan {
+    Plan {
+        folder: folder.into(),
+        count,
+        seed: 7,
+        recipe: serde_json::json!({ "objects": { "count": [5, 30] }, "hue_deg": 0.1 }),
+        classes: ["cap_label", "cap", "label"].map(String::from).to_vec(),
+        split: Split::default(),
+        obstructed: Obstructed::Drop,
+        writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default()), Box::new(Sidecar)],
+    }
+}
+
+fn make(plan: &Plan) -> Result<Report> {
+    generate(plan, sample, &|_| {}, &AtomicBool::new(false))
+}
+
+fn threads<T: Send>(n: usize, f: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
+}
+
+/// Every file below a folder and its bytes.
+fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(dir) = folders.pop() {
+        for entry in std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()) {
+            if entry.is_dir() {
+                folders.push(entry);
+            } else {
+                files.insert(entry.strip_prefix(folder).unwrap().into(), std::fs::read(&entry).unwrap());
+            }
+        }
+    }
+    files
+}
+
+fn text(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+fn faults(folder: &Path) -> Vec<String> {
+    check(folder).unwrap().faults.iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn a_dataset_has_the_files_that_trainers_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let report = make(&plan(dir.path(), 12)).unwrap();
+    assert_eq!(text(dir.path(), "labels/train/000001.txt"), "1 0.109375 0.093750 0.187500 0.187500\n");
+    assert_eq!(text(dir.path(), "labels/train/000004.txt"), "");
+    assert!(text(dir.path(), "data.yaml").ends_with(
+        "train: images/train\nval: images/val\nnc: 3\nnames:\n  0: \"cap_label\"\n  1: \"cap\"\n  2: \"label\"\n"
+    ));
+    assert!(dir.path().join("images/val/000005.png").is_file() && dir.path().join("labels/val/000005.txt").is_file());
+    assert_eq!(faults(dir.path()), [""; 0]);
+    assert_eq!((report.images, report.val, report.made, report.objects), (12, 3, 12, 18));
+    assert_eq!((report.labelled, report.dropped(), report.retries), (12, 6, 12));
+    assert_eq!(check(dir.path()).unwrap().rows.iter().sum::<usize>(), 12);
+    assert_eq!(report.classes.iter().map(|c| c.labelled).sum::<u64>(), 12);
+}
+
+#[test]
+fn the_bytes_are_the_same_at_any_number_of_threads() {
+    let (one, four) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    threads(1, || make(&plan(one.path(), 40))).unwrap();
+    threads(4, || make(&plan(four.path(), 40))).unwrap();
+    assert_eq!(bytes(one.path()), bytes(four.path()));
+}
+
+#[test]
+fn a_stopped_run_goes_on_to_the_same_bytes() {
+    let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    make(&plan(whole.path(), 30)).unwrap();
+    let stop = AtomicBool::new(false);
+    let after_some = |p: Progress| stop.store(p.made >= 7, Ordering::Relaxed);
+    let e = threads(3, || generate(&plan(broken.path(), 30), sample, &after_some, &stop)).unwrap_err();
+    assert!(matches!(e, Error::Interrupted { .. }) && e.to_string().contains("of 30 samples are in"), "{e}");
+
+    // What a kill may leave: a torn line, half a file, a temporary file, a file whose line never came.
+    let journal = broken.path().join("index.jsonl");
+    let lines = std::fs::read_to_string(&journal).unwrap();
+    let finished = lines.lines().count();
+    assert!((7..=9).contains(&finished), "{finished}");
+    std::fs::write(&journal, &lines[..lines.len() - 20]).unwrap();
+    std::fs::write(broken.path().join("images/train/000001.png"), b"half").unwrap();
+    std::fs::write(broken.path().join("images/train/.petcomp-x1.tmp"), b"half").unwrap();
+    std::fs::write(broken.path().join("labels/train/000029.txt"), b"9 9 9").unwrap();
+
+    let made = AtomicU64::new(0);
+    let counted = |k| {
+        made.fetch_add(1, Ordering::Relaxed);
+        sample(k)
+    };
+    let report = generate(&plan(broken.path(), 30), counted, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!((report.made, made.into_inner()), (30 - finished as u64 + 2, 30 - finished as u64 + 2));
+    assert_eq!(report, Report { made: report.made, ..make(&plan(whole.path(), 30)).unwrap() });
+    assert_eq!(bytes(whole.path()), bytes(broken.path()));
+}
+
+#[test]
+fn a_finished_dataset_is_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 5)).unwrap();
+    let before = bytes(dir.path());
+    let never = |_| -> Result<Sample> { panic!("nothing is missing") };
+    let report = generate(&plan(dir.path(), 5), never, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!((report.images, report.made), (5, 0));
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn a_dataset_may_grow() {
+    let (grown, at_once) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    make(&plan(grown.path(), 5)).unwrap();
+    assert_eq!(make(&plan(grown.path(), 12)).unwrap().made, 7);
+    make(&plan(at_once.path(), 12)).unwrap();
+    assert_eq!(bytes(grown.path()), bytes(at_once.path()));
+}
+
+#[test]
+fn another_plan_in_the_same_folder_is_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 3)).unwrap();
+    let before = bytes(dir.path());
+    let refused = |change: &dyn Fn(&mut Plan)| {
+        let mut plan = plan(dir.path(), 3);
+        change(&mut plan);
+        make(&plan).unwrap_err().to_string()
+    };
+    let seed = refused(&|p| p.seed = 8);
+    assert!(seed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"), "{seed}");
+    let recipe = refused(&|p| p.recipe["objects"]["count"][1] = 20.into());
+    assert!(recipe.contains("recipe.objects.count[1]: the dataset was begun with 30, this run has 20"), "{recipe}");
+    assert!(refused(&|p| p.recipe["light"] = true.into()).contains("recipe.light: the dataset was begun with null"));
+    assert!(refused(&|p| p.obstructed = Obstructed::Keep).contains("obstructed"));
+    assert!(refused(&|p| p.writers = vec![Box::new(Yolo::default())]).contains("writers"));
+    assert!(refused(&|p| p.split = Split { val_percent: 20, order: SplitOrder::Consecutive }).contains("split.order"));
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn folders_that_are_something_else_are_refused_and_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("photo.png");
+    std::fs::write(&file, b"mine").unwrap();
+    for (folder, what) in
+        [(file.clone(), "is a file"), (file.join("out"), "is a file"), (dir.path().into(), "is not empty")]
+    {
+        let e = make(&plan(&folder, 3)).unwrap_err().to_string();
+        assert!(e.contains(what), "{e}");
+    }
+    assert_eq!(bytes(dir.path()), BTreeMap::from([("photo.png".into(), b"mine".to_vec())]));
+}
+
+#[test]
+fn one_run_at_a_time_writes_a_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let second = |_| {
+        let e = make(&plan(dir.path(), 1)).unwrap_err().to_string();
+        assert!(e.contains("another run is writing"), "{e}");
+    };
+    generate(&plan(dir.path(), 1), sample, &second, &AtomicBool::new(false)).unwrap();
+}
+
+#[test]
+fn a_failing_sample_ends_the_run_and_keeps_the_others() {
+    let dir = tempfile::tempdir().unwrap();
+    let fails = |k| if k == 6 { Err(Error::value("objects", "would not settle")) } else { sample(k) };
+    let e = threads(1, || generate(&plan(dir.path(), 20), fails, &|_| {}, &AtomicBool::new(false))).unwrap_err();
+    assert_eq!(e.to_string(), "objects: would not settle");
+    assert_eq!(text(dir.path(), "index.jsonl").lines().count(), 6);
+    assert_eq!(make(&plan(dir.path(), 20)).unwrap().made, 14);
+}
+
+#[test]
+fn what_a_writer_cannot_hold_is_an_error() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |change: &(dyn Fn(&mut Sample) + Sync)| {
+        let made = |k| {
+            sample(k).inspect(|_| {}).map(|mut s| {
+                change(&mut s);
+                s
+            })
+        };
+        generate(&plan(dir.path(), 1), made, &|_| {}, &AtomicBool::new(false)).unwrap_err().to_string()
+    };
+    let odd = run(&|s| s.labels.objects = vec![object(1, 3, [0.0; 2], &[])]);
+    assert_eq!(odd, "labels.objects[0].class: 3, but there are 3 classes");
+    assert!(run(&|s| s.labels.image = [63, 48]).starts_with("labels.image: 63 x 48"));
+    let small = run(&|s| {
+        s.frame = Image::new(9, 40);
+        s.labels = Labels { image: [9, 40], objects: vec![] };
+    });
+    assert_eq!(small, "image: 9 x 40 pixels, expected at least 10 a side for YOLO");
+}
+
+#[test]
+fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut plan = plan(dir.path(), 1);
+    plan.obstructed = Obstructed::Keep;
+    let twins = |_| {
+        let mut s = sample(0)?;
+        s.labels.objects =
+            vec![object(1, 0, [0.0, 0.0], &[]), object(2, 0, [0.0, 0.0], &[1]), object(3, 0, [52.0, 39.0], &[])];
+        Ok(s)
+    };
+    let report = generate(&plan, twins, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!((report.objects, report.labelled), (3, 3));
+    let rows = "0 0.093750 0.093750 0.187500 0.187500\n0 0.906250 0.906250 0.187500 0.187500\n";
+    assert_eq!(text(dir.path(), "labels/val/000000.txt"), rows);
+}
+
+#[test]
+fn segments_hold_outlines_and_jpegs_are_accepted() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut plan = plan(dir.path(), 8);
+    plan.writers = vec![
+        Box::new(Pictures { format: PictureFormat::Jpg, exr: true }),
+        Box::new(Yolo { task: YoloTask::Segment, ..Yolo::default() }),
+    ];
+    make(&plan).unwrap();
+    let row = "1 0.015625 0.000000 0.203125 0.000000 0.203125 0.187500 0.015625 0.187500\n";
+    let sorted = |text: &str| {
+        let mut points: Vec<_> = text.split_whitespace().skip(1).map(String::from).collect();
+        points.sort();
+        points
+    };
+    assert_eq!(sorted(&text(dir.path(), "labels/train/000001.txt")), sorted(row));
+    assert_eq!(faults(dir.path()), [""; 0]);
+    let exr: Image<PremulRgba> = io::read(dir.path().join("exr/train/000001.exr")).unwrap();
+    assert_eq!(exr.size(), (64, 48));
+}
+
+#[test]
+fn a_sidecar_reads_back_bit_by_bit() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 4)).unwrap();
+    let record: Record = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
+    let made = sample(3).unwrap();
+    assert_eq!((record.scene, record.labels), (made.scene, made.labels));
+    assert_eq!((record.seed, record.index, record.labelled), (7, 3, vec![ObjectId(1), ObjectId(3)]));
+}
+
+#[test]
+fn a_check_finds_every_fault_and_its_place() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    let row = "0 0.5 0.5 0.1 0.1";
+    write("labels/train/000001.txt", &format!("{row}\n0 0.5 0.5 0.1\n3 0.5 0.5 0.1 0.1\n{row}\n"));
+    write(
+        "labels/train/000002.txt",
+        "0 0.5 1.1 0.1 0.1\n0 0.5 0.5 0 0.1\n0.5 0.5 0.5 0.1 0.1\n0 a 0.5 0.1 0.1\n-1 0 0 1 1\n",
+    );
+    write("labels/train/000003.txt", &format!("{row}\n0 0.1 0.1 0.2 0.2 0.3 0.3\n"));
+    write("labels/train/000099.txt", "");
+    std::fs::remove_file(dir.path().join("labels/train/000004.txt")).unwrap();
+    let whole = std::fs::read(dir.path().join("images/val/000005.png")).unwrap();
+    std::fs::write(dir.path().join("images/val/000005.png"), &whole[..whole.len() / 2]).unwrap();
+    std::fs::copy(dir.path().join("images/train/000006.png"), dir.path().join("images/val/000000.png")).unwrap();
+    io::write(dir.path().join("images/train/000007.png"), &Image::<LinearRgb>::new(9, 30)).unwrap();
+
+    let found = faults(dir.path()).join("\n");
+    for expected in [
+        "labels/train/000001.txt:2: 4 columns, expected 5",
+        "labels/train/000001.txt:3: class 3, but data.yaml has 3 classes, from 0",
+        "labels/train/000001.txt:4: the same row stands above",
+        "labels/train/000002.txt:1: 1.1, expected a share of the image, 0 to 1",
+        "labels/train/000002.txt:2: a box of 0 x 0.1, expected sides above 0",
+        "labels/train/000002.txt:3: class 0.5, expected a whole number from 0",
+        "labels/train/000002.txt:4: \"a\", expected a number",
+        "labels/train/000002.txt:5: class -1, expected a whole number from 0",
+        "labels/train/000003.txt:1: 5 columns, expected a class and at least 3 pairs",
+        "labels/train/000004.txt: missing",
+        "labels/train/000099.txt: no image of this name",
+        "images/val/000005.png: ",
+        "images/val/000000.png: the same bytes as images/train/000006.png",
+        "images/train/000007.png: 9 x 30 pixels, expected at least 10 a side",
+        "index.jsonl:2: labels/train/000001.txt has ",
+        "index.jsonl:5: labels/train/000004.txt is missing",
+    ] {
+        assert!(found.contains(expected), "no `{expected}` in\n{found}");
+    }
+}
+
+#[test]
+fn an_empty_folder_fails_the_check() {
+    let dir = tempfile::tempdir().unwrap();
+    assert!(faults(dir.path())[0].starts_with("data.yaml: "), "{:?}", faults(dir.path()));
+    assert!(check(&dir.path().join("none")).is_err());
+}
+
+#[test]
+fn a_contact_sheet_shows_the_pictures_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let options = SheetOptions { title: "twelve".into(), columns: 3, ..SheetOptions::default() };
+    let six = contact_sheet_of(dir.path(), 6, &options).unwrap();
+    let all = contact_sheet_of(dir.path(), 100, &options).unwrap();
+    assert_eq!(six.width(), all.width());
+    assert_eq!(all.height() - six.height(), 2 * (48 + 4 + 16 + 16));
+    let orange = petcomp::Srgb8 { r: 0xE6, g: 0x9F, b: 0x00 };
+    assert!(all.pixels().contains(&orange));
+    assert!(contact_sheet_of(&dir.path().join("images"), 6, &options).is_err());
+}
+
+#[test]
+fn a_writer_of_one_s_own_takes_part() {
+    struct Count;
+    impl Writer for Count {
+        fn settings(&self) -> serde_json::Value {
+            "count".into()
+        }
+        fn begin(&self, _: &Path, _: &[String]) -> Result<()> {
+            Ok(())
+        }
+        fn write(&self, folder: &Path, entry: &petcomp::dataset::Entry<'_>) -> Result<Vec<PathBuf>> {
+            let path = PathBuf::from(format!("{}.txt", entry.k));
+            io::write_text(folder.join(&path), &entry.labelled.len().to_string())?;
+            Ok(vec![path])
+        }
+    }
+    let dir = tempfile::tempdir().unwrap();
+    make(&Plan { writers: vec![Box::new(Count)], ..plan(dir.path(), 4) }).unwrap();
+    assert_eq!(text(dir.path(), "3.txt"), "2");
+}

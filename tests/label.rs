@@ -1,0 +1,350 @@
+//! Laws of labels, against pictures cast by brute force: many rays a pixel, no code shared with the library's renderer.
+
+use geo::Contains;
+use petcomp::camera::Camera;
+use petcomp::filter::Pyramid;
+use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
+use petcomp::label::{AmodalBox, BBox, LabelOptions, Labels, knotted, label};
+use petcomp::render::{DeepImage, DeepSample};
+use petcomp::scene::{Card, Grade};
+use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
+use proptest::prelude::*;
+use std::sync::Arc;
+
+/// Rays along each side of a pixel; a pixel's coverage is then known to within 1 / RAYS.
+const RAYS: usize = 8;
+
+const IMAGE: [u32; 2] = [96, 72];
+
+/// A camera one metre above the surface that looks straight down.
+fn camera() -> Camera {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    Camera {
+        image: IMAGE,
+        focal_px: Vector2::new(100.0, 100.0),
+        principal_px: Point2::new(48.0, 36.0),
+        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+    }
+}
+
+fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[[f64; 2]]) -> Card {
+    let rotation = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
+    let world_from_card = Pose::from_parts(Vector3::from(center).into(), rotation);
+    Card {
+        id: ObjectId(id),
+        class: id % 4,
+        quad: petcomp::geom::Quad { world_from_card, size },
+        texture: Arc::new(Pyramid::new(Image::filled(2, 2, PremulRgba::new(0.5, 0.5, 0.5, 1.0)))),
+        outline_uv: outline.iter().map(|&[u, v]| Point2::new(u, v)).collect(),
+        grade: Grade::default(),
+    }
+}
+
+const WHOLE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+/// Casts opaque cards, each as far as its outline reaches.
+fn cast(shot: &Shot) -> DeepImage {
+    let outlines: Vec<_> = shot.cards.iter().map(polygon).collect();
+    let [w, h] = shot.camera.image.map(|n| n as usize);
+    let pixels = (0..w * h).map(|i| pixel(shot, &outlines, (i % w) as f64, (i / w) as f64));
+    DeepImage::from_pixels(Image::filled(w, h, LinearRgb::WHITE), pixels)
+}
+
+fn polygon(card: &Card) -> geo::Polygon<f64> {
+    let ring: Vec<_> = card.outline_uv.iter().map(|p| (p.x, p.y)).collect();
+    geo::Polygon::new(ring.into(), Vec::new())
+}
+
+fn pixel(shot: &Shot, outlines: &[geo::Polygon<f64>], x: f64, y: f64) -> Vec<DeepSample> {
+    let share = 1.0 / (RAYS * RAYS) as f32;
+    let mut samples: Vec<DeepSample> = Vec::new();
+    for i in 0..RAYS * RAYS {
+        let offset = |k: usize| (k as f64 + 0.5) / RAYS as f64;
+        let ray = shot.camera.ray(Point2::new(x + offset(i % RAYS), y + offset(i / RAYS)));
+        let hits = shot.cards.iter().zip(outlines).filter_map(|(card, outline)| {
+            let (t, uv) = card.quad.intersect(&ray)?;
+            outline.contains(&geo::Point::new(uv.x, uv.y)).then_some((t, card.id))
+        });
+        let mut hits: Vec<_> = hits.collect();
+        hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (order, &(t, object)) in hits.iter().enumerate() {
+            let k = samples.iter().position(|s| s.object == object).unwrap_or(samples.len());
+            if k == samples.len() {
+                samples.push(DeepSample { object, depth: Depth(t as f32), ..DeepSample::default() });
+            }
+            samples[k].alpha += share;
+            samples[k].visible += if order == 0 { share } else { 0.0 };
+        }
+    }
+    samples.sort_by(|a, b| a.depth.0.total_cmp(&b.depth.0));
+    samples
+}
+
+fn shot(cards: impl IntoIterator<Item = Card>) -> Shot {
+    cards.into_iter().fold(Shot::new(camera()), Shot::with_card)
+}
+
+fn labels(shot: &Shot, options: &LabelOptions) -> Labels {
+    label(&cast(shot), shot, options)
+}
+
+/// A card with a convex outline, wherever it may be, at any angle.
+fn any_card(id: u32) -> impl Strategy<Value = Card> {
+    let place = prop::array::uniform3(-0.4..0.4_f64);
+    let angles = prop::array::uniform3(-1.2..1.2_f64);
+    let size = prop::array::uniform2(0.05..0.4_f64);
+    (place, angles, size, 3_usize..9)
+        .prop_map(move |([x, y, z], angles, size, corners)| card(id, [x, y, z + 0.2], angles, size, &round(corners)))
+}
+
+/// A tilted card that is too small to reach into the heights of the others.
+fn apart(id: u32) -> impl Strategy<Value = Card> {
+    let place = (-0.2..0.2_f64, -0.2..0.2_f64);
+    (place, prop::array::uniform3(-1.2..1.2_f64), prop::array::uniform2(0.05..0.15_f64), 3_usize..9)
+        .prop_map(move |((x, y), angles, size, n)| card(id, [x, y, 0.22 * f64::from(id - 1)], angles, size, &round(n)))
+}
+
+/// A regular polygon that fills the card's texture.
+fn round(corners: usize) -> Vec<[f64; 2]> {
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / corners as f64;
+    (0..corners).map(|i| [0.5 + 0.5 * angle(i).cos(), 0.5 + 0.5 * angle(i).sin()]).collect()
+}
+
+/// A card that lies flat at height `z`.
+fn flat_card(id: u32) -> impl Strategy<Value = Card> {
+    let place = prop::array::uniform2(-0.4..0.4_f64);
+    (place, -3.2..3.2_f64, prop::array::uniform2(0.05..0.3_f64), 3_usize..9).prop_map(move |([x, y], turn, size, n)| {
+        card(id, [x, y, 0.01 * f64::from(id)], [0.0, 0.0, turn], size, &round(n))
+    })
+}
+
+fn area(rings: &[Vec<Point2<f64>>]) -> f64 {
+    let ring = |r: &Vec<Point2<f64>>| {
+        let next = r.iter().cycle().skip(1);
+        0.5 * r.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>().abs()
+    };
+    rings.iter().map(ring).sum()
+}
+
+fn off(a: &BBox, b: &BBox) -> f64 {
+    [a.x0 - b.x0, a.y0 - b.y0, a.x1 - b.x1, a.y1 - b.y1].into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+/// Coverage of an object and the box around every pixel of which it covers more than `least`.
+fn raster(deep: &DeepImage, id: u32, least: f32) -> (f64, BBox) {
+    let mut sum = 0.0;
+    let mut dots = Vec::new();
+    for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
+        for s in deep.at(x, y).iter().filter(|s| s.object == ObjectId(id)) {
+            sum += f64::from(s.alpha);
+            if s.alpha <= least {
+                continue;
+            }
+            dots.extend([Point2::new(x as f64, y as f64), Point2::new(x as f64 + 1.0, y as f64 + 1.0)]);
+        }
+    }
+    (sum, BBox::around(dots))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn a_visible_box_lies_in_the_amodal_box_and_fractions_in_0_to_1(cards in [any_card(1), any_card(2), any_card(3)]) {
+        for object in labels(&shot(cards), &LabelOptions::default()).objects {
+            prop_assert!(object.amodal_box.contains(&object.visible_box));
+            prop_assert!((0.0..=1.0).contains(&object.visible_fraction));
+            let [w, h] = IMAGE.map(f64::from);
+            let picture = BBox { x0: 0.0, y0: 0.0, x1: w, y1: h };
+            prop_assert!(picture.contains(&object.amodal_box) && !object.amodal_box.is_empty());
+            prop_assert!(object.outline_px.iter().flatten().all(|p| (0.0..=w).contains(&p.x) && (0.0..=h).contains(&p.y)));
+        }
+    }
+
+    #[test]
+    fn an_amodal_box_is_that_of_the_mask_rendered_alone(cards in [any_card(1), any_card(2)]) {
+        let options = LabelOptions::default();
+        let found = labels(&shot(cards.clone()), &options);
+        for one in cards {
+            let (_, alone) = raster(&cast(&shot([one.clone()])), one.id.0, options.alpha_threshold);
+            let object = found.objects.iter().find(|o| o.id == one.id);
+            prop_assert_eq!(object.map_or_else(BBox::default, |o| o.amodal_box), alone);
+        }
+    }
+
+    #[test]
+    fn an_outline_encloses_what_a_raster_counts(one in any_card(1)) {
+        let scene = shot([one]);
+        let deep = cast(&scene);
+        let options = LabelOptions { amodal: AmodalBox::Outline, ..LabelOptions::default() };
+        let (counted, around) = raster(&deep, 1, 0.0);
+        for object in label(&deep, &scene, &options).objects {
+            // Each ray stands for 1/64 of a pixel; the outline's border of length L crosses about 2 L RAYS of them, and
+            // rounds up and down alike: half a ray's width along the border bounds the error.
+            let border = 2.0 * (object.amodal_box.width() + object.amodal_box.height());
+            prop_assert!((area(&object.outline_px) - counted).abs() <= 0.5 * border / RAYS as f64 + 0.1);
+            // The outline ends inside the outermost pixels that rays hit, or less than a ray's distance outside.
+            prop_assert!(around.is_empty() || off(&object.amodal_box, &around) <= 1.0 + 1.0 / RAYS as f64);
+        }
+    }
+
+    #[test]
+    fn the_higher_of_two_flat_cards_that_share_pixels_lies_over_the_other(cards in [flat_card(1), flat_card(2)]) {
+        let scene = shot(cards);
+        let deep = cast(&scene);
+        let shared = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)))
+            .any(|(x, y)| deep.at(x, y).iter().any(|s| s.alpha > s.visible));
+        let found = label(&deep, &scene, &LabelOptions::default());
+        let covered = |id: u32| found.objects.iter().find(|o| o.id == ObjectId(id)).map(|o| o.covered_by.clone());
+        if let (Some(low), Some(high)) = (covered(1), covered(2)) {
+            prop_assert!(high.is_empty());
+            // Rays miss an overlap thinner than their distance, never the other way round.
+            prop_assert!(!shared || low == [ObjectId(2)]);
+        }
+    }
+
+    #[test]
+    fn a_topmost_opaque_card_is_seen_whole(cards in [apart(1), apart(2), apart(3), apart(4)]) {
+        for object in labels(&shot(cards), &LabelOptions::default()).objects.iter().filter(|o| o.is_topmost()) {
+            prop_assert!(object.visible_fraction > 0.999, "{object:?}");
+        }
+    }
+
+    #[test]
+    fn the_threshold_on_the_overlap_is_the_iou_of_the_rasters(cards in [flat_card(1), flat_card(2)]) {
+        let scene = shot(cards);
+        let deep = cast(&scene);
+        let (mut shared, mut all) = (0.0, 0.0);
+        for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
+            let samples = deep.at(x, y);
+            shared += samples.iter().map(|s| f64::from(s.alpha - s.visible)).sum::<f64>();
+            all += samples.iter().map(|s| f64::from(s.visible)).sum::<f64>();
+        }
+        let iou: f64 = if all > 0.0 { shared / all } else { 0.0 };
+        let covered_at = |iou| {
+            let options = LabelOptions { overlap_iou: iou, ..LabelOptions::default() };
+            label(&deep, &scene, &options).objects.iter().any(|o| !o.is_topmost())
+        };
+        // A raster of 8 x 8 rays a pixel knows the area of shapes of this size to a few percent.
+        prop_assert!(iou < 0.02 || covered_at(0.9 * iou - 0.01));
+        prop_assert!(!covered_at(1.1 * iou + 0.01));
+    }
+}
+
+#[test]
+fn three_cards_that_lie_over_each_other_in_a_circle_are_a_knot() {
+    // Like the flaps of a carton: each card is tilted about its long side, over the next, under the one before.
+    let flap = |id: u32| {
+        let turn = std::f64::consts::TAU / 3.0 * f64::from(id);
+        let spin = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
+        let along = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.3);
+        let mut flap = card(id, [0.0; 3], [0.0; 3], [0.5, 0.06], &WHOLE);
+        flap.quad.world_from_card = Pose::from_parts((spin * Vector3::new(0.0, 0.1, 0.1)).into(), spin * along);
+        flap
+    };
+    let found = labels(&shot([1, 2, 3].map(flap)), &LabelOptions::default());
+    assert_eq!(found.objects.len(), 3);
+    assert!(found.objects.iter().all(|o| o.covered_by.len() == 1), "{:?}", found.objects);
+    assert_eq!(knotted(&found.objects), [1, 2, 3].map(ObjectId));
+}
+
+#[test]
+fn a_stack_is_no_knot() {
+    let stack = [1, 2, 3].map(|id| card(id, [0.0, 0.0, 0.1 * f64::from(id)], [0.0; 3], [0.2; 2], &WHOLE));
+    let found = labels(&shot(stack), &LabelOptions::default());
+    assert_eq!(found.objects[0].covered_by, [ObjectId(2), ObjectId(3)]);
+    assert!(found.objects[2].is_topmost() && knotted(&found.objects).is_empty());
+}
+
+#[test]
+fn a_tilted_card_is_compared_where_the_two_overlap() {
+    // Card 1 is lower at its centre than card 2, but its raised end is above card 2, and there they overlap.
+    let tilted = card(1, [0.0, 0.0, 0.1], [0.0, -0.5, 0.0], [0.6, 0.1], &WHOLE);
+    let small = card(2, [0.2, 0.0, 0.15], [0.0; 3], [0.1; 2], &WHOLE);
+    let found = labels(&shot([tilted, small]), &LabelOptions::default());
+    assert!(found.objects[0].is_topmost());
+    assert_eq!(found.objects[1].covered_by, [ObjectId(1)]);
+}
+
+#[test]
+fn cards_at_the_same_depth_are_ordered_by_id() {
+    let twins = [2, 1].map(|id| card(id, [0.0, 0.0, 0.1], [0.0; 3], [0.2; 2], &WHOLE));
+    let found = labels(&shot(twins), &LabelOptions::default());
+    assert!(found.objects[0].is_topmost());
+    assert_eq!(found.objects[1].covered_by, [ObjectId(1)]);
+}
+
+#[test]
+fn cards_that_only_touch_do_not_overlap() {
+    let beside = [(1, -0.05), (2, 0.05)].map(|(id, x)| card(id, [x, 0.0, 0.1], [0.0; 3], [0.1; 2], &WHOLE));
+    let found = labels(&shot(beside), &LabelOptions::default());
+    assert!(found.objects.iter().all(|o| o.is_topmost()));
+}
+
+#[test]
+fn a_card_that_reaches_behind_the_camera_is_clipped_to_the_picture() {
+    // A strip through the camera's height, tilted: its near end is above and behind the lens.
+    let strip = card(1, [0.6, 0.0, 0.7], [0.0, -0.9, 0.0], [2.0, 0.1], &WHOLE);
+    let scene = shot([strip]);
+    let deep = cast(&scene);
+    let found = label(&deep, &scene, &LabelOptions { amodal: AmodalBox::Outline, ..LabelOptions::default() });
+    let (counted, around) = raster(&deep, 1, 0.0);
+    assert!(counted > 100.0, "the strip crosses the picture");
+    assert!(off(&found.objects[0].amodal_box, &around) <= 1.0);
+    assert!((area(&found.objects[0].outline_px) - counted).abs() < 0.02 * counted);
+}
+
+#[test]
+fn what_cannot_be_seen_has_no_label() {
+    let out_of_sight = card(1, [3.0, 0.0, 0.0], [0.0; 3], [0.2; 2], &WHOLE);
+    let behind = card(2, [0.0, 0.0, 2.0], [0.0; 3], [0.2; 2], &WHOLE);
+    let edge_on = card(3, [0.0, 0.0, 0.5], [0.0, std::f64::consts::FRAC_PI_2, 0.0], [0.2; 2], &WHOLE);
+    let scene = shot([out_of_sight, behind, edge_on]);
+    for amodal in [AmodalBox::Mask, AmodalBox::Outline] {
+        assert!(labels(&scene, &LabelOptions { amodal, ..LabelOptions::default() }).objects.is_empty());
+    }
+}
+
+#[test]
+fn an_outline_that_is_none_still_gives_a_mask_box() {
+    let nan = [[f64::NAN, 0.0], [1.0, 0.0], [1.0, 1.0]];
+    for outline in [&[][..], &[[0.5, 0.5]], &[[0.0, 0.0], [1.0, 1.0]], &[[0.2, 0.2], [0.4, 0.4], [0.8, 0.8]], &nan] {
+        let whole = shot([card(1, [0.0; 3], [0.0; 3], [0.2; 2], &WHOLE)]);
+        let scene = shot([card(1, [0.0; 3], [0.0; 3], [0.2; 2], outline)]);
+        let found = label(&cast(&whole), &scene, &LabelOptions::default());
+        assert_eq!(found.objects[0].amodal_box, BBox { x0: 38.0, y0: 26.0, x1: 58.0, y1: 46.0 });
+        assert!(found.objects[0].outline_px.is_empty());
+    }
+}
+
+#[test]
+fn an_outline_that_crosses_itself_keeps_both_loops() {
+    let bow_tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+    let found = labels(&shot([card(1, [0.0; 3], [0.0; 3], [0.4; 2], &bow_tie)]), &LabelOptions::default());
+    // Two triangles of a quarter of the 40 x 40 pixel card each.
+    assert_eq!(found.objects[0].outline_px.len(), 2);
+    assert!((area(&found.objects[0].outline_px) - 800.0).abs() < 0.1);
+}
+
+#[test]
+fn an_outline_cut_apart_by_the_picture_s_edge_keeps_its_parts() {
+    let comb = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.8, 1.0], [0.8, 0.2], [0.2, 0.2], [0.2, 1.0], [0.0, 1.0]];
+    let scene = shot([card(1, [0.0, 0.4, 0.0], [0.0; 3], [0.4; 2], &comb)]);
+    let deep = cast(&scene);
+    let found = label(&deep, &scene, &LabelOptions::default());
+    assert_eq!(found.objects[0].outline_px.len(), 2);
+    assert!((area(&found.objects[0].outline_px) - raster(&deep, 1, 0.0).0).abs() < 1.0);
+}
+
+#[test]
+fn film_seen_through_film_counts_as_seen() {
+    let image = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
+    let front = DeepSample { object: ObjectId(1), alpha: 0.4, visible: 0.4, ..DeepSample::default() };
+    let back = DeepSample { object: ObjectId(2), alpha: 0.5, visible: 0.3, ..DeepSample::default() };
+    let deep =
+        DeepImage::from_pixels(image, (0..96 * 72).map(|i| if i == 96 + 2 { vec![front, back] } else { vec![] }));
+    let scene = shot([2, 1].map(|id| card(id, [0.0; 3], [0.0; 3], [0.1; 2], &WHOLE)));
+    let found = label(&deep, &scene, &LabelOptions::default());
+    assert!((found.objects[1].visible_fraction - 0.6).abs() < 1e-6);
+    assert_eq!(found.objects[1].visible_box, BBox { x0: 2.0, y0: 1.0, x1: 3.0, y1: 2.0 });
+}
