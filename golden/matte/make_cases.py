@@ -11,6 +11,7 @@ import os
 import shutil
 
 import blenders
+import exr_file
 import pictures
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -192,6 +193,16 @@ def job(folder, node, source, params):
                 prefix=folder + os.sep, outputs=outputs)
 
 
+def plain(path):
+    """Leave nothing but the samples of a reference, so that remaking it gives the same bytes; one channel of a matte."""
+    width, height, channels = exr_file.read(path)
+    if len(channels) == 3:
+        channels = {"Y": channels["R"]}
+    elif len(channels) == 1:
+        channels = {"Y": next(iter(channels.values()))}
+    exr_file.write(path, width, height, channels)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     blenders.add_arguments(parser)
@@ -208,6 +219,9 @@ def main():
             write_case(folder, version, node, about, source, params)
             jobs.append(job(folder, node, source, params))
         blenders.run(version, commands[version], jobs)
+        for done in jobs:
+            for name in done["outputs"].values():
+                plain(done["prefix"] + name + ".exr")
         print("Blender %s: %d cases" % (version, len(jobs)))
 
 

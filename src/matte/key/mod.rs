@@ -17,7 +17,7 @@ mod rows;
 mod stream;
 
 pub(super) use chroma::{differences, from_ycc, to_ycc};
-pub use options::{BlurSum, Falloff, KeyOptions, Profile};
+pub use options::{Falloff, KeyOptions, Profile};
 pub use photo::Photo;
 
 use crate::error::{Error, Result};
