@@ -15,24 +15,38 @@ def attribute(name, kind, value):
     return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
 
 
+def zipped(raw):
+    """Split into even and odd bytes, take differences of neighbours, deflate; as it is where that is not smaller."""
+    parts = bytearray(raw[0::2] + raw[1::2])
+    for i in range(len(parts) - 1, 0, -1):
+        parts[i] = (parts[i] - parts[i - 1] + 128) & 255
+    packed = zlib.compress(bytes(parts), 9)
+    return packed if len(packed) < len(raw) else bytes(raw)
+
+
 def write(path, width, height, channels):
-    """Write channels of float bytes without compression."""
+    """Write channels of float bytes, zip-compressed."""
     names = sorted(channels)
     entries = b"".join(n.encode() + b"\0" + struct.pack("<iBxxxii", FLOAT, 0, 1, 1) for n in names) + b"\0"
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     header = struct.pack("<ii", 20000630, 2) + b"".join((
-        attribute("channels", "chlist", entries), attribute("compression", "compression", bytes([NO_COMPRESSION])),
+        attribute("channels", "chlist", entries), attribute("compression", "compression", bytes([ZIP])),
         attribute("dataWindow", "box2i", window), attribute("displayWindow", "box2i", window),
         attribute("lineOrder", "lineOrder", b"\0"), attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
         attribute("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0)),
         attribute("screenWindowWidth", "float", struct.pack("<f", 1)))) + b"\0"
-    row, line = 4 * width, 4 * width * len(names)
-    start = len(header) + 8 * height
+    row, blocks = 4 * width, []
+    for top in range(0, height, ROWS_PER_BLOCK[ZIP]):
+        lines = range(top, min(top + ROWS_PER_BLOCK[ZIP], height))
+        packed = zipped(b"".join(channels[n][y * row:(y + 1) * row] for y in lines for n in names))
+        blocks.append(struct.pack("<ii", top, len(packed)) + packed)
+    at = len(header) + 8 * len(blocks)
     with open(path, "wb") as out:
         out.write(header)
-        out.write(b"".join(struct.pack("<Q", start + y * (8 + line)) for y in range(height)))
-        for y in range(height):
-            out.write(struct.pack("<ii", y, line) + b"".join(channels[n][y * row:(y + 1) * row] for n in names))
+        for block in blocks:
+            out.write(struct.pack("<Q", at))
+            at += len(block)
+        out.write(b"".join(blocks))
 
 
 def text(data, at):

@@ -11,6 +11,7 @@ import os
 import shutil
 
 import blenders
+import exr_file
 import pictures
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -18,6 +19,8 @@ INPUTS = os.path.join(HERE, "inputs")
 
 GREEN, BLUE, RED = (0.1, 0.75, 0.2), (0.1, 0.2, 0.8), (0.8, 0.2, 0.1)
 GREY, CYAN, YELLOW, MAGENTA = (0.5, 0.5, 0.5), (0.1, 0.7, 0.7), (0.7, 0.7, 0.1), (0.7, 0.1, 0.7)
+# Channels in Blender's own names; that of U is G.
+CHANNELS = {"RGB": ("R", "G", "B"), "HSV": ("H", "S", "V"), "YUV": ("Y", "G", "V"), "YCC": ("Y", "CB", "CR")}
 FALLOFFS = ("SMOOTH", "SPHERE", "ROOT", "INVERSE_SQUARE", "SHARP", "LINEAR")
 ALL = dict(blur_pre=3, screen_balance=0.4, clip_black=0.1, clip_white=0.9, edge_kernel_radius=2,
            edge_kernel_tolerance=0.15, blur_post=2, dilate_distance=-3, feather_distance=3, feather_falloff="SHARP",
@@ -167,6 +170,9 @@ def write_case(folder, version, node, about, source, params):
     if "key_color" in params:
         lines.append("screen = %s" % toml(params["key_color"]))
     settings = {n: v for n, v in params.items() if n not in blenders.GIVEN_ELSEWHERE}
+    for name in ("matte_channel", "limit_channel"):
+        if node == "channel_key" and name in settings:
+            settings[name] = CHANNELS[settings["color_space"]].index(settings[name])
     lines += ["", "[options]", "profile = %s" % toml(blenders.PROFILES[version])]
     lines += ["%s = %s" % (name, toml(value)) for name, value in settings.items()]
     lines += ["", "[reference]", 'program = "Blender"', 'version = "%s"' % version,
@@ -187,6 +193,16 @@ def job(folder, node, source, params):
                 prefix=folder + os.sep, outputs=outputs)
 
 
+def plain(path):
+    """Leave nothing but the samples of a reference, so that remaking it gives the same bytes; one channel of a matte."""
+    width, height, channels = exr_file.read(path)
+    if len(channels) == 3:
+        channels = {"Y": channels["R"]}
+    elif len(channels) == 1:
+        channels = {"Y": next(iter(channels.values()))}
+    exr_file.write(path, width, height, channels)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     blenders.add_arguments(parser)
@@ -203,6 +219,9 @@ def main():
             write_case(folder, version, node, about, source, params)
             jobs.append(job(folder, node, source, params))
         blenders.run(version, commands[version], jobs)
+        for done in jobs:
+            for name in done["outputs"].values():
+                plain(done["prefix"] + name + ".exr")
         print("Blender %s: %d cases" % (version, len(jobs)))
 
 

@@ -1,11 +1,21 @@
 //! Matte: a photo on a screen becomes a cut-out.
 
+mod channel_key;
+mod chroma_key;
+mod color_spill;
 mod cut_out;
+mod difference_key;
 pub mod key;
+mod keying_screen;
 mod screen;
 mod segment;
 
+pub use channel_key::{ChannelKeyOptions, ChannelKeyed, ChannelLimit, KeySpace, channel_key};
+pub use chroma_key::{ChromaKeyOptions, chroma_key};
+pub use color_spill::{Channel, ColorSpillOptions, SpillLimit, color_spill};
 pub use cut_out::{CutOut, CutOutOptions, MatteMethod, Within, cut_out};
+pub use difference_key::{DifferenceKeyOptions, difference_key};
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
+pub use keying_screen::{ScreenPoint, keying_screen};
 pub use screen::screen_color;
 pub use segment::{SegmentOptions, Segmentation, Step, Threshold, Tone, segment};

@@ -3,7 +3,7 @@
 //! `cargo bench --bench matte`: every line is one 4K frame on all cores, into pictures that are already allocated.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use petcomp::matte::key::{BlurSum, KeyOptions, Keyed, Keying, Profile, Screen};
+use petcomp::matte::key::{KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -92,8 +92,6 @@ fn bench(c: &mut Criterion) {
         group
             .bench_function(format!("key/all stages, {name}"), |b| b.iter(|| job.run_into(&opts, &mut keyed).unwrap()));
     }
-    let opts = KeyOptions { blur_sum: BlurSum::Running, ..all_stages(Profile::Blender34) };
-    group.bench_function("key/all stages, running sums", |b| b.iter(|| job.run_into(&opts, &mut keyed).unwrap()));
     group.finish();
 }
 

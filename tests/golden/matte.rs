@@ -3,6 +3,7 @@
 use crate::case::Case;
 use petcomp::io::exr::read_channels;
 use petcomp::matte::key::{KeyOptions, Keying, Photo, Screen};
+use petcomp::matte::{ChannelKeyed, channel_key, chroma_key, color_spill, difference_key};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use serde::de::DeserializeOwned;
 
@@ -10,13 +11,27 @@ use serde::de::DeserializeOwned;
 pub(crate) fn run(case: &Case) -> Result<(), String> {
     match text(case, "node")? {
         "keying" => keying(case),
+        "chroma_key" => {
+            let matte = chroma_key(&photo(case)?, color(case, "screen")?, &options(case)?);
+            same_cut(case, &matte)
+        }
+        "channel_key" => {
+            let ChannelKeyed { matte, cutout } = channel_key(&photo(case)?, &options(case)?);
+            all([same_matte(case, "reference_matte.exr", &matte), same_image(case, "reference.exr", &cutout)])
+        }
+        "difference_key" => {
+            let clean = input(case, "second")?.ok_or("second: missing")?;
+            let matte = difference_key(&photo(case)?, &clean, &options(case)?).map_err(|e| e.to_string())?;
+            same_cut(case, &matte)
+        }
+        "color_spill" => same_image(case, "reference.exr", &color_spill(&photo(case)?, &options(case)?)),
         other => Err(format!("node: \"{other}\" is not known")),
     }
 }
 
 fn keying(case: &Case) -> Result<(), String> {
     let opts: KeyOptions = options(case)?;
-    let photo = input(case, "input")?.ok_or("input: missing")?;
+    let photo = photo(case)?;
     let [plate, garbage, core] = ["plate", "garbage", "core"].map(|name| input(case, name));
     let (plate, garbage, core) = (plate?, garbage?, core?);
     let plate = plate.map(|p| p.map(PremulRgba::color));
@@ -35,14 +50,23 @@ fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, opts: &KeyOptions) -> Resul
     let keyed = job.run(opts).map_err(|e| e.to_string())?;
     let edges = job.edges(opts).map_err(|e| e.to_string())?;
     let alone = job.matte(opts).map_err(|e| e.to_string())?;
-    let results = [
+    all([
         same_matte(case, "reference_matte.exr", &keyed.matte),
         same_matte(case, "reference_edges.exr", &edges),
         same_image(case, "reference.exr", &keyed.cutout),
         same_matte(case, "reference_matte.exr", &alone),
-    ];
+    ])
+}
+
+fn all<const N: usize>(results: [Result<(), String>; N]) -> Result<(), String> {
     let wrong: Vec<String> = results.into_iter().filter_map(Result::err).collect();
     if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
+}
+
+/// A matte, and the photo seen through it.
+fn same_cut(case: &Case, matte: &Image<Coverage>) -> Result<(), String> {
+    let cutout = photo(case)?.zip_map(matte, PremulRgba::masked);
+    all([same_matte(case, "reference_matte.exr", matte), same_image(case, "reference.exr", &cutout)])
 }
 
 fn same_matte(case: &Case, file: &str, got: &Image<Coverage>) -> Result<(), String> {
@@ -90,6 +114,10 @@ fn text<'c>(case: &'c Case, key: &str) -> Result<&'c str, String> {
 fn color(case: &Case, key: &str) -> Result<LinearRgb, String> {
     let value = case.table.get(key).ok_or_else(|| format!("{key}: missing"))?;
     value.clone().try_into().map_err(|e| format!("{key}: {e}"))
+}
+
+fn photo(case: &Case) -> Result<Image<PremulRgba>, String> {
+    input(case, "input")?.ok_or_else(|| "input: missing".into())
 }
 
 /// A picture that the case names, if it does.

@@ -37,9 +37,23 @@ fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
 }
 
 /// Blue and red difference of a colour in unit scale, 128/255 being neutral.
-pub(crate) fn differences(p: PremulRgba, divided: bool) -> [f32; 2] {
-    let behaviour = if divided { Behaviour::V45 } else { Behaviour::V34 };
+pub(in crate::matte) fn differences(p: PremulRgba, is_late: bool) -> [f32; 2] {
+    let behaviour = if is_late { Behaviour::V45 } else { Behaviour::V34 };
     DIFFERENCES.map(|w| to_unit(signal(p, w, NEUTRAL), behaviour))
+}
+
+/// All three signals of a colour in unit scale.
+pub(in crate::matte) fn to_ycc(p: PremulRgba, is_late: bool) -> [f32; 3] {
+    let behaviour = if is_late { Behaviour::V45 } else { Behaviour::V34 };
+    let [cb, cr] = differences(p, is_late);
+    [to_unit(signal(p, LUMA, FOOT), behaviour), cb, cr]
+}
+
+/// The colour of three signals in unit scale.
+pub(in crate::matte) fn from_ycc(signals: [f32; 3]) -> [f32; 3] {
+    let [y, cb, cr] = signals.map(|s| s * FULL);
+    let p = color(y, cb, cr, 1.0);
+    [p.r, p.g, p.b]
 }
 
 /// The colour of three signals in code values.

@@ -16,7 +16,8 @@ mod robust;
 mod rows;
 mod stream;
 
-pub use options::{BlurSum, Falloff, KeyOptions, Profile};
+pub(super) use chroma::{differences, from_ycc, to_ycc};
+pub use options::{Falloff, KeyOptions, Profile};
 pub use photo::Photo;
 
 use crate::error::{Error, Result};

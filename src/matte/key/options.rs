@@ -61,17 +61,6 @@ pub enum Falloff {
     Linear,
 }
 
-/// How the box blurs add up their samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BlurSum {
-    /// Sample by sample in Blender's order: its bits, at a cost that grows with the size.
-    #[default]
-    Exact,
-    /// Running sums in double precision: the same cost at any size, within a few 1e-7 on values of 0 to 1.
-    Running,
-}
-
 /// Settings of the [keyer](super), under the names that Blender 3.4 gives its Keying node.
 ///
 /// The ranges are Blender's. [`Keying::run`](super::Keying::run) refuses values outside them, [`key`](super::key) moves
@@ -112,8 +101,6 @@ pub struct KeyOptions {
     pub subtract_screen: bool,
     /// Lets the `robust` profile key against a screen too grey to be told from the foreground. Default: false.
     pub accept_weak_key: bool,
-    /// How the box blurs add up. Default: `exact`.
-    pub blur_sum: BlurSum,
 }
 
 impl Default for KeyOptions {
@@ -135,7 +122,6 @@ impl Default for KeyOptions {
             ignore_brightness: false,
             subtract_screen: false,
             accept_weak_key: false,
-            blur_sum: BlurSum::default(),
         }
     }
 }

@@ -90,11 +90,6 @@ impl<'a, P: Photo> Keyer<'a, P> {
         Self { screen, channel, terms, despill: Despill { factor, balance, subtract }, loops }
     }
 
-    /// Saturation of the key; 0 for a plate.
-    pub(super) fn saturation(&self) -> f32 {
-        self.terms.saturation
-    }
-
     /// Row `y` of the raw matte.
     pub(super) fn matte_row(&self, y: usize, pixels: &[P], out: &mut [f32]) {
         match self.screen {

@@ -1,0 +1,165 @@
+//! Channel Key: one channel of some colour space against the others.
+
+use super::key::{Photo, Profile, from_ycc, to_ycc};
+use crate::image::Image;
+use crate::pixel::{Coverage, PremulRgba};
+use serde::{Deserialize, Serialize};
+
+/// The colour space whose channels are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum KeySpace {
+    /// Red, green, blue.
+    #[serde(rename = "RGB")]
+    Rgb,
+    /// Hue, saturation, value.
+    #[serde(rename = "HSV")]
+    Hsv,
+    /// Brightness and two differences.
+    #[serde(rename = "YUV")]
+    Yuv,
+    /// Brightness and two differences with studio swing.
+    #[serde(rename = "YCC")]
+    Ycc,
+}
+
+/// What the channel is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
+pub enum ChannelLimit {
+    /// One other channel.
+    Single,
+    /// The larger of both others.
+    Max,
+}
+
+/// Settings of [`channel_key`], under the names that Blender 3.4 gives them; channels are counted from 0.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ChannelKeyOptions {
+    /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
+    pub profile: Profile,
+    /// The colour space. Default: `RGB`.
+    pub color_space: KeySpace,
+    /// The key channel, 0 to 2. Default: 1.
+    pub matte_channel: u8,
+    /// What it is compared with. Default: `MAX`.
+    pub limit_method: ChannelLimit,
+    /// The channel it is compared with, where it is one. Default: 0.
+    pub limit_channel: u8,
+    /// Values of `1 - (key - limit)` above this are foreground. Default: 1.
+    pub limit_max: f32,
+    /// Values below this are screen. Default: 0.
+    pub limit_min: f32,
+}
+
+impl Default for ChannelKeyOptions {
+    fn default() -> Self {
+        Self {
+            profile: Profile::default(),
+            color_space: KeySpace::Rgb,
+            matte_channel: 1,
+            limit_method: ChannelLimit::Max,
+            limit_channel: 0,
+            limit_max: 1.0,
+            limit_min: 0.0,
+        }
+    }
+}
+
+/// What a channel key makes of a photo.
+#[derive(Clone, Debug, Default)]
+pub struct ChannelKeyed {
+    /// How much of each pixel is foreground.
+    pub matte: Image<Coverage>,
+    /// The photo seen through its matte, premultiplied. Blender 3.4 multiplies the channels of the colour space, offsets
+    /// and hue included: outside RGB its colours are odd.
+    pub cutout: Image<PremulRgba>,
+}
+
+/// Keys a photo by how far one channel exceeds the others.
+///
+/// Takes a scene-linear photo, opaque or premultiplied; returns pictures of the same size.
+///
+/// # Method
+/// `a = 1 - (key - limit)`: the pixel's alpha above `limit_max`, 0 below `limit_min`, linear between, at most its alpha.
+pub fn channel_key<P: Photo>(photo: &Image<P>, opts: &ChannelKeyOptions) -> ChannelKeyed {
+    let matte = photo.map(|p| {
+        let p = p.premul();
+        Coverage(matte_of(to_space(p, opts), p.a, opts))
+    });
+    let cutout = photo.zip_map(&matte, |p, m| {
+        let p = p.premul();
+        if opts.profile == Profile::Blender45 || opts.color_space == KeySpace::Rgb {
+            return p.masked(m);
+        }
+        let [x, y, z] = to_space(p, opts).map(|v| v * m.0);
+        let [r, g, b] = from_space([x, y, z], opts.color_space);
+        PremulRgba::new(r, g, b, p.a * m.0)
+    });
+    ChannelKeyed { matte, cutout }
+}
+
+fn matte_of(c: [f32; 3], alpha: f32, opts: &ChannelKeyOptions) -> f32 {
+    let key = usize::from(opts.matte_channel.min(2));
+    let others = [(1, 2), (0, 2), (0, 1)][key];
+    let limit = match opts.limit_method {
+        ChannelLimit::Single => c[usize::from(opts.limit_channel.min(2))],
+        ChannelLimit::Max if c[others.0] < c[others.1] => c[others.1],
+        ChannelLimit::Max => c[others.0],
+    };
+    let a = 1.0 - (c[key] - limit);
+    let m = if a > opts.limit_max {
+        alpha
+    } else if a < opts.limit_min {
+        0.0
+    } else {
+        (a - opts.limit_min) / (opts.limit_max - opts.limit_min)
+    };
+    if m < alpha { m } else { alpha }
+}
+
+fn to_space(p: PremulRgba, opts: &ChannelKeyOptions) -> [f32; 3] {
+    match opts.color_space {
+        KeySpace::Rgb => [p.r, p.g, p.b],
+        KeySpace::Hsv => to_hsv(p),
+        KeySpace::Yuv => [
+            0.2126 * p.r + 0.7152 * p.g + 0.0722 * p.b,
+            -0.09991 * p.r - 0.33609 * p.g + 0.436 * p.b,
+            0.615 * p.r - 0.55861 * p.g - 0.05639 * p.b,
+        ],
+        KeySpace::Ycc => to_ycc(p, opts.profile == Profile::Blender45),
+    }
+}
+
+fn from_space([x, y, z]: [f32; 3], space: KeySpace) -> [f32; 3] {
+    match space {
+        KeySpace::Rgb => [x, y, z],
+        KeySpace::Hsv => from_hsv([x, y, z]).map(|v| if v > 0.0 { v } else { 0.0 }),
+        KeySpace::Yuv => [x + 1.28033 * z, x - 0.21482 * y - 0.38059 * z, x + 2.12798 * y],
+        KeySpace::Ycc => from_ycc([x, y, z]),
+    }
+}
+
+/// Keeps divisions by zero away, as Blender does; too small to change any other result.
+const TINY: f32 = 1e-20;
+
+/// Hue 0 to 1, saturation and value, unclamped, in the rounding of Blender's own conversion.
+fn to_hsv(p: PremulRgba) -> [f32; 3] {
+    let (mut r, mut g, mut b, mut k) = (p.r, p.g, p.b, 0.0);
+    if g < b {
+        (g, b, k) = (b, g, -1.0);
+    }
+    let mut least = b;
+    if r < g {
+        (r, g, k) = (g, r, -2.0 / 6.0 - k);
+        least = if g < b { g } else { b };
+    }
+    let chroma = r - least;
+    [(k + (g - b) / (6.0 * chroma + TINY)).abs(), chroma / (r + TINY), r]
+}
+
+fn from_hsv([h, s, v]: [f32; 3]) -> [f32; 3] {
+    let unit = |n: f32| n.clamp(0.0, 1.0);
+    let n = [(h * 6.0 - 3.0).abs() - 1.0, 2.0 - (h * 6.0 - 2.0).abs(), 2.0 - (h * 6.0 - 4.0).abs()];
+    n.map(|n| ((unit(n) - 1.0) * s + 1.0) * v)
+}

@@ -1,0 +1,112 @@
+//! Color Spill: the screen's light on the subject, taken away.
+
+use super::key::{Photo, Profile};
+use crate::image::Image;
+use crate::pixel::PremulRgba;
+use serde::{Deserialize, Serialize};
+
+/// A colour channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Channel {
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+}
+
+/// What the spill channel may be as large as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
+pub enum SpillLimit {
+    /// One other channel.
+    Simple,
+    /// The mean of both others.
+    Average,
+}
+
+/// Settings of [`color_spill`], under the names that Blender 3.4 gives them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ColorSpillOptions {
+    /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
+    pub profile: Profile,
+    /// The screen's channel. Default: `G`.
+    pub channel: Channel,
+    /// What it is limited by. Default: `SIMPLE`.
+    pub limit_method: SpillLimit,
+    /// The channel that limits, where it is one. Default: `R`.
+    pub limit_channel: Channel,
+    /// Multiple of the limit that is allowed. Default: 1.
+    pub ratio: f32,
+    /// Share of the excess that is taken; 4.5 scales the spill channel alone by it. Default: 1.
+    pub fac: f32,
+    /// The excess is handed out by the three strengths below. Default: false.
+    pub use_unspill: bool,
+    /// Share of the excess for (or, in the spill channel, from) red. Default: 0.
+    pub unspill_red: f32,
+    /// The same for green. Default: 0.
+    pub unspill_green: f32,
+    /// The same for blue. Default: 0.
+    pub unspill_blue: f32,
+}
+
+impl Default for ColorSpillOptions {
+    fn default() -> Self {
+        Self {
+            profile: Profile::default(),
+            channel: Channel::G,
+            limit_method: SpillLimit::Simple,
+            limit_channel: Channel::R,
+            ratio: 1.0,
+            fac: 1.0,
+            use_unspill: false,
+            unspill_red: 0.0,
+            unspill_green: 0.0,
+            unspill_blue: 0.0,
+        }
+    }
+}
+
+/// Takes the excess of the screen's channel from a photo.
+///
+/// Takes a scene-linear photo, opaque or premultiplied; returns it premultiplied, same size, alpha as it was.
+///
+/// # Method
+/// The excess of the spill channel over `ratio` times its limit is subtracted from it where positive, and handed to the
+/// other channels as the strengths say.
+pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Image<PremulRgba> {
+    let spill = opts.channel as usize;
+    let others = [(1, 2), (0, 2), (0, 1)][spill];
+    let strengths = strengths(opts, spill);
+    let is_late = opts.profile == Profile::Blender45;
+    photo.map(|p| {
+        let p = p.premul();
+        let c = [p.r, p.g, p.b];
+        let limit = match opts.limit_method {
+            SpillLimit::Simple => c[opts.limit_channel as usize],
+            SpillLimit::Average => (c[others.0] + c[others.1]) * 0.5,
+        };
+        let excess = if is_late {
+            opts.fac * c[spill] - opts.ratio * limit
+        } else {
+            opts.fac.min(1.0) * (c[spill] - opts.ratio * limit)
+        };
+        if !(excess > 0.0) {
+            return p;
+        }
+        let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
+        PremulRgba::new(r, g, b, p.a)
+    })
+}
+
+/// What every channel gets of the excess.
+fn strengths(opts: &ColorSpillOptions, spill: usize) -> [f32; 3] {
+    let mut given = match opts.use_unspill {
+        true => [opts.unspill_red, opts.unspill_green, opts.unspill_blue],
+        false => [0, 1, 2].map(|k| if k == spill { 1.0 } else { 0.0 }),
+    };
+    given[spill] = -given[spill];
+    given
+}

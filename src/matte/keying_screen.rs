@@ -1,0 +1,99 @@
+//! Keying Screen: a plate from a few points where the screen is seen.
+
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use nalgebra::Point2;
+
+/// A point of the photo and the screen's colour there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScreenPoint {
+    /// Where, pixels from the top left.
+    pub at_px: Point2<f64>,
+    /// Scene-linear.
+    pub color: LinearRgb,
+}
+
+/// Width of the Gaussian around a point at smoothness 0, and what smoothness 1 adds, in widths of the picture; Blender's.
+const SIGMA: [f64; 2] = [0.15, 0.85];
+
+/// Makes a plate out of points, as Blender 4.5 does: a mean of all points, weighted by a Gaussian of their distance.
+///
+/// `smoothness` is 0 to 1. The plate does not pass through the colours of the points; distances are measured in
+/// widths and heights of the picture. Points outside the picture are skipped.
+///
+/// # Method
+/// `sum(w color) / sum(w)` with `w = exp(-d^2 / sigma^2)`, `sigma = 0.15 + 0.85 smoothness`, in double precision.
+/// # Errors
+/// [`Error::Value`] where no point lies in the picture, or `smoothness` outside 0 to 1.
+pub fn keying_screen(
+    (width, height): (usize, usize),
+    points: &[ScreenPoint],
+    smoothness: f64,
+) -> Result<Image<LinearRgb>> {
+    if !(0.0..=1.0).contains(&smoothness) {
+        return Err(Error::value("smoothness", format!("{smoothness}, expected 0 to 1")));
+    }
+    let (w, h) = (width as f64, height as f64);
+    let inside = |p: &&ScreenPoint| (0.0..=w).contains(&p.at_px.x) && (0.0..=h).contains(&p.at_px.y);
+    let points: Vec<ScreenPoint> = points.iter().filter(inside).copied().collect();
+    if points.is_empty() {
+        return Err(Error::value("points", format!("none inside the {width} x {height} pixels, expected at least 1")));
+    }
+    let sigma = SIGMA[0] + SIGMA[1] * smoothness;
+    Ok(Image::from_fn(width, height, |x, y| {
+        let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
+        let square = |p: &ScreenPoint| ((p.at_px.x - x) / w).powi(2) + ((p.at_px.y - y) / h).powi(2);
+        // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios are the same.
+        let nearest = points.iter().map(square).fold(f64::INFINITY, f64::min);
+        let weight = |p: &ScreenPoint| libm::exp((nearest - square(p)) / (sigma * sigma));
+        weighted_mean(points.iter().map(|p| (weight(p), p.color)))
+    }))
+}
+
+fn weighted_mean(parts: impl Iterator<Item = (f64, LinearRgb)>) -> LinearRgb {
+    let ([r, g, b], total) = parts.fold(([0.0; 3], 0.0), |([r, g, b], total), (w, c)| {
+        ([r + w * f64::from(c.r), g + w * f64::from(c.g), b + w * f64::from(c.b)], total + w)
+    });
+    LinearRgb::from([r, g, b].map(|v| (v / total) as f32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEFT: ScreenPoint = ScreenPoint { at_px: Point2::new(2.0, 5.0), color: LinearRgb::new(0.1, 0.6, 0.2) };
+    const RIGHT: ScreenPoint = ScreenPoint { at_px: Point2::new(18.0, 5.0), color: LinearRgb::new(0.2, 0.8, 0.3) };
+
+    #[test]
+    fn one_point_makes_an_even_plate() {
+        let plate = keying_screen((20, 10), &[LEFT], 0.0).unwrap();
+        assert!(plate.pixels().iter().all(|&c| c == LEFT.color));
+    }
+
+    #[test]
+    fn between_two_points_the_plate_is_their_mean() {
+        let plate = keying_screen((20, 10), &[LEFT, RIGHT], 0.3).unwrap();
+        let middle = (plate[(9, 4)].g + plate[(10, 4)].g) / 2.0;
+        assert!((middle - 0.7).abs() < 1e-6);
+        assert!(plate[(0, 4)].g < plate[(19, 4)].g);
+    }
+
+    #[test]
+    fn weights_follow_the_formula() {
+        let plate = keying_screen((20, 10), &[LEFT, RIGHT], 0.0).unwrap();
+        let weight = |p: ScreenPoint| {
+            let (dx, dy) = ((p.at_px.x - 6.5) / 20.0, (p.at_px.y - 1.5) / 10.0);
+            (-(dx * dx + dy * dy) / 0.15f64.powi(2)).exp()
+        };
+        let (a, b) = (weight(LEFT), weight(RIGHT));
+        let want = (a * 0.6 + b * 0.8) / (a + b);
+        assert!((f64::from(plate[(6, 1)].g) - want).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_plate_needs_a_point_in_the_picture() {
+        let outside = ScreenPoint { at_px: Point2::new(-1.0, 0.0), ..LEFT };
+        assert!(keying_screen((20, 10), &[outside], 0.0).is_err());
+    }
+}
