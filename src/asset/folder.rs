@@ -109,6 +109,9 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
         Error::Photo { .. } => e.in_file(photo),
         other => other,
     })?;
+    for remark in &cut.remarks {
+        log::warn!("{}: {remark}", photo.display());
+    }
     let file = cut_out_file(photo, add);
     io::create_folder(folder.join(&add.asset))?;
     io::write(folder.join(&file), &cut.image)?;

@@ -48,7 +48,7 @@ pub use overrides::Override;
 pub use raster::FromFile;
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
-pub use worker::serve as serve_worker;
+pub use worker::{serve as serve_worker, worker_version};
 pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
 
 use crate::{Error, Image, Result};

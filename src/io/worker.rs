@@ -8,6 +8,7 @@
 use super::format::{Format, Source};
 use super::limits::{Demand, Limits};
 use super::raster::{Raster, Refusal, Samples, Wanted};
+use crate::Error;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -20,6 +21,8 @@ use std::time::Duration;
 const PROGRAM: &str = "petcomp-oiio-worker";
 /// Names the worker program where it lies elsewhere.
 const PROGRAM_VARIABLE: &str = "PETCOMP_OIIO_WORKER";
+/// Asks the worker for its version instead.
+const VERSION: &str = "--version";
 /// Wall-clock time for any file, and for each further 10 million pixels that the limits allow to be asked for.
 const PATIENCE: Duration = Duration::from_secs(10);
 const PATIENCE_PER_10_MPX: Duration = Duration::from_secs(1);
@@ -78,6 +81,19 @@ pub(super) fn decode(path: &Path, source: &Source, limits: &Limits, wanted: Want
     let megapixels = u32::try_from(limits.pixels / 10_000_000).unwrap_or(u32::MAX);
     let patience = PATIENCE.saturating_add(PATIENCE_PER_10_MPX.saturating_mul(megapixels));
     answer(child, limits, source.bytes.len() as u64, patience)
+}
+
+/// The OpenImageIO that the worker program links, as that tells it.
+///
+/// # Errors
+/// [`Error::File`] where there is no worker program or it does not start.
+pub fn worker_version() -> crate::Result<String> {
+    let program = program().ok_or_else(|| Error::file(PROGRAM, "not found beside this program"))?;
+    let output = Command::new(&program).arg(VERSION).output().map_err(|e| Error::file(&program, e))?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned()),
+        false => Err(Error::file(&program, format!("does not run: {}", output.status))),
+    }
 }
 
 /// Beside the running program; one folder up serves test programs, which cargo puts below the others.
@@ -159,7 +175,12 @@ fn receive_samples(mut pipe: impl Read, sample: Sample, count: usize) -> Result<
 
 /// The whole of the worker program: answers the question in its arguments.
 pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
-    let outcome = match (arguments.next(), arguments.next()) {
+    let first = arguments.next();
+    if first.as_deref().is_some_and(|argument| argument == VERSION) {
+        let told = writeln!(std::io::stdout(), "OpenImageIO {}", super::oiio::version());
+        return if told.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+    }
+    let outcome = match (first, arguments.next()) {
         (Some(question), Some(path)) => decode_as_asked(&question.to_string_lossy(), Path::new(&path)),
         _ => Err(format!("{PROGRAM} is started by petcomp, with a question and a path").into()),
     };

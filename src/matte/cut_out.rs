@@ -1,6 +1,7 @@
 //! Cut-out: segmentation, screen colour and key in one go, trimmed to the object.
 
 use super::key::{KeyOptions, Keying, Screen};
+use super::remark::Remark;
 use super::screen::{screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
 use crate::error::{Error, Result};
@@ -83,6 +84,8 @@ pub struct CutOut {
     pub method: MatteMethod,
     /// Mean matte that the key leaves on the screen far from the object, where it should be 0; 0 for an outline.
     pub residue: f32,
+    /// What a person should know, of the segmentation and of the key.
+    pub remarks: Vec<Remark>,
     /// Where the object was found in the photo.
     pub segmentation: Segmentation,
 }
@@ -90,18 +93,19 @@ pub struct CutOut {
 /// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
 /// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
 const KEYABLE: f32 = 0.3;
-/// A key that leaves more than this of the screen is worth a warning.
-const RESIDUE: f32 = 0.05;
+/// A key that leaves more than this of the screen is worth a remark: what it leaves veils the object, too. An even screen
+/// leaves 0.01 to 0.12 with one key colour for the whole picture.
+const RESIDUE: f32 = 0.2;
 
 /// Cuts the one object out of a photo on a uniform screen or board.
 ///
-/// `photo` is scene-linear. A screen too grey to be keyed gives a matte from the outline, and a warning.
+/// `photo` is scene-linear. A screen too grey to be keyed gives a matte from the outline, and a [`Remark`].
 ///
 /// # Errors
 /// Those of [`segment`]; [`Error::Value`] (`key.clip_black`, `soften_px`, ..) for an option that cannot be right.
 pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut> {
     opts.check()?;
-    let segmentation = segment(photo, &opts.segment).map_err(|e| within(e, "segment"))?;
+    let segmentation = segment(photo, &opts.segment).map_err(|e| e.within("segment"))?;
     let screen = screen_color(photo, &segmentation.mask)?;
     let method = opts.method.unwrap_or_else(|| method_for(screen));
     let (whole, residue) = match method {
@@ -115,7 +119,13 @@ pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut>
     let (image, scale) = reduced(whole.crop(roi), opts.longest_side);
     let corner = Point2::new(roi.x as f64, roi.y as f64);
     let hull = segmentation.hull.iter().map(|p| ((p - corner) * scale).into()).collect();
-    Ok(CutOut { image, hull, roi, scale, screen, method, residue, segmentation })
+    let mut remarks = segmentation.remarks.clone();
+    match method {
+        MatteMethod::Outline if opts.method.is_none() => remarks.push(Remark::GreyScreen(screen)),
+        MatteMethod::Key if residue > RESIDUE => remarks.push(Remark::Residue(residue)),
+        _ => {}
+    }
+    Ok(CutOut { image, hull, roi, scale, screen, method, residue, remarks, segmentation })
 }
 
 impl CutOutOptions {
@@ -130,14 +140,6 @@ impl CutOutOptions {
     }
 }
 
-/// The same error about a value of a table within the options.
-fn within(error: Error, table: &str) -> Error {
-    match error {
-        Error::Value { at, what } => Error::Value { at: format!("{table}.{at}"), what },
-        other => other,
-    }
-}
-
 fn method_for(screen: LinearRgb) -> MatteMethod {
     let mut channels: [f32; 3] = screen.into();
     channels.sort_by(f32::total_cmp);
@@ -146,10 +148,6 @@ fn method_for(screen: LinearRgb) -> MatteMethod {
     if high > 0.0 && (high - others) / high >= KEYABLE {
         return MatteMethod::Key;
     }
-    let LinearRgb { r, g, b } = screen;
-    log::warn!(
-        "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to be keyed: the matte is the object's outline, nothing is see-through"
-    );
     MatteMethod::Outline
 }
 
@@ -159,14 +157,8 @@ fn keyed(
     found: &Segmentation,
     opts: &CutOutOptions,
 ) -> Result<(Image<PremulRgba>, f32)> {
-    let keyed = Keying::new(photo, Screen::Color(screen)).run(&opts.key).map_err(|e| within(e, "key"))?;
+    let keyed = Keying::new(photo, Screen::Color(screen)).run(&opts.key).map_err(|e| e.within("key"))?;
     let residue = mean(&keyed.matte, &screen_pixels(&found.mask));
-    if residue > RESIDUE {
-        log::warn!(
-            "the key leaves {:.0} % of the screen: uneven light, or an object of the screen's hue",
-            100.0 * residue
-        );
-    }
     let cut = match opts.within {
         Within::Tight => softened(&found.tight, opts.soften_px),
         Within::Hull => softened(&found.mask, opts.soften_px),

@@ -7,6 +7,7 @@ mod cut_out;
 mod difference_key;
 pub mod key;
 mod keying_screen;
+mod remark;
 mod screen;
 mod segment;
 
@@ -17,5 +18,6 @@ pub use cut_out::{CutOut, CutOutOptions, MatteMethod, Within, cut_out};
 pub use difference_key::{DifferenceKeyOptions, difference_key};
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
 pub use keying_screen::{ScreenPoint, keying_screen};
+pub use remark::Remark;
 pub use screen::screen_color;
 pub use segment::{SegmentOptions, Segmentation, Step, Threshold, Tone, segment};

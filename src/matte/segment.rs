@@ -8,6 +8,7 @@ mod threshold;
 pub use band::Tone;
 pub use threshold::Threshold;
 
+use super::remark::Remark;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
@@ -68,6 +69,8 @@ pub struct Segmentation {
     pub hull: Vec<Point2<f64>>,
     /// Whether the object reaches the left, top, right and bottom border of the photo: then part of it is missing.
     pub touches: [bool; 4],
+    /// What a person should know.
+    pub remarks: Vec<Remark>,
     /// Every intermediate picture, in the order of the work.
     pub steps: Vec<Step>,
 }
@@ -113,10 +116,11 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let both = first_binary.zip_map(&last_binary, |a, b| a && b);
     let edges = cluster::without_specks(&thinned(&both, &first, opts.ridge), opts.speck);
     let join_px = opts.join * longer_side(&small) as f64;
-    let object = main_cluster(&edges, join_px)?;
+    let (object, mut remarks) = main_cluster(&edges, join_px)?;
     let hull = scaled(&hull::convex_hull(&object), small.size(), photo.size());
     let touches = touches(&object);
     check_object(&hull, touches, photo.size())?;
+    remarks.extend(truncation(touches));
     let tight = shown(&enclosed(&object, join_px));
     let steps = [
         ("grey", band::root(&small, [1.0; 3])),
@@ -133,6 +137,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
         tight: filter::resize(&tight, photo.width(), photo.height()),
         hull,
         touches,
+        remarks,
         steps: steps.map(|(name, image)| Step { name, image }).into(),
     })
 }
@@ -216,7 +221,7 @@ const REMNANT: f64 = 0.05;
 ///
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
 /// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
-fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<Image<bool>> {
+fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<Remark>)> {
     let groups = Groups::of(&filter::dilate(edges, join_px / 2.0));
     let sizes = groups.sizes(edges);
     let Some(main) = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i))) else {
@@ -228,6 +233,7 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<Image<bool>> {
     let object = member(main);
     let hull = hull::coverage(&hull::convex_hull(&object), edges.width(), edges.height()).map(|c| c.0 > 0.0);
     let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
+    let mut remarks = Vec::new();
     for i in (0..sizes.len()).filter(|&i| i != main && 2 * inside[i] < sizes[i]) {
         let share = sizes[i] as f64 / sizes[main] as f64;
         if share >= RIVAL {
@@ -238,11 +244,11 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<Image<bool>> {
             )));
         }
         if share >= REMNANT {
-            log::warn!("left out what is {}: too far from the object {}", place(&member(i)), place(&object));
+            remarks.push(Remark::LeftOut { what: place(&member(i)), object: place(&object) });
         }
     }
     let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
-    Ok(groups.only(belongs).zip_map(edges, |near, edge| near && edge))
+    Ok((groups.only(belongs).zip_map(edges, |near, edge| near && edge), remarks))
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.
@@ -310,14 +316,13 @@ fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)
     if touches == [true; 4] {
         return Err(refused("the object reaches all four borders; photograph it with background all around it"));
     }
-    let reached: Vec<_> = BORDERS.iter().zip(touches).filter(|(_, t)| *t).map(|(name, _)| *name).collect();
-    if !reached.is_empty() {
-        log::warn!(
-            "the object reaches the {} border: what lies beyond is missing from its size",
-            reached.join(" and ")
-        );
-    }
     Ok(())
+}
+
+/// The remark on an object that the photo cuts off; none for a whole one.
+fn truncation(touches: [bool; 4]) -> Option<Remark> {
+    let reached: Vec<_> = BORDERS.into_iter().zip(touches).filter(|(_, t)| *t).map(|(name, _)| name).collect();
+    (!reached.is_empty()).then_some(Remark::Truncated(reached))
 }
 
 #[cfg(test)]

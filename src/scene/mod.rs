@@ -25,7 +25,7 @@ pub use light::{AreaLight, Exposure, LightShape};
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
 pub use recipe::{Background, Choice, GradeRanges, LightRanges, Recipe, Selections};
-pub use resolve::Look;
+pub use resolve::{CATCHER, Look};
 pub use shot::{Card, Shot};
 pub use stack::Start;
 pub use stock::stock;

@@ -9,6 +9,9 @@ use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::scene::{CameraSource, Card, Exposure, Object, Placement, Scene, Shot};
 use std::sync::Arc;
 
+/// Shadows fall on the plane of the surface as far as this many times its sides: the extent of the reference scenes.
+pub const CATCHER: f64 = 3.0;
+
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
 pub struct Look {
@@ -24,7 +27,8 @@ impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
     /// `look` finds an object's asset and photo, or nothing; for a library that is [`Look::of`]. `plate` is the background at the picture's
-    /// size; none leaves it transparent. Object `i` gets id `i + 1`; the shadow catcher is the labelled surface.
+    /// size; none leaves it transparent. Object `i` gets id `i + 1`; the shadow catcher is the plane of the
+    /// labelled surface, [`CATCHER`] times as large.
     ///
     /// # Errors
     /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an impossible value
@@ -56,7 +60,7 @@ impl Scene {
         Ok(Shot {
             camera,
             plate,
-            catcher: self.surface.size,
+            catcher: self.surface.size.map(|side| CATCHER * side),
             cards,
             lights: self.lights.clone(),
             ambient: self.ambient,
@@ -164,7 +168,7 @@ mod tests {
     fn a_known_scene_becomes_a_shot() {
         let shot = scene().resolve(look, None).unwrap();
         assert_eq!(shot.cards.iter().map(|c| c.id).collect::<Vec<_>>(), [ObjectId(1), ObjectId(2)]);
-        assert_eq!((shot.exposure, shot.catcher, shot.cards[0].class), (2.0, [0.4, 0.3], 3));
+        assert_eq!((shot.exposure, shot.catcher, shot.cards[0].class), (2.0, [0.4, 0.3].map(|side| CATCHER * side), 3));
     }
 
     #[test]

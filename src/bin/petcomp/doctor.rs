@@ -34,7 +34,7 @@ fn version_of(program: &str) -> Option<String> {
 
 /// The worker that reads what only OpenImageIO can.
 fn openimageio() -> anyhow::Result<String> {
-    Ok(String::from("?"))
+    Ok(io::worker_version()?)
 }
 
 /// Half-transparent white must come back as half of linear white, not of encoded white.

@@ -1,9 +1,9 @@
 //! `petcomp matte`: photo -> matte and cut-out.
 
 use crate::common::Common;
-use petcomp::matte::{CutOutOptions, SegmentOptions, cut_out, segment};
+use petcomp::matte::{CutOutOptions, Remark, SegmentOptions, cut_out, segment};
 use petcomp::{LinearRgb, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
@@ -39,6 +39,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
             io::create_folder(output)?;
+            warn(photo, &found.remarks);
             for (i, step) in found.steps.iter().enumerate() {
                 let path = output.join(format!("{i}_{}.png", step.name));
                 io::write(&path, &step.image)?;
@@ -50,6 +51,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
             io::write(output, &cut.image)?;
+            warn(photo, &cut.remarks);
             let (w, h) = cut.image.size();
             common.say(
                 format_args!("{}: {w} x {h}, matte by {:?}", output.display(), cut.method).to_string().to_lowercase(),
@@ -57,4 +59,8 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+fn warn(photo: &Path, remarks: &[Remark]) {
+    remarks.iter().for_each(|remark| log::warn!("{}: {remark}", photo.display()));
 }

@@ -1,0 +1,33 @@
+#!/bin/sh
+# Remakes every reference in golden/ with the program that it comes from; `git diff --stat golden` then shows what moved.
+# Debian's Blender is expected to be there (`make golden` installs it); Python packages go into target/golden-tools.
+set -eu
+cd "$(dirname "$0")/.."
+tools=target/golden-tools
+
+# An environment of its own for each Python package: environment NAME PACKAGE...
+environment() {
+    name=$1
+    shift
+    [ -x "$tools/$name/bin/python" ] || python3 -m venv "$tools/$name"
+    "$tools/$name/bin/python" -m pip install --quiet "$@"
+}
+blend() { blender -b --factory-startup --python-use-system-env -noaudio -P "$@"; }
+
+environment colour colour-science==0.4.7 numpy
+environment bpy42 bpy==4.2.0
+environment bpy45 bpy==4.5.15
+
+echo "references by:"
+blender --version | head -n 1
+for name in colour bpy42 bpy45; do "$tools/$name/bin/python" -m pip freeze | grep -iE '^(bpy|colour-science)=='; done
+
+echo "colour"
+"$tools/colour/bin/python" golden/color/reference.py
+blend golden/color/shift_hsv.py
+echo "camera"
+blend golden/camera/camera_reference.py -- --per-case 16 --seed 1 --out golden/camera
+echo "matte"
+python3 golden/matte/make_cases.py --blender blender --bpy42 "$tools/bpy42/bin/python" --bpy45 "$tools/bpy45/bin/python"
+echo "render"
+golden/render/references.sh
