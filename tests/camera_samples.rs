@@ -52,7 +52,7 @@ fn printed_markers_are_found_and_give_the_surface_to_a_third_of_a_pixel() {
     for (marker, truth) in found.iter().zip(MARKERS) {
         let errors = [0, 1, 2, 3].map(|i| (marker.corners_px[i] - Point2::from(truth[i])).norm());
         println!("marker {}: {errors:.3?} px", marker.id);
-        assert!(errors.into_iter().all(|e| e < 0.45));
+        assert!(errors.into_iter().all(|e| e < 0.3));
     }
     let mut label: Label = io::read_json(sample("bg0004.label.json")).unwrap();
     label.surface.corners_px = None;

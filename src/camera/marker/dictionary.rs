@@ -7,7 +7,7 @@ use crate::image::Image;
 
 /// Cells per side of the pattern, and of the marker with its black border.
 const PATTERN: usize = 4;
-const CELLS: usize = PATTERN + 2;
+pub(super) const CELLS: usize = PATTERN + 2;
 /// Wrong bits that are forgiven: the least distance between two markers is 4.
 const FORGIVEN: u32 = 1;
 /// White has to be this many times brighter than black.
@@ -31,8 +31,17 @@ pub(super) fn is_white(id: u32, column: usize, row: usize) -> bool {
     margin(column) || margin(row) || (inner(column) && inner(row) && bit())
 }
 
-/// The number of the marker between four corners (clockwise), and how many corners its printed top left is further on.
-pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<(u32, usize)> {
+/// What stands between four corners.
+pub(super) struct Reading {
+    pub(super) id: u32,
+    /// How many corners the printed top left is further on.
+    pub(super) turns: usize,
+    /// Which cells are white, row by row from the first corner.
+    pub(super) white: [[bool; CELLS]; CELLS],
+}
+
+/// The marker between four corners (clockwise).
+pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Reading> {
     let photo_from_square = square_from_corners(corners);
     let mut cells = [[0.0; CELLS]; CELLS];
     for (row, line) in cells.iter_mut().enumerate() {
@@ -43,18 +52,20 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<(u3
     let all = cells.as_flattened();
     let (dark, bright) = (all.iter().copied().fold(f32::MAX, f32::min), all.iter().copied().fold(0.0, f32::max));
     let middle = (dark + bright) / 2.0;
+    let white = cells.map(|line| line.map(|cell| cell > middle));
     let border = |i: usize| i == 0 || i == CELLS - 1;
     let mut code = 0;
-    for (row, line) in cells.iter().enumerate() {
-        for (column, &cell) in line.iter().enumerate() {
+    for (row, line) in white.iter().enumerate() {
+        for (column, &white) in line.iter().enumerate() {
             match border(row) || border(column) {
-                true if cell > middle => return None,
+                true if white => return None,
                 true => {}
-                false => code = code << 1 | u16::from(cell > middle),
+                false => code = (code << 1) | u16::from(white),
             }
         }
     }
-    if bright < CONTRAST * dark { None } else { lookup(code) }
+    let (id, turns) = if bright < CONTRAST * dark { None } else { lookup(code) }?;
+    Some(Reading { id, turns, white })
 }
 
 /// The mean of nine samples inside a cell.

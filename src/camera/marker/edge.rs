@@ -1,5 +1,7 @@
 //! Corners of a dark square to a fraction of a pixel: where its fitted sides meet.
 
+use super::dictionary::CELLS;
+use crate::camera::rectangle::square_from_corners;
 use crate::geom::{Point2, Vector2};
 use crate::image::Image;
 
@@ -12,6 +14,11 @@ const STEPS_PER_PX: f64 = 4.0;
 const REACH_CELLS: f64 = 0.6;
 /// Longest and shortest such reach, pixels.
 const REACH_PX: std::ops::RangeInclusive<f64> = 1.5..=5.0;
+/// The same for edges inside the pattern.
+const INNER_REACH_CELLS: f64 = 0.45;
+/// White that has grown by more, pixels, is another fault; fewer edges than these do not tell.
+const MOST_GROWTH_PX: f64 = 1.0;
+const FEWEST_EDGES: usize = 6;
 /// Probes farther than this from the fitted line do not belong to it, pixels.
 const OFF_LINE_PX: f64 = 0.7;
 
@@ -36,6 +43,51 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
         }
     }
     Some(corners)
+}
+
+/// The corners of a marker in a picture whose white has grown over its black: too bright for the sensor, a pixel that is
+/// half white is as white as one that is all white, and every edge moves into the dark.
+///
+/// The cells tell by how much: each edge between them that rises along an axis has moved back, each that falls, forward,
+/// while the grid they should lie on has shrunk with the outline. Least squares over all edges of the pattern.
+pub(super) fn without_growth(
+    light: &Image<f32>,
+    corners: &[Point2<f64>; 4],
+    white: &[[bool; CELLS]; CELLS],
+) -> Option<[Point2<f64>; 4]> {
+    let photo_from_square = square_from_corners(corners);
+    let (mut xy, mut xx, mut edges) = (0.0, 0.0, 0);
+    for across in 1..CELLS - 1 {
+        for along in 1..CELLS {
+            for upright in [false, true] {
+                let cell = |i: usize| if upright { white[i][across] } else { white[across][i] };
+                let place = |t: f64| {
+                    let (t, side) = (t / CELLS as f64, (across as f64 + 0.5) / CELLS as f64);
+                    photo_from_square.map(if upright { Point2::new(side, t) } else { Point2::new(t, side) })
+                };
+                if cell(along - 1) == cell(along) {
+                    continue;
+                }
+                let rising = if cell(along) { 1.0 } else { -1.0 };
+                let (foot, step) = (place(along as f64), place(along as f64 + 0.5) - place(along as f64 - 0.5));
+                let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
+                let Some(moved) = crossing(light, foot, step.normalize() * rising, reach) else { continue };
+                let x = 2.0 * along as f64 / CELLS as f64 - rising - 1.0;
+                (xy, xx, edges) = (xy + x * moved * rising, xx + x * x, edges + 1);
+            }
+        }
+    }
+    let growth = if edges >= FEWEST_EDGES { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) } else { 0.0 };
+    let lines = [0, 1, 2, 3].map(|i| {
+        let along = corners[(i + 1) % 4] - corners[i];
+        let normal = Vector2::new(along.y, -along.x).normalize();
+        Line { normal, offset: normal.dot(&corners[i].coords) + growth }
+    });
+    let mut grown = *corners;
+    for i in 0..4 {
+        grown[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
+    }
+    Some(grown)
 }
 
 /// The edge near the segment from `a` to `b`, dark on its right-hand side (clockwise corners, y down).

@@ -2,8 +2,8 @@
 //!
 //! # Method
 //! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each side is then fitted as a
-//! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. The cells are
-//! looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
+//! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. Their edges
+//! tell how far an overexposed white has grown over the black, and the corners are moved back by that. The bits are looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
 
 mod candidate;
 mod dictionary;
@@ -17,8 +17,8 @@ use crate::pixel::LinearRgb;
 
 /// The family of markers that is found.
 pub const FAMILY: &str = "DICT_4X4_50";
-/// Noise of a marker's corner, pixels.
-const CORNER_SIGMA_PX: f64 = 0.1;
+/// Noise of a marker's corner, pixels: root mean square on the sample background with markers.
+const CORNER_SIGMA_PX: f64 = 0.15;
 
 /// A marker in a photo.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,8 +36,9 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
         .into_iter()
         .filter_map(|rough| {
             let fine = edge::refined(&light, &rough)?;
-            let (id, turns) = dictionary::read(&light, &fine)?;
-            Some(Marker { id, corners_px: [0, 1, 2, 3].map(|i| fine[(i + turns) % 4]) })
+            let dictionary::Reading { id, turns, white } = dictionary::read(&light, &fine)?;
+            let corners = edge::without_growth(&light, &fine, &white)?;
+            Some(Marker { id, corners_px: [0, 1, 2, 3].map(|i| corners[(i + turns) % 4]) })
         })
         .collect();
     found.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners_px[0].x.total_cmp(&b.corners_px[0].x)));
