@@ -19,7 +19,7 @@ pub enum SolveError {
     #[error("surface: width_m and height_m are both missing, expected at least one")]
     NoScale,
     /// There are no corners.
-    #[error("surface: corners_px is missing")]
+    #[error("surface: corners_px is missing, and there are no four points on the surface instead")]
     NoCorners,
     /// A value that must be positive is not.
     #[error("{at}: {value}, expected a positive number")]

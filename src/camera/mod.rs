@@ -8,6 +8,7 @@
 mod belief;
 mod chi;
 mod corners;
+mod dlt;
 mod doctor;
 mod error;
 mod exchange;
@@ -17,6 +18,7 @@ mod joint;
 mod label;
 mod labelme;
 mod locate;
+mod marker;
 mod model;
 mod options;
 mod overlay;
@@ -43,6 +45,7 @@ pub use label::{
 };
 pub use labelme::from_labelme;
 pub use locate::locate;
+pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;

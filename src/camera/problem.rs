@@ -2,6 +2,7 @@
 
 use super::belief::{Belief, Beliefs};
 use super::corners::{self, Checked};
+use super::dlt;
 use super::error::SolveError;
 use super::focal::{self, Witness};
 use super::label::Label;
@@ -21,6 +22,9 @@ const EXTREME_RATIO: f64 = 1e3;
 const CORNER_SIGMA_PX: f64 = 1.0;
 /// Relative noise of a camera height of which only the value is stated.
 const HEIGHT_SIGMA: f64 = 0.03;
+
+/// Points lower than this part of the shorter side lie on the surface, for a first guess.
+const ON_SURFACE: f64 = 0.01;
 
 /// The units of the solver, and what they stand for.
 #[derive(Clone, Copy, Debug)]
@@ -58,9 +62,10 @@ impl Problem {
         }
         check_numbers(label)?;
         let sigma_px = label.surface.corner_sigma_px.unwrap_or(CORNER_SIGMA_PX);
-        let labelled = label.surface.corners_px.ok_or(SolveError::NoCorners)?.map(|c| label.pixel(c));
-        let Checked { corners: corners_px, warnings } = corners::check(labelled, sigma_px, image, options.order)?;
         let sides = Sides::new(label, options)?;
+        let labelled = label.surface.corners_px.map(|corners| corners.map(|c| label.pixel(c)));
+        let quad_px = labelled.or_else(|| sides.predicted(label)).ok_or(SolveError::NoCorners)?;
+        let Checked { corners: corners_px, warnings } = corners::check(quad_px, sigma_px, image, options.order)?;
 
         let diagonal = Vector2::from(image.map(f64::from));
         let center = label.camera.principal_point_px.map_or((diagonal / 2.0).into(), |px| label.pixel(px));
@@ -87,6 +92,8 @@ impl Problem {
         let rigid = elastic != Elastic::BOTH;
         let points = label.points.iter();
         let further = points.map(|p| (p.xyz_m.into(), label.pixel(p.px), p.sigma_px.unwrap_or(sigma_px), rigid));
+        // Corners that were only predicted are a start and no evidence.
+        let corner_sights = corner_sights.take(if labelled.is_some() { 4 } else { 0 });
         let sights = corner_sights.chain(further).map(|(p, px, sigma, rigid)| frame.sight(p, px, sigma, rigid));
         let ln_focal_range = [1.0 / LONGEST_FOCAL, LONGEST_FOCAL].map(|f| libm::log(f * usual));
         let evidence = Evidence { sights: sights.collect(), beliefs, ln_focal_range };
@@ -172,6 +179,16 @@ impl Sides {
             Self::Width(w) => [w, w / ratio()],
             Self::Height(h) => [h * ratio(), h],
         }
+    }
+
+    /// Where the corners of a rectangle of known sides must be by the further points on its surface.
+    fn predicted(self, label: &Label) -> Option<[Point2<f64>; 4]> {
+        let Self::Both(size) = self else { return None };
+        let near = ON_SURFACE * size[0].min(size[1]);
+        let flat = label.points.iter().filter(|p| p.xyz_m[2].abs() <= near);
+        let pairs: Vec<_> = flat.map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px))).collect();
+        let map = dlt::homography(&pairs)?;
+        Some(corner_points(size).map(|c| map.map(c.xy())))
     }
 
     fn elastic(self) -> Elastic {

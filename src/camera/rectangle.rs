@@ -7,7 +7,7 @@
 //! known. They are the imaginary and the real part of one complex equation, which gives them their weights.
 
 use super::corners::triangle_areas;
-use crate::geom::Vector2;
+use crate::geom::{Homography, Point2, Vector2};
 use nalgebra::{Matrix3, Vector3};
 
 /// The picture of a rectangle in homogeneous coordinates; units as in [`camera`](super).
@@ -115,6 +115,13 @@ impl Stance {
         let rotation = upright.transpose() * mirror * upright * self.rotation * mirror;
         Self { rotation, ..*self }
     }
+}
+
+/// The map from the unit square (u right, v down) to four corners from its (0, 0), clockwise; exact.
+pub(crate) fn square_from_corners(corners: &[Point2<f64>; 4]) -> Homography {
+    let areas = triangle_areas(&corners.map(|c| c.coords));
+    let [c0, c1, _, c3] = [0, 1, 2, 3].map(|i| corners[i].to_homogeneous() * areas[i]);
+    Homography(Matrix3::from_columns(&[c1 - c0, c3 - c0, c0]))
 }
 
 /// Rodrigues' formula for the shortest turn of a unit vector in front of the camera (`z > 0`) to +z.

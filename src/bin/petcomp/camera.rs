@@ -16,6 +16,8 @@ pub(crate) enum Command {
     Doctor(SolveArgs),
     /// Say solved cameras as another program does
     Export(ExportArgs),
+    /// Find printed markers (ArUco DICT_4X4_50) in a photo and add their corners to a label as points
+    Markers(MarkersArgs),
     /// Turn a photo into a metric top view of the surface, or lay a picture on it
     Rectify(RectifyArgs),
 }
@@ -57,6 +59,18 @@ enum Words {
 }
 
 #[derive(clap::Args)]
+pub(crate) struct MarkersArgs {
+    /// The photo
+    photo: PathBuf,
+    /// Label with the markers' family, size and places; its corners may be missing
+    #[arg(long, value_name = "LABEL")]
+    map: PathBuf,
+    /// Label to write
+    #[arg(short, long, value_name = "LABEL")]
+    output: PathBuf,
+}
+
+#[derive(clap::Args)]
 pub(crate) struct RectifyArgs {
     /// The photo (its size is that of the result with --back)
     photo: PathBuf,
@@ -79,6 +93,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Joint(args) => joint(args, common),
         Command::Doctor(args) => doctor(args, common),
         Command::Export(args) => export(args, common),
+        Command::Markers(args) => markers(args, common),
         Command::Rectify(args) => rectify(args),
     }
 }
@@ -144,6 +159,16 @@ fn export_colmap(args: &ExportArgs, files: &[CameraFile]) -> anyhow::Result<()> 
     io::write_text(folder.join("cameras.txt"), &model.cameras)?;
     io::write_text(folder.join("images.txt"), &model.images)?;
     Ok(io::write_text(folder.join("points3D.txt"), &model.points)?)
+}
+
+fn markers(args: &MarkersArgs, common: &Common) -> anyhow::Result<()> {
+    let label: Label = io::read_json(&args.map)?;
+    let known = label.points.len();
+    let photo: Image<LinearRgb> = io::read(&args.photo)?;
+    let label = camera::with_markers(label, &photo).map_err(|e| e.in_file(&args.map))?;
+    io::write_json(&args.output, &label)?;
+    common.say(format_args!("{}: {} marker corners", args.output.display(), label.points.len() - known));
+    Ok(())
 }
 
 fn rectify(args: &RectifyArgs) -> anyhow::Result<()> {

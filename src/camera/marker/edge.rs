@@ -1,0 +1,160 @@
+//! Corners of a dark square to a fraction of a pixel: where its fitted sides meet.
+
+use super::dictionary::CELLS;
+use crate::camera::rectangle::square_from_corners;
+use crate::geom::{Point2, Vector2};
+use crate::image::Image;
+
+/// Stretches along each side, and the part of it near its corners that is not looked at.
+const PROBES: usize = 32;
+const CORNER_PART: f64 = 0.12;
+/// Samples per pixel across a side.
+const STEPS_PER_PX: f64 = 4.0;
+/// How far across is looked, in cells of the marker: its border is one cell wide, and so should be the paper's margin.
+const REACH_CELLS: f64 = 0.6;
+/// Longest and shortest such reach, pixels.
+const REACH_PX: std::ops::RangeInclusive<f64> = 1.5..=5.0;
+/// The same for edges inside the pattern.
+const INNER_REACH_CELLS: f64 = 0.45;
+/// White that has grown by more, pixels, is another fault; fewer edges than these do not tell.
+const MOST_GROWTH_PX: f64 = 1.0;
+const FEWEST_EDGES: usize = 6;
+/// Probes farther than this from the fitted line do not belong to it, pixels.
+const OFF_LINE_PX: f64 = 0.7;
+
+/// A straight line: the points `p` with `normal . p = offset`.
+#[derive(Clone, Copy)]
+struct Line {
+    normal: Vector2<f64>,
+    offset: f64,
+}
+
+/// The corners where the fitted sides of a dark quadrangle meet; none where a side shows no edge.
+pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
+    let mut corners = *rough;
+    // The second time the probes stand where the sides are.
+    for _ in 0..2 {
+        let mut lines = [Line { normal: Vector2::zeros(), offset: 0.0 }; 4];
+        for (i, line) in lines.iter_mut().enumerate() {
+            *line = side(light, corners[i], corners[(i + 1) % 4])?;
+        }
+        for i in 0..4 {
+            corners[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
+        }
+    }
+    Some(corners)
+}
+
+/// The corners of a marker in a picture whose white has grown over its black: too bright for the sensor, a pixel that is
+/// half white is as white as one that is all white, and every edge moves into the dark.
+///
+/// The cells tell by how much: each edge between them that rises along an axis has moved back, each that falls, forward,
+/// while the grid they should lie on has shrunk with the outline. Least squares over all edges of the pattern.
+pub(super) fn without_growth(
+    light: &Image<f32>,
+    corners: &[Point2<f64>; 4],
+    white: &[[bool; CELLS]; CELLS],
+) -> Option<[Point2<f64>; 4]> {
+    let photo_from_square = square_from_corners(corners);
+    let (mut xy, mut xx, mut edges) = (0.0, 0.0, 0);
+    for across in 1..CELLS - 1 {
+        for along in 1..CELLS {
+            for upright in [false, true] {
+                let cell = |i: usize| if upright { white[i][across] } else { white[across][i] };
+                let place = |t: f64| {
+                    let (t, side) = (t / CELLS as f64, (across as f64 + 0.5) / CELLS as f64);
+                    photo_from_square.map(if upright { Point2::new(side, t) } else { Point2::new(t, side) })
+                };
+                if cell(along - 1) == cell(along) {
+                    continue;
+                }
+                let rising = if cell(along) { 1.0 } else { -1.0 };
+                let (foot, step) = (place(along as f64), place(along as f64 + 0.5) - place(along as f64 - 0.5));
+                let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
+                let Some(moved) = crossing(light, foot, step.normalize() * rising, reach) else { continue };
+                let x = 2.0 * along as f64 / CELLS as f64 - rising - 1.0;
+                (xy, xx, edges) = (xy + x * moved * rising, xx + x * x, edges + 1);
+            }
+        }
+    }
+    let growth = if edges >= FEWEST_EDGES { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) } else { 0.0 };
+    let lines = [0, 1, 2, 3].map(|i| {
+        let along = corners[(i + 1) % 4] - corners[i];
+        let normal = Vector2::new(along.y, -along.x).normalize();
+        Line { normal, offset: normal.dot(&corners[i].coords) + growth }
+    });
+    let mut grown = *corners;
+    for i in 0..4 {
+        grown[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
+    }
+    Some(grown)
+}
+
+/// The edge near the segment from `a` to `b`, dark on its right-hand side (clockwise corners, y down).
+fn side(light: &Image<f32>, a: Point2<f64>, b: Point2<f64>) -> Option<Line> {
+    let along = b - a;
+    let outward = Vector2::new(along.y, -along.x).normalize();
+    let reach = (REACH_CELLS * along.norm() / 6.0).clamp(*REACH_PX.start(), *REACH_PX.end());
+    let probe = |i: usize| {
+        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBES as f64;
+        let foot = a + along * part;
+        Some(foot + outward * crossing(light, foot, outward, reach)?)
+    };
+    let mut points: Vec<_> = (0..PROBES).filter_map(probe).collect();
+    for _ in 0..2 {
+        let line = fitted(&points)?;
+        points.retain(|p| (line.normal.dot(&p.coords) - line.offset).abs() < OFF_LINE_PX);
+    }
+    if points.len() < PROBES / 2 { None } else { fitted(&points) }
+}
+
+/// Where the light rises along a direction: the centre of gravity of its slope, which blur does not move.
+fn crossing(light: &Image<f32>, foot: Point2<f64>, direction: Vector2<f64>, reach: f64) -> Option<f64> {
+    let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
+    let place = |i: f64| -reach + 2.0 * reach * i / steps as f64;
+    let value = |i: usize| {
+        let at = foot + direction * place(i as f64);
+        f64::from(bilinear(light, at.x - 0.5, at.y - 0.5))
+    };
+    let (mut rise, mut moment, mut before) = (0.0, 0.0, value(0));
+    for i in 1..=steps {
+        let now = value(i);
+        rise += now - before;
+        moment += (now - before) * place(i as f64 - 0.5);
+        before = now;
+    }
+    let edge = moment / rise;
+    (rise > 0.02 && edge.abs() <= reach).then_some(edge)
+}
+
+/// The value between pixel centres at integers; outside as the nearest pixel inside.
+fn bilinear(light: &Image<f32>, x: f64, y: f64) -> f32 {
+    let (i, j) = (x.floor(), y.floor());
+    let (u, v) = ((x - i) as f32, (y - j) as f32);
+    let at = |di: isize, dj: isize| light.nearest(i as isize + di, j as isize + dj);
+    (at(0, 0) * (1.0 - u) + at(1, 0) * u) * (1.0 - v) + (at(0, 1) * (1.0 - u) + at(1, 1) * u) * v
+}
+
+/// The line with the least squared distances; none through fewer than two points.
+fn fitted(points: &[Point2<f64>]) -> Option<Line> {
+    if points.len() < 2 {
+        return None;
+    }
+    let mean = points.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / points.len() as f64;
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for p in points {
+        let d = p.coords - mean;
+        (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
+    }
+    let angle = libm::atan2(2.0 * xy, xx - yy) / 2.0;
+    let normal = Vector2::new(-libm::sin(angle), libm::cos(angle));
+    Some(Line { normal, offset: normal.dot(&mean) })
+}
+
+fn meeting(a: &Line, b: &Line) -> Option<Point2<f64>> {
+    let det = a.normal.perp(&b.normal);
+    let x = a.offset * b.normal.y - b.offset * a.normal.y;
+    let y = a.normal.x * b.offset - b.normal.x * a.offset;
+    let p = Point2::new(x / det, y / det);
+    (det.abs() > 0.05 && p.coords.iter().all(|v| v.is_finite())).then_some(p)
+}

@@ -1,0 +1,133 @@
+//! Printed square markers (ArUco `DICT_4X4_50`) in a photo, with corners to a fraction of a pixel.
+//!
+//! # Method
+//! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each side is then fitted as a
+//! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. Their edges
+//! tell how far an overexposed white has grown over the black, and the corners are moved back by that. The bits are looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
+
+mod candidate;
+mod dictionary;
+mod edge;
+
+use super::label::{Label, LabelPoint};
+use crate::error::{Error, Result};
+use crate::geom::Point2;
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+
+/// The family of markers that is found.
+pub const FAMILY: &str = "DICT_4X4_50";
+/// Noise of a marker's corner, pixels: root mean square on the sample background with markers.
+const CORNER_SIGMA_PX: f64 = 0.15;
+
+/// A marker in a photo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Marker {
+    /// Its number in the dictionary.
+    pub id: u32,
+    /// Corners of its black square as printed: top left, top right, bottom right, bottom left, pixels.
+    pub corners_px: [Point2<f64>; 4],
+}
+
+/// All markers of [`FAMILY`] in a scene-linear photo, in order of number and then of place.
+pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
+    let light = photo.map(LinearRgb::luminance);
+    let mut found: Vec<Marker> = candidate::quads(photo)
+        .into_iter()
+        .filter_map(|rough| {
+            let fine = edge::refined(&light, &rough)?;
+            let dictionary::Reading { id, turns, white } = dictionary::read(&light, &fine)?;
+            let corners = edge::without_growth(&light, &fine, &white)?;
+            Some(Marker { id, corners_px: [0, 1, 2, 3].map(|i| corners[(i + turns) % 4]) })
+        })
+        .collect();
+    found.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners_px[0].x.total_cmp(&b.corners_px[0].x)));
+    found
+}
+
+/// The label with the corners of its markers, found in its photo, as points of known place.
+///
+/// # Errors
+/// [`Error::Value`] for a label without a marker map, one of another family, and a photo that shows none of its markers.
+pub fn with_markers(mut label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
+    let Some(markers) = &label.markers else {
+        return Err(Error::value("markers", "missing, expected family, size_m and map"));
+    };
+    if markers.family != FAMILY {
+        return Err(Error::value("markers.family", format!("\"{}\", expected \"{FAMILY}\"", markers.family)));
+    }
+    let half = markers.size_m / 2.0;
+    let offset = if label.pixel_origin == super::PixelOrigin::Center { 0.5 } else { 0.0 };
+    let before = label.points.len();
+    for marker in find_markers(photo) {
+        let Some([x, y, z]) = markers.map.get(&marker.id) else { continue };
+        let places = [[x - half, y + half], [x + half, y + half], [x + half, y - half], [x - half, y - half]];
+        for ([x, y], px) in places.into_iter().zip(marker.corners_px) {
+            label.points.push(LabelPoint {
+                xyz_m: [x, y, *z],
+                px: [px.x - offset, px.y - offset],
+                sigma_px: Some(CORNER_SIGMA_PX),
+                note: Some(format!("marker {}", marker.id)),
+            });
+        }
+    }
+    if label.points.len() == before {
+        return Err(Error::value("markers", "none of them was found in the photo"));
+    }
+    Ok(label)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::simulate::Scenario;
+    use crate::filter::Pyramid;
+
+    /// Marker `id` as printed, with a margin of one cell, `cell` pixels to the cell.
+    fn printed(id: u32, cell: usize) -> Image<LinearRgb> {
+        let grey = |x: usize, y: usize| if dictionary::is_white(id, x / cell, y / cell) { 0.8 } else { 0.04 };
+        Image::from_fn(8 * cell, 8 * cell, |x, y| LinearRgb { r: grey(x, y), g: grey(x, y), b: grey(x, y) })
+    }
+
+    #[test]
+    fn printed_markers_are_found_to_a_tenth_of_a_pixel() {
+        for (id, tilt) in [(0, 0.0), (7, 20.0), (23, 40.0), (49, 55.0)] {
+            let scenario = Scenario { image: [400, 300], focal_px: 320.0, size: [0.4, 0.4], ..Scenario::default() };
+            let camera = scenario.tilted(tilt).view(5, u64::from(id)).camera;
+            let sheet = Pyramid::new(printed(id, 24));
+            let photo = super::super::project_picture(&sheet, &camera, [0.4, 0.4]);
+            // Paper on a grey table.
+            let alpha = Pyramid::new(Image::filled(192, 192, crate::Coverage(1.0)));
+            let alpha = super::super::project_picture(&alpha, &camera, [0.4, 0.4]);
+            let photo = photo.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
+            let found = find_markers(&photo);
+            assert_eq!(found.iter().map(|m| m.id).collect::<Vec<_>>(), [id], "{tilt}");
+            for (i, [x, y]) in [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]].into_iter().enumerate() {
+                let (truth, _) = camera.project([x, y, 0.0].into()).unwrap();
+                let error = (found[0].corners_px[i] - truth).norm();
+                assert!(error < 0.15, "{id} at {tilt}, corner {i}: {error}");
+            }
+        }
+    }
+
+    trait Grey {
+        fn add_scaled_grey(self, grey: f32) -> Self;
+    }
+
+    impl Grey for LinearRgb {
+        fn add_scaled_grey(self, grey: f32) -> Self {
+            Self { r: self.r + grey, g: self.g + grey, b: self.b + grey }
+        }
+    }
+
+    #[test]
+    fn nothing_is_found_where_nothing_is() {
+        assert!(find_markers(&Image::filled(100, 80, LinearRgb::WHITE)).is_empty());
+        assert!(find_markers(&Image::new(0, 0)).is_empty());
+        let noise = Image::from_fn(200, 200, |x, y| {
+            let v = ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
+            LinearRgb { r: v, g: v, b: v }
+        });
+        assert!(find_markers(&noise).is_empty());
+    }
+}
