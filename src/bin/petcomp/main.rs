@@ -10,6 +10,8 @@ mod diff;
 mod doctor;
 mod label;
 mod matte;
+mod matte_key;
+mod matte_nodes;
 mod render;
 mod scene;
 mod settle;

@@ -1,6 +1,7 @@
 //! `petcomp matte`: photo -> matte and cut-out.
 
 use crate::common::Common;
+use crate::{matte_key, matte_nodes};
 use petcomp::matte::{CutOutOptions, SegmentOptions, cut_out, segment};
 use petcomp::{LinearRgb, io};
 use std::path::PathBuf;
@@ -29,10 +30,16 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         options: Option<PathBuf>,
     },
+    /// Key a picture against a screen colour or plate, as Blender's Keying node does
+    Key(Box<matte_key::Args>),
+    #[command(flatten)]
+    Node(matte_nodes::Command),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
+        Command::Key(args) => matte_key::run(args)?,
+        Command::Node(command) => matte_nodes::run(command)?,
         Command::Segment { photo, output, options } => {
             let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
