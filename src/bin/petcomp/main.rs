@@ -11,6 +11,7 @@ mod doctor;
 mod label;
 mod matte;
 mod matte_key;
+mod matte_nodes;
 mod render;
 mod scene;
 mod settle;

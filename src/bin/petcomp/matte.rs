@@ -1,6 +1,7 @@
 //! `petcomp matte`: photo -> matte and cut-out.
 
 use crate::common::Common;
+use crate::{matte_key, matte_nodes};
 use petcomp::matte::{CutOutOptions, Remark, SegmentOptions, cut_out, segment};
 use petcomp::{LinearRgb, io};
 use std::path::{Path, PathBuf};
@@ -18,8 +19,6 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         options: Option<PathBuf>,
     },
-    /// Key a picture as Blender's Keying node does
-    Key(crate::matte_key::Args),
     /// Find the object, key it, and write it without its background
     Cut {
         /// Photo of one object on a uniform screen or board
@@ -31,10 +30,16 @@ pub(crate) enum Command {
         #[arg(long, value_name = "FILE")]
         options: Option<PathBuf>,
     },
+    /// Key a picture against a screen colour or plate, as Blender's Keying node does
+    Key(Box<matte_key::Args>),
+    #[command(flatten)]
+    Node(matte_nodes::Command),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
+        Command::Key(args) => matte_key::run(args)?,
+        Command::Node(command) => matte_nodes::run(command)?,
         Command::Segment { photo, output, options } => {
             let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
@@ -46,7 +51,6 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
                 common.say(path.display());
             }
         }
-        Command::Key(args) => crate::matte_key::run(args)?,
         Command::Cut { photo, output, options } => {
             let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;

@@ -10,33 +10,33 @@ use std::path::{Path, PathBuf};
 /// Keys a picture against a screen colour or plate, as Blender's Keying node does.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Args {
-    /// The picture to key; alpha is taken as premultiplied.
+    /// The picture to key; alpha is taken as premultiplied
     input: PathBuf,
-    /// Where the premultiplied cut-out goes; an EXR holds 32-bit floats.
+    /// Where the premultiplied cut-out goes; an EXR holds 32-bit floats
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Where the matte goes.
+    /// Where the matte goes
     #[arg(long, value_name = "FILE")]
     matte: Option<PathBuf>,
-    /// Where the edges go that the levels leave alone.
+    /// Where the edges go that the levels leave alone
     #[arg(long, value_name = "FILE")]
     edges: Option<PathBuf>,
-    /// Colour of the screen, scene-linear.
+    /// Colour of the screen, scene-linear
     #[arg(long, value_name = "R,G,B", value_parser = color, required_unless_present = "plate", conflicts_with = "plate")]
     screen: Option<LinearRgb>,
-    /// A picture of the screen alone: every pixel is keyed against its own colour.
+    /// A picture of the screen alone: every pixel is keyed against its own colour
     #[arg(long, value_name = "FILE")]
     plate: Option<PathBuf>,
-    /// A matte of what is surely not foreground.
+    /// A matte of what is surely not foreground
     #[arg(long, value_name = "FILE")]
     garbage: Option<PathBuf>,
-    /// A matte of what is surely foreground.
+    /// A matte of what is surely foreground
     #[arg(long, value_name = "FILE")]
     core: Option<PathBuf>,
-    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust.
+    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust
     #[arg(long, value_name = "NAME", default_value = "blender-3.4")]
     profile: Profile,
-    /// A setting under Blender's name, such as key.clip_black=0.1.
+    /// A setting under Blender's name, such as key.clip_black=0.1
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
     settings: Vec<String>,
 }

@@ -1,0 +1,229 @@
+//! The vectors of the specification, and numbers at their extremes. Whole pictures are held against Blender in
+//! `tests/golden`.
+
+use super::*;
+
+const GREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
+const LATE: Profile = Profile::Blender45;
+
+fn with_balances(b: f32, f: f32, e: f32) -> KeyOptions {
+    KeyOptions { screen_balance: b, despill_factor: f, despill_balance: e, ..KeyOptions::default() }
+}
+
+fn keyed_pixel(pixel: [f32; 3], key_color: [f32; 3], opts: &KeyOptions) -> (f32, [f32; 4]) {
+    let keyed = key(&Image::filled(1, 1, pixel.into()), key_color.into(), opts);
+    let c = keyed.cutout[(0, 0)];
+    (keyed.matte[(0, 0)].0, [c.r, c.g, c.b, c.a])
+}
+
+/// A matte from garbage alone: what a row operation makes of given values.
+fn row_operation(values: &[f32], opts: &KeyOptions) -> Vec<f32> {
+    let photo = Image::filled(values.len(), 1, LinearRgb::grey(0.3));
+    let garbage = Image::from_vec(values.len(), 1, values.iter().map(|v| Coverage(1.0 - v)).collect());
+    let job = Keying::new(&photo, Screen::Color(GREEN)).with_garbage(&garbage);
+    job.matte(opts).unwrap().pixels().iter().map(|m| m.0).collect()
+}
+
+const ROW: [f32; 12] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.25];
+
+#[test]
+fn pixels_come_out_as_in_blender() {
+    let (blue, cyan) = ([0.1, 0.2, 0.8], [0.1, 0.7, 0.7]);
+    let (green, grey) = ([0.1, 0.75, 0.2], [0.5; 3]);
+    let cases: [([f32; 3], [f32; 3], [f32; 3], f32, [f32; 4]); 11] = [
+        ([0.1, 0.75, 0.2], green, [0.5, 1.0, 0.5], 0.0, [0.0; 4]),
+        ([0.3, 0.55, 0.25], green, [0.5, 1.0, 0.5], 0.609068632, [0.182720602, 0.16749388, 0.152267158, 0.609068632]),
+        ([0.3, 0.55, 0.25], green, [0.0, 1.0, 0.0], 0.488636374, [0.146590918, 0.122159094, 0.122159094, 0.488636374]),
+        ([0.3, 0.55, 0.25], green, [1.0, 1.0, 1.0], 0.700854659, [0.210256413, 0.210256413, 0.175213665, 0.700854659]),
+        ([0.6, 0.5, 0.4], green, [0.5, 1.0, 0.5], 1.0, [0.6, 0.5, 0.4, 1.0]),
+        ([0.2, 0.4, 0.9], blue, [0.3, 0.5, 0.3], 0.293172777, [0.0586345568, 0.117269114, 0.181767121, 0.293172777]),
+        ([0.5, 0.6, 0.5], grey, [0.5, 1.0, 0.5], 1.0, [0.5, 0.6, 0.5, 1.0]),
+        ([0.5, 0.4, 0.5], [1.0; 3], [0.5, 1.0, 0.5], 0.0, [0.0; 4]),
+        ([1.2, 2.5, 1.1], green, [0.5, 1.0, 0.5], 1.0, [1.2, 1.1500001, 1.1, 1.0]),
+        (
+            [-0.2, 0.3, 0.1],
+            green,
+            [0.5, 1.0, 0.5],
+            0.279411793,
+            [-0.0558823608, -0.0139705911, 0.0279411804, 0.279411793],
+        ),
+        ([0.4, 0.7, 0.65], cyan, [0.5, 1.0, 0.5], 0.750000119, [0.300000042, 0.525000095, 0.412500083, 0.750000119]),
+    ];
+    for (pixel, key_color, [b, f, e], matte, image) in cases {
+        let got = keyed_pixel(pixel, key_color, &with_balances(b, f, e));
+        assert_eq!(got, (matte, image), "{pixel:?} against {key_color:?}");
+    }
+}
+
+#[test]
+fn overexposure_looks_at_alpha_in_blender_4_5_alone() {
+    let opts = KeyOptions { profile: LATE, ..with_balances(0.5, 1.0, 0.5) };
+    assert_eq!(keyed_pixel([1.2, 2.5, 1.1], GREEN.into(), &opts).0, 0.602940977);
+    assert_eq!(keyed_pixel([1.2, 2.5, 1.1], GREEN.into(), &KeyOptions::default()).0, 1.0);
+}
+
+#[test]
+fn row_operations_come_out_as_in_blender() {
+    let of = |profile, change: fn(&mut KeyOptions)| {
+        let mut opts = KeyOptions::of(profile);
+        change(&mut opts);
+        row_operation(&ROW, &opts)
+    };
+    let early = Profile::Blender34;
+    let third = [0.0, 0.0, 0.0, 0.333333343, 0.666666687, 1.0, 0.833333313, 0.5, 0.166666672, 0.0, 0.0833333358, 0.125];
+    assert_eq!(of(early, |o| o.blur_post = 2), third);
+    let third =
+        [0.0, 0.0, 0.0, 0.333333373, 0.666666746, 1.0, 0.833333373, 0.5, 0.166666687, 0.0, 0.0833333433, 0.166666687];
+    let blurred = of(LATE, |o| o.blur_post = 3);
+    assert_eq!(blurred[..5], third[..5]);
+    assert_eq!(blurred[6..], third[6..]);
+    let dilated = [0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.5];
+    assert_eq!(of(early, |o| o.dilate_distance = 4), dilated);
+    let mut full = dilated;
+    full[0] = 1.0;
+    assert_eq!(of(LATE, |o| o.dilate_distance = 4), full);
+    let feathered =
+        [0.0, 0.0, 0.110695973, 0.626597643, 1.0, 1.0, 1.0, 0.678326368, 0.321161509, 0.0670427307, 0.154445693, 0.25];
+    assert_eq!(of(early, |o| o.feather_distance = 3), feathered);
+    let inward = [0.0, 0.0, 0.0, 0.0, 0.372827768, 0.866210938, 0.677976489, 0.321673632, 0.0, 0.0, 0.0, 0.25];
+    assert_eq!(of(LATE, |o| o.feather_distance = -3), inward);
+}
+
+#[test]
+fn a_weak_key_makes_no_nan() {
+    for saturation in [0.0, 1e-30, 1e-10, 1e-3] {
+        let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
+        let photo = Image::from_fn(7, 5, |x, y| LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32));
+        for (_, profile) in Profile::ALL {
+            assert!(
+                key(&photo, screen, &KeyOptions::of(profile)).matte.pixels().iter().all(|m| (0.0..=1.0).contains(&m.0))
+            );
+        }
+    }
+}
+
+fn all_stages(profile: Profile) -> KeyOptions {
+    KeyOptions {
+        blur_pre: 3,
+        clip_black: 0.1,
+        clip_white: 0.9,
+        blur_post: 3,
+        dilate_distance: -2,
+        feather_distance: 4,
+        ..KeyOptions::of(profile)
+    }
+}
+
+#[test]
+fn extreme_but_finite_pixels_make_no_nan() {
+    let sizes = [1e-42f32, 1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e20, 1e30];
+    let photo = Image::from_fn(17, 13, |x, y| {
+        let at = |k: usize| sizes[(x * 7 + y * 3 + k * 5) % 8] * if (x + y + k) % 5 == 0 { -1.0 } else { 1.0 };
+        PremulRgba::new(at(0), at(1), at(2), [0.0, 0.5, 1.0, 1.5][(x + y) % 4])
+    });
+    for (_, profile) in Profile::ALL {
+        for opts in [KeyOptions::of(profile), all_stages(profile)] {
+            let keyed = Keying::new(&photo, Screen::Color(GREEN)).run(&opts).unwrap();
+            assert!(keyed.matte.pixels().iter().all(|m| !m.0.is_nan()), "{opts:?}");
+            assert!(keyed.cutout.pixels().iter().all(|p| !(p.r + p.a).is_nan() && !p.g.is_nan() && !p.b.is_nan()));
+        }
+    }
+}
+
+#[test]
+fn the_robust_profile_defines_and_counts_what_is_no_number() {
+    let mut photo = Image::filled(9, 9, GREEN.opaque());
+    photo[(4, 4)].b = f32::NAN;
+    photo[(5, 4)].a = f32::INFINITY;
+    let garbage = Image::from_fn(9, 9, |x, _| Coverage(if x == 0 { f32::NAN } else { 0.0 }));
+    let job = Keying::new(&photo, Screen::Color(GREEN)).with_garbage(&garbage);
+    let keyed = job.run(&all_stages(Profile::Robust)).unwrap();
+    assert_eq!((keyed.deviations.unusable_pixels, keyed.deviations.unusable_mattes), (2, 9));
+    assert!(keyed.matte.pixels().iter().all(|m| (0.0..=1.0).contains(&m.0)));
+    assert!(keyed.cutout.pixels().iter().all(|p| p.color().is_finite() && p.a.is_finite()));
+}
+
+#[test]
+fn windows_may_be_larger_than_the_picture() {
+    let opts = |profile| KeyOptions {
+        blur_pre: 300,
+        edge_kernel_radius: 100,
+        blur_post: 300,
+        dilate_distance: 100,
+        feather_distance: -100,
+        ..all_stages(profile)
+    };
+    for (width, height) in [(1, 1), (5, 1), (1, 5), (3, 2)] {
+        let photo = Image::from_fn(width, height, |x, y| LinearRgb::new(0.3, 0.2 * (x + y) as f32, 0.25));
+        for (_, profile) in Profile::ALL {
+            let keyed = key(&photo, GREEN, &opts(profile));
+            assert!(keyed.matte.pixels().iter().all(|m| m.0.is_finite()));
+        }
+    }
+}
+
+#[test]
+fn a_picture_without_pixels_has_a_matte_without_pixels() {
+    for size in [(0, 0), (0, 5), (5, 0)] {
+        let keyed = key(&Image::new(size.0, size.1), GREEN, &all_stages(Profile::Blender34));
+        assert!(keyed.matte.is_empty() && keyed.cutout.is_empty());
+    }
+}
+
+#[test]
+fn bits_do_not_depend_on_the_number_of_threads() {
+    let photo =
+        Image::from_fn(20_000, 3, |x, y| LinearRgb::new(0.3, 0.2 + ((x * 31 + y * 17) % 97) as f32 * 0.005, 0.25));
+    let tall = Image::from_fn(37, 211, |x, y| photo[((x * 211 + y) % 20_000, x % 3)]);
+    let on = |threads: usize, photo: &Image<LinearRgb>, opts: &KeyOptions| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| key(photo, GREEN, opts).matte)
+    };
+    for (_, profile) in Profile::ALL {
+        let opts = all_stages(profile);
+        assert!(on(1, &photo, &opts) == on(3, &photo, &opts));
+        assert!(on(1, &tall, &opts) == on(7, &tall, &opts));
+    }
+}
+
+#[test]
+fn the_matte_alone_is_the_same_matte() {
+    let photo = Image::from_fn(70, 40, |x, y| LinearRgb::new(0.2, 0.01 * (x + y) as f32, 0.3));
+    let job = Keying::new(&photo, Screen::Color(GREEN));
+    let opts = all_stages(Profile::Blender42);
+    assert!(job.matte(&opts).unwrap() == job.run(&opts).unwrap().matte);
+}
+
+#[test]
+fn a_plate_of_one_colour_keys_like_that_colour() {
+    let photo = Image::from_fn(70, 40, |x, y| LinearRgb::new(0.2, 0.01 * (x + y) as f32, 0.3));
+    let plate = Image::filled(70, 40, GREEN);
+    for (_, profile) in Profile::ALL {
+        let opts = all_stages(profile);
+        let by_plate = Keying::new(&photo, Screen::Plate(&plate)).run(&opts).unwrap();
+        let by_color = Keying::new(&photo, Screen::Color(GREEN)).run(&opts).unwrap();
+        assert!(by_plate.matte == by_color.matte && by_plate.cutout == by_color.cutout);
+    }
+}
+
+#[test]
+fn what_cannot_be_keyed_is_refused_by_name() {
+    let photo = Image::filled(4, 3, GREEN);
+    let small = Image::new(2, 2);
+    let message = |job: Keying<'_, LinearRgb>| job.run(&KeyOptions::default()).unwrap_err().to_string();
+    let job = Keying::new(&photo, Screen::Color(GREEN));
+    assert_eq!(message(job.with_garbage(&small)), "garbage: 2 x 2 pixels, expected the photo's 4 x 3");
+    let nan = Screen::Color(LinearRgb::new(f32::NAN, 0.0, 0.0));
+    assert_eq!(message(Keying::new(&photo, nan)), "screen: [NaN, 0.0, 0.0], expected finite numbers");
+}
+
+#[test]
+fn subtracting_the_screen_leaves_the_foreground() {
+    let opts = KeyOptions { subtract_screen: true, ignore_brightness: true, ..KeyOptions::default() };
+    let front = LinearRgb::grey(0.4);
+    let half = front.scale(0.5) + GREEN.scale(0.5);
+    let keyed = key(&Image::filled(1, 1, half), GREEN, &opts);
+    assert!((keyed.matte[(0, 0)].0 - 0.5).abs() < 1e-6);
+    let c = keyed.cutout[(0, 0)];
+    assert!([c.r, c.g, c.b].iter().all(|v| (v - 0.2).abs() < 1e-6));
+}
