@@ -1,6 +1,6 @@
 //! Degenerate, awkward and wrong labels: what the specification's section 9 says happens, exactly.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests")]
+#![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 use petcomp::camera::simulate::{Scenario, View};
 use petcomp::camera::{self, FocalSource, Label, Priors, Solution, SolveError, SolveOptions, Warning};

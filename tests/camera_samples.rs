@@ -1,7 +1,4 @@
 //! The sample backgrounds: cameras from their labels, and from their printed markers, against the renderer's truth.
-
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests")]
-
 use petcomp::camera::{self, CameraFile, Label, SolveOptions};
 use petcomp::geom::{Point2, Point3};
 use petcomp::{Image, LinearRgb, io};

@@ -55,29 +55,7 @@ pub(super) fn without_growth(
     corners: &[Point2<f64>; 4],
     white: &[[bool; CELLS]; CELLS],
 ) -> Option<[Point2<f64>; 4]> {
-    let photo_from_square = square_from_corners(corners);
-    let (mut xy, mut xx, mut edges) = (0.0, 0.0, 0);
-    for across in 1..CELLS - 1 {
-        for along in 1..CELLS {
-            for upright in [false, true] {
-                let cell = |i: usize| if upright { white[i][across] } else { white[across][i] };
-                let place = |t: f64| {
-                    let (t, side) = (t / CELLS as f64, (across as f64 + 0.5) / CELLS as f64);
-                    photo_from_square.map(if upright { Point2::new(side, t) } else { Point2::new(t, side) })
-                };
-                if cell(along - 1) == cell(along) {
-                    continue;
-                }
-                let rising = if cell(along) { 1.0 } else { -1.0 };
-                let (foot, step) = (place(along as f64), place(along as f64 + 0.5) - place(along as f64 - 0.5));
-                let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
-                let Some(moved) = crossing(light, foot, step.normalize() * rising, reach) else { continue };
-                let x = 2.0 * along as f64 / CELLS as f64 - rising - 1.0;
-                (xy, xx, edges) = (xy + x * moved * rising, xx + x * x, edges + 1);
-            }
-        }
-    }
-    let growth = if edges >= FEWEST_EDGES { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) } else { 0.0 };
+    let growth = growth(light, corners, white);
     let lines = [0, 1, 2, 3].map(|i| {
         let along = corners[(i + 1) % 4] - corners[i];
         let normal = Vector2::new(along.y, -along.x).normalize();
@@ -88,6 +66,50 @@ pub(super) fn without_growth(
         grown[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
     }
     Some(grown)
+}
+
+/// How far white has grown over black, pixels; 0 where too few edges tell.
+fn growth(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &[[bool; CELLS]; CELLS]) -> f64 {
+    let photo_from_square = square_from_corners(corners);
+    let place = |edge: &InnerEdge, along: f64| {
+        let (along, across) = (along / CELLS as f64, (edge.across as f64 + 0.5) / CELLS as f64);
+        photo_from_square.map(if edge.upright { Point2::new(across, along) } else { Point2::new(along, across) })
+    };
+    let (mut xy, mut xx, mut count) = (0.0, 0.0, 0);
+    for edge in inner_edges(white) {
+        let along = edge.along as f64;
+        let (foot, step) = (place(&edge, along), place(&edge, along + 0.5) - place(&edge, along - 0.5));
+        let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
+        let Some(moved) = crossing(light, foot, step.normalize() * edge.rising, reach) else { continue };
+        let x = 2.0 * along / CELLS as f64 - edge.rising - 1.0;
+        (xy, xx, count) = (xy + x * moved * edge.rising, xx + x * x, count + 1);
+    }
+    if count < FEWEST_EDGES { 0.0 } else { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) }
+}
+
+/// An edge between a black and a white cell.
+struct InnerEdge {
+    /// It is crossed on the way from the first corner to the fourth, not to the second.
+    upright: bool,
+    /// The row or column of the two cells.
+    across: usize,
+    /// The line of the grid it lies on.
+    along: usize,
+    /// 1 from black to white, -1 from white to black.
+    rising: f64,
+}
+
+fn inner_edges(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerEdge> {
+    let mut edges = Vec::new();
+    for (upright, across, along) in
+        [false, true].into_iter().flat_map(|u| (1..CELLS - 1).flat_map(move |x| (1..CELLS).map(move |a| (u, x, a))))
+    {
+        let cell = |i: usize| if upright { white[i][across] } else { white[across][i] };
+        if cell(along - 1) != cell(along) {
+            edges.push(InnerEdge { upright, across, along, rising: if cell(along) { 1.0 } else { -1.0 } });
+        }
+    }
+    edges
 }
 
 /// The edge near the segment from `a` to `b`, dark on its right-hand side (clockwise corners, y down).
