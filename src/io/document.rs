@@ -119,7 +119,9 @@ fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     let mistake = |e: &serde_json::Error, at: String| {
         let said = e.to_string();
         let what = said.split(" at line ").next().unwrap_or_default().into();
-        Mistake { at, line: Some(e.line()), what }.into_error()
+        // A type that reads itself from a tree of values has no lines.
+        let line = Some(e.line()).filter(|&line| line > 0);
+        Mistake { at, line, what }.into_error()
     };
     let mut document = serde_json::Deserializer::from_str(text);
     let value =
