@@ -1,6 +1,6 @@
 //! Labelled photos of the place that scenes are set in.
 
-use crate::camera::{self, Camera, Label, SolveOptions};
+use crate::camera::{self, Camera, SolveOptions};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::{Image, Roi};
@@ -21,7 +21,6 @@ pub(crate) struct Place {
     /// Of the label and the photo's length: another one is another place.
     pub(crate) checksum: u32,
     photo: PathBuf,
-    photo_size: [u32; 2],
     kept: Roi,
     image: [u32; 2],
     plate: OnceLock<Arc<Image<LinearRgb>>>,
@@ -40,19 +39,18 @@ impl Place {
     }
 
     fn open(path: &Path, image: [u32; 2]) -> Result<Self> {
-        let label: Label = io::read_json(path)?;
+        let label = camera::read_label(path)?;
         let solution = camera::solve(&label, &SolveOptions::default()).map_err(|e| Error::from(e).in_file(path))?;
         for warning in &solution.warnings {
             log::warn!("{}: {warning}", path.display());
         }
-        let photo_size = label.image_size();
-        let kept = middle(photo_size, image);
+        let kept = middle(label.image_size(), image);
         let camera = cropped(solution.camera, kept).resized(image);
         let background = Background { name: name(path), size: solution.size, camera: CameraSource::Known(camera) };
         let photo = path.with_file_name(&label.image.file);
         let length = std::fs::metadata(&photo).map_err(|e| Error::file(&photo, e))?.len();
         let checksum = crc32fast::hash(format!("{length} {}", io::read_text(path)?).as_bytes());
-        Ok(Self { background, checksum, photo, photo_size, kept, image, plate: OnceLock::new() })
+        Ok(Self { background, checksum, photo, kept, image, plate: OnceLock::new() })
     }
 
     /// The photo at the picture's size, scene-linear; read once.
@@ -61,11 +59,6 @@ impl Place {
             return Ok(plate.clone());
         }
         let photo = io::read::<LinearRgb>(&self.photo)?;
-        let expected = self.photo_size.map(|side| side as usize);
-        if [photo.width(), photo.height()] != expected {
-            let what = format!("{:?} pixels, but its label says {:?}", photo.size(), self.photo_size);
-            return Err(Error::file(&self.photo, what));
-        }
         let [width, height] = self.image.map(|side| side as usize);
         let plate = Arc::new(filter::resize(&photo.crop(self.kept), width, height));
         Ok(self.plate.get_or_init(|| plate).clone())

@@ -185,34 +185,15 @@ fn rectify(args: &RectifyArgs) -> anyhow::Result<()> {
     Ok(io::write(&args.output, &camera::rectify(&photo, &seen, solution.size, px_per_metre)?)?)
 }
 
-/// A label, with what its photo knows of the focal length where it says nothing itself.
+/// A label of ours, or with dimensions given one of LabelMe's.
 fn read_label(path: &Path, size: Option<[f64; 2]>) -> petcomp::Result<Label> {
-    let mut label = match size {
-        Some(size) => camera::from_labelme(&io::read_text(path)?, size).map_err(|e| e.in_file(path))?,
-        None => io::read_json::<Label>(path)?,
-    };
-    let Some(photo) = photo_of(path, &label) else { return Ok(label) };
-    let header = io::read_header(&photo)?;
-    if [header.width, header.height] != label.image_size().map(|n| n as usize) {
-        let what = format!(
-            "{}: {} x {} pixels, the label says {:?}",
-            photo.display(),
-            header.width,
-            header.height,
-            label.image_size()
-        );
-        return Err(Error::value("image", what).in_file(path));
+    match size {
+        Some(size) => {
+            let label = camera::from_labelme(&io::read_text(path)?, size).map_err(|e| e.in_file(path))?;
+            camera::with_photo(label, path)
+        }
+        None => camera::read_label(path),
     }
-    if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
-        label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
-    }
-    Ok(label)
-}
-
-/// The label's picture, where it is there.
-fn photo_of(path: &Path, label: &Label) -> Option<PathBuf> {
-    let photo = path.with_file_name(&label.image.file);
-    (!label.image.file.is_empty() && photo.is_file()).then_some(photo)
 }
 
 fn solved(path: &Path, label: &Label) -> petcomp::Result<Solution> {
@@ -227,7 +208,7 @@ fn located(error: camera::SolveError, path: &Path) -> Error {
 fn write(args: &SolveArgs, path: &Path, label: &Label, solution: &Solution, common: &Common) -> anyhow::Result<()> {
     let target = args.output.clone().unwrap_or_else(|| beside(path, "camera.json"));
     io::write_json(&target, &CameraFile::new(label, solution))?;
-    if let Some(photo) = photo_of(path, label) {
+    if let Some(photo) = camera::photo_of(label, path) {
         let photo: Image<LinearRgb> = io::read(photo)?;
         io::write(beside(&target, "overlay.png"), &camera::overlay(&photo, solution))?;
     }
