@@ -4,7 +4,8 @@
     python3 tests/benches/peers/matte.py --blender blender
 
 Blender: seconds of a render whose tree is image -> Keying -> Composite, least of N, less that of image -> Composite; the
-picture is in memory and nothing is written.  petcomp: `cargo bench --bench matte`, pictures in memory likewise.
+picture is in memory and nothing is written.  petcomp: `cargo bench --bench matte`, pictures in memory likewise; the lower
+end of criterion's interval.
 """
 
 import argparse
@@ -68,7 +69,7 @@ def time_petcomp():
                           stderr=subprocess.DEVNULL, text=True, check=True).stdout
     unit = {"ns": 1e-9, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
     found = re.findall(r"^(matte/\S+ ?[^\n]*?)\s+time:\s+\[(\S+) (\S+)", said, re.M)
-    return {name.split("/", 2)[2]: float(value) * unit[u] for name, value, u in found}
+    return {name.strip().split("/", 2)[2]: float(value) * unit[u] for name, value, u in found}
 
 
 def main():
