@@ -24,21 +24,22 @@ def zipped(raw):
     return packed if len(packed) < len(raw) else bytes(raw)
 
 
-def write(path, width, height, channels):
-    """Write channels of float bytes, zip-compressed."""
+def write(path, width, height, channels, compression=ZIP):
+    """Write channels of float bytes."""
     names = sorted(channels)
     entries = b"".join(n.encode() + b"\0" + struct.pack("<iBxxxii", FLOAT, 0, 1, 1) for n in names) + b"\0"
     window = struct.pack("<4i", 0, 0, width - 1, height - 1)
     header = struct.pack("<ii", 20000630, 2) + b"".join((
-        attribute("channels", "chlist", entries), attribute("compression", "compression", bytes([ZIP])),
+        attribute("channels", "chlist", entries), attribute("compression", "compression", bytes([compression])),
         attribute("dataWindow", "box2i", window), attribute("displayWindow", "box2i", window),
         attribute("lineOrder", "lineOrder", b"\0"), attribute("pixelAspectRatio", "float", struct.pack("<f", 1)),
         attribute("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0)),
         attribute("screenWindowWidth", "float", struct.pack("<f", 1)))) + b"\0"
-    row, blocks = 4 * width, []
-    for top in range(0, height, ROWS_PER_BLOCK[ZIP]):
-        lines = range(top, min(top + ROWS_PER_BLOCK[ZIP], height))
-        packed = zipped(b"".join(channels[n][y * row:(y + 1) * row] for y in lines for n in names))
+    row, blocks, rows = 4 * width, [], ROWS_PER_BLOCK[compression]
+    for top in range(0, height, rows):
+        lines = range(top, min(top + rows, height))
+        packed = b"".join(channels[n][y * row:(y + 1) * row] for y in lines for n in names)
+        packed = packed if compression == NO_COMPRESSION else zipped(packed)
         blocks.append(struct.pack("<ii", top, len(packed)) + packed)
     at = len(header) + 8 * len(blocks)
     with open(path, "wb") as out:

@@ -6,7 +6,7 @@
 
 JOBS.json is a list of objects, all done in one Blender session:
 
-    node      keying | chroma_key | channel_key | difference_key | color_spill
+    node      keying | chroma_key | channel_key | difference_key | color_spill | empty (for timing: the input itself)
     input     EXR file, taken as it is: Non-Color, premultiplied
     params    settings under Blender 3.4's property names; see NODES and KEYING below.  Pictures are file names:
               key_image (instead of key_color), garbage_matte, core_matte, second_image
@@ -112,6 +112,10 @@ def set_option(node, kind, name, value):
 
 def make_node(tree, job):
     kind = job["node"]
+    if kind == "empty":
+        node = tree.nodes.new("CompositorNodeImage")
+        node.image = load(job["input"])
+        return node
     node = tree.nodes.new(NODES[kind])
     image = "Image 1" if kind == "difference_key" else "Image"
     link_picture(tree, job["input"], node.inputs[image])

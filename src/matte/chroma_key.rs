@@ -45,12 +45,9 @@ pub fn chroma_key<P: Photo>(photo: &Image<P>, screen: LinearRgb, opts: &ChromaKe
         let [c, r] = centred(p);
         let (x, z) = (c * cos + r * sin, r * cos - c * sin);
         let inside = x - z.abs() / slope;
-        if !(inside > 0.0) {
-            return Coverage(p.a);
-        }
         let angle = libm::atan2(f64::from(z), f64::from(x)) as f32;
         let alpha = if angle.abs() < narrowest { 0.0 } else { 1.0 - inside / opts.gain };
-        Coverage(if alpha < p.a { alpha } else { p.a })
+        Coverage(if inside > 0.0 && alpha < p.a { alpha } else { p.a })
     })
 }
 

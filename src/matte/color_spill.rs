@@ -93,11 +93,8 @@ pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Imag
         } else {
             opts.fac.min(1.0) * (c[spill] - opts.ratio * limit)
         };
-        if !(excess > 0.0) {
-            return p;
-        }
         let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
-        PremulRgba::new(r, g, b, p.a)
+        if excess > 0.0 { PremulRgba::new(r, g, b, p.a) } else { p }
     })
 }
 

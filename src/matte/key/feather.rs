@@ -266,6 +266,7 @@ fn offer<const LIMITED: bool, const N: usize>(
 mod tests {
     use super::*;
 
+    #[expect(clippy::excessive_precision, reason = "numbers with the nine digits that Blender prints")]
     #[test]
     fn the_tables_are_the_published_ones() {
         let opts = KeyOptions { feather_distance: 3, ..KeyOptions::default() };

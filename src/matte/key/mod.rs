@@ -134,7 +134,8 @@ pub struct Deviations {
 /// takes plates, garbage and core mattes, and photos with alpha.
 pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, opts: &KeyOptions) -> Keyed {
     let opts = opts.clamped();
-    let mut keyed = Keyed { cutout: Image::new(photo.width(), photo.height()), ..Keyed::default() };
+    let mut keyed = Keyed::default();
+    fit(&mut keyed.cutout, photo.width(), photo.height());
     let stream = Stream::new(Keying::new(photo, Screen::Color(screen)), None, &opts);
     keyed.deviations = stream.compute(Plane::Matte, &mut keyed.matte, &mut keyed.cutout);
     keyed

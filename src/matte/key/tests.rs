@@ -1,6 +1,8 @@
 //! The vectors of the specification, and numbers at their extremes. Whole pictures are held against Blender in
 //! `tests/golden`.
 
+#![expect(clippy::excessive_precision, reason = "numbers with the nine digits that Blender prints")]
+
 use super::*;
 
 const GREEN: LinearRgb = LinearRgb::new(0.1, 0.75, 0.2);
@@ -26,11 +28,14 @@ fn row_operation(values: &[f32], opts: &KeyOptions) -> Vec<f32> {
 
 const ROW: [f32; 12] = [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.25];
 
+/// Pixel, key, the three balances, matte and cut-out.
+type Vector = ([f32; 3], [f32; 3], [f32; 3], f32, [f32; 4]);
+
 #[test]
 fn pixels_come_out_as_in_blender() {
     let (blue, cyan) = ([0.1, 0.2, 0.8], [0.1, 0.7, 0.7]);
     let (green, grey) = ([0.1, 0.75, 0.2], [0.5; 3]);
-    let cases: [([f32; 3], [f32; 3], [f32; 3], f32, [f32; 4]); 11] = [
+    let cases: [Vector; 11] = [
         ([0.1, 0.75, 0.2], green, [0.5, 1.0, 0.5], 0.0, [0.0; 4]),
         ([0.3, 0.55, 0.25], green, [0.5, 1.0, 0.5], 0.609068632, [0.182720602, 0.16749388, 0.152267158, 0.609068632]),
         ([0.3, 0.55, 0.25], green, [0.0, 1.0, 0.0], 0.488636374, [0.146590918, 0.122159094, 0.122159094, 0.488636374]),
@@ -118,7 +123,7 @@ fn all_stages(profile: Profile) -> KeyOptions {
 fn extreme_but_finite_pixels_make_no_nan() {
     let sizes = [1e-42f32, 1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e20, 1e30];
     let photo = Image::from_fn(17, 13, |x, y| {
-        let at = |k: usize| sizes[(x * 7 + y * 3 + k * 5) % 8] * if (x + y + k) % 5 == 0 { -1.0 } else { 1.0 };
+        let at = |k: usize| sizes[(x * 7 + y * 3 + k * 5) % 8] * if (x + y + k).is_multiple_of(5) { -1.0 } else { 1.0 };
         PremulRgba::new(at(0), at(1), at(2), [0.0, 0.5, 1.0, 1.5][(x + y) % 4])
     });
     for (_, profile) in Profile::ALL {
