@@ -1,7 +1,7 @@
-//! Accuracy of the camera solver on simulated views, against the tables of the specification's section 15.
+//! Accuracy of the camera solver on simulated views, against tables of what a maximum-likelihood solver reaches.
 //!
 //! Every view is a function of a seed and its number. The tables were measured with another program (the prototype), with
-//! other random views; the slack is the specification's.
+//! other random views; hence the slack.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests are tests")]
 
@@ -272,7 +272,7 @@ fn height_error_px(view: &View, solution: &Solution) -> f64 {
 
 #[test]
 fn photos_together_reach_the_table() {
-    // Section 15.4: 60 trials per cell, so that the specification compares with a slack of 1.6; these are 120.
+    // The table has 60 trials per cell, hence a slack of 1.6; these are 120.
     let table = [
         ([0.0, 5.0], [Spread(8.6, 41.0), Spread(13.0, 33.0), Spread(8.1, 24.0), Spread(4.5, 12.0)]),
         ([0.0, 10.0], [Spread(5.6, 17.0), Spread(4.4, 15.0), Spread(2.7, 5.6), Spread(1.4, 4.3)]),

@@ -1,4 +1,4 @@
-//! Degenerate, awkward and wrong labels: what the specification's section 9 says happens, exactly.
+//! Degenerate, awkward and wrong labels: what happens, exactly.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
@@ -250,7 +250,7 @@ fn small_rectangles_are_ambiguous_and_say_so() {
         });
         hits.count() as f64 / 200.0
     };
-    // 120 px and 1200 px; the specification measured about 90 % (over all tilts) and 0 %.
+    // 120 px and 1200 px; a prototype had about 90 % (over all tilts) and 0 %.
     assert!(ambiguous(0.03) > 0.6, "{}", ambiguous(0.03));
     assert_eq!(ambiguous(0.3), 0.0);
 }

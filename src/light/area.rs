@@ -87,7 +87,7 @@ pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -
 pub(crate) mod tests {
     use super::*;
 
-    /// The light of rendering.md section 8, test 1.
+    /// A light whose irradiance at five points was worked out by another program.
     pub(crate) fn square() -> AreaLight {
         AreaLight {
             shape: LightShape::Rectangle,

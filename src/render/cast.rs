@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Side of the blocks that the picture is put together from, pixels.
 const TILE: usize = 16;
 
-/// Sub-samples a side from which on a sharper level of detail pays (rendering.md, section 7.2).
+/// Sub-samples a side from which on a sharper level of detail pays.
 const DENSE: usize = 4;
 
 /// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
@@ -24,8 +24,11 @@ const DENSE: usize = 4;
 /// numbers in `options` are brought into the range that works. Ask [`check`](super::check) about shots from outside.
 ///
 /// # Method
-/// rendering.md, section 7. Departs from it by keeping irradiance on a lattice in the picture instead of one on each
-/// receiver, by mixing two texture levels once instead of at each reading, and by ordering cards block by block.
+/// Everything is planar, so each map between two planes seen from a point is a homography. Irradiance is smooth: it is
+/// computed once per receiver on a lattice in the picture, as a sum over Gauss nodes of the lights and fixed directions
+/// of the environment, each seen through the product of `1 - alpha` of the cards in between. Textures are sharp: they are
+/// read at the quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave over. Cards
+/// are ordered by depth block by block; blocks in which they cross are split.
 pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let view = View::of(&shot.camera);

@@ -32,7 +32,7 @@ pub struct RenderOptions {
 }
 
 impl Quality {
-    /// The numbers behind the name: those of the table in rendering.md, section 7.3.
+    /// The numbers behind the name: points on the measured curve of error (against Cycles) over run time.
     pub fn options(self) -> RenderOptions {
         let [subsamples, light_samples, ambient_samples] = match self {
             Self::Draft => [1, 2, 8],

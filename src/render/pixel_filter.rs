@@ -49,7 +49,7 @@ fn cumulative(s: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// rendering.md, section 7.2: offsets and left-over sigma for r = 1, 2, 3, 4, 6.
+    /// Offsets and left-over sigma for r = 1, 2, 3, 4, 6, worked out by another program.
     #[test]
     fn quantiles_are_the_published_ones() {
         let table: [(&[f64], f64); 5] = [

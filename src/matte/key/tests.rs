@@ -1,4 +1,4 @@
-//! The vectors of the specification, and numbers at their extremes. Whole pictures are held against Blender in
+//! Single pixels and rows with the digits that Blender prints, and numbers at their extremes. Whole pictures are held against Blender in
 //! `tests/golden`.
 
 #![expect(clippy::excessive_precision, reason = "numbers with the nine digits that Blender prints")]
