@@ -84,6 +84,19 @@ pub struct Step {
     pub image: Image<Coverage>,
 }
 
+impl Step {
+    /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms as shares of the
+    /// largest.
+    pub fn shown(&self) -> Image<Coverage> {
+        let most = self.image.pixels().iter().fold(0.0f32, |most, c| most.max(c.0));
+        if most <= 1.0 {
+            return self.image.clone();
+        }
+        let scale = 1.0 / libm::log1pf(most);
+        self.image.map(|c| Coverage(scale * libm::log1pf(c.0.max(0.0))))
+    }
+}
+
 /// Finds the one object on a uniform background.
 ///
 /// `photo` is scene-linear, at least 32 pixels a side. The object may reach the border of the photo (which is warned

@@ -45,9 +45,11 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
             io::create_folder(output)?;
             warn(photo, &found.remarks);
-            for (i, step) in found.steps.iter().enumerate() {
-                let path = output.join(format!("{i}_{}.png", step.name));
-                io::write(&path, &step.image)?;
+            let steps = found.steps.iter().map(|step| (step.name, step.shown()));
+            let outcome = [("hull", found.mask.clone()), ("outline", found.tight.clone())];
+            for (i, (name, picture)) in steps.chain(outcome).enumerate() {
+                let path = output.join(format!("{i}_{name}.png"));
+                io::write(&path, &picture)?;
                 common.say(path.display());
             }
         }
