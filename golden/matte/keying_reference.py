@@ -12,6 +12,7 @@ JOBS.json is a list of objects, all done in one Blender session:
               key_image (instead of key_color), garbage_matte, core_matte, second_image
     prefix    outputs are written to PREFIX + name + ".exr" as 32-bit float
     outputs   {"Image": "name", "Matte": "name", "Edges": "name"}: which outputs of the node, and their names
+    linked    optional: the output that the Composite node gets; the first one where it is not given
     repeats   optional: render so many times more and print the seconds of each
 
 There is no colour conversion anywhere, and the compositor runs on the CPU in full precision.  Tried with Blender 3.4.1
@@ -170,7 +171,7 @@ def do(job):
     tree = new_tree(*size)
     node = make_node(tree, job)
     sink = tree.nodes.new("CompositorNodeComposite")
-    tree.links.new(node.outputs[0], sink.inputs["Image"])
+    tree.links.new(node.outputs[job.get("linked", 0)], sink.inputs["Image"])
     with tempfile.TemporaryDirectory(prefix="keying_") as folder:
         for output, name in job["outputs"].items():
             add_file_output(tree, node.outputs[output], folder, name + "_")

@@ -37,6 +37,26 @@ pub fn read_toml_with<T: DeserializeOwned>(path: impl AsRef<Path>, overrides: &[
     parse_toml(&text).map_err(|e| e.in_file(path))
 }
 
+/// Settings from overrides alone: all of them lie in the table of that name.
+///
+/// # Errors
+/// An override outside the table or that leads nowhere; a key that `T` does not know, with the one that was probably
+/// meant; a value that does not fit.
+pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) -> Result<T> {
+    let mut document = toml::Table::new();
+    document.insert(table.into(), toml::Table::new().into());
+    overrides.iter().try_for_each(|o| o.apply(&mut document))?;
+    let settings = document.remove(table).unwrap_or_else(|| toml::Table::new().into());
+    if let Some(key) = document.keys().next() {
+        return Err(Error::value(key, format!("no such table, expected {table}.NAME=VALUE")));
+    }
+    serde_path_to_error::deserialize(settings).map_err(|e| {
+        let at = format!("{table}.{}", e.path());
+        let e: toml::de::Error = e.into_inner();
+        Mistake { at: at.trim_end_matches('.').into(), line: None, what: e.message().into() }.into_error()
+    })
+}
+
 /// Reads a document that says by its extension whether it is JSON (`.json`) or TOML (any other).
 ///
 /// # Errors
@@ -244,6 +264,19 @@ mod tests {
         let expected = "objects.count: invalid type: string \"three\", expected u32";
         assert_eq!(toml("seed = 1\n[objects]\ncount = \"three\""), format!("recipe.toml: {expected}"));
         assert_eq!(json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}"), format!("recipe.json: {expected}"));
+    }
+
+    #[test]
+    fn settings_are_made_of_overrides_alone() {
+        let made = |texts: &[&str]| {
+            let overrides: Result<Vec<Override>> = texts.iter().map(|t| t.parse()).collect();
+            overrides.and_then(|o| from_overrides::<Objects>("key", &o)).map_err(|e| e.to_string())
+        };
+        let objects = made(&["key.count=3", "key.size_m = 0.5"]).unwrap();
+        assert_eq!((objects.count, objects.size_m), (3, Some(0.5)));
+        assert_eq!(made(&["key.cuont=3"]).unwrap_err(), "key: unknown key \"cuont\", did you mean \"count\"?");
+        assert_eq!(made(&["key.count=x"]).unwrap_err(), "key.count: invalid type: string \"x\", expected u32");
+        assert_eq!(made(&["kye.count=3"]).unwrap_err(), "kye: no such table, expected key.NAME=VALUE");
     }
 
     #[test]

@@ -39,7 +39,8 @@ mod write;
 
 pub use atomic::create_folder;
 pub use document::{
-    read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
+    from_overrides, read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json,
+    write_text, write_toml,
 };
 pub use format::Format;
 pub use header::Header;

@@ -1,9 +1,9 @@
-//! The keyer against a plain copy of the same buffers.
+//! The keyer against a plain copy of the same buffers, and the two ways to blur against each other.
 //!
 //! `cargo bench --bench matte`: every line is one 4K frame on all cores, into pictures that are already allocated.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use petcomp::matte::key::{KeyOptions, Keyed, Keying, Profile, Screen};
+use petcomp::matte::key::{Blur, KeyOptions, Keyed, Keying, Profile, Screen};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -92,7 +92,40 @@ fn bench(c: &mut Criterion) {
         group
             .bench_function(format!("key/all stages, {name}"), |b| b.iter(|| job.run_into(&opts, &mut keyed).unwrap()));
     }
+    for (size, blur, name) in BLURS {
+        let opts = blurred(size, blur);
+        group.bench_function(format!("blur {size}, {name}"), |b| b.iter(|| job.matte_into(&opts, &mut matte).unwrap()));
+    }
     group.finish();
+    compare_blurs(&job);
+}
+
+/// Sizes at which the two ways to blur are compared.
+const BLURS: [(u32, Blur, &str); 6] = [
+    (6, Blur::Exact, "exact"),
+    (6, Blur::RunningSum, "running sum"),
+    (20, Blur::Exact, "exact"),
+    (20, Blur::RunningSum, "running sum"),
+    (60, Blur::Exact, "exact"),
+    (60, Blur::RunningSum, "running sum"),
+];
+
+/// Both blurs of one size, all else at its default.
+fn blurred(size: u32, blur: Blur) -> KeyOptions {
+    KeyOptions { blur_pre: size, blur_post: size, blur, ..KeyOptions::default() }
+}
+
+/// Prints by how much the matte differs between the two ways to blur.
+fn compare_blurs(job: &Keying<'_, PremulRgba>) {
+    for size in [6, 20, 60] {
+        let [exact, running] = [Blur::Exact, Blur::RunningSum].map(|blur| job.matte(&blurred(size, blur)).unwrap());
+        let both = exact.pixels().iter().zip(running.pixels());
+        let (max, sum) = both.fold((0.0f64, 0.0), |(max, sum), (a, b)| {
+            let d = f64::from((a.0 - b.0).abs());
+            (max.max(d), sum + d)
+        });
+        println!("blur {size}, exact - running sum: max {max:.2e}, mean {:.2e}", sum / exact.pixels().len() as f64);
+    }
 }
 
 criterion_group!(benches, bench);

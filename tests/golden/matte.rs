@@ -3,7 +3,7 @@
 use crate::case::Case;
 use petcomp::io::exr::read_channels;
 use petcomp::matte::key::{KeyOptions, Keying, Photo, Screen};
-use petcomp::matte::{ChannelKeyed, channel_key, chroma_key, color_spill, difference_key};
+use petcomp::matte::{ChannelKeyed, ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use serde::de::DeserializeOwned;
 
@@ -25,6 +25,7 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
             same_cut(case, &matte)
         }
         "color_spill" => same_image(case, "reference.exr", &color_spill(&photo(case)?, &options(case)?)),
+        "keying_screen" => screen(case),
         other => Err(format!("node: \"{other}\" is not known")),
     }
 }
@@ -44,6 +45,37 @@ fn keying(case: &Case) -> Result<(), String> {
     job = garbage.iter().fold(job, |job, m| job.with_garbage(m));
     job = core.iter().fold(job, |job, m| job.with_core(m));
     check(case, &job, &opts)
+}
+
+/// The one node whose bits are not Blender's: it adds up in double precision.
+fn screen(case: &Case) -> Result<(), String> {
+    #[derive(serde::Deserialize)]
+    struct Given {
+        size: (usize, usize),
+        smoothness: f64,
+        points: Vec<Point>,
+        tolerance: Tolerance,
+    }
+    #[derive(serde::Deserialize)]
+    struct Point {
+        at_px: [f64; 2],
+        color: LinearRgb,
+    }
+    #[derive(serde::Deserialize)]
+    struct Tolerance {
+        hard_fail: f32,
+    }
+    let given: Given = case.table.clone().try_into().map_err(|e: toml::de::Error| e.to_string())?;
+    let points: Vec<_> = given.points.iter().map(|p| ScreenPoint { at_px: p.at_px.into(), color: p.color }).collect();
+    let plate = keying_screen(given.size, &points, given.smoothness).map_err(|e| e.to_string())?;
+    let [r, g, b, _] = rgba(case, "reference.exr")?;
+    let want = r.iter().zip(&g).zip(&b).map(|((r, g), b)| LinearRgb::new(*r, *g, *b));
+    if plate.pixels().len() != r.len() {
+        return Err(format!("{} pixels, expected {}", plate.pixels().len(), r.len()));
+    }
+    let apart = |a: &LinearRgb, b: LinearRgb| (a.r - b.r).abs().max((a.g - b.g).abs()).max((a.b - b.b).abs());
+    let most = plate.pixels().iter().zip(want).map(|(a, b)| apart(a, b)).fold(0.0, f32::max);
+    if most <= given.tolerance.hard_fail { Ok(()) } else { Err(format!("differs by {most:e}")) }
 }
 
 fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, opts: &KeyOptions) -> Result<(), String> {

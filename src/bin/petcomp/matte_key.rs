@@ -1,10 +1,9 @@
 //! `petcomp matte key`: Blender's Keying node on one picture.
 
-use anyhow::{Context, Result};
-use petcomp::io::{self, Bits, ToFile, WriteOptions};
+use anyhow::Result;
+use petcomp::io::{self, Bits, Override, ToFile, WriteOptions};
 use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
-use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 
 /// Keys a picture against a screen colour or plate, as Blender's Keying node does.
@@ -38,11 +37,11 @@ pub(crate) struct Args {
     profile: Profile,
     /// A setting under Blender's name, such as key.clip_black=0.1
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
-    settings: Vec<String>,
+    settings: Vec<Override>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let opts = KeyOptions { profile: args.profile, ..settings("key", &args.settings)? };
+    let opts = KeyOptions { profile: args.profile, ..io::from_overrides("key", &args.settings)? };
     let photo: Image<PremulRgba> = io::read(&args.input)?;
     let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
     let [garbage, core] = [&args.garbage, &args.core].map(|path| path.as_ref().map(io::read::<Coverage>).transpose());
@@ -59,20 +58,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     args.matte.as_ref().map(|path| write(path, &keyed.matte)).transpose()?;
     args.edges.as_ref().map(|path| write(path, &job.edges(&opts)?)).transpose()?;
     Ok(())
-}
-
-/// Settings of one table from `table.NAME=VALUE` arguments.
-pub(crate) fn settings<T: DeserializeOwned>(table: &str, given: &[String]) -> Result<T> {
-    let mut values = toml::Table::new();
-    for setting in given {
-        let named = setting.split_once('=').and_then(|(name, value)| Some((name.strip_prefix(table)?, value)));
-        let (name, value) = named
-            .and_then(|(name, value)| Some((name.trim().strip_prefix('.')?, value.trim())))
-            .with_context(|| format!("--set {setting}: expected {table}.NAME=VALUE"))?;
-        let parsed = format!("v = {value}").parse::<toml::Table>().ok().and_then(|mut t| t.remove("v"));
-        values.insert(name.into(), parsed.unwrap_or_else(|| value.into()));
-    }
-    values.try_into().map_err(|e: toml::de::Error| anyhow::anyhow!("--set {table}: {}", e.message()))
 }
 
 /// A colour from `R,G,B`.

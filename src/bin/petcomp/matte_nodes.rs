@@ -1,8 +1,9 @@
 //! `petcomp matte chroma-key`, `channel-key`, `difference-key`, `color-spill`, `keying-screen`: Blender's other keyers.
 
-use crate::matte_key::{color, settings, write};
+use crate::matte_key::{color, write};
 use anyhow::Result;
 use nalgebra::Point2;
+use petcomp::io::{Override, from_overrides};
 use petcomp::matte::{ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, io};
 use std::path::PathBuf;
@@ -20,7 +21,7 @@ pub(crate) struct Pictures {
     matte: Option<PathBuf>,
     /// A setting under Blender's name, such as key.tolerance=0.2 or key.profile=blender-4.5
     #[arg(long = "set", value_name = "key.NAME=VALUE")]
-    settings: Vec<String>,
+    settings: Vec<Override>,
 }
 
 #[derive(clap::Subcommand, Debug)]
@@ -64,19 +65,20 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command) -> Result<()> {
     match command {
         Command::ChromaKey { pictures, screen } => {
-            pictures.cut(|photo, given| Ok(chroma_key(photo, *screen, &settings("key", given)?)))
+            pictures.cut(|photo, given| Ok(chroma_key(photo, *screen, &from_overrides("key", given)?)))
         }
         Command::DifferenceKey { pictures, clean } => {
             let clean: Image<PremulRgba> = io::read(clean)?;
-            pictures.cut(|photo, given| Ok(difference_key(photo, &clean, &settings("key", given)?)?))
+            pictures.cut(|photo, given| Ok(difference_key(photo, &clean, &from_overrides("key", given)?)?))
         }
         Command::ChannelKey(pictures) => {
-            let keyed = channel_key(&io::read::<PremulRgba>(&pictures.input)?, &settings("key", &pictures.settings)?);
+            let keyed =
+                channel_key(&io::read::<PremulRgba>(&pictures.input)?, &from_overrides("key", &pictures.settings)?);
             pictures.write(&keyed.cutout, &keyed.matte)
         }
         Command::ColorSpill(pictures) => {
             let photo: Image<PremulRgba> = io::read(&pictures.input)?;
-            write(&pictures.output, &color_spill(&photo, &settings("key", &pictures.settings)?))
+            write(&pictures.output, &color_spill(&photo, &from_overrides("key", &pictures.settings)?))
         }
         Command::KeyingScreen { input, output, points, smoothness } => {
             let photo: Image<PremulRgba> = io::read(input)?;
@@ -88,7 +90,7 @@ pub(crate) fn run(command: &Command) -> Result<()> {
 
 impl Pictures {
     /// Writes the picture seen through a matte.
-    fn cut(&self, matte: impl Fn(&Image<PremulRgba>, &[String]) -> Result<Image<Coverage>>) -> Result<()> {
+    fn cut(&self, matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>) -> Result<()> {
         let photo: Image<PremulRgba> = io::read(&self.input)?;
         let matte = matte(&photo, &self.settings)?;
         self.write(&photo.zip_map(&matte, |p, m| p.masked(m)), &matte)

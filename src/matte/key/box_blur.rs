@@ -2,10 +2,24 @@
 
 use super::calm::{Calm, Extremes, RUN};
 use super::model::Behaviour;
-use super::rows::{Pad, Rows, Window, around, window_rows};
+use super::options::{Blur, KeyOptions};
+use super::rows::{Pad, Rows, Source, Window, around, window_rows};
+use super::running_blur::{Reach, RunningBlur};
+
+/// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
+pub(super) fn blurred<'a>(source: impl Rows + 'a, opts: &KeyOptions, size: u32, picture: (usize, usize)) -> Source<'a> {
+    let (behaviour, size) = (opts.profile.behaviour(), size as usize);
+    match opts.blur {
+        Blur::Exact => Box::new(BoxBlur::new(source, behaviour, size, picture)),
+        Blur::RunningSum => {
+            let reach = Kernel::new(behaviour, size, picture).reach();
+            Box::new(RunningBlur::new(source, reach, picture))
+        }
+    }
+}
 
 /// A plane blurred by a box, along x and then along y.
-pub(super) struct BoxBlur<S> {
+struct BoxBlur<S> {
     source: S,
     kernel: Kernel,
     height: usize,
@@ -37,6 +51,17 @@ impl Kernel {
         Self::CutOff { radius, columns: (0..width).map(|x| around(x, radius, width).len() as f32).collect() }
     }
 
+    /// The samples whose weight is not 0.
+    fn reach(&self) -> Reach {
+        match self {
+            Self::CutOff { radius, .. } => Reach { radius: *radius, repeat: false },
+            Self::Repeat { weights, .. } => {
+                let radius = weights.iter().filter(|w| **w > 0.0).count() - 1;
+                Reach { radius, repeat: true }
+            }
+        }
+    }
+
     fn radius(&self) -> usize {
         match self {
             Self::CutOff { radius, .. } => *radius,
@@ -58,7 +83,7 @@ fn weights(size: usize) -> Vec<f32> {
 
 impl<S: Rows> BoxBlur<S> {
     /// A blur of `size` (at least 1) over a plane of that width and height.
-    pub(super) fn new(source: S, behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
+    fn new(source: S, behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
         let kernel = Kernel::new(behaviour, size, (width, height));
         let capacity = window_rows(kernel.radius(), height);
         Self {

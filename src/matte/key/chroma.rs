@@ -3,11 +3,11 @@
 //! The signals are those of ITU-R BT.709 with studio swing, in the rounding of Blender's own table. Its two matrices are
 //! not exact inverses of each other: even without blurring, colours move by up to 7e-4 per unit.
 
-use super::box_blur::BoxBlur;
+use super::box_blur::blurred;
 use super::model::{Behaviour, Model, Robust};
 use super::options::{KeyOptions, Profile};
 use super::photo::Photo;
-use super::rows::Rows;
+use super::rows::{Rows, Source};
 use crate::image::Image;
 use crate::pixel::PremulRgba;
 
@@ -114,19 +114,19 @@ pub(super) struct ChromaBlur<'a, P> {
     photo: &'a Image<P>,
     careful: bool,
     behaviour: Behaviour,
-    blurred: [BoxBlur<Difference<'a, P>>; 2],
+    blurred: [Source<'a>; 2],
     rows: [Vec<f32>; 2],
 }
 
 impl<'a, P: Photo> ChromaBlur<'a, P> {
     pub(super) fn new(photo: &'a Image<P>, opts: &KeyOptions) -> Self {
         let (behaviour, careful) = (opts.profile.behaviour(), opts.profile == Profile::Robust);
-        let blurred = DIFFERENCES.map(|weights| {
+        let planes = DIFFERENCES.map(|weights| {
             let plane = Difference { photo, careful, weights, behaviour };
-            BoxBlur::new(plane, behaviour, opts.blur_pre as usize, photo.size())
+            blurred(plane, opts, opts.blur_pre, photo.size())
         });
         let rows = [vec![0.0; photo.width()], vec![0.0; photo.width()]];
-        Self { photo, careful, behaviour, blurred, rows }
+        Self { photo, careful, behaviour, blurred: planes, rows }
     }
 
     /// Writes row `y`.

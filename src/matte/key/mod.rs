@@ -81,10 +81,11 @@ mod photo;
 mod raw;
 mod robust;
 mod rows;
+mod running_blur;
 mod stream;
 
 pub(super) use chroma::{differences, from_ycc, to_ycc};
-pub use options::{Falloff, KeyOptions, Profile};
+pub use options::{Blur, Falloff, KeyOptions, Profile};
 pub use photo::Photo;
 
 use crate::error::{Error, Result};

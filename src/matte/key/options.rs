@@ -61,6 +61,19 @@ pub enum Falloff {
     Linear,
 }
 
+/// How the box blurs of [`KeyOptions::blur_pre`] and [`KeyOptions::blur_post`] add up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Blur {
+    /// Sample by sample in Blender's order: Blender's bits.
+    #[default]
+    Exact,
+    /// By running sums, whose cost does not depend on the size: nearer the true mean than Blender is. Samples are rounded
+    /// to 2^-24 and held within 65504 (half precision's largest); one that is no number counts as 0. An edge that only
+    /// just is one may not be found, so that the levels clip it.
+    RunningSum,
+}
+
 /// Settings of the [keyer](super), under the names that Blender 3.4 gives its Keying node.
 ///
 /// The ranges are Blender's. [`Keying::run`](super::Keying::run) refuses values outside them, [`key`](super::key) moves
@@ -72,6 +85,8 @@ pub struct KeyOptions {
     pub profile: Profile,
     /// Size of the blur of the chroma before keying, 0 to 2048 pixels; against noise and chroma subsampling. Default: 0.
     pub blur_pre: u32,
+    /// How both blurs add up. Not a setting of Blender's. Default: `exact`.
+    pub blur: Blur,
     /// Which of the two other channels the key is weighed against: 0 = the later one, 1 = the earlier one. Default: 0.5.
     pub screen_balance: f32,
     /// Raw matte at or below this becomes 0, in 0..1. Default: 0.
@@ -108,6 +123,7 @@ impl Default for KeyOptions {
         Self {
             profile: Profile::default(),
             blur_pre: 0,
+            blur: Blur::default(),
             screen_balance: 0.5,
             clip_black: 0.0,
             clip_white: 1.0,
@@ -203,11 +219,12 @@ mod tests {
 
     #[test]
     fn the_toml_table_is_the_struct() {
-        let text = "profile = \"blender-4.5\"\nclip_black = 0.25\nfeather_falloff = \"INVERSE_SQUARE\"\n";
+        let text = "profile = \"blender-4.5\"\nclip_black = 0.25\nfeather_falloff = \"INVERSE_SQUARE\"\nblur = \"running_sum\"\n";
         let opts: KeyOptions = toml::from_str(text).unwrap();
         let want = KeyOptions {
             clip_black: 0.25,
             feather_falloff: Falloff::InverseSquare,
+            blur: Blur::RunningSum,
             ..KeyOptions::of(Profile::Blender45)
         };
         assert_eq!(opts, want);

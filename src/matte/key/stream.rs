@@ -1,6 +1,6 @@
 //! The stages in their order, and the bands of rows that run them side by side.
 
-use super::box_blur::BoxBlur;
+use super::box_blur::blurred;
 use super::chroma::ChromaBlur;
 use super::dilate::Dilate;
 use super::edge::{Clip, Edges};
@@ -167,7 +167,7 @@ impl<'a, P: Photo> Stream<'a, P> {
         let (o, size) = (self.opts, self.size());
         let mut source = self.limited();
         if o.blur_post > 0 {
-            source = Box::new(BoxBlur::new(source, self.behaviour(), o.blur_post as usize, size));
+            source = blurred(source, o, o.blur_post, size);
         }
         if o.dilate_distance != 0 {
             source = Box::new(Dilate::new(source, size, o));

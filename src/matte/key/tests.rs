@@ -184,8 +184,8 @@ fn bits_do_not_depend_on_the_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| key(photo, GREEN, opts).matte)
     };
-    for (_, profile) in Profile::ALL {
-        let opts = all_stages(profile);
+    let runs = |profile| [Blur::Exact, Blur::RunningSum].map(|blur| KeyOptions { blur, ..all_stages(profile) });
+    for opts in Profile::ALL.into_iter().flat_map(|(_, profile)| runs(profile)) {
         assert!(on(1, &photo, &opts) == on(3, &photo, &opts));
         assert!(on(1, &tall, &opts) == on(7, &tall, &opts));
     }
@@ -197,6 +197,36 @@ fn the_matte_alone_is_the_same_matte() {
     let job = Keying::new(&photo, Screen::Color(GREEN));
     let opts = all_stages(Profile::Blender42);
     assert!(job.matte(&opts).unwrap() == job.run(&opts).unwrap().matte);
+}
+
+#[test]
+fn running_sums_are_blenders_up_to_its_own_rounding() {
+    let photo = Image::from_fn(170, 130, |x, y| {
+        let shade = ((x * 31 + y * 17) % 97) as f32 * 0.001;
+        if (x / 30 + y / 20) % 3 == 0 { LinearRgb::new(0.6, 0.3 + shade, 0.2) } else { GREEN.map(|c| c + shade) }
+    });
+    let job = Keying::new(&photo, Screen::Color(GREEN));
+    for (_, profile) in Profile::ALL {
+        for size in [1, 2, 5, 6, 20, 60] {
+            let matte = |blur_pre, blur| {
+                let opts = KeyOptions { blur_pre, blur_post: size, blur, ..KeyOptions::of(profile) };
+                job.matte(&opts).unwrap()
+            };
+            let differ = |pre| {
+                let (exact, running) = (matte(pre, Blur::Exact), matte(pre, Blur::RunningSum));
+                let both = exact.pixels().iter().zip(running.pixels());
+                both.map(|(a, b)| f64::from((a.0 - b.0).abs())).fold(0.0, f64::max)
+            };
+            // A pass adds up to 2 size samples within 0 to 1 in single precision, each addition wrong by half a step at
+            // most; the running sum rounds each sample by as little, once.
+            let bound = f64::from(2 * (2 * size + 2)) * 2f64.powi(-24);
+            assert!(differ(0) <= bound, "{profile:?} {size}: {} > {bound}", differ(0));
+            // An error e of both colour differences moves green by at most 0.75 e and the mean of the others by 1.95 e,
+            // hence the matte by less than 4 e / S, with S = 0.51 for this screen.
+            let bound = bound * (1.0 + 4.0 / 0.51);
+            assert!(differ(size) <= bound, "{profile:?} {size}, chroma too: {} > {bound}", differ(size));
+        }
+    }
 }
 
 #[test]
