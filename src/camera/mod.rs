@@ -47,7 +47,7 @@ pub use label::{
 pub use labelme::from_labelme;
 pub use locate::locate;
 pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
-pub use options::{CornerOrder, Priors, SolveOptions};
+pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
 pub use read::{photo_of, read_label, with_photo};

@@ -3,7 +3,7 @@
 use super::error::SolveError;
 use super::focal::Witness;
 use super::label::Label;
-use super::options::{CornerOrder, SolveOptions};
+use super::options::{CornerOrder, Effort, SolveOptions};
 use super::problem::Problem;
 use super::refine::Minimum;
 use super::search::{TELLING, degrees_apart};
@@ -35,6 +35,9 @@ const CONFLICT_SIGMAS: f64 = 3.0;
 /// # Ok::<(), camera::SolveError>(())
 /// ```
 pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
+    if options.effort != Effort::Whole {
+        return as_labelled(label, options).map(|(solution, ..)| solution);
+    }
     let solution = without_wrong_exif(label, options)?;
     Ok(with_sides_exchanged(label, options, solution))
 }
@@ -42,7 +45,11 @@ pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveErr
 /// The solution of a label as it stands; another pose that fits as well is its alternative.
 fn as_labelled(label: &Label, options: &SolveOptions) -> Result<(Solution, Problem, Minimum), SolveError> {
     let problem = Problem::new(label, options)?;
-    let found = problem.search().ok_or(SolveError::NoPose)?;
+    let found = match options.effort {
+        Effort::Whole => problem.search(),
+        Effort::Steps(most) => problem.first_guess(most),
+    };
+    let found = found.ok_or(SolveError::NoPose)?;
     let mut solution = problem.solution(&found.best, options);
     if let Some(other) = found.other.filter(|other| other.cost < found.best.cost + TELLING) {
         let apart_deg = degrees_apart(&found.best.state.stance, &other.state.stance);
