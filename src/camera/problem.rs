@@ -5,7 +5,7 @@ use super::corners::{self, Checked};
 use super::dlt;
 use super::error::SolveError;
 use super::focal::{self, Witness};
-use super::label::Label;
+use super::label::{Label, LabelPoint};
 use super::model::{Elastic, Sight, State};
 use super::options::{Priors, SolveOptions};
 use super::rectangle::View;
@@ -25,6 +25,8 @@ const HEIGHT_SIGMA: f64 = 0.03;
 
 /// Points lower than this part of the shorter side lie on the surface, for a first guess.
 const ON_SURFACE: f64 = 0.01;
+/// A surface more than so many times longer than what its points span is not carried well by them.
+const LONE_MARKER: f64 = 3.0;
 
 /// The units of the solver, and what they stand for.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +67,11 @@ impl Problem {
         let sides = Sides::new(label, options)?;
         let labelled = label.surface.corners_px.map(|corners| corners.map(|c| label.pixel(c)));
         let quad_px = labelled.or_else(|| sides.predicted(label)).ok_or(SolveError::NoCorners)?;
-        let Checked { corners: corners_px, warnings } = corners::check(quad_px, sigma_px, image, options.order)?;
+        let Checked { corners: corners_px, mut warnings } = corners::check(quad_px, sigma_px, image, options.order)?;
+
+        if labelled.is_none() {
+            warnings.extend(sides.lone_marker(label));
+        }
 
         let diagonal = Vector2::from(image.map(f64::from));
         let center = label.camera.principal_point_px.map_or((diagonal / 2.0).into(), |px| label.pixel(px));
@@ -140,6 +146,12 @@ impl Frame {
     }
 }
 
+/// The points that lie on a surface of this size.
+fn on_surface(label: &Label, size: [f64; 2]) -> impl Iterator<Item = &LabelPoint> {
+    let near = ON_SURFACE * size[0].min(size[1]);
+    label.points.iter().filter(move |p| p.xyz_m[2].abs() <= near)
+}
+
 /// The corners of a rectangle of this size, in label order.
 pub(crate) fn corner_points(size: [f64; 2]) -> [Point3<f64>; 4] {
     let [x, y] = size.map(|s| s / 2.0);
@@ -184,11 +196,22 @@ impl Sides {
     /// Where the corners of a rectangle of known sides must be by the further points on its surface.
     fn predicted(self, label: &Label) -> Option<[Point2<f64>; 4]> {
         let Self::Both(size) = self else { return None };
-        let near = ON_SURFACE * size[0].min(size[1]);
-        let flat = label.points.iter().filter(|p| p.xyz_m[2].abs() <= near);
-        let pairs: Vec<_> = flat.map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px))).collect();
+        let pairs: Vec<_> =
+            on_surface(label, size).map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px))).collect();
         let map = dlt::homography(&pairs)?;
         Some(corner_points(size).map(|c| map.map(c.xy())))
+    }
+
+    /// Doubt, where the points on the surface span much less than it.
+    fn lone_marker(self, label: &Label) -> Option<Warning> {
+        let Self::Both(size) = self else { return None };
+        let span = |axis: usize| {
+            let along = on_surface(label, size).map(|p| p.xyz_m[axis]);
+            let [low, high] = along.fold([f64::MAX, f64::MIN], |[low, high], v| [v.min(low), v.max(high)]);
+            high - low
+        };
+        let (span, side) = (span(0).max(span(1)), size[0].max(size[1]));
+        (side > LONE_MARKER * span).then_some(Warning::LoneMarker { span, side })
     }
 
     fn elastic(self) -> Elastic {

@@ -16,7 +16,7 @@ pub(crate) enum Command {
     Doctor(SolveArgs),
     /// Say solved cameras as another program does
     Export(ExportArgs),
-    /// Find printed markers (ArUco DICT_4X4_50) in a photo and add their corners to a label as points
+    /// Find printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their corners to a label as points
     Markers(MarkersArgs),
     /// Turn a photo into a metric top view of the surface, or lay a picture on it
     Rectify(RectifyArgs),
