@@ -42,7 +42,7 @@ pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, F
 pub use focal::{FocalSource, focal_from_equivalent};
 pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
-    Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
+    Artwork, Crop, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
 };
 pub use labelme::from_labelme;
 pub use locate::locate;

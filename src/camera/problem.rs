@@ -58,9 +58,14 @@ pub(crate) struct Problem {
 impl Problem {
     /// Checks a label and brings it into the solver's units.
     pub(crate) fn new(label: &Label, options: &SolveOptions) -> Result<Self, SolveError> {
+        Self::with_focal(label, None, options)
+    }
+
+    /// The same, where a stated distortion is to be understood at this focal length (in units) instead of the believed one.
+    pub(crate) fn with_focal(label: &Label, focal: Option<f64>, options: &SolveOptions) -> Result<Self, SolveError> {
         let image = label.image_size();
-        if image.contains(&0) {
-            return Err(SolveError::BadImage(image));
+        if let Some(size) = [image, label.taken_size()].into_iter().find(|size| size.contains(&0)) {
+            return Err(SolveError::BadImage(size));
         }
         check_numbers(label)?;
         let sigma_px = label.surface.corner_sigma_px.unwrap_or(CORNER_SIGMA_PX);
@@ -74,13 +79,13 @@ impl Problem {
         }
 
         let diagonal = Vector2::from(image.map(f64::from));
-        let center = label.camera.principal_point_px.map_or((diagonal / 2.0).into(), |px| label.pixel(px));
+        let center = label.camera.principal_point_px.map_or(label.taken_center(), |px| label.pixel(px));
         let (principal_px, unit_px) = (center, diagonal.norm() / 2.0);
         let (mut ln_focal, witness) = focal::belief(label, &options.priors);
         ln_focal.mean -= libm::log(unit_px);
-        let usual = focal::usual_px(image) / unit_px;
+        let usual = focal::usual_px(label.taken_size()) / unit_px;
 
-        let kappa = kappa(label, libm::exp(ln_focal.mean), options);
+        let kappa = kappa(label, focal.unwrap_or_else(|| libm::exp(ln_focal.mean)), options);
         let quad = corners_px.map(|c| undistorted((c - principal_px) / unit_px, kappa.mean));
         let view = View::new(&quad);
         let size = sides.completed(|| ratio_without_sides(&view, libm::exp(ln_focal.mean)));
@@ -240,13 +245,13 @@ fn ratio_without_sides(view: &View, believed: f64) -> f64 {
 }
 
 fn principal_sigma(label: &Label, priors: &Priors) -> f64 {
-    let [w, h] = label.image_size().map(f64::from);
-    let usual = if label.image.cropped { priors.cropped_sigma } else { priors.principal_sigma };
-    let unit_px = libm::hypot(w, h) / 2.0;
-    label.camera.principal_point_sigma_px.map_or(2.0 * usual, |px| px / unit_px)
+    let usual = if label.is_cropped_anywhere() { priors.cropped_sigma } else { priors.principal_sigma };
+    let diagonal_px = |size: [u32; 2]| libm::hypot(f64::from(size[0]), f64::from(size[1]));
+    let unit_px = diagonal_px(label.image_size()) / 2.0;
+    label.camera.principal_point_sigma_px.unwrap_or(usual * diagonal_px(label.taken_size())) / unit_px
 }
 
-/// A stated coefficient is a fact, at the focal length believed.
+/// A stated coefficient is a fact, at a focal length.
 fn kappa(label: &Label, focal: f64, options: &SolveOptions) -> Belief {
     match label.camera.k1 {
         Some(k1) => Belief { mean: k1 / (focal * focal), sigma: 0.0 },
@@ -285,6 +290,7 @@ fn check_numbers(label: &Label) -> Result<(), SolveError> {
     };
     finite("surface.corners_px", surface.corners_px.as_ref().map_or(&[], |c| c.as_flattened()))?;
     finite("camera.principal_point_px", camera.principal_point_px.as_ref().map_or(&[], |c| c.as_slice()))?;
+    finite("image.crop.offset_px", label.image.crop.as_ref().map_or(&[], |c| c.offset_px.as_slice()))?;
     finite("camera.k1", camera.k1.as_slice())?;
     for point in &label.points {
         finite("points.xyz_m", &point.xyz_m)?;

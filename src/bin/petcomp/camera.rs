@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Command {
     /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png beside it
     Solve(SolveArgs),
-    /// Solve photos of one camera together: labels that share camera.id and picture size
+    /// Solve photos of one camera together: labels that share camera.id and shape of the picture
     Joint(SolveArgs),
     /// Say in plain words what is known how well, and what to measure
     Doctor(SolveArgs),
