@@ -8,7 +8,7 @@ BUILD     := g++ pkg-config libopenimageio-dev
 BLENDER   := blender python3-numpy python3-venv
 OUT       := demo
 # Each set of features that stands alone; the first, empty one builds without a C++ compiler.
-FEATURES  := "" oiio settle
+FEATURES  := "" markers oiio settle
 
 .PHONY: demo test lint bench golden packages blender
 

@@ -17,6 +17,7 @@ pub mod light;
 pub mod matte;
 mod pixel;
 pub mod render;
+pub mod report;
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;

@@ -310,6 +310,37 @@ fn a_stated_distortion_is_undone() {
 }
 
 #[test]
+fn a_stated_distortion_is_understood_at_the_focal_length_found() {
+    for kappa in [-0.02, 0.02] {
+        let mut view = exact(&Scenario { kappa, ..Scenario::default() }.tilted(40.0), 8);
+        // The usual lens that is believed first is 25 % longer.
+        view.label.camera.k1 = Some(view.kappa * view.camera.focal_px.x.powi(2) / 2500f64.powi(2));
+        let solution = camera::solve(&view.label, &ideal()).unwrap();
+        assert!(solution.rms_px < 1e-6 && (solution.kappa - view.kappa).abs() < 1e-8, "{}", solution.kappa);
+        assert!(focal_error(&view, &solution) < 1e-7);
+    }
+}
+
+#[test]
+fn a_known_crop_is_as_good_as_the_whole_picture() {
+    let mut view = Scenario::realistic().tilted(20.0).view(1, 2);
+    view.label.camera.focal_35mm = Some(3200.0 / 5000.0 * 36f64.hypot(24.0));
+    let whole = solve(&view.label);
+    let mut part = view.label.clone();
+    (part.image.width, part.image.height, part.image.cropped) = (3500, 2300, true);
+    part.surface.corners_px = part.surface.corners_px.map(|c| c.map(|[x, y]| [x - 150.0, y - 400.0]));
+    let unknown = solve(&part);
+    part.image.crop = Some(camera::Crop { offset_px: [150.0, 400.0], width: 4000, height: 3000 });
+    let known = solve(&part);
+    assert!((known.camera.focal_px.x / whole.camera.focal_px.x - 1.0).abs() < 1e-6);
+    assert!((known.camera.center() - whole.camera.center()).norm() < 1e-6);
+    assert!((known.sigma.ln_focal / whole.sigma.ln_focal - 1.0).abs() < 1e-4);
+    assert!(unknown.sigma.ln_focal > 1.5 * whole.sigma.ln_focal);
+    part.image.crop = Some(camera::Crop { offset_px: [0.0, 0.0], width: 0, height: 3000 });
+    assert_eq!(camera::solve(&part, &SolveOptions::default()).unwrap_err(), SolveError::BadImage([0, 3000]));
+}
+
+#[test]
 fn impossible_numbers_are_errors_that_name_the_field() {
     let good = Scenario::default().tilted(20.0).view(1, 9).label;
     let message = |edit: &dyn Fn(&mut Label)| {

@@ -245,3 +245,19 @@ fn one_camera_solve_says_what_it_found() {
     let said = desk.ok(&["camera", "solve", "a.label.json"]);
     assert!(said.contains("tilt") && desk.path("a.camera.json").exists(), "{said}");
 }
+
+#[test]
+fn a_report_is_a_table_and_plots() {
+    let desk = Desk::new();
+    desk.ok(&["report", "camera", "-o", "found", "--views", "2"]);
+    let csv = std::fs::read_to_string(desk.path("found/camera.csv")).expect("the table");
+    // Two lenses, four noises, ten tilts, eight methods, and the head.
+    assert_eq!(csv.lines().count(), 2 * 4 * 10 * 8 + 1);
+    let fields = |line: &str| line.split(',').count();
+    assert!(csv.lines().all(|line| fields(line) == 11), "{csv}");
+    for plot in ["tilt_ideal", "tilt_realistic", "height_ideal", "height_realistic", "time_ideal", "time_realistic"] {
+        let svg = std::fs::read_to_string(desk.path(&format!("found/camera_{plot}.svg"))).expect("a plot");
+        assert!(svg.starts_with("<svg") && svg.contains("<circle") && !svg.contains("NaN"), "{plot}");
+    }
+    assert!(desk.refused(&["report", "camera", "--views", "0"]).contains("views: 0, expected at least 1"));
+}

@@ -61,8 +61,8 @@ pub enum SolveError {
     /// The corners are in another order than asked for ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
     #[error("surface.corners_px: {0}, and the order was asked to be strict")]
     Order(Warning),
-    /// Photos that should be of one camera differ in size.
-    #[error("photo {photo} differs in size from the first: not one camera")]
+    /// Photos that should be of one camera differ in the shape of the picture.
+    #[error("photo {photo} differs in shape from the first: not one camera")]
     DifferentPictures {
         /// Which photo, from 0.
         photo: usize,

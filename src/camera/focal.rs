@@ -55,9 +55,10 @@ pub(crate) fn usual_px(image: [u32; 2]) -> f64 {
 
 /// What to believe of the logarithm of the focal length in pixels, and who says so.
 pub(crate) fn belief(label: &Label, priors: &Priors) -> (Belief, Witness) {
-    let (camera, image) = (&label.camera, label.image_size());
+    let (camera, image) = (&label.camera, label.taken_size());
     let equivalent = camera.focal_35mm.map(|mm| focal_from_equivalent(mm, image));
-    let believable = equivalent.filter(|f| !label.image.cropped && POSSIBLE_FOCAL.contains(&(f / longer_side(image))));
+    let believable =
+        equivalent.filter(|f| !label.is_cropped_anywhere() && POSSIBLE_FOCAL.contains(&(f / longer_side(image))));
     let (focal_px, usual_sigma, witness) = match (camera.focal_px, believable) {
         (Some(px), _) => (px, STATED_SIGMA, Witness::Person),
         (None, Some(px)) => (px, EQUIVALENT_SIGMA, Witness::Exif),

@@ -15,7 +15,6 @@ use super::solution::Solution;
 use super::uncertainty::{Uncertainty, focal_share};
 use super::warning::Warning;
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
-use std::collections::BTreeMap;
 
 /// A photo whose chi squared is beyond this contradicts the others: 0.01 % of two degrees of freedom.
 const OUTLIER: f64 = 18.4;
@@ -38,12 +37,12 @@ pub struct Joint {
 /// Solves photos of one camera together: they share focal length, principal point and distortion, and photos of one surface
 /// share its sides.
 ///
-/// The labels have to agree in picture size; see [`one_camera`].
+/// The labels have to agree in the shape of their pictures; one may be a reduced copy. See [`one_camera`].
 ///
 /// # Errors
-/// [`SolveError::DifferentPictures`] where the sizes differ; the first photo's error where no photo can be used.
+/// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no photo can be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
-    if let Some(other) = labels.iter().position(|l| l.image_size() != labels[0].image_size()) {
+    if let Some(other) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
         return Err(SolveError::DifferentPictures { photo: other });
     }
     let mut photos: Vec<_> = labels.iter().map(|label| super::solve(label, options)).collect();
@@ -69,17 +68,33 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     }
 }
 
-/// Groups of labels that name the same camera and agree in picture size, each in order; unnamed cameras stand alone.
+/// Groups of labels that name the same camera and agree in the shape of their pictures, each in order; unnamed cameras
+/// stand alone.
 pub fn one_camera(labels: &[Label]) -> Vec<Vec<usize>> {
-    let mut groups: BTreeMap<(&str, [u32; 2]), Vec<usize>> = BTreeMap::new();
-    let mut alone = Vec::new();
+    let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, label) in labels.iter().enumerate() {
-        match &label.camera.id {
-            Some(id) => groups.entry((id, label.image_size())).or_default().push(i),
-            None => alone.push(vec![i]),
+        let named = label.camera.id.is_some();
+        let fits = |group: &&mut Vec<usize>| {
+            let first = &labels[group[0]];
+            named && first.camera.id == label.camera.id && same_frame(first, label)
+        };
+        match groups.iter_mut().find(fits) {
+            Some(group) => group.push(i),
+            None => groups.push(vec![i]),
         }
     }
-    groups.into_values().chain(alone).collect()
+    groups
+}
+
+/// Two pictures show the same frame of a camera, in whatever number of pixels: in units of the diagonal, everything that a
+/// camera's photos share is then the same.
+fn same_frame(a: &Label, b: &Label) -> bool {
+    if a.image.crop.is_some() || b.image.crop.is_some() || a.image.cropped || b.image.cropped {
+        return a.image_size() == b.image_size() && a.image.crop == b.image.crop;
+    }
+    let ([aw, ah], [bw, bh]) = (a.image_size().map(f64::from), b.image_size().map(f64::from));
+    // Reduced sizes are rounded to whole pixels.
+    (aw * bh - ah * bw).abs() <= aw.max(ah).max(bw).max(bh)
 }
 
 /// The photos of one camera as one problem.
@@ -421,13 +436,34 @@ mod tests {
     }
 
     #[test]
-    fn cameras_are_told_apart_by_name_and_picture_size() {
+    fn cameras_are_told_apart_by_name_and_shape_of_the_picture() {
         let (mut labels, _) = labels(4, 4, [20.0, 30.0]);
         (labels[1].image.width, labels[3].camera.id) = (3000, None);
-        assert_eq!(one_camera(&labels), [vec![1], vec![0, 2], vec![3]]);
+        assert_eq!(one_camera(&labels), [vec![0, 2], vec![1], vec![3]]);
         assert!(matches!(
             solve_joint(&labels, &SolveOptions::default()),
             Err(SolveError::DifferentPictures { photo: 1 })
         ));
+    }
+
+    #[test]
+    fn a_reduced_photo_shares_the_lens() {
+        let (labels, _) = labels(5, 6, [10.0, 30.0]);
+        let together = solve_joint(&labels, &SolveOptions::default()).unwrap();
+        let mut reduced = labels.clone();
+        for label in &mut reduced[3..] {
+            (label.image.width, label.image.height) = (label.image.width / 4, label.image.height / 4);
+            let surface = &mut label.surface;
+            surface.corners_px = surface.corners_px.map(|c| c.map(|p| p.map(|v| v / 4.0)));
+            surface.corner_sigma_px = surface.corner_sigma_px.map(|s| s / 4.0);
+        }
+        assert_eq!(one_camera(&reduced), [vec![0, 1, 2, 3, 4, 5]]);
+        let scaled = solve_joint(&reduced, &SolveOptions::default()).unwrap();
+        for (i, (a, b)) in together.photos.iter().zip(&scaled.photos).enumerate() {
+            let (a, b) = (a.as_ref().unwrap(), b.as_ref().unwrap());
+            let scale = if i < 3 { 1.0 } else { 4.0 };
+            assert!((scale * b.camera.focal_px.x / a.camera.focal_px.x - 1.0).abs() < 1e-6, "{i}");
+            assert!((b.camera.center() - a.camera.center()).norm() < 1e-6, "{i}");
+        }
     }
 }

@@ -57,6 +57,21 @@ pub struct LabelImage {
     /// A part was cut away, so that the lens need not look at the picture's centre. Default: false.
     #[serde(default)]
     pub cropped: bool,
+    /// Where it was cut out, if that is known; it then does not count as cropped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crop: Option<Crop>,
+}
+
+/// Where a picture was cut out of a larger one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Crop {
+    /// Top-left corner in the larger picture, pixels.
+    pub offset_px: [f64; 2],
+    /// Width of the larger picture, pixels.
+    pub width: u32,
+    /// Height of the larger picture, pixels.
+    pub height: u32,
 }
 
 /// Where the origin of pixel coordinates is.
@@ -100,7 +115,7 @@ pub struct LabelSurface {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LabelCamera {
-    /// Its name; photos that share name and picture size share a lens.
+    /// Its name; photos that share name and shape share a lens.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<String>,
     /// Focal length, pixels.
@@ -198,6 +213,22 @@ impl Label {
     /// Width and height of the picture, pixels.
     pub fn image_size(&self) -> [u32; 2] {
         [self.image.width, self.image.height]
+    }
+
+    /// Width and height of the picture that the camera took, pixels.
+    pub(crate) fn taken_size(&self) -> [u32; 2] {
+        self.image.crop.map_or(self.image_size(), |crop| [crop.width, crop.height])
+    }
+
+    /// The centre of the picture that the camera took, in this one's pixels.
+    pub(crate) fn taken_center(&self) -> Point2<f64> {
+        let offset = self.image.crop.map_or([0.0; 2], |crop| crop.offset_px);
+        Point2::from(self.taken_size().map(|side| f64::from(side) / 2.0)) - Vector2::from(offset)
+    }
+
+    /// A part was cut away, and it is not known which.
+    pub(crate) fn is_cropped_anywhere(&self) -> bool {
+        self.image.cropped && self.image.crop.is_none()
     }
 
     /// A labelled pixel position in our convention.

@@ -42,12 +42,12 @@ pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, F
 pub use focal::{FocalSource, focal_from_equivalent};
 pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
-    Artwork, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
+    Artwork, Crop, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
 };
 pub use labelme::from_labelme;
 pub use locate::locate;
 pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
-pub use options::{CornerOrder, Priors, SolveOptions};
+pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
 pub use read::{photo_of, read_label, with_photo};

@@ -13,6 +13,21 @@ pub struct SolveOptions {
     pub reference_height: Option<f64>,
     /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015 picture diagonals.
     pub max_height_sigma_px: Option<f64>,
+    /// How long to look. Default: to the end.
+    pub effort: Effort,
+}
+
+/// How long to look for the most probable camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// From every start, until nothing changes any more.
+    #[default]
+    Whole,
+    /// From the closed form only, at most so many steps; 0 is the closed form itself.
+    ///
+    /// Looks for no other pose, believes EXIF and the order of the sides, and gives the standard deviations of where it
+    /// stopped.
+    Steps(usize),
 }
 
 /// What to do with corners in another order than clockwise from the top left.

@@ -5,7 +5,7 @@ use super::corners::{self, Checked};
 use super::dlt;
 use super::error::SolveError;
 use super::focal::{self, Witness};
-use super::label::Label;
+use super::label::{Label, LabelPoint};
 use super::model::{Elastic, Sight, State};
 use super::options::{Priors, SolveOptions};
 use super::rectangle::View;
@@ -25,6 +25,8 @@ const HEIGHT_SIGMA: f64 = 0.03;
 
 /// Points lower than this part of the shorter side lie on the surface, for a first guess.
 const ON_SURFACE: f64 = 0.01;
+/// A surface more than so many times longer than what its points span is not carried well by them.
+const LONE_MARKER: f64 = 3.0;
 
 /// The units of the solver, and what they stand for.
 #[derive(Clone, Copy, Debug)]
@@ -56,25 +58,34 @@ pub(crate) struct Problem {
 impl Problem {
     /// Checks a label and brings it into the solver's units.
     pub(crate) fn new(label: &Label, options: &SolveOptions) -> Result<Self, SolveError> {
+        Self::with_focal(label, None, options)
+    }
+
+    /// The same, where a stated distortion is to be understood at this focal length (in units) instead of the believed one.
+    pub(crate) fn with_focal(label: &Label, focal: Option<f64>, options: &SolveOptions) -> Result<Self, SolveError> {
         let image = label.image_size();
-        if image.contains(&0) {
-            return Err(SolveError::BadImage(image));
+        if let Some(size) = [image, label.taken_size()].into_iter().find(|size| size.contains(&0)) {
+            return Err(SolveError::BadImage(size));
         }
         check_numbers(label)?;
         let sigma_px = label.surface.corner_sigma_px.unwrap_or(CORNER_SIGMA_PX);
         let sides = Sides::new(label, options)?;
         let labelled = label.surface.corners_px.map(|corners| corners.map(|c| label.pixel(c)));
         let quad_px = labelled.or_else(|| sides.predicted(label)).ok_or(SolveError::NoCorners)?;
-        let Checked { corners: corners_px, warnings } = corners::check(quad_px, sigma_px, image, options.order)?;
+        let Checked { corners: corners_px, mut warnings } = corners::check(quad_px, sigma_px, image, options.order)?;
+
+        if labelled.is_none() {
+            warnings.extend(sides.lone_marker(label));
+        }
 
         let diagonal = Vector2::from(image.map(f64::from));
-        let center = label.camera.principal_point_px.map_or((diagonal / 2.0).into(), |px| label.pixel(px));
+        let center = label.camera.principal_point_px.map_or(label.taken_center(), |px| label.pixel(px));
         let (principal_px, unit_px) = (center, diagonal.norm() / 2.0);
         let (mut ln_focal, witness) = focal::belief(label, &options.priors);
         ln_focal.mean -= libm::log(unit_px);
-        let usual = focal::usual_px(image) / unit_px;
+        let usual = focal::usual_px(label.taken_size()) / unit_px;
 
-        let kappa = kappa(label, libm::exp(ln_focal.mean), options);
+        let kappa = kappa(label, focal.unwrap_or_else(|| libm::exp(ln_focal.mean)), options);
         let quad = corners_px.map(|c| undistorted((c - principal_px) / unit_px, kappa.mean));
         let view = View::new(&quad);
         let size = sides.completed(|| ratio_without_sides(&view, libm::exp(ln_focal.mean)));
@@ -140,6 +151,12 @@ impl Frame {
     }
 }
 
+/// The points that lie on a surface of this size.
+fn on_surface(label: &Label, size: [f64; 2]) -> impl Iterator<Item = &LabelPoint> {
+    let near = ON_SURFACE * size[0].min(size[1]);
+    label.points.iter().filter(move |p| p.xyz_m[2].abs() <= near)
+}
+
 /// The corners of a rectangle of this size, in label order.
 pub(crate) fn corner_points(size: [f64; 2]) -> [Point3<f64>; 4] {
     let [x, y] = size.map(|s| s / 2.0);
@@ -184,11 +201,22 @@ impl Sides {
     /// Where the corners of a rectangle of known sides must be by the further points on its surface.
     fn predicted(self, label: &Label) -> Option<[Point2<f64>; 4]> {
         let Self::Both(size) = self else { return None };
-        let near = ON_SURFACE * size[0].min(size[1]);
-        let flat = label.points.iter().filter(|p| p.xyz_m[2].abs() <= near);
-        let pairs: Vec<_> = flat.map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px))).collect();
+        let pairs: Vec<_> =
+            on_surface(label, size).map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px))).collect();
         let map = dlt::homography(&pairs)?;
         Some(corner_points(size).map(|c| map.map(c.xy())))
+    }
+
+    /// Doubt, where the points on the surface span much less than it.
+    fn lone_marker(self, label: &Label) -> Option<Warning> {
+        let Self::Both(size) = self else { return None };
+        let span = |axis: usize| {
+            let along = on_surface(label, size).map(|p| p.xyz_m[axis]);
+            let [low, high] = along.fold([f64::MAX, f64::MIN], |[low, high], v| [v.min(low), v.max(high)]);
+            high - low
+        };
+        let (span, side) = (span(0).max(span(1)), size[0].max(size[1]));
+        (side > LONE_MARKER * span).then_some(Warning::LoneMarker { span, side })
     }
 
     fn elastic(self) -> Elastic {
@@ -217,13 +245,13 @@ fn ratio_without_sides(view: &View, believed: f64) -> f64 {
 }
 
 fn principal_sigma(label: &Label, priors: &Priors) -> f64 {
-    let [w, h] = label.image_size().map(f64::from);
-    let usual = if label.image.cropped { priors.cropped_sigma } else { priors.principal_sigma };
-    let unit_px = libm::hypot(w, h) / 2.0;
-    label.camera.principal_point_sigma_px.map_or(2.0 * usual, |px| px / unit_px)
+    let usual = if label.is_cropped_anywhere() { priors.cropped_sigma } else { priors.principal_sigma };
+    let diagonal_px = |size: [u32; 2]| libm::hypot(f64::from(size[0]), f64::from(size[1]));
+    let unit_px = diagonal_px(label.image_size()) / 2.0;
+    label.camera.principal_point_sigma_px.unwrap_or(usual * diagonal_px(label.taken_size())) / unit_px
 }
 
-/// A stated coefficient is a fact, at the focal length believed.
+/// A stated coefficient is a fact, at a focal length.
 fn kappa(label: &Label, focal: f64, options: &SolveOptions) -> Belief {
     match label.camera.k1 {
         Some(k1) => Belief { mean: k1 / (focal * focal), sigma: 0.0 },
@@ -262,6 +290,7 @@ fn check_numbers(label: &Label) -> Result<(), SolveError> {
     };
     finite("surface.corners_px", surface.corners_px.as_ref().map_or(&[], |c| c.as_flattened()))?;
     finite("camera.principal_point_px", camera.principal_point_px.as_ref().map_or(&[], |c| c.as_slice()))?;
+    finite("image.crop.offset_px", label.image.crop.as_ref().map_or(&[], |c| c.offset_px.as_slice()))?;
     finite("camera.k1", camera.k1.as_slice())?;
     for point in &label.points {
         finite("points.xyz_m", &point.xyz_m)?;

@@ -99,10 +99,15 @@ impl Evidence {
     /// Only minima below `bar` are of interest: a start that is far above it and hardly falls any more is left where it is.
     /// (The mirrored start of a large rectangle creeps along a valley floor for as long as it is let.)
     pub(crate) fn refine(&self, start: State, bar: f64) -> Option<Minimum> {
+        self.refine_for(start, bar, MOST_STEPS)
+    }
+
+    /// The same, leaving off after so many steps.
+    pub(crate) fn refine_for(&self, start: State, bar: f64, most_steps: usize) -> Option<Minimum> {
         let (mut state, mut normal) = (start, self.normal(&start)?);
         let mut damping = DAMPING;
         let mut steps = 0;
-        while steps < MOST_STEPS && damping < HOPELESS {
+        while steps < most_steps && damping < HOPELESS {
             steps += 1;
             let Some((step, scaled)) = normal.damped_step(damping) else {
                 damping *= STIFFEN;

@@ -42,6 +42,15 @@ impl Problem {
         Some(Found { best, other: elsewhere.min_by(|a, b| a.cost.total_cmp(&b.cost)).copied() })
     }
 
+    /// The closed form, where it stands above the surface, after at most so many steps.
+    pub(crate) fn first_guess(&self, most_steps: usize) -> Option<Found> {
+        let fact = self.evidence.beliefs.ln_focal.is_fact();
+        let said = self.closed_form_focal().filter(|_| !fact);
+        let start = self.start(said.unwrap_or_else(|| libm::exp(self.evidence.beliefs.ln_focal.mean)));
+        let best = self.evidence.refine_for(start, f64::INFINITY, most_steps).filter(is_above)?;
+        Some(Found { best, other: None })
+    }
+
     /// What is believed, what the corners say, and a short and a long lens; only the fact where there is one.
     fn focal_starts(&self) -> [Option<f64>; 4] {
         let belief = self.evidence.beliefs.ln_focal;

@@ -3,16 +3,19 @@
 use super::error::SolveError;
 use super::focal::Witness;
 use super::label::Label;
-use super::options::{CornerOrder, SolveOptions};
+use super::options::{CornerOrder, Effort, SolveOptions};
 use super::problem::Problem;
 use super::refine::Minimum;
-use super::search::{TELLING, degrees_apart};
+use super::search::{Found, TELLING, degrees_apart};
 use super::solution::Solution;
 use super::uncertainty::Uncertainty;
 use super::warning::Warning;
 
 /// Picture and belief contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
+/// How often a stated distortion is understood anew, and the relative change of the focal length that ends it.
+const MOST_REPEATS: usize = 20;
+const SETTLED: f64 = 1e-9;
 
 /// Solves the camera that sees a rectangle of known size at four labelled corners.
 ///
@@ -35,14 +38,16 @@ const CONFLICT_SIGMAS: f64 = 3.0;
 /// # Ok::<(), camera::SolveError>(())
 /// ```
 pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
+    if options.effort != Effort::Whole {
+        return as_labelled(label, options).map(|(solution, ..)| solution);
+    }
     let solution = without_wrong_exif(label, options)?;
     Ok(with_sides_exchanged(label, options, solution))
 }
 
 /// The solution of a label as it stands; another pose that fits as well is its alternative.
 fn as_labelled(label: &Label, options: &SolveOptions) -> Result<(Solution, Problem, Minimum), SolveError> {
-    let problem = Problem::new(label, options)?;
-    let found = problem.search().ok_or(SolveError::NoPose)?;
+    let (problem, found) = with_stated_distortion(label, options)?;
     let mut solution = problem.solution(&found.best, options);
     if let Some(other) = found.other.filter(|other| other.cost < found.best.cost + TELLING) {
         let apart_deg = degrees_apart(&found.best.state.stance, &other.state.stance);
@@ -50,6 +55,32 @@ fn as_labelled(label: &Label, options: &SolveOptions) -> Result<(Solution, Probl
         solution.alternative = Some(Box::new(problem.solution(&other, options)));
     }
     Ok((solution, problem, found.best))
+}
+
+/// The search, repeated for a label that states k1 until that is understood at the focal length found.
+fn with_stated_distortion(label: &Label, options: &SolveOptions) -> Result<(Problem, Found), SolveError> {
+    let mut problem = Problem::new(label, options)?;
+    let mut found = search(&problem, options)?;
+    let known = label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.evidence.beliefs.ln_focal.is_fact();
+    let mut understood = problem.evidence.beliefs.ln_focal.mean;
+    for _ in 0..if known { 0 } else { MOST_REPEATS } {
+        let ln_focal = found.best.state.ln_focal;
+        if (ln_focal - understood).abs() < SETTLED {
+            break;
+        }
+        understood = ln_focal;
+        problem = Problem::with_focal(label, Some(libm::exp(ln_focal)), options)?;
+        found = search(&problem, options)?;
+    }
+    Ok((problem, found))
+}
+
+fn search(problem: &Problem, options: &SolveOptions) -> Result<Found, SolveError> {
+    let found = match options.effort {
+        Effort::Whole => problem.search(),
+        Effort::Steps(most) => problem.first_guess(most),
+    };
+    found.ok_or(SolveError::NoPose)
 }
 
 /// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer beside.

@@ -25,6 +25,16 @@ pub enum Warning {
         /// Which corner, from 0, in clockwise order from the first.
         corner: usize,
     },
+    /// The points that stand for the corners are close together.
+    #[error(
+        "markers within {span:.3} m alone carry a surface of {side:.3} m: put four of them just inside its corners"
+    )]
+    LoneMarker {
+        /// Longer side of what the points span, metres.
+        span: f64,
+        /// Longer side of the surface, metres.
+        side: f64,
+    },
     /// The optical axis is almost parallel to the surface.
     #[error("grazing view: the camera looks along the surface ({tilt_deg:.1} degrees from above)")]
     Grazing {

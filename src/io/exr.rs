@@ -164,6 +164,8 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> std::result::Result<Heade
         channels: in_usual_order(list.iter().map(|c| c.name.to_string()).collect()),
         bits: list.iter().map(|c| 8 * c.sample_type.bytes_per_sample() as u32).max().unwrap_or(0),
         focal_35mm: None,
+        digital_zoom: false,
+        cropped: false,
         metadata: texts(first),
     })
 }

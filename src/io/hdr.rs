@@ -26,6 +26,8 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
         channels: usual_names(3).unwrap_or_default(),
         bits: 32,
         focal_35mm: None,
+        digital_zoom: false,
+        cropped: false,
         metadata: decoder.metadata().custom_attributes,
     })
 }

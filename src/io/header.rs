@@ -16,8 +16,13 @@ pub struct Header {
     pub channels: Vec<String>,
     /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is float.
     pub bits: u32,
-    /// Focal length that gives the same view on 36 x 24 mm film, millimetres, where the camera noted it.
+    /// Focal length that gives the same view on 36 x 24 mm film, millimetres, where the camera noted it, or the focal length
+    /// and the resolution of its sensor. Of the picture as it was taken.
     pub focal_35mm: Option<f64>,
+    /// The camera enlarged the middle of its picture, so that its focal length may not be the picture's.
+    pub digital_zoom: bool,
+    /// The camera noted a picture of another shape: a part was cut away.
+    pub cropped: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
 }

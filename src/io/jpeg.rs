@@ -41,6 +41,8 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
         channels: usual_names(decoder.color_type().channel_count().into()).unwrap_or_default(),
         bits: 8,
         focal_35mm: None,
+        digital_zoom: false,
+        cropped: false,
         metadata: comments.flat_map(|text| notes_of_lines(&text)).collect(),
     })
 }

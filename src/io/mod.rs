@@ -121,8 +121,9 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let source = Source::open(path, &limits)?;
     let mut header = caught(|| header(&source, &limits)).map_err(|e| Error::file(path, e))?;
     let notes = camera_notes(&source);
+    header.cropped = notes.taken_in_another_shape([header.width, header.height]);
     (header.width, header.height) = notes.orientation.size((header.width, header.height));
-    header.focal_35mm = notes.focal_35mm;
+    (header.focal_35mm, header.digital_zoom) = (notes.focal_35mm, notes.digital_zoom);
     Ok(header)
 }
 

@@ -45,6 +45,8 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
         channels: usual_names(color.samples()).unwrap_or_default(),
         bits: if depth == BitDepth::Sixteen { 16 } else { 8 },
         focal_35mm: None,
+        digital_zoom: false,
+        cropped: false,
         metadata,
     })
 }

@@ -60,7 +60,17 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
     let Opened { mut decoder, width, height, names, bits } = open(bytes, limits)?;
     let text = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
     let (bits, metadata) = (u32::from(bits), notes_of_lines(&text));
-    Ok(Header { format: Format::Tiff, width, height, channels: names, bits, focal_35mm: None, metadata })
+    Ok(Header {
+        format: Format::Tiff,
+        width,
+        height,
+        channels: names,
+        bits,
+        focal_35mm: None,
+        digital_zoom: false,
+        cropped: false,
+        metadata,
+    })
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {

@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Command {
     /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png beside it
     Solve(SolveArgs),
-    /// Solve photos of one camera together: labels that share camera.id and picture size
+    /// Solve photos of one camera together: labels that share camera.id and shape of the picture
     Joint(SolveArgs),
     /// Say in plain words what is known how well, and what to measure
     Doctor(SolveArgs),
     /// Say solved cameras as another program does
     Export(ExportArgs),
-    /// Find printed markers (ArUco DICT_4X4_50) in a photo and add their corners to a label as points
+    /// Find printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their corners to a label as points
     Markers(MarkersArgs),
     /// Turn a photo into a metric top view of the surface, or lay a picture on it
     Rectify(RectifyArgs),

@@ -13,6 +13,7 @@ mod matte;
 mod matte_key;
 mod matte_nodes;
 mod render;
+mod report;
 mod scene;
 mod settle;
 
@@ -59,6 +60,9 @@ enum Stage {
     Dataset(dataset::Command),
     /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::Args),
+    /// Measure how good a stage is, on simulated data: tables and plots
+    #[command(subcommand)]
+    Report(report::Command),
     /// What this machine has, and whether petcomp works on it
     Doctor(doctor::Args),
 }
@@ -84,6 +88,7 @@ fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Stage::Render(args) => render::run(args, common)?,
         Stage::Label(args) => label::run(args, common)?,
         Stage::Dataset(command) => dataset::run(command, common)?,
+        Stage::Report(command) => report::run(command, common)?,
         Stage::Diff(args) => return diff::run(args, common),
         Stage::Doctor(args) => return doctor::run(args),
     }

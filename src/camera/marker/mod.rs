@@ -1,24 +1,31 @@
-//! Printed square markers (ArUco `DICT_4X4_50`) in a photo, with corners to a fraction of a pixel.
+//! Printed square markers in a photo, with corners to a fraction of a pixel: ArUco `DICT_4X4_50` by our own means, AprilTags
+//! (`tag36h11`) by the AprilTag library where petcomp is built with the feature `markers`.
 //!
 //! # Method
 //! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each side is then fitted as a
 //! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. Their edges
 //! tell how far an overexposed white has grown over the black, and the corners are moved back by that. The bits are looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
 
+#[cfg(feature = "markers")]
+mod april;
 mod candidate;
 mod dictionary;
 mod edge;
 
-use super::label::{Label, LabelPoint};
+use super::label::{Label, LabelPoint, MarkerMap, PixelOrigin};
+use super::options::SolveOptions;
+use super::search::TELLING;
 use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
-/// The family of markers that is found.
+/// The family of markers that is always found.
 pub const FAMILY: &str = "DICT_4X4_50";
 /// Noise of a marker's corner, pixels: root mean square on the sample background with markers.
 const CORNER_SIGMA_PX: f64 = 0.15;
+/// Markers that fit less well than this are tried in the other directions, too.
+const IMPROBABLE: f64 = 1e-4;
 
 /// A marker in a photo.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,34 +54,78 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 
 /// The label with the corners of its markers, found in its photo, as points of known place.
 ///
+/// Where the corners fit the map only when every marker is turned by the same angle, they are turned, with a message in
+/// the log: another program's artwork was printed, or the map's axes are other ones.
+///
 /// # Errors
-/// [`Error::Value`] for a label without a marker map, one of another family, and a photo that shows none of its markers.
-pub fn with_markers(mut label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
-    let Some(markers) = &label.markers else {
+/// [`Error::Value`] for a label without a marker map, one of a family that is not known, and a photo that shows none of
+/// its markers.
+pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
+    let Some(map) = &label.markers else {
         return Err(Error::value("markers", "missing, expected family, size_m and map"));
     };
-    if markers.family != FAMILY {
-        return Err(Error::value("markers.family", format!("\"{}\", expected \"{FAMILY}\"", markers.family)));
+    let (mut found, sigma_px) = find_family(map, photo)?;
+    found.retain(|marker| map.map.contains_key(&marker.id));
+    if found.is_empty() {
+        return Err(Error::value("markers", "none of them was found in the photo"));
     }
-    let half = markers.size_m / 2.0;
-    let offset = if label.pixel_origin == super::PixelOrigin::Center { 0.5 } else { 0.0 };
-    let before = label.points.len();
-    for marker in find_markers(photo) {
-        let Some([x, y, z]) = markers.map.get(&marker.id) else { continue };
+    let turned = |turns| with_points(&label, map, &found, sigma_px, turns);
+    let turns = turns_that_fit(turned);
+    if turns > 0 {
+        let degrees = 90 * turns;
+        log::warn!(
+            "markers: they fit the map only when turned by {degrees} degrees (markers.artwork, or the map's axes)"
+        );
+    }
+    Ok(turned(turns))
+}
+
+/// The markers of a map's family, and the noise of their corners.
+fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>, f64)> {
+    match map.family.as_str() {
+        FAMILY => Ok((find_markers(photo), CORNER_SIGMA_PX)),
+        #[cfg(feature = "markers")]
+        april::FAMILY => Ok((april::find(photo, map.artwork), april::CORNER_SIGMA_PX)),
+        #[cfg(not(feature = "markers"))]
+        "tag36h11" => {
+            Err(Error::value("markers.family", "\"tag36h11\", but petcomp was built without the feature markers"))
+        }
+        other => Err(Error::value("markers.family", format!("\"{other}\", expected \"{FAMILY}\" or \"tag36h11\""))),
+    }
+}
+
+/// The label with the corners of some markers as points, each marker turned by so many right angles.
+fn with_points(label: &Label, map: &MarkerMap, found: &[Marker], sigma_px: f64, turns: usize) -> Label {
+    let mut label = label.clone();
+    let half = map.size_m / 2.0;
+    let offset = if label.pixel_origin == PixelOrigin::Center { 0.5 } else { 0.0 };
+    for (marker, [x, y, z]) in found.iter().filter_map(|m| Some((m, map.map.get(&m.id)?))) {
         let places = [[x - half, y + half], [x + half, y + half], [x + half, y - half], [x - half, y - half]];
-        for ([x, y], px) in places.into_iter().zip(marker.corners_px) {
+        for (i, [x, y]) in places.into_iter().enumerate() {
+            let px = marker.corners_px[(i + turns) % 4];
             label.points.push(LabelPoint {
                 xyz_m: [x, y, *z],
                 px: [px.x - offset, px.y - offset],
-                sigma_px: Some(CORNER_SIGMA_PX),
+                sigma_px: Some(sigma_px),
                 note: Some(format!("marker {}", marker.id)),
             });
         }
     }
-    if label.points.len() == before {
-        return Err(Error::value("markers", "none of them was found in the photo"));
+    label
+}
+
+/// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where the
+/// photo does not tell.
+fn turns_that_fit(turned: impl Fn(usize) -> Label) -> usize {
+    let chi2 = |turns| super::solve(&turned(turns), &SolveOptions::default()).map_or(f64::INFINITY, |s| s.fit.chi2);
+    let straight = super::solve(&turned(0), &SolveOptions::default()).ok();
+    if straight.as_ref().is_some_and(|s| s.fit.p_value.is_none_or(|p| p >= IMPROBABLE)) {
+        return 0;
     }
-    Ok(label)
+    let straight = straight.map_or(f64::INFINITY, |s| s.fit.chi2);
+    let others = (1..4).map(|turns| (turns, chi2(turns)));
+    let best = others.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, chi2)| chi2 + TELLING < straight);
+    best.map_or(0, |(turns, _)| turns)
 }
 
 #[cfg(test)]

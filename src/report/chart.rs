@@ -1,0 +1,181 @@
+//! Charts of curves on logarithmic or linear axes, side by side, as SVG.
+
+use std::fmt::Write;
+
+/// Size of a chart's frame, and the room around it for words, in SVG units.
+const FRAME: [f64; 2] = [300.0, 260.0];
+const LEFT: f64 = 62.0;
+const TOP: f64 = 40.0;
+const BELOW: f64 = 48.0;
+/// Width of the column of names at the right.
+const NAMES: f64 = 200.0;
+/// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
+const COLORS: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
+
+/// Charts next to each other; curves of one place in the list share colour and name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Chart {
+    /// What is seen in it.
+    pub title: String,
+    /// What each curve is called, the same in every chart of a row.
+    pub names: Vec<String>,
+    /// Across.
+    pub across: Axis,
+    /// Upwards.
+    pub up: Axis,
+    /// One per name.
+    pub curves: Vec<Curve>,
+}
+
+/// The points of a curve, from left to right; points that are not finite, or not positive on a logarithmic axis, are left out.
+pub type Curve = Vec<[f64; 2]>;
+
+/// One direction of a chart.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Axis {
+    /// What it is, with its unit.
+    pub title: String,
+    /// Least and greatest value in the frame; both positive where it is logarithmic.
+    pub range: [f64; 2],
+    /// Every factor of ten is as long as another.
+    pub logarithmic: bool,
+}
+
+impl Axis {
+    /// A logarithmic axis over powers of ten that hold all positive values; 1 to 10 where there are none.
+    pub fn over_decades(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
+        let seen = values.into_iter().filter(|v| v.is_finite() && *v > 0.0);
+        let [low, high] = seen.fold([f64::INFINITY, 0.0], |[low, high], v| [v.min(low), v.max(high)]);
+        let range =
+            if low <= high { [libm::floor(libm::log10(low)), libm::ceil(libm::log10(high))] } else { [0.0, 1.0] };
+        let range = [range[0], range[1].max(range[0] + 1.0)].map(libm::exp10);
+        Self { title: title.into(), range, logarithmic: true }
+    }
+
+    /// How far along a value is, from 0 to 1; none where it cannot be shown.
+    fn part(&self, value: f64) -> Option<f64> {
+        let [low, high, value] =
+            [self.range[0], self.range[1], value].map(|v| if self.logarithmic { libm::log10(v) } else { v });
+        let part = (value - low) / (high - low);
+        part.is_finite().then(|| part.clamp(0.0, 1.0))
+    }
+
+    /// Values with a line through the chart.
+    fn marks(&self) -> Vec<f64> {
+        if self.logarithmic {
+            let [low, high] = self.range.map(|v| libm::round(libm::log10(v)) as i32);
+            return (low..=high).map(|e| libm::exp10(f64::from(e))).collect();
+        }
+        (0..=4).map(|i| self.range[0] + (self.range[1] - self.range[0]) * f64::from(i) / 4.0).collect()
+    }
+}
+
+impl Chart {
+    /// Charts side by side with one list of names, the first chart's, as an SVG document.
+    pub fn row(charts: &[Self]) -> String {
+        let names = charts.first().map_or(&[][..], |c| &c.names);
+        let width = charts.len() as f64 * (LEFT + FRAME[0]) + NAMES;
+        let height = TOP + FRAME[1] + BELOW;
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
+             font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
+        );
+        for (i, chart) in charts.iter().enumerate() {
+            let left = LEFT + i as f64 * (LEFT + FRAME[0]);
+            chart.draw(&mut svg, left);
+        }
+        let left = width - NAMES + 16.0;
+        for (i, name) in names.iter().enumerate() {
+            let y = TOP + 14.0 + 20.0 * i as f64;
+            let color = COLORS[i % COLORS.len()];
+            svg += &format!("<path d=\"M{left} {y}h24\" stroke=\"{color}\" stroke-width=\"2\"/>\n");
+            svg += &words(left + 32.0, y + 4.0, "start", name);
+        }
+        svg + "</svg>\n"
+    }
+
+    fn draw(&self, svg: &mut String, left: f64) {
+        let [w, h] = FRAME;
+        let x = |value| self.across.part(value).map(|part| left + w * part);
+        let y = |value| self.up.part(value).map(|part| TOP + h * (1.0 - part));
+        for mark in self.across.marks() {
+            let Some(x) = x(mark) else { continue };
+            *svg += &format!("<path d=\"M{x:.1} {TOP}v{h}\" stroke=\"#ddd\"/>\n");
+            *svg += &words(x, TOP + h + 16.0, "middle", &short(mark));
+        }
+        for mark in self.up.marks() {
+            let Some(y) = y(mark) else { continue };
+            *svg += &format!("<path d=\"M{left} {y:.1}h{w}\" stroke=\"#ddd\"/>\n");
+            *svg += &words(left - 6.0, y + 4.0, "end", &short(mark));
+        }
+        *svg +=
+            &format!("<rect x=\"{left}\" y=\"{TOP}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#888\"/>\n");
+        *svg += &words(left + w / 2.0, TOP - 10.0, "middle", &self.title);
+        *svg += &words(left + w / 2.0, TOP + h + 36.0, "middle", &self.across.title);
+        *svg += &words(left - LEFT + 8.0, TOP - 26.0, "start", &self.up.title);
+        for (i, curve) in self.curves.iter().enumerate() {
+            let seen: Vec<_> = curve.iter().filter_map(|p| Some([x(p[0])?, y(p[1])?])).collect();
+            let color = COLORS[i % COLORS.len()];
+            let path = seen.iter().map(|[x, y]| format!("{x:.1},{y:.1} ")).collect::<String>();
+            *svg += &format!(
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>\n",
+                path.trim_end()
+            );
+            for [x, y] in seen {
+                let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{color}\"/>");
+            }
+        }
+    }
+}
+
+fn words(x: f64, y: f64, anchor: &str, text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>\n")
+}
+
+/// A number as short as it can be told, up to a thousandth.
+fn short(value: f64) -> String {
+    let text = format!("{value:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decades_hold_all_values_and_something_where_there_are_none() {
+        assert_eq!(Axis::over_decades("", [0.02, 30.0, 0.0, f64::NAN]).range, [0.01, 100.0]);
+        assert_eq!(Axis::over_decades("", [1.0]).range, [1.0, 10.0]);
+        assert_eq!(Axis::over_decades("", []).range, [1.0, 10.0]);
+    }
+
+    #[test]
+    fn what_cannot_be_shown_is_left_out() {
+        let axis = Axis::over_decades("<x> & y", [1.0, 100.0]);
+        let curve = vec![[1.0, 10.0], [f64::NAN, 1.0], [10.0, 0.0], [10.0, f64::INFINITY], [100.0, 100.0]];
+        let chart = Chart {
+            across: axis.clone(),
+            up: axis,
+            curves: vec![curve],
+            names: vec!["a".into()],
+            ..Default::default()
+        };
+        let svg = Chart::row(&[chart]);
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("&lt;x> &amp; y"), "{svg}");
+    }
+
+    #[test]
+    fn points_lie_where_their_values_say() {
+        let axis = |logarithmic, range| Axis { title: String::new(), range, logarithmic };
+        let chart = Chart {
+            across: axis(false, [0.0, 10.0]),
+            up: axis(true, [1.0, 100.0]),
+            curves: vec![vec![[5.0, 10.0]]],
+            ..Default::default()
+        };
+        let middle = format!("cx=\"{:.1}\" cy=\"{:.1}\"", LEFT + FRAME[0] / 2.0, TOP + FRAME[1] / 2.0);
+        assert!(Chart::row(&[chart]).contains(&middle));
+    }
+}

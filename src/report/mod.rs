@@ -1,0 +1,8 @@
+//! Report: how good a stage is, measured on simulated data, as tables and plots.
+//!
+//! Errors are the same at every run; times are this machine's.
+
+pub mod camera;
+mod chart;
+
+pub use chart::{Axis, Chart, Curve};
