@@ -179,7 +179,7 @@ impl Scenario {
 }
 
 /// Where a point is seen through a lens with distortion; not finite behind the camera.
-fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
+pub(crate) fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
     let half = libm::hypot(f64::from(camera.image[0]), f64::from(camera.image[1])) / 2.0;
     let Some((px, _)) = camera.project(point) else { return Point2::new(f64::NAN, f64::NAN) };
     let off = px - camera.principal_px;

@@ -4,7 +4,7 @@
 //! each of them with seven more photos of the same camera, at the same tilt.
 
 use super::{Axis, Chart, Curve};
-use crate::camera::simulate::{Scenario, View};
+use crate::camera::simulate::{Scenario, View, distorted};
 use crate::camera::{self, Effort, Priors, Solution, SolveOptions};
 use crate::geom::Point3;
 use crate::{Error, Result, io};
@@ -214,15 +214,16 @@ fn focal_percent(view: &View, solution: &Solution) -> f64 {
     100.0 * (solution.camera.focal_px.x / view.camera.focal_px.x - 1.0).abs()
 }
 
-/// Root mean square over a grid above the rectangle, between the fitted and the true camera; infinite where a point is
+/// Root mean square over a grid above the rectangle: where the fitted camera sees it, and where the photo shows it; infinite where a point is
 /// behind either.
 fn height_error_px(view: &View, solution: &Solution) -> f64 {
     const GRID: usize = 4;
     let part = |i: usize| i as f64 / (GRID - 1) as f64 - 0.5;
     let off = |i: usize| {
         let at = |[w, h]: [f64; 2]| Point3::new(part(i % GRID) * w, part(i / GRID) * h, HEIGHT);
-        let (found, _) = solution.camera.project(at(solution.size))?;
-        Some((found - view.camera.project(at(view.size))?.0).norm_squared())
+        let found = distorted(&solution.camera, solution.kappa, at(solution.size));
+        let off = (found - distorted(&view.camera, view.kappa, at(view.size))).norm_squared();
+        off.is_finite().then_some(off)
     };
     let sum: f64 = (0..GRID * GRID).map(|i| off(i).unwrap_or(f64::INFINITY)).sum();
     (sum / (GRID * GRID) as f64).sqrt()
