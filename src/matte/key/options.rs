@@ -71,6 +71,9 @@ pub enum Blur {
     /// By running sums, whose cost does not depend on the size: nearer the true mean than Blender is. Samples are rounded
     /// to 2^-24 and held within 65504 (half precision's largest); one that is no number counts as 0. An edge that only
     /// just is one may not be found, so that the levels clip it.
+    ///
+    /// Worth it beyond a size of about ten: on a 4K frame with both blurs at 6, 20 and 60 it takes 1.1, 0.6 and 0.3 of
+    /// the time and differs by 1.8e-7, 3.6e-7 and 6.6e-7 at most (`cargo bench --bench matte`).
     RunningSum,
 }
 
