@@ -29,5 +29,6 @@ echo "camera"
 blend golden/camera/camera_reference.py -- --per-case 16 --seed 1 --out golden/camera
 echo "matte"
 python3 golden/matte/make_cases.py --blender blender --bpy42 "$tools/bpy42/bin/python" --bpy45 "$tools/bpy45/bin/python"
+"$tools/bpy45/bin/python" golden/matte/keying_screen_reference.py
 echo "render"
 golden/render/references.sh
