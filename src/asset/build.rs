@@ -1,7 +1,6 @@
 //! Many photos into an asset folder, from a list.
 
 use super::folder::{AddPhoto, Scale, asset_of, cut_out_file, read_or_new, write_photo};
-use super::manifest::under;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS, Manifest};
 use crate::error::{Error, Result};
 use crate::io;
@@ -95,7 +94,7 @@ pub fn build(
     let records: Vec<Result<_>> = work.collect();
     for (i, (record, add)) in records.into_iter().zip(&adds).enumerate() {
         let inserted = manifest.insert(asset_of(add, record?));
-        inserted.map_err(|e| under(e, &format!("photos[{i}]")).in_file(path))?;
+        inserted.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?;
     }
     manifest.write(folder)?;
     Ok(Built { photos: count, assets: manifest.assets.len() })
@@ -116,7 +115,7 @@ impl List {
         }
         let adds = self.photos.iter().enumerate().map(|(i, photo)| {
             let add = photo.add(&self.cut_out).and_then(|add| add.check(manifest).map(|()| add));
-            add.map_err(|e| under(e, &format!("photos[{i}]")))
+            add.map_err(|e| e.within(&format!("photos[{i}]")))
         });
         let adds: Vec<AddPhoto> = adds.collect::<Result<_>>()?;
         self.check_files(&adds)?;

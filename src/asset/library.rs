@@ -1,7 +1,7 @@
 //! An asset folder in memory, ready to be put into scenes.
 
 use super::MANIFEST;
-use super::manifest::{AssetRecord, Manifest, PhotoRecord, under};
+use super::manifest::{AssetRecord, Manifest, PhotoRecord};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::geom::Point2;
@@ -99,7 +99,7 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     let told = record.size_m.map(|side| side * record.px_per_metre);
     if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
         let what = format!("{:.1} x {:.1} pixels, but {} has {w} x {h}", told[0], told[1], record.file);
-        return Err(under(Error::value("size_m", what), at).in_file(folder.join(MANIFEST)));
+        return Err(Error::value("size_m", what).within(at).in_file(folder.join(MANIFEST)));
     }
     if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
         let (x, y) = (i % image.width(), i / image.width());

@@ -139,7 +139,7 @@ impl Manifest {
         unique("classes", self.classes.iter().map(String::as_str))?;
         unique("assets", self.assets.iter().map(|asset| asset.name.as_str()))?;
         for (i, asset) in self.assets.iter().enumerate() {
-            let inside = |e| under(e, &format!("assets[{i}]"));
+            let inside = |e: Error| e.within(&format!("assets[{i}]"));
             asset.check().map_err(inside)?;
             self.class(&asset.class).map_err(inside)?;
         }
@@ -157,7 +157,7 @@ impl AssetRecord {
         }
         unique("photos", self.photos.iter().map(|photo| photo.file.as_str()))?;
         for (i, photo) in self.photos.iter().enumerate() {
-            photo.check().map_err(|e| under(e, &format!("photos[{i}]")))?;
+            photo.check().map_err(|e| e.within(&format!("photos[{i}]")))?;
         }
         Ok(())
     }
@@ -204,14 +204,6 @@ pub(super) fn check_positive(at: &str, value: f64) -> Result<()> {
         return Ok(());
     }
     Err(Error::value(at, format!("{value}, expected a number above 0")))
-}
-
-/// The same error about a value inside something.
-pub(super) fn under(error: Error, place: &str) -> Error {
-    match error {
-        Error::Value { at, what } => Error::Value { at: format!("{place}.{at}"), what },
-        other => other,
-    }
 }
 
 fn unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
