@@ -25,5 +25,5 @@ pub mod settle;
 pub use camera::Camera;
 pub use error::{Error, Result};
 pub use image::{Image, Roi};
-pub use pixel::{Coverage, Depth, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba};
+pub use pixel::{Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba};
 pub use scene::{Scene, Shot};

@@ -64,6 +64,19 @@ pub struct StraightRgba {
     pub a: f32,
 }
 
+/// Tinted see-through film: the light that a pixel adds, and the share of what is behind that each channel loses.
+///
+/// What [`PremulRgba`] is with an alpha of its own for each channel; zero is nothing at all. Stored as opacity, which
+/// averages like alpha; [`Film::transmittance`] is 1 minus that.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Film {
+    /// Light that the film reflects: already multiplied by how much of the pixel it covers.
+    pub color: LinearRgb,
+    /// 1 minus the transmittance, per channel, 0 to 1.
+    pub opacity: LinearRgb,
+}
+
 /// Display-encoded sRGB, 8 bits a channel.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -140,6 +153,13 @@ impl Mix for PremulRgba {
     #[inline(always)]
     fn add_scaled(self, w: f32, o: Self) -> Self {
         Self { r: self.r + w * o.r, g: self.g + w * o.g, b: self.b + w * o.b, a: self.a + w * o.a }
+    }
+}
+
+impl Mix for Film {
+    #[inline(always)]
+    fn add_scaled(self, w: f32, o: Self) -> Self {
+        Self { color: self.color.add_scaled(w, o.color), opacity: self.opacity.add_scaled(w, o.opacity) }
     }
 }
 
@@ -272,6 +292,54 @@ impl StraightRgba {
     }
 }
 
+impl Film {
+    /// A film from the light it adds and the share of what is behind that passes, per channel.
+    #[inline(always)]
+    pub fn new(color: LinearRgb, transmittance: LinearRgb) -> Self {
+        Self { color, opacity: transmittance.map(|t| 1.0 - t) }
+    }
+
+    /// The share of what is behind that passes, per channel.
+    #[inline(always)]
+    pub fn transmittance(self) -> LinearRgb {
+        self.opacity.map(|o| 1.0 - o)
+    }
+
+    /// `self` in front of an opaque colour: `color + transmittance * behind`.
+    #[inline(always)]
+    pub fn over_color(self, behind: LinearRgb) -> LinearRgb {
+        self.color + self.transmittance() * behind
+    }
+
+    /// The same with one alpha for all channels, their mean: what a program without film makes of it.
+    #[inline(always)]
+    pub fn to_rgba(self) -> PremulRgba {
+        let LinearRgb { r, g, b } = self.opacity;
+        let a = if r == g && g == b { r } else { (r + g + b) / 3.0 };
+        PremulRgba::new(self.color.r, self.color.g, self.color.b, a)
+    }
+
+    /// Every channel loses the same share.
+    #[inline(always)]
+    pub fn is_grey(self) -> bool {
+        self.opacity.r == self.opacity.g && self.opacity.g == self.opacity.b
+    }
+
+    /// Every channel is finite and every opacity between 0 and 1: what a texture may hold.
+    #[inline(always)]
+    pub fn is_sound(self) -> bool {
+        self.color.is_finite() && <[f32; 3]>::from(self.opacity).iter().all(|o| (0.0..=1.0).contains(o))
+    }
+}
+
+impl From<PremulRgba> for Film {
+    /// Grey film: every channel loses alpha.
+    #[inline(always)]
+    fn from(p: PremulRgba) -> Self {
+        Self { color: p.color(), opacity: LinearRgb::grey(p.a) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,6 +353,20 @@ mod tests {
     #[test]
     fn transparent_pixels_become_straight_without_nan() {
         assert_eq!(PremulRgba::TRANSPARENT.to_straight(), StraightRgba::default());
+    }
+
+    #[test]
+    fn grey_film_and_rgba_are_the_same() {
+        let p = PremulRgba::new(0.1, 0.2, 0.3, 0.7);
+        assert_eq!(Film::from(p).to_rgba(), p);
+        assert!(Film::from(p).is_grey() && Film::default() == PremulRgba::TRANSPARENT.into());
+    }
+
+    #[test]
+    fn film_tints_what_is_behind() {
+        let film = Film::new(LinearRgb::grey(0.125), LinearRgb::new(0.5, 1.0, 0.25));
+        assert_eq!(film.over_color(LinearRgb::WHITE), LinearRgb::new(0.625, 1.125, 0.375));
+        assert!(!film.is_grey() && film.is_sound());
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //!
 //! [Porter and Duff 1984]: https://doi.org/10.1145/800031.808606
 
-use crate::pixel::{Coverage, Mix, PremulRgba};
+use crate::pixel::{Coverage, Film, Mix, PremulRgba};
 
 impl PremulRgba {
     /// `self` in front of `behind`.
@@ -45,6 +45,15 @@ impl PremulRgba {
     }
 }
 
+impl Film {
+    /// `self` in front of `behind`: films multiply what they let pass.
+    #[inline(always)]
+    pub fn over(self, behind: Self) -> Self {
+        let pass = self.transmittance();
+        Self { color: self.color + pass * behind.color, opacity: self.opacity + pass * behind.opacity }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -54,6 +63,12 @@ mod tests {
         let channel = 0.0f32..=1.0;
         (channel.clone(), channel.clone(), channel.clone(), channel)
             .prop_map(|(r, g, b, a)| PremulRgba::new(r * a, g * a, b * a, a))
+    }
+
+    #[test]
+    fn grey_film_goes_over_as_rgba_does() {
+        let (a, b) = (PremulRgba::new(0.1, 0.2, 0.3, 0.5), PremulRgba::new(0.2, 0.1, 0.0, 0.25));
+        assert_eq!(Film::from(a).over(b.into()), a.over(b).into());
     }
 
     fn close(a: PremulRgba, b: PremulRgba) -> bool {

@@ -208,7 +208,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits, wanted: Wanted) -> std::resu
         let planes: Vec<_> = picked.iter().map(|&i| &part.channel_data.list[i].sample_data).collect();
         let (width, height) = size_of(window);
         let mut samples = interleaved(part, &planes, window);
-        if let (Wanted::Color, 3.., Some(matrix)) = (wanted, planes.len(), &to_rec709) {
+        if let (Wanted::Color | Wanted::Film, 3.., Some(matrix)) = (wanted, planes.len(), &to_rec709) {
             convert(&mut samples, planes.len(), matrix);
         }
         return Ok(Raster {

@@ -46,7 +46,7 @@ pub use format::Format;
 pub use header::Header;
 pub use limits::Limits;
 pub use overrides::Override;
-pub use raster::FromFile;
+pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
 pub use worker::{serve as serve_worker, worker_version};

@@ -4,7 +4,7 @@
 //! the file says otherwise. A matte or a depth is never display-encoded.
 
 use crate::color::{decode_srgb8, decode_srgb16, srgb_to_linear};
-use crate::{Coverage, Depth, Image, LinearRgb, PremulRgba, Srgb8, StraightRgba};
+use crate::{Coverage, Depth, Film, Image, LinearRgb, PremulRgba, Srgb8, StraightRgba};
 use rayon::prelude::*;
 
 /// Samples of a picture, channels interleaved, rows from the top.
@@ -70,6 +70,8 @@ pub(super) fn one_line(text: &str) -> String {
 pub enum Wanted {
     /// `R G B`, or `Y` for grey; `A` where it is there.
     Color,
+    /// As `Color`, with the transmittance `VR VG VB` or else `TR TG TB` where one is there.
+    Film,
     /// The only channel, or `A`, or `Y`.
     Coverage,
     /// The only channel, or `Z`.
@@ -80,10 +82,15 @@ impl Wanted {
     /// Where the wanted channels stand among `names`: red, green, blue and perhaps alpha, or one.
     pub(super) fn pick(self, names: &[String]) -> Result<Vec<usize>, String> {
         let at = |name: &str| names.iter().position(|n| n == name);
+        let all = |names: [&str; 3]| names.into_iter().map(at).collect::<Option<Vec<_>>>();
         let found = match self {
-            Self::Color => [at("R"), at("G"), at("B")]
-                .into_iter()
-                .collect::<Option<Vec<_>>>()
+            Self::Film => {
+                let through = all(VIEW_TRANSMITTANCE).or_else(|| all(TRANSMITTANCE)).unwrap_or_default();
+                let color = Self::Color.pick(names)?;
+                let alpha_free = if through.is_empty() { color.len() } else { 3 };
+                Some(color.into_iter().take(alpha_free).chain(through).collect())
+            }
+            Self::Color => all(["R", "G", "B"])
                 .or_else(|| at("Y").map(|y| vec![y; 3]))
                 .map(|color| color.into_iter().chain(at("A")).collect()),
             _ if names.len() == 1 => Some(vec![0]),
@@ -96,12 +103,17 @@ impl Wanted {
 
     fn expected(self) -> &'static str {
         match self {
-            Self::Color => "R G B or Y, with or without A",
+            Self::Color | Self::Film => "R G B or Y, with or without A",
             Self::Coverage => "one channel, or one named A or Y",
             Self::Depth => "one channel, or one named Z",
         }
     }
 }
+
+/// Channels of a film's measured transmittance: the screen seen through it and in its shadow.
+pub const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
+/// Channels of a film's view transmittance: the share of the line of sight that passes.
+pub const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
 
 /// How a pixel type is made from the samples of a file. Sealed by being private to `io`.
 pub trait FromFile: Copy + Send + Sync + Default + 'static {
@@ -159,6 +171,23 @@ impl FromFile for PremulRgba {
     const WANTED: Wanted = Wanted::Color;
     fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
         raster.0.colors()
+    }
+}
+
+impl FromFile for Film {
+    const WANTED: Wanted = Wanted::Film;
+    /// Transmittance where float channels have it, else alpha for every channel.
+    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
+        let picked = Wanted::Film.pick(&raster.0.names)?;
+        match (&raster.0.samples, &picked[..]) {
+            (Samples::F32(v), &[r, g, b, tr, tg, tb]) => {
+                Ok(raster.0.each(v, |px| Film::new([px[r], px[g], px[b]].into(), [px[tr], px[tg], px[tb]].into())))
+            }
+            _ => {
+                let rgba: Image<PremulRgba> = raster.0.colors()?;
+                Ok(Image::from_vec(rgba.width(), rgba.height(), rgba.pixels().iter().map(|&p| p.into()).collect()))
+            }
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use super::atomic::write_bytes;
 use super::{Format, exr, jpeg, png, tiff};
 use crate::color::{decode_srgb8, encode_srgb8, encode_srgb16};
-use crate::{Coverage, Depth, Error, Image, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba};
+use crate::{Coverage, Depth, Error, Film, Image, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -80,7 +80,15 @@ pub trait ToFile: Copy + Send + Sync {
     fn codes16(self) -> [u16; 4];
     /// Scene-linear channels, colours multiplied by alpha.
     #[doc(hidden)]
-    fn linear(self) -> [f32; 4];
+    fn linear(self) -> [f32; CHANNELS];
+}
+
+/// Channels of the pixel that has most.
+const CHANNELS: usize = 7;
+
+/// The first channels as they are, zeros for the rest.
+fn first<const N: usize>(channels: [f32; N]) -> [f32; CHANNELS] {
+    std::array::from_fn(|i| if i < N { channels[i] } else { 0.0 })
 }
 
 const COLOR: &[&str] = &["R", "G", "B"];
@@ -104,8 +112,8 @@ impl ToFile for LinearRgb {
     fn codes16(self) -> [u16; 4] {
         [encode_srgb16(self.r), encode_srgb16(self.g), encode_srgb16(self.b), u16::MAX]
     }
-    fn linear(self) -> [f32; 4] {
-        [self.r, self.g, self.b, 1.0]
+    fn linear(self) -> [f32; CHANNELS] {
+        first([self.r, self.g, self.b])
     }
 }
 
@@ -119,7 +127,7 @@ impl ToFile for StraightRgba {
         let [r, g, b, _] = LinearRgb::new(self.r, self.g, self.b).codes16();
         [r, g, b, plain16(self.a)]
     }
-    fn linear(self) -> [f32; 4] {
+    fn linear(self) -> [f32; CHANNELS] {
         self.to_premul().linear()
     }
 }
@@ -132,8 +140,24 @@ impl ToFile for PremulRgba {
     fn codes16(self) -> [u16; 4] {
         self.to_straight().codes16()
     }
-    fn linear(self) -> [f32; 4] {
-        [self.r, self.g, self.b, self.a]
+    fn linear(self) -> [f32; CHANNELS] {
+        first([self.r, self.g, self.b, self.a])
+    }
+}
+
+impl ToFile for Film {
+    /// Programs that know no film see the grey one: `A`.
+    const NAMES: &'static [&'static str] = &["R", "G", "B", "A", "TR", "TG", "TB"];
+    const CODED: bool = false;
+    fn codes8(self) -> [u8; 4] {
+        self.to_rgba().codes8()
+    }
+    fn codes16(self) -> [u16; 4] {
+        self.to_rgba().codes16()
+    }
+    fn linear(self) -> [f32; CHANNELS] {
+        let (PremulRgba { r, g, b, a }, t) = (self.to_rgba(), self.transmittance());
+        [r, g, b, a, t.r, t.g, t.b]
     }
 }
 
@@ -145,8 +169,8 @@ impl ToFile for Coverage {
     fn codes16(self) -> [u16; 4] {
         [plain16(self.0); 4]
     }
-    fn linear(self) -> [f32; 4] {
-        [self.0; 4]
+    fn linear(self) -> [f32; CHANNELS] {
+        first([self.0])
     }
 }
 
@@ -159,8 +183,8 @@ impl ToFile for Depth {
     fn codes16(self) -> [u16; 4] {
         [plain16(self.0); 4]
     }
-    fn linear(self) -> [f32; 4] {
-        [self.0; 4]
+    fn linear(self) -> [f32; CHANNELS] {
+        first([self.0])
     }
 }
 
@@ -172,7 +196,7 @@ impl ToFile for Srgb8 {
     fn codes16(self) -> [u16; 4] {
         self.codes8().map(|code| u16::from(code) * 257)
     }
-    fn linear(self) -> [f32; 4] {
+    fn linear(self) -> [f32; CHANNELS] {
         decode_srgb8(self).linear()
     }
 }
@@ -185,7 +209,7 @@ impl ToFile for Srgba8 {
     fn codes16(self) -> [u16; 4] {
         self.codes8().map(|code| u16::from(code) * 257)
     }
-    fn linear(self) -> [f32; 4] {
+    fn linear(self) -> [f32; CHANNELS] {
         let LinearRgb { r, g, b } = decode_srgb8(Srgb8 { r: self.r, g: self.g, b: self.b });
         StraightRgba { r, g, b, a: f32::from(self.a) / 255.0 }.linear()
     }
@@ -206,7 +230,10 @@ pub(super) enum Codes {
 }
 
 /// Channels side by side, pixel after pixel, rows in parallel.
-pub(super) fn flat<P: ToFile, T: Copy + Default + Send>(image: &Image<P>, f: impl Fn(P) -> [T; 4] + Sync) -> Vec<T> {
+pub(super) fn flat<P: ToFile, T: Copy + Default + Send, const N: usize>(
+    image: &Image<P>,
+    f: impl Fn(P) -> [T; N] + Sync,
+) -> Vec<T> {
     let n = P::NAMES.len();
     let mut out = vec![T::default(); image.pixels().len() * n];
     let rows = image.width().max(1);
@@ -271,7 +298,9 @@ pub(super) fn stored_as<P: ToFile>(format: Option<Format>, asked: Option<Bits>) 
         Some(Format::Exr) => &[Bits::Float, Bits::Half],
         Some(Format::Tiff) if P::CODED => &[Bits::Sixteen, Bits::Eight, Bits::Float],
         Some(Format::Tiff) => &[Bits::Float],
-        Some(Format::Png | Format::Jpeg) if !P::CODED => return Err("a depth needs float samples: .exr or .tif".into()),
+        Some(Format::Png | Format::Jpeg) if !P::CODED => {
+            return Err("a depth or a film needs float samples: .exr or .tif".into());
+        }
         Some(Format::Png) => &[Bits::Eight, Bits::Sixteen],
         Some(Format::Jpeg) => &[Bits::Eight],
         _ => return Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
@@ -306,4 +335,29 @@ fn marked(metadata: &[(String, String)]) -> Vec<(String, String)> {
     let named = metadata.iter().any(|(key, _)| key == COLORSPACE.0);
     let ours = (!named).then(|| (COLORSPACE.0.to_string(), COLORSPACE.1.to_string()));
     ours.into_iter().chain(metadata.iter().cloned()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_reads_back_and_other_readers_see_its_grey_alpha() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("film.exr");
+        let film = Film::new(LinearRgb::new(0.5, 0.25, 0.125), LinearRgb::new(0.25, 0.5, 0.75));
+        write(&path, &Image::filled(3, 2, film)).unwrap();
+        assert_eq!(crate::io::read::<Film>(&path).unwrap(), Image::filled(3, 2, film));
+        assert_eq!(crate::io::read::<PremulRgba>(&path).unwrap()[(0, 0)], PremulRgba::new(0.5, 0.25, 0.125, 0.5));
+        assert!(write(folder.path().join("film.png"), &Image::filled(3, 2, film)).is_err());
+    }
+
+    #[test]
+    fn a_picture_without_transmittance_is_a_grey_film() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rgba.exr");
+        let p = PremulRgba::new(0.5, 0.25, 0.125, 0.75);
+        write(&path, &Image::filled(3, 2, p)).unwrap();
+        assert_eq!(crate::io::read::<Film>(&path).unwrap()[(2, 1)], p.into());
+    }
 }
