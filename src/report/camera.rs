@@ -314,6 +314,7 @@ fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> Strin
             across: across.clone(),
             up: up.clone(),
             curves: Method::ALL.map(curve).into(),
+            defaults: Vec::new(),
         }
     };
     Chart::row(&NOISES.map(chart))
@@ -335,6 +336,11 @@ fn against_time(rows: &[Row]) -> String {
             across: across.clone(),
             up: up.clone(),
             curves: NOISES.map(curve).into(),
+            defaults: rows
+                .iter()
+                .filter(|r| r.tilt_deg == tilt_deg && r.method == Method::Whole)
+                .map(|r| [r.time_us, error(r)])
+                .collect(),
         }
     };
     Chart::row(&TIMED_TILTS.map(chart))

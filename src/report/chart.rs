@@ -25,6 +25,8 @@ pub struct Chart {
     pub up: Axis,
     /// One per name.
     pub curves: Vec<Curve>,
+    /// Points with a ring around them: where the defaults are.
+    pub defaults: Vec<[f64; 2]>,
 }
 
 /// The points of a curve, from left to right; points that are not finite, or not positive on a logarithmic axis, are left out.
@@ -124,6 +126,9 @@ impl Chart {
             for [x, y] in seen {
                 let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{color}\"/>");
             }
+        }
+        for [x, y] in self.defaults.iter().filter_map(|p| Some([x(p[0])?, y(p[1])?])) {
+            let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\" fill=\"none\" stroke=\"#c00\"/>");
         }
     }
 }

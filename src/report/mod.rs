@@ -4,5 +4,9 @@
 
 pub mod camera;
 mod chart;
+mod page;
+mod table;
 
 pub use chart::{Axis, Chart, Curve};
+pub use page::{Page, base64, escaped};
+pub use table::Table;

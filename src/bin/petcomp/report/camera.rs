@@ -1,14 +1,8 @@
-//! `petcomp report`: how good a stage is, measured on simulated data.
+//! `petcomp report camera`: the camera solver on simulated views.
 
 use crate::common::Common;
 use petcomp::report::camera::{self, CameraReportOptions};
 use std::path::PathBuf;
-
-#[derive(clap::Subcommand)]
-pub(crate) enum Command {
-    /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
-    Camera(Args),
-}
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -20,8 +14,7 @@ pub(crate) struct Args {
     views: u64,
 }
 
-pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
-    let Command::Camera(args) = command;
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
     let rows =
         camera::write(&args.output, &CameraReportOptions { views: args.views }, |done, of| progress.at(done, of))?;

@@ -1,0 +1,84 @@
+//! Tables of text: CSV for programs, Markdown for the README, HTML for the page.
+
+use super::page::escaped;
+
+/// A table: what the columns are, with their units, and a row of texts for each line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Table {
+    /// Titles of the columns.
+    pub columns: Vec<String>,
+    /// Cells; each row has as many as there are columns.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// A table without rows.
+    pub fn new<'a>(columns: impl IntoIterator<Item = &'a str>) -> Self {
+        Self { columns: columns.into_iter().map(String::from).collect(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    ///
+    /// # Panics
+    /// When it has not one cell per column.
+    pub fn push(&mut self, row: impl IntoIterator<Item = impl Into<String>>) {
+        let row: Vec<String> = row.into_iter().map(Into::into).collect();
+        assert_eq!(row.len(), self.columns.len(), "one cell per column");
+        self.rows.push(row);
+    }
+
+    /// As comma-separated values (RFC 4180), the titles first.
+    pub fn csv(&self) -> String {
+        let cell = |text: &String| {
+            let quoted = text.contains([',', '"', '\n', '\r']);
+            if quoted { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.clone() }
+        };
+        self.lines().map(|row| row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n").collect()
+    }
+
+    /// As a Markdown table.
+    pub fn markdown(&self) -> String {
+        let cell = |text: &String| text.replace('|', "\\|").replace('\n', " ");
+        let line = |row: &Vec<String>| format!("| {} |\n", row.iter().map(cell).collect::<Vec<_>>().join(" | "));
+        let rule = format!("|{}\n", " --- |".repeat(self.columns.len()));
+        line(&self.columns) + &rule + &self.rows.iter().map(line).collect::<String>()
+    }
+
+    /// As an HTML table.
+    pub fn html(&self) -> String {
+        let line = |row: &Vec<String>, tag: &str| {
+            let cells = row.iter().map(|text| format!("<{tag}>{}</{tag}>", escaped(text))).collect::<String>();
+            format!("<tr>{cells}</tr>\n")
+        };
+        let rows = self.rows.iter().map(|row| line(row, "td")).collect::<String>();
+        format!("<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n", line(&self.columns, "th"))
+    }
+
+    fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
+        std::iter::once(&self.columns).chain(&self.rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn awkward() -> Table {
+        let mut table = Table::new(["case", "error, px"]);
+        table.push(["a|b <c>", "1\"2"]);
+        table
+    }
+
+    #[test]
+    fn awkward_cells_stay_one_cell() {
+        assert_eq!(awkward().csv(), "case,\"error, px\"\na|b <c>,\"1\"\"2\"\n");
+        assert_eq!(awkward().markdown(), "| case | error, px |\n| --- | --- |\n| a\\|b <c> | 1\"2 |\n");
+        assert!(awkward().html().contains("<td>a|b &lt;c&gt;</td>"));
+    }
+
+    #[test]
+    #[should_panic(expected = "one cell per column")]
+    fn a_short_row_is_refused() {
+        Table::new(["a", "b"]).push(["1"]);
+    }
+}
