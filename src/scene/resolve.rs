@@ -132,6 +132,7 @@ mod tests {
 
     fn scene() -> Scene {
         let object = Object {
+            outline: vec![],
             asset: "b1".into(),
             photo: 0,
             size: [0.2, 0.1],
@@ -144,7 +145,7 @@ mod tests {
             image: [8, 6],
             plate: String::new(),
             camera: CameraSource::Known(camera()),
-            surface: Surface { size: [0.4, 0.3] },
+            surface: Surface::new([0.4, 0.3]),
             objects: vec![object.clone(), object],
             lights: vec![],
             ambient: LinearRgb::WHITE,
