@@ -25,7 +25,7 @@ pub struct Extreme {
 pub enum Promise {
     /// [`Verdict::Rested`].
     Rests,
-    /// Any other verdict: the scene or its options cannot be right.
+    /// Any other verdict, or an error: the scene or its options cannot be right.
     IsRefused,
     /// [`Verdict::Rested`], with all that it says, or another verdict.
     IsTold,
@@ -40,9 +40,9 @@ pub struct ExtremeEnd {
     pub cards: usize,
     /// What was promised.
     pub promise: Promise,
-    /// How the last try ended, and how many there were.
-    pub verdict: Verdict,
-    /// See [`verdict`](Self::verdict).
+    /// How the last try ended; none where the options were refused at the door.
+    pub verdict: Option<Verdict>,
+    /// How many tries there were.
     pub tries: usize,
     /// Deepest overlap at the end, as a share of the typical card's length.
     pub overlap: f64,
@@ -56,24 +56,21 @@ pub struct ExtremeEnd {
 
 impl Extreme {
     /// Settles it.
-    ///
-    /// # Errors
-    /// As [`settle`].
-    pub fn run(&self) -> Result<ExtremeEnd> {
+    pub fn run(&self) -> ExtremeEnd {
         let (typical, start) = (super::world::typical_length(&self.scene), Instant::now());
-        let Settled { verdict, rejected, overlap, energy_rise, seconds, .. } =
-            settle(self.scene.clone(), &self.options)?;
-        Ok(ExtremeEnd {
+        let end = settle(self.scene.clone(), &self.options).ok();
+        let number = |of: fn(&Settled) -> f64| end.as_ref().map_or(0.0, of);
+        ExtremeEnd {
             name: self.name.clone(),
             cards: self.scene.objects.len(),
             promise: self.promise,
-            verdict,
-            tries: rejected.len() + 1,
-            overlap: overlap / typical,
-            energy_rise,
-            seconds,
+            tries: end.as_ref().map_or(0, |end| end.rejected.len() + 1),
+            overlap: number(|end| end.overlap) / typical,
+            energy_rise: number(|end| end.energy_rise),
+            seconds: number(|end| end.seconds),
             wall_ms: start.elapsed().as_secs_f64() * 1e3,
-        })
+            verdict: end.map(|end| end.verdict),
+        }
     }
 }
 
@@ -81,8 +78,8 @@ impl ExtremeEnd {
     /// Whether the promise was kept.
     pub fn is_as_promised(&self) -> bool {
         match self.promise {
-            Promise::Rests => self.verdict == Verdict::Rested,
-            Promise::IsRefused => self.verdict != Verdict::Rested,
+            Promise::Rests => self.verdict == Some(Verdict::Rested),
+            Promise::IsRefused => self.verdict != Some(Verdict::Rested),
             Promise::IsTold => true,
         }
     }
@@ -187,9 +184,8 @@ fn impossible() -> Result<Vec<Extreme>> {
     Ok(vec![
         refused("larger than the box", larger, usual),
         Extreme { promise: Promise::IsTold, ..extreme("started in one place", in_one_place) },
+        Extreme { promise: Promise::IsTold, ..refused("steps twice as long", heap(6, 20)?, longer(2.0)) },
         refused("steps 4 times too long", heap(6, 20)?, longer(4.0)),
-        refused("steps 8 times too long", heap(6, 20)?, longer(8.0)),
-        refused("steps 16 times too long", heap(6, 20)?, longer(16.0)),
     ])
 }
 
@@ -258,7 +254,7 @@ mod tests {
             if extreme.scene.objects.len() > 100 {
                 continue;
             }
-            let end = extreme.run().unwrap();
+            let end = extreme.run();
             println!("{end:?}");
             if !end.is_as_promised() {
                 broken.push(end);

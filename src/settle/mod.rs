@@ -42,7 +42,8 @@ pub struct Settled {
     pub seconds: f64,
     /// Deepest overlap of a dropped body with another body, the floor or a wall at the end, metres.
     pub overlap: f64,
-    /// Most energy that appeared between two steps of the last fall, as a share of what the drop gave away.
+    /// Most energy that appeared between two steps of the last fall, as a share of what the drop gave away; a drop by less
+    /// than a quarter of a card counts as one by that.
     pub energy_rise: f64,
 }
 
