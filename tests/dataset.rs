@@ -27,7 +27,7 @@ fn scene(k: u64) -> Scene {
         image: IMAGE,
         plate: "tray".into(),
         camera: CameraSource::Known(camera),
-        surface: Surface { size: [0.4, 0.3] },
+        surface: Surface::new([0.4, 0.3]),
         objects: Vec::new(),
         lights: Vec::new(),
         ambient: LinearRgb::grey(0.1),

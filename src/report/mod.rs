@@ -5,6 +5,8 @@
 pub mod camera;
 mod chart;
 mod page;
+#[cfg(feature = "settle")]
+pub mod settle;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};

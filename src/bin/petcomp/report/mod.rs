@@ -1,6 +1,7 @@
 //! `petcomp report`: how good a stage is, measured: one file per stage.
 
 mod camera;
+mod settle;
 
 use crate::common::Common;
 
@@ -8,10 +9,16 @@ use crate::common::Common;
 pub(crate) enum Command {
     /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
     Camera(camera::Args),
+    /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
+    Settle(settle::Args),
+    /// How extreme scenes settle: stability.csv and stability.md
+    Stability(settle::StabilityArgs),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Camera(args) => camera::run(args, common),
+        Command::Settle(args) => settle::run(args, common),
+        Command::Stability(args) => settle::run_stability(args, common),
     }
 }
