@@ -8,6 +8,7 @@ pub mod composite;
 pub mod dataset;
 pub mod diff;
 mod error;
+pub mod eval;
 pub mod filter;
 pub mod geom;
 mod image;
