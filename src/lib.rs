@@ -22,6 +22,7 @@ pub mod report;
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;
+pub mod train;
 
 pub use camera::Camera;
 pub use error::{Error, Result};
