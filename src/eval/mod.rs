@@ -19,6 +19,7 @@ mod yolo;
 mod yolov5;
 
 pub use bootstrap::{Interval, bootstrap};
+pub(crate) use bootstrap::{drawn, interval};
 pub use coco::{AreaRange, CocoScores, MAX_DETECTIONS, coco};
 pub use coco_json::{CocoTruth, read_coco_results, read_coco_truth};
 pub use confusion::{Confusion, ConfusionOptions};

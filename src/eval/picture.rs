@@ -29,16 +29,19 @@ fn picture(title: &str, axes: [&str; 2], lines: &[Vec<[f64; 2]>], curves: &Curve
 pub fn confusion_picture(confusion: &Confusion, names: &[String]) -> String {
     let n = confusion.counts.len();
     let side = NAMES + CELL * n as f64;
+    // The turned name of the last column reaches beyond it.
+    let width = side + NAMES / 2.0;
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{side}\" height=\"{side}\" font-family=\"sans-serif\" \
-         font-size=\"12\">\n<rect width=\"{side}\" height=\"{side}\" fill=\"white\"/>\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{side}\" font-family=\"sans-serif\" \
+         font-size=\"12\">\n<rect width=\"{width}\" height=\"{side}\" fill=\"white\"/>\n"
     );
-    svg += &word(NAMES / 2.0, NAMES - 28.0, "found, down; true, across", "");
+    svg += &word([NAMES / 2.0, 20.0], "middle", "found, down; true, across", "");
     for i in 0..n {
         let name = if i + 1 == n { "background".into() } else { class_name(i, names) };
         let middle = NAMES + CELL * (i as f64 + 0.5);
-        svg += &word(NAMES / 2.0, middle + 4.0, &name, "");
-        svg += &word(middle, NAMES - 10.0, &name, &format!(" transform=\"rotate(-40 {middle} {})\"", NAMES - 10.0));
+        svg += &word([NAMES / 2.0, middle + 4.0], "middle", &name, "");
+        let turned = format!(" transform=\"rotate(-40 {middle} {})\"", NAMES - 8.0);
+        svg += &word([middle, NAMES - 8.0], "start", &name, &turned);
         for j in 0..n {
             svg += &cell(confusion, i, j);
         }
@@ -55,11 +58,11 @@ fn cell(confusion: &Confusion, found: usize, truth: usize) -> String {
     let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
     format!(
         "<rect x=\"{x}\" y=\"{y}\" width=\"{CELL}\" height=\"{CELL}\" fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"/>\n"
-    ) + &word(x + CELL / 2.0, y + CELL / 2.0 + 4.0, &count.to_string(), ink)
+    ) + &word([x + CELL / 2.0, y + CELL / 2.0 + 4.0], "middle", &count.to_string(), ink)
 }
 
-fn word(x: f64, y: f64, text: &str, more: &str) -> String {
-    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"middle\"{more}>{}</text>\n", escaped(text))
+fn word([x, y]: [f64; 2], anchor: &str, text: &str, more: &str) -> String {
+    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n", escaped(text))
 }
 
 fn class_name(class: usize, names: &[String]) -> String {

@@ -65,6 +65,9 @@ def ultralytics_trainer(batch_size, seed):
                 part.close_mosaic(hyp)
 
     class Loader(torch.utils.data.DataLoader):
+        # Torch says None where batches come from a sampler of batches; the trainer divides by it.
+        batch_size = property(lambda self: batch_size, lambda self, value: None)
+
         def reset(self):
             """Workers start anew with every epoch: nothing to do."""
 
@@ -84,19 +87,15 @@ def ultralytics_trainer(batch_size, seed):
             sources = {REAL if path in real else SYNTHETIC for path in batch["im_file"]}
             if len(sources) != 1:
                 raise ValueError("a batch of both sources")
-            batch["factor"] = factor[sources.pop()]
+            self.factor = factor[sources.pop()]
             return batch
 
-        def get_model(self, *args, **kwargs):
-            model = super().get_model(*args, **kwargs)
-            plain = model.loss
+        # The training loop assigns the batch's loss here before it goes backward; the model stays Ultralytics' own.
+        loss = property(lambda self: self.weighted, lambda self, value: self.weigh(value))
 
-            def loss(batch, preds=None):
-                total, items = plain(batch, preds)
-                return total * batch.get("factor", 1.0), items
-
-            model.loss = loss
-            return model
+        def weigh(self, value):
+            self.weighted = value * self.factor if torch.is_tensor(value) else value
+            self.factor = 1.0  # once a batch
 
     return Balanced
 

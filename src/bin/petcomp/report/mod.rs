@@ -1,6 +1,7 @@
 //! `petcomp report`: how good a stage is, measured: one file per stage.
 
 mod camera;
+mod experiments;
 
 use crate::common::Common;
 
@@ -8,10 +9,13 @@ use crate::common::Common;
 pub(crate) enum Command {
     /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
     Camera(camera::Args),
+    /// Our trainings beside the values of the paper, with intervals and a test
+    Experiments(experiments::Args),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Camera(args) => camera::run(args, common),
+        Command::Experiments(args) => experiments::run(args, common),
     }
 }
