@@ -8,6 +8,7 @@ pub mod composite;
 pub mod dataset;
 pub mod diff;
 mod error;
+pub mod eval;
 pub mod filter;
 pub mod geom;
 mod image;
@@ -21,6 +22,7 @@ pub mod report;
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;
+pub mod train;
 
 pub use camera::Camera;
 pub use error::{Error, Result};

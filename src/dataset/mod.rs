@@ -30,6 +30,7 @@ mod sidecar;
 mod split;
 mod studio;
 mod yolo;
+mod yolo_set;
 mod yolo_yaml;
 
 pub use check::{Checked, Fault, check};
@@ -44,6 +45,7 @@ pub use sidecar::{Record, Sidecar};
 pub use split::{Part, Split, SplitOrder};
 pub use studio::Studio;
 pub use yolo::{Yolo, YoloBox, YoloTask};
+pub use yolo_set::YoloSet;
 
 use crate::error::Result;
 use crate::image::Image;

@@ -4,6 +4,8 @@
 
 pub mod camera;
 mod chart;
+pub mod eval;
+pub mod experiments;
 mod page;
 #[cfg(feature = "settle")]
 pub mod settle;

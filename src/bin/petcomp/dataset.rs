@@ -1,6 +1,7 @@
 //! `petcomp dataset`: recipe -> images with labels, ready to train on.
 
 use crate::common::{Common, RecipeArgs, interruption};
+use crate::training;
 use petcomp::dataset::{self, Checked, Report, Studio, contact_sheet_of};
 use petcomp::io;
 use std::path::{Path, PathBuf};
@@ -25,6 +26,12 @@ pub(crate) enum Command {
         #[arg(short = 'n', long, value_name = "N", default_value_t = 24)]
         most: usize,
     },
+    /// Plan batches of one source each, with the weight of their loss (equation 2 of the paper)
+    Batches(training::Batches),
+    /// Anchors that fit a dataset's boxes, by k-means
+    Anchors(training::Anchors),
+    /// Write what the paper's experiments need in YOLOv5 and Ultralytics
+    TrainKit(training::Kit),
 }
 
 #[derive(clap::Args)]
@@ -56,6 +63,9 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let rows: usize = rows.iter().sum();
             common.say(format_args!("{}: {images} images, {rows} labels, no fault", folder.display()));
         }
+        Command::Batches(args) => training::write_batches(args, common)?,
+        Command::Anchors(args) => training::print_anchors(args, common)?,
+        Command::TrainKit(args) => training::write_kit(args, common)?,
         Command::Sheet { folder, output, most } => {
             io::write(output, &contact_sheet_of(folder, *most, &Default::default())?)?;
             common.say(output.display());

@@ -8,6 +8,7 @@ mod dataset;
 mod demo;
 mod diff;
 mod doctor;
+mod eval;
 mod label;
 mod matte;
 mod matte_key;
@@ -16,6 +17,7 @@ mod render;
 mod report;
 mod scene;
 mod settle;
+mod training;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -58,6 +60,8 @@ enum Stage {
     /// Recipe -> images with labels, ready to train on
     #[command(subcommand)]
     Dataset(dataset::Command),
+    /// Detections against the truth: average precision, curves, confusion
+    Eval(eval::Args),
     /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::Args),
     /// Measure how good a stage is, on simulated data: tables and plots
@@ -88,6 +92,7 @@ fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Stage::Render(args) => render::run(args, common)?,
         Stage::Label(args) => label::run(args, common)?,
         Stage::Dataset(command) => dataset::run(command, common)?,
+        Stage::Eval(args) => eval::run(args, common)?,
         Stage::Report(command) => report::run(command, common)?,
         Stage::Diff(args) => return diff::run(args, common),
         Stage::Doctor(args) => return doctor::run(args),

@@ -2,6 +2,7 @@
 
 mod camera;
 mod settle;
+mod experiments;
 
 use crate::common::Common;
 
@@ -13,6 +14,8 @@ pub(crate) enum Command {
     Settle(settle::Args),
     /// How extreme scenes settle: stability.csv and stability.md
     Stability(settle::StabilityArgs),
+    /// Our trainings beside the values of the paper, with intervals and a test
+    Experiments(experiments::Args),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -20,5 +23,6 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Camera(args) => camera::run(args, common),
         Command::Settle(args) => settle::run(args, common),
         Command::Stability(args) => settle::run_stability(args, common),
+        Command::Experiments(args) => experiments::run(args, common),
     }
 }
