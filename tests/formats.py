@@ -1,0 +1,91 @@
+"""Checks a dataset with the programs that it was written for: formats.py CHECK FOLDER, run by tests/formats.rs."""
+
+import glob
+import json
+import pathlib
+import sys
+
+# Annotations of one image have this many ids, as the writer documents.
+IDS_PER_IMAGE = 1 << 16
+# A polygon along the edges of pixels is filled by pycocotools on a grid of fifths of a pixel: nearly all pixels agree.
+POLYGON_IOU = 0.97
+
+
+def coco(folder, is_exact):
+    import contextlib
+    import io
+
+    import numpy as np
+    from pycocotools.coco import COCO
+    from pycocotools.cocoeval import COCOeval
+
+    pixels = json.loads((folder / "pixels.json").read_text())
+    count, crowd, worst = 0, 0, 1.0
+    for part in ["train", "val"]:
+        truth = COCO(str(folder / f"annotations/instances_{part}.json"))
+        assert truth.getCatIds() == [1, 2], truth.getCatIds()
+        names = sorted(path.name for path in (folder / "images" / part).iterdir())
+        assert sorted(image["file_name"] for image in truth.loadImgs(truth.getImgIds())) == names
+        for annotation in truth.loadAnns(truth.getAnnIds()):
+            image, number = divmod(annotation["id"], IDS_PER_IMAGE)
+            assert image == annotation["image_id"]
+            found = truth.annToMask(annotation).astype(bool)
+            expected = np.zeros_like(found)
+            x, y = np.array(pixels[f"{image}/{number}"]).T
+            expected[y, x] = True
+            iou = (found & expected).sum() / (found | expected).sum()
+            assert iou == 1.0 if is_exact or annotation["iscrowd"] else iou >= POLYGON_IOU, (annotation["id"], iou)
+            assert annotation["area"] == expected.sum()
+            left, top, width, height = annotation["bbox"]
+            assert (left, top, left + width, top + height) == (x.min(), y.min(), x.max() + 1, y.max() + 1)
+            count, crowd, worst = count + 1, crowd + annotation["iscrowd"], min(worst, iou)
+        # The truth as its own detections is found whole.
+        own = [dict(a, score=0.9) for a in truth.loadAnns(truth.getAnnIds(iscrowd=False))]
+        for kind in ["bbox", "segm"]:
+            evaluation = COCOeval(truth, truth.loadRes(own), kind)
+            evaluation.evaluate()
+            evaluation.accumulate()
+            with contextlib.redirect_stdout(io.StringIO()):
+                evaluation.summarize()
+            assert abs(evaluation.stats[0] - 1) < 1e-9, evaluation.stats
+    assert count > 10 and crowd > 0
+    print(f"pycocotools: {count} annotations, {crowd} crowd, smallest IoU of masks {worst:.4f}, AP 1.0")
+
+
+def ultralytics(folder, is_segment):
+    from ultralytics.data.utils import check_det_dataset, verify_image_label
+
+    data = check_det_dataset(str(folder / "data.yaml"), autodownload=False)
+    found, rows, outlines = 0, 0, 0
+    for part in ["train", "val"]:
+        for image in sorted(glob.glob(f"{data[part]}/*")):
+            label = image.replace("/images/", "/labels/").rsplit(".", 1)[0] + ".txt"
+            answer = verify_image_label((image, label, "", False, data["nc"], 0, 0, False))
+            assert answer[0] is not None and answer[-2] == 0 and not answer[-1], answer
+            found, rows, outlines = found + 1, rows + len(answer[1]), outlines + len(answer[3])
+    assert found == 12 and rows > 10 and outlines == (rows if is_segment else 0), (found, rows, outlines)
+    print(f"ultralytics: {found} images, {rows} rows, {outlines} outlines, none refused; names {data['names']}")
+
+
+def yolov5(folder):
+    from yolov5.utils.dataloaders import verify_image_label
+
+    rows = 0
+    for image in sorted(glob.glob(f"{folder}/images/*/*")):
+        label = image.replace("/images/", "/labels/").rsplit(".", 1)[0] + ".txt"
+        answer = verify_image_label((image, label, ""))
+        assert answer[0] is not None and answer[-2] == 0 and not answer[-1], answer
+        rows += len(answer[1])
+    assert rows > 10
+    print(f"yolov5: {rows} rows, none refused")
+
+
+if __name__ == "__main__":
+    check, folder = sys.argv[1], pathlib.Path(sys.argv[2])
+    {
+        "rle": lambda: coco(folder, True),
+        "polygon": lambda: coco(folder, False),
+        "detect": lambda: ultralytics(folder, False),
+        "segment": lambda: ultralytics(folder, True),
+        "yolov5": lambda: yolov5(folder),
+    }[check]()
