@@ -40,10 +40,11 @@ bench: packages
 golden: blender
 	golden/make.sh
 
-# pycocotools, for the tests that ask it; where it cannot be had they say so and pass.
+# pycocotools and webdataset, for the tests that ask them; where they cannot be had the tests say so and pass.
 python:
-	@[ -x $(PYTHON) ] || { python3 -m venv target/python && target/python/bin/pip install --quiet pycocotools; } || \
-	  { rm -rf target/python; echo "pycocotools cannot be installed (python3-venv and pip): its tests are skipped"; }
+	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
+	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset; } || \
+	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
 
 packages:
 	@$(call install,$(BUILD))

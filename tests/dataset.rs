@@ -301,6 +301,22 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
 }
 
 #[test]
+fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
+    let dir = tempfile::tempdir().unwrap();
+    let circle = |k| {
+        let mut s = sample(k)?;
+        s.labels.objects =
+            [(1, 3), (2, 1), (3, 2)].map(|(id, over)| object(id, 0, [6.0 * id as f64; 2], &[over])).into();
+        s.labels.objects.push(object(4, 1, [40.0; 2], &[]));
+        Ok(s)
+    };
+    let report = generate(&plan(dir.path(), 2), circle, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!((report.knotted, report.objects, report.labelled), (6, 8, 2));
+    let record: Record = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
+    assert_eq!((record.knotted, record.topmost), ([1, 2, 3].map(ObjectId).to_vec(), vec![ObjectId(4)]));
+}
+
+#[test]
 fn segments_hold_borders_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);

@@ -77,6 +77,21 @@ def yolov5(folder):
     print(f"yolov5: {rows} rows, none refused")
 
 
+def webdataset(folder):
+    import webdataset
+
+    for part, numbers in [("train", [1, 2, 3, 4, 6, 7, 8, 9, 11]), ("val", [0, 5, 10])]:
+        archives = sorted(map(str, (folder / "webdataset").glob(f"{part}-*.tar")))
+        samples = list(webdataset.WebDataset(archives, shardshuffle=False))
+        assert [int(sample["__key__"]) for sample in samples] == numbers
+        for sample in samples:
+            key = sample["__key__"]
+            assert sample["png"] == (folder / f"images/{part}/{key}.png").read_bytes()
+            assert sample["txt"] == (folder / f"labels/{part}/{key}.txt").read_bytes()
+            assert json.loads(sample["json"])["index"] == json.loads(sample["coco.json"])["image"]["id"] == int(key)
+    print("webdataset: 12 samples in order, their files unchanged")
+
+
 if __name__ == "__main__":
     check, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     {
@@ -84,4 +99,5 @@ if __name__ == "__main__":
         "detect": lambda: ultralytics(folder, False),
         "segment": lambda: ultralytics(folder, True),
         "yolov5": lambda: yolov5(folder),
+        "webdataset": lambda: webdataset(folder),
     }[check]()

@@ -196,6 +196,12 @@ fn an_archive_holds_the_files_of_its_samples_in_order() {
 }
 
 #[test]
+fn webdataset_reads_archives() {
+    let dir = made("formats = [\"webdataset\", \"coco\", \"yolo\"]\nwebdataset = { samples = 4 }");
+    python("webdataset", "webdataset", dir.path());
+}
+
+#[test]
 fn layers_add_up_to_the_picture_and_ids_to_what_is_seen() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let ((w, h), channels) = read_channels(dir.path().join("layers/train/000003.exr")).unwrap();
@@ -219,9 +225,9 @@ fn a_mask_is_what_the_layer_of_its_object_shows() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let (_, channels) = read_channels(dir.path().join("layers/train/000007.exr")).unwrap();
     for object in sample(7).unwrap().labels.objects {
-        let plane = |c: &str| channels.iter().find(|p| p.name == format!("object{:03}.{c}", object.id.0)).unwrap();
-        for (channel, mask) in [("amodal", &object.amodal_mask), ("A", &object.visible_mask)] {
-            let alpha = |x: u32, y: u32| plane(channel).samples[(y * IMAGE[0] + x) as usize];
+        let plane = |layer: &str| channels.iter().find(|p| p.name == format!("{layer}{:03}.A", object.id.0)).unwrap();
+        for (layer, mask) in [("amodal", &object.amodal_mask), ("object", &object.visible_mask)] {
+            let alpha = |x: u32, y: u32| plane(layer).samples[(y * IMAGE[0] + x) as usize];
             assert_eq!(*mask, petcomp::label::Mask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1));
         }
         assert!(object.visible_mask.pixels().count() <= object.amodal_mask.pixels().count());

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 /// | `shadow.R G B` | factor on the background |
 /// | `CryptoObject00.R` ... | Cryptomatte: which objects, and how much of each is seen |
 /// | `object003.R G B A` | light of one object that reaches the eye, and its seen share (`cards`) |
-/// | `object003.amodal`, `object003.Z` | its coverage as if alone, and its depth (`cards`) |
+/// | `object003.Z`, `amodal003.A` | its depth, and its coverage as if alone (`cards`) |
 ///
 /// Objects are called `object003_CLASS` in the Cryptomatte's list. Without film,
 /// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`.
@@ -95,21 +95,31 @@ fn nearest(samples: &[DeepSample]) -> f32 {
     samples.iter().find(|sample| sample.visible > least).map_or(f32::INFINITY, |sample| sample.depth.0)
 }
 
-/// The layers of one object.
+/// One channel of an object.
+struct Channel {
+    layer: &'static str,
+    name: &'static str,
+    value: fn(&DeepSample) -> f32,
+    /// Where the object is not.
+    none: f32,
+}
+
+/// The channels of an object.
+const CARD: [Channel; 6] = [
+    Channel { layer: "object", name: "R", value: |s| s.light.r, none: 0.0 },
+    Channel { layer: "object", name: "G", value: |s| s.light.g, none: 0.0 },
+    Channel { layer: "object", name: "B", value: |s| s.light.b, none: 0.0 },
+    Channel { layer: "object", name: "A", value: |s| s.visible, none: 0.0 },
+    Channel { layer: "object", name: "Z", value: |s| s.depth.0, none: f32::INFINITY },
+    Channel { layer: "amodal", name: "A", value: |s| s.alpha, none: 0.0 },
+];
+
 fn card(deep: &DeepImage, id: ObjectId) -> Vec<Plane> {
-    let values: [(&str, fn(&DeepSample) -> f32, f32); 6] = [
-        ("R", |s| s.light.r, 0.0),
-        ("G", |s| s.light.g, 0.0),
-        ("B", |s| s.light.b, 0.0),
-        ("A", |s| s.visible, 0.0),
-        ("amodal", |s| s.alpha, 0.0),
-        ("Z", |s| s.depth.0, f32::INFINITY),
-    ];
-    let plane = |(channel, value, none): (&str, fn(&DeepSample) -> f32, f32)| {
-        let own = |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(none, value);
-        (format!("object{:03}.{channel}", id.0), each(deep, own))
+    let plane = |Channel { layer, name, value, none }: &Channel| {
+        let own = |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(*none, value);
+        (format!("{layer}{:03}.{name}", id.0), each(deep, own))
     };
-    values.into_iter().map(plane).collect()
+    CARD.iter().map(plane).collect()
 }
 
 /// One value for each pixel.

@@ -16,7 +16,8 @@ pub(crate) const LEAST_SIDE_PX: u32 = 10;
 /// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
 ///
 /// Rows of `detect` are `class cx cy w h`, of `segment` `class x1 y1 x2 y2 ...`; positions are shares of the image's
-/// width and height, 0 to 1, six decimals. An image without objects has an empty file; equal rows are written once.
+/// width and height, 0 to 1, six decimals. An image without objects has an empty file; equal rows are written once; objects
+/// that are to be ignored have none.
 ///
 /// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks for them beside the
 /// file; YOLOv5 wants `path:` added, or to be started with the dataset as its working folder.
