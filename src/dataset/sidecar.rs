@@ -33,7 +33,7 @@ pub struct Record {
     pub labelled: Vec<ObjectId>,
     /// Objects that nothing lies over, by the topmost rule.
     pub topmost: Vec<ObjectId>,
-    /// Objects that lie over each other in a circle, or between two circles.
+    /// Objects that lie over each other in a circle.
     pub knotted: Vec<ObjectId>,
     /// Scenes that were drawn and thrown away before this one.
     pub retries: u32,
