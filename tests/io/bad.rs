@@ -139,7 +139,7 @@ fn limits_are_the_callers() {
         io::read_with::<PremulRgba>(folder.file("a.png"), &options).unwrap_err().to_string()
     };
     let e = under(Limits { side: 19, ..Default::default() });
-    assert!(e.ends_with("20 pixels along a side, over the limit of 19 (Limits::side)"), "{e}");
+    assert!(e.ends_with("20 pixels along a side, over the limit of 19 (Limits::side; --limit side=N)"), "{e}");
     assert!(under(Limits { file_bytes: 9, ..Default::default() }).contains("Limits::file_bytes"));
 }
 
