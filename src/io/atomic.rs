@@ -1,4 +1,4 @@
-//! Whole files or none: everything is written beside its place and then moved there.
+//! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
 
 use super::format::reason;
 use crate::{Error, Result};
@@ -18,7 +18,25 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
         _ => failed(e),
     })?;
     file.write_all(bytes).map_err(failed)?;
+    // Before it gets its name: after a power cut there is the old file or the new one.
+    file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|e| failed(e.error))?;
+    sync_folder(folder).map_err(failed)
+}
+
+/// Puts the names in a folder on the disk.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    match std::fs::File::open(folder)?.sync_all() {
+        // Some file systems have no such thing.
+        Err(e) if e.kind() == std::io::ErrorKind::InvalidInput => Ok(()),
+        done => done,
+    }
+}
+
+/// Other systems write names by themselves.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 

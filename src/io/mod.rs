@@ -34,6 +34,7 @@ mod orient;
 mod overrides;
 #[cfg(feature = "oiio")]
 mod patience;
+mod place;
 mod png;
 mod profile;
 #[cfg(feature = "oiio")]
@@ -41,6 +42,7 @@ mod protocol;
 mod raster;
 #[cfg(feature = "oiio")]
 mod serve;
+mod soundness;
 mod tiff;
 #[cfg(feature = "oiio")]
 mod worker;
@@ -55,6 +57,7 @@ pub use format::Format;
 pub use header::Header;
 pub use limits::{Limits, Raise};
 pub use overrides::Override;
+pub use place::{below, clean_name, refuse_links};
 pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 #[cfg(feature = "oiio")]
 #[doc(hidden)]

@@ -235,8 +235,8 @@ fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> s
     let notes: Vec<_> =
         options.metadata.iter().map(|(key, value)| ffi::Note { key: key.clone(), value: value.clone() }).collect();
     let samples = match bits {
-        Bits::Eight => super::write::flat(image, P::codes8),
-        Bits::Sixteen => bytemuck::cast_slice(&super::write::flat(image, P::codes16)).to_vec(),
+        Bits::Eight => super::write::flat(image, P::codes::<u8>),
+        Bits::Sixteen => bytemuck::cast_slice(&super::write::flat(image, P::codes::<u16>)).to_vec(),
         Bits::Half | Bits::Float => bytemuck::cast_slice(&super::write::flat(image, P::linear)).to_vec(),
     };
     let name = path.to_str().ok_or("a file name that is not UTF-8, which OpenImageIO cannot open")?;
