@@ -9,6 +9,8 @@ pub mod dataset;
 pub mod diff;
 mod error;
 pub mod filter;
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod geom;
 mod image;
 pub mod io;

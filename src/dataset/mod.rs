@@ -33,6 +33,7 @@ mod yolo_yaml;
 pub use check::{Checked, Fault, check};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use generate::{Plan, Progress, generate};
+pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report};
 pub use pictures::{PictureFormat, Pictures};
 pub use setup::Setup;

@@ -125,7 +125,11 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
     write_bytes(path.as_ref(), text.as_bytes())
 }
 
-fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+/// Takes a TOML document in that is a text already.
+///
+/// # Errors
+/// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that do not fit.
+pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
     parse_toml_lines(text, |byte| Some(line_of(text, byte)))
 }
 
@@ -146,7 +150,11 @@ fn parse_toml_lines<T: DeserializeOwned>(text: &str, line: impl Fn(usize) -> Opt
     })
 }
 
-fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+/// Takes a JSON document in that is a text already.
+///
+/// # Errors
+/// As [`parse_toml`].
+pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     let mistake = |e: &serde_json::Error, at: String| {
         let said = e.to_string();
         let what = said.split(" at line ").next().unwrap_or_default().into();

@@ -1,8 +1,8 @@
 //! What the camera wrote beside the pixels: which way up, and how wide the lens was.
 
 use super::orient::Orientation;
-use std::io::{BufRead, Cursor, Seek};
 use exif::{Exif, In, Tag, Value};
+use std::io::{BufRead, Cursor, Seek};
 
 /// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;

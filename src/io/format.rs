@@ -139,7 +139,9 @@ pub(super) fn open_regular(path: &Path, most: u64, expected: &str) -> Result<(Fi
     regular(&std::fs::metadata(path).map_err(failed)?, expected).map_err(|e| Error::file(path, e))?;
     let file = File::open(path).map_err(failed)?;
     let meta = file.metadata().map_err(failed)?;
-    regular(&meta, expected).and_then(|()| at_most(meta.len(), most, "bytes", "file_bytes")).map_err(|e| Error::file(path, e))?;
+    regular(&meta, expected)
+        .and_then(|()| at_most(meta.len(), most, "bytes", "file_bytes"))
+        .map_err(|e| Error::file(path, e))?;
     Ok((file, meta.len()))
 }
 

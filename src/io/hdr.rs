@@ -12,7 +12,12 @@ use std::io::{Cursor, Read};
 fn check_length(start: &[u8], limits: &Limits) -> Result<(), Refusal> {
     match start.windows(2).any(|pair| pair == b"\n\n") {
         true => Ok(()),
-        false => Ok(at_most(start.len() as u64, limits.metadata_bytes, "bytes without an end of the header", "metadata_bytes")?),
+        false => Ok(at_most(
+            start.len() as u64,
+            limits.metadata_bytes,
+            "bytes without an end of the header",
+            "metadata_bytes",
+        )?),
     }
 }
 

@@ -80,7 +80,9 @@ pub(super) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<H
 /// The embedded colour profile, which segments of 64 KiB hold in parts.
 pub(super) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
     let parts = segments(bytes).take_while(|s| s.marker != SOS).filter(|s| s.marker == APP2);
-    let numbered = |s: Segment<'_>| s.data.strip_prefix(ICC)?.split_first_chunk().map(|(&[number, _], part)| (number, part.to_vec()));
+    let numbered = |s: Segment<'_>| {
+        s.data.strip_prefix(ICC)?.split_first_chunk().map(|(&[number, _], part)| (number, part.to_vec()))
+    };
     let mut parts: Vec<(u8, Vec<u8>)> = parts.filter_map(numbered).collect();
     parts.sort_by_key(|&(number, _)| number);
     (!parts.is_empty()).then(|| parts.into_iter().flat_map(|(_, part)| part).collect())

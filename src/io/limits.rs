@@ -63,11 +63,13 @@ impl FromStr for Raise {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let (name, number) = text.split_once('=').ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
+        let (name, number) =
+            text.split_once('=').ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
         let unit = SUFFIXES.iter().find(|(suffix, _)| number.ends_with(*suffix));
         let (digits, factor) = unit.map_or((number, 1), |&(suffix, factor)| (number.trim_end_matches(suffix), factor));
         let value = digits.parse().ok().and_then(|v: u64| v.checked_mul(factor));
-        let value = value.ok_or_else(|| Error::value(name, format!("{number:?}, expected a number such as 65536 or 4G")))?;
+        let value =
+            value.ok_or_else(|| Error::value(name, format!("{number:?}, expected a number such as 65536 or 4G")))?;
         let raise = Self { name: name.into(), value };
         Limits::default().with(&raise)?;
         Ok(raise)
@@ -128,7 +130,7 @@ impl Limits {
         if bytes > RATIO_FREE_BYTES {
             at_most(bytes / d.file_bytes.max(1), self.ratio, "decoded bytes for each byte of the file", "ratio")?;
         }
-        Ok(())
+        affordable(bytes)
     }
 }
 

@@ -50,8 +50,8 @@ mod write;
 
 pub use atomic::create_folder;
 pub use document::{
-    from_overrides, read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json,
-    write_text, write_toml,
+    from_overrides, parse_json, parse_toml, read_document, read_json, read_text, read_toml, read_toml_with,
+    write_document, write_json, write_text, write_toml,
 };
 pub use format::Format;
 pub use header::Header;
@@ -74,7 +74,7 @@ use profile::Profile;
 #[cfg(feature = "oiio")]
 use protocol::{Ask, Sample, Shape, Told};
 use raster::{Opaque, Raster, Refusal, Wanted};
-use std::io::{Cursor, Seek};
+use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -132,8 +132,7 @@ static CHOSEN: OnceLock<ReadOptions> = OnceLock::new();
 
 impl Default for ReadOptions {
     fn default() -> Self {
-        let built_in =
-            || Self { limits: Limits::default(), fallback: Fallback::default(), window: Window::default() };
+        let built_in = || Self { limits: Limits::default(), fallback: Fallback::default(), window: Window::default() };
         CHOSEN.get().cloned().unwrap_or_else(built_in)
     }
 }
@@ -200,7 +199,8 @@ fn profile_of(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profi
 pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let (path, options) = (path.as_ref(), ReadOptions::default());
     let mut opened = Opened::open(path, &options.limits)?;
-    let (mut header, notes) = match caught(|| header(&mut opened, &options.limits)) {
+    let Opened { file, bytes, format } = &mut opened;
+    let (mut header, notes) = match caught(|| header(file, *bytes, *format, &options.limits)) {
         Err(Refusal::Unsupported(what)) => header_elsewhere(path, what, &options)?,
         header => header.map_err(|e| Error::file(path, e))?,
     };
@@ -211,6 +211,21 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     }
     (header.focal_35mm, header.digital_zoom) = (notes.focal_35mm, notes.digital_zoom);
     Ok(header)
+}
+
+/// The header of a file in memory, for fuzzing: nothing is caught.
+pub(crate) fn header_of(bytes: &[u8]) -> std::result::Result<Header, String> {
+    let format = Format::of_bytes(bytes).ok_or("no picture")?;
+    let told = header(&mut Cursor::new(bytes), bytes.len() as u64, format, &Limits::default());
+    told.map(|(header, _)| header).map_err(|e| e.to_string())
+}
+
+/// What a worker says, for fuzzing.
+#[cfg(feature = "oiio")]
+pub(crate) fn worker_answer(bytes: &[u8]) -> bool {
+    let mut from = bytes;
+    let shape = protocol::receive_shape(&mut from, &Limits::default(), bytes.len() as u64);
+    shape.ok().and_then(|shape| protocol::receive_samples(&mut from, shape.ok()?).ok()).is_some()
 }
 
 /// What the camera noted; EXR and HDR have no place for it.
@@ -224,16 +239,20 @@ fn camera_notes(source: &Source) -> CameraNotes {
 }
 
 /// What stands in front of the pixels, and no more of the file than that takes.
-fn header(opened: &mut Opened, limits: &Limits) -> std::result::Result<(Header, CameraNotes), Refusal> {
-    let Opened { file, bytes, format } = opened;
+fn header<R: BufRead + Seek>(
+    file: &mut R,
+    bytes: u64,
+    format: Format,
+    limits: &Limits,
+) -> std::result::Result<(Header, CameraNotes), Refusal> {
     let header = match format {
-        Format::Exr => exr::header(&mut *file, *bytes, limits)?,
-        Format::Hdr => hdr::header(&mut *file, *bytes, limits)?,
-        Format::Png => png::header(&mut *file, *bytes, limits)?,
-        Format::Tiff => tiff::header(&mut *file, *bytes, limits)?,
+        Format::Exr => exr::header(&mut *file, bytes, limits)?,
+        Format::Hdr => hdr::header(&mut *file, bytes, limits)?,
+        Format::Png => png::header(&mut *file, bytes, limits)?,
+        Format::Tiff => tiff::header(&mut *file, bytes, limits)?,
         Format::Jpeg => {
             let start = jpeg::head(file, limits)?;
-            return Ok((jpeg::header(&start, *bytes, limits)?, CameraNotes::of_file(Cursor::new(&start))));
+            return Ok((jpeg::header(&start, bytes, limits)?, CameraNotes::of_file(Cursor::new(&start))));
         }
         other => return Err(Refusal::Unsupported(format!("{} needs OpenImageIO", other.name()))),
     };
@@ -263,7 +282,12 @@ fn caught<T>(f: impl FnOnce() -> std::result::Result<T, Refusal>) -> std::result
 
 /// Another decoder for what ours do not know.
 #[cfg(feature = "oiio")]
-fn elsewhere(source: &Source, what: String, options: &ReadOptions, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+fn elsewhere(
+    source: &Source,
+    what: String,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> std::result::Result<Raster, Refusal> {
     match told(source, what, options, Ask::Pixels { wanted, window: options.window })? {
         Told::Raster(raster) => Ok(oiio::associated(raster, source)),
         Told::Shape(_) => Err("OpenImageIO gave no pixels".into()),

@@ -107,10 +107,7 @@ pub(super) fn decode(
     })
 }
 
-fn open<'a>(
-    source: &'a Source,
-    limits: &Limits,
-) -> std::result::Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
+fn open<'a>(source: &'a Source, limits: &Limits) -> std::result::Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
     start()?;
     // Named in messages, and opened by the few readers that know only files.
     let name = source.path.to_string_lossy();
@@ -156,7 +153,8 @@ fn filled<T: bytemuck::Pod>(count: usize, reader: &ffi::Reader<'_>) -> std::resu
 fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
     let (width, height) = (layout.width as usize, layout.height as usize);
     let (columns, stride) = (layout.data_width as usize, layout.channels.len());
-    let same_window = (layout.x, layout.y, layout.data_width, layout.data_height) == (0, 0, layout.width, layout.height);
+    let same_window =
+        (layout.x, layout.y, layout.data_width, layout.data_height) == (0, 0, layout.width, layout.height);
     if same_window && picked.iter().copied().eq(0..stride) {
         return samples;
     }

@@ -57,7 +57,8 @@ mod tests {
 
     #[test]
     fn any_text_makes_a_harmless_name() {
-        let names = ["../../etc/passwd", "", ".", "..", "a/b", "C:\\x", "nul", "CON.txt", ".hidden", "ä b", "ok-1_2.png"];
+        let names =
+            ["../../etc/passwd", "", ".", "..", "a/b", "C:\\x", "nul", "CON.txt", ".hidden", "ä b", "ok-1_2.png"];
         let cleaned = names.map(clean_name);
         assert_eq!(cleaned[0], "_.._.._etc_passwd");
         assert_eq!(cleaned[10], "ok-1_2.png");

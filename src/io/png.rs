@@ -8,7 +8,6 @@ use crate::io::Format;
 use png::{BitDepth, ColorType, Transformations};
 use std::io::{BufRead, Cursor, Seek};
 
-
 impl From<png::DecodingError> for Refusal {
     fn from(e: png::DecodingError) -> Self {
         let cut = matches!(&e, png::DecodingError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof);

@@ -69,7 +69,13 @@ impl Profile {
         let near = |v: f32, w: f32| (v - w).abs() < SAME;
         let unit = ColorMatrix::from(Matrix3::identity());
         let plain = self.to_rec709.rows.iter().flatten().zip(unit.rows.iter().flatten()).all(|(&v, &w)| near(v, w));
-        plain && self.curves.iter().flatten().enumerate().all(|(i, &v)| near(v, srgb_to_linear((i % CODES) as f32 / FULL)))
+        plain
+            && self
+                .curves
+                .iter()
+                .flatten()
+                .enumerate()
+                .all(|(i, &v)| near(v, srgb_to_linear((i % CODES) as f32 / FULL)))
     }
 
     /// Linear Rec. 709 of display values from 0 to 1.
@@ -85,7 +91,8 @@ const CODES: usize = 1 << 16;
 
 /// Light of every 16-bit code; none for a curve that is not one.
 fn table(curve: &ToneReprCurve) -> Option<Vec<f32>> {
-    let light: Vec<f32> = (0..CODES).map(|code| evaluate(curve, f64::from(code as u16) / f64::from(FULL)) as f32).collect();
+    let light: Vec<f32> =
+        (0..CODES).map(|code| evaluate(curve, f64::from(code as u16) / f64::from(FULL)) as f32).collect();
     light.iter().all(|v| v.is_finite()).then_some(light)
 }
 
@@ -99,10 +106,34 @@ fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
         },
         ToneReprCurve::Parametric(p) => match p.iter().map(|&v| f64::from(v)).collect::<Vec<_>>()[..] {
             [g] => libm::pow(x, g),
-            [g, a, b] => if x >= -b / a { libm::pow(a * x + b, g) } else { 0.0 },
-            [g, a, b, c] => if x >= -b / a { libm::pow(a * x + b, g) + c } else { c },
-            [g, a, b, c, d] => if x >= d { libm::pow(a * x + b, g) } else { c * x },
-            [g, a, b, c, d, e, f] => if x >= d { libm::pow(a * x + b, g) + e } else { c * x + f },
+            [g, a, b] => {
+                if x >= -b / a {
+                    libm::pow(a * x + b, g)
+                } else {
+                    0.0
+                }
+            }
+            [g, a, b, c] => {
+                if x >= -b / a {
+                    libm::pow(a * x + b, g) + c
+                } else {
+                    c
+                }
+            }
+            [g, a, b, c, d] => {
+                if x >= d {
+                    libm::pow(a * x + b, g)
+                } else {
+                    c * x
+                }
+            }
+            [g, a, b, c, d, e, f] => {
+                if x >= d {
+                    libm::pow(a * x + b, g) + e
+                } else {
+                    c * x + f
+                }
+            }
             _ => f64::NAN,
         },
     }

@@ -192,8 +192,14 @@ mod tests {
             Samples::F16([0.5, 1.0, 2.0].map(half::f16::from_f32).to_vec()),
             Samples::F32(vec![0.1, -1.0, f32::INFINITY]),
         ] {
-            let sent =
-                Raster { width: 1, height: 1, names: names.clone(), samples, display_encoded: false, premultiplied: false };
+            let sent = Raster {
+                width: 1,
+                height: 1,
+                names: names.clone(),
+                samples,
+                display_encoded: false,
+                premultiplied: false,
+            };
             let mut pipe = Vec::new();
             send_raster(&mut pipe, &sent).unwrap();
             assert_eq!(received(&pipe).unwrap(), sent);

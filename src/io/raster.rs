@@ -266,7 +266,9 @@ impl Raster {
                 self.decoded(v, &at, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into(), light)
             }
             (Samples::U16(v), None) => self.decoded(v, &at, 65_535.0, |codes| codes.map(decode_srgb16), light),
-            (Samples::U8(v), Some(p)) => self.decoded(v, &at, 255.0, |c| p.light(c.map(|c| f32::from(c) / 255.0)), light),
+            (Samples::U8(v), Some(p)) => {
+                self.decoded(v, &at, 255.0, |c| p.light(c.map(|c| f32::from(c) / 255.0)), light)
+            }
             (Samples::U16(v), Some(p)) => {
                 self.decoded(v, &at, 65_535.0, |c| p.light(c.map(|c| f32::from(c) / 65_535.0)), light)
             }

@@ -47,7 +47,11 @@ fn answer_all(limits: &Limits, from: &mut impl BufRead, to: &mut impl Write) -> 
 }
 
 /// The file of a question; a format of an unknown name is for the answer to tell.
-fn received_file(question: &Question, limits: &Limits, from: &mut impl Read) -> Result<std::result::Result<Source, String>> {
+fn received_file(
+    question: &Question,
+    limits: &Limits,
+    from: &mut impl Read,
+) -> Result<std::result::Result<Source, String>> {
     at_most(question.bytes, limits.file_bytes, "bytes", "file_bytes").map_err(std::io::Error::other)?;
     let mut bytes = vec![0; question.bytes as usize];
     from.read_exact(&mut bytes)?;

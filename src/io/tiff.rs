@@ -41,6 +41,7 @@ fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Ope
     most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
     let mut decoder = Decoder::new(file)?.with_limits(most);
     let (width, height) = decoder.dimensions()?;
+    refuse_missing_palette(&mut decoder)?;
     let (channels, bits) = match decoder.colortype()? {
         ColorType::Gray(bits) => (1, bits),
         ColorType::GrayA(bits) => (2, bits),
@@ -53,6 +54,23 @@ fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Ope
     limits.check(Demand { width: w, height: h, channels, bytes_per_pixel, file_bytes })?;
     let names = usual_names(channels as usize).ok_or("channels of an unknown kind")?;
     Ok(Opened { decoder, width: width as usize, height: height as usize, names, bits })
+}
+
+/// TIFF 6.0, `PhotometricInterpretation` = 3: codes are places in a palette.
+const PALETTE: u16 = 3;
+
+/// OpenImageIO, which reads palettes, makes a black picture where there is none.
+fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
+    if decoder.find_tag_unsigned(Tag::PhotometricInterpretation)? != Some(PALETTE) {
+        return Ok(());
+    }
+    let bits = decoder.find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?.unwrap_or_default();
+    let colors = bits.first().and_then(|&bits| 1_usize.checked_shl(bits.into())).unwrap_or(0);
+    let entries = decoder.find_tag_unsigned_vec::<u16>(Tag::ColorMap)?.unwrap_or_default().len();
+    match entries == 3 * colors {
+        true => Ok(()),
+        false => Err(format!("damaged TIFF: a palette of {entries} entries, expected {}", 3 * colors).into()),
+    }
 }
 
 /// The embedded colour profile.
@@ -68,15 +86,7 @@ pub(super) fn header(file: impl Read + Seek, file_bytes: u64, limits: &Limits) -
     let Opened { mut decoder, width, height, names, bits } = open(file, file_bytes, limits)?;
     let text = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
     let (bits, metadata) = (u32::from(bits), notes_of_lines(&text));
-    Ok(Header {
-        format: Format::Tiff,
-        width,
-        height,
-        channels: names,
-        bits,
-        metadata,
-        ..Header::default()
-    })
+    Ok(Header { format: Format::Tiff, width, height, channels: names, bits, metadata, ..Header::default() })
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {

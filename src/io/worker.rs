@@ -95,7 +95,9 @@ impl Pool {
                 }
                 Err(Failure::Slow(patience)) => {
                     let seconds = patience.as_secs_f64();
-                    return Err(format!("unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)").into());
+                    return Err(
+                        format!("unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)").into()
+                    );
                 }
                 Err(Failure::Died(how)) => {
                     log::debug!("{}: OpenImageIO died on it ({how})", source.path.display());
@@ -132,7 +134,8 @@ impl Drop for Worker {
 
 impl Worker {
     fn start(program: &Path, limits: &Limits) -> Result<Self, Refusal> {
-        let not_started = |e: std::io::Error| format!("needs OpenImageIO, and {} does not start: {e}", program.display());
+        let not_started =
+            |e: std::io::Error| format!("needs OpenImageIO, and {} does not start: {e}", program.display());
         let argument = serde_json::to_string(limits).map_err(|e| e.to_string())?;
         let mut child = Command::new(program)
             .arg(argument)
@@ -220,15 +223,17 @@ fn patience_for(shape: &Shape) -> Duration {
 fn warn_of(missing: &[String]) {
     static SAID: Once = Once::new();
     if !missing.is_empty() {
-        SAID.call_once(|| log::warn!("the OpenImageIO worker is less confined than it could be: {}", missing.join("; ")));
+        SAID.call_once(|| {
+            log::warn!("the OpenImageIO worker is less confined than it could be: {}", missing.join("; "))
+        });
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use super::super::{Format, Window};
     use super::super::raster::{Raster, Samples, Wanted};
+    use super::super::{Format, Window};
+    use super::*;
     use std::os::unix::fs::PermissionsExt;
 
     /// A worker that greets and then does what a shell script says; `$n` counts how many were started in its folder.
@@ -252,7 +257,8 @@ mod tests {
         }
     }
 
-    const GREY: &str = r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
+    const GREY: &str =
+        r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
 
     #[test]
     fn an_answer_is_a_line_and_samples() {

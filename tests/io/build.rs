@@ -68,6 +68,17 @@ pub(crate) fn find(file: &[u8], text: &[u8]) -> usize {
     file.windows(text.len()).position(|w| w == text).unwrap_or_else(|| panic!("{:?}", String::from_utf8_lossy(text)))
 }
 
+/// Where the places of an EXR's blocks are: behind the zero that ends its attributes.
+pub(crate) fn end_of_attributes(file: &[u8]) -> usize {
+    let text = |at: usize| at + file[at..].iter().position(|&b| b == 0).unwrap() + 1;
+    let mut at = 8;
+    while file[at] != 0 {
+        let size = text(text(at));
+        at = size + 4 + u32::from_le_bytes(*file[size..].first_chunk().unwrap()) as usize;
+    }
+    at + 1
+}
+
 /// An EXR file with bytes of an attribute's value replaced, from `at` on.
 pub(crate) fn attribute(file: &[u8], name_and_kind: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
     let value = find(file, name_and_kind.as_bytes()) + name_and_kind.len() + 4;

@@ -11,11 +11,12 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
     let folder = Folder::new();
     let (w, h) = (40, 30);
     let mut files = Vec::new();
-    let mut add = |name: &'static str, bits: Option<Bits>, compression, write: &dyn Fn(&std::path::Path, &WriteOptions)| {
-        let path = folder.file(name);
-        write(&path, &WriteOptions { bits, compression, ..Default::default() });
-        files.push((name, std::fs::read(path).unwrap()));
-    };
+    let mut add =
+        |name: &'static str, bits: Option<Bits>, compression, write: &dyn Fn(&std::path::Path, &WriteOptions)| {
+            let path = folder.file(name);
+            write(&path, &WriteOptions { bits, compression, ..Default::default() });
+            files.push((name, std::fs::read(path).unwrap()));
+        };
     fn to<P: ToFile>(image: &Image<P>) -> impl Fn(&std::path::Path, &WriteOptions) {
         move |path, options| io::write_with(path, image, options).unwrap()
     }
@@ -41,7 +42,10 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
     add("grey16.tif", Some(Bits::Sixteen), zip, &to(&matte));
     files.push(("rgb.hdr", hdr(w, h)));
     files.push(("palette.png", palette_png()));
-    files.push(("interlaced.png", png(&[ihdr(2, 2, 8, 0, 1), (b"IDAT", stored(&[0, 1, 0, 2, 0, 3, 4])), (b"IEND", vec![])])));
+    files.push((
+        "interlaced.png",
+        png(&[ihdr(2, 2, 8, 0, 1), (b"IDAT", stored(&[0, 1, 0, 2, 0, 3, 4])), (b"IEND", vec![])]),
+    ));
     files.push(("tags.tif", tiff(&tags(8, 8, &[]), &(0..64).collect::<Vec<u8>>())));
     files
 }

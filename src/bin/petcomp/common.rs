@@ -59,6 +59,7 @@ impl OpenImageIo {
 impl Common {
     /// Sets up threads, messages and what is read; called once.
     pub(crate) fn apply(&self) -> anyhow::Result<()> {
+        end_with_the_reader();
         let level = match (self.quiet, self.verbose) {
             (true, _) => log::LevelFilter::Error,
             (_, 0) => log::LevelFilter::Warn,
@@ -148,6 +149,18 @@ impl Drop for Progress {
     }
 }
 
+/// `petcomp ... | head` ends when head does: printing to nobody is no failure of ours, and no panic.
+fn end_with_the_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let said = info.payload_as_str().unwrap_or_default();
+        if said.starts_with("failed printing to std") && said.contains("Broken pipe") {
+            std::process::exit(READER_GONE.into());
+        }
+        usual(info);
+    }));
+}
+
 /// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures; the second one ends
 /// the program at once.
 pub(crate) fn interruption() -> &'static AtomicBool {
@@ -215,6 +228,8 @@ const INCOMPLETE: u8 = 2;
 const DATA: u8 = 3;
 const FILE: u8 = 4;
 const INTERRUPTED: u8 = 130;
+/// As of a program that SIGPIPE ended.
+const READER_GONE: u8 = 141;
 
 /// Prints one line of causes and gives the exit status: 2 where some of many files could not be used, 3 for data that cannot be right, 4 for files that cannot be used,
 /// 130 after an interruption. (2 is a wrong command line too; clap says that.)
