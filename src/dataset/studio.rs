@@ -1,10 +1,10 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
-use crate::asset::{Asset, Library, Photo};
+use crate::asset::{Asset, Library, Panorama};
 use crate::camera;
 use crate::composite;
 use crate::dataset::place::Place;
-use crate::dataset::{Plan, Sample, Setup, Sidecar};
+use crate::dataset::{Plan, Sample, Setup, Sidecar, Writer};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label;
@@ -53,17 +53,24 @@ impl Studio {
     }
 
     /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
-    pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Plan {
-        Plan {
+    ///
+    /// # Errors
+    /// Classes that the setup's policy for obstructed objects cannot add to.
+    pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
+        let labels = &self.setup.labels;
+        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures)];
+        writers.extend(labels.writers());
+        writers.push(Box::new(Sidecar));
+        Ok(Plan {
             folder: folder.into(),
             count,
             seed,
             recipe: self.fingerprint(),
-            classes: self.library.classes.clone(),
+            classes: labels.obstructed.classes(&self.library.classes)?,
             split: self.setup.split,
-            obstructed: self.setup.obstructed,
-            writers: vec![Box::new(self.setup.pictures), Box::new(self.setup.yolo), Box::new(Sidecar)],
-        }
+            obstructed: labels.obstructed,
+            writers,
+        })
     }
 
     /// Everything that decides what a picture or its labels are, cut-outs and labels by checksum; not where folders lie.
@@ -72,7 +79,8 @@ impl Studio {
             self.library.assets.iter().map(|a| (a.name.as_str(), checksums(a))).collect();
         let places: BTreeMap<&str, u32> =
             self.places.iter().map(|place| (place.background.name.as_str(), place.checksum)).collect();
-        let Setup { scene, render, label, .. } = &self.setup;
+        let Setup { scene, render, labels, .. } = &self.setup;
+        let label = labels.options();
         serde_json::json!({ "scene": scene, "render": render, "label": label, "assets": assets, "backgrounds": places })
     }
 
@@ -91,9 +99,10 @@ impl Studio {
     pub fn sample(&self, seed: u64, k: u64) -> Result<Sample> {
         let mut retries = 0;
         loop {
-            let scene = self.draw(redraw_seed(seed, k, retries), k)?;
+            let scene_seed = redraw_seed(seed, k, retries);
+            let scene = self.draw(scene_seed, k)?;
             match self.take(scene) {
-                Ok(sample) => return Ok(Sample { retries, ..sample }),
+                Ok(sample) => return Ok(Sample { retries, scene_seed, ..sample }),
                 Err(Error::Unsettled { what }) if retries < REDRAWS => {
                     log::info!("scene {k} is drawn again: {what}");
                     retries += 1;
@@ -108,11 +117,12 @@ impl Studio {
     /// # Errors
     /// As the stages: no camera, no rest, a name that is not in the folders.
     pub fn take(&self, scene: Scene) -> Result<Sample> {
+        let drawn = scene.clone();
         let (scene, shot) = self.resolve(scene)?;
         let deep = render::cast(&shot, &self.setup.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
-        let labels = label::label(&deep, &shot, &self.setup.label);
-        Ok(Sample { frame, labels, scene, retries: 0 })
+        let labels = label::label(&deep, &shot, &self.setup.labels.options());
+        Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, retries: 0 })
     }
 
     /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its exposure.
@@ -125,7 +135,7 @@ impl Studio {
         if let Some(plate) = &plate {
             scene = light::expose(scene, plate);
         }
-        let shot = scene.resolve(|object| Look::of(&self.library, object), plate)?;
+        let shot = scene.resolve(|object| Look::of(&self.library, object), plate, panorama(&scene)?)?;
         Ok((scene, shot))
     }
 
@@ -153,10 +163,14 @@ impl Studio {
     }
 }
 
+/// The picture of the surroundings that a scene names.
+fn panorama(scene: &Scene) -> Result<Option<Arc<Panorama>>> {
+    scene.environment.as_ref().map(|map| Panorama::read(&map.file).map(Arc::new)).transpose()
+}
+
 /// One checksum for each photo's cut-out.
 fn checksums(asset: &Asset) -> Vec<u32> {
-    let of = |photo: &Photo| crc32fast::hash(bytemuck::cast_slice(photo.texture.base().pixels()));
-    asset.photos.iter().map(of).collect()
+    asset.photos.iter().map(|photo| photo.texture.checksum()).collect()
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.
