@@ -8,12 +8,35 @@
 //! | half and float (EXR, TIFF, HDR) | taken as scene-linear Rec. 709 | EXR premultiplied, TIFF as it says | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
-//! padded with zeros from its data window to its display window. An EXR that names other primaries is converted; embedded ICC profiles are not
-//! applied.
+//! padded with zeros from its data window to its display window ([`Window`] keeps the former), and converted if it names
+//! other primaries. A colour profile (ICC) of primaries and curves, such as Display P3 or Adobe RGB, is applied to display
+//! codes; others are named in a warning and the codes taken for sRGB. Inks (CMYK) are multiplied. Samples that are infinite or no
+//! number are counted in a warning, and become codes of 0 or full where integers are written.
 //!
-//! Sizes are checked against [`Limits`] before anything is allocated, decoders that panic are caught, and truncated JPEGs,
-//! which decoders take for grey pictures, are refused. Files are written beside their place and moved there: whole or
-//! not at all.
+//! # What is promised of files that nobody vouches for
+//!
+//! No file that is handed to petcomp kills it, hangs it, takes the machine's memory or gets out of its folder; what can be
+//! read is read right, what cannot is named in one line.
+//!
+//! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, TIFF, Radiance HDR; DPX and Cineon
+//!   only under their own names.
+//! * **What a file may ask for** is in [`Limits`], and checked before pixels are touched, in arithmetic that cannot wrap: by default
+//!   32,768 pixels along a side, 128 Mi in all, 64 channels, 1 GiB decoded, 10,000 times the file above 64 MiB, 64 MiB that
+//!   is not pixels. Memory that the system does not give is not attempted.
+//! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file. What they do not know goes
+//!   to OpenImageIO in a worker process, which gets the file's bytes and gives samples through pipes. It may open no file
+//!   (Landlock, seccomp, file size 0), start nothing, connect nowhere, has memory for the file in hand, and is killed when it takes more
+//!   than [`Limits::seconds`]. A file on which two workers die is named with the signal. The worker is not believed either.
+//! * **What is written** stands beside its place first, is put on the disk, and is moved there: whole or not at all. A link in
+//!   the way is replaced, not followed; [`refuse_links`] and [`clean_name`] keep outputs in their folder. No metadata of an input
+//!   gets into an output, so neither places (GPS) nor serial numbers do.
+//! * **Documents** (JSON, TOML) are at most 64 MiB and nested 80 to 128 deep, without a key twice or a number that is not finite;
+//!   a mistake is named with its line.
+//!
+//! Not promised: that decoders have no mistakes ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
+//! and Debian does not mend them), that a kernel without Landlock or seccomp confines as well (one warning says so), that
+//! the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
+//! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be told from real ones.
 
 mod atomic;
 #[cfg(feature = "oiio")]

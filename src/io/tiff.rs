@@ -32,6 +32,8 @@ struct Opened<R: Read + Seek> {
     height: usize,
     names: Vec<String>,
     bits: u8,
+    /// Stored as cyan, magenta, yellow and black.
+    inks: bool,
 }
 
 fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Opened<R>, Refusal> {
@@ -46,14 +48,15 @@ fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Ope
         ColorType::Gray(bits) => (1, bits),
         ColorType::GrayA(bits) => (2, bits),
         ColorType::RGB(bits) => (3, bits),
-        ColorType::RGBA(bits) => (4, bits),
+        ColorType::RGBA(bits) | ColorType::CMYK(bits) => (4, bits),
         other => return Err(Refusal::Unsupported(format!("unsupported TIFF: {other:?}"))),
     };
     let (w, h) = (width.into(), height.into());
     let bytes_per_pixel = channels * u64::from(bits).div_ceil(8);
     limits.check(Demand { width: w, height: h, channels, bytes_per_pixel, file_bytes })?;
-    let names = usual_names(channels as usize).ok_or("channels of an unknown kind")?;
-    Ok(Opened { decoder, width: width as usize, height: height as usize, names, bits })
+    let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
+    let names = usual_names(if inks { 3 } else { channels as usize }).ok_or("channels of an unknown kind")?;
+    Ok(Opened { decoder, width: width as usize, height: height as usize, names, bits, inks })
 }
 
 /// TIFF 6.0, `PhotometricInterpretation` = 3: codes are places in a palette.
@@ -83,14 +86,14 @@ pub(super) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
 }
 
 pub(super) fn header(file: impl Read + Seek, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
-    let Opened { mut decoder, width, height, names, bits } = open(file, file_bytes, limits)?;
+    let Opened { mut decoder, width, height, names, bits, .. } = open(file, file_bytes, limits)?;
     let text = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
     let (bits, metadata) = (u32::from(bits), notes_of_lines(&text));
     Ok(Header { format: Format::Tiff, width, height, channels: names, bits, metadata, ..Header::default() })
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
-    let Opened { mut decoder, width, height, names, .. } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    let Opened { mut decoder, width, height, names, inks, .. } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
     if decoder.image_buffer_layout()?.planes != 1 {
         return Err(Refusal::Unsupported("unsupported TIFF: separate planes".into()));
@@ -103,6 +106,12 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
         DecodingResult::F64(v) => Samples::F32(v.into_iter().map(|x| x as f32).collect()),
         _ => return Err(Refusal::Unsupported("unsupported TIFF: signed or long integer samples".into())),
     };
+    let samples = match samples {
+        Samples::U8(v) if inks => Samples::U8(left_by_inks(&v, u8::MAX.into())),
+        Samples::U16(v) if inks => Samples::U16(left_by_inks(&v, u16::MAX.into())),
+        _ if inks => return Err(Refusal::Unsupported("unsupported TIFF: inks in float".into())),
+        samples => samples,
+    };
     let (display_encoded, count) = match &samples {
         Samples::U8(v) => (true, v.len()),
         Samples::U16(v) => (true, v.len()),
@@ -114,6 +123,16 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     }
     let premultiplied = extra.first() == Some(&ASSOCIATED_ALPHA);
     Ok(Raster { width, height, names, samples, display_encoded, premultiplied })
+}
+
+/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded as the inks were; a colour
+/// profile would say it better, and is not applied to inks.
+fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: u64) -> Vec<T> {
+    let left = |ink: T, black: T| {
+        let product = (full - ink.into()) * (full - black.into());
+        T::try_from((product + full / 2) / full).unwrap_or_default()
+    };
+    inks.chunks_exact(4).flat_map(|px| [left(px[0], px[3]), left(px[1], px[3]), left(px[2], px[3])]).collect()
 }
 
 /// A whole file of integer codes; alpha is straight.

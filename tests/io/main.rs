@@ -9,6 +9,8 @@ mod build;
 mod damaged;
 mod faults;
 mod fuzz;
+#[cfg(feature = "oiio")]
+mod kinds;
 mod make;
 mod meaning;
 mod sweep;

@@ -41,6 +41,8 @@ fn a_worker_may_open_nothing_and_start_nothing() {
     let status = status(pid);
     let line = |name: &str| status.lines().find_map(|l| l.strip_prefix(name)).map(str::trim);
     assert_eq!(line("NoNewPrivs:"), Some("1"));
+    // The filters are those of a thread.
+    assert_eq!(line("Threads:"), Some("1"));
     // 2: a filter. A kernel without one is warned of, and then nothing can be said here.
     if std::path::Path::new("/proc/sys/kernel/seccomp").exists() {
         assert_eq!(line("Seccomp:"), Some("2"));
