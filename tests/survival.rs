@@ -137,6 +137,15 @@ fn ends(mut child: Child) -> std::process::ExitStatus {
     }
 }
 
+/// Until a run has finished its first picture, and so listens to signals.
+fn wait_for_a_sample(folder: &Path) {
+    let start = Instant::now();
+    while std::fs::metadata(folder.join("index.jsonl")).map_or(0, |m| m.len()) == 0 {
+        assert!(start.elapsed() < Duration::from_secs(120), "no picture in two minutes");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
 /// A recipe and what it needs.
 fn demo(desk: &Desk) {
     let output = desk.run(&["demo", "--samples", &samples(), "-n", "1", "-q", "-o", "demo"]);
@@ -170,7 +179,7 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
             desk.command(&args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
         };
         let child = run("100000");
-        std::thread::sleep(Duration::from_millis(1500));
+        wait_for_a_sample(&desk.0.path().join(signal));
         assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
         assert_eq!(ends(child).code(), Some(130), "{signal}");
         let killed = run("100000");

@@ -175,10 +175,16 @@ mod tests {
     fn other_primaries_become_rec_709() {
         let p3 = RgbSpace { primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]], white: [0.3127, 0.3290] };
         let adobe = RgbSpace { primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]], white: [0.3127, 0.3290] };
-        let gamma = |v: f64| libm::pow(v, 563.0 / 256.0);
-        let srgb = |v: f64| f64::from(srgb_to_linear(v as f32));
-        let cases: [(ColorProfile, RgbSpace, &dyn Fn(f64) -> f64); 2] =
-            [(ColorProfile::new_display_p3(), p3, &srgb), (ColorProfile::new_adobe_rgb(), adobe, &gamma)];
+        fn gamma(v: f64) -> f64 {
+            libm::pow(v, 563.0 / 256.0)
+        }
+        fn srgb(v: f64) -> f64 {
+            f64::from(srgb_to_linear(v as f32))
+        }
+        let cases = [
+            (ColorProfile::new_display_p3(), p3, srgb as fn(f64) -> f64),
+            (ColorProfile::new_adobe_rgb(), adobe, gamma as fn(f64) -> f64),
+        ];
         for (icc, space, curve) in cases {
             let profile = parsed(&icc).unwrap();
             for display in [[0.2, 0.5, 0.9], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [0.8, 0.1, 0.3]] {

@@ -153,7 +153,7 @@ impl Drop for Progress {
 fn end_with_the_reader() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        let said = info.payload_as_str().unwrap_or_default();
+        let said = info.payload().downcast_ref::<String>().map_or("", String::as_str);
         if said.starts_with("failed printing to std") && said.contains("Broken pipe") {
             std::process::exit(READER_GONE.into());
         }
