@@ -1,5 +1,6 @@
 # make demo   a labelled sample dataset from the photographs in this repository
 # make test   every test
+# make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 
 CARGO     := cargo
@@ -12,6 +13,10 @@ PYTHON    := $(CURDIR)/target/python/bin/python
 FEATURES  := "" markers oiio settle
 
 .PHONY: demo test lint bench golden formats python packages blender
+# Seconds for each door of fuzz/.
+FUZZ      := 60
+
+.PHONY: demo test lint bench golden packages blender soak fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins
@@ -23,6 +28,22 @@ test: packages python
 	  echo "tests with features [$$f] alone"; \
 	  $(CARGO) test --release --locked --no-default-features --features "$$f" --lib --quiet || exit 1; \
 	done
+
+# 100,000 damaged pictures.
+soak: packages
+	$(CARGO) test --release --locked --test io -- --ignored --nocapture sweep::soak
+
+# By cargo-fuzz and a nightly compiler where they are (`cargo install cargo-fuzz`, `rustup toolchain install nightly`);
+# by seeds and chance on the stable one otherwise.
+fuzz: packages
+	@if $(CARGO) +nightly fuzz --version >/dev/null 2>&1; then \
+	  cd fuzz && for door in label recipe journal worker header; do \
+	    $(CARGO) +nightly fuzz run --sanitizer none $$door -- -max_total_time=$(FUZZ) -timeout=5 -rss_limit_mb=1024 || exit 1; \
+	  done; \
+	else \
+	  echo "no cargo-fuzz with a nightly compiler here: seeds and chance instead"; \
+	  $(CARGO) test --release --locked --test io -- --ignored --nocapture fuzz::; \
+	fi
 
 lint: packages
 	$(CARGO) fmt --check

@@ -42,6 +42,7 @@ pub use coco::{Coco, CocoMask};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use formats::{Extent, Format, LabelSetup};
 pub use generate::{Plan, Progress, generate};
+pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report};
 pub use layers::Layers;
 pub use obstructed::{Labelled, OBSTRUCTED, Obstructed};

@@ -1,4 +1,4 @@
-//! Whole files or none: everything is written beside its place and then moved there.
+//! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
 
 use super::format::reason;
 use crate::{Error, Result};
@@ -28,7 +28,25 @@ pub fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::
     let mut pieces = BufWriter::new(&mut file);
     fill(&mut pieces).and_then(|()| pieces.flush()).map_err(failed)?;
     drop(pieces);
+    // Before it gets its name: after a power cut there is the old file or the new one.
+    file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|e| failed(e.error))?;
+    sync_folder(folder).map_err(failed)
+}
+
+/// Puts the names in a folder on the disk.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    match std::fs::File::open(folder)?.sync_all() {
+        // Some file systems have no such thing.
+        Err(e) if e.kind() == std::io::ErrorKind::InvalidInput => Ok(()),
+        done => done,
+    }
+}
+
+/// Other systems write names by themselves.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 

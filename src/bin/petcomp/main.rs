@@ -73,8 +73,7 @@ enum Stage {
 
 fn main() -> ExitCode {
     let cli = Cli::parse_from(diff::accept_idiff_spelling(std::env::args()));
-    cli.common.apply();
-    match run(&cli) {
+    match cli.common.apply().and_then(|()| run(&cli)) {
         Ok(code) => code,
         Err(error) => common::report(&error),
     }
