@@ -9,6 +9,7 @@ mod check;
 mod draw;
 mod fall;
 mod light;
+mod limit;
 mod placement;
 mod range;
 mod recipe;
@@ -16,11 +17,13 @@ mod resolve;
 mod shot;
 mod stack;
 mod stock;
+mod variation;
 
-pub use draw::Draws;
+pub use draw::{Distribution, DrawLog, Drawn, Draws};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
+pub use limit::Limit;
 pub use light::{AreaLight, Exposure, LightShape};
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
@@ -29,6 +32,7 @@ pub use resolve::{CATCHER, Look};
 pub use shot::{Card, Shot};
 pub use stack::Start;
 pub use stock::stock;
+pub use variation::{Ablation, Source};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;
