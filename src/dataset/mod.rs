@@ -22,27 +22,35 @@ mod folder;
 mod formats;
 mod generate;
 mod journal;
+mod merge;
 mod obstructed;
 mod pictures;
 mod place;
+mod run;
 mod setup;
+mod shard;
 mod sidecar;
 mod split;
 mod studio;
+mod times;
 mod yolo;
 mod yolo_yaml;
 
 pub use check::{Checked, Fault, check};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use formats::{Format, LabelSetup};
-pub use generate::{Plan, Progress, generate};
-pub use journal::{ClassCount, Report};
+pub use generate::{Plan, generate};
+pub use journal::{ClassCount, Report, mend};
+pub use merge::merge;
 pub use obstructed::{Labelled, OBSTRUCTED, Obstructed};
 pub use pictures::{PictureFormat, Pictures};
+pub use run::Progress;
 pub use setup::Setup;
+pub use shard::{Numbers, Shard, ShardChoice};
 pub use sidecar::{Record, Sidecar};
 pub use split::{Part, Split, SplitOrder};
 pub use studio::Studio;
+pub use times::Times;
 pub use yolo::{Yolo, YoloBox, YoloTask};
 
 use crate::error::Result;
@@ -50,7 +58,7 @@ use crate::image::Image;
 use crate::label::Labels;
 use crate::pixel::PremulRgba;
 use crate::render::DeepImage;
-use crate::scene::Scene;
+use crate::scene::{Drawn, Scene};
 use std::path::{Path, PathBuf};
 
 /// One finished picture and all that is known of it.
@@ -68,8 +76,12 @@ pub struct Sample {
     pub scene: Scene,
     /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
     pub scene_seed: u64,
-    /// Scenes that were drawn and thrown away before this one.
-    pub retries: u32,
+    /// Why each scene that was drawn before this one was thrown away.
+    pub rejected: Vec<String>,
+    /// Every draw that the scene was made with, in order.
+    pub draws: Vec<Drawn>,
+    /// How long it took; in no file of the dataset.
+    pub times: Times,
 }
 
 /// A sample and its place in the dataset: what a [`Writer`] writes.

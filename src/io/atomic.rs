@@ -22,6 +22,28 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
+/// Copies a file in one step: readers see the old one or the new one, never a part.
+///
+/// # Errors
+/// [`Error::File`] for the one that cannot be read or written.
+pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<()> {
+    let (from, to) = (from.as_ref(), to.as_ref());
+    let bytes = std::fs::read(from).map_err(|e| Error::file(from, reason(&e)))?;
+    write_bytes(to, &bytes)
+}
+
+/// Brings everything that was written to the file system of a folder to the disk, so that it outlives a power cut.
+///
+/// Where it cannot be done nothing is lost but time: what is not there is made again.
+pub fn sync(folder: impl AsRef<Path>) {
+    #[cfg(target_os = "linux")]
+    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?)) {
+        log::debug!("{}: syncfs: {e}", folder.as_ref().display());
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = folder;
+}
+
 /// A new file that vanishes if it is not moved to its place, readable like any other file of the user.
 fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
