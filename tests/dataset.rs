@@ -2,7 +2,7 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    Obstructed, Numbers, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions, Sidecar, Split,
+    Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions, Sidecar, Split,
     SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
 };
 use petcomp::geom::{Point2, Pose, Vector2};
@@ -31,6 +31,7 @@ fn scene(k: u64) -> Scene {
         objects: Vec::new(),
         lights: Vec::new(),
         ambient: LinearRgb::grey(0.1),
+        environment: None,
         exposure: Exposure::default(),
     }
 }
@@ -61,7 +62,17 @@ fn sample(k: u64) -> Result<Sample> {
     let labels = Labels { image: IMAGE, objects: objects.collect() };
     let drawn = Scene { exposure: Exposure::MatchPlate { gain_ev: 0.1 }, ..scene(k) };
     let rejected = vec!["two bodies overlap".to_owned(); (k % 3) as usize];
-    Ok(Sample { frame, deep: DeepImage::default(), labels, drawn, scene: scene(k), scene_seed: k ^ 7, rejected, draws: vec![], times: Times::default() })
+    Ok(Sample {
+        frame,
+        deep: DeepImage::default(),
+        labels,
+        drawn,
+        scene: scene(k),
+        scene_seed: k ^ 7,
+        rejected,
+        draws: vec![],
+        times: Times::default(),
+    })
 }
 
 fn plan(folder: &Path, count: u64) -> Plan {

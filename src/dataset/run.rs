@@ -117,7 +117,8 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
     /// Closes the books, whatever happened, then says what did.
     fn finish(self) -> Result<Report> {
         let (plan, wall) = (self.plan, self.began.elapsed());
-        let Books { journal, progressed: Progress { made, .. }, times, failure } = self.books.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let Books { journal, progressed: Progress { made, .. }, times, failure } =
+            self.books.into_inner().unwrap_or_else(PoisonError::into_inner);
         io::sync(&plan.folder);
         times.append(&plan.folder, made, wall);
         let closed = journal.close(plan.count);

@@ -7,6 +7,7 @@
 
 mod check;
 mod draw;
+mod environment;
 mod fall;
 mod light;
 mod limit;
@@ -20,11 +21,12 @@ mod stock;
 mod variation;
 
 pub use draw::{Distribution, DrawLog, Drawn, Draws};
+pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
-pub use limit::Limit;
 pub use light::{AreaLight, Exposure, LightShape};
+pub use limit::Limit;
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
 pub use recipe::{Background, Choice, GradeRanges, LightRanges, Recipe, Selections};
@@ -60,6 +62,9 @@ pub struct Scene {
     /// Radiance of a constant environment, scene-linear.
     #[serde(default)]
     pub ambient: LinearRgb,
+    /// Light from a picture of the surroundings, on top of `ambient`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub environment: Option<Environment>,
     /// How bright rendered light is on the plate.
     #[serde(default)]
     pub exposure: Exposure,

@@ -4,8 +4,8 @@ use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::stack::{Column, Start};
 use crate::scene::{
-    AreaLight, CameraSource, DrawLog, Drawn, Draws, Exposure, Grade, LightShape, Limit, Object, Range, Scene,
-    SettleOptions, Source, Surface,
+    AreaLight, CameraSource, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, Grade, LightShape, Limit, Object,
+    Range, Scene, SettleOptions, Source, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -42,6 +42,8 @@ pub struct Recipe {
     /// Irradiance of the constant environment on the surface, as a share of what the lights give at its centre; the
     /// radiance itself when there is no light. Default: `[0.3, 0.8]`.
     pub ambient: Range,
+    /// Light from a picture of the surroundings, on top of `ambient`.
+    pub environment: EnvironmentRanges,
     /// Brighter or darker than the plate, EV. Default: `[-0.3, 0.3]`.
     pub gain_ev: Range,
     /// How objects come to rest.
@@ -160,6 +162,7 @@ impl Default for Recipe {
             grade: GradeRanges::default(),
             lights: vec![LightRanges::default()],
             ambient: Range::new(0.3, 0.8),
+            environment: EnvironmentRanges::default(),
             gain_ev: Range::new(-0.3, 0.3),
             settle: SettleOptions::default(),
         }
@@ -219,14 +222,7 @@ impl Recipe {
         Ok((scene, log.into_draws()))
     }
 
-    fn compose(
-        &self,
-        seed: u64,
-        k: u64,
-        log: &DrawLog,
-        backgrounds: &[Background],
-        stock: &[Choice],
-    ) -> Result<Scene> {
+    fn compose(&self, seed: u64, k: u64, log: &DrawLog, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
         self.check()?;
         let draws = Draws::new(seed, k).logged(log);
         let background = pick_background(&draws, backgrounds)?;
@@ -246,6 +242,7 @@ impl Recipe {
             objects,
             ambient: ambient(&lights, self.ambient.draw(&draws, "ambient")),
             lights,
+            environment: self.environment.draw(&draws),
             exposure: Exposure::MatchPlate { gain_ev: self.gain_ev.draw(&draws, "gain_ev") },
         };
         scene.check()?;
@@ -266,6 +263,7 @@ impl Recipe {
         self.grade.value.check("grade.value", 0.0, any)?;
         self.lights.iter().enumerate().try_for_each(|(i, light)| light.check(&format!("lights[{i}]")))?;
         self.ambient.check("ambient", 0.0, any)?;
+        self.environment.check()?;
         self.gain_ev.check("gain_ev", -32.0, 32.0)?;
         self.settle.check()
     }
@@ -316,6 +314,7 @@ impl Choice {
         Ok(Object {
             asset: self.asset.clone(),
             photo,
+            back: None,
             size: self.photo_sizes[photo],
             thickness: self.thickness,
             mass: self.mass,

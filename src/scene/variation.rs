@@ -3,7 +3,7 @@
 //! Draws are keyed by their path and not by what was drawn before, so two recipes that differ in one switch give scenes
 //! that differ in nothing else: scene `k` of one and scene `k` of the other are a pair.
 
-use crate::scene::{GradeRanges, LightRanges, Limit, Range, Recipe, Selections};
+use crate::scene::{EnvironmentRanges, GradeRanges, LightRanges, Limit, Range, Recipe, Selections};
 use serde::{Deserialize, Serialize};
 
 /// A source of variation that a recipe can do without.
@@ -68,6 +68,7 @@ impl Recipe {
             Source::Light => Self {
                 lights: self.lights.iter().map(LightRanges::still).collect(),
                 ambient: self.ambient.middle(),
+                environment: self.environment.still(),
                 gain_ev: self.gain_ev.middle(),
                 ..self
             },
@@ -79,6 +80,17 @@ impl GradeRanges {
     /// Colours as they are in the photo.
     pub const UNCHANGED: Self =
         Self { hue_deg: Range::fixed(0.0), saturation: Range::fixed(1.0), value: Range::fixed(1.0) };
+}
+
+impl EnvironmentRanges {
+    /// The first picture, not turned by chance.
+    fn still(&self) -> Self {
+        Self {
+            files: self.files.first().cloned().into_iter().collect(),
+            rotation_deg: self.rotation_deg.middle(),
+            strength: self.strength.middle(),
+        }
+    }
 }
 
 impl LightRanges {
@@ -109,12 +121,8 @@ mod tests {
             focal_px: Some(55.0),
         };
         let place = |name: &str| Background { name: name.into(), size: [0.6, 0.4], camera };
-        let choice = |i| Choice {
-            asset: format!("b{i}"),
-            photo_sizes: vec![[0.2, 0.07]; 3],
-            thickness: 0.005,
-            mass: 0.03,
-        };
+        let choice =
+            |i| Choice { asset: format!("b{i}"), photo_sizes: vec![[0.2, 0.07]; 3], thickness: 0.005, mass: 0.03 };
         let stock: Vec<Choice> = (0..9).map(choice).collect();
         (0..120).map(|k| recipe.scene(5, k, &[place("a"), place("b")], &stock).unwrap()).collect()
     }
