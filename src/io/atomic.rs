@@ -4,7 +4,7 @@ use super::format::reason;
 use crate::{Error, Result};
 use std::fs::Permissions;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -51,6 +51,13 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
     builder.tempfile_in(folder)
+}
+
+/// The way from a folder to a file or folder, both absolute.
+pub fn relative(to: &Path, from: &Path) -> PathBuf {
+    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(to.components().skip(shared)).collect()
 }
 
 /// Makes a folder, and those above it; one that is there already is fine.

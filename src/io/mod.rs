@@ -37,7 +37,7 @@ mod tiff;
 mod worker;
 mod write;
 
-pub use atomic::{copy, create_folder, sync};
+pub use atomic::{copy, create_folder, relative, sync};
 pub use document::{
     from_overrides, read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json,
     write_text, write_toml,

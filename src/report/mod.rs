@@ -4,6 +4,7 @@
 
 pub mod camera;
 mod chart;
+pub mod dataset;
 mod page;
 mod table;
 
