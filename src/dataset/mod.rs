@@ -35,6 +35,7 @@ mod sharing;
 mod sidecar;
 mod split;
 mod studio;
+mod summary;
 mod times;
 mod yolo;
 mod yolo_yaml;
@@ -56,6 +57,7 @@ pub use sharing::{Group, Leaks, Sharing};
 pub use sidecar::{Record, Sidecar};
 pub use split::{Part, Split, SplitOrder};
 pub use studio::Studio;
+pub use summary::{Shown, Summary};
 pub use times::Times;
 pub use yolo::{Yolo, YoloBox, YoloTask};
 

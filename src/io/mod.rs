@@ -50,7 +50,7 @@ pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
 pub use worker::{serve as serve_worker, worker_version};
-pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
+pub use write::{Bits, Compression, ToFile, WriteOptions, jpeg_bytes, write, write_with};
 
 use crate::{Error, Image, Result};
 use exif::CameraNotes;

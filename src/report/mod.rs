@@ -5,9 +5,11 @@
 pub mod camera;
 mod chart;
 pub mod dataset;
+mod histogram;
 mod page;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};
+pub use histogram::Histogram;
 pub use page::{Page, base64, escaped};
 pub use table::Table;
