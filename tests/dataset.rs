@@ -2,8 +2,8 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelSetup, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions, Sidecar,
-    Split, SplitOrder, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
+    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions,
+    Sidecar, Split, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
 };
 use petcomp::geom::{Point2, Pose, Vector2};
 use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
@@ -68,16 +68,27 @@ fn sample(k: u64) -> Result<Sample> {
     let objects = (0..k % 4).map(|i| object(i as u32 + 1, (k + i) as u32 % 3, place(i), under(i)));
     let labels = Labels { image: IMAGE, objects: objects.collect() };
     let drawn = Scene { exposure: Exposure::MatchPlate { gain_ev: 0.1 }, ..scene(k) };
-    let retries = (k % 3) as u32;
+    let rejected = vec!["two bodies overlap".to_owned(); (k % 3) as usize];
     let nothing = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
     let deep = DeepImage::from_pixels(nothing, vec![vec![]; frame.pixels().len()]);
-    Ok(Sample { frame, deep, labels, drawn, scene: scene(k), scene_seed: k ^ 7, retries })
+    Ok(Sample {
+        frame,
+        deep,
+        labels,
+        drawn,
+        scene: scene(k),
+        scene_seed: k ^ 7,
+        rejected,
+        draws: vec![],
+        times: Times::default(),
+    })
 }
 
 fn plan(folder: &Path, count: u64) -> Plan {
     Plan {
         folder: folder.into(),
         count,
+        numbers: Numbers::All,
         seed: 7,
         recipe: serde_json::json!({ "objects": { "count": [5, 30] }, "hue_deg": 0.1 }),
         classes: ["cap_label", "cap", "label"].map(String::from).to_vec(),

@@ -24,15 +24,23 @@ mod formats;
 mod generate;
 mod journal;
 mod layers;
+mod listing;
+mod merge;
+mod near;
 mod obstructed;
 mod pictures;
 mod place;
+mod run;
 mod setup;
+mod shard;
+mod sharing;
 mod sidecar;
 mod split;
 mod studio;
 mod voc;
 mod webdataset;
+mod summary;
+mod times;
 mod yolo;
 mod yolo_set;
 mod yolo_yaml;
@@ -45,9 +53,18 @@ pub use generate::{Plan, Progress, generate};
 pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report};
 pub use layers::Layers;
+pub use formats::{Format, LabelSetup};
+pub use generate::{Plan, generate};
+pub use journal::{ClassCount, Report, mend};
+pub use listing::Listing;
+pub use merge::merge;
+pub use near::{NEAR_CODES, Near};
 pub use obstructed::{Labelled, OBSTRUCTED, Obstructed};
 pub use pictures::{PictureFormat, Pictures};
+pub use run::Progress;
 pub use setup::Setup;
+pub use shard::{Numbers, Shard, ShardChoice};
+pub use sharing::{Group, Leaks, Sharing};
 pub use sidecar::{Record, Sidecar};
 pub use split::{Part, Split, SplitOrder};
 pub use studio::Studio;
@@ -55,13 +72,16 @@ pub use yolo_set::YoloSet;
 pub use voc::Voc;
 pub use webdataset::WebDataset;
 pub use yolo::{Yolo, YoloTask};
+pub use summary::{Shown, Summary};
+pub use times::Times;
+pub use yolo::{Yolo, YoloBox, YoloTask};
 
 use crate::error::Result;
 use crate::image::Image;
 use crate::label::Labels;
 use crate::pixel::PremulRgba;
 use crate::render::DeepImage;
-use crate::scene::Scene;
+use crate::scene::{Drawn, Scene};
 use std::path::{Path, PathBuf};
 
 /// One finished picture and all that is known of it.
@@ -79,8 +99,12 @@ pub struct Sample {
     pub scene: Scene,
     /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
     pub scene_seed: u64,
-    /// Scenes that were drawn and thrown away before this one.
-    pub retries: u32,
+    /// Why each scene that was drawn before this one was thrown away.
+    pub rejected: Vec<String>,
+    /// Every draw that the scene was made with, in order.
+    pub draws: Vec<Drawn>,
+    /// How long it took; in no file of the dataset.
+    pub times: Times,
 }
 
 /// A sample and its place in the dataset: what a [`Writer`] writes.

@@ -4,7 +4,7 @@ use super::format::reason;
 use crate::{Error, Result};
 use std::fs::Permissions;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -50,6 +50,28 @@ fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
+/// Copies a file in one step: readers see the old one or the new one, never a part.
+///
+/// # Errors
+/// [`Error::File`] for the one that cannot be read or written.
+pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<()> {
+    let (from, to) = (from.as_ref(), to.as_ref());
+    let bytes = std::fs::read(from).map_err(|e| Error::file(from, reason(&e)))?;
+    write_bytes(to, &bytes)
+}
+
+/// Brings everything that was written to the file system of a folder to the disk, so that it outlives a power cut.
+///
+/// Where it cannot be done nothing is lost but time: what is not there is made again.
+pub fn sync(folder: impl AsRef<Path>) {
+    #[cfg(target_os = "linux")]
+    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?)) {
+        log::debug!("{}: syncfs: {e}", folder.as_ref().display());
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = folder;
+}
+
 /// A new file that vanishes if it is not moved to its place, readable like any other file of the user.
 fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     let mut builder = tempfile::Builder::new();
@@ -57,6 +79,13 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
     builder.tempfile_in(folder)
+}
+
+/// The way from a folder to a file or folder, both absolute.
+pub fn relative(to: &Path, from: &Path) -> PathBuf {
+    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(to.components().skip(shared)).collect()
 }
 
 /// Makes a folder, and those above it; one that is there already is fine.

@@ -280,6 +280,15 @@ pub fn write_with<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>, options: 
     write_bytes(path, &bytes)
 }
 
+/// The bytes of a JPEG file.
+///
+/// # Errors
+/// An image without pixels, or with transparent ones.
+pub fn jpeg_bytes<P: ToFile>(image: &Image<P>) -> Result<Vec<u8>> {
+    let options = WriteOptions::default();
+    encode(Path::new("picture.jpg"), image, &options).map_err(|what| Error::value("picture", what))
+}
+
 fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> std::result::Result<Vec<u8>, String> {
     if image.is_empty() {
         return Err(format!("{} x {} pixels, expected at least 1 x 1", image.width(), image.height()));

@@ -6,11 +6,14 @@ pub mod camera;
 mod chart;
 pub mod eval;
 pub mod experiments;
+pub mod dataset;
+mod histogram;
 mod page;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};
+pub use histogram::Histogram;
 pub use page::{Page, base64, escaped};
 pub use table::Table;

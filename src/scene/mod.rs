@@ -11,6 +11,7 @@ mod environment;
 mod fall;
 mod hull;
 mod light;
+mod limit;
 mod placement;
 mod range;
 mod recipe;
@@ -18,13 +19,15 @@ mod resolve;
 mod shot;
 mod stack;
 mod stock;
+mod variation;
 
-pub use draw::Draws;
+pub use draw::{Distribution, DrawLog, Drawn, Draws};
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
 pub use light::{AreaLight, Exposure, LightShape};
+pub use limit::Limit;
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
 pub use recipe::{Background, Choice, Collider, GradeRanges, LightRanges, Recipe, Selections};
@@ -32,6 +35,7 @@ pub use resolve::{CATCHER, Look};
 pub use shot::{Card, Shot};
 pub use stack::Start;
 pub use stock::stock;
+pub use variation::{Ablation, Source};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;

@@ -4,8 +4,8 @@ use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::stack::{Column, Start};
 use crate::scene::{
-    AreaLight, CameraSource, Draws, EnvironmentRanges, Exposure, Grade, LightShape, Object, Range, Scene,
-    SettleOptions, Surface,
+    AreaLight, CameraSource, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, Grade, LightShape, Limit, Object,
+    Range, Scene, SettleOptions, Source, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -21,6 +21,12 @@ const MOST_OBJECTS: usize = 10_000;
 pub struct Recipe {
     /// Width and height of the pictures, pixels. Default: `[640, 480]`.
     pub image: [u32; 2],
+    /// Sources of variation that are switched off; all other draws stay as they are. Default: none.
+    pub off: Vec<Source>,
+    /// Labelled photos of the place that are used, each a viewpoint: the first so many. Default: `"all"`.
+    pub viewpoints: Limit,
+    /// Photos of each asset that are used: the first so many. Default: `"all"`.
+    pub photos: Limit,
     /// Objects in a scene. Default: `[4, 12]`.
     pub objects: Range,
     /// How many different choices of objects there are. Default: `"unique"`, a new one for every scene.
@@ -165,6 +171,9 @@ impl Default for Recipe {
     fn default() -> Self {
         Self {
             image: [640, 480],
+            off: Vec::new(),
+            viewpoints: Limit::All,
+            photos: Limit::All,
             objects: Range::new(4.0, 12.0),
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
@@ -215,10 +224,31 @@ impl Recipe {
     /// A range that cannot be right; no background; no stock while objects are asked for; a card that fits the surface
     /// in no direction.
     pub fn scene(&self, seed: u64, k: u64, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
+        self.explained(seed, k, backgrounds, stock).map(|(scene, _)| scene)
+    }
+
+    /// Scene `k` and every draw that it was made with, in order.
+    ///
+    /// # Errors
+    /// As [`scene`](Self::scene).
+    pub fn explained(
+        &self,
+        seed: u64,
+        k: u64,
+        backgrounds: &[Background],
+        stock: &[Choice],
+    ) -> Result<(Scene, Vec<Drawn>)> {
+        let log = DrawLog::default();
+        let recipe = self.narrowed();
+        let scene = recipe.compose(seed, k, &log, recipe.viewpoints.of(backgrounds), stock)?;
+        Ok((scene, log.into_draws()))
+    }
+
+    fn compose(&self, seed: u64, k: u64, log: &DrawLog, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
         self.check()?;
-        let draws = Draws::new(seed, k);
+        let draws = Draws::new(seed, k).logged(log);
         let background = pick_background(&draws, backgrounds)?;
-        let mut objects = self.choose(seed, k, stock)?;
+        let mut objects = self.choose(seed, k, log, stock)?;
         for (i, object) in objects.iter_mut().enumerate() {
             self.vary(object, &draws, &format!("objects[{i}]"));
         }
@@ -267,13 +297,13 @@ impl Recipe {
     }
 
     /// Assets and photos of one selection, at their own size and colour.
-    fn choose(&self, seed: u64, k: u64, stock: &[Choice]) -> Result<Vec<Object>> {
+    fn choose(&self, seed: u64, k: u64, log: &DrawLog, stock: &[Choice]) -> Result<Vec<Object>> {
         let selection = match self.selections {
             Selections::Unique => k,
             Selections::Of(0) => return Err(Error::value("selections", "0, expected at least 1")),
             Selections::Of(n) => k % n,
         };
-        let draws = Draws::new(seed, selection);
+        let draws = Draws::new(seed, selection).logged(log);
         let count = self.objects.draw_count(&draws, "selection.objects");
         if count > 0 && stock.is_empty() {
             return Err(Error::value("objects", format!("{count} asked for, but there is no asset to choose from")));
@@ -284,8 +314,8 @@ impl Recipe {
                 if left.is_empty() {
                     left = (0..stock.len()).collect();
                 }
-                let choice = &stock[left.swap_remove(draws.below(&format!("selection[{i}].asset"), left.len()))];
-                choice.object(&draws, &format!("selection[{i}].photo"), self.collider)
+                let choice = &stock[left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))];
+                choice.object(&draws, &format!("selection[{i}].photo"), self.photos, self.collider)
             })
             .collect()
     }
@@ -305,11 +335,11 @@ impl Recipe {
 }
 
 impl Choice {
-    fn object(&self, draws: &Draws, path: &str, collider: Collider) -> Result<Object> {
+    fn object(&self, draws: &Draws, path: &str, photos: Limit, collider: Collider) -> Result<Object> {
         if self.photo_sizes.is_empty() {
             return Err(Error::value(format!("assets.{}", self.asset), "no photo, expected at least one"));
         }
-        let photo = draws.below(path, self.photo_sizes.len());
+        let photo = draws.choose(path, photos.of(&self.photo_sizes).len());
         let outline = match collider {
             Collider::Box => Vec::new(),
             Collider::Hull => self.photo_outlines.get(photo).cloned().unwrap_or_default(),
@@ -356,7 +386,7 @@ impl LightRanges {
 fn pick_background<'a>(draws: &Draws, backgrounds: &'a [Background]) -> Result<&'a Background> {
     match backgrounds.len() {
         0 => Err(Error::value("backgrounds", "none, expected at least one labelled photo")),
-        n => Ok(&backgrounds[draws.below("background", n)]),
+        n => Ok(&backgrounds[draws.choose("background", n)]),
     }
 }
 

@@ -62,7 +62,7 @@ pub(super) struct Column<'a> {
     pub(super) surface: Surface,
     pub(super) start: &'a Start,
     pub(super) options: &'a SettleOptions,
-    pub(super) draws: &'a Draws,
+    pub(super) draws: &'a Draws<'a>,
 }
 
 impl Column<'_> {

@@ -18,6 +18,10 @@ pub(crate) struct Common {
     /// Say nothing but results and errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
+    /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an object a line on the
+    /// standard error
+    #[arg(long, value_name = "HOW", default_value = "bar", global = true)]
+    progress: Shown,
     /// Say more; twice for everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
@@ -56,6 +60,13 @@ impl OpenImageIo {
     }
 }
 
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Shown {
+    Bar,
+    Json,
+}
+
 impl Common {
     /// Sets up threads, messages and what is read; called once.
     pub(crate) fn apply(&self) -> anyhow::Result<()> {
@@ -86,9 +97,9 @@ impl Common {
         }
     }
 
-    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet.
+    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON, asked for or not.
     pub(crate) fn progress(&self, what: &'static str) -> Progress {
-        Progress::new(what, self.quiet)
+        Progress::new(what, self.quiet, self.progress)
     }
 }
 
@@ -104,41 +115,86 @@ pub(crate) struct RecipeArgs {
 }
 
 impl RecipeArgs {
+    /// Reads the recipe.
+    pub(crate) fn setup(&self) -> anyhow::Result<Setup> {
+        Ok(Setup::read(&self.recipe, &self.overrides)?)
+    }
+
     /// Opens the folders that the recipe names.
     pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
-        Ok(Studio::open(Setup::read(&self.recipe, &self.overrides)?)?)
+        Ok(Studio::open(self.setup()?)?)
     }
 }
 
 /// How far a long job is.
 pub(crate) struct Progress {
     bar: ProgressBar,
-    lines: Option<std::sync::Mutex<Instant>>,
+    lines: Option<std::sync::Mutex<Lines>>,
     what: &'static str,
+}
+
+/// Progress that is told in lines.
+struct Lines {
+    json: bool,
+    every: Duration,
+    /// When the job began, and how many steps were done then.
+    began: Option<(Instant, u64)>,
+    last: Instant,
 }
 
 impl Progress {
     const LINE_EVERY: Duration = Duration::from_secs(10);
+    const JSON_EVERY: Duration = Duration::from_secs(1);
 
-    fn new(what: &'static str, quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let target = if terminal && !quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    fn new(what: &'static str, quiet: bool, shown: Shown) -> Self {
+        let (terminal, json) = (std::io::stderr().is_terminal(), shown == Shown::Json);
+        let drawn = terminal && !quiet && !json;
+        let target = if drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {per_sec}  {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(what);
-        let lines = (!terminal && !quiet).then(|| std::sync::Mutex::new(Instant::now()));
-        Self { bar, lines, what }
+        let every = if json { Self::JSON_EVERY } else { Self::LINE_EVERY };
+        let lines = Lines { json, every, began: None, last: Instant::now() };
+        let told = json || (!terminal && !quiet);
+        Self { bar, lines: told.then(|| std::sync::Mutex::new(lines)), what }
     }
 
-    /// So many steps of so many are done.
+    /// So many steps of so many are done; the first call tells what was done before.
     pub(crate) fn at(&self, done: u64, total: u64) {
-        self.bar.set_length(total);
+        if self.bar.length() != Some(total) {
+            self.bar.set_length(total);
+            self.bar.set_position(done);
+            self.bar.reset_eta();
+        }
         self.bar.set_position(done);
-        let Some(Ok(mut last)) = self.lines.as_ref().map(|l| l.lock()) else { return };
-        if last.elapsed() >= Self::LINE_EVERY {
-            *last = Instant::now();
-            eprintln!("{}: {done} of {total}", self.what);
+        if let Some(Ok(mut lines)) = self.lines.as_ref().map(|lines| lines.lock()) {
+            lines.at(self.what, done, total);
+        }
+    }
+}
+
+impl Lines {
+    fn at(&mut self, what: &str, done: u64, total: u64) {
+        let first = self.began.is_none();
+        let (began, before) = *self.began.get_or_insert((Instant::now(), done));
+        if !(self.json && (first || done == total)) && self.last.elapsed() < self.every {
+            return;
+        }
+        self.last = Instant::now();
+        let rate = done.saturating_sub(before) as f64 / began.elapsed().as_secs_f64().max(1e-9);
+        let left = total.saturating_sub(done) as f64 / rate;
+        // JSON has no infinity: what is not known yet is null.
+        if self.json {
+            let (rate, left) = (rate.is_finite().then_some(rate), left.is_finite().then_some(left));
+            eprintln!(
+                "{}",
+                serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left })
+            );
+        } else if rate > 0.0 {
+            eprintln!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left");
+        } else {
+            eprintln!("{what}: {done} of {total}");
         }
     }
 }

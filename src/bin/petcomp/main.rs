@@ -17,7 +17,6 @@ mod render;
 mod report;
 mod scene;
 mod settle;
-mod training;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
