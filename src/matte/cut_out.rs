@@ -2,7 +2,7 @@
 
 use super::key::{KeyOptions, Keying, Screen};
 use super::remark::Remark;
-use super::screen::{screen_color, screen_pixels};
+use super::screen::{is_keyable, screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
 use crate::error::{Error, Result};
 use crate::filter;
@@ -90,9 +90,6 @@ pub struct CutOut {
     pub segmentation: Segmentation,
 }
 
-/// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
-/// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
-const KEYABLE: f32 = 0.3;
 /// A key that leaves more than this of the screen is worth a remark: what it leaves veils the object, too. An even screen
 /// leaves 0.01 to 0.12 with one key colour for the whole picture.
 const RESIDUE: f32 = 0.2;
@@ -141,14 +138,7 @@ impl CutOutOptions {
 }
 
 fn method_for(screen: LinearRgb) -> MatteMethod {
-    let mut channels: [f32; 3] = screen.into();
-    channels.sort_by(f32::total_cmp);
-    let [low, mid, high] = channels;
-    let others = 0.5 * (low + mid);
-    if high > 0.0 && (high - others) / high >= KEYABLE {
-        return MatteMethod::Key;
-    }
-    MatteMethod::Outline
+    if is_keyable(screen) { MatteMethod::Key } else { MatteMethod::Outline }
 }
 
 fn keyed(

@@ -11,6 +11,7 @@ mod doctor;
 mod eval;
 mod label;
 mod matte;
+mod matte_film;
 mod matte_key;
 mod matte_nodes;
 mod render;
