@@ -23,6 +23,12 @@ pub enum Remark {
         .0.r, .0.g, .0.b
     )]
     GreyScreen(LinearRgb),
+    /// Searches at other depths found another outline: they overlap with this one by this share.
+    #[error("the outline is unsure: searches at other depths agree with it to {:.0} %", 100.0 * .0)]
+    Unstable(f64),
+    /// Only this share of the outline lies on edges.
+    #[error("the outline is unsure: only {:.0} % of it lies on edges; is the object in focus, and is all of it seen?", 100.0 * .0)]
+    Unsupported(f64),
     /// The key leaves this share of the screen.
     #[error("the key leaves {:.0} % of the screen: uneven light, or an object of the screen's hue", 100.0 * .0)]
     Residue(f32),
