@@ -46,6 +46,12 @@ fn mean(photo: &Image<LinearRgb>, set: &Image<bool>) -> Option<LinearRgb> {
     (count > 0).then(|| sum.map(|s| (s / count as f64) as f32).into())
 }
 
+/// Which channel of a colour is the largest; of equal ones the first.
+pub(super) fn strongest_channel(color: LinearRgb) -> usize {
+    let channels: [f32; 3] = color.into();
+    (1..3).fold(0, |best, c| if channels[c] > channels[best] { c } else { best })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
