@@ -33,3 +33,10 @@ pub enum Remark {
     #[error("the key leaves {:.0} % of the screen: uneven light, or an object of the screen's hue", 100.0 * .0)]
     Residue(f32),
 }
+
+impl Remark {
+    /// The cut-out may be wrong; otherwise it is merely less than it could be.
+    pub fn is_doubt(&self) -> bool {
+        !matches!(self, Self::GreyScreen(_))
+    }
+}

@@ -106,9 +106,7 @@ pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Cove
     let along = Image::from_fn(w, h, |x, y| {
         largest(&mut band.row(y)[x.saturating_sub(reach)..(x + reach + 1).min(w)].iter().copied())
     });
-    Image::from_fn(w, h, |x, y| {
-        largest(&mut (y.saturating_sub(reach)..(y + reach + 1).min(h)).map(|v| along[(x, v)]))
-    })
+    Image::from_fn(w, h, |x, y| largest(&mut (y.saturating_sub(reach)..(y + reach + 1).min(h)).map(|v| along[(x, v)])))
 }
 
 /// Width of the frame along the border that shows the background, as a share of the longer side.

@@ -50,8 +50,11 @@ pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<
         return searched.swap_remove(first).chosen(Confidence::default());
     }
     let outlines: Vec<Option<Image<bool>>> = searched.iter().map(|s| s.compared(picture.size())).collect();
-    let beliefs: Vec<Confidence> =
-        searched.iter().enumerate().map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i) }).collect();
+    let beliefs: Vec<Confidence> = searched
+        .iter()
+        .enumerate()
+        .map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i) })
+        .collect();
     let wanted = |i: usize| opts.levels.is_none_or(|levels| searched[i].reduction == 1 && searched[i].levels == levels);
     let most = (0..searched.len()).filter(|&i| wanted(i)).map(|i| beliefs[i].value()).fold(0.0, f64::max);
     let pick = (0..searched.len()).find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most).unwrap_or(0);
@@ -129,6 +132,7 @@ fn agreement(outlines: &[Option<Image<bool>>], i: usize) -> f64 {
 
 /// Intersection over union.
 fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
-    let count = |holds: fn(bool, bool) -> bool| a.pixels().iter().zip(b.pixels()).filter(|(a, b)| holds(**a, **b)).count();
+    let count =
+        |holds: fn(bool, bool) -> bool| a.pixels().iter().zip(b.pixels()).filter(|(a, b)| holds(**a, **b)).count();
     count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
 }

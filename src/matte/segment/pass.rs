@@ -178,4 +178,3 @@ fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)
     }
     Ok(())
 }
-

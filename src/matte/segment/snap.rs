@@ -52,8 +52,7 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
     let least = LEAST_CHANGE * noises[n / 2].max(ROUNDING);
     let found: Vec<Option<f64>> = profiles.iter().map(|p| p.half_way(least)).collect();
     let moved = |i: usize| {
-        let mut near: Vec<f64> =
-            (0..=2 * NEIGHBOURS).filter_map(|k| found[(i + n + k - NEIGHBOURS) % n]).collect();
+        let mut near: Vec<f64> = (0..=2 * NEIGHBOURS).filter_map(|k| found[(i + n + k - NEIGHBOURS) % n]).collect();
         near.sort_by(f64::total_cmp);
         let by = near.get(near.len() / 2).copied().unwrap_or(0.0);
         let (w, h) = (roots.width() as f64, roots.height() as f64);
