@@ -4,7 +4,9 @@ mod band;
 mod choose;
 mod cluster;
 mod confidence;
+mod holes;
 mod hull;
+mod mattes;
 mod pass;
 mod snap;
 mod threshold;
@@ -144,7 +146,10 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let scale = [w as f64 / found.inside.width() as f64, h as f64 / found.inside.height() as f64];
     let reduction = scale[0].max(scale[1]);
     let to_photo = |p: Point2<f64>| Point2::new(p.x * scale[0], p.y * scale[1]);
-    let around = Outline::around(&filter::gaussian_blur(&shown(&found.inside), CRACK_BLUR_PX));
+    let resized = filter::resize(picture.as_ref(), found.inside.width(), found.inside.height());
+    let margin_px = HOLE_MARGIN * longer_side(&resized) as f64;
+    let solid = holes::without_holes(&resized, &found.inside, &holes::around(&found.inside, margin_px));
+    let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
     let outline = snap::snapped(&around.map(to_photo), photo, reduction);
     let tips: Vec<_> = inset(&found.hull, TIP_INSET_PX).into_iter().map(to_photo).collect();
     let hull = Outline { rings: outline.rings.iter().cloned().chain([tips]).collect() }.hull();
@@ -165,6 +170,8 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     })
 }
 
+/// Width of the zone around the object that is not asked for the screen, as a share of the longer side: contact shadows.
+const HOLE_MARGIN: f64 = 0.04;
 /// Blur that turns the cracks between pixels into a line, pixels of the search.
 const CRACK_BLUR_PX: f32 = 0.7;
 

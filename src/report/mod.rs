@@ -4,6 +4,7 @@
 
 pub mod camera;
 mod chart;
+pub mod matte;
 mod page;
 mod table;
 
