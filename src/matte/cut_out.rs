@@ -5,7 +5,7 @@ use super::key::{KeyOptions, Keying, Screen};
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
 use super::remark::Remark;
-use super::screen::{screen_color, screen_pixels};
+use super::screen::{is_keyable, screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
 use crate::error::{Error, Result};
 use crate::filter;
@@ -120,9 +120,6 @@ impl CutOut {
     }
 }
 
-/// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
-/// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
-const KEYABLE: f32 = 0.3;
 /// A matte that leaves more than this of the screen is worth a remark: what it leaves veils the object, too.
 const RESIDUE: f32 = 0.2;
 
@@ -218,14 +215,7 @@ fn plate(
 }
 
 fn method_for(screen: LinearRgb) -> MatteMethod {
-    let mut channels: [f32; 3] = screen.into();
-    channels.sort_by(f32::total_cmp);
-    let [low, mid, high] = channels;
-    let others = 0.5 * (low + mid);
-    if high > 0.0 && (high - others) / high >= KEYABLE {
-        return MatteMethod::Physical;
-    }
-    MatteMethod::Outline
+    if is_keyable(screen) { MatteMethod::Physical } else { MatteMethod::Outline }
 }
 
 /// What a method makes of the whole photo.

@@ -13,6 +13,8 @@ pub(super) struct Registered {
     pub(super) shift_px: [f64; 2],
     /// Standard deviation of the shift; infinite where there is no structure at all.
     pub(super) sigma_px: f64,
+    /// Correlation of the two where they lie on each other, -1 to 1.
+    pub(super) agreement: f64,
 }
 
 /// Levels of the pyramid that the search climbs down: shifts of up to 2 pixels of the coarsest are found.
@@ -47,12 +49,13 @@ pub(super) fn shift(a: &Image<LinearRgb>, b: &Image<LinearRgb>, mask: &Image<boo
         let next = (filter::halve(a), filter::halve(b), filter::halve(mask));
         levels.push(next);
     }
-    let mut found = Registered { shift_px: [0.0; 2], sigma_px: f64::INFINITY };
+    let mut found = Registered { shift_px: [0.0; 2], sigma_px: f64::INFINITY, agreement: 0.0 };
     for (level, (a, b, mask)) in levels.iter().enumerate().rev() {
         let at_full = f64::from(1 << level);
         let start = found.shift_px.map(|s| s / at_full);
-        let Some((at, sigma)) = refined(&high_passed(a), &high_passed(b), mask, start.into()) else { continue };
-        found = Registered { shift_px: (at * at_full).into(), sigma_px: sigma * at_full };
+        let Some((at, last)) = refined(&high_passed(a), &high_passed(b), mask, start.into()) else { continue };
+        found =
+            Registered { shift_px: (at * at_full).into(), sigma_px: last.sigma * at_full, agreement: last.agreement };
     }
     if Vector2::from(found.shift_px).norm() < SIGNIFICANT * found.sigma_px {
         found.shift_px = [0.0; 2];
@@ -77,29 +80,29 @@ fn high_passed(image: &Image<Coverage>) -> Image<Coverage> {
     filter::gaussian_blur(&image.zip_map(&smooth, |v, mean| Coverage(v.0 - mean.0)), 1.0)
 }
 
-/// Gauss and Newton from a start; the shift and its standard deviation, nothing where there is no structure.
+/// Gauss and Newton from a start; the shift and the last step, nothing where there is no structure.
 fn refined(
     a: &Image<Coverage>,
     b: &Image<Coverage>,
     mask: &Image<Coverage>,
     start: Vector2<f64>,
-) -> Option<(Vector2<f64>, f64)> {
+) -> Option<(Vector2<f64>, Step)> {
     let mut at = start;
-    let mut sigma = f64::INFINITY;
+    let mut last = step(a, &moved(b, at.into()), mask)?;
     for _ in 0..STEPS {
-        let step = step(a, &moved(b, at.into()), mask)?;
-        at += step.by;
-        sigma = step.sigma;
-        if step.by.norm() < SHORT_PX {
+        at += last.by;
+        if last.by.norm() < SHORT_PX {
             break;
         }
+        last = step(a, &moved(b, at.into()), mask)?;
     }
-    at.iter().all(|v| v.is_finite()).then_some((at, sigma))
+    at.iter().all(|v| v.is_finite()).then_some((at, last))
 }
 
 struct Step {
     by: Vector2<f64>,
     sigma: f64,
+    agreement: f64,
 }
 
 /// One step: the gain by regression of `a` on `b`, the shift by regression of what is left on the gradient.
@@ -109,8 +112,9 @@ fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Opt
         let rows = (1..h.saturating_sub(1)).flat_map(|y| (1..w.saturating_sub(1)).map(move |x| (x, y)));
         rows.filter(|&at| mask[at].0 > 0.5)
     };
-    let (mut ab, mut bb) = (0.0_f64, 0.0_f64);
+    let (mut aa, mut ab, mut bb) = (0.0_f64, 0.0_f64, 0.0_f64);
     for at in inside() {
+        aa += f64::from(a[at].0 * a[at].0);
         ab += f64::from(a[at].0 * b[at].0);
         bb += f64::from(b[at].0 * b[at].0);
     }
@@ -127,7 +131,8 @@ fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Opt
     }
     let inverse: Matrix2<f64> = normal.try_inverse()?;
     let variance = square / count * CORRELATED;
-    Some(Step { by: inverse * right, sigma: (variance * inverse.trace()).sqrt() })
+    let agreement = ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE);
+    Some(Step { by: inverse * right, sigma: (variance * inverse.trace()).sqrt(), agreement })
 }
 
 /// Neighbouring pixels that vary together after the blur: the area of its kernel, 4 pi sigma^2.
@@ -137,12 +142,20 @@ const CORRELATED: f64 = 12.6;
 mod tests {
     use super::*;
 
+    /// Blobs at places that do not repeat, so that only one shift fits.
     fn bumps(dx: f64, dy: f64) -> Image<LinearRgb> {
+        let blobs: Vec<[f64; 4]> = (0..40)
+            .map(|i| {
+                let i = f64::from(i);
+                [(37.7 * i) % 120.0, (53.3 * i) % 90.0, 2.5 + (i * 0.71) % 3.0, 0.3 * libm::cos(i)]
+            })
+            .collect();
         Image::from_fn(120, 90, |x, y| {
             let (x, y) = (x as f64 + 0.5 - dx, y as f64 + 0.5 - dy);
-            LinearRgb::grey(
-                (0.5 + 0.2 * libm::sin(0.31 * x) * libm::cos(0.23 * y) + 0.1 * libm::sin(0.11 * x * y / 40.0)) as f32,
-            )
+            let blob = |[u, v, size, height]: &[f64; 4]| {
+                height * libm::exp(-((x - u).powi(2) + (y - v).powi(2)) / (2.0 * size * size))
+            };
+            LinearRgb::grey((0.8 + blobs.iter().map(blob).sum::<f64>()) as f32)
         })
     }
 

@@ -212,12 +212,25 @@ pub fn table(summaries: &[Summary]) -> Table {
 /// Every photo with every method.
 pub fn details(rows: &[Row]) -> Table {
     let mut table = Table::new([
-        "photo", "method", "mae_lit", "psnr_lit", "mae_shaded", "psnr_shaded", "sad", "mse", "gradient", "residue", "iou",
-        "box_px", "time_ms", "doubts",
+        "photo",
+        "method",
+        "mae_lit",
+        "psnr_lit",
+        "mae_shaded",
+        "psnr_shaded",
+        "sad",
+        "mse",
+        "gradient",
+        "residue",
+        "iou",
+        "box_px",
+        "time_ms",
+        "doubts",
     ]);
     for row in rows {
         let e = row.score.unwrap_or_default();
-        let errors = [e.mae_lit, e.psnr_lit, e.mae_shaded, e.psnr_shaded, e.sad, e.mse, e.gradient, e.residue, e.iou, e.box_px];
+        let errors =
+            [e.mae_lit, e.psnr_lit, e.mae_shaded, e.psnr_shaded, e.sad, e.mse, e.gradient, e.residue, e.iou, e.box_px];
         let number = |v: f64| if row.score.is_some() { format!("{v:.6}") } else { String::new() };
         let head = [row.photo.clone(), row.method.name().to_owned()];
         let tail = [format!("{:.1}", row.time_ms), row.doubts.join("; ")];
@@ -239,7 +252,11 @@ pub fn chart(summaries: &[Summary]) -> String {
         across: across.clone(),
         up: up.clone(),
         curves: summaries.iter().map(|s| vec![[s.time_ms, error(&s.score)]]).collect(),
-        defaults: summaries.iter().filter(|s| s.method == Method::Physical).map(|s| [s.time_ms, error(&s.score)]).collect(),
+        defaults: summaries
+            .iter()
+            .filter(|s| s.method == Method::Physical)
+            .map(|s| [s.time_ms, error(&s.score)])
+            .collect(),
     };
     Chart::row(&errors.map(chart))
 }

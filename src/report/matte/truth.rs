@@ -110,7 +110,8 @@ impl Known {
         let mut seen = self.foreground.clone();
         for ((pixel, t), k) in seen.pixels_mut().iter_mut().zip(self.transmittance.pixels()).zip(screen.pixels()) {
             *pixel = (*pixel + *t * *k).map(|v| {
-                let deviation = (self.noise.shot * self.noise.shot * f64::from(v) + self.noise.read * self.noise.read).sqrt();
+                let deviation =
+                    (self.noise.shot * self.noise.shot * f64::from(v) + self.noise.read * self.noise.read).sqrt();
                 let code = 255.0 * crate::color::linear_to_srgb((v + (deviation * draw()) as f32).clamp(0.0, 1.0));
                 crate::color::srgb_to_linear(code.round() / 255.0)
             });
