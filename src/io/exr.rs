@@ -61,6 +61,23 @@ pub fn write_channels(
     write_bytes(path, &bytes)
 }
 
+/// As [`write_channels`], with half floats.
+///
+/// # Errors
+/// Those of [`write_channels`].
+pub fn write_half_channels(
+    path: impl AsRef<Path>,
+    size: (usize, usize),
+    channels: &[(&str, &[f32])],
+    metadata: &[(String, String)],
+) -> Result<()> {
+    let path = path.as_ref();
+    let halves = |samples: &[f32]| FlatSamples::F16(samples.iter().map(|&v| half::f16::from_f32(v)).collect());
+    let planes = channels.iter().map(|&(name, samples)| (name, halves(samples))).collect();
+    let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
+    write_bytes(path, &bytes)
+}
+
 /// Reads every channel of the first part of an EXR file, and the picture's size.
 ///
 /// # Errors

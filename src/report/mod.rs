@@ -8,6 +8,7 @@ pub mod eval;
 pub mod experiments;
 pub mod dataset;
 mod histogram;
+pub mod matte;
 mod page;
 #[cfg(feature = "settle")]
 pub mod settle;

@@ -62,9 +62,9 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Cut { photo, output, options } => {
             let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
-            io::write(output, &cut.image)?;
+            io::write(output, &cut.to_rgba())?;
             warn(photo, &cut.remarks);
-            let (w, h) = cut.image.size();
+            let (w, h) = cut.film.size();
             common.say(
                 format_args!("{}: {w} x {h}, matte by {:?}", output.display(), cut.method).to_string().to_lowercase(),
             );

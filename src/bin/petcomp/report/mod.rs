@@ -3,6 +3,7 @@
 mod camera;
 mod settle;
 mod experiments;
+mod matte;
 
 use crate::common::Common;
 
@@ -16,6 +17,8 @@ pub(crate) enum Command {
     Stability(settle::StabilityArgs),
     /// Our trainings beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
+    /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
+    Matte(matte::Args),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -24,5 +27,6 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Settle(args) => settle::run(args, common),
         Command::Stability(args) => settle::run_stability(args, common),
         Command::Experiments(args) => experiments::run(args, common),
+        Command::Matte(args) => matte::run(args, common),
     }
 }
