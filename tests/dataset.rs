@@ -30,6 +30,7 @@ fn scene(k: u64) -> Scene {
         objects: Vec::new(),
         lights: Vec::new(),
         ambient: LinearRgb::grey(0.1),
+        environment: None,
         exposure: Exposure::default(),
     }
 }

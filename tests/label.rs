@@ -2,14 +2,12 @@
 
 use geo::Contains;
 use petcomp::camera::Camera;
-use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{AmodalBox, BBox, LabelOptions, Labels, knotted, label};
 use petcomp::render::{DeepImage, DeepSample};
 use petcomp::scene::{Card, Grade};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use proptest::prelude::*;
-use std::sync::Arc;
 
 /// Rays along each side of a pixel; a pixel's coverage is then known to within 1 / RAYS.
 const RAYS: usize = 8;
@@ -34,7 +32,8 @@ fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[
         id: ObjectId(id),
         class: id % 4,
         quad: petcomp::geom::Quad { world_from_card, size },
-        texture: Arc::new(Pyramid::new(Image::filled(2, 2, PremulRgba::new(0.5, 0.5, 0.5, 1.0)))),
+        texture: Image::filled(2, 2, PremulRgba::new(0.5, 0.5, 0.5, 1.0)).into(),
+        back: None,
         outline_uv: outline.iter().map(|&[u, v]| Point2::new(u, v)).collect(),
         grade: Grade::default(),
     }

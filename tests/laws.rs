@@ -112,6 +112,7 @@ fn pile() -> Scene {
     let card = |i: usize| Object {
         asset: format!("b{i}"),
         photo: 0,
+        back: None,
         size: [0.2, 0.08],
         thickness: 0.006,
         mass: 0.03,

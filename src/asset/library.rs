@@ -2,12 +2,12 @@
 
 use super::MANIFEST;
 use super::manifest::{AssetRecord, Manifest, PhotoRecord};
+use super::texture::Texture;
 use crate::error::{Error, Result};
-use crate::filter::Pyramid;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::io;
-use crate::pixel::PremulRgba;
+use crate::pixel::Film;
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ pub struct Photo {
     /// Width and height of the card that carries the whole cut-out, metres.
     pub size: [f64; 2],
     /// The cut-out, premultiplied, scene-linear.
-    pub texture: Arc<Pyramid<PremulRgba>>,
+    pub texture: Texture,
     /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
     /// What the manifest says of it.
@@ -94,7 +94,7 @@ fn places((i, asset): (usize, &AssetRecord)) -> impl Iterator<Item = (usize, usi
 const SLACK_PX: f64 = 0.5;
 
 fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
-    let image: Image<PremulRgba> = io::read(folder.join(&record.file))?;
+    let image: Image<Film> = io::read(folder.join(&record.file))?;
     let (w, h) = (image.width() as f64, image.height() as f64);
     let told = record.size_m.map(|side| side * record.px_per_metre);
     if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
@@ -103,12 +103,12 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     }
     if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
         let (x, y) = (i % image.width(), i / image.width());
-        let what = format!("{:?} at ({x}, {y}), expected finite colour and alpha from 0 to 1", image.pixels()[i]);
+        let what = format!("{:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1", image.pixels()[i]);
         return Err(Error::file(folder.join(&record.file), what));
     }
     Ok(Photo {
         size: record.size_m,
-        texture: Arc::new(Pyramid::new(image)),
+        texture: image.into(),
         outline_uv: record.outline_px.iter().map(|&[x, y]| Point2::new(x / w, y / h)).collect(),
         record: record.clone(),
     })
@@ -118,6 +118,7 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
 mod tests {
     use super::super::manifest::tests::photo;
     use super::*;
+    use crate::pixel::PremulRgba;
 
     fn folder_with(picture: Option<(usize, usize)>) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
@@ -137,7 +138,7 @@ mod tests {
         let library = Library::open(folder.path()).unwrap();
         let asset = library.find("a").unwrap();
         assert_eq!((asset.class, asset.photos.len()), (2, 1));
-        assert_eq!(asset.photos[0].texture.base()[(3, 3)], PremulRgba::new(0.25, 0.5, 0.125, 0.75));
+        assert_eq!(asset.photos[0].texture.texel(3, 3), PremulRgba::new(0.25, 0.5, 0.125, 0.75).into());
         assert_eq!(asset.photos[0].outline_uv[0], Point2::new(1.0 / 40.0, 1.0 / 20.0));
     }
 

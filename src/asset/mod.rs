@@ -12,14 +12,18 @@ mod build;
 mod folder;
 mod library;
 mod manifest;
+mod panorama;
 mod size;
+mod texture;
 mod thumbnail;
 
 pub use build::{Built, List, ListedPhoto, build};
 pub use folder::{AddPhoto, Scale, add_photo};
 pub use library::{Asset, Library, Photo};
 pub use manifest::{AssetRecord, Manifest, PhotoRecord, default_classes};
+pub use panorama::{Panorama, direction_to_uv, uv_to_direction};
 pub use size::oriented_size;
+pub use texture::Texture;
 
 /// Name of the manifest in an asset folder.
 pub const MANIFEST: &str = "assets.toml";

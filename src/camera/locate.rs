@@ -39,6 +39,7 @@ mod tests {
             objects: Vec::new(),
             lights: Vec::new(),
             ambient: LinearRgb::BLACK,
+            environment: None,
             exposure: Exposure::default(),
         }
     }

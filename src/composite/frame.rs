@@ -1,45 +1,42 @@
 //! The finished frame: what objects add, over what their shadows leave of the plate.
 
 use crate::image::Image;
-use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::{DeepImage, DeepSample};
+use crate::pixel::{Film, LinearRgb, PremulRgba};
+use crate::render::DeepImage;
 
 /// Folds deep samples into a picture, over `plate` where there is one.
 ///
 /// Scene-linear, premultiplied, of the deep picture's size. With a plate every pixel is opaque,
-/// `light + (1 - coverage) * shadow * plate`, and the plate's own bits where there is neither card nor shadow. Without,
-/// pixels are the objects' light and coverage; shadows need something to fall on and are left out.
+/// `light + transmittance * shadow * plate`, and the plate's own bits where there is neither card nor shadow. Without,
+/// pixels are the objects' light and coverage; shadows need something to fall on and are left out, and film loses its
+/// tint ([`film`] keeps it).
 ///
 /// # Panics
 /// When the plate's size is not the picture's.
 pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<PremulRgba> {
     let size = (deep.width(), deep.height());
     match plate {
-        None => Image::from_fn(size.0, size.1, |x, y| flatten(deep.at(x, y))),
+        None => Image::from_fn(size.0, size.1, |x, y| deep.flat(x, y).to_rgba()),
         Some(plate) => {
             assert_eq!(plate.size(), size, "plate and picture differ in size");
             Image::from_fn(size.0, size.1, |x, y| {
                 let behind = deep.shadow()[(x, y)] * plate[(x, y)];
-                flatten(deep.at(x, y)).over(behind.opaque()).color().opaque()
+                deep.flat(x, y).over_color(behind).opaque()
             })
         }
     }
 }
 
-/// Light and coverage of one pixel's objects.
-fn flatten(samples: &[DeepSample]) -> PremulRgba {
-    let mut sum = PremulRgba::TRANSPARENT;
-    for s in samples {
-        sum = sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible));
-    }
-    // A sum of shares that make up a whole may miss it by a rounding.
-    PremulRgba { a: sum.a.min(1.0), ..sum }
+/// Folds deep samples into a picture of their light and of what they let pass, per channel; scene-linear.
+pub fn film(deep: &DeepImage) -> Image<Film> {
+    Image::from_fn(deep.width(), deep.height(), |x, y| deep.flat(x, y))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::pixel::{Depth, ObjectId};
+    use crate::render::DeepSample;
 
     fn sample(light: f32, visible: f32) -> DeepSample {
         DeepSample { object: ObjectId(1), depth: Depth(1.0), light: LinearRgb::grey(light), alpha: 0.5, visible }
@@ -65,6 +62,23 @@ mod tests {
         let odd = LinearRgb::new(0.1, f32::MIN_POSITIVE, 7.3);
         let out = frame(&deep(), Some(&Image::filled(3, 1, odd)));
         assert_eq!(out[(0, 0)], odd.opaque());
+    }
+
+    #[test]
+    fn film_tints_the_plate() {
+        let tints = [[0.5, 0.25, 0.0], [0.25, 0.0, 0.5]].map(LinearRgb::from).to_vec();
+        let out = frame(&deep().with_tints(tints), Some(&Image::filled(3, 1, LinearRgb::grey(0.8))));
+        let expected = [0.25, 0.75, 0.5].map(|pass| 0.3 + pass * 0.8);
+        assert!((0..3).all(|c| (<[f32; 3]>::from(out[(2, 0)].color())[c] - expected[c]).abs() < 1e-6));
+    }
+
+    #[test]
+    fn grey_tints_give_the_bits_of_alpha() {
+        let plate = Image::filled(3, 1, LinearRgb::new(0.1, 0.7, 0.33));
+        let tinted = deep().with_tints([0.5, 0.25].map(LinearRgb::grey).to_vec());
+        for plate in [None, Some(&plate)] {
+            assert_eq!(frame(&tinted, plate), frame(&deep(), plate));
+        }
     }
 
     #[test]

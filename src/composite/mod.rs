@@ -3,4 +3,4 @@
 mod frame;
 mod porter_duff;
 
-pub use frame::frame;
+pub use frame::{film, frame};

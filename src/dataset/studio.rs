@@ -1,6 +1,6 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
-use crate::asset::{Asset, Library, Photo};
+use crate::asset::{Asset, Library, Panorama};
 use crate::camera;
 use crate::composite;
 use crate::dataset::place::Place;
@@ -125,7 +125,7 @@ impl Studio {
         if let Some(plate) = &plate {
             scene = light::expose(scene, plate);
         }
-        let shot = scene.resolve(|object| Look::of(&self.library, object), plate)?;
+        let shot = scene.resolve(|object| Look::of(&self.library, object), plate, panorama(&scene)?)?;
         Ok((scene, shot))
     }
 
@@ -153,10 +153,14 @@ impl Studio {
     }
 }
 
+/// The picture of the surroundings that a scene names.
+fn panorama(scene: &Scene) -> Result<Option<Arc<Panorama>>> {
+    scene.environment.as_ref().map(|map| Panorama::read(&map.file).map(Arc::new)).transpose()
+}
+
 /// One checksum for each photo's cut-out.
 fn checksums(asset: &Asset) -> Vec<u32> {
-    let of = |photo: &Photo| crc32fast::hash(bytemuck::cast_slice(photo.texture.base().pixels()));
-    asset.photos.iter().map(of).collect()
+    asset.photos.iter().map(|photo| photo.texture.checksum()).collect()
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

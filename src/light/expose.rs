@@ -66,6 +66,7 @@ mod tests {
             objects: Vec::new(),
             lights: vec![square()],
             ambient: LinearRgb::grey(0.1),
+            environment: None,
             exposure,
         }
     }

@@ -86,8 +86,8 @@ impl Look {
 ///
 /// A level read bilinearly has variance `4^level / 4` texels.
 fn level(card: &Card, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[f64]) -> f64 {
-    let image = card.texture.base();
-    let texels = (image.width() * image.height()) as f64;
+    let (width, height) = card.texture.size();
+    let texels = (width * height) as f64;
     let per_pixel = seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
     let dense = if offsets.len() >= DENSE { 0.25 } else { 0.0 };
     let level = libm::log2(2.0 * left_over_sigma(offsets) * per_pixel) - dense;

@@ -1,5 +1,6 @@
 //! What the renderer asks of a shot, asked once.
 
+use crate::asset::Texture;
 use crate::error::{Error, Result};
 use crate::scene::{Card, Shot};
 
@@ -26,6 +27,14 @@ pub fn check(shot: &Shot) -> Result<()> {
             return Err(Error::value(format!("lights[{i}]"), "not finite, expected numbers"));
         }
     }
+    if let Some(map) = &shot.environment
+        && !(map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0)
+    {
+        return Err(Error::value(
+            "environment",
+            "rotation or strength is not a number that can be, expected finite ones",
+        ));
+    }
     if !shot.exposure.is_finite() || !shot.ambient.is_finite() {
         return Err(Error::value("exposure", "exposure or ambient is not finite, expected numbers"));
     }
@@ -44,15 +53,20 @@ fn check_card(card: &Card) -> std::result::Result<(), String> {
     if card.id.0 == 0 {
         return Err("id 0, expected 1 or more".into());
     }
-    let texture = card.texture.base();
-    for (y, row) in texture.rows().enumerate() {
-        for (x, p) in row.iter().enumerate() {
-            if !p.color().is_finite() || !p.a.is_finite() {
-                return Err(format!("texture has a value that is not finite at ({x}, {y})"));
-            }
-            if !(0.0..=1.0).contains(&p.a) {
-                return Err(format!("texture has alpha {} at ({x}, {y}), expected 0 to 1", p.a));
-            }
+    check_texture(&card.texture)?;
+    card.back.as_ref().map_or(Ok(()), |back| check_texture(back).map_err(|what| format!("back: {what}")))
+}
+
+fn check_texture(texture: &Texture) -> std::result::Result<(), String> {
+    let (width, height) = texture.size();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        let texel = texture.texel(x, y);
+        let opacity: [f32; 3] = texel.opacity.into();
+        if !texel.color.is_finite() || !texel.opacity.is_finite() {
+            return Err(format!("texture has a value that is not finite at ({x}, {y})"));
+        }
+        if let Some(wrong) = opacity.iter().find(|o| !(0.0..=1.0).contains(*o)) {
+            return Err(format!("texture has alpha {wrong} at ({x}, {y}), expected 0 to 1"));
         }
     }
     Ok(())

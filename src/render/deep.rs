@@ -1,7 +1,7 @@
 //! Deep samples: per pixel, front to back, what each object does to the pixel.
 
 use crate::image::Image;
-use crate::pixel::{Depth, LinearRgb, ObjectId};
+use crate::pixel::{Depth, Film, LinearRgb, ObjectId};
 
 /// What one object contributes to one pixel, averaged over the pixel.
 ///
@@ -22,12 +22,17 @@ pub struct DeepSample {
 }
 
 /// A picture of deep samples, and what the shadows leave of the surface's light.
+///
+/// Films hide a share of their own in each channel: pictures with film know [`tints`](Self::tints) beside the samples,
+/// whose `alpha` and `visible` are then the mean over channels. Pictures without film have none and pay for none.
 #[derive(Clone, Debug, Default)]
 pub struct DeepImage {
     width: usize,
     height: usize,
     starts: Vec<u32>,
     samples: Vec<DeepSample>,
+    /// One for each sample where there is film; else empty.
+    tints: Vec<LinearRgb>,
     shadow: Image<LinearRgb>,
 }
 
@@ -48,7 +53,18 @@ impl DeepImage {
             starts.push(samples.len() as u32);
         }
         assert_eq!(starts.len(), width * height + 1, "one list of samples per pixel");
-        Self { width, height, starts, samples, shadow }
+        Self { width, height, starts, samples, tints: Vec::new(), shadow }
+    }
+
+    /// The same picture with what each sample hides, channel by channel: `visible`, of which that is the mean.
+    ///
+    /// In the order of the samples, pixel by pixel; none at all for a picture without film.
+    ///
+    /// # Panics
+    /// When there is neither none nor one for each sample.
+    pub fn with_tints(self, tints: Vec<LinearRgb>) -> Self {
+        assert!(tints.is_empty() || tints.len() == self.samples.len(), "one tint per sample");
+        Self { tints, ..self }
     }
 
     /// Assembles a picture from samples in any order of pixels, each with its column and row; those of one pixel come
@@ -76,7 +92,7 @@ impl DeepImage {
         }
         ends.rotate_right(1);
         ends[0] = 0;
-        Self { width, height, starts: ends, samples: placed, shadow }
+        Self { width, height, starts: ends, samples: placed, tints: Vec::new(), shadow }
     }
 
     /// Number of columns.
@@ -92,8 +108,32 @@ impl DeepImage {
     /// The samples of one pixel, front to back.
     #[inline(always)]
     pub fn at(&self, x: usize, y: usize) -> &[DeepSample] {
+        &self.samples[self.range(x, y)]
+    }
+
+    /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself seen; empty where no
+    /// object of the picture is film: every channel is the sample's `visible` then.
+    #[inline(always)]
+    pub fn tints(&self, x: usize, y: usize) -> &[LinearRgb] {
+        if self.tints.is_empty() { &[] } else { &self.tints[self.range(x, y)] }
+    }
+
+    /// All that the objects do to one pixel: their light, and what they hide of what is behind, per channel.
+    #[inline(always)]
+    pub fn flat(&self, x: usize, y: usize) -> Film {
+        let (samples, tints) = (self.at(x, y), self.tints(x, y));
+        let color = samples.iter().fold(LinearRgb::BLACK, |sum, s| sum + s.light);
+        let hidden = match tints {
+            [] => LinearRgb::grey(samples.iter().map(|s| s.visible).sum()),
+            tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
+        };
+        // A sum of shares that make up a whole may miss it by a rounding.
+        Film { color, opacity: hidden.map(|o| o.min(1.0)) }
+    }
+
+    fn range(&self, x: usize, y: usize) -> std::ops::Range<usize> {
         let i = y * self.width + x;
-        &self.samples[self.starts[i] as usize..self.starts[i + 1] as usize]
+        self.starts[i] as usize..self.starts[i + 1] as usize
     }
 
     /// The factor on the plate, per channel.

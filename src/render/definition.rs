@@ -2,7 +2,6 @@
 
 use crate::camera::Camera;
 use crate::composite;
-use crate::filter::Pyramid;
 use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::light;
@@ -40,7 +39,8 @@ fn card(id: u32, center: [f64; 3], rotation: UnitQuaternion<f64>, size: [f64; 2]
         id: ObjectId(id),
         class: 0,
         quad: Quad { world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation), size },
-        texture: Arc::new(Pyramid::new(texture)),
+        texture: texture.into(),
+        back: None,
         outline_uv: Arc::new([]),
         grade: Grade::default(),
     }

@@ -1,5 +1,6 @@
 //! The definition, sample by sample: slow and obviously right.
 
+use crate::asset::Texture;
 use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
 use crate::image::Image;
@@ -169,8 +170,12 @@ fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]
 
 /// Bilinear texel of a card's full texture; what lies outside counts as nothing.
 fn texel(card: &Card, [u, v]: [f64; 2]) -> PremulRgba {
-    let image = card.texture.base();
-    sample_bilinear(image, u * image.width() as f64, v * image.height() as f64)
+    let (width, height) = card.texture.size();
+    let (x, y) = (u * width as f64, v * height as f64);
+    match &card.texture {
+        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y),
+        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y).to_rgba(),
+    }
 }
 
 /// A ratio of averages, per channel; 1 where there is nothing to average.

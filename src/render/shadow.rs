@@ -112,13 +112,14 @@ impl<'a> Casters<'a> {
 impl Caster<'_> {
     /// The coarsest alpha whose texels are no larger than `cell` metres.
     fn shade(&self, cell: f64) -> Arc<Shade> {
-        let texture = self.card.texture.base();
-        let texels = (texture.width() * texture.height()) as f64;
+        let texture = &self.card.texture;
+        let (width, height) = texture.size();
+        let texels = (width * height) as f64;
         let texel = (self.sheet.size[0] * self.sheet.size[1] / texels).sqrt();
         let level = (libm::log2((cell / texel).max(1.0)) as usize).min(self.shades.len() - 1);
         // Asked for outside of the lock: a pyramid may halve in parallel, and whoever waits may come back here.
-        let image = self.card.texture.level(level);
-        self.shades[level].get_or_init(|| Arc::new(Shade::new(texture, image, level))).clone()
+        let shade = Arc::new(Shade::new(texture, level));
+        self.shades[level].get_or_init(|| shade).clone()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Textures made ready for one picture: one level of detail, a transparent border, the card's colours.
 
+use crate::asset::Texture;
 use crate::image::Image;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::four::Four;
@@ -19,9 +20,9 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    fn new(image: &Image<PremulRgba>, level: usize, reach_texels: f64) -> Self {
+    fn new((width, height): (usize, usize), level: usize, reach_texels: f64) -> Self {
         let scale = libm::exp2(-(level as f64));
-        let texels = [image.width() as f64 * scale, image.height() as f64 * scale];
+        let texels = [width as f64 * scale, height as f64 * scale];
         Self { texels, reach: texels.map(|n| reach_texels / n) }
     }
 
@@ -50,12 +51,12 @@ impl Baked {
         let last = texture.levels() - 1;
         let fine = (level.max(0.0) as usize).min(last);
         let mix = if fine < last { (level.max(0.0) - fine as f64) as f32 } else { 0.0 };
-        let image = texture.level(fine);
+        let image = &rgba(texture, fine);
         // The full picture ends at its edge; smaller ones fade half a texel out, and as far again where mixed.
         let reach = [0.0, 0.5, 1.5][usize::from(fine > 0 || mix > 0.0) + usize::from(mix > 0.0)];
-        let mut baked = Self::bordered(image, Grid::new(texture.base(), fine, reach));
+        let mut baked = Self::bordered(image, Grid::new(texture.size(), fine, reach));
         if mix > 0.0 {
-            baked.mix_in(texture.level(fine + 1), mix);
+            baked.mix_in(&rgba(texture, fine + 1), mix);
         }
         baked.grade(&card.grade);
         baked
@@ -110,6 +111,14 @@ impl Baked {
     }
 }
 
+/// A level of detail, film by its mean opacity.
+fn rgba(texture: &Texture, level: usize) -> Image<PremulRgba> {
+    match texture {
+        Texture::Rgba(pyramid) => pyramid.level(level).clone(),
+        Texture::Film(pyramid) => pyramid.level(level).map(crate::pixel::Film::to_rgba),
+    }
+}
+
 /// The nearer (weight 3/4) and farther (1/4) of the two coarse texels around bordered fine texel `i`.
 fn taps(i: usize) -> (isize, isize) {
     let i = i as isize - BORDER as isize;
@@ -135,9 +144,10 @@ pub(super) struct Shade {
 }
 
 impl Shade {
-    /// Alpha of `image`, which is `base` halved `level` times.
-    pub(super) fn new(base: &Image<PremulRgba>, image: &Image<PremulRgba>, level: usize) -> Self {
-        let grid = Grid::new(base, level, if level > 0 { 0.5 } else { 0.0 });
+    /// Alpha of a texture halved `level` times.
+    pub(super) fn new(texture: &Texture, level: usize) -> Self {
+        let image = &rgba(texture, level);
+        let grid = Grid::new(texture.size(), level, if level > 0 { 0.5 } else { 0.0 });
         let (width, height) = (image.width() + 2 * BORDER, image.height() + 2 * BORDER);
         let mut alpha = vec![0.0; width * height];
         for (y, row) in image.rows().enumerate() {

@@ -146,7 +146,7 @@ pub(super) fn texture_rows(sheet: &Sheet, point: &Matrix3<f64>, w: &Vector3<f64>
 
 /// The cards of a shot that are there at all, in the order of their ids.
 pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, Sheet)> {
-    let there = shot.cards.iter().filter(|card| !card.texture.base().is_empty());
+    let there = shot.cards.iter().filter(|card| !card.texture.is_empty());
     let mut sheets: Vec<_> = there.filter_map(|card| Some((card, Sheet::of(card)?))).collect();
     sheets.sort_by_key(|(card, _)| card.id);
     sheets

@@ -20,6 +20,7 @@ impl Scene {
         each(&self.objects, "objects", check_object)?;
         each(&self.lights, "lights", check_light)?;
         expect_color(self.ambient, "ambient")?;
+        self.environment.as_ref().map_or(Ok(()), |map| map.check("environment"))?;
         match self.exposure {
             Exposure::Ev(ev) => expect(ev.is_finite(), "exposure.ev", ev, "a finite number"),
             Exposure::MatchPlate { gain_ev } => {
@@ -130,6 +131,7 @@ mod tests {
         let object = Object {
             asset: "b1".into(),
             photo: 0,
+            back: None,
             size: [0.2, 0.1],
             thickness: 0.005,
             mass: 0.03,
@@ -157,6 +159,7 @@ mod tests {
             objects: vec![object.clone(), Object { placement: falling, ..object }],
             lights: vec![light],
             ambient: LinearRgb::grey(0.5),
+            environment: None,
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
         }
     }

@@ -7,6 +7,7 @@
 
 mod check;
 mod draw;
+mod environment;
 mod fall;
 mod light;
 mod placement;
@@ -18,6 +19,7 @@ mod stack;
 mod stock;
 
 pub use draw::Draws;
+pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
@@ -56,6 +58,9 @@ pub struct Scene {
     /// Radiance of a constant environment, scene-linear.
     #[serde(default)]
     pub ambient: LinearRgb,
+    /// Light from a picture of the surroundings, on top of `ambient`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub environment: Option<Environment>,
     /// How bright rendered light is on the plate.
     #[serde(default)]
     pub exposure: Exposure,

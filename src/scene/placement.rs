@@ -12,6 +12,9 @@ pub struct Object {
     /// Which of the asset's photos, from 0.
     #[serde(default)]
     pub photo: usize,
+    /// Which photo its back shows; by default the same one, seen through.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub back: Option<usize>,
     /// Width and height of the card, metres.
     pub size: [f64; 2],
     /// Thickness of the body that falls, metres.

@@ -4,7 +4,8 @@ use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::stack::{Column, Start};
 use crate::scene::{
-    AreaLight, CameraSource, Draws, Exposure, Grade, LightShape, Object, Range, Scene, SettleOptions, Surface,
+    AreaLight, CameraSource, Draws, EnvironmentRanges, Exposure, Grade, LightShape, Object, Range, Scene,
+    SettleOptions, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -35,6 +36,8 @@ pub struct Recipe {
     /// Irradiance of the constant environment on the surface, as a share of what the lights give at its centre; the
     /// radiance itself when there is no light. Default: `[0.3, 0.8]`.
     pub ambient: Range,
+    /// Light from a picture of the surroundings, on top of `ambient`.
+    pub environment: EnvironmentRanges,
     /// Brighter or darker than the plate, EV. Default: `[-0.3, 0.3]`.
     pub gain_ev: Range,
     /// How objects come to rest.
@@ -150,6 +153,7 @@ impl Default for Recipe {
             grade: GradeRanges::default(),
             lights: vec![LightRanges::default()],
             ambient: Range::new(0.3, 0.8),
+            environment: EnvironmentRanges::default(),
             gain_ev: Range::new(-0.3, 0.3),
             settle: SettleOptions::default(),
         }
@@ -208,6 +212,7 @@ impl Recipe {
             objects,
             ambient: ambient(&lights, self.ambient.draw(&draws, "ambient")),
             lights,
+            environment: self.environment.draw(&draws),
             exposure: Exposure::MatchPlate { gain_ev: self.gain_ev.draw(&draws, "gain_ev") },
         };
         scene.check()?;
@@ -228,6 +233,7 @@ impl Recipe {
         self.grade.value.check("grade.value", 0.0, any)?;
         self.lights.iter().enumerate().try_for_each(|(i, light)| light.check(&format!("lights[{i}]")))?;
         self.ambient.check("ambient", 0.0, any)?;
+        self.environment.check()?;
         self.gain_ev.check("gain_ev", -32.0, 32.0)?;
         self.settle.check()
     }
@@ -278,6 +284,7 @@ impl Choice {
         Ok(Object {
             asset: self.asset.clone(),
             photo,
+            back: None,
             size: self.photo_sizes[photo],
             thickness: self.thickness,
             mass: self.mass,

@@ -1,12 +1,12 @@
 //! From a scene with nothing unknown to a shot.
 
+use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::filter::Pyramid;
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
-use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::scene::{CameraSource, Card, Exposure, Object, Placement, Scene, Shot};
+use crate::pixel::{LinearRgb, ObjectId};
+use crate::scene::{CameraSource, Card, EnvironmentMap, Exposure, Object, Placement, Scene, Shot};
 use std::sync::Arc;
 
 /// Shadows fall on the plane of the surface as far as this many times its sides: the extent of the reference scenes.
@@ -18,7 +18,9 @@ pub struct Look {
     /// Index into the class list.
     pub class: u32,
     /// The cut-out, premultiplied, scene-linear.
-    pub texture: Arc<Pyramid<PremulRgba>>,
+    pub texture: Texture,
+    /// What its back shows; none where that is the front seen through.
+    pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
 }
@@ -27,16 +29,18 @@ impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
     /// `look` finds an object's asset and photo, or nothing; for a library that is [`Look::of`]. `plate` is the background at the picture's
-    /// size; none leaves it transparent. Object `i` gets id `i + 1`; the shadow catcher is the plane of the
+    /// size; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id `i + 1`; the shadow catcher is the plane of the
     /// labelled surface, [`CATCHER`] times as large.
     ///
     /// # Errors
     /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an impossible value
-    /// ([`check`](Self::check)); an asset or photo that `look` does not find; a plate of another size.
+    /// ([`check`](Self::check)); an asset or photo that `look` does not find; a plate of another size; an environment
+    /// without its picture.
     pub fn resolve(
         &self,
         look: impl Fn(&Object) -> Option<Look>,
         plate: Option<Arc<Image<LinearRgb>>>,
+        panorama: Option<Arc<Panorama>>,
     ) -> Result<Shot> {
         self.check()?;
         let camera = self.known_camera()?;
@@ -52,6 +56,7 @@ impl Scene {
                 class: look.class,
                 quad: Quad { world_from_card, size: object.size },
                 texture: look.texture,
+                back: look.back,
                 outline_uv: look.outline_uv,
                 grade: object.grade,
             })
@@ -64,8 +69,18 @@ impl Scene {
             cards,
             lights: self.lights.clone(),
             ambient: self.ambient,
+            environment: self.environment_map(panorama)?,
             exposure,
         })
+    }
+
+    fn environment_map(&self, panorama: Option<Arc<Panorama>>) -> Result<Option<EnvironmentMap>> {
+        let Some(named) = &self.environment else { return Ok(None) };
+        let missing =
+            || Error::value("environment.file", format!("\"{}\", but its picture is not at hand", named.file));
+        let panorama = panorama.ok_or_else(missing)?;
+        let (rotation, strength) = (named.rotation_deg.to_radians(), named.strength as f32);
+        Ok(Some(EnvironmentMap { panorama, rotation, strength }))
     }
 
     fn known_camera(&self) -> Result<Camera> {
@@ -119,6 +134,7 @@ fn id<T: TryFrom<usize>>(i: usize) -> Result<T> {
 mod tests {
     use super::*;
     use crate::geom::{UnitQuaternion, Vector2};
+    use crate::pixel::PremulRgba;
     use crate::scene::{Grade, Surface};
 
     fn camera() -> Camera {
@@ -134,6 +150,7 @@ mod tests {
         let object = Object {
             asset: "b1".into(),
             photo: 0,
+            back: None,
             size: [0.2, 0.1],
             thickness: 0.005,
             mass: 0.03,
@@ -148,25 +165,26 @@ mod tests {
             objects: vec![object.clone(), object],
             lights: vec![],
             ambient: LinearRgb::WHITE,
+            environment: None,
             exposure: Exposure::Ev(1.0),
         }
     }
 
     fn look(object: &Object) -> Option<Look> {
-        let texture = Arc::new(Pyramid::new(Image::filled(2, 2, PremulRgba::default())));
+        let texture = Texture::from(Image::filled(2, 2, PremulRgba::default()));
         let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
-        (object.asset == "b1").then_some(Look { class: 3, texture, outline_uv })
+        (object.asset == "b1").then_some(Look { class: 3, texture, back: None, outline_uv })
     }
 
     fn complaint(spoil: impl Fn(&mut Scene)) -> String {
         let mut scene = scene();
         spoil(&mut scene);
-        scene.resolve(look, None).unwrap_err().to_string()
+        scene.resolve(look, None, None).unwrap_err().to_string()
     }
 
     #[test]
     fn a_known_scene_becomes_a_shot() {
-        let shot = scene().resolve(look, None).unwrap();
+        let shot = scene().resolve(look, None, None).unwrap();
         assert_eq!(shot.cards.iter().map(|c| c.id).collect::<Vec<_>>(), [ObjectId(1), ObjectId(2)]);
         assert_eq!((shot.exposure, shot.catcher, shot.cards[0].class), (2.0, [0.4, 0.3].map(|side| CATCHER * side), 3));
     }
@@ -191,7 +209,7 @@ mod tests {
     #[test]
     fn a_plate_of_another_size_is_told() {
         let plate = Arc::new(Image::filled(3, 6, LinearRgb::BLACK));
-        let told = scene().resolve(look, Some(plate)).unwrap_err().to_string();
+        let told = scene().resolve(look, Some(plate), None).unwrap_err().to_string();
         assert_eq!(told, "plate: 3 x 6 pixels, expected 8 x 6");
     }
 }

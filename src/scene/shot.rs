@@ -1,11 +1,11 @@
 //! A scene with nothing left to find out: what the renderer takes.
 
+use crate::asset::Texture;
 use crate::camera::Camera;
-use crate::filter::Pyramid;
 use crate::geom::{Point2, Quad};
 use crate::image::Image;
-use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::scene::{AreaLight, Grade};
+use crate::pixel::{LinearRgb, ObjectId};
+use crate::scene::{AreaLight, EnvironmentMap, Grade};
 use std::sync::Arc;
 
 /// Everything a picture is made of, in memory and known.
@@ -26,6 +26,8 @@ pub struct Shot {
     pub lights: Vec<AreaLight>,
     /// Radiance of a constant environment.
     pub ambient: LinearRgb,
+    /// Light from a picture of the surroundings, on top of `ambient`.
+    pub environment: Option<EnvironmentMap>,
     /// Factor from rendered radiance to plate values.
     pub exposure: f32,
 }
@@ -40,7 +42,11 @@ pub struct Card {
     /// Where it lies and how large it is.
     pub quad: Quad,
     /// The cut-out, premultiplied, scene-linear.
-    pub texture: Arc<Pyramid<PremulRgba>>,
+    pub texture: Texture,
+    /// What the side that looks along `-z` of the card shows, right way round as seen from there; none where it is the
+    /// front seen through. Whoever looks through a card (the eye, or a receiver of light) looks through the side that
+    /// faces it.
+    pub back: Option<Texture>,
     /// Its outline in texture coordinates (0 to 1, right and down), in order.
     pub outline_uv: Arc<[Point2<f64>]>,
     /// Change of its colours.
@@ -57,6 +63,7 @@ impl Shot {
             cards: Vec::new(),
             lights: Vec::new(),
             ambient: LinearRgb::BLACK,
+            environment: None,
             exposure: 1.0,
         }
     }
@@ -87,6 +94,12 @@ impl Shot {
     /// With a constant environment of this radiance.
     pub fn with_ambient(mut self, ambient: LinearRgb) -> Self {
         self.ambient = ambient;
+        self
+    }
+
+    /// With light from a picture of the surroundings.
+    pub fn with_environment(mut self, environment: EnvironmentMap) -> Self {
+        self.environment = Some(environment);
         self
     }
 }

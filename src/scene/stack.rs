@@ -129,6 +129,7 @@ mod tests {
         let card = |i: usize| Object {
             asset: format!("b{i}"),
             photo: 0,
+            back: None,
             size,
             thickness: 0.0002 * (i + 1) as f64,
             mass: 0.03,

@@ -24,6 +24,10 @@ impl Look {
     pub fn of(library: &Library, object: &Object) -> Option<Self> {
         let asset = library.find(&object.asset)?;
         let photo = asset.photos.get(object.photo)?;
-        Some(Self { class: asset.class, texture: photo.texture.clone(), outline_uv: photo.outline_uv.clone() })
+        let back = match object.back {
+            Some(i) => Some(asset.photos.get(i)?.texture.clone()),
+            None => None,
+        };
+        Some(Self { class: asset.class, texture: photo.texture.clone(), back, outline_uv: photo.outline_uv.clone() })
     }
 }

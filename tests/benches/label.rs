@@ -2,14 +2,12 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use petcomp::camera::Camera;
-use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
 use petcomp::render::{DeepImage, DeepSample};
 use petcomp::scene::{Card, Grade};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use std::hint::black_box;
-use std::sync::Arc;
 
 const CARDS: u32 = 30;
 
@@ -35,7 +33,8 @@ fn card(id: u32) -> Card {
         id: ObjectId(id),
         class: id % 4,
         quad: Quad { world_from_card: Pose::from_parts(place.into(), rotation), size: [0.2, 0.07] },
-        texture: Arc::new(Pyramid::new(Image::new(2, 2))),
+        texture: Image::<PremulRgba>::new(2, 2).into(),
+        back: None,
         outline_uv: (0..40).map(|i| Point2::new(0.5 + 0.5 * angle(i).cos(), 0.5 + 0.5 * angle(i).sin())).collect(),
         grade: Grade::default(),
     }

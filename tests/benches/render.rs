@@ -1,7 +1,7 @@
 //! Milliseconds per frame: 20 cards over a tray at 640 x 480, each preset, on one thread and on all.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use petcomp::filter::Pyramid;
+use petcomp::asset::Texture;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::render::{Quality, cast};
 use petcomp::scene::{AreaLight, Card, Grade, LightShape};
@@ -38,7 +38,7 @@ fn shot() -> Shot {
         power: 9.0,
         color: LinearRgb::new(1.0, 0.95, 0.85),
     };
-    let textures: Vec<_> = (0..5).map(|k| Arc::new(Pyramid::new(texture(k)))).collect();
+    let textures: Vec<_> = (0..5).map(|k| Texture::from(texture(k))).collect();
     let shot = Shot::new(camera).with_light(light).with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
     (0..20).fold(shot, |shot, k| {
         let f = f64::from(k);
@@ -49,6 +49,7 @@ fn shot() -> Shot {
             class: 0,
             quad: Quad { world_from_card: Pose::from_parts(center.into(), rotation), size: [0.07, 0.21] },
             texture: textures[k as usize % textures.len()].clone(),
+            back: None,
             outline_uv: Arc::new([]),
             grade: Grade { hue_deg: 7.0 * k as f32, saturation: 0.9, value: 1.1 },
         })

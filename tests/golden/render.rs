@@ -5,7 +5,6 @@
 //! share of pixels that the case states.
 
 use crate::case::Case;
-use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::render::{Quality, RenderOptions, cast, check};
 use petcomp::scene::{AreaLight, Card, Grade, LightShape};
@@ -117,7 +116,8 @@ fn card(dir: &Path, q: &Value) -> Result<Card, String> {
         id: ObjectId(number(&q["id"]) as u32),
         class: 0,
         quad: Quad { world_from_card, size: numbers(&q["size"]) },
-        texture: Arc::new(Pyramid::new(read(dir, &q["texture"])?)),
+        texture: read(dir, &q["texture"])?.into(),
+        back: None,
         outline_uv: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from).into(),
         grade: Grade {
             hue_deg: factor("hue_shift", 0.0),

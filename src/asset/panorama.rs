@@ -1,0 +1,136 @@
+//! A picture of everything around: an equirectangular environment map.
+
+use crate::error::{Error, Result};
+use crate::geom::Vector3;
+use crate::image::Image;
+use crate::io;
+use crate::pixel::{LinearRgb, Mix};
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+/// Radiance from every direction, as an equirectangular picture, scene-linear.
+///
+/// Row 0 is straight up (`+z`); the middle column is `+x`, and `+y` lies at a quarter of the width.
+#[derive(Debug)]
+pub struct Panorama {
+    image: Image<LinearRgb>,
+}
+
+impl Panorama {
+    /// A panorama from its picture.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for a picture without pixels, or with a value that is negative, NaN or infinite.
+    pub fn new(image: Image<LinearRgb>) -> Result<Self> {
+        if image.is_empty() {
+            return Err(Error::value("environment", "0 pixels, expected at least one"));
+        }
+        let is_light = |c: &LinearRgb| c.is_finite() && c.r >= 0.0 && c.g >= 0.0 && c.b >= 0.0;
+        if let Some(i) = image.pixels().iter().position(|c| !is_light(c)) {
+            let (x, y) = (i % image.width(), i / image.width());
+            let what = format!("{:?} at ({x}, {y}), expected numbers of at least 0", image.pixels()[i]);
+            return Err(Error::value("environment", what));
+        }
+        Ok(Self { image })
+    }
+
+    /// Reads a panorama from a file, an HDR or EXR as a rule.
+    ///
+    /// # Errors
+    /// Those of [`io::read`]; those of [`new`](Self::new), naming the file.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        Self::new(io::read(path)?).map_err(|e| e.in_file(path))
+    }
+
+    /// The picture.
+    pub fn image(&self) -> &Image<LinearRgb> {
+        &self.image
+    }
+
+    /// Radiance from a direction of any length.
+    ///
+    /// # Method
+    /// Bilinear between texel centres, around in `u`, the outermost row going on in `v`.
+    pub fn radiance(&self, direction: &Vector3<f64>) -> LinearRgb {
+        let [u, v] = direction_to_uv(direction);
+        let (width, height) = self.image.size();
+        let x = u * width as f64 - 0.5;
+        let y = (v * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
+        let (left, top) = (x.floor(), y.floor());
+        let column = |i: f64| i.rem_euclid(width as f64) as usize % width;
+        let (columns, rows) = ([column(left), column(left + 1.0)], [top as usize, (top as usize + 1).min(height - 1)]);
+        let (s, t) = ((x - left) as f32, (y - top) as f32);
+        let corner = |i: usize, j: usize| self.image[(columns[i], rows[j])];
+        LinearRgb::BLACK
+            .add_scaled((1.0 - s) * (1.0 - t), corner(0, 0))
+            .add_scaled(s * (1.0 - t), corner(1, 0))
+            .add_scaled((1.0 - s) * t, corner(0, 1))
+            .add_scaled(s * t, corner(1, 1))
+    }
+}
+
+/// Where a direction (of any length but 0) lies in an equirectangular picture, 0 to 1, right and down.
+pub fn direction_to_uv(direction: &Vector3<f64>) -> [f64; 2] {
+    let u = 0.5 - libm::atan2(direction.y, direction.x) / TAU;
+    let v = libm::atan2(direction.xy().norm(), direction.z) / PI;
+    [u, v]
+}
+
+/// The unit direction that a place in an equirectangular picture shows.
+pub fn uv_to_direction([u, v]: [f64; 2]) -> Vector3<f64> {
+    let (sin, cos) = libm::sincos((0.5 - u) * TAU);
+    let (radius, z) = libm::sincos(v * PI);
+    Vector3::new(radius * cos, radius * sin, z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axes_lie_where_the_definition_says() {
+        let table = [(Vector3::x(), [0.5, 0.5]), (Vector3::y(), [0.25, 0.5]), (-Vector3::y(), [0.75, 0.5])];
+        for (direction, [u, v]) in table {
+            let found = direction_to_uv(&direction);
+            assert!((found[0] - u).abs() < 1e-12 && (found[1] - v).abs() < 1e-12, "{direction:?}: {found:?}");
+        }
+        assert_eq!(direction_to_uv(&Vector3::z())[1], 0.0);
+        assert!((direction_to_uv(&-Vector3::z())[1] - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn places_and_directions_go_back_and_forth() {
+        for (i, j) in (0..16).flat_map(|i| (0..8).map(move |j| (i, j))) {
+            let uv = [(f64::from(i) + 0.5) / 16.0, (f64::from(j) + 0.5) / 8.0];
+            let back = direction_to_uv(&uv_to_direction(uv));
+            assert!((back[0] - uv[0]).abs() < 1e-12 && (back[1] - uv[1]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn texel_centres_give_texels_and_the_seam_is_closed() {
+        let image = Image::from_fn(8, 4, |x, y| LinearRgb::grey((x + 10 * y) as f32));
+        let panorama = Panorama::new(image).unwrap();
+        let at = |u: f64, v: f64| panorama.radiance(&uv_to_direction([u, v])).g;
+        assert!((at(2.5 / 8.0, 1.5 / 4.0) - 12.0).abs() < 1e-4);
+        assert!((at(0.0, 1.5 / 4.0) - 13.5).abs() < 1e-4, "half of texel 7, half of texel 0");
+        assert!((panorama.radiance(&Vector3::z()).g - at(0.5, 1e-9)).abs() < 1e-3, "the pole belongs to row 0");
+    }
+
+    #[test]
+    fn what_is_not_light_is_refused() {
+        assert!(Panorama::new(Image::new(0, 0)).is_err());
+        for bad in [f32::NAN, f32::INFINITY, -1.0] {
+            let mut image = Image::filled(4, 2, LinearRgb::WHITE);
+            image.pixels_mut()[5].g = bad;
+            assert!(Panorama::new(image).unwrap_err().to_string().contains("(1, 1)"));
+        }
+    }
+
+    #[test]
+    fn one_pixel_is_everywhere() {
+        let panorama = Panorama::new(Image::filled(1, 1, LinearRgb::grey(2.0))).unwrap();
+        assert_eq!(panorama.radiance(&Vector3::new(0.3, -0.2, -0.9)).r, 2.0);
+    }
+}

@@ -1,0 +1,154 @@
+//! Light from all around: an equirectangular picture, as a scene names it and as a shot holds it.
+
+use crate::asset::Panorama;
+use crate::error::{Error, Result};
+use crate::geom::Vector3;
+use crate::pixel::LinearRgb;
+use crate::scene::{Draws, Range};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// An environment map as a scene names it; its light comes on top of the constant `ambient`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Environment {
+    /// The picture: HDR or EXR, equirectangular, `+z` up.
+    pub file: String,
+    /// Turn about `+z`: at 90 the world's `+x` shows what lies at `+y` in the picture, degrees. Default: 0.
+    #[serde(default)]
+    pub rotation_deg: f64,
+    /// Factor on its values. Default: 1.
+    #[serde(default = "one")]
+    pub strength: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Environment {
+    /// Fails on the first value that cannot be right.
+    pub(super) fn check(&self, at: &str) -> Result<()> {
+        let expect = |claim: bool, field: &str, what: String| {
+            if claim { Ok(()) } else { Err(Error::value(format!("{at}.{field}"), what)) }
+        };
+        expect(!self.file.is_empty(), "file", "\"\", expected the name of a picture".into())?;
+        let turn = self.rotation_deg;
+        expect(turn.is_finite(), "rotation_deg", format!("{turn:?}, expected a finite number"))?;
+        let strength = self.strength;
+        expect(
+            strength.is_finite() && strength >= 0.0,
+            "strength",
+            format!("{strength:?}, expected a number of at least 0"),
+        )
+    }
+}
+
+/// An environment map in memory: a shared picture and how it is turned.
+#[derive(Clone, Debug)]
+pub struct EnvironmentMap {
+    /// The picture.
+    pub panorama: Arc<Panorama>,
+    /// Turn about `+z`, radians: a direction of the world is turned by this before it is looked up.
+    pub rotation: f64,
+    /// Factor on its values.
+    pub strength: f32,
+}
+
+impl EnvironmentMap {
+    /// A picture as it is.
+    pub fn new(panorama: Arc<Panorama>) -> Self {
+        Self { panorama, rotation: 0.0, strength: 1.0 }
+    }
+
+    /// Radiance from a direction of the world.
+    pub fn radiance(&self, direction: &Vector3<f64>) -> LinearRgb {
+        self.panorama.radiance(&turned(direction, self.rotation)).scale(self.strength)
+    }
+}
+
+/// A direction turned about `+z`, counterclockwise as seen from above.
+pub(crate) fn turned(direction: &Vector3<f64>, angle: f64) -> Vector3<f64> {
+    let (sin, cos) = libm::sincos(angle);
+    let d = direction;
+    Vector3::new(cos * d.x - sin * d.y, sin * d.x + cos * d.y, d.z)
+}
+
+/// What a scene's environment map is drawn from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EnvironmentRanges {
+    /// Pictures to choose from, relative to the recipe; none gives scenes without a map. Default: none.
+    pub files: Vec<String>,
+    /// Turn about the vertical, degrees. Default: `[-180, 180]`.
+    pub rotation_deg: Range,
+    /// Factor on the picture's values. Default: 1.
+    pub strength: Range,
+}
+
+impl Default for EnvironmentRanges {
+    fn default() -> Self {
+        Self { files: Vec::new(), rotation_deg: Range::new(-180.0, 180.0), strength: Range::fixed(1.0) }
+    }
+}
+
+impl EnvironmentRanges {
+    /// A map, its turn and its strength; none where there is none to choose from.
+    pub(super) fn draw(&self, draws: &Draws) -> Option<Environment> {
+        if self.files.is_empty() {
+            return None;
+        }
+        Some(Environment {
+            file: self.files[draws.below("environment.file", self.files.len())].clone(),
+            rotation_deg: self.rotation_deg.draw(draws, "environment.rotation_deg"),
+            strength: self.strength.draw(draws, "environment.strength"),
+        })
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        if let Some(i) = self.files.iter().position(String::is_empty) {
+            let what = "\"\", expected the name of a picture";
+            return Err(Error::value(format!("environment.files[{i}]"), what));
+        }
+        self.rotation_deg.check("environment.rotation_deg", -f64::INFINITY, f64::INFINITY)?;
+        self.strength.check("environment.strength", 0.0, f64::INFINITY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::direction_to_uv;
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn a_quarter_turn_shows_y_at_x() {
+        let [u, v] = direction_to_uv(&turned(&Vector3::x(), FRAC_PI_2));
+        assert!((u - 0.25).abs() < 1e-12 && (v - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_file_needs_only_a_name() {
+        let read: Environment = toml::from_str("file = 'lab.hdr'").unwrap();
+        assert_eq!(read, Environment { file: "lab.hdr".into(), rotation_deg: 0.0, strength: 1.0 });
+        assert!(read.check("environment").is_ok());
+    }
+
+    #[test]
+    fn what_cannot_be_right_is_told() {
+        let good = Environment { file: "lab.hdr".into(), rotation_deg: 0.0, strength: 1.0 };
+        let told = |e: Environment| e.check("environment").unwrap_err().to_string();
+        assert!(told(Environment { file: String::new(), ..good.clone() }).starts_with("environment.file"));
+        assert!(told(Environment { rotation_deg: f64::NAN, ..good.clone() }).starts_with("environment.rotation_deg"));
+        assert!(told(Environment { strength: -1.0, ..good }).starts_with("environment.strength: -1.0"));
+    }
+
+    #[test]
+    fn no_pictures_are_no_environment() {
+        assert_eq!(EnvironmentRanges::default().draw(&Draws::new(1, 2)), None);
+        let ranges = EnvironmentRanges { files: vec!["a.hdr".into(), "b.hdr".into()], ..Default::default() };
+        let files: std::collections::BTreeSet<_> =
+            (0..20).filter_map(|k| ranges.draw(&Draws::new(1, k))).map(|e| e.file).collect();
+        assert_eq!(files.len(), 2);
+    }
+}
