@@ -212,6 +212,7 @@ def main():
         plain(1, "veil", [0.26, 0.2], [0.02, 0.03, 0.13], 58, 15, 10),
         plain(2, "veil", [0.24, 0.16], [-0.04, -0.02, 0.09], -47, 100, 35)])
     save("pile_of_5", [graded(k) for k in range(5)], physics={"rest_speed": 0.002, "seed": 5})
+    save("pile_of_20", [graded(k) for k in range(20)], physics={"rest_speed": 0.002, "seed": 2})
     save("pile_of_30", [graded(k) for k in range(30)], physics={"rest_speed": 0.002, "seed": 11})
     few = [plain(1, "leaf", [0.2, 0.12], [0.08, 0.04, 0.07], 25, 40, 20),
            bottle(1, pose=pose([-0.1, -0.02, 0.05], 8, 70, 30)),
