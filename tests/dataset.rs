@@ -32,6 +32,8 @@ fn scene(k: u64) -> Scene {
         ambient: LinearRgb::grey(0.1),
         environment: None,
         exposure: Exposure::default(),
+        cast: Default::default(),
+        finish: Default::default(),
     }
 }
 

@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label;
 use crate::light;
-use crate::pixel::LinearRgb;
-use crate::render;
+use crate::pixel::{LinearRgb, PremulRgba};
+use crate::render::{self, DeepImage};
 use crate::scene::{Background, Choice, Draws, Look, Scene, Shot, stock};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -109,10 +109,17 @@ impl Studio {
     /// As the stages: no camera, no rest, a name that is not in the folders.
     pub fn take(&self, scene: Scene) -> Result<Sample> {
         let (scene, shot) = self.resolve(scene)?;
-        let deep = render::cast(&shot, &self.setup.render);
-        let frame = composite::frame(&deep, shot.plate.as_deref());
+        let (deep, frame) = self.shoot(&scene, &shot);
         let labels = label::label(&deep, &shot, &self.setup.label);
         Ok(Sample { frame, labels, scene, retries: 0 })
+    }
+
+    /// Renders a shot and finishes its frame as the scene asks.
+    pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
+        let deep = render::cast(shot, &self.setup.render);
+        let frame = composite::frame(&deep, shot.plate.as_deref());
+        let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
+        (deep, frame)
     }
 
     /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its exposure.
@@ -123,7 +130,7 @@ impl Studio {
         let plate = self.plate(&scene.plate)?;
         let mut scene = self.rest(camera::locate(scene)?)?;
         if let Some(plate) = &plate {
-            scene = light::expose(scene, plate);
+            scene = light::match_plate(scene, plate);
         }
         let shot = scene.resolve(|object| Look::of(&self.library, object), plate, panorama(&scene)?)?;
         Ok((scene, shot))

@@ -19,6 +19,7 @@ mod atomic;
 mod document;
 mod exif;
 pub mod exr;
+pub mod exr_parts;
 #[cfg(feature = "oiio")]
 mod ffi;
 mod format;

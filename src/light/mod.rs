@@ -8,10 +8,14 @@ mod ambient;
 mod area;
 mod expose;
 mod nodes;
+mod noise;
 mod polygon;
+mod surface;
 
 pub use ambient::ambient_directions;
 pub use area::{LightFrame, frame, irradiance, radiance};
-pub use expose::{expose, plate_white};
+pub use expose::{expose, match_plate, plate_white};
 pub use nodes::{Node, gauss_legendre, nodes};
+pub use noise::{match_noise, plate_noise};
 pub use polygon::polygon_irradiance;
+pub use surface::{match_cast, surface_color};

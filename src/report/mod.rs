@@ -5,6 +5,7 @@
 pub mod camera;
 mod chart;
 mod page;
+pub mod render;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};

@@ -69,7 +69,12 @@ pub(crate) struct RecipeArgs {
 impl RecipeArgs {
     /// Opens the folders that the recipe names.
     pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
-        Ok(Studio::open(Setup::read(&self.recipe, &self.overrides)?)?)
+        Ok(Studio::open(self.setup()?)?)
+    }
+
+    /// What the recipe file says.
+    pub(crate) fn setup(&self) -> anyhow::Result<Setup> {
+        Ok(Setup::read(&self.recipe, &self.overrides)?)
     }
 }
 
