@@ -7,6 +7,7 @@ use petcomp::dataset::{
 };
 use petcomp::geom::{Point2, Pose, Vector2};
 use petcomp::label::{BBox, Labels, ObjectLabel};
+use petcomp::render::DeepImage;
 use petcomp::scene::{CameraSource, Exposure, Surface};
 use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
@@ -49,6 +50,7 @@ fn object(id: u32, class: u32, [x, y]: [f64; 2], covered_by: &[u32]) -> ObjectLa
         visible_box: b,
         visible_fraction: 1.0,
         covered_by: covered_by.iter().map(|&id| ObjectId(id)).collect(),
+        ..ObjectLabel::default()
     }
 }
 
@@ -60,7 +62,9 @@ fn sample(k: u64) -> Result<Sample> {
     let under = |i: u64| if i == 1 { &[1][..] } else { &[] };
     let objects = (0..k % 4).map(|i| object(i as u32 + 1, (k + i) as u32 % 3, place(i), under(i)));
     let labels = Labels { image: IMAGE, objects: objects.collect() };
-    Ok(Sample { frame, labels, scene: scene(k), retries: (k % 3) as u32 })
+    let drawn = Scene { exposure: Exposure::MatchPlate { gain_ev: 0.1 }, ..scene(k) };
+    let retries = (k % 3) as u32;
+    Ok(Sample { frame, deep: DeepImage::default(), labels, drawn, scene: scene(k), scene_seed: k ^ 7, retries })
 }
 
 fn plan(folder: &Path, count: u64) -> Plan {
@@ -304,7 +308,7 @@ fn a_sidecar_reads_back_bit_by_bit() {
     make(&plan(dir.path(), 4)).unwrap();
     let record: Record = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
     let made = sample(3).unwrap();
-    assert_eq!((record.scene, record.labels), (made.scene, made.labels));
+    assert_eq!((record.scene, record.labels, record.drawn), (made.scene, made.labels, made.drawn));
     assert_eq!((record.seed, record.index, record.labelled), (7, 3, vec![ObjectId(1), ObjectId(3)]));
 }
 

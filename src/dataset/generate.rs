@@ -27,6 +27,13 @@ pub struct Plan {
     pub writers: Vec<Box<dyn Writer>>,
 }
 
+impl Plan {
+    /// Hash of everything but the seed that decides what a sample is.
+    pub fn recipe_hash(&self) -> String {
+        format!("{:08x}", crc32fast::hash(self.recipe.to_string().as_bytes()))
+    }
+}
+
 /// How far [`generate`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
@@ -62,7 +69,7 @@ pub fn generate(
     let journal = Journal::open(&plan.folder)?;
     let missing: Vec<u64> = (0..plan.count).filter(|&k| !journal.has(k)).collect();
     let books = Mutex::new(Books { journal, made: 0, failure: None });
-    let run = Run { plan, make, progress, stop, books };
+    let run = Run { plan, recipe_hash: plan.recipe_hash(), make, progress, stop, books };
     run.tell(&run.books());
     run.work(&missing)?;
     run.finish()
@@ -71,6 +78,7 @@ pub fn generate(
 /// What the threads of one run share.
 struct Run<'a, F> {
     plan: &'a Plan,
+    recipe_hash: String,
     make: F,
     progress: &'a (dyn Fn(Progress) + Sync),
     stop: &'a AtomicBool,
@@ -122,14 +130,16 @@ impl<F: Fn(u64) -> Result<Sample> + Sync> Run<'_, F> {
 
     fn write(&self, k: u64, sample: &Sample) -> Result<Line> {
         check(sample, self.plan.classes.len())?;
-        let labelled = self.plan.obstructed.labelled(&sample.labels);
+        let Plan { folder, seed, classes, .. } = self.plan;
+        let labelled = self.plan.obstructed.labelled(&sample.labels, classes.len());
         let part = self.plan.split.part(k, self.plan.count);
-        let entry = Entry { k, seed: self.plan.seed, part, sample, labelled: &labelled };
+        let recipe_hash = &self.recipe_hash;
+        let entry = Entry { k, seed: *seed, classes, recipe_hash, part, sample, labelled: &labelled };
         let mut files = Vec::new();
         for writer in &self.plan.writers {
-            files.extend(writer.write(&self.plan.folder, &entry)?);
+            files.extend(writer.write(folder, &entry)?);
         }
-        Line::of(&entry, self.plan.classes.len(), &self.plan.folder, &files)
+        Line::of(&entry, folder, &files)
     }
 
     fn tell(&self, books: &Books) {
@@ -156,6 +166,8 @@ impl<F: Fn(u64) -> Result<Sample> + Sync> Run<'_, F> {
                 what: format!("{done} of {count} samples are in {folder}; the same command goes on"),
             });
         }
+        let samples: Vec<_> = lines.iter().map(Line::written).collect();
+        plan.writers.iter().try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
         Ok(Report::of(&lines, &plan.classes, plan.count, books.made))
     }
 }

@@ -4,7 +4,7 @@
 //! the order in which samples finish; [`Journal::close`] puts them in order of number, so a finished folder does not tell
 //! how it was made.
 
-use crate::dataset::{Entry, Part};
+use crate::dataset::{Entry, Part, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::knotted;
@@ -25,7 +25,7 @@ pub(crate) struct Line {
     pub(crate) k: u64,
     /// Its part.
     pub(crate) part: Part,
-    /// Objects of each class in the picture, and how many of them have a label.
+    /// Objects of each class in the picture (of the class they are labelled as, if they are), and how many have a label.
     pub(crate) classes: Vec<[u64; 2]>,
     /// Objects that lie over each other in a circle.
     pub(crate) knotted: u64,
@@ -49,13 +49,13 @@ pub(crate) struct Finished {
 
 impl Line {
     /// The line of a sample whose files have just been written.
-    pub(crate) fn of(entry: &Entry<'_>, class_count: usize, folder: &Path, files: &[PathBuf]) -> Result<Self> {
-        let mut classes = vec![[0; 2]; class_count];
+    pub(crate) fn of(entry: &Entry<'_>, folder: &Path, files: &[PathBuf]) -> Result<Self> {
+        let mut classes = vec![[0; 2]; entry.classes.len()];
         for object in &entry.sample.labels.objects {
-            classes[object.class as usize][0] += 1;
-        }
-        for object in entry.labelled {
-            classes[object.class as usize][1] += 1;
+            let label = entry.labelled.iter().find(|label| label.object.id == object.id);
+            let count = &mut classes[label.map_or(object.class, |label| label.class) as usize];
+            count[0] += 1;
+            count[1] += u64::from(label.is_some());
         }
         Ok(Self {
             k: entry.k,
@@ -65,6 +65,12 @@ impl Line {
             retries: entry.sample.retries,
             files: files.iter().map(|path| Finished::of(folder, path)).collect::<Result<_>>()?,
         })
+    }
+
+    /// What a writer needs to know to join it with others.
+    pub(crate) fn written(&self) -> Written {
+        let files = self.files.iter().map(|file| file.path.split('/').collect()).collect();
+        Written { k: self.k, part: self.part, files }
     }
 
     /// Every file is there in its full size.

@@ -1,9 +1,8 @@
 //! The file that a dataset is made from.
 
-use crate::dataset::{Obstructed, Pictures, Split, Yolo};
+use crate::dataset::{LabelSetup, Pictures, Split};
 use crate::error::Result;
 use crate::io;
-use crate::label::LabelOptions;
 use crate::render::RenderOptions;
 use crate::scene::Recipe;
 use serde::{Deserialize, Serialize};
@@ -21,16 +20,12 @@ pub struct Setup {
     pub scene: Recipe,
     /// How finely pictures are sampled.
     pub render: RenderOptions,
-    /// What counts as visible and as overlapping.
-    pub label: LabelOptions,
+    /// How labels are made and written.
+    pub labels: LabelSetup,
     /// Which pictures are for validation.
     pub split: Split,
-    /// What happens to the labels of objects that something lies over. Default: `drop`.
-    pub obstructed: Obstructed,
     /// Format of the pictures.
     pub pictures: Pictures,
-    /// Labels for YOLO.
-    pub yolo: Yolo,
 }
 
 impl Default for Setup {
@@ -40,11 +35,9 @@ impl Default for Setup {
             backgrounds: "backgrounds".into(),
             scene: Recipe::default(),
             render: RenderOptions::default(),
-            label: LabelOptions::default(),
+            labels: LabelSetup::default(),
             split: Split::default(),
-            obstructed: Obstructed::default(),
             pictures: Pictures::default(),
-            yolo: Yolo::default(),
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Everything known of a sample, one JSON file beside each image.
 
-use crate::dataset::{Entry, Part, Writer};
+use crate::dataset::{Entry, Part, Sample, Writer};
 use crate::error::Result;
 use crate::io;
-use crate::label::Labels;
+use crate::label::{Labels, knotted};
 use crate::pixel::ObjectId;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -19,19 +19,29 @@ pub struct Sidecar;
 pub struct Record {
     /// Version of the program that made the sample.
     pub petcomp: String,
+    /// Hash of the recipe and of the files it names.
+    pub recipe_hash: String,
     /// Seed of the dataset.
     pub seed: u64,
+    /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
+    pub scene_seed: u64,
     /// Number of the sample.
     pub index: u64,
     /// Part of the dataset.
     pub part: Part,
     /// Objects that have a label in the dataset's other files.
     pub labelled: Vec<ObjectId>,
+    /// Objects that nothing lies over, by the topmost rule.
+    pub topmost: Vec<ObjectId>,
+    /// Objects that lie over each other in a circle, or between two circles.
+    pub knotted: Vec<ObjectId>,
     /// Scenes that were drawn and thrown away before this one.
     pub retries: u32,
     /// What is where in the picture.
     pub labels: Labels,
-    /// What the picture was made from: camera, poses, lights, and every other drawn value.
+    /// Every value as it was drawn: objects still in the air, exposure still open.
+    pub drawn: Scene,
+    /// What the picture was made from: camera, resting poses, lights, exposure.
     pub scene: Scene,
 }
 
@@ -48,18 +58,30 @@ impl Writer for Sidecar {
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
-        let record = Record {
+        let path = entry.path("scenes", "json");
+        io::write_json(folder.join(&path), &Record::of(entry))?;
+        Ok(vec![path])
+    }
+}
+
+impl Record {
+    /// What there is to say of an entry.
+    fn of(entry: &Entry<'_>) -> Self {
+        let Sample { labels, drawn, scene, scene_seed, retries, .. } = entry.sample;
+        Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
+            recipe_hash: entry.recipe_hash.to_owned(),
             seed: entry.seed,
+            scene_seed: *scene_seed,
             index: entry.k,
             part: entry.part,
-            labelled: entry.labelled.iter().map(|object| object.id).collect(),
-            retries: entry.sample.retries,
-            labels: entry.sample.labels.clone(),
-            scene: entry.sample.scene.clone(),
-        };
-        let path = entry.path("scenes", "json");
-        io::write_json(folder.join(&path), &record)?;
-        Ok(vec![path])
+            labelled: entry.labelled.iter().map(|label| label.object.id).collect(),
+            topmost: labels.objects.iter().filter(|object| object.is_topmost()).map(|object| object.id).collect(),
+            knotted: knotted(&labels.objects),
+            retries: *retries,
+            labels: labels.clone(),
+            drawn: drawn.clone(),
+            scene: scene.clone(),
+        }
     }
 }

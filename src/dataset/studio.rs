@@ -4,7 +4,7 @@ use crate::asset::{Asset, Library, Panorama};
 use crate::camera;
 use crate::composite;
 use crate::dataset::place::Place;
-use crate::dataset::{Plan, Sample, Setup, Sidecar};
+use crate::dataset::{Plan, Sample, Setup, Sidecar, Writer};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label;
@@ -53,17 +53,24 @@ impl Studio {
     }
 
     /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
-    pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Plan {
-        Plan {
+    ///
+    /// # Errors
+    /// Classes that the setup's policy for obstructed objects cannot add to.
+    pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
+        let labels = &self.setup.labels;
+        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures)];
+        writers.extend(labels.writers());
+        writers.push(Box::new(Sidecar));
+        Ok(Plan {
             folder: folder.into(),
             count,
             seed,
             recipe: self.fingerprint(),
-            classes: self.library.classes.clone(),
+            classes: labels.obstructed.classes(&self.library.classes)?,
             split: self.setup.split,
-            obstructed: self.setup.obstructed,
-            writers: vec![Box::new(self.setup.pictures), Box::new(self.setup.yolo), Box::new(Sidecar)],
-        }
+            obstructed: labels.obstructed,
+            writers,
+        })
     }
 
     /// Everything that decides what a picture or its labels are, cut-outs and labels by checksum; not where folders lie.
@@ -72,7 +79,8 @@ impl Studio {
             self.library.assets.iter().map(|a| (a.name.as_str(), checksums(a))).collect();
         let places: BTreeMap<&str, u32> =
             self.places.iter().map(|place| (place.background.name.as_str(), place.checksum)).collect();
-        let Setup { scene, render, label, .. } = &self.setup;
+        let Setup { scene, render, labels, .. } = &self.setup;
+        let label = labels.options();
         serde_json::json!({ "scene": scene, "render": render, "label": label, "assets": assets, "backgrounds": places })
     }
 
@@ -91,9 +99,10 @@ impl Studio {
     pub fn sample(&self, seed: u64, k: u64) -> Result<Sample> {
         let mut retries = 0;
         loop {
-            let scene = self.draw(redraw_seed(seed, k, retries), k)?;
+            let scene_seed = redraw_seed(seed, k, retries);
+            let scene = self.draw(scene_seed, k)?;
             match self.take(scene) {
-                Ok(sample) => return Ok(Sample { retries, ..sample }),
+                Ok(sample) => return Ok(Sample { retries, scene_seed, ..sample }),
                 Err(Error::Unsettled { what }) if retries < REDRAWS => {
                     log::info!("scene {k} is drawn again: {what}");
                     retries += 1;
@@ -108,10 +117,11 @@ impl Studio {
     /// # Errors
     /// As the stages: no camera, no rest, a name that is not in the folders.
     pub fn take(&self, scene: Scene) -> Result<Sample> {
+        let drawn = scene.clone();
         let (scene, shot) = self.resolve(scene)?;
         let (deep, frame) = self.shoot(&scene, &shot);
-        let labels = label::label(&deep, &shot, &self.setup.label);
-        Ok(Sample { frame, labels, scene, retries: 0 })
+        let labels = label::label(&deep, &shot, &self.setup.labels.options());
+        Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, retries: 0 })
     }
 
     /// Renders a shot and finishes its frame as the scene asks.

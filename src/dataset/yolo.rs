@@ -1,11 +1,11 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Entry, Part, Writer};
+use crate::dataset::{Entry, Labelled, Part, Writer};
 use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::io;
-use crate::label::{BBox, ObjectLabel};
+use crate::label::BBox;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -83,7 +83,7 @@ impl Yolo {
     fn rows(&self, entry: &Entry<'_>) -> String {
         let image = entry.sample.labels.image.map(f64::from);
         let mut rows: Vec<String> = Vec::new();
-        for row in entry.labelled.iter().flat_map(|object| self.rows_of(object, image)) {
+        for row in entry.labelled.iter().filter(|label| !label.ignored).flat_map(|label| self.rows_of(label, image)) {
             if !rows.contains(&row) {
                 rows.push(row);
             }
@@ -91,15 +91,15 @@ impl Yolo {
         rows.concat()
     }
 
-    fn rows_of(&self, object: &ObjectLabel, image: [f64; 2]) -> Vec<String> {
+    fn rows_of(&self, &Labelled { object, class, .. }: &Labelled<'_>, image: [f64; 2]) -> Vec<String> {
         let chosen = match self.boxes {
             YoloBox::Amodal => object.amodal_box,
             YoloBox::Visible => object.visible_box,
         };
         match self.task {
             _ if chosen.is_empty() => Vec::new(),
-            YoloTask::Detect => vec![box_row(object.class, &chosen, image)],
-            YoloTask::Segment => object.outline_px.iter().map(|ring| ring_row(object.class, ring, image)).collect(),
+            YoloTask::Detect => vec![box_row(class, &chosen, image)],
+            YoloTask::Segment => object.outline_px.iter().map(|ring| ring_row(class, ring, image)).collect(),
         }
     }
 }

@@ -55,13 +55,15 @@ impl BBox {
     }
 
     /// Grown to hold the pixel in column `x`, row `y`.
+    #[cfg(test)]
     pub(crate) fn with_pixel(self, x: usize, y: usize) -> Self {
         let (x, y) = (x as f64, y as f64);
         let pixel = Self { x0: x, y0: y, x1: x + 1.0, y1: y + 1.0 };
         if self.is_empty() { pixel } else { self.hull(pixel) }
     }
 
-    fn hull(self, o: Self) -> Self {
+    /// The smallest box around two; neither is empty.
+    pub(crate) fn hull(self, o: Self) -> Self {
         Self { x0: self.x0.min(o.x0), y0: self.y0.min(o.y0), x1: self.x1.max(o.x1), y1: self.y1.max(o.y1) }
     }
 }

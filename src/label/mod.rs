@@ -1,18 +1,22 @@
 //! Label: what is where in a picture, read from the same deep samples as the picture itself.
 //!
-//! Boxes and visibility are folds over the deep samples, so a label cannot disagree with its picture. Outlines and the
+//! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its picture. Outlines and the
 //! topmost rule are geometry: the cards' outlines as the camera sees them.
 
 mod bbox;
 pub(crate) mod draw;
+mod mask;
 mod outline;
 pub(crate) mod overlay;
+mod rle;
 mod topmost;
 mod visibility;
 
 pub use bbox::BBox;
+pub use mask::Mask;
 pub use overlay::overlay;
 pub use topmost::knotted;
+pub use visibility::DepthRange;
 
 use crate::geom::Point2;
 use crate::pixel::ObjectId;
@@ -32,7 +36,9 @@ pub struct Labels {
 }
 
 /// Everything known of one object in one picture.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+///
+/// "Amodal" is the whole object as far as it lies in the picture, as if it were alone; "visible" is what is seen of it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ObjectLabel {
     /// Which object of the scene.
     pub id: ObjectId,
@@ -41,13 +47,21 @@ pub struct ObjectLabel {
     /// Outline projected into the picture and clipped to it, pixels: one ring per part that the clipping leaves (a
     /// convex outline leaves one), none for a card seen edge-on.
     pub outline_px: Vec<Vec<Point2<f64>>>,
-    /// Box around the whole object as far as it lies in the picture.
+    /// Box around the whole object.
     pub amodal_box: BBox,
     /// Box around what is seen of it; empty when nothing is.
     pub visible_box: BBox,
-    /// Seen share of its coverage, 0 to 1.
+    /// Pixels that it covers, seen or not.
+    pub amodal_mask: Mask,
+    /// Pixels in which it is seen. See-through objects over each other are seen in the same pixels.
+    pub visible_mask: Mask,
+    /// Seen share of its coverage, 0 to 1: what half covers a pixel counts half.
     pub visible_fraction: f64,
-    /// Objects that lie over it, by the topmost rule.
+    /// Pixels of the visible mask over pixels of the amodal one, 0 to 1.
+    pub visible_pixel_fraction: f64,
+    /// How far away it is.
+    pub depth: DepthRange,
+    /// Objects that lie over it, by the topmost rule, in order of id.
     pub covered_by: Vec<ObjectId>,
 }
 
@@ -108,23 +122,34 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let seen = visibility::fold(deep, &ids, options);
     let regions = cards.iter().map(|card| outline::region(card, &shot.camera));
     let all = cards.iter().zip(regions).zip(seen).map(|((&card, region), seen)| Silhouette { card, region, seen });
-    let touching: Vec<_> = all.filter(|s| !amodal_box(s, options.amodal).is_empty()).collect();
+    let touching: Vec<_> = all.filter(|s| !s.amodal_box(options.amodal).is_empty()).collect();
     let covers = topmost::covers(&touching, &shot.camera, options.overlap_iou);
-    let objects = touching.iter().zip(covers).map(|(silhouette, covered_by)| ObjectLabel {
-        id: silhouette.card.id,
-        class: silhouette.card.class,
-        outline_px: outline::rings(&silhouette.region),
-        amodal_box: amodal_box(silhouette, options.amodal),
-        visible_box: silhouette.seen.visible_box,
-        visible_fraction: silhouette.seen.fraction(),
-        covered_by,
-    });
+    let objects = touching.into_iter().zip(covers).map(|(s, covered_by)| s.into_label(options.amodal, covered_by));
     Labels { image, objects: objects.collect() }
 }
 
-fn amodal_box(silhouette: &Silhouette<'_>, around: AmodalBox) -> BBox {
-    match around {
-        AmodalBox::Mask => silhouette.seen.amodal_box,
-        AmodalBox::Outline => outline::bounds(&silhouette.region),
+impl Silhouette<'_> {
+    fn amodal_box(&self, around: AmodalBox) -> BBox {
+        match around {
+            AmodalBox::Mask => self.seen.amodal.bounds(),
+            AmodalBox::Outline => outline::bounds(&self.region),
+        }
+    }
+
+    fn into_label(self, amodal: AmodalBox, covered_by: Vec<ObjectId>) -> ObjectLabel {
+        let [visible, whole] = [&self.seen.visible, &self.seen.amodal].map(|mask| mask.area() as f64);
+        ObjectLabel {
+            id: self.card.id,
+            class: self.card.class,
+            outline_px: outline::rings(&self.region),
+            amodal_box: self.amodal_box(amodal),
+            visible_box: self.seen.visible.bounds(),
+            visible_fraction: self.seen.fraction,
+            visible_pixel_fraction: if whole > 0.0 { visible / whole } else { 0.0 },
+            amodal_mask: self.seen.amodal,
+            visible_mask: self.seen.visible,
+            depth: self.seen.depth,
+            covered_by,
+        }
     }
 }

@@ -15,7 +15,7 @@ use crate::pixel::ObjectId;
 use crate::scene::Card;
 use geo::{Area, Centroid, MultiPolygon};
 
-/// For each object, the ids of those that lie over it, in the order given.
+/// For each object, the ids of those that lie over it, in order of id.
 ///
 /// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two cards at exactly the
 /// same depth, the one given first lies over the other.

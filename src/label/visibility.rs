@@ -1,26 +1,75 @@
 //! What is seen of each object: one fold over the deep samples.
 
-use crate::label::{BBox, LabelOptions};
+use crate::label::mask::Bits;
+use crate::label::{LabelOptions, Mask};
 use crate::pixel::ObjectId;
-use crate::render::DeepImage;
+use crate::render::{DeepImage, DeepSample};
+use serde::{Deserialize, Serialize};
 
 /// What the deep samples tell of one object.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Seen {
-    /// Around the pixels that the object covers, as if alone.
-    pub(crate) amodal_box: BBox,
-    /// Around the pixels in which it is seen.
-    pub(crate) visible_box: BBox,
-    /// Its own coverage, summed over the picture, pixels.
-    pub(crate) alpha: f64,
-    /// The seen part of that, pixels.
-    pub(crate) visible: f64,
+    /// The pixels that the object covers, as if alone.
+    pub(crate) amodal: Mask,
+    /// The pixels in which it is seen.
+    pub(crate) visible: Mask,
+    /// Seen share of its coverage.
+    pub(crate) fraction: f64,
+    /// How far away it is.
+    pub(crate) depth: DepthRange,
 }
 
-impl Seen {
-    /// Seen share of the coverage, 0 to 1; 0 where there is no coverage.
-    pub(crate) fn fraction(&self) -> f64 {
-        if self.alpha > 0.0 { (self.visible / self.alpha).clamp(0.0, 1.0) } else { 0.0 }
+/// Distances of an object along the optical axis, metres, over the pixels that it touches; zeros where it touches none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DepthRange {
+    /// Of its nearest pixel.
+    pub near: f64,
+    /// The mean, by coverage as if alone.
+    pub mean: f64,
+    /// Of its farthest pixel.
+    pub far: f64,
+}
+
+/// Sums and masks of one object while the fold runs.
+struct Tally {
+    amodal: Bits,
+    visible: Bits,
+    /// Coverage, the seen part of it, and coverage times depth, summed over pixels.
+    sums: [f64; 3],
+    near: f64,
+    far: f64,
+}
+
+impl Tally {
+    fn new(size: [u32; 2]) -> Self {
+        let none = Bits::new(size);
+        Self { amodal: none.clone(), visible: none, sums: [0.0; 3], near: f64::INFINITY, far: 0.0 }
+    }
+
+    #[inline]
+    fn add(&mut self, x: usize, y: usize, sample: &DeepSample, threshold: f32) {
+        let (alpha, depth) = (f64::from(sample.alpha), f64::from(sample.depth.0));
+        self.sums[0] += alpha;
+        self.sums[1] += f64::from(sample.visible);
+        self.sums[2] += alpha * depth;
+        self.near = self.near.min(depth);
+        self.far = self.far.max(depth);
+        if sample.alpha > threshold {
+            self.amodal.insert(x, y);
+        }
+        if sample.visible > threshold {
+            self.visible.insert(x, y);
+        }
+    }
+
+    fn seen(self) -> Seen {
+        let [alpha, visible, depth] = self.sums;
+        let (amodal, seen) = (self.amodal.mask(), self.visible.mask());
+        if alpha <= 0.0 {
+            return Seen { amodal, visible: seen, ..Seen::default() };
+        }
+        let depth = DepthRange { near: self.near, mean: depth / alpha, far: self.far };
+        Seen { amodal, visible: seen, fraction: (visible / alpha).clamp(0.0, 1.0), depth }
     }
 }
 
@@ -28,22 +77,15 @@ impl Seen {
 ///
 /// Sums run in `f64`, row by row, so they are the same at any thread count.
 pub(crate) fn fold(deep: &DeepImage, ids: &[ObjectId], options: &LabelOptions) -> Vec<Seen> {
-    let mut seen = vec![Seen::default(); ids.len()];
+    let size = [deep.width() as u32, deep.height() as u32];
+    let mut tallies: Vec<_> = ids.iter().map(|_| Tally::new(size)).collect();
     for y in 0..deep.height() {
         for x in 0..deep.width() {
             for sample in deep.at(x, y) {
                 let Ok(i) = ids.binary_search(&sample.object) else { continue };
-                let object = &mut seen[i];
-                object.alpha += f64::from(sample.alpha);
-                object.visible += f64::from(sample.visible);
-                if sample.alpha > options.alpha_threshold {
-                    object.amodal_box = object.amodal_box.with_pixel(x, y);
-                }
-                if sample.visible > options.alpha_threshold {
-                    object.visible_box = object.visible_box.with_pixel(x, y);
-                }
+                tallies[i].add(x, y, sample, options.alpha_threshold);
             }
         }
     }
-    seen
+    tallies.into_iter().map(Tally::seen).collect()
 }

@@ -72,7 +72,7 @@ pub(crate) fn generate(
     folder: &Path,
     common: &Common,
 ) -> anyhow::Result<Report> {
-    let plan = studio.plan(count, seed, folder);
+    let plan = studio.plan(count, seed, folder)?;
     let progress = common.progress("pictures");
     let report =
         dataset::generate(&plan, |k| studio.sample(seed, k), &|p| progress.at(p.done, p.count), interruption())?;

@@ -1,0 +1,102 @@
+//! What happens to objects that something lies over.
+
+use crate::error::{Error, Result};
+use crate::label::{Labels, ObjectLabel};
+use serde::{Deserialize, Serialize};
+
+/// Name of the class of [`Obstructed::Class`].
+pub const OBSTRUCTED: &str = "obstructed";
+
+/// What happens to the labels of objects that something lies over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Obstructed {
+    /// They get none: a detector of what can be picked, as in the paper. A trainer takes them for background.
+    #[default]
+    Drop,
+    /// They are labelled like the others.
+    Keep,
+    /// They are labelled as to be ignored where a format can say so (COCO `iscrowd`, Pascal VOC `difficult`): finding
+    /// them is neither right nor wrong. YOLO cannot; there they get no label.
+    Ignore,
+    /// They are labelled as a class of their own, the last: [`OBSTRUCTED`].
+    Class,
+}
+
+/// An object that gets a label.
+#[derive(Clone, Copy, Debug)]
+pub struct Labelled<'a> {
+    /// The object.
+    pub object: &'a ObjectLabel,
+    /// Class that it is labelled as.
+    pub class: u32,
+    /// Finding it is neither right nor wrong.
+    pub ignored: bool,
+}
+
+impl Obstructed {
+    /// The classes of the labels, from those of the objects.
+    ///
+    /// # Errors
+    /// A class of the objects that is called as the one that would be added.
+    pub fn classes(self, classes: &[String]) -> Result<Vec<String>> {
+        let mut classes = classes.to_vec();
+        if self == Self::Class {
+            if classes.iter().any(|name| name == OBSTRUCTED) {
+                let what = format!("\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name");
+                return Err(Error::value("labels.obstructed", what));
+            }
+            classes.push(OBSTRUCTED.into());
+        }
+        Ok(classes)
+    }
+
+    /// The objects that get a label, `class_count` classes of labels being there.
+    pub fn labelled(self, labels: &Labels, class_count: usize) -> Vec<Labelled<'_>> {
+        labels.objects.iter().filter_map(|object| self.label(object, class_count)).collect()
+    }
+
+    fn label(self, object: &ObjectLabel, class_count: usize) -> Option<Labelled<'_>> {
+        let plain = Labelled { object, class: object.class, ignored: false };
+        match self {
+            _ if object.is_topmost() => Some(plain),
+            Self::Drop => None,
+            Self::Keep => Some(plain),
+            Self::Ignore => Some(Labelled { ignored: true, ..plain }),
+            Self::Class => Some(Labelled { class: class_count.saturating_sub(1) as u32, ..plain }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::ObjectId;
+
+    fn pair() -> Labels {
+        let below = ObjectLabel { id: ObjectId(1), class: 1, covered_by: vec![ObjectId(2)], ..ObjectLabel::default() };
+        let above = ObjectLabel { id: ObjectId(2), class: 0, ..ObjectLabel::default() };
+        Labels { image: [8, 8], objects: vec![below, above] }
+    }
+
+    /// Id, class and whether ignored, of each label.
+    fn told(policy: Obstructed) -> Vec<(u32, u32, bool)> {
+        let labels = pair();
+        let classes = policy.classes(&["cap", "none"].map(String::from)).unwrap();
+        policy.labelled(&labels, classes.len()).iter().map(|l| (l.object.id.0, l.class, l.ignored)).collect()
+    }
+
+    #[test]
+    fn each_policy_changes_the_obstructed_object_alone() {
+        assert_eq!(told(Obstructed::Drop), [(2, 0, false)]);
+        assert_eq!(told(Obstructed::Keep), [(1, 1, false), (2, 0, false)]);
+        assert_eq!(told(Obstructed::Ignore), [(1, 1, true), (2, 0, false)]);
+        assert_eq!(told(Obstructed::Class), [(1, 2, false), (2, 0, false)]);
+    }
+
+    #[test]
+    fn a_class_that_is_there_already_is_not_added() {
+        assert!(Obstructed::Class.classes(&[OBSTRUCTED.to_owned()]).is_err());
+        assert_eq!(Obstructed::Keep.classes(&[OBSTRUCTED.to_owned()]).unwrap(), [OBSTRUCTED]);
+    }
+}

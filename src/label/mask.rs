@@ -1,0 +1,183 @@
+//! Masks: which pixels of a picture belong to an object, as runs down its columns.
+
+use crate::label::{BBox, rle};
+use serde::{Deserialize, Serialize};
+
+/// Yes or no for each pixel of a picture, in the run lengths that COCO uses.
+///
+/// The runs go down the columns, from left to right, and take turns: the first is of pixels outside, the second of pixels
+/// inside, and so on. In files: `{ size = [height, width], counts = "..." }`, COCO's compressed text. The default is the
+/// mask of a picture without pixels.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "rle::Text", into = "rle::Text")]
+pub struct Mask {
+    size: [u32; 2],
+    runs: Vec<u32>,
+}
+
+impl Mask {
+    /// From what `inside` says of column and row; `size` is width and height.
+    pub fn from_fn(size: [u32; 2], mut inside: impl FnMut(u32, u32) -> bool) -> Self {
+        let pixels = (0..size[0]).flat_map(|x| (0..size[1]).map(move |y| (x, y)));
+        Self::from_pixels(size, pixels.map(|(x, y)| inside(x, y)))
+    }
+
+    /// From the pixels column by column.
+    fn from_pixels(size: [u32; 2], pixels: impl Iterator<Item = bool>) -> Self {
+        let mut runs = vec![0];
+        let mut last = false;
+        for pixel in pixels {
+            if pixel != last {
+                runs.push(0);
+                last = pixel;
+            }
+            *runs.last_mut().expect("starts with one run") += 1;
+        }
+        Self { size, runs }
+    }
+
+    /// From runs; none unless they add up to the picture, no run but the first being empty.
+    pub(crate) fn from_runs(size: [u32; 2], runs: Vec<u32>) -> Option<Self> {
+        let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
+        let whole = sum == u64::from(size[0]) * u64::from(size[1]) && runs.iter().skip(1).all(|&n| n > 0);
+        whole.then_some(Self { size, runs })
+    }
+
+    /// Width and height of the picture.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Run lengths, the first of pixels outside.
+    pub fn runs(&self) -> &[u32] {
+        &self.runs
+    }
+
+    /// Number of pixels inside.
+    pub fn area(&self) -> u64 {
+        self.inside().map(|(_, n)| n).sum()
+    }
+
+    /// No pixel is inside.
+    pub fn is_empty(&self) -> bool {
+        self.runs.len() < 2
+    }
+
+    /// The box around the pixels inside, whole pixels; empty for an empty mask.
+    pub fn bounds(&self) -> BBox {
+        let h = u64::from(self.size[1]);
+        let around = |(start, n): (u64, u64)| {
+            let (first, last) = (start / h, (start + n - 1) / h);
+            // A run that turns into the next column touches the picture's lower and upper edge.
+            let rows = if first == last { [start % h, (start + n - 1) % h + 1] } else { [0, h] };
+            BBox { x0: first as f64, y0: rows[0] as f64, x1: (last + 1) as f64, y1: rows[1] as f64 }
+        };
+        self.inside().map(around).reduce(BBox::hull).unwrap_or_default()
+    }
+
+    /// The pixels inside, column and row, column by column.
+    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> {
+        let h = u64::from(self.size[1]);
+        self.inside().flat_map(|(start, n)| start..start + n).map(move |i| ((i / h) as u32, (i % h) as u32))
+    }
+
+    /// Start and length of each run of pixels inside.
+    fn inside(&self) -> impl Iterator<Item = (u64, u64)> {
+        let mut at = 0;
+        let runs = self.runs.iter().map(move |&n| {
+            let start = at;
+            at += u64::from(n);
+            (start, u64::from(n))
+        });
+        runs.skip(1).step_by(2)
+    }
+}
+
+/// A mask under construction: one bit a pixel, column by column.
+#[derive(Clone, Debug)]
+pub(crate) struct Bits {
+    words: Vec<u64>,
+    size: [u32; 2],
+}
+
+impl Bits {
+    /// No pixel is inside.
+    pub(crate) fn new(size: [u32; 2]) -> Self {
+        let pixels = size[0] as usize * size[1] as usize;
+        Self { words: vec![0; pixels.div_ceil(u64::BITS as usize)], size }
+    }
+
+    /// Takes a pixel in.
+    #[inline]
+    pub(crate) fn insert(&mut self, x: usize, y: usize) {
+        let i = x * self.size[1] as usize + y;
+        self.words[i / 64] |= 1 << (i % 64);
+    }
+
+    /// The runs: looks for the next pixel that differs, a word at a time.
+    pub(crate) fn mask(&self) -> Mask {
+        let end = self.size[0] as usize * self.size[1] as usize;
+        let mut runs = Vec::new();
+        let (mut at, mut value) = (0, false);
+        while at < end || runs.is_empty() {
+            let next = self.next(at, !value).min(end);
+            runs.push((next - at) as u32);
+            (at, value) = (next, !value);
+        }
+        Mask { size: self.size, runs }
+    }
+
+    /// The first place from `at` on that has this value, or any place beyond the end.
+    fn next(&self, at: usize, value: bool) -> usize {
+        let mut word = at / 64;
+        let mut mask = u64::MAX << (at % 64);
+        while let Some(&bits) = self.words.get(word) {
+            let found = if value { bits } else { !bits } & mask;
+            if found != 0 {
+                return word * 64 + found.trailing_zeros() as usize;
+            }
+            (word, mask) = (word + 1, u64::MAX);
+        }
+        usize::MAX
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn bits_and_pixels_give_the_same_runs(
+            (w, h, dots) in (1..20_u32, 1..20_u32).prop_flat_map(|(w, h)| {
+                (Just(w), Just(h), prop::collection::vec((0..w, 0..h), 0..60))
+            })
+        ) {
+            let mut bits = Bits::new([w, h]);
+            dots.iter().for_each(|&(x, y)| bits.insert(x as usize, y as usize));
+            let mask = Mask::from_fn([w, h], |x, y| dots.contains(&(x, y)));
+            prop_assert_eq!(bits.mask(), mask.clone());
+            let mut sorted = dots.clone();
+            sorted.sort();
+            sorted.dedup();
+            prop_assert_eq!(mask.pixels().collect::<Vec<_>>(), sorted.clone());
+            prop_assert_eq!(mask.area(), sorted.len() as u64);
+            let around = sorted.iter().fold(BBox::default(), |b, &(x, y)| b.with_pixel(x as usize, y as usize));
+            prop_assert_eq!(mask.bounds(), around);
+        }
+    }
+
+    #[test]
+    fn a_full_mask_starts_with_an_empty_run() {
+        let full = Mask::from_fn([3, 2], |_, _| true);
+        assert_eq!((full.runs(), full.area()), (&[0, 6][..], 6));
+        assert_eq!(full.bounds(), BBox { x0: 0.0, y0: 0.0, x1: 3.0, y1: 2.0 });
+    }
+
+    #[test]
+    fn an_empty_mask_has_no_bounds() {
+        let none = Bits::new([4, 5]).mask();
+        assert!(none.is_empty() && none.bounds().is_empty() && none.runs() == [20]);
+    }
+}

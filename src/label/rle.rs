@@ -1,0 +1,138 @@
+//! Run lengths as COCO writes them: one text for a mask.
+//!
+//! # Method
+//! COCO's "compressed RLE", as its annotations define it: from the fourth run on, the difference to the run two before
+//! is stored (runs of neighbouring columns are alike); each number goes, lowest bits first, into groups of five bits, the
+//! sixth bit of a group says that another follows, the highest bit of the last group is the sign; a group is the
+//! character that many places after `0`.
+
+use crate::label::Mask;
+use serde::{Deserialize, Serialize};
+
+/// Code of the character for the group 0.
+const ZERO: u8 = b'0';
+
+/// Bits in a group.
+const GROUP: u32 = 5;
+
+/// Set in a group that another follows.
+const MORE: u8 = 1 << GROUP;
+
+/// Set in a last group of a negative number.
+const SIGN: u8 = 1 << (GROUP - 1);
+
+/// A mask in a file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Text {
+    /// Height and width: COCO's order.
+    size: [u32; 2],
+    counts: String,
+}
+
+impl From<Mask> for Text {
+    fn from(mask: Mask) -> Self {
+        let [w, h] = mask.size();
+        Self { size: [h, w], counts: encode(mask.runs()) }
+    }
+}
+
+impl TryFrom<Text> for Mask {
+    type Error = String;
+
+    fn try_from(text: Text) -> Result<Self, String> {
+        let [h, w] = text.size;
+        let runs = decode(&text.counts).ok_or("counts: not COCO's compressed run lengths")?;
+        let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
+        Mask::from_runs([w, h], runs).ok_or_else(|| format!("counts: runs of {sum} pixels in all, expected {w} x {h}"))
+    }
+}
+
+/// The text of runs.
+pub(crate) fn encode(runs: &[u32]) -> String {
+    let mut text = String::new();
+    for (i, &run) in runs.iter().enumerate() {
+        let before = if i > 2 { runs[i - 2] } else { 0 };
+        push(&mut text, i64::from(run) - i64::from(before));
+    }
+    text
+}
+
+fn push(text: &mut String, mut number: i64) {
+    loop {
+        let group = (number as u8) & (MORE - 1);
+        number >>= GROUP;
+        let is_last = number == if group & SIGN == 0 { 0 } else { -1 };
+        text.push(char::from(ZERO + if is_last { group } else { group | MORE }));
+        if is_last {
+            return;
+        }
+    }
+}
+
+/// The runs of a text; none where it is no text of runs.
+pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
+    let mut runs: Vec<u32> = Vec::new();
+    let mut bytes = text.bytes();
+    while let Some(first) = bytes.next() {
+        let number = pull(first, &mut bytes)?;
+        let before = if runs.len() > 2 { runs[runs.len() - 2] } else { 0 };
+        runs.push(u32::try_from(number.checked_add(i64::from(before))?).ok()?);
+    }
+    Some(runs)
+}
+
+fn pull(first: u8, rest: &mut impl Iterator<Item = u8>) -> Option<i64> {
+    let (mut number, mut shift, mut byte) = (0, 0, first);
+    loop {
+        let group = byte.checked_sub(ZERO).filter(|&group| group < 2 * MORE)?;
+        number |= i64::from(group & (MORE - 1)) << shift;
+        shift += GROUP;
+        if group & MORE == 0 {
+            return Some(if group & SIGN == 0 { number } else { number | -1 << shift });
+        }
+        // A difference of two runs has 33 bits: seven groups.
+        byte = rest.next().filter(|_| shift < 7 * GROUP)?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_text_reads_back(runs in prop::collection::vec(any::<u32>(), 0..40)) {
+            prop_assert_eq!(decode(&encode(&runs)), Some(runs));
+        }
+
+        #[test]
+        fn what_is_no_text_of_runs_is_refused_without_panic(text in ".{0,40}") {
+            let _ = decode(&text);
+        }
+    }
+
+    /// Texts made by `encode` of pycocotools 2.0.11.
+    #[test]
+    fn texts_are_those_of_pycocotools() {
+        let square = Mask::from_fn([4, 5], |x, y| (1..3).contains(&x) && (1..4).contains(&y));
+        let bars = Mask::from_fn([640, 480], |x, y| match x {
+            200..203 => (100..300).contains(&y),
+            203 => (50..60).contains(&y),
+            300..302 => (5..470).contains(&y),
+            _ => false,
+        });
+        let none = Mask::from_fn([640, 480], |_, _| false);
+        let texts = [square, bars, none].map(|mask| encode(mask.runs()));
+        assert_eq!(texts, ["63204", "Tkm2X6h8000^NRJSV]1W>VcbN0k]n4", "PP\\9"]);
+    }
+
+    #[test]
+    fn a_mask_of_another_size_is_refused() {
+        let read = |json: &str| serde_json::from_str::<Mask>(json).map_err(|e| e.to_string());
+        assert!(read(r#"{"size":[2,3],"counts":"06"}"#).is_ok());
+        assert!(read(r#"{"size":[2,2],"counts":"06"}"#).unwrap_err().contains("6 pixels in all, expected 2 x 2"));
+        assert!(read(r#"{"size":[2,3],"counts":"\u0007"}"#).is_err());
+    }
+}
