@@ -9,9 +9,11 @@ mod area;
 mod expose;
 mod nodes;
 mod polygon;
+mod sky;
 
 pub use ambient::ambient_directions;
 pub use area::{LightFrame, frame, irradiance, radiance};
 pub use expose::{expose, plate_white};
 pub use nodes::{Node, gauss_legendre, nodes};
 pub use polygon::polygon_irradiance;
+pub use sky::{SkyPiece, sky_pieces};
