@@ -286,7 +286,7 @@ fn segments_hold_outlines_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);
     plan.writers = vec![
-        Box::new(Pictures { format: PictureFormat::Jpg, exr: true }),
+        Box::new(Pictures { format: PictureFormat::Jpg, exr: true, ..Pictures::default() }),
         Box::new(Yolo { task: YoloTask::Segment, ..Yolo::default() }),
     ];
     make(&plan).unwrap();

@@ -21,6 +21,7 @@ mod stack;
 mod stock;
 
 pub use draw::Draws;
+pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
