@@ -4,12 +4,13 @@
 
 pub mod camera;
 mod chart;
+pub mod dataset;
 pub mod eval;
 pub mod experiments;
-pub mod dataset;
 mod histogram;
 pub mod matte;
 mod page;
+pub mod render;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod table;
