@@ -8,7 +8,10 @@ pub mod composite;
 pub mod dataset;
 pub mod diff;
 mod error;
+pub mod eval;
 pub mod filter;
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod geom;
 mod image;
 pub mod io;
@@ -21,6 +24,7 @@ pub mod report;
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;
+pub mod train;
 
 pub use camera::Camera;
 pub use error::{Error, Result};

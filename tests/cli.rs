@@ -230,7 +230,9 @@ fn a_scene_goes_through_the_stages_one_by_one() {
     desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
     desk.ok(&["scene", "draw", "demo/recipe.toml", "-k", "3", "--seed", "5", "-o", "scene.toml"]);
     desk.ok(&["scene", "check", "scene.toml"]);
-    desk.ok(&["settle", "scene.toml", "-o", "rest.json"]);
+    desk.ok(&["settle", "scene.toml", "-o", "rest.json", "--trace", "fall.csv", "--preview", "rest.png"]);
+    assert!(std::fs::read_to_string(desk.path("fall.csv")).is_ok_and(|csv| csv.starts_with("seconds,object,x,y,z,")));
+    assert!(desk.path("rest.png").exists());
     desk.ok(&["render", "rest.json", "demo/recipe.toml", "-o", "frame.exr"]);
     desk.ok(&["render", "scene.toml", "demo/recipe.toml", "-o", "again.exr"]);
     desk.ok(&["diff", "frame.exr", "again.exr"]);

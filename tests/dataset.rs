@@ -2,11 +2,12 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions, Sidecar, Split,
-    Shard, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, mend, merge,
+    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, Shard,
+    SheetOptions, Sidecar, Split, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, mend,
+    merge,
 };
 use petcomp::geom::{Point2, Pose, Vector2};
-use petcomp::label::{BBox, Labels, ObjectLabel};
+use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
 use petcomp::render::DeepImage;
 use petcomp::scene::{CameraSource, Exposure, Surface};
 use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io, report};
@@ -27,7 +28,7 @@ fn scene(k: u64) -> Scene {
         image: IMAGE,
         plate: "tray".into(),
         camera: CameraSource::Known(camera),
-        surface: Surface { size: [0.4, 0.3] },
+        surface: Surface::new([0.4, 0.3]),
         objects: Vec::new(),
         lights: Vec::new(),
         ambient: LinearRgb::grey(0.1),
@@ -46,10 +47,17 @@ fn object(id: u32, class: u32, [x, y]: [f64; 2], covered_by: &[u32]) -> ObjectLa
         outline_px: vec![corners.map(|[x, y]| Point2::new(x, y)).to_vec()],
         amodal_box: b,
         visible_box: b,
+        amodal_mask: mask(&b),
+        visible_mask: mask(&b),
         visible_fraction: 1.0,
         covered_by: covered_by.iter().map(|&id| ObjectId(id)).collect(),
         ..ObjectLabel::default()
     }
+}
+
+fn mask(b: &BBox) -> Mask {
+    let inside = |v: u32, from: f64, to: f64| (from..to).contains(&f64::from(v));
+    Mask::from_fn(IMAGE, |x, y| inside(x, b.x0, b.x1) && inside(y, b.y0, b.y1))
 }
 
 /// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the first.
@@ -62,9 +70,11 @@ fn sample(k: u64) -> Result<Sample> {
     let labels = Labels { image: IMAGE, objects: objects.collect() };
     let drawn = Scene { exposure: Exposure::MatchPlate { gain_ev: 0.1 }, ..scene(k) };
     let rejected = vec!["two bodies overlap".to_owned(); (k % 3) as usize];
+    let nothing = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
+    let deep = DeepImage::from_pixels(nothing, vec![vec![]; frame.pixels().len()]);
     Ok(Sample {
         frame,
-        deep: DeepImage::default(),
+        deep,
         labels,
         drawn,
         scene: scene(k),
@@ -87,6 +97,18 @@ fn plan(folder: &Path, count: u64) -> Plan {
         obstructed: Obstructed::Drop,
         writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default()), Box::new(Sidecar)],
     }
+}
+
+/// The same with every format.
+fn full_plan(folder: &Path, count: u64) -> Plan {
+    let formats = r#"formats = ["yolo", "coco", "voc", "webdataset", "layers"]
+        webdataset = { samples = 3 }"#;
+    let labels: LabelSetup = toml::from_str(formats).unwrap();
+    let mut plan = plan(folder, count);
+    plan.writers.truncate(1);
+    plan.writers.push(Box::new(Sidecar));
+    plan.writers.extend(labels.writers(&Pictures::default()));
+    plan
 }
 
 fn make(plan: &Plan) -> Result<Report> {
@@ -142,18 +164,18 @@ fn a_dataset_has_the_files_that_trainers_read() {
 #[test]
 fn the_bytes_are_the_same_at_any_number_of_threads() {
     let (one, four) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    threads(1, || make(&plan(one.path(), 40))).unwrap();
-    threads(4, || make(&plan(four.path(), 40))).unwrap();
+    threads(1, || make(&full_plan(one.path(), 40))).unwrap();
+    threads(4, || make(&full_plan(four.path(), 40))).unwrap();
     assert_eq!(bytes(one.path()), bytes(four.path()));
 }
 
 #[test]
 fn a_stopped_run_goes_on_to_the_same_bytes() {
     let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    make(&plan(whole.path(), 30)).unwrap();
+    make(&full_plan(whole.path(), 30)).unwrap();
     let stop = AtomicBool::new(false);
     let after_some = |p: Progress| stop.store(p.made >= 7, Ordering::Relaxed);
-    let e = threads(3, || generate(&plan(broken.path(), 30), sample, &after_some, &stop)).unwrap_err();
+    let e = threads(3, || generate(&full_plan(broken.path(), 30), sample, &after_some, &stop)).unwrap_err();
     assert!(matches!(e, Error::Interrupted { .. }) && e.to_string().contains("of 30 samples are in"), "{e}");
 
     // What a kill may leave: a torn line, half a file, a temporary file, a file whose line never came.
@@ -171,9 +193,9 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
         made.fetch_add(1, Ordering::Relaxed);
         sample(k)
     };
-    let report = generate(&plan(broken.path(), 30), counted, &|_| {}, &AtomicBool::new(false)).unwrap();
+    let report = generate(&full_plan(broken.path(), 30), counted, &|_| {}, &AtomicBool::new(false)).unwrap();
     assert_eq!((report.made, made.into_inner()), (30 - finished as u64 + 2, 30 - finished as u64 + 2));
-    assert_eq!(report, Report { made: report.made, ..make(&plan(whole.path(), 30)).unwrap() });
+    assert_eq!(report, Report { made: report.made, ..make(&full_plan(whole.path(), 30)).unwrap() });
     assert_eq!(bytes(whole.path()), bytes(broken.path()));
 }
 
@@ -191,9 +213,9 @@ fn a_finished_dataset_is_left_alone() {
 #[test]
 fn a_dataset_may_grow() {
     let (grown, at_once) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    make(&plan(grown.path(), 5)).unwrap();
-    assert_eq!(make(&plan(grown.path(), 12)).unwrap().made, 7);
-    make(&plan(at_once.path(), 12)).unwrap();
+    make(&full_plan(grown.path(), 5)).unwrap();
+    assert_eq!(make(&full_plan(grown.path(), 12)).unwrap().made, 7);
+    make(&full_plan(at_once.path(), 12)).unwrap();
     assert_eq!(bytes(grown.path()), bytes(at_once.path()));
 }
 
@@ -292,7 +314,23 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
 }
 
 #[test]
-fn segments_hold_outlines_and_jpegs_are_accepted() {
+fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
+    let dir = tempfile::tempdir().unwrap();
+    let circle = |k| {
+        let mut s = sample(k)?;
+        s.labels.objects =
+            [(1, 3), (2, 1), (3, 2)].map(|(id, over)| object(id, 0, [6.0 * id as f64; 2], &[over])).into();
+        s.labels.objects.push(object(4, 1, [40.0; 2], &[]));
+        Ok(s)
+    };
+    let report = generate(&plan(dir.path(), 2), circle, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!((report.knotted, report.objects, report.labelled), (6, 8, 2));
+    let record: Record = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
+    assert_eq!((record.knotted, record.topmost), ([1, 2, 3].map(ObjectId).to_vec(), vec![ObjectId(4)]));
+}
+
+#[test]
+fn segments_hold_borders_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);
     plan.writers = vec![

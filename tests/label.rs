@@ -3,7 +3,7 @@
 use geo::Contains;
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
-use petcomp::label::{AmodalBox, BBox, LabelOptions, Labels, knotted, label};
+use petcomp::label::{AmodalBox, BBox, DepthRange, LabelOptions, Labels, knotted, label};
 use petcomp::render::{DeepImage, DeepSample};
 use petcomp::scene::{Card, Grade};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
@@ -266,6 +266,23 @@ fn a_tilted_card_is_compared_where_the_two_overlap() {
 }
 
 #[test]
+fn masks_and_depth_are_those_of_the_card() {
+    // Card 2 hides the right half of card 1: its left edge is at x = 0, the picture's middle.
+    let cards = [(1, 0.0, [0.2, 0.2]), (2, 0.1, [0.2, 0.4])]
+        .map(|(id, x, size)| card(id, [x, 0.0, 0.1 * f64::from(id)], [0.0; 3], size, &WHOLE));
+    let found = labels(&shot(cards), &LabelOptions::default());
+    let [below, above] = [&found.objects[0], &found.objects[1]];
+    // 0.2 m seen from 0.9 m with 100 pixels a metre at one metre; edges cut pixels in part.
+    let (side, edge) = (20.0 / 0.9, 48.0);
+    assert!((below.amodal_mask.area() as f64 - side * side).abs() < 4.0 * side);
+    assert_eq!(above.amodal_mask, above.visible_mask);
+    assert!(below.visible_mask.pixels().all(|(x, _)| f64::from(x) <= edge));
+    assert!((below.visible_pixel_fraction - 0.5).abs() < 0.05 && (below.visible_fraction - 0.5).abs() < 0.02);
+    let DepthRange { near, mean, far } = below.depth;
+    assert!([near, mean, far].iter().all(|depth| (depth - 0.9).abs() < 1e-6), "{:?}", below.depth);
+}
+
+#[test]
 fn cards_at_the_same_depth_are_ordered_by_id() {
     let twins = [2, 1].map(|id| card(id, [0.0, 0.0, 0.1], [0.0; 3], [0.2; 2], &WHOLE));
     let found = labels(&shot(twins), &LabelOptions::default());
@@ -346,4 +363,5 @@ fn film_seen_through_film_counts_as_seen() {
     let found = label(&deep, &scene, &LabelOptions::default());
     assert!((found.objects[1].visible_fraction - 0.6).abs() < 1e-6);
     assert_eq!(found.objects[1].visible_box, BBox { x0: 2.0, y0: 1.0, x1: 3.0, y1: 2.0 });
+    assert_eq!(found.objects[1].visible_pixel_fraction, 1.0);
 }

@@ -29,6 +29,7 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
         return Err(Error::file(folder, format!("is not empty and has no {IDENTITY}, expected a new or empty folder")));
     }
     io::create_folder(folder)?;
+    io::refuse_links(folder)?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {

@@ -3,8 +3,8 @@
 //! A [`Studio`] opens what a recipe file ([`Setup`]) names and makes sample `k` of it: draws the scene, lets it settle,
 //! lights, renders and labels it.
 //!
-//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Yolo`]
-//! the labels, [`Sidecar`] everything that was drawn. Sample `k` has the same files, to the byte, whatever the number of
+//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Sidecar`]
+//! everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`WebDataset`] and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
 //! threads, and after any interruption:
 //!
 //! ```text
@@ -17,11 +17,13 @@
 //! ```
 
 mod check;
+mod coco;
 mod contact_sheet;
 mod folder;
 mod formats;
 mod generate;
 mod journal;
+mod layers;
 mod listing;
 mod merge;
 mod near;
@@ -37,14 +39,23 @@ mod split;
 mod studio;
 mod summary;
 mod times;
+mod voc;
+mod webdataset;
 mod yolo;
+mod yolo_set;
 mod yolo_yaml;
 
 pub use check::{Checked, Fault, check};
+pub use coco::{Coco, CocoMask};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
+pub use formats::{Extent, Format, LabelSetup};
 pub use formats::{Format, LabelSetup};
+pub use generate::{Plan, Progress, generate};
 pub use generate::{Plan, generate};
+pub(crate) use journal::read as journal_lines;
+pub use journal::{ClassCount, Report};
 pub use journal::{ClassCount, Report, mend};
+pub use layers::Layers;
 pub use listing::Listing;
 pub use merge::merge;
 pub use near::{NEAR_CODES, Near};
@@ -59,7 +70,11 @@ pub use split::{Part, Split, SplitOrder};
 pub use studio::Studio;
 pub use summary::{Shown, Summary};
 pub use times::Times;
+pub use voc::Voc;
+pub use webdataset::WebDataset;
 pub use yolo::{Yolo, YoloBox, YoloTask};
+pub use yolo::{Yolo, YoloTask};
+pub use yolo_set::YoloSet;
 
 use crate::error::Result;
 use crate::image::Image;
@@ -127,6 +142,17 @@ pub struct Written {
     pub part: Part,
     /// Its files below the dataset's folder, those of all writers, in their order.
     pub files: Vec<PathBuf>,
+}
+
+impl Written {
+    /// The sample's file in a folder of the dataset: the first of `coco` is the one that COCO joins.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
+        let found = self.files.iter().find(|file| file.starts_with(kind)).map(PathBuf::as_path);
+        found.ok_or_else(|| std::io::Error::other(format!("sample {} has no file in {kind}", self.k)))
+    }
 }
 
 /// A layout that a dataset is written in.

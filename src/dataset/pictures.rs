@@ -29,7 +29,7 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    fn extension(self) -> &'static str {
+    pub(crate) fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
             Self::Jpg => "jpg",

@@ -34,7 +34,7 @@ pub struct Record {
     pub labelled: Vec<ObjectId>,
     /// Objects that nothing lies over, by the topmost rule.
     pub topmost: Vec<ObjectId>,
-    /// Objects that lie over each other in a circle, or between two circles.
+    /// Objects that lie over each other in a circle.
     pub knotted: Vec<ObjectId>,
     /// Why each scene that was drawn before this one was thrown away.
     pub rejected: Vec<String>,

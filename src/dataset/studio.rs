@@ -59,9 +59,8 @@ impl Studio {
     /// Classes that the setup's policy for obstructed objects cannot add to.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let labels = &self.setup.labels;
-        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures)];
-        writers.extend(labels.writers());
-        writers.push(Box::new(Sidecar));
+        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
+        writers.extend(labels.writers(&self.setup.pictures));
         Ok(Plan {
             folder: folder.into(),
             count,

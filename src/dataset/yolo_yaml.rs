@@ -1,10 +1,12 @@
 //! `data.yaml`: the part of YAML that describes a YOLO dataset, written and read.
 
 use crate::dataset::Part;
+use std::path::{Path, PathBuf};
 
 /// What a `data.yaml` says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct DataYaml {
+    path: Option<String>,
     train: Option<String>,
     val: Option<String>,
     nc: Option<usize>,
@@ -21,6 +23,16 @@ impl DataYaml {
             Part::Train => self.train.as_deref(),
             Part::Val => self.val.as_deref(),
         }
+    }
+
+    /// Where the folders of the parts are, for a file in `folder`.
+    pub(crate) fn root(&self, folder: &Path) -> PathBuf {
+        self.path.as_deref().map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
+    }
+
+    /// Names of the classes.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// Number of classes.
@@ -83,6 +95,7 @@ impl DataYaml {
             return if key == expected.to_string() { Ok(()) } else { Err(format!("class {key}, expected {expected}")) };
         }
         match key {
+            "path" => self.path = Some(unquoted(value)),
             "train" => self.train = Some(unquoted(value)),
             "val" => self.val = Some(unquoted(value)),
             "nc" => self.nc = Some(value.parse().map_err(|_| format!("nc: {value}, expected a number"))?),

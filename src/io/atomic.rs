@@ -1,13 +1,21 @@
-//! Whole files or none: everything is written beside its place and then moved there.
+//! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
 
 use super::format::reason;
 use crate::{Error, Result};
 use std::fs::Permissions;
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Component, Path, PathBuf};
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_through(path, |file| file.write_all(bytes))
+}
+
+/// Writes a file piece by piece: nothing of it is there before `fill` has written all of it.
+///
+/// # Errors
+/// [`Error::File`] with what `fill` or the system says.
+pub fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let failed = |e: std::io::Error| Error::file(path, format!("cannot be written: {}", reason(&e)));
     if path.is_dir() {
         return Err(Error::file(path, "cannot be written: is a folder"));
@@ -17,8 +25,28 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
         std::io::ErrorKind::NotFound => Error::file(path, format!("cannot be written: no folder {}", folder.display())),
         _ => failed(e),
     })?;
-    file.write_all(bytes).map_err(failed)?;
+    let mut pieces = BufWriter::new(&mut file);
+    fill(&mut pieces).and_then(|()| pieces.flush()).map_err(failed)?;
+    drop(pieces);
+    // Before it gets its name: after a power cut there is the old file or the new one.
+    file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|e| failed(e.error))?;
+    sync_folder(folder).map_err(failed)
+}
+
+/// Puts the names in a folder on the disk.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    match std::fs::File::open(folder)?.sync_all() {
+        // Some file systems have no such thing.
+        Err(e) if e.kind() == std::io::ErrorKind::InvalidInput => Ok(()),
+        done => done,
+    }
+}
+
+/// Other systems write names by themselves.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 

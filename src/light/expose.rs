@@ -62,7 +62,7 @@ mod tests {
                 photo: [80, 60],
                 focal_px: None,
             },
-            surface: Surface { size: [0.4, 0.3] },
+            surface: Surface::new([0.4, 0.3]),
             objects: Vec::new(),
             lights: vec![square()],
             ambient: LinearRgb::grey(0.1),

@@ -12,6 +12,7 @@
 
 mod cast;
 mod check;
+mod cryptomatte;
 mod deep;
 #[cfg(test)]
 mod definition;
@@ -29,6 +30,7 @@ mod view;
 
 pub use cast::cast;
 pub use check::check;
+pub use cryptomatte::Cryptomatte;
 pub use deep::{DeepImage, DeepSample};
 pub use options::{Quality, RenderOptions};
 pub use reference::reference;

@@ -5,8 +5,13 @@
 pub mod camera;
 mod chart;
 pub mod dataset;
+pub mod eval;
+pub mod experiments;
 mod histogram;
+pub mod matte;
 mod page;
+#[cfg(feature = "settle")]
+pub mod settle;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};

@@ -9,6 +9,7 @@ mod check;
 mod draw;
 mod environment;
 mod fall;
+mod hull;
 mod light;
 mod limit;
 mod placement;
@@ -29,7 +30,7 @@ pub use light::{AreaLight, Exposure, LightShape};
 pub use limit::Limit;
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
-pub use recipe::{Background, Choice, GradeRanges, LightRanges, Recipe, Selections};
+pub use recipe::{Background, Choice, Collider, GradeRanges, LightRanges, Recipe, Selections};
 pub use resolve::{CATCHER, Look};
 pub use shot::{Card, Shot};
 pub use stack::Start;
@@ -76,6 +77,24 @@ pub struct Scene {
 pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
+    /// Coefficient of friction of everything that touches here, the cards among themselves too. Default: 0.5.
+    #[serde(default = "Surface::usual_friction")]
+    pub friction: f64,
+    /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
+    #[serde(default)]
+    pub restitution: f64,
+}
+
+impl Surface {
+    /// A surface of this width and height (metres), with the usual friction and no bounce.
+    pub const fn new(size: [f64; 2]) -> Self {
+        Self { size, friction: Self::usual_friction(), restitution: 0.0 }
+    }
+
+    /// Between plastics, and between plastic and wood: 0.2 to 0.6 in tables.
+    const fn usual_friction() -> f64 {
+        0.5
+    }
 }
 
 /// The camera, or the labelled rectangle it can be solved from.

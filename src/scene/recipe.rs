@@ -46,8 +46,25 @@ pub struct Recipe {
     pub environment: EnvironmentRanges,
     /// Brighter or darker than the plate, EV. Default: `[-0.3, 0.3]`.
     pub gain_ev: Range,
+    /// Coefficient of friction in a scene, [`Surface::friction`]. Default: 0.5.
+    pub friction: Range,
+    /// Share of the speed that a bounce gives back, [`Surface::restitution`]. Default: 0.
+    pub restitution: Range,
+    /// What falls in place of a cut-out. Default: `box`.
+    pub collider: Collider,
     /// How objects come to rest.
     pub settle: SettleOptions,
+}
+
+/// What falls in place of a cut-out, as thick as the asset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Collider {
+    /// A box around the whole card.
+    #[default]
+    Box,
+    /// A convex prism of the object's hull: cards come to lie closer, at some cost in time.
+    Hull,
 }
 
 /// How many different choices of objects there are; in files `"unique"` or a number above 0.
@@ -131,6 +148,8 @@ pub struct Choice {
     pub asset: String,
     /// Width and height of the card of each of its photos, metres; at least one.
     pub photo_sizes: Vec<[f64; 2]>,
+    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are not known.
+    pub photo_outlines: Vec<Vec<[f64; 2]>>,
     /// Thickness, metres.
     pub thickness: f64,
     /// Mass, kilograms.
@@ -164,6 +183,9 @@ impl Default for Recipe {
             ambient: Range::new(0.3, 0.8),
             environment: EnvironmentRanges::default(),
             gain_ev: Range::new(-0.3, 0.3),
+            friction: Range::fixed(Surface::new([0.0; 2]).friction),
+            restitution: Range::fixed(0.0),
+            collider: Collider::Box,
             settle: SettleOptions::default(),
         }
     }
@@ -230,7 +252,11 @@ impl Recipe {
         for (i, object) in objects.iter_mut().enumerate() {
             self.vary(object, &draws, &format!("objects[{i}]"));
         }
-        let surface = Surface { size: background.size };
+        let surface = Surface {
+            size: background.size,
+            friction: self.friction.draw(&draws, "friction"),
+            restitution: self.restitution.draw(&draws, "restitution"),
+        };
         Column { surface, start: &self.start, options: &self.settle, draws: &draws }.stack(&mut objects)?;
         let lights: Vec<AreaLight> =
             self.lights.iter().enumerate().map(|(i, light)| light.draw(&draws, &format!("lights[{i}]"))).collect();
@@ -265,6 +291,8 @@ impl Recipe {
         self.ambient.check("ambient", 0.0, any)?;
         self.environment.check()?;
         self.gain_ev.check("gain_ev", -32.0, 32.0)?;
+        self.friction.check("friction", 0.0, any)?;
+        self.restitution.check("restitution", 0.0, 1.0)?;
         self.settle.check()
     }
 
@@ -287,7 +315,7 @@ impl Recipe {
                     left = (0..stock.len()).collect();
                 }
                 let choice = &stock[left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))];
-                choice.object(&draws, &format!("selection[{i}].photo"), self.photos)
+                choice.object(&draws, &format!("selection[{i}].photo"), self.photos, self.collider)
             })
             .collect()
     }
@@ -295,6 +323,7 @@ impl Recipe {
     fn vary(&self, object: &mut Object, draws: &Draws, path: &str) {
         let scale = self.scale.draw(draws, &format!("{path}.scale"));
         object.size = object.size.map(|length| length * scale);
+        object.outline.iter_mut().for_each(|corner| *corner = corner.map(|length| length * scale));
         object.thickness *= scale;
         object.mass *= scale * scale * scale;
         object.grade = Grade {
@@ -306,17 +335,22 @@ impl Recipe {
 }
 
 impl Choice {
-    fn object(&self, draws: &Draws, path: &str, photos: Limit) -> Result<Object> {
+    fn object(&self, draws: &Draws, path: &str, photos: Limit, collider: Collider) -> Result<Object> {
         if self.photo_sizes.is_empty() {
             return Err(Error::value(format!("assets.{}", self.asset), "no photo, expected at least one"));
         }
         let photo = draws.choose(path, photos.of(&self.photo_sizes).len());
+        let outline = match collider {
+            Collider::Box => Vec::new(),
+            Collider::Hull => self.photo_outlines.get(photo).cloned().unwrap_or_default(),
+        };
         Ok(Object {
             asset: self.asset.clone(),
             photo,
             back: None,
             size: self.photo_sizes[photo],
             thickness: self.thickness,
+            outline,
             mass: self.mass,
             placement: Start::unplaced(),
             grade: Grade::default(),
@@ -395,6 +429,7 @@ mod tests {
         let choice = |i| Choice {
             asset: format!("b{i}"),
             photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
+            photo_outlines: vec![vec![[-0.1, -0.03], [0.1, -0.03], [0.0, 0.035]], vec![]],
             thickness: 0.005,
             mass: 0.03,
         };
@@ -533,6 +568,31 @@ mod tests {
             }
             let [x, y, z] = scene.lights[0].position;
             assert!((0.8..=1.6).contains(&z) && x.hypot(y) <= 0.8 + 1e-12);
+        }
+    }
+
+    #[test]
+    fn friction_and_bounce_are_drawn_for_a_scene() {
+        let recipe = Recipe { friction: Range::new(0.2, 0.6), restitution: Range::new(0.0, 0.3), ..Recipe::default() };
+        let drawn: Vec<Surface> = (0..50).map(|k| scene(&recipe, k).surface).collect();
+        assert!(drawn.iter().all(|s| (0.2..0.6).contains(&s.friction) && (0.0..0.3).contains(&s.restitution)));
+        assert!(drawn.iter().any(|s| s.friction < 0.25) && drawn.iter().any(|s| s.friction > 0.55));
+        let wrong = Recipe { restitution: Range::new(0.0, 1.2), ..Recipe::default() };
+        assert_eq!(
+            wrong.check().unwrap_err().to_string(),
+            "restitution: [0, 1.2], expected [min, max] between 0 and 1"
+        );
+    }
+
+    #[test]
+    fn hulls_fall_only_where_they_are_asked_for_and_known_and_grow_with_their_card() {
+        let with = |collider| scene(&Recipe { collider, objects: Range::fixed(9.0), ..Recipe::default() }, 2).objects;
+        let (boxes, hulls) = (with(Collider::Box), with(Collider::Hull));
+        assert!(boxes.iter().all(|object| object.outline.is_empty()));
+        assert!(hulls.iter().any(|object| object.photo == 0) && hulls.iter().any(|object| object.photo == 1));
+        for object in &hulls {
+            let top = object.outline.last().map(|corner| corner[1]);
+            assert_eq!(top, (object.photo == 0).then_some(0.035 * object.size[0] / 0.2), "{object:?}");
         }
     }
 

@@ -148,6 +148,7 @@ mod tests {
 
     fn scene() -> Scene {
         let object = Object {
+            outline: vec![],
             asset: "b1".into(),
             photo: 0,
             back: None,
@@ -161,7 +162,7 @@ mod tests {
             image: [8, 6],
             plate: String::new(),
             camera: CameraSource::Known(camera()),
-            surface: Surface { size: [0.4, 0.3] },
+            surface: Surface::new([0.4, 0.3]),
             objects: vec![object.clone(), object],
             lights: vec![],
             ambient: LinearRgb::WHITE,

@@ -3,6 +3,7 @@
 mod camera;
 mod case;
 mod color;
+mod eval;
 mod matte;
 mod render;
 
@@ -14,8 +15,13 @@ use std::path::Path;
 type Run = fn(&Case) -> Result<(), String>;
 
 /// The stages that have golden cases: folder name and runner.
-const STAGES: &[(&str, Run)] =
-    &[("camera", camera::run), ("color", color::run), ("matte", matte::run), ("render", render::run)];
+const STAGES: &[(&str, Run)] = &[
+    ("camera", camera::run),
+    ("color", color::run),
+    ("eval", eval::run),
+    ("matte", matte::run),
+    ("render", render::run),
+];
 
 fn main() {
     let args = Arguments::from_args();

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
-use petcomp::io::Override;
+use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -25,6 +25,39 @@ pub(crate) struct Common {
     /// Say more; twice for everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
+    /// Let pictures ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60, ...
+    #[arg(long = "limit", value_name = "NAME=N", global = true)]
+    limits: Vec<Raise>,
+    /// What reads pictures that petcomp's own decoders do not know
+    #[arg(long, value_enum, default_value_t, global = true)]
+    oiio: OpenImageIo,
+}
+
+/// Where OpenImageIO runs.
+#[derive(Clone, Copy, Default, clap::ValueEnum)]
+enum OpenImageIo {
+    /// In a confined process of its own
+    #[default]
+    Worker,
+    /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
+    InProcess,
+    /// Not at all
+    Off,
+}
+
+impl OpenImageIo {
+    fn fallback(self) -> anyhow::Result<Fallback> {
+        match self {
+            Self::Worker => Ok(Fallback::Worker),
+            Self::Off => Ok(Fallback::Nothing),
+            #[cfg(feature = "in-process-oiio")]
+            Self::InProcess => Ok(Fallback::InProcess(petcomp::io::oiio::in_process())),
+            #[cfg(not(feature = "in-process-oiio"))]
+            Self::InProcess => anyhow::bail!(
+                "--oiio in-process: this petcomp does not link OpenImageIO; build it with `--features in-process-oiio`"
+            ),
+        }
+    }
 }
 
 /// How progress is shown.
@@ -35,8 +68,9 @@ enum Shown {
 }
 
 impl Common {
-    /// Sets up threads and messages; called once.
-    pub(crate) fn apply(&self) {
+    /// Sets up threads, messages and what is read; called once.
+    pub(crate) fn apply(&self) -> anyhow::Result<()> {
+        end_with_the_reader();
         let level = match (self.quiet, self.verbose) {
             (true, _) => log::LevelFilter::Error,
             (_, 0) => log::LevelFilter::Warn,
@@ -51,6 +85,9 @@ impl Common {
         logger.init();
         // Fails only if a pool exists already, and then that pool serves.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
+        let limits = self.limits.iter().try_fold(Limits::default(), Limits::with)?;
+        let options = ReadOptions { limits, fallback: self.oiio.fallback()?, ..Default::default() };
+        Ok(options.make_default()?)
     }
 
     /// Prints a result line, unless told to be quiet.
@@ -168,6 +205,18 @@ impl Drop for Progress {
     }
 }
 
+/// `petcomp ... | head` ends when head does: printing to nobody is no failure of ours, and no panic.
+fn end_with_the_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let said = info.payload().downcast_ref::<String>().map_or("", String::as_str);
+        if said.starts_with("failed printing to std") && said.contains("Broken pipe") {
+            std::process::exit(READER_GONE.into());
+        }
+        usual(info);
+    }));
+}
+
 /// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures; the second one ends
 /// the program at once.
 pub(crate) fn interruption() -> &'static AtomicBool {
@@ -187,15 +236,65 @@ pub(crate) fn interruption() -> &'static AtomicBool {
     &STOP
 }
 
+/// Files of which some could not be used, while the run went on.
+#[derive(Default)]
+pub(crate) struct Batch {
+    files: usize,
+    failed: usize,
+}
+
+impl Batch {
+    /// Counts a file; one that could not be used is named at once.
+    pub(crate) fn count(&mut self, outcome: anyhow::Result<()>) {
+        self.files += 1;
+        if let Err(error) = outcome {
+            self.failed += 1;
+            eprintln!("failed: {}", format!("{error:#}").replace('\n', " "));
+        }
+    }
+
+    /// # Errors
+    /// [`Incomplete`] when any file failed.
+    pub(crate) fn finish(self) -> anyhow::Result<()> {
+        match self.failed {
+            0 => Ok(()),
+            _ => Err(Incomplete(self).into()),
+        }
+    }
+}
+
+/// The rest was done.
+pub(crate) struct Incomplete(Batch);
+
+impl std::fmt::Display for Incomplete {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} of {} files could not be used; the rest is done", self.0.failed, self.0.files)
+    }
+}
+
+impl std::fmt::Debug for Incomplete {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Display::fmt(self, f)
+    }
+}
+
+impl std::error::Error for Incomplete {}
+
+const INCOMPLETE: u8 = 2;
 const DATA: u8 = 3;
 const FILE: u8 = 4;
 const INTERRUPTED: u8 = 130;
+/// As of a program that SIGPIPE ended.
+const READER_GONE: u8 = 141;
 
-/// Prints one line of causes and gives the exit status: 3 for data that cannot be right, 4 for files that cannot be used,
-/// 130 after an interruption. (2 is a wrong command line; clap says that.)
+/// Prints one line of causes and gives the exit status: 2 where some of many files could not be used, 3 for data that cannot be right, 4 for files that cannot be used,
+/// 130 after an interruption. (2 is a wrong command line too; clap says that.)
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     let line = format!("{error:#}").replace('\n', " ");
     eprintln!("error: {line}");
+    if error.is::<Incomplete>() {
+        return ExitCode::from(INCOMPLETE);
+    }
     ExitCode::from(match error.downcast_ref::<petcomp::Error>() {
         Some(petcomp::Error::File { .. }) => FILE,
         Some(petcomp::Error::Interrupted { .. }) => INTERRUPTED,

@@ -8,8 +8,10 @@ mod dataset;
 mod demo;
 mod diff;
 mod doctor;
+mod eval;
 mod label;
 mod matte;
+mod matte_film;
 mod matte_key;
 mod matte_nodes;
 mod render;
@@ -58,6 +60,8 @@ enum Stage {
     /// Recipe -> images with labels, ready to train on
     #[command(subcommand)]
     Dataset(dataset::Command),
+    /// Detections against the truth: average precision, curves, confusion
+    Eval(eval::Args),
     /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::Args),
     /// Measure how good a stage is, on simulated data: tables and plots
@@ -69,8 +73,7 @@ enum Stage {
 
 fn main() -> ExitCode {
     let cli = Cli::parse_from(diff::accept_idiff_spelling(std::env::args()));
-    cli.common.apply();
-    match run(&cli) {
+    match cli.common.apply().and_then(|()| run(&cli)) {
         Ok(code) => code,
         Err(error) => common::report(&error),
     }
@@ -88,6 +91,7 @@ fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Stage::Render(args) => render::run(args, common)?,
         Stage::Label(args) => label::run(args, common)?,
         Stage::Dataset(command) => dataset::run(command, common)?,
+        Stage::Eval(args) => eval::run(args, common)?,
         Stage::Report(command) => report::run(command, common)?,
         Stage::Diff(args) => return diff::run(args, common),
         Stage::Doctor(args) => return doctor::run(args),

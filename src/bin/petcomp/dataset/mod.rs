@@ -4,6 +4,7 @@ mod generate;
 mod inspect;
 mod recipe;
 mod select;
+mod training;
 
 pub(crate) use generate::{make, tell};
 
@@ -31,6 +32,12 @@ pub(crate) enum Command {
     Report(inspect::Report),
     /// Draw a sheet of the first pictures with their boxes
     Sheet(inspect::Sheet),
+    /// Plan batches of one source each, with the weight of their loss (equation 2 of the paper)
+    Batches(training::Batches),
+    /// Anchors that fit a dataset's boxes, by k-means
+    Anchors(training::Anchors),
+    /// Write what the paper's experiments need in YOLOv5 and Ultralytics
+    TrainKit(training::Kit),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -45,5 +52,8 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Check(args) => inspect::check(args, common),
         Command::Report(args) => inspect::report(args, common),
         Command::Sheet(args) => inspect::sheet(args, common),
+        Command::Batches(args) => training::batches(args, common),
+        Command::Anchors(args) => training::anchors(args, common),
+        Command::TrainKit(args) => training::kit(args, common),
     }
 }

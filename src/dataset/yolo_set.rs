@@ -1,0 +1,117 @@
+//! A YOLO dataset on disk, of petcomp's or of the user's own: which images, which classes.
+
+use super::Part;
+use super::yolo_yaml::DataYaml;
+use crate::error::{Error, Result};
+use crate::io;
+use std::path::{Path, PathBuf};
+
+/// Images and classes of a YOLO dataset.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct YoloSet {
+    /// Names of the classes.
+    pub classes: Vec<String>,
+    /// Images to learn from, in order of name or as listed.
+    pub train: Vec<PathBuf>,
+    /// Images to choose the best model by.
+    pub val: Vec<PathBuf>,
+}
+
+impl YoloSet {
+    /// Reads what `FOLDER/data.yaml` names: folders of images, or text files that list them; relative to its `path:`,
+    /// which is relative to the folder.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a missing `data.yaml`, one without classes, or a part without images.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let path = folder.join("data.yaml");
+        let (yaml, faults) = DataYaml::read(&io::read_text(&path)?);
+        if let Some((line, what)) = faults.into_iter().next() {
+            let line = line.map(|n| format!("line {n}: ")).unwrap_or_default();
+            return Err(Error::file(path, format!("{line}{what}")));
+        }
+        let root = yaml.root(folder);
+        let part = |part| images(&root.join(yaml.folder(part).unwrap_or_default()));
+        Ok(Self { classes: yaml.names().to_vec(), train: part(Part::Train)?, val: part(Part::Val)? })
+    }
+
+    /// The label file of an image: its path with the last `images` replaced by `labels`.
+    pub fn label_of(image: &Path) -> PathBuf {
+        let parts: Vec<_> = image.components().collect();
+        let last = parts.iter().rposition(|part| part.as_os_str() == "images");
+        let swapped = parts.iter().enumerate().map(|(i, part)| match last {
+            Some(place) if place == i => "labels".as_ref(),
+            _ => part.as_os_str(),
+        });
+        swapped.collect::<PathBuf>().with_extension("txt")
+    }
+}
+
+fn images(place: &Path) -> Result<Vec<PathBuf>> {
+    let found = if place.extension().is_some_and(|e| e == "txt") { listed(place)? } else { inside(place)? };
+    if found.is_empty() {
+        return Err(Error::file(place, "no images, expected at least one"));
+    }
+    Ok(found)
+}
+
+/// The lines of a list; `./` is the list's own folder, as for YOLOv5.
+fn listed(list: &Path) -> Result<Vec<PathBuf>> {
+    let text = io::read_text(list)?;
+    let folder = list.parent().unwrap_or(Path::new(""));
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    Ok(lines.map(|line| line.strip_prefix("./").map_or_else(|| line.into(), |below| folder.join(below))).collect())
+}
+
+fn inside(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut images = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if extension.is_some_and(|e| ["jpg", "jpeg", "png"].contains(&e.as_str())) {
+            images.push(path);
+        }
+    }
+    images.sort();
+    Ok(images)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(yaml: &str) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for part in ["images/train", "images/val"] {
+            std::fs::create_dir_all(folder.path().join(part)).unwrap();
+        }
+        for image in ["images/train/b.png", "images/train/a.jpg", "images/train/note.md", "images/val/c.png"] {
+            std::fs::write(folder.path().join(image), "").unwrap();
+        }
+        std::fs::write(folder.path().join("some.txt"), "./images/val/c.png\n\n").unwrap();
+        std::fs::write(folder.path().join("data.yaml"), yaml).unwrap();
+        folder
+    }
+
+    #[test]
+    fn folders_and_lists_of_images_are_read() {
+        let set = folder("train: images/train\nval: some.txt\nnames: [cap]\n");
+        let read = YoloSet::open(set.path()).unwrap();
+        assert_eq!(read.train, ["images/train/a.jpg", "images/train/b.png"].map(|p| set.path().join(p)));
+        assert_eq!((read.val, read.classes), (vec![set.path().join("images/val/c.png")], vec!["cap".into()]));
+    }
+
+    #[test]
+    fn a_part_without_images_is_named() {
+        let set = folder("path: images\ntrain: train\nval: nowhere\nnames: [cap]\n");
+        let said = YoloSet::open(set.path()).unwrap_err().to_string();
+        assert!(said.contains("nowhere"), "{said}");
+    }
+
+    #[test]
+    fn the_last_images_of_a_path_becomes_labels() {
+        let label = YoloSet::label_of(Path::new("/images/set/images/train/a.b.png"));
+        assert_eq!(label, Path::new("/images/set/labels/train/a.b.txt"));
+    }
+}

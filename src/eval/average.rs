@@ -1,0 +1,89 @@
+//! Average precision from a precision curve, in its two definitions.
+
+use super::rank::Running;
+
+/// Where precision is read: recalls of 0, 0.01 .. 1.
+const POINTS: usize = 101;
+
+/// The area under the interpolated precision envelope, by trapezoids over 101 recalls.
+///
+/// The curve starts at precision 1 for recall 0 and ends at precision 0 for recall 1, so a perfect detector has 0.995.
+///
+/// # Method
+/// As YOLOv5 computes it (its file `utils/metrics.py`, function `compute_ap`, method `interp`).
+pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
+    let xs: Vec<f64> = [0.0].iter().chain(recall).chain(&[1.0]).copied().collect();
+    let mut ys: Vec<f64> = [1.0].iter().chain(precision).chain(&[0.0]).copied().collect();
+    falling(&mut ys);
+    let read: Vec<f64> = (0..POINTS).map(|i| interpolated(recall_at(i), &xs, &ys)).collect();
+    let strip = |i: usize| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0;
+    (0..POINTS - 1).map(strip).sum()
+}
+
+/// The mean of the precision envelope at 101 recalls, each read at the first detection that reaches it.
+///
+/// # Method
+/// As the COCO tools compute it (`COCOeval.accumulate`).
+pub(super) fn mean_of_samples(recall: &[f64], precision: &[f64]) -> f64 {
+    let mut ys = precision.to_vec();
+    falling(&mut ys);
+    let read = |i| ys.get(recall.partition_point(|&r| r < recall_at(i))).copied().unwrap_or(0.0);
+    (0..POINTS).map(read).sum::<f64>() / POINTS as f64
+}
+
+/// Recall and precision after each detection, `epsilon` keeping the divisions defined.
+pub(super) fn recall_and_precision(sums: &Running, truths: f64, epsilon: [f64; 2]) -> (Vec<f64>, Vec<f64>) {
+    let both = sums.right.iter().zip(&sums.wrong);
+    let recall = sums.right.iter().map(|right| right / (truths + epsilon[0])).collect();
+    (recall, both.map(|(right, wrong)| right / (right + wrong + epsilon[1])).collect())
+}
+
+/// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.
+pub(super) fn interpolated(x: f64, xs: &[f64], ys: &[f64]) -> f64 {
+    let after = xs.partition_point(|&at| at <= x);
+    match after {
+        0 => ys[0],
+        n if n == xs.len() => ys[n - 1],
+        n => (ys[n] - ys[n - 1]) / (xs[n] - xs[n - 1]) * (x - xs[n - 1]) + ys[n - 1],
+    }
+}
+
+/// Makes values the greatest of those that follow.
+fn falling(values: &mut [f64]) {
+    let mut best = f64::NEG_INFINITY;
+    for value in values.iter_mut().rev() {
+        best = best.max(*value);
+        *value = best;
+    }
+}
+
+fn recall_at(i: usize) -> f64 {
+    if i + 1 == POINTS { 1.0 } else { i as f64 * 0.01 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_everything_found_without_error_is_half() {
+        let (recall, precision) = ([0.25, 0.5], [1.0, 1.0]);
+        // Recalls 0 to 0.5 are 51 of 101 readings.
+        assert!((mean_of_samples(&recall, &precision) - 51.0 / 101.0).abs() < 1e-12);
+        // From 0.5 the line falls to 0 at 1: half of the half is added.
+        assert!((trapezoid(&recall, &precision) - 0.75).abs() < 1e-12);
+    }
+
+    #[test]
+    fn precision_later_on_lifts_what_was_before() {
+        let mut values = [0.1, 0.5, 0.2, 0.3];
+        falling(&mut values);
+        assert_eq!(values, [0.5, 0.5, 0.3, 0.3]);
+    }
+
+    #[test]
+    fn reading_between_outside_and_at_doubled_places() {
+        let (xs, ys) = ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 3.0, 5.0]);
+        assert_eq!([-1.0, 0.5, 1.0, 1.5, 9.0].map(|x| interpolated(x, &xs, &ys)), [0.0, 0.5, 3.0, 4.0, 5.0]);
+    }
+}

@@ -1,0 +1,212 @@
+//! Eval: how well the boxes of a detector match the truth.
+//!
+//! Average precision has two definitions in use, and they differ by more than rounding: [`Definition::Yolov5`]
+//! integrates a precision curve over 101 points, [`Definition::Coco`] averages 101 readings of it, looks at no more
+//! than 100 detections an image and knows boxes that count for nobody. Both are computed here from the same
+//! [`Sheet`]s, one per image.
+
+mod average;
+mod bootstrap;
+mod coco;
+mod coco_json;
+mod confusion;
+mod curve;
+mod overlap;
+mod picture;
+mod rank;
+mod tag;
+mod yolo;
+mod yolov5;
+
+pub use bootstrap::{Interval, bootstrap};
+pub(crate) use bootstrap::{drawn, interval};
+pub use coco::{AreaRange, CocoScores, MAX_DETECTIONS, coco};
+pub use coco_json::{CocoTruth, read_coco_results, read_coco_truth};
+pub use confusion::{Confusion, ConfusionOptions};
+pub use curve::{Curves, curves};
+pub use overlap::iou;
+pub use picture::{confusion_picture, f1_picture, precision_recall_picture};
+pub use tag::{Tags, read_tags};
+pub use yolo::{YoloTruth, read_yolo_found, read_yolo_truth};
+pub use yolov5::yolov5;
+
+use crate::label::BBox;
+use serde::{Deserialize, Serialize};
+
+/// Number of thresholds of intersection over union: 0.50 to 0.95 in steps of 0.05.
+pub const THRESHOLDS: usize = 10;
+
+/// A box of the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueBox {
+    /// Index into the class list.
+    pub class: u32,
+    /// Where, pixels.
+    pub bbox: BBox,
+    /// Area that decides its size range, square pixels: that of its mask where there is one.
+    pub area: f64,
+    /// It counts neither as found nor as missed (COCO's `iscrowd`).
+    pub crowd: bool,
+}
+
+/// A box that a detector found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundBox {
+    /// Index into the class list.
+    pub class: u32,
+    /// Where, pixels.
+    pub bbox: BBox,
+    /// How sure the detector is; only the order matters.
+    pub confidence: f64,
+}
+
+/// What is in an image and what was found in it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sheet {
+    /// Name of the image, without folder and extension.
+    pub image: String,
+    /// What there is.
+    pub truth: Vec<TrueBox>,
+    /// What was found, in any order.
+    pub found: Vec<FoundBox>,
+}
+
+/// Which average precision is meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Definition {
+    /// The trapezoid over 101 interpolated points, as YOLOv5 computes it.
+    #[default]
+    Yolov5,
+    /// The mean of 101 samples of the precision curve, at most 100 detections an image, as the COCO tools compute it.
+    Coco,
+}
+
+/// Average precision of one class at every threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ClassScores {
+    /// Index into the class list.
+    pub class: u32,
+    /// How many boxes there are to be found.
+    pub truths: u64,
+    /// Precision and recall at the confidence with the best mean F1 (`yolov5`), at threshold 0.5.
+    pub precision: f64,
+    /// See [`precision`](Self::precision).
+    pub recall: f64,
+    /// Average precision per threshold of intersection over union.
+    pub ap: [f64; THRESHOLDS],
+}
+
+/// Average precisions of all classes that occur in the truth.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Scores {
+    /// Which definition.
+    pub definition: Definition,
+    /// One per class with something to find, in order.
+    pub classes: Vec<ClassScores>,
+}
+
+impl Scores {
+    /// mAP@0.5:0.95: the mean over classes and thresholds; 0 where there is nothing to find.
+    pub fn map(&self) -> f64 {
+        mean(self.classes.iter().map(ClassScores::mean))
+    }
+
+    /// mAP at one threshold, by its place in the list: 0 is mAP@0.5.
+    ///
+    /// # Panics
+    /// When there are not so many thresholds.
+    pub fn map_at(&self, threshold: usize) -> f64 {
+        mean(self.classes.iter().map(|class| class.ap[threshold]))
+    }
+}
+
+impl ClassScores {
+    /// AP@0.5:0.95.
+    pub fn mean(&self) -> f64 {
+        mean(self.ap)
+    }
+}
+
+/// Scores by the definition asked for; the names of the classes are not needed.
+///
+/// `weights` says how often each image counts; empty means once. Confidences that are equal rank in the order of
+/// images, and within one as given.
+///
+/// # Panics
+/// When there are weights and not one per sheet.
+pub fn evaluate(sheets: &[Sheet], definition: Definition, weights: &[u32]) -> Scores {
+    match definition {
+        Definition::Yolov5 => yolov5(sheets, weights),
+        Definition::Coco => coco(sheets, weights).scores,
+    }
+}
+
+/// 0.50, 0.55 .. 0.95, as NumPy's `linspace` gives them.
+pub fn thresholds() -> [f64; THRESHOLDS] {
+    let step = (0.95 - 0.5) / (THRESHOLDS - 1) as f64;
+    std::array::from_fn(|i| if i + 1 == THRESHOLDS { 0.95 } else { i as f64 * step + 0.5 })
+}
+
+fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
+    if count == 0 { 0.0 } else { sum / f64::from(count) }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn bbox(x0: f64, y0: f64, w: f64, h: f64) -> BBox {
+        BBox { x0, y0, x1: x0 + w, y1: y0 + h }
+    }
+
+    pub(crate) fn there(class: u32, bbox: BBox) -> TrueBox {
+        TrueBox { class, bbox, area: bbox.width() * bbox.height(), crowd: false }
+    }
+
+    pub(crate) fn found(class: u32, bbox: BBox, confidence: f64) -> FoundBox {
+        FoundBox { class, bbox, confidence }
+    }
+
+    pub(crate) fn sheet(truth: Vec<TrueBox>, found: Vec<FoundBox>) -> Sheet {
+        Sheet { image: String::new(), truth, found }
+    }
+
+    #[test]
+    fn nothing_to_find_scores_nothing() {
+        for definition in [Definition::Yolov5, Definition::Coco] {
+            assert_eq!(evaluate(&[], definition, &[]).map(), 0.0);
+            let false_alarm = sheet(vec![], vec![found(0, bbox(0.0, 0.0, 5.0, 5.0), 0.9)]);
+            assert!(evaluate(&[false_alarm], definition, &[]).classes.is_empty());
+        }
+    }
+
+    #[test]
+    fn what_is_found_exactly_scores_one() {
+        let b = bbox(10.0, 10.0, 50.0, 40.0);
+        let all = [sheet(vec![there(3, b)], vec![found(3, b, 0.2)])];
+        assert!((evaluate(&all, Definition::Coco, &[]).map() - 1.0).abs() < 1e-12);
+        // The trapezoid ends at precision 0, so the last of 100 intervals counts half.
+        assert!((evaluate(&all, Definition::Yolov5, &[]).map() - 0.995).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_image_that_counts_twice_is_an_image_that_is_there_twice() {
+        let b = bbox(10.0, 10.0, 50.0, 40.0);
+        let good = sheet(vec![there(0, b)], vec![found(0, b, 0.8), found(0, bbox(80.0, 0.0, 9.0, 9.0), 0.9)]);
+        let bad = sheet(vec![there(0, b)], vec![found(0, bbox(12.0, 9.0, 50.0, 40.0), 0.7)]);
+        for definition in [Definition::Yolov5, Definition::Coco] {
+            let twice = evaluate(&[good.clone(), good.clone(), bad.clone()], definition, &[]);
+            let weighted = evaluate(&[good.clone(), bad.clone()], definition, &[2, 1]);
+            assert!((twice.map() - weighted.map()).abs() < 1e-12, "{definition:?}");
+            let without = evaluate(&[good.clone(), bad.clone()], definition, &[0, 1]);
+            assert_eq!(without.map(), evaluate(&[bad.clone()], definition, &[]).map());
+        }
+    }
+
+    #[test]
+    fn thresholds_end_where_they_should() {
+        assert_eq!((thresholds()[0], thresholds()[9]), (0.5, 0.95));
+    }
+}

@@ -1,0 +1,75 @@
+//! Tags of images (light, camera position, ..), for scores per factor.
+
+use crate::error::{Error, Result};
+use crate::io;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// What is known of each image beside its boxes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tags {
+    /// The factors: `light`, `camera`, ..
+    pub factors: Vec<String>,
+    levels: BTreeMap<String, Vec<String>>,
+}
+
+/// Reads a CSV whose first column is the image's name and whose others are factors; its first line names them.
+///
+/// # Errors
+/// [`Error::File`] for a file without a line of names, a line of another length, or an image told twice.
+pub fn read_tags(path: &Path) -> Result<Tags> {
+    let text = io::read_text(path)?;
+    parse(&text).map_err(|what| Error::file(path, what))
+}
+
+fn parse(text: &str) -> std::result::Result<Tags, String> {
+    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let cells = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+    let titles = lines.next().map(|(_, line)| cells(line)).unwrap_or_default();
+    if titles.len() < 2 {
+        return Err("no factors, expected a first line such as image,light,camera".into());
+    }
+    let mut tags = Tags { factors: titles[1..].to_vec(), levels: BTreeMap::new() };
+    for (i, line) in lines {
+        let row = cells(line);
+        if row.len() != titles.len() {
+            return Err(format!("line {}: {} cells, expected {}", i + 1, row.len(), titles.len()));
+        }
+        let stem = Path::new(&row[0]).file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        if tags.levels.insert(stem, row[1..].to_vec()).is_some() {
+            return Err(format!("line {}: image \"{}\" is told twice", i + 1, row[0]));
+        }
+    }
+    Ok(tags)
+}
+
+impl Tags {
+    /// What a factor is for an image; none for an image without tags.
+    pub fn of(&self, image: &str, factor: usize) -> Option<&str> {
+        self.levels.get(image)?.get(factor).map(String::as_str)
+    }
+
+    /// Everything that a factor is for some image, in order.
+    pub fn levels(&self, factor: usize) -> BTreeSet<&str> {
+        self.levels.values().filter_map(|row| row.get(factor).map(String::as_str)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_told_by_image() {
+        let tags = parse("image,light,camera\na.png, dim, v0\nb,bright,v1\n").unwrap();
+        assert_eq!((tags.of("a", 0), tags.of("b", 1), tags.of("c", 0)), (Some("dim"), Some("v1"), None));
+        assert_eq!(tags.levels(0).into_iter().collect::<Vec<_>>(), ["bright", "dim"]);
+    }
+
+    #[test]
+    fn bad_tables_are_named() {
+        assert!(parse("").unwrap_err().contains("no factors"));
+        assert!(parse("image,light\na,dim,v0\n").unwrap_err().contains("line 2: 3 cells, expected 2"));
+        assert!(parse("image,light\na,dim\na.png,dim\n").unwrap_err().contains("told twice"));
+    }
+}

@@ -1,0 +1,208 @@
+//! Reads truth and detections from folders of YOLO text files.
+
+use super::{FoundBox, Sheet, TrueBox};
+use crate::error::{Error, Result};
+use crate::io;
+use crate::label::BBox;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Truth of a folder of images: a sheet per label file, nothing found yet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct YoloTruth {
+    /// In order of the images' names.
+    pub sheets: Vec<Sheet>,
+    /// Width and height of each image, pixels.
+    pub sizes: Vec<[u32; 2]>,
+}
+
+/// Reads `NAME.txt` of a folder of labels: `class cx cy w h`, shares of the image, one box a line; outlines
+/// (`class x1 y1 x2 y2 ..`) give the box around them.
+///
+/// Sizes come from the images, which are looked for where YOLO has them: the same path with its last `labels` replaced
+/// by `images`. `size` is taken for all where there are no images; overlaps do not depend on it, COCO's ranges of area do.
+///
+/// # Errors
+/// [`Error::File`] for a folder without labels, a label without an image where no `size` is given, or a bad line.
+pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTruth> {
+    let mut truth = YoloTruth::default();
+    for (name, path) in texts(labels)? {
+        let size = size.map_or_else(|| image_size(labels, &name), Ok)?;
+        let boxes = rows(&path, 0)?.into_iter().map(|row| row.truth(size)).collect();
+        truth.sheets.push(Sheet { image: name, truth: boxes, found: Vec::new() });
+        truth.sizes.push(size);
+    }
+    if truth.sheets.is_empty() {
+        return Err(Error::file(labels, "no label files, expected NAME.txt"));
+    }
+    Ok(truth)
+}
+
+/// Adds what a detector found, from `NAME.txt` of a folder: `class cx cy w h confidence`.
+///
+/// An image without a file has no detections; a file without an image is refused, as it may be a misspelt name.
+///
+/// # Errors
+/// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
+pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
+    let known: BTreeMap<String, usize> = truth.sheets.iter().enumerate().map(|(i, s)| (s.image.clone(), i)).collect();
+    for (name, path) in texts(folder)? {
+        let Some(&i) = known.get(&name) else {
+            return Err(Error::file(&path, format!("no image \"{name}\" in the truth of {} images", known.len())));
+        };
+        truth.sheets[i].found = rows(&path, 1)?.into_iter().map(|row| row.found(truth.sizes[i])).collect();
+    }
+    Ok(())
+}
+
+/// The text files of a folder by their names without extension, in order.
+fn texts(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut texts = BTreeMap::new();
+    for entry in entries {
+        let path = entry.map_err(|e| Error::file(folder, e))?.path();
+        let name = path.file_stem().map(|n| n.to_string_lossy().into_owned());
+        if let (Some(name), true) = (name, path.extension().is_some_and(|e| e == "txt")) {
+            texts.insert(name, path);
+        }
+    }
+    Ok(texts)
+}
+
+fn image_size(labels: &Path, name: &str) -> Result<[u32; 2]> {
+    let parts: Vec<_> = labels.components().collect();
+    let place = parts.iter().rposition(|part| part.as_os_str() == "labels");
+    let folder: PathBuf = parts
+        .iter()
+        .enumerate()
+        .map(|(i, part)| if Some(i) == place { "images".as_ref() } else { part.as_os_str() })
+        .collect();
+    let candidates = ["jpg", "png", "jpeg", "exr", "tif"].map(|ext| folder.join(format!("{name}.{ext}")));
+    let Some(image) = candidates.iter().find(|path| path.is_file()) else {
+        let what = format!("no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead");
+        return Err(Error::file(folder, what));
+    };
+    let header = io::read_header(image)?;
+    Ok([header.width as u32, header.height as u32])
+}
+
+/// A line: class, box in shares of the image, and what stands behind.
+struct Row {
+    class: u32,
+    shares: BBox,
+    confidence: f64,
+}
+
+/// The lines of a file, with `extra` numbers (a confidence or nothing) at their ends.
+fn rows(path: &Path, extra: usize) -> Result<Vec<Row>> {
+    let text = io::read_text(path)?;
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    let row = |(i, line)| row(line, extra).map_err(|what| Error::file(path, format!("line {}: {what}", i + 1)));
+    lines.map(row).collect()
+}
+
+fn row(line: &str, extra: usize) -> std::result::Result<Row, String> {
+    let mut words = line.split_ascii_whitespace();
+    let class = words.next().unwrap_or_default();
+    let class = class.parse::<u32>().map_err(|_| format!("class \"{class}\", expected 0, 1, .."))?;
+    let number = |word: &str| match word.parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        _ => Err(format!("\"{word}\", expected a number")),
+    };
+    let numbers: Vec<f64> = words.map(number).collect::<std::result::Result<_, _>>()?;
+    let Some(count) = numbers.len().checked_sub(extra) else { return Err(too_few(&numbers, extra)) };
+    let (place, behind) = numbers.split_at(count);
+    let shares = match place {
+        &[cx, cy, w, h] => BBox { x0: cx - w / 2.0, y0: cy - h / 2.0, x1: cx + w / 2.0, y1: cy + h / 2.0 },
+        outline if outline.len() >= 6 && outline.len().is_multiple_of(2) => {
+            BBox::around(outline.chunks_exact(2).map(|p| crate::geom::Point2::new(p[0], p[1])))
+        }
+        _ => return Err(too_few(&numbers, extra)),
+    };
+    Ok(Row { class, shares, confidence: behind.first().copied().unwrap_or(1.0) })
+}
+
+fn too_few(numbers: &[f64], extra: usize) -> String {
+    let expected = if extra == 0 { "cx cy w h, or an outline" } else { "cx cy w h confidence" };
+    format!("{} numbers behind the class, expected {expected}", numbers.len())
+}
+
+impl Row {
+    fn bbox(&self, [w, h]: [u32; 2]) -> BBox {
+        let (w, h, s) = (f64::from(w), f64::from(h), self.shares);
+        BBox { x0: s.x0 * w, y0: s.y0 * h, x1: s.x1 * w, y1: s.y1 * h }
+    }
+
+    fn truth(&self, size: [u32; 2]) -> TrueBox {
+        let bbox = self.bbox(size);
+        TrueBox { class: self.class, bbox, area: bbox.width() * bbox.height(), crowd: false }
+    }
+
+    fn found(&self, size: [u32; 2]) -> FoundBox {
+        FoundBox { class: self.class, bbox: self.bbox(size), confidence: self.confidence }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn boxes_and_outlines_become_pixels() {
+        let labels = folder(&[("a.txt", "1 0.5 0.5 0.2 0.4\n\n2 0 0 0.5 0 0.5 0.25\n"), ("b.txt", "")]);
+        let truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
+        assert_eq!(truth.sheets[0].truth[0].bbox, BBox { x0: 40.0, y0: 60.0, x1: 60.0, y1: 140.0 });
+        assert_eq!(truth.sheets[0].truth[1].bbox, BBox { x0: 0.0, y0: 0.0, x1: 50.0, y1: 50.0 });
+        assert_eq!((truth.sheets[1].image.as_str(), truth.sheets[1].truth.len()), ("b", 0));
+    }
+
+    #[test]
+    fn detections_come_with_confidence_and_may_be_missing() {
+        let labels = folder(&[("a.txt", "1 0.5 0.5 0.2 0.4\n"), ("b.txt", "0 0.5 0.5 1 1\n")]);
+        let mut truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
+        let found = folder(&[("b.txt", "0 0.5 0.5 1 1 0.25\n")]);
+        read_yolo_found(found.path(), &mut truth).unwrap();
+        assert_eq!((truth.sheets[0].found.len(), truth.sheets[1].found[0].confidence), (0, 0.25));
+    }
+
+    #[test]
+    fn bad_lines_are_named() {
+        let said = |line: &str| {
+            let labels = folder(&[("a.txt", line)]);
+            read_yolo_truth(labels.path(), Some([9, 9])).unwrap_err().to_string()
+        };
+        assert!(said("0 0.5 0.5 0.1\n").contains("a.txt: line 1: 3 numbers behind the class"));
+        assert!(said("0 0.5 0.5 0.1 0.1\ncap 0 0 0 0\n").contains("line 2: class \"cap\""));
+        assert!(said("0 0.5 NaN 0.1 0.1").contains("\"NaN\", expected a number"));
+    }
+
+    #[test]
+    fn a_detection_for_an_unknown_image_is_refused() {
+        let labels = folder(&[("a.txt", "")]);
+        let mut truth = read_yolo_truth(labels.path(), Some([9, 9])).unwrap();
+        let said = read_yolo_found(folder(&[("c.txt", "")]).path(), &mut truth).unwrap_err().to_string();
+        assert!(said.contains("no image \"c\""), "{said}");
+    }
+
+    #[test]
+    fn sizes_come_from_the_images_beside_the_labels() {
+        let root = tempfile::tempdir().unwrap();
+        for part in ["labels/val", "images/val"] {
+            std::fs::create_dir_all(root.path().join(part)).unwrap();
+        }
+        std::fs::write(root.path().join("labels/val/a.txt"), "0 0.5 0.5 1 1\n").unwrap();
+        let labels = root.path().join("labels/val");
+        assert!(read_yolo_truth(&labels, None).unwrap_err().to_string().contains("to take the size from"));
+        let image = crate::Image::filled(8, 6, crate::LinearRgb::WHITE);
+        io::write(root.path().join("images/val/a.png"), &image).unwrap();
+        assert_eq!(read_yolo_truth(&labels, None).unwrap().sizes, [[8, 6]]);
+    }
+}

@@ -1,0 +1,195 @@
+//! Average precision as YOLOv5 computes it.
+
+use super::average::{interpolated, recall_and_precision, trapezoid};
+use super::rank::{self, Hit, Marks, Running};
+use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox};
+use crate::label::BBox;
+use rayon::prelude::*;
+
+/// Confidences at which precision, recall and F1 are read.
+pub(super) const CONFIDENCES: usize = 1000;
+/// Keeps recall and F1 defined, as in the original.
+const EPSILON: f64 = 1e-16;
+/// Keeps an intersection over union defined, square pixels, as in the original.
+const AREA_EPSILON: f32 = 1e-7;
+/// Half the width, in readings, of the window that F1 is smoothed with before its best confidence is taken.
+const SMOOTHING: usize = 50;
+
+/// Average precision by the definition of YOLOv5, with precision and recall at the confidence of the best F1.
+///
+/// Each detection is held against the box of its class that it overlaps most; of those that name the same box the
+/// surest counts. Boxes marked as crowd are taken as any other: YOLO labels have no such mark.
+///
+/// # Method
+/// YOLOv5 7.0: `val.py` (`process_batch`) and `utils/metrics.py` (`ap_per_class`); overlaps in single precision as there.
+/// Departs from it where confidences or overlaps are equal: there the order is that of an unstable sort, here that of
+/// the input.
+///
+/// # Panics
+/// When there are weights and not one per sheet.
+pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
+    assert!(weights.is_empty() || weights.len() == sheets.len(), "one weight per sheet");
+    let classes: Vec<_> = rank::classes(sheets).into_iter().filter_map(|c| Ranked::new(sheets, c, weights)).collect();
+    let best = best_confidence(&classes);
+    let scores = classes.par_iter().map(|class| class.scores(best, weights)).collect();
+    Scores { definition: Definition::Yolov5, classes: scores }
+}
+
+/// The detections of a class with something to find.
+pub(super) struct Ranked {
+    pub(super) class: u32,
+    pub(super) truths: f64,
+    hits: Vec<Hit>,
+    /// At threshold 0.5.
+    pub(super) recall: Vec<f64>,
+    pub(super) precision: Vec<f64>,
+    /// Negated, so that they rise.
+    confidences: Vec<f64>,
+}
+
+impl Ranked {
+    pub(super) fn new(sheets: &[Sheet], class: u32, weights: &[u32]) -> Option<Self> {
+        let counted = |(i, sheet): (usize, &Sheet)| {
+            rank::weight(weights, i) * sheet.truth.iter().filter(|t| t.class == class).count() as f64
+        };
+        let truths: f64 = sheets.iter().enumerate().map(counted).sum();
+        let mut hits: Vec<Hit> =
+            sheets.par_iter().enumerate().flat_map_iter(|(i, sheet)| held_against(sheet, i, class)).collect();
+        rank::sort(&mut hits);
+        let (recall, precision) = curve(&rank::running(&hits, 0, weights), truths);
+        let counting = hits.iter().filter(|h| rank::weight(weights, h.sheet) > 0.0);
+        let confidences = counting.map(|h| -h.confidence).collect();
+        (truths > 0.0).then_some(Self { class, truths, hits, recall, precision, confidences })
+    }
+
+    fn scores(&self, best: usize, weights: &[u32]) -> ClassScores {
+        let ap = |threshold| {
+            let (recall, precision) = curve(&rank::running(&self.hits, threshold, weights), self.truths);
+            if recall.is_empty() { 0.0 } else { trapezoid(&recall, &precision) }
+        };
+        ClassScores {
+            class: self.class,
+            truths: self.truths as u64,
+            precision: self.precision_at(confidence(best)),
+            recall: self.recall_at(confidence(best)),
+            ap: std::array::from_fn(ap),
+        }
+    }
+
+    pub(super) fn precision_at(&self, confidence: f64) -> f64 {
+        self.read(&self.precision, confidence, 1.0)
+    }
+
+    pub(super) fn recall_at(&self, confidence: f64) -> f64 {
+        self.read(&self.recall, confidence, 0.0)
+    }
+
+    /// 0 for a class in which nothing at all was found.
+    fn read(&self, values: &[f64], confidence: f64, above_all: f64) -> f64 {
+        match self.confidences.first() {
+            None => 0.0,
+            Some(&surest) if -confidence < surest => above_all,
+            Some(_) => interpolated(-confidence, &self.confidences, values),
+        }
+    }
+
+    pub(super) fn f1_at(&self, confidence: f64) -> f64 {
+        let (p, r) = (self.precision_at(confidence), self.recall_at(confidence));
+        2.0 * p * r / (p + r + EPSILON)
+    }
+}
+
+fn curve(sums: &Running, truths: f64) -> (Vec<f64>, Vec<f64>) {
+    recall_and_precision(sums, truths, [EPSILON, 0.0])
+}
+
+/// Reading `i` of [`CONFIDENCES`], 0 to 1.
+pub(super) fn confidence(i: usize) -> f64 {
+    i as f64 / (CONFIDENCES - 1) as f64
+}
+
+/// Where the smoothed mean F1 of the classes is greatest.
+pub(super) fn best_confidence(classes: &[Ranked]) -> usize {
+    let f1 = |i| classes.iter().map(|class| class.f1_at(confidence(i))).sum::<f64>();
+    let f1: Vec<f64> = (0..CONFIDENCES).into_par_iter().map(f1).collect();
+    let at = |i: isize| f1[i.clamp(0, CONFIDENCES as isize - 1) as usize];
+    let window = |i: usize| -> f64 {
+        let (i, reach) = (i as isize, SMOOTHING as isize);
+        (i - reach..=i + reach).map(at).sum()
+    };
+    let mut best = (0, f64::NEG_INFINITY);
+    for (i, value) in (0..CONFIDENCES).map(|i| (i, window(i))) {
+        if value > best.1 {
+            best = (i, value);
+        }
+    }
+    best.0
+}
+
+/// The detections of a class in one image, marked right where they found something.
+fn held_against(sheet: &Sheet, place: usize, class: u32) -> impl Iterator<Item = Hit> {
+    let truth: Vec<&TrueBox> = sheet.truth.iter().filter(|t| t.class == class).collect();
+    let mut found: Vec<&FoundBox> = sheet.found.iter().filter(|f| f.class == class).collect();
+    found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    let mut taken: Vec<Marks> = vec![0; truth.len()];
+    found.into_iter().map(move |f| {
+        let hit = |right| Hit { confidence: f.confidence, sheet: place, right, ignored: 0 };
+        let overlaps = truth.iter().map(|t| overlap(&t.bbox, &f.bbox)).enumerate();
+        // Of equal overlaps the last: that is how the original's descending sort leaves them.
+        let Some((nearest, most)) = overlaps.max_by(|a, b| a.1.total_cmp(&b.1)) else { return hit(0) };
+        let reached = reached(most);
+        let right = reached & !taken[nearest];
+        taken[nearest] |= reached;
+        hit(right)
+    })
+}
+
+/// Intersection over union in single precision.
+fn overlap(a: &BBox, b: &BBox) -> f32 {
+    let [a, b] = [a, b].map(|b| [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32));
+    let area = |b: [f32; 4]| (b[2] - b[0]) * (b[3] - b[1]);
+    let shared = (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
+    shared / (area(a) + area(b) - shared + AREA_EPSILON)
+}
+
+fn reached(overlap: f32) -> Marks {
+    let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
+    // From both ends, as PyTorch's `linspace` rounds.
+    let threshold =
+        |i: usize| if i < THRESHOLDS / 2 { 0.5 + step * i as f32 } else { 0.95 - step * (THRESHOLDS - 1 - i) as f32 };
+    (0..THRESHOLDS).filter(|&i| overlap >= threshold(i)).fold(0, |marks, i| marks | 1 << i)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{bbox, found, sheet, there};
+    use super::*;
+
+    #[test]
+    fn the_surer_of_two_that_name_a_box_counts() {
+        let b = bbox(0.0, 0.0, 100.0, 100.0);
+        let near = bbox(0.0, 0.0, 100.0, 90.0);
+        let hits: Vec<_> =
+            held_against(&sheet(vec![there(0, b)], vec![found(0, b, 0.5), found(0, near, 0.9)]), 0, 0).collect();
+        assert_eq!(hits[0].confidence, 0.9);
+        // The surer one overlaps by 0.9 (just below, with the original's epsilon); the exact one has only the rest.
+        assert_eq!((hits[0].right | hits[1].right).count_ones(), 10);
+        assert_eq!(hits[0].right & hits[1].right, 0);
+        assert_eq!(hits[1].right & 1, 0);
+    }
+
+    #[test]
+    fn a_class_that_was_never_found_scores_zero_and_counts() {
+        let b = bbox(0.0, 0.0, 10.0, 10.0);
+        let scores = yolov5(&[sheet(vec![there(0, b), there(1, b)], vec![found(0, b, 0.5)])], &[]);
+        assert_eq!(scores.classes[1].ap, [0.0; 10]);
+        assert!((scores.map() - 0.995 / 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn other_classes_do_not_take_a_box() {
+        let b = bbox(0.0, 0.0, 10.0, 10.0);
+        let scores = yolov5(&[sheet(vec![there(0, b)], vec![found(1, b, 0.9), found(0, b, 0.5)])], &[]);
+        assert!((scores.map_at(0) - 0.995).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,130 @@
+//! Anchors that fit a dataset's boxes.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+/// A box is within an anchor's reach when no side differs from the anchor's by this factor or more: what equation 1 can
+/// decode, and YOLOv5's default.
+pub const THRESHOLD: f64 = 4.0;
+/// Rounds of the clustering; it rests after a few dozen.
+const ROUNDS: usize = 300;
+
+/// Widths and heights that stand for a dataset's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Anchors {
+    /// Width and height, by area, in the unit of the boxes.
+    pub sizes: Vec<[f64; 2]>,
+    /// Mean intersection over union of a box with the anchor that fits it best, both about one centre.
+    pub mean_iou: f64,
+    /// Share of the boxes within reach of some anchor ([`THRESHOLD`]).
+    pub best_possible_recall: f64,
+}
+
+/// `count` anchors for boxes of these widths and heights, in any unit; the same seed gives the same anchors.
+///
+/// Boxes without area are left out. Fewer boxes than anchors give one anchor per box; no boxes none.
+///
+/// # Method
+/// k-means with 1 - IoU as distance ([Redmon and Farhadi 2017], section 2), started by [k-means++].
+///
+/// [Redmon and Farhadi 2017]: https://arxiv.org/abs/1612.08242
+/// [k-means++]: https://dl.acm.org/doi/10.5555/1283383.1283494
+pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
+    let boxes: Vec<[f64; 2]> = boxes.iter().copied().filter(|b| b.iter().all(|v| v.is_finite() && *v > 0.0)).collect();
+    if boxes.is_empty() || count == 0 {
+        return Anchors::default();
+    }
+    let mut sizes = spread(&boxes, count.min(boxes.len()), &mut ChaCha8Rng::seed_from_u64(seed));
+    let mut before = Vec::new();
+    for _ in 0..ROUNDS {
+        let nearest: Vec<usize> = boxes.iter().map(|b| nearest(b, &sizes).0).collect();
+        if nearest == before {
+            break;
+        }
+        sizes = (0..sizes.len()).map(|k| mean_of(&boxes, &nearest, k).unwrap_or(sizes[k])).collect();
+        before = nearest;
+    }
+    sizes.sort_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])));
+    let mean_iou = boxes.iter().map(|b| nearest(b, &sizes).1).sum::<f64>() / boxes.len() as f64;
+    let reached = boxes.iter().filter(|b| sizes.iter().any(|a| in_reach(b, a))).count();
+    Anchors { sizes, mean_iou, best_possible_recall: reached as f64 / boxes.len() as f64 }
+}
+
+/// Starting points far from each other: each drawn with the square of its distance to those before.
+fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2]> {
+    let uniform = |rng: &mut ChaCha8Rng| (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut sizes = vec![boxes[(uniform(rng) * boxes.len() as f64) as usize]];
+    while sizes.len() < count {
+        let squares: Vec<f64> = boxes.iter().map(|b| (1.0 - nearest(b, &sizes).1).powi(2)).collect();
+        let mut left = uniform(rng) * squares.iter().sum::<f64>();
+        let drawn = squares.iter().position(|s| {
+            left -= s;
+            left < 0.0
+        });
+        sizes.push(boxes[drawn.unwrap_or(boxes.len() - 1)]);
+    }
+    sizes
+}
+
+fn nearest(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
+    let fits = sizes.iter().map(|a| fit(a, b)).enumerate();
+    fits.fold((0, f64::NEG_INFINITY), |best, (k, fit)| if fit > best.1 { (k, fit) } else { best })
+}
+
+/// Intersection over union about one centre.
+fn fit(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    let shared = a[0].min(b[0]) * a[1].min(b[1]);
+    shared / (a[0] * a[1] + b[0] * b[1] - shared)
+}
+
+fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> {
+    let members = boxes.iter().zip(nearest).filter(|(_, n)| **n == k).map(|(b, _)| b);
+    let (sum, count) = members.fold(([0.0; 2], 0.0), |(sum, n), b| ([sum[0] + b[0], sum[1] + b[1]], n + 1.0));
+    (count > 0.0).then(|| sum.map(|s| s / count))
+}
+
+fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
+    (0..2).all(|i| (b[i] / anchor[i]).max(anchor[i] / b[i]) < THRESHOLD)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clear_groups_are_found() {
+        let groups = [[10.0, 20.0], [60.0, 40.0], [200.0, 210.0]];
+        let boxes: Vec<[f64; 2]> = (0..300)
+            .map(|i| {
+                let wobble = 1.0 + 0.05 * ((i * 37 % 11) as f64 / 5.0 - 1.0);
+                groups[i % 3].map(|v| v * wobble)
+            })
+            .collect();
+        let found = anchors(&boxes, 3, 1);
+        for (a, g) in found.sizes.iter().zip(groups) {
+            assert!(fit(a, &g) > 0.97, "{a:?} {g:?}");
+        }
+        assert!(found.mean_iou > 0.9 && found.best_possible_recall == 1.0);
+    }
+
+    #[test]
+    fn boxes_out_of_reach_lower_the_recall() {
+        let found = anchors(&[[10.0, 10.0], [10.0, 10.0], [10.0, 10.0], [10.0, 10.0], [1000.0, 10.0]], 1, 1);
+        assert!(found.best_possible_recall < 1.0);
+    }
+
+    #[test]
+    fn awkward_boxes_are_left_out_and_few_boxes_are_their_own_anchors() {
+        assert_eq!(anchors(&[], 9, 1), Anchors::default());
+        let found = anchors(&[[0.0, 5.0], [f64::NAN, 1.0], [4.0, 5.0], [8.0, 2.0]], 9, 1);
+        assert_eq!(found.sizes.len(), 2);
+        assert!((found.mean_iou - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_anchors() {
+        let boxes: Vec<[f64; 2]> = (1..200).map(|i| [f64::from(i % 37 + 1), f64::from(i % 23 + 1)]).collect();
+        assert_eq!(anchors(&boxes, 9, 4), anchors(&boxes, 9, 4));
+    }
+}

@@ -1,0 +1,205 @@
+//! Files with which the paper's experiments run in YOLOv5 and Ultralytics.
+
+use super::{Balance, Updates, batches_per_epoch};
+use crate::dataset::YoloSet;
+use crate::error::{Error, Result};
+use crate::io;
+use std::path::{Path, PathBuf};
+
+/// Equation 2 for PyTorch.
+const BALANCED_PY: &str = include_str!("balanced.py");
+/// The paper's settings where it states them, YOLOv5's defaults elsewhere.
+const HYP_YAML: &str = include_str!("hyp.yaml");
+
+/// What the kit is for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KitOptions {
+    /// Folder of the YOLO dataset of photographs.
+    pub real: PathBuf,
+    /// Folder of the YOLO dataset that petcomp made.
+    pub synthetic: PathBuf,
+    /// Weights of the two in the combined training.
+    pub balance: Balance,
+    /// Trainings per variant. Default: 6, the paper's.
+    pub seeds: u64,
+    /// Epochs. Default: 300, the paper's.
+    pub epochs: u64,
+    /// Images in a batch. Default: 32, the paper's.
+    pub batch: u64,
+}
+
+impl KitOptions {
+    /// The paper's numbers for two datasets.
+    pub fn new(real: impl Into<PathBuf>, synthetic: impl Into<PathBuf>) -> Self {
+        let (real, synthetic) = (real.into(), synthetic.into());
+        Self { real, synthetic, balance: Balance::default(), seeds: 6, epochs: 300, batch: 32 }
+    }
+}
+
+/// A way to train that the paper compares: which images to learn from and to choose the best epoch by.
+struct Variant {
+    name: &'static str,
+    train: &'static [&'static str],
+    val: &'static [&'static str],
+}
+
+/// Concatenation comes in the paper's two forms; `combined` is trained by `balanced.py`.
+const VARIANTS: [Variant; 5] = [
+    Variant { name: "real", train: &["real_train"], val: &["real_val"] },
+    Variant { name: "synthetic", train: &["synthetic_train"], val: &["synthetic_val"] },
+    Variant { name: "concatenated", train: &["real_train", "synthetic_train"], val: &["real_val"] },
+    Variant {
+        name: "concatenated_val_both",
+        train: &["real_train", "synthetic_train"],
+        val: &["real_val", "synthetic_val"],
+    },
+    Variant { name: "combined", train: &["real_train", "synthetic_train"], val: &["real_val"] },
+];
+
+/// Writes the kit: lists of images, one `VARIANT.yaml` each, `hyp.yaml`, `balance.json`, `balanced.py`, `commands.sh`.
+///
+/// Lists hold whole paths, so the kit may be anywhere, but the datasets may not move.
+///
+/// # Errors
+/// Those of [`YoloSet::open`] and [`Balance::weights`]; [`Error::Value`] when the two datasets name other classes.
+pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
+    let [real, synthetic] = [&options.real, &options.synthetic].map(|set| opened(set));
+    let (real, synthetic) = (real?, synthetic?);
+    if real.classes != synthetic.classes {
+        let what = format!(
+            "{:?} in {}, expected {:?} as in {}",
+            synthetic.classes,
+            options.synthetic.display(),
+            real.classes,
+            options.real.display()
+        );
+        return Err(Error::value("classes", what));
+    }
+    let counts = [real.train.len() as u64, synthetic.train.len() as u64];
+    let weights = options.balance.weights(counts[0], counts[1])?;
+    io::create_folder(folder)?;
+    for (name, images) in [
+        ("real_train", &real.train),
+        ("real_val", &real.val),
+        ("synthetic_train", &synthetic.train),
+        ("synthetic_val", &synthetic.val),
+    ] {
+        let lines: String = images.iter().map(|path| format!("{}\n", path.display())).collect();
+        io::write_text(folder.join(format!("{name}.txt")), &lines)?;
+    }
+    for variant in &VARIANTS {
+        io::write_text(folder.join(format!("{}.yaml", variant.name)), &variant.yaml(&real.classes))?;
+    }
+    let balance = serde_json::json!({
+        "alpha": options.balance.alpha, "normalize": options.balance.normalize,
+        "images": { "real": counts[0], "synthetic": counts[1] }, "weights": weights,
+    });
+    io::write_json(folder.join("balance.json"), &balance)?;
+    io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
+    io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
+    io::write_text(folder.join("commands.sh"), &commands(options, counts))
+}
+
+fn opened(folder: &Path) -> Result<YoloSet> {
+    let whole = std::fs::canonicalize(folder).map_err(|e| Error::file(folder, e))?;
+    YoloSet::open(&whole)
+}
+
+impl Variant {
+    fn yaml(&self, classes: &[String]) -> String {
+        let list = |names: &[&str]| names.iter().map(|name| format!("  - {name}.txt\n")).collect::<String>();
+        // A JSON string is a YAML string, whatever is in it.
+        let names =
+            classes.iter().enumerate().map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())));
+        let names: String = names.collect();
+        format!(
+            "# `path` is this folder; start the training in it.\npath: .\ntrain:\n{}val:\n{}nc: {}\nnames:\n{names}",
+            list(self.train),
+            list(self.val),
+            classes.len()
+        )
+    }
+}
+
+/// The commands of all trainings, with equally many updates for the single sources told in words.
+fn commands(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
+    let KitOptions { seeds, epochs, batch, .. } = options;
+    let combined = Updates::of(real + synthetic, *batch, *epochs);
+    let equal = |images| combined.epochs_of(batches_per_epoch(images, *batch));
+    let mut text = format!(
+        "#!/bin/sh\n# Start in this folder. YOLOV5 is the folder of a clone of YOLOv5; combined trainings need Ultralytics.\n\
+         # One epoch over both sources: {} batches; {} updates in all. Equally many updates take {:.1} epochs of the\n\
+         # synthetic images alone and {:.1} of the real ones.\nset -eu\n: \"${{YOLOV5:?}}\"\nexport PYTHONPATH=\"$PWD\"\n",
+        combined.batches,
+        combined.total,
+        equal(synthetic),
+        equal(real)
+    );
+    for variant in VARIANTS.iter().filter(|v| v.name != "combined") {
+        text += &format!("\n# {}\nfor seed in $(seq 1 {seeds}); do\n", variant.name);
+        text += &format!(
+            "  python \"$YOLOV5/train.py\" --data {0}.yaml --hyp hyp.yaml --weights yolov5s.pt --img 640 --epochs {epochs} \
+             --batch-size {batch} --cos-lr --seed \"$seed\" --project runs/{0} --name \"$seed\"\ndone\n",
+            variant.name
+        );
+    }
+    text += &format!("\n# combined (equation 2)\nfor seed in $(seq 1 {seeds}); do\n");
+    text += &format!(
+        "  python balanced.py --epochs {epochs} --batch {batch} --seed \"$seed\" --name \"combined/$seed\"\ndone\n"
+    );
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Image, LinearRgb};
+
+    fn dataset(root: &Path, name: &str, train: usize, names: &str) -> PathBuf {
+        let folder = root.join(name);
+        for part in ["train", "val"] {
+            io::create_folder(folder.join("images").join(part)).unwrap();
+            let count = if part == "train" { train } else { 1 };
+            for i in 0..count {
+                let path = folder.join("images").join(part).join(format!("{i}.png"));
+                io::write(path, &Image::filled(16, 16, LinearRgb::WHITE)).unwrap();
+            }
+        }
+        io::write_text(folder.join("data.yaml"), &format!("train: images/train\nval: images/val\nnames: {names}\n"))
+            .unwrap();
+        folder
+    }
+
+    #[test]
+    fn a_kit_has_every_variant_list_and_seed() {
+        let root = tempfile::tempdir().unwrap();
+        let [real, synthetic] = [("real", 2), ("made", 6)].map(|(name, n)| dataset(root.path(), name, n, "[cap]"));
+        let kit = root.path().join("kit");
+        write(&kit, &KitOptions::new(real, synthetic)).unwrap();
+        for variant in &VARIANTS {
+            let text = io::read_text(kit.join(format!("{}.yaml", variant.name))).unwrap();
+            variant.train.iter().for_each(|list| assert!(text.contains(&format!("  - {list}.txt")), "{text}"));
+        }
+        assert_eq!(io::read_text(kit.join("synthetic_train.txt")).unwrap().lines().count(), 6);
+        let balance: serde_json::Value = io::read_json(kit.join("balance.json")).unwrap();
+        assert_eq!(balance["weights"], serde_json::json!({ "real": 1.0, "synthetic": 8.0 / 12.0 * 0.5 }));
+        let commands = io::read_text(kit.join("commands.sh")).unwrap();
+        assert!(commands.contains("seq 1 6") && commands.contains("--cos-lr"));
+    }
+
+    #[test]
+    fn the_papers_settings_are_in_the_hyperparameters() {
+        for line in ["lr0: 0.01", "lrf: 0.2", "momentum: 0.937", "warmup_epochs: 3.0", "mosaic: 1.0", "fliplr: 0.5"] {
+            assert!(HYP_YAML.lines().any(|l| l.split('#').next().unwrap_or_default().trim() == line), "{line}");
+        }
+    }
+
+    #[test]
+    fn other_classes_are_refused() {
+        let root = tempfile::tempdir().unwrap();
+        let real = dataset(root.path(), "real", 2, "[cap]");
+        let made = dataset(root.path(), "made", 2, "[cap, label]");
+        let said = write(&root.path().join("kit"), &KitOptions::new(real, made)).unwrap_err().to_string();
+        assert!(said.starts_with("classes: [\"cap\", \"label\"] in "), "{said}");
+    }
+}

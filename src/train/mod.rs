@@ -1,0 +1,18 @@
+//! Train: what a detector's training needs beside images: equation numbers are those of the paper.
+//!
+//! Plain functions for any trainer: the balance of two sources of images ([`Balance`], equation 2), batches of one
+//! source each ([`batches`]), how a network's numbers become boxes ([`decode`], equation 1), anchors that fit a
+//! dataset ([`anchors()`]), how many epochs make equally many updates ([`Updates`]), and a [`kit`] of files for PyTorch.
+
+mod anchors;
+mod balance;
+mod batches;
+mod decode;
+pub mod kit;
+mod updates;
+
+pub use anchors::{Anchors, THRESHOLD, anchors};
+pub use balance::{Balance, Weights};
+pub use batches::{Batch, BatchOptions, Source, batches};
+pub use decode::{decode, encode};
+pub use updates::{Updates, batches_per_epoch};
