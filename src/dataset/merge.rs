@@ -103,7 +103,12 @@ fn open(path: &Path) -> Result<(Value, Share)> {
 
 /// The plan that a dataset was made with, but for where its samples come from.
 fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
-    let writers = document.remove("writers").unwrap_or_default();
+    let said: Vec<Map<String, Value>> = field(&mut document, "writers")?;
+    let pictures = match said.iter().find(|settings| settings.contains_key("pictures")) {
+        Some(settings) => field(&mut settings.clone(), "pictures")?,
+        None => Pictures::default(),
+    };
+    let writers = said.into_iter().flatten().map(|(name, settings)| writer(&name, settings, &pictures));
     Ok(Plan {
         folder: folder.into(),
         count,
@@ -113,11 +118,7 @@ fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<P
         classes: field(&mut document, "classes")?,
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
-        writers: field::<Vec<Map<String, Value>>>(&mut Map::from_iter([("writers".into(), writers)]), "writers")?
-            .into_iter()
-            .flatten()
-            .map(|(name, settings)| writer(&name, settings))
-            .collect::<Result<_>>()?,
+        writers: writers.collect::<Result<_>>()?,
     })
 }
 
@@ -126,10 +127,10 @@ fn field<T: serde::de::DeserializeOwned>(document: &mut Map<String, Value>, name
 }
 
 /// The writer of a name and settings, as [`Writer::settings`] told them.
-fn writer(name: &str, settings: Value) -> Result<Box<dyn Writer>> {
+fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Writer>> {
     let wrong = |e: serde_json::Error| Error::value(format!("writers.{name}"), e);
     match name {
-        "pictures" => Ok(Box::new(serde_json::from_value::<Pictures>(settings).map_err(wrong)?)),
+        "pictures" => Ok(Box::new(*pictures)),
         "sidecar" => Ok(Box::new(Sidecar)),
         format => {
             let mut setup = json!({ "formats": [format] });
@@ -138,7 +139,7 @@ fn writer(name: &str, settings: Value) -> Result<Box<dyn Writer>> {
             }
             let setup: LabelSetup = serde_json::from_value(setup).map_err(wrong)?;
             let unknown = || Error::value(format!("writers.{name}"), "no such layout");
-            setup.writers().into_iter().next().ok_or_else(unknown)
+            setup.writers(pictures).into_iter().next().ok_or_else(unknown)
         }
     }
 }
