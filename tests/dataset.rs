@@ -445,10 +445,10 @@ fn a_writer_of_one_s_own_takes_part() {
 }
 
 fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
-    Plan { numbers: Numbers::Shard(Shard::new(index, of).unwrap()), ..plan(folder, count) }
+    Plan { numbers: Numbers::Shard(Shard::new(index, of).unwrap()), ..full_plan(folder, count) }
 }
 
-/// Shards of 20 samples, made in an order of their own.
+/// Shards of 20 samples in every format, made in an order of their own.
 fn shards(dir: &Path) -> Vec<PathBuf> {
     let folders: Vec<PathBuf> = (1..=3).map(|i| dir.join(format!("shard-{i}"))).collect();
     for i in [2, 0, 1] {
@@ -464,7 +464,7 @@ fn joined(shards: &[PathBuf], folder: &Path) -> Result<Report> {
 #[test]
 fn merged_shards_are_the_bytes_of_one_run() {
     let (whole, dir) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    make(&plan(whole.path(), 20)).unwrap();
+    make(&full_plan(whole.path(), 20)).unwrap();
     let mut folders = shards(dir.path());
     folders.reverse();
     let merged = dir.path().join("merged");
