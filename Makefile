@@ -16,7 +16,7 @@ FEATURES  := "" markers oiio settle
 # Seconds for each door of fuzz/.
 FUZZ      := 60
 
-.PHONY: demo test lint bench golden packages blender soak fuzz
+.PHONY: demo test lint bench golden packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins
@@ -32,6 +32,12 @@ test: packages python
 # 100,000 damaged pictures.
 soak: packages
 	$(CARGO) test --release --locked --test io -- --ignored --nocapture sweep::soak
+
+# Kills, a full disk and a Slurm of one machine; what comes out must be what an unbroken run gives.
+soak-dataset: demo
+	tests/soak/kill.sh $(OUT)/recipe.toml 200
+	tests/soak/disk_full.sh $(OUT)/recipe.toml
+	tests/cluster/slurm.sh $(OUT)/recipe.toml
 
 # By cargo-fuzz and a nightly compiler where they are (`cargo install cargo-fuzz`, `rustup toolchain install nightly`);
 # by seeds and chance on the stable one otherwise.

@@ -2,14 +2,15 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions,
-    Sidecar, Split, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
+    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, Shard,
+    SheetOptions, Sidecar, Split, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, mend,
+    merge,
 };
 use petcomp::geom::{Point2, Pose, Vector2};
 use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
 use petcomp::render::DeepImage;
 use petcomp::scene::{CameraSource, Exposure, Surface};
-use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
+use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io, report};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -120,15 +121,16 @@ fn threads<T: Send>(n: usize, f: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
 }
 
-/// Every file below a folder and its bytes.
+/// Every file below a folder and its bytes, but for the lock and the notes of how long runs took.
 fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(dir) = folders.pop() {
         for entry in std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()) {
+            let hidden = entry.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
             if entry.is_dir() {
                 folders.push(entry);
-            } else {
+            } else if !hidden {
                 files.insert(entry.strip_prefix(folder).unwrap().into(), std::fs::read(&entry).unwrap());
             }
         }
@@ -442,4 +444,151 @@ fn a_writer_of_one_s_own_takes_part() {
     let dir = tempfile::tempdir().unwrap();
     make(&Plan { writers: vec![Box::new(Count)], ..plan(dir.path(), 4) }).unwrap();
     assert_eq!(text(dir.path(), "3.txt"), "2");
+}
+
+fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
+    Plan { numbers: Numbers::Shard(Shard::new(index, of).unwrap()), ..full_plan(folder, count) }
+}
+
+/// Shards of 20 samples in every format, made in an order of their own.
+fn shards(dir: &Path) -> Vec<PathBuf> {
+    let folders: Vec<PathBuf> = (1..=3).map(|i| dir.join(format!("shard-{i}"))).collect();
+    for i in [2, 0, 1] {
+        make(&shard(&folders[i], 20, i as u64 + 1, 3)).unwrap();
+    }
+    folders
+}
+
+fn joined(shards: &[PathBuf], folder: &Path) -> Result<Report> {
+    merge(shards, folder, &|_| {}, &AtomicBool::new(false))
+}
+
+#[test]
+fn merged_shards_are_the_bytes_of_one_run() {
+    let (whole, dir) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    make(&full_plan(whole.path(), 20)).unwrap();
+    let mut folders = shards(dir.path());
+    folders.reverse();
+    let merged = dir.path().join("merged");
+    let report = joined(&folders, &merged).unwrap();
+    assert_eq!((report.images, report.made), (20, 20));
+    assert_eq!(bytes(whole.path()), bytes(&merged));
+    assert_eq!(joined(&folders, &merged).unwrap().made, 0);
+}
+
+#[test]
+fn shards_that_do_not_make_a_whole_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = shards(dir.path());
+    let refused = |folders: &[PathBuf]| joined(folders, &dir.path().join("merged")).unwrap_err().to_string();
+    assert_eq!(refused(&folders[..2]), "shards: shard 3/3 is missing");
+    assert_eq!(refused(&[]), "shards: none, expected their folders");
+    let twice = [folders.clone(), vec![folders[0].clone()]].concat();
+    assert!(refused(&twice).contains("is shard 1/3, as "));
+
+    let whole = dir.path().join("whole");
+    make(&plan(&whole, 3)).unwrap();
+    assert!(refused(&[whole]).ends_with("is a whole dataset, expected a shard"));
+
+    let other = dir.path().join("other");
+    make(&Plan { seed: 8, ..shard(&other, 20, 3, 3) }).unwrap();
+    let mixed = refused(&[folders[0].clone(), folders[1].clone(), other]);
+    assert!(mixed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"), "{mixed}");
+
+    let journal = folders[1].join("index.jsonl");
+    let lines = std::fs::read_to_string(&journal).unwrap();
+    std::fs::write(&journal, lines.lines().skip(1).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    assert!(refused(&folders).contains("shard-2: sample 1 is missing: finish this shard first"));
+    std::fs::write(&journal, lines).unwrap();
+
+    let damaged = folders[0].join("labels/train/000003.txt");
+    let size = std::fs::metadata(&damaged).unwrap().len();
+    std::fs::write(&damaged, vec![b'7'; size as usize]).unwrap();
+    assert!(refused(&folders).contains("000003.txt: has other bytes than when it was written"));
+}
+
+#[test]
+fn one_sample_is_made_again_alone_and_the_others_are_left() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let before = bytes(dir.path());
+    std::fs::write(dir.path().join("labels/train/000007.txt"), b"").unwrap();
+    let made = std::sync::Mutex::new(Vec::new());
+    let counted = |k| {
+        made.lock().unwrap().push(k);
+        sample(k)
+    };
+    let one = Plan { numbers: Numbers::One(7), ..plan(dir.path(), 12) };
+    generate(&one, counted, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!(made.into_inner().unwrap(), [7]);
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn what_was_damaged_at_its_size_is_found_and_made_again() {
+    let dir = tempfile::tempdir().unwrap();
+    // More than the last lines, whose files every run compares.
+    make(&plan(dir.path(), 600)).unwrap();
+    let before = bytes(dir.path());
+    let image = dir.path().join("images/train/000002.png");
+    let size = std::fs::metadata(&image).unwrap().len();
+    std::fs::write(&image, vec![0; size as usize]).unwrap();
+    assert_eq!(mend(dir.path()).unwrap(), (599, 1));
+    assert_eq!(make(&plan(dir.path(), 600)).unwrap().made, 1);
+    assert_eq!(before, bytes(dir.path()));
+    assert!(mend(&dir.path().join("images")).unwrap_err().to_string().contains("begun before"));
+}
+
+#[test]
+fn an_image_that_looks_like_a_trained_one_is_a_leak() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let train: Image<LinearRgb> = io::read(dir.path().join("images/train/000006.png")).unwrap();
+    let brighter = train.map(|p| p.scale(1.001));
+    io::write(dir.path().join("images/val/000005.png"), &brighter).unwrap();
+    let found = faults(dir.path()).join("\n");
+    assert!(found.contains("images/val/000005.png: leak: differs from images/train/000006.png"), "{found}");
+}
+
+#[test]
+fn the_classes_balance_and_box_sizes_are_counted() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let checked = check(dir.path()).unwrap();
+    let table = checked.balance();
+    assert_eq!(table.rows.len(), 3);
+    assert_eq!(table.rows[0][4], "18.8 / 18.8 / 18.8 %");
+    assert!(checked.remarks().iter().all(|remark| remark.starts_with("class ")), "{:?}", checked.remarks());
+}
+
+/// The page as a browser sees it after a script has clicked: the text of the document's title.
+fn browse(page: &str, script: &str) -> Option<String> {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("page.html");
+    let page = page.replace("</body>", &format!("<script>{script}</script></body>"));
+    std::fs::write(&file, page).unwrap();
+    let mut command = std::process::Command::new("chromium");
+    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"]);
+    command.arg(format!("--user-data-dir={}", dir.path().join("profile").display())).arg(&file);
+    let output = command.output().ok()?;
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let title = dom.split("<title>").nth(1)?.split("</title>").next()?;
+    Some(title.to_owned())
+}
+
+#[test]
+fn a_browser_shows_the_report_and_its_switches_work() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let page = report::dataset::page(dir.path(), 6).unwrap().document();
+    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+    let script = "const shown = id => getComputedStyle(document.querySelector('.' + id)).display != 'none';\
+        const before = [shown('boxes'), shown('masks')];\
+        document.getElementById('boxes').click(); document.getElementById('masks').click();\
+        const pictures = [...document.images].filter(i => i.complete && i.naturalWidth == 64).length;\
+        document.title = [before, shown('boxes'), shown('masks'), pictures, document.querySelectorAll('.boxes rect').length].join();";
+    match browse(&page, script) {
+        Some(title) => assert_eq!(title, "true,false,false,true,6,3"),
+        None => eprintln!("skipped: no chromium here (Debian: chromium)"),
+    }
 }

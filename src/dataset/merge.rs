@@ -103,10 +103,12 @@ fn open(path: &Path) -> Result<(Value, Share)> {
 
 /// The plan that a dataset was made with, but for where its samples come from.
 fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
-    let writers = document.remove("writers").unwrap_or_default();
-    let writers: Vec<Map<String, Value>> = field(&mut Map::from_iter([("writers".into(), writers)]), "writers")?;
-    let writers: Map<String, Value> = writers.into_iter().flatten().collect();
-    let pictures = pictures(&writers)?;
+    let said: Vec<Map<String, Value>> = field(&mut document, "writers")?;
+    let pictures = match said.iter().find(|settings| settings.contains_key("pictures")) {
+        Some(settings) => field(&mut settings.clone(), "pictures")?,
+        None => Pictures::default(),
+    };
+    let writers = said.into_iter().flatten().map(|(name, settings)| writer(&name, settings, &pictures));
     Ok(Plan {
         folder: folder.into(),
         count,
@@ -116,21 +118,12 @@ fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<P
         classes: field(&mut document, "classes")?,
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
-        writers: writers
-            .into_iter()
-            .map(|(name, settings)| writer(&name, settings, &pictures))
-            .collect::<Result<_>>()?,
+        writers: writers.collect::<Result<_>>()?,
     })
 }
 
 fn field<T: serde::de::DeserializeOwned>(document: &mut Map<String, Value>, name: &str) -> Result<T> {
     serde_json::from_value(document.remove(name).unwrap_or_default()).map_err(|e| Error::value(name, e))
-}
-
-/// How the pictures are written, which other layouts name.
-fn pictures(writers: &Map<String, Value>) -> Result<Pictures> {
-    let told = writers.get("pictures").cloned().ok_or_else(|| Error::value("writers", "no pictures"))?;
-    serde_json::from_value(told).map_err(|e| Error::value("writers.pictures", e))
 }
 
 /// The writer of a name and settings, as [`Writer::settings`] told them.
