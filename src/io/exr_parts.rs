@@ -112,7 +112,7 @@ const SEVERAL_PARTS: u8 = 0x10;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ::exr::prelude::{ReadChannels as _, ReadLayers as _};
+    use exr::prelude::{ReadChannels, ReadLayers};
 
     fn parts() -> Vec<Part> {
         let notes = |n: usize| (0..n).map(|i| (format!("note {i}"), format!("{i}"))).collect();
