@@ -16,4 +16,5 @@ pub use area::{LightFrame, frame, irradiance, radiance};
 pub use expose::{expose, plate_white};
 pub use nodes::{Node, gauss_legendre, nodes};
 pub use polygon::polygon_irradiance;
+pub(crate) use sky::sky_cells;
 pub use sky::{SkyPiece, sky_pieces};
