@@ -187,23 +187,27 @@ fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]
 }
 
 impl Facing<'_> {
-    /// What a card shows to whoever looks at it from a point: full detail, what lies outside counts as nothing.
-    fn texel(&self, [u, v]: [f64; 2], from: &Vector3<f64>) -> Film {
-        let from_behind = self.sheet.normal.dot(&(from - self.sheet.center)) < 0.0;
-        let (texture, u) = match &self.card.back {
-            Some(back) if from_behind => (back, 1.0 - u),
-            _ => (&self.card.texture, u),
-        };
-        let (width, height) = texture.size();
-        let (x, y) = (u * width as f64, v * height as f64);
-        let film = match texture {
-            Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y).into(),
-            Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y),
-        };
-        let grade = &self.card.grade;
-        let color = crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value);
-        Film { color, opacity: graded_opacity(film.opacity, grade) }
+    fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {
+        texel(self.card, &self.sheet, uv, from)
     }
+}
+
+/// What a card shows to whoever looks at it from a point: full detail, what lies outside counts as nothing.
+pub(super) fn texel(card: &Card, sheet: &Sheet, [u, v]: [f64; 2], from: &Vector3<f64>) -> Film {
+    let from_behind = sheet.normal.dot(&(from - sheet.center)) < 0.0;
+    let (texture, u) = match &card.back {
+        Some(back) if from_behind => (back, 1.0 - u),
+        _ => (&card.texture, u),
+    };
+    let (width, height) = texture.size();
+    let (x, y) = (u * width as f64, v * height as f64);
+    let film = match texture {
+        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y).into(),
+        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y),
+    };
+    let grade = &card.grade;
+    let color = crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value);
+    Film { color, opacity: graded_opacity(film.opacity, grade) }
 }
 
 /// A ratio of averages, per channel; 1 where there is nothing to average.

@@ -28,9 +28,8 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
 }
 
 fn quality(name: &str) -> Option<Quality> {
-    [("draft", Quality::Draft), ("fast", Quality::Fast), ("good", Quality::Good), ("high", Quality::High)]
-        .into_iter()
-        .find_map(|(n, q)| (n == name).then_some(q))
+    let named = [Quality::Draft, Quality::Fast, Quality::Good, Quality::High, Quality::Reference];
+    ["draft", "fast", "good", "high", "reference"].into_iter().zip(named).find_map(|(n, q)| (n == name).then_some(q))
 }
 
 fn render(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
