@@ -220,10 +220,10 @@ mod tests {
         Panorama::new(Image::filled(64, 32, LinearRgb::new(1.0, 2.0, 0.5))).unwrap()
     }
 
-    /// A dark sky with a sun of one texel (0.35 degrees) and 20000 times its radiance.
+    /// A dark sky with a sun of one texel (0.35 degrees) and 500000 times its radiance.
     fn sunny() -> Panorama {
         Panorama::new(Image::from_fn(1024, 512, |x, y| {
-            LinearRgb::grey(if (x, y) == (300, 131) { 20_000.0 } else { 1.0 })
+            LinearRgb::grey(if (x, y) == (300, 131) { 500_000.0 } else { 1.0 })
         }))
         .unwrap()
     }

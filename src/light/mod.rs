@@ -19,5 +19,6 @@ pub use expose::{expose, match_plate, plate_white};
 pub use nodes::{Node, gauss_legendre, nodes};
 pub use noise::{match_noise, plate_noise};
 pub use polygon::polygon_irradiance;
+pub(crate) use sky::sky_cells;
 pub use sky::{SkyPiece, sky_pieces};
 pub use surface::{match_cast, surface_color};

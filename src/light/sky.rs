@@ -25,9 +25,19 @@ pub struct SkyPiece {
 /// a piece of its own. A piece that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; what the
 /// horizon cuts off others is made up for by scaling all to the irradiance that a sum over the whole map gives.
 pub fn sky_pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<SkyPiece> {
+    scaled(map, &map.panorama.pieces(count), normal)
+}
+
+/// The same in even rectangles, about `count` of them: slower to come right, with nothing to go wrong.
+pub(crate) fn sky_cells(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<SkyPiece> {
+    let rows = (count as f64 / 2.0).sqrt().ceil() as usize;
+    scaled(map, &map.panorama.even(rows), normal)
+}
+
+fn scaled(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<SkyPiece> {
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
-    let seen: Vec<_> = map.panorama.pieces(count).iter().filter_map(|piece| over(piece, &local)).collect();
+    let seen: Vec<_> = pieces.iter().filter_map(|piece| over(piece, &local)).collect();
     let sum = seen.iter().fold([0.0; 3], |sum, (_, e, _)| std::array::from_fn(|c| sum[c] + e[c]));
     let whole = map.panorama.irradiance(&local);
     let strength = f64::from(map.strength);

@@ -19,9 +19,6 @@ use rayon::prelude::*;
 /// Side of the blocks that the picture is put together from, pixels.
 const TILE: usize = 32;
 
-/// The sky's shadows are so much softer that nodes may be so much further apart.
-const SOFTER: f64 = 2.0;
-
 /// Sub-samples a side from which on a sharper level of detail pays.
 const DENSE: usize = 4;
 
@@ -43,8 +40,7 @@ pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let cards = sheets(shot);
     let casters = Casters::new(&cards, Sheet::surface(shot.catcher));
     let tinted = casters.tinted;
-    let softer: f64 = std::env::var("PC_SOFT").map_or(SOFTER, |v| v.parse().unwrap_or(2.0));
-    let [fine, coarse] = [1.0, softer].map(|scale| Lattice::new(&view, scale * options.cell_px));
+    let [fine, coarse] = [1.0, 2.0].map(|scale| Lattice::new(&view, scale * options.cell_px));
     let studio = Studio { fine, coarse, casters, shot, options };
 
     let looks: Vec<_> = cards.par_iter().map(|(card, sheet)| Look::of(card, sheet, &view, &offsets)).collect();

@@ -142,6 +142,12 @@ impl DeepImage {
         self.starts[i] as usize..self.starts[i + 1] as usize
     }
 
+    /// The same picture with other factors on the plate, computed from column, row and factor.
+    pub(crate) fn map_shadow(self, f: impl Fn(usize, usize, LinearRgb) -> LinearRgb + Sync) -> Self {
+        let shadow = Image::from_fn(self.width, self.height, |x, y| f(x, y, self.shadow[(x, y)]));
+        Self { shadow, ..self }
+    }
+
     /// The factor on the plate, per channel.
     pub fn shadow(&self) -> &Image<LinearRgb> {
         &self.shadow

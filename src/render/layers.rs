@@ -289,25 +289,50 @@ impl Stack {
     fn shade_ground(&self, whole: &Block, block: &Block, through: &Through, shadow: &mut [LinearRgb]) {
         let (Some(map), Some(seen)) = (&self.ground.share, &self.ground.seen) else { return };
         let offsets = &self.samples.offsets;
-        let (r, n) = (offsets.len(), self.samples.per_side());
         let edges = sides(&seen.u, &seen.v, &seen.w, [0.0; 2]);
+        let reach = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()));
         for y in block.y.clone() {
             let spans: Vec<_> = offsets.iter().map(|o| span(&edges, y as f64 + 0.5 + o)).collect();
+            let low = spans.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max) + reach;
+            let high = spans.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) - reach;
             let line = &mut shadow[(y - whole.y.start) * whole.x.len() + block.x.start - whole.x.start..];
             for (i, shadow) in line.iter_mut().take(block.x.len()).enumerate() {
-                let (x, mut sum, mut weight) = (block.x.start + i, Four::ZERO, Four::ZERO);
-                for (sub, t) in through.of(i, y - block.y.start).enumerate() {
-                    let (sx, sy) = (sub % r, sub / r);
-                    let at = x as f64 + 0.5 + offsets[sx];
-                    let (column, row) = if self.samples.each { (x * n + sx, y * n + sy) } else { (x, y) };
-                    let (column, row) = (self.samples.columns[column], self.samples.rows[row]);
-                    let on_ground = at >= spans[sy].0 && at <= spans[sy].1 && map.holds(column, row);
-                    let share = if on_ground { map.at(column, row) } else { Four::ONE };
-                    (sum, weight) = (sum.add_scaled(1.0, t.times(share)), weight.add_scaled(1.0, t));
-                }
-                *shadow = ratio(&sum, &weight);
+                let x = block.x.start + i;
+                let inside = x as f64 + 0.5 >= low && x as f64 + 0.5 <= high;
+                *shadow = if inside && !self.samples.each {
+                    self.share_at(map, x, y).rgb()
+                } else {
+                    self.mean_share(map, [x, y], &spans, through.of(i, y - block.y.start))
+                };
             }
         }
+    }
+
+    /// The share in the middle of a pixel.
+    fn share_at(&self, map: &Map, x: usize, y: usize) -> Four {
+        let (column, row) = (self.samples.columns[x], self.samples.rows[y]);
+        if map.holds(column, row) { map.at(column, row) } else { Four::ONE }
+    }
+
+    /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the surface.
+    fn mean_share(
+        &self,
+        map: &Map,
+        [x, y]: [usize; 2],
+        spans: &[(f64, f64)],
+        through: impl Iterator<Item = Four>,
+    ) -> LinearRgb {
+        let (r, n) = (self.samples.offsets.len(), self.samples.per_side());
+        let (mut sum, mut weight) = (Four::ZERO, Four::ZERO);
+        for (sub, t) in through.enumerate() {
+            let (sx, sy) = (sub % r, sub / r);
+            let at = x as f64 + 0.5 + self.samples.offsets[sx];
+            let on_ground = at >= spans[sy].0 && at <= spans[sy].1;
+            let place = if self.samples.each { [x * n + sx, y * n + sy] } else { [x, y] };
+            let share = if on_ground { self.share_at(map, place[0], place[1]) } else { Four::ONE };
+            (sum, weight) = (sum.add_scaled(1.0, t.times(share)), weight.add_scaled(1.0, t));
+        }
+        ratio(&sum, &weight)
     }
 }
 

@@ -4,7 +4,7 @@ use crate::geom::Vector3;
 use crate::light;
 use crate::pixel::{LinearRgb, Mix};
 use crate::render::RenderOptions;
-use crate::scene::{AreaLight, EnvironmentMap, Shot};
+use crate::scene::{AreaLight, Shot};
 use nalgebra::{Matrix3, Vector4};
 use std::f64::consts::PI;
 
@@ -59,15 +59,25 @@ impl Lamps {
     pub(super) fn of(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Self {
         let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
         let ambient = ambient(shot.ambient, options.ambient_samples, normal);
-        let map = shot.environment.iter().flat_map(|map| pieces(map, options.ambient_samples, normal));
+        let map =
+            shot.environment.iter().flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
+        Self::from_parts(faces, ambient, map)
+    }
+
+    /// The same for a quadrature without cleverness: the map in even rectangles.
+    pub(super) fn plain(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
+        let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
+        let ambient = ambient(shot.ambient, options.ambient_samples, normal);
+        let map =
+            shot.environment.iter().flat_map(|map| pieces(light::sky_cells(map, options.ambient_samples, normal)));
+        let Self { faces, sky } = Self::from_parts(faces, ambient, map);
+        faces.into_iter().chain(sky).collect()
+    }
+
+    fn from_parts(faces: Vec<Lamp>, ambient: Lamp, map: impl Iterator<Item = Lamp>) -> Self {
         let sky = std::iter::once(ambient).chain(map).collect();
         let lit = |lamps: Vec<Lamp>| lamps.into_iter().filter(|lamp| lamp.radiance != LinearRgb::BLACK).collect();
         Self { faces: lit(faces), sky: lit(sky) }
-    }
-
-    /// All of them.
-    pub(super) fn all(self) -> Vec<Lamp> {
-        self.faces.into_iter().chain(self.sky).collect()
     }
 
     /// Irradiance of the sky where nothing is in its way.
@@ -99,7 +109,7 @@ fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {
 }
 
 /// The pieces of a map that a receiver sees: a lamp each, since each has a colour of its own.
-fn pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<Lamp> {
+fn pieces(pieces: Vec<light::SkyPiece>) -> impl Iterator<Item = Lamp> {
     let lamp = |piece: light::SkyPiece| Lamp {
         radiance: piece.irradiance,
         sources: vec![Source {
@@ -108,7 +118,7 @@ fn pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<Lamp
             kind: Kind::Sky { share: 1.0 },
         }],
     };
-    light::sky_pieces(map, count, normal).into_iter().map(lamp).collect()
+    pieces.into_iter().map(lamp)
 }
 
 /// Axes of a frame whose `z` is `normal`.

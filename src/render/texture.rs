@@ -7,7 +7,7 @@ use crate::render::four::Four;
 use crate::scene::Grade;
 use nalgebra::Vector3;
 
-/// Transparent texels around a texture: what the coarser of two mixed levels reaches beyond the finer one's edge.
+/// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to read on.
 const BORDER: usize = 2;
 
 /// Positions are worked out for this many samples at once.
@@ -23,8 +23,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    fn new((width, height): (usize, usize), level: usize, reach_texels: f64) -> Self {
-        let scale = libm::exp2(-(level as f64));
+    fn new((width, height): (usize, usize), level: f64, reach_texels: f64) -> Self {
+        let scale = libm::exp2(-level);
         let texels = [width as f64 * scale, height as f64 * scale];
         Self { texels, reach: texels.map(|n| reach_texels / n) }
     }
@@ -95,25 +95,23 @@ pub(super) struct Baked {
 }
 
 impl Baked {
-    /// A texture at a level of detail between two halvings, in a card's own colours.
+    /// A texture at a level of detail, which need not be whole, in a card's own colours.
     ///
-    /// Levels are mixed before they are read, so that a reading costs four texels and not eight.
+    /// The level below is averaged further, so that there are no more texels than are needed and a reading costs four of
+    /// them.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: f64) -> Self {
-        let last = texture.levels() - 1;
-        let fine = (level.max(0.0) as usize).min(last);
-        let mix = if fine < last { (level.max(0.0) - fine as f64) as f32 } else { 0.0 };
-        // The full picture ends at its edge; smaller ones fade half a texel out, and as far again where mixed.
-        let reach = [0.0, 0.5, 1.5][usize::from(fine > 0 || mix > 0.0) + usize::from(mix > 0.0)];
-        let grid = Grid::new(texture.size(), fine, reach);
-        let levels = Levels { fine, mix };
+        let level = level.clamp(0.0, (texture.levels() - 1) as f64);
+        let detail = Detail { level: level as usize, step: libm::exp2(level.fract()) };
+        // The full picture ends at its edge; smaller ones fade half a texel out.
+        let grid = Grid::new(texture.size(), level, if level > 0.0 { 0.5 } else { 0.0 });
         let (size, texels, opacity) = match texture {
             Texture::Rgba(pyramid) => {
-                let (size, texels) = levels.read(|l| pyramid.level(l), |p: PremulRgba| p.into());
+                let (size, texels) = detail.read(|l| pyramid.level(l), |p: PremulRgba| p.into());
                 (size, texels, Vec::new())
             }
             Texture::Film(pyramid) => {
-                let (size, texels) = levels.read(|l| pyramid.level(l), |p: Film| p.color.into());
-                let (_, opacity) = levels.read(|l| pyramid.level(l), |p: Film| p.opacity.into());
+                let (size, texels) = detail.read(|l| pyramid.level(l), |p: Film| p.color.into());
+                let (_, opacity) = detail.read(|l| pyramid.level(l), |p: Film| p.opacity.into());
                 (size, texels, opacity)
             }
         };
@@ -165,74 +163,88 @@ fn grade_colors(texels: &mut [Four], grade: &Grade) {
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
 fn shift_colors(texels: &mut [Four], hue_deg: f32, saturation: f32, value: f32) {
-    for t in texels.iter_mut().filter(|t| t.0 != [0.0; 4]) {
-        let LinearRgb { r, g, b } = crate::color::shift_hsv(t.rgb(), hue_deg, saturation, value);
-        *t = Four([r, g, b, t.alpha()]);
+    for run in texels.chunks_mut(LANES).filter(|run| run.iter().any(|t| t.0 != [0.0; 4])) {
+        let mut colors = [[0.0; LANES]; 3];
+        for (lane, t) in run.iter().enumerate() {
+            (0..3).for_each(|c| colors[c][lane] = t.0[c]);
+        }
+        for lane in 0..LANES {
+            let color = LinearRgb::new(colors[0][lane], colors[1][lane], colors[2][lane]);
+            let LinearRgb { r, g, b } = crate::color::shift_hsv(color, hue_deg, saturation, value);
+            (colors[0][lane], colors[1][lane], colors[2][lane]) = (r, g, b);
+        }
+        for (lane, t) in run.iter_mut().enumerate() {
+            (0..3).for_each(|c| t.0[c] = colors[c][lane]);
+        }
     }
 }
 
-/// Two levels of detail next to each other, and how much of the smaller one.
-struct Levels {
-    fine: usize,
-    mix: f32,
+/// A level of detail, and how much smaller the picture is to be.
+struct Detail {
+    level: usize,
+    /// Texels of the level that make one, along each side: 1 up to 2.
+    step: f64,
 }
 
-impl Levels {
-    /// Size and texels of the finer level, bordered, the smaller one enlarged and mixed in.
+impl Detail {
+    /// Size and texels, bordered.
     fn read<'a, P: Copy + 'a>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
-        four: impl Fn(P) -> Four + Copy,
+        four: impl Fn(P) -> Four,
     ) -> ((usize, usize), Vec<Four>) {
-        let image = level(self.fine);
-        let (width, height) = (image.width() + 2 * BORDER, image.height() + 2 * BORDER);
+        let image = level(self.level);
+        let (columns, rows) = (Shares::of(image.width(), self.step), Shares::of(image.height(), self.step));
+        let (width, height) = (columns.0.len() + 2 * BORDER, rows.0.len() + 2 * BORDER);
         let mut texels = vec![Four::ZERO; width * height];
-        for (y, row) in image.rows().enumerate() {
-            let line = &mut texels[(y + BORDER) * width + BORDER..][..row.len()];
-            line.iter_mut().zip(row).for_each(|(t, &p)| *t = four(p));
-        }
-        if self.mix > 0.0 {
-            mix_in(&mut texels, width, &bordered(level(self.fine + 1), four), self.mix);
+        let (mut line, mut sum) = (vec![Four::ZERO; image.width()], vec![Four::ZERO; image.width()]);
+        for (share, out) in rows.0.iter().zip(texels.chunks_exact_mut(width).skip(BORDER)) {
+            sum.fill(Four::ZERO);
+            for (y, weight) in share.weighted() {
+                line.iter_mut().zip(image.row(y)).for_each(|(t, &p)| *t = four(p));
+                sum.iter_mut().zip(&line).for_each(|(s, t)| *s = s.add_scaled(weight, *t));
+            }
+            for (share, out) in columns.0.iter().zip(&mut out[BORDER..]) {
+                *out = share.weighted().fold(Four::ZERO, |s, (x, weight)| s.add_scaled(weight, sum[x]));
+            }
         }
         ((width, height), texels)
     }
 }
 
-/// Rows of a picture with an empty texel on each side, and an empty row above and below.
-fn bordered<P: Copy>(image: &Image<P>, four: impl Fn(P) -> Four) -> Vec<Vec<Four>> {
-    let width = image.width() + 2;
-    let row = |row: &[P]| {
-        let mut line = vec![Four::ZERO; width];
-        line[1..].iter_mut().zip(row).for_each(|(t, &p)| *t = four(p));
-        line
-    };
-    let empty = || std::iter::once(vec![Four::ZERO; width]);
-    empty().chain(image.rows().map(row)).chain(empty()).collect()
+/// What each texel of a smaller picture takes from a larger one, along one side.
+struct Shares(Vec<Share>);
+
+/// Up to three texels in a row and their weights, which add up to 1 (less at the end, where the picture ends).
+struct Share {
+    first: usize,
+    weights: [f32; 3],
+    count: usize,
 }
 
-/// Mixes in the next smaller level, enlarged: `mix` of it, the rest of what is there.
-fn mix_in(texels: &mut [Four], width: usize, coarse: &[Vec<Four>], mix: f32) {
-    let empty = vec![Four::ZERO; coarse[0].len()];
-    let row = |j: isize| usize::try_from(j + 1).ok().and_then(|j| coarse.get(j)).unwrap_or(&empty);
-    let mut line = empty.clone();
-    for (y, fine) in texels.chunks_exact_mut(width).enumerate() {
-        let (near, far) = taps(y);
-        for ((l, near), far) in line.iter_mut().zip(row(near)).zip(row(far)) {
-            *l = near.lerp(*far, 0.25);
-        }
-        let at = |i: isize| usize::try_from(i + 1).ok().and_then(|i| line.get(i)).copied().unwrap_or(Four::ZERO);
-        for (x, texel) in fine.iter_mut().enumerate() {
-            let (near, far) = taps(x);
-            *texel = texel.lerp(at(near).lerp(at(far), 0.25), mix);
-        }
+impl Shares {
+    /// Averages over `step` texels (1 up to 2).
+    fn of(len: usize, step: f64) -> Self {
+        let count = (len as f64 / step).ceil() as usize;
+        Self((0..count).map(|k| Share::of(k as f64 * step, (k + 1) as f64 * step, len)).collect())
     }
 }
 
-/// The nearer (weight 3/4) and farther (1/4) of the two coarse texels around bordered fine texel `i`.
-fn taps(i: usize) -> (isize, isize) {
-    let i = i as isize - BORDER as isize;
-    let near = i.div_euclid(2);
-    (near, if i.rem_euclid(2) == 0 { near - 1 } else { near + 1 })
+impl Share {
+    fn of(start: f64, end: f64, len: usize) -> Self {
+        let first = (start as usize).min(len - 1);
+        let count = ((end.ceil() as usize).min(len) - first).min(3);
+        let weight = |n: usize| {
+            let at = (first + n) as f64;
+            (((at + 1.0).min(end) - at.max(start)).max(0.0) / (end - start)) as f32
+        };
+        Self { first, weights: [weight(0), weight(1), weight(2)], count }
+    }
+
+    #[inline(always)]
+    fn weighted(&self) -> impl Iterator<Item = (usize, f32)> {
+        self.weights.into_iter().take(self.count).enumerate().map(|(n, weight)| (self.first + n, weight))
+    }
 }
 
 /// Opacity alone, for what falls into shadow.
@@ -248,7 +260,7 @@ pub(super) struct Shade {
 impl Shade {
     /// Opacity of a texture halved `level` times, in a card's own colours.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: usize) -> Self {
-        let grid = Grid::new(texture.size(), level, if level > 0 { 0.5 } else { 0.0 });
+        let grid = Grid::new(texture.size(), level as f64, if level > 0 { 0.5 } else { 0.0 });
         match texture {
             Texture::Rgba(pyramid) => Self::of(grid, pyramid.level(level), &[&|p: PremulRgba| p.a]),
             Texture::Film(pyramid) => {
@@ -313,6 +325,17 @@ mod tests {
             let x = 0.02 + k as f32 * 0.013;
             let (i, f) = whole_and_rest(x, 60.0);
             assert!((0.0..=1.0).contains(&f) && (i as f32 + f - x).abs() < 1e-5, "{x}: {i} + {f}");
+        }
+    }
+
+    #[test]
+    fn shares_add_up_but_for_the_end() {
+        for (len, step) in [(7, 1.0), (7, 1.3), (10, 1.999), (1, 1.5)] {
+            let shares = Shares::of(len, step).0;
+            let mut taken = vec![0.0; len];
+            shares.iter().flat_map(Share::weighted).for_each(|(x, w)| taken[x] += f64::from(w) * step);
+            assert!(taken.iter().all(|t| (t - 1.0).abs() < 1e-6), "{len}, {step}: every texel is used once");
+            assert!(shares.len() == (len as f64 / step).ceil() as usize);
         }
     }
 
