@@ -62,7 +62,9 @@ pub(super) fn shift(a: &Image<LinearRgb>, b: &Image<LinearRgb>, mask: &Image<boo
             Registered { shift_px: (at * at_full).into(), sigma_px: last.sigma * at_full, agreement: last.agreement };
     }
     let unlike = found.agreement < LEAST_AGREEMENT;
-    if unlike || Vector2::from(found.shift_px).norm() < SIGNIFICANT * found.sigma_px {
+    // A search over more than a quarter of the picture has lost its way: there was nothing to hold on to.
+    let lost = Vector2::from(found.shift_px).norm() > 0.25 * a.width().min(a.height()) as f64;
+    if lost || unlike || Vector2::from(found.shift_px).norm() < SIGNIFICANT * found.sigma_px {
         found.shift_px = [0.0; 2];
     }
     found
