@@ -114,3 +114,17 @@ fn difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
     let [r, g, b] = [0, 1, 2].map(|c| (i[c] - through * k[c]).max(0.0));
     PremulRgba::new(r, g, b, 1.0 - through)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colour_difference_takes_the_screen_away_and_keeps_what_is_grey() {
+        let screen = LinearRgb::new(0.05, 0.4, 0.1);
+        assert_eq!(difference(screen, screen), PremulRgba::TRANSPARENT);
+        assert_eq!(difference(LinearRgb::grey(0.3), screen), PremulRgba::new(0.3, 0.3, 0.3, 1.0));
+        let half = difference(screen.scale(0.5) + LinearRgb::grey(0.1), screen);
+        assert!((half.a - 0.5).abs() < 1e-6 && (half.g - 0.1).abs() < 1e-6);
+    }
+}
