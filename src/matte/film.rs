@@ -1,10 +1,12 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
+mod planes;
 mod solve;
 mod tint;
 mod view;
 
+pub use planes::film_planes;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;

@@ -4,10 +4,11 @@ mod cells;
 mod polynomial;
 
 use super::register::{self, Registered};
+use super::screen::{screen_pixels, strongest_channel};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
-use crate::pixel::LinearRgb;
+use crate::pixel::{Coverage, LinearRgb};
 use polynomial::Polynomial;
 use serde::{Deserialize, Serialize};
 
@@ -111,6 +112,31 @@ impl ScreenPlate {
         Ok(plate)
     }
 
+    /// [`ScreenPlate::fit`] to what an object's mask and a margin around it leave free.
+    ///
+    /// # Errors
+    /// Those of [`ScreenPlate::fit`].
+    /// # Panics
+    /// When the sizes differ.
+    pub fn fit_outside(photo: &Image<LinearRgb>, mask: &Image<Coverage>, opts: &PlateOptions) -> Result<Self> {
+        Self::fit(photo, &screen_pixels(mask), opts)
+    }
+
+    /// [`ScreenPlate::from_photo`], checked on what an object's mask and a margin around it leave free.
+    ///
+    /// # Errors
+    /// Those of [`ScreenPlate::from_photo`].
+    /// # Panics
+    /// When the sizes of photo and mask differ.
+    pub fn from_photo_outside(
+        empty: &Image<LinearRgb>,
+        photo: &Image<LinearRgb>,
+        mask: &Image<Coverage>,
+        opts: &PlateOptions,
+    ) -> Result<Self> {
+        Self::from_photo(empty, photo, &screen_pixels(mask), opts)
+    }
+
     /// One colour everywhere: what the paper takes for the screen.
     pub fn even(color: LinearRgb, size: (usize, usize)) -> Self {
         let image = Image::filled(size.0, size.1, color);
@@ -180,7 +206,7 @@ impl PlateOptions {
 
 /// 1 minus darkest over brightest of the strongest channel.
 fn unevenness(plate: &ScreenPlate) -> f32 {
-    let strongest = super::screen::strongest_channel(plate.color());
+    let strongest = strongest_channel(plate.color());
     let values = plate.image.pixels().iter().map(|p| <[f32; 3]>::from(*p)[strongest]);
     let (low, high) = values.fold((f32::MAX, 0.0_f32), |(low, high), v| (low.min(v), high.max(v)));
     if high > 0.0 { 1.0 - (low / high).clamp(0.0, 1.0) } else { 0.0 }
@@ -189,3 +215,6 @@ fn unevenness(plate: &ScreenPlate) -> f32 {
 fn refused(what: impl Into<String>) -> Error {
     Error::Photo { what: what.into() }
 }
+
+#[cfg(test)]
+mod tests;

@@ -10,6 +10,7 @@ mod diff;
 mod doctor;
 mod label;
 mod matte;
+mod matte_film;
 mod matte_key;
 mod matte_nodes;
 mod render;
