@@ -21,7 +21,7 @@ pub enum Method {
     Difference,
     /// Film from one screen.
     Physical,
-    /// Film from two screens, the second one simulated.
+    /// Film from two screens, both shots made of the truth.
     TwoScreen,
 }
 
@@ -51,8 +51,8 @@ impl Method {
         }
     }
 
-    /// Cuts the object out; `second` is the object on another screen.
-    pub(super) fn run(self, known: &Known, second: &Image<LinearRgb>) -> Result<Cut> {
+    /// Cuts the object out; `shots` are those of the two-screen method.
+    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<Cut> {
         let photo = &known.photo;
         let found = segment(photo, &SegmentOptions::default())?;
         if self == Self::Paper {
@@ -80,8 +80,8 @@ impl Method {
                 Cut { film: solved.film, transmittance: solved.transmittance, outline, found }
             }
             Self::TwoScreen => {
-                let other = fitted(second, &found)?;
-                let shots = [(photo, &plate), (second, &other)];
+                let plates = [fitted(&shots[0], &found)?, fitted(&shots[1], &found)?];
+                let shots = [(&shots[0], &plates[0]), (&shots[1], &plates[1])];
                 let solved = triangulate(&shots, &inside, &Default::default())?;
                 let outline = found.tight.clone();
                 Cut { film: solved.film, transmittance: solved.transmittance, outline, found }
