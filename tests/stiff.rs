@@ -149,7 +149,8 @@ impl Quality {
         Self {
             iou: count(|a, b| a && b) / count(|a, b| a || b),
             box_px: off.fold(0.0, f64::max),
-            doubts: cut.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect(),
+            // Those of the outline: what film cannot know on a screen of its own hue is another matter.
+            doubts: cut.segmentation.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect(),
         }
     }
 

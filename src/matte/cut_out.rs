@@ -350,6 +350,6 @@ mod tests {
         assert_eq!(back, opts);
         let wrong = CutOutOptions { segment: SegmentOptions { levels: Some(99), ..Default::default() }, ..opts };
         let said = cut_out(&slab(GREEN), &wrong).unwrap_err().to_string();
-        assert_eq!(said, "segment.levels: Some(99), expected 2 to 8");
+        assert_eq!(said, "segment.levels: 99, expected 2 to 8");
     }
 }

@@ -1,8 +1,9 @@
 //! Error of the matting methods against run time, on photos with known mattes.
 //!
 //! The truth is a renderer's: light added, transmittance with and without the object's own shadow, coverage, screen.
-//! Every method sees the same photos and finds the object itself; the second screen of the two-screen method is the first
-//! with two channels swapped, under the same light, with the noise of the same sensor.
+//! Every method sees the same photos and finds the object itself. The two-screen method sees two shots made of the truth
+//! by `F + T K`, with the noise of the same sensor: on the photo's screen, and on one with green and blue swapped. (The
+//! photo itself departs from the model by what blurs and refracts the screen, which a second shot would do alike.)
 
 mod method;
 mod score;
@@ -58,6 +59,8 @@ pub struct Summary {
 const GOOD_BOX_PX: f64 = 2.0;
 /// The outline that is promised.
 const GOOD_IOU: f64 = 0.95;
+/// Shots made of each photo's truth: their noise is drawn from seeds of their own.
+const SHOTS: u64 = 2;
 /// New backgrounds per photo.
 const BACKGROUNDS: u64 = 3;
 /// Longest side of a patch of a new background, pixels.
@@ -75,10 +78,11 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     for i in 0..truths.len() {
         progress(i as u64, truths.len() as u64);
         let known = truths.read(i)?;
-        let second = known.on(&known.screen.map(swapped), i as u64);
+        let on = |screen: &Image<LinearRgb>, shot: u64| known.on(screen, SHOTS * i as u64 + shot);
+        let shots = [on(&known.screen, 0), on(&known.screen.map(swapped), 1)];
         let backgrounds: Vec<_> = (0..BACKGROUNDS).map(|k| background(known.photo.size(), k)).collect();
         for method in Method::ALL {
-            let work = || row(method, &known, &second, &backgrounds);
+            let work = || row(method, &known, &shots, &backgrounds);
             rows.push(one.as_ref().map_or_else(|_| work(), |pool| pool.install(work)));
         }
     }
@@ -90,9 +94,9 @@ fn swapped(c: LinearRgb) -> LinearRgb {
     LinearRgb::new(c.r, c.b, c.g)
 }
 
-fn row(method: Method, known: &Known, second: &Image<LinearRgb>, backgrounds: &[Image<LinearRgb>]) -> Row {
+fn row(method: Method, known: &Known, shots: &[Image<LinearRgb>; 2], backgrounds: &[Image<LinearRgb>]) -> Row {
     let start = Instant::now();
-    let cut = method.run(known, second);
+    let cut = method.run(known, shots);
     let time_ms = 1e3 * start.elapsed().as_secs_f64();
     let (score, doubts) = match &cut {
         Ok(cut) => {

@@ -136,3 +136,33 @@ fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
         |holds: fn(bool, bool) -> bool| a.pixels().iter().zip(b.pixels()).filter(|(a, b)| holds(**a, **b)).count();
     count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(side: usize) -> Option<Image<bool>> {
+        Some(Image::from_fn(20, 20, |x, y| x < side && y < side))
+    }
+
+    #[test]
+    fn agreement_is_the_mean_overlap_and_failures_do_not_agree() {
+        assert_eq!(overlap(&square(10).unwrap(), &square(5).unwrap()), 0.25);
+        let found = [square(10), square(10), square(5), None];
+        assert!((agreement(&found, 0) - (1.0 + 0.25 + 0.0) / 3.0).abs() < 1e-12);
+        assert_eq!((agreement(&found, 3), agreement(&found[..1], 0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn the_depth_that_was_asked_for_is_taken() {
+        let disc = |x: f64, y: f64| (x - 150.0).hypot(y - 100.0) < 60.0;
+        let photo = Image::from_fn(300, 200, |x, y| {
+            if disc(x as f64, y as f64) { LinearRgb::WHITE } else { LinearRgb::new(0.04, 0.4, 0.08) }
+        });
+        for levels in [2, 3, 6] {
+            let chosen = best(&photo, &SegmentOptions { levels: Some(levels), ..Default::default() }).unwrap();
+            assert_eq!(chosen.levels, levels);
+            assert_eq!(chosen.pass.inside.size(), photo.size());
+        }
+    }
+}

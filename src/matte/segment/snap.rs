@@ -133,3 +133,44 @@ fn evenly(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
     }
     points
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc of radius 30.3 with a blurred edge.
+    fn photo() -> Image<LinearRgb> {
+        let disc = Image::from_fn(100, 90, |x, y| {
+            let r = (x as f64 + 0.5 - 50.0).hypot(y as f64 + 0.5 - 45.0);
+            let inside = (30.3 - r + 0.5).clamp(0.0, 1.0) as f32;
+            LinearRgb::new(0.04, 0.4, 0.08).scale(1.0 - inside) + LinearRgb::grey(0.5 * inside)
+        });
+        filter::gaussian_blur(&disc, 0.8)
+    }
+
+    fn circle(radius: f64) -> Outline {
+        let at = |i: usize| {
+            let a = std::f64::consts::TAU * i as f64 / 200.0;
+            Point2::new(50.0 + radius * libm::cos(a), 45.0 + radius * libm::sin(a))
+        };
+        Outline { rings: vec![(0..200).map(at).collect()] }
+    }
+
+    #[test]
+    fn an_outline_a_pixel_off_comes_to_the_edge() {
+        for radius in [29.3, 30.3, 31.3] {
+            let snapped = snapped(&circle(radius), &photo(), 1.0);
+            let worst =
+                snapped.rings[0].iter().map(|p| ((p.x - 50.0).hypot(p.y - 45.0) - 30.3).abs()).fold(0.0, f64::max);
+            // From a pixel outside, the reach ends before the blurred edge has its full height: half of less lies farther out.
+            assert!(worst < 0.6, "from {radius}: {worst} px off");
+        }
+    }
+
+    #[test]
+    fn an_outline_over_nothing_stays() {
+        let even = Image::filled(100, 90, LinearRgb::grey(0.3));
+        let area = |outline: &Outline| outline.area();
+        assert!((area(&snapped(&circle(30.0), &even, 1.0)) / area(&circle(30.0)) - 1.0).abs() < 0.005);
+    }
+}

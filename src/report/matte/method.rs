@@ -21,7 +21,7 @@ pub enum Method {
     Difference,
     /// Film from one screen.
     Physical,
-    /// Film from two screens, the second one simulated.
+    /// Film from two screens, both shots made of the truth.
     TwoScreen,
 }
 
@@ -51,8 +51,8 @@ impl Method {
         }
     }
 
-    /// Cuts the object out; `second` is the object on another screen.
-    pub(super) fn run(self, known: &Known, second: &Image<LinearRgb>) -> Result<Cut> {
+    /// Cuts the object out; `shots` are those of the two-screen method.
+    pub(super) fn run(self, known: &Known, shots: &[Image<LinearRgb>; 2]) -> Result<Cut> {
         let photo = &known.photo;
         let found = segment(photo, &SegmentOptions::default())?;
         if self == Self::Paper {
@@ -80,8 +80,8 @@ impl Method {
                 Cut { film: solved.film, transmittance: solved.transmittance, outline, found }
             }
             Self::TwoScreen => {
-                let other = fitted(second, &found)?;
-                let shots = [(photo, &plate), (second, &other)];
+                let plates = [fitted(&shots[0], &found)?, fitted(&shots[1], &found)?];
+                let shots = [(&shots[0], &plates[0]), (&shots[1], &plates[1])];
                 let solved = triangulate(&shots, &inside, &Default::default())?;
                 let outline = found.tight.clone();
                 Cut { film: solved.film, transmittance: solved.transmittance, outline, found }
@@ -113,4 +113,18 @@ fn difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
     let through = if excess(k) > 0.0 { (excess(i) / excess(k)).clamp(0.0, 1.0) } else { 0.0 };
     let [r, g, b] = [0, 1, 2].map(|c| (i[c] - through * k[c]).max(0.0));
     PremulRgba::new(r, g, b, 1.0 - through)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colour_difference_takes_the_screen_away_and_keeps_what_is_grey() {
+        let screen = LinearRgb::new(0.05, 0.4, 0.1);
+        assert_eq!(difference(screen, screen), PremulRgba::TRANSPARENT);
+        assert_eq!(difference(LinearRgb::grey(0.3), screen), PremulRgba::new(0.3, 0.3, 0.3, 1.0));
+        let half = difference(screen.scale(0.5) + LinearRgb::grey(0.1), screen);
+        assert!((half.a - 0.5).abs() < 1e-6 && (half.g - 0.1).abs() < 1e-6);
+    }
 }

@@ -123,3 +123,72 @@ fn box_error(found: &Cut, truth: [f64; 4]) -> f64 {
     let sides = [low(|p| p.x), low(|p| p.y), high(|p| p.x), high(|p| p.y)];
     sides.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{background, truth::Noise};
+    use super::*;
+    use crate::matte::{SegmentOptions, segment};
+
+    const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
+
+    /// A slab of clear film with an opaque bar on an even screen.
+    fn known() -> Known {
+        let (w, h) = (160, 100);
+        let on = |x: usize, y: usize| (40..120).contains(&x) && (30..70).contains(&y);
+        let bar = |x: usize, y: usize| on(x, y) && (70..90).contains(&x);
+        let foreground = Image::from_fn(w, h, |x, y| match (bar(x, y), on(x, y)) {
+            (true, _) => LinearRgb::new(0.5, 0.1, 0.1),
+            (false, true) => LinearRgb::grey(0.1),
+            _ => LinearRgb::BLACK,
+        });
+        let passes = |film: f32| {
+            Image::from_fn(w, h, move |x, y| {
+                LinearRgb::grey(if bar(x, y) {
+                    0.0
+                } else if on(x, y) {
+                    film
+                } else {
+                    1.0
+                })
+            })
+        };
+        let (transmittance, view) = (passes(0.5), passes(0.75));
+        let screen = Image::filled(w, h, GREEN);
+        let photo = Image::from_fn(w, h, |x, y| foreground[(x, y)] + transmittance[(x, y)] * GREEN);
+        let mask = Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y)))));
+        let (box_px, noise) = ([40.0, 30.0, 120.0, 70.0], Noise { shot: 0.0, read: 0.0 });
+        Known { name: "slab".into(), photo, foreground, transmittance, view, screen, mask, box_px, noise }
+    }
+
+    fn truth(known: &Known) -> Cut {
+        Cut {
+            film: known.foreground.zip_map(&known.view, Film::new),
+            transmittance: known.transmittance.clone(),
+            outline: known.mask.clone(),
+            found: segment(&known.photo, &SegmentOptions::default()).unwrap(),
+        }
+    }
+
+    #[test]
+    fn the_truth_has_no_error() {
+        let known = known();
+        let score = Score::of(&truth(&known), &known, &[background(known.photo.size(), 1)]);
+        let all =
+            [score.sad, score.mse, score.gradient, score.mae_lit, score.mae_shaded, score.residue, 1.0 - score.iou];
+        assert!(all.iter().all(|e| e.abs() < 1e-6), "{score:?}");
+        assert!(score.psnr_lit > 100.0 && score.box_px <= 2.0, "{score:?}");
+    }
+
+    #[test]
+    fn errors_are_those_of_the_definition() {
+        let known = known();
+        let mut cut = truth(&known);
+        // A tenth too opaque everywhere: on a background of 1, a tenth too dark.
+        cut.film = cut.film.map(|f| Film { color: f.color, opacity: f.opacity.map(|o| o + 0.1) });
+        let score = Score::of(&cut, &known, &[Image::filled(160, 100, LinearRgb::WHITE)]);
+        assert!((score.mse - 0.01).abs() < 1e-5 && (score.sad - 1.6).abs() < 1e-3, "{score:?}");
+        assert!((score.mae_lit - 0.1).abs() < 1e-5 && (score.psnr_lit - 20.0).abs() < 1e-2, "{score:?}");
+        assert!((score.residue - 0.1).abs() < 1e-5 && score.mae_shaded < 1e-6, "{score:?}");
+    }
+}
