@@ -238,6 +238,20 @@ fn a_scene_goes_through_the_stages_one_by_one() {
     desk.ok(&["diff", "frame.exr", "again.exr"]);
     desk.ok(&["label", "rest.json", "demo/recipe.toml", "-o", "labels.json", "--overlay", "overlay.png"]);
     assert!(desk.path("overlay.png").exists());
+
+    // The same picture in parts, at another quality, and for Blender.
+    let parts = ["render", "rest.json", "demo/recipe.toml", "-o", "parts.exr", "--quality", "draft"];
+    desk.ok(&[&parts[..], &["--aov", "beauty,id,depth,cryptomatte,layers", "--preview", "look.png"]].concat());
+    assert!(desk.path("look.png").exists());
+    let told = text(&desk.run(&["diff", "frame.exr", "parts.exr"]).stdout);
+    assert!(told.contains("SSIM = 0.9") && told.contains("FLIP = 0.0"), "{told}");
+    assert!(text(&desk.run(&[&parts[..], &["--aov", "normals"]].concat()).stderr).contains("expected some of beauty"));
+    desk.ok(&["scene", "export", "rest.json", "demo/recipe.toml", "--to", "cycles", "blender"]);
+    assert!(
+        ["scene.json", "plate.exr", "card_1.exr", "scene_reference.py"]
+            .iter()
+            .all(|f| desk.path("blender").join(f).exists())
+    );
 }
 
 #[test]

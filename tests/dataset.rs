@@ -34,6 +34,8 @@ fn scene(k: u64) -> Scene {
         ambient: LinearRgb::grey(0.1),
         environment: None,
         exposure: Exposure::default(),
+        cast: Default::default(),
+        finish: Default::default(),
     }
 }
 
@@ -334,7 +336,7 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);
     plan.writers = vec![
-        Box::new(Pictures { format: PictureFormat::Jpg, exr: true }),
+        Box::new(Pictures { format: PictureFormat::Jpg, exr: true, ..Pictures::default() }),
         Box::new(Yolo { task: YoloTask::Segment, ..Yolo::default() }),
     ];
     make(&plan).unwrap();

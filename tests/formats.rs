@@ -5,12 +5,12 @@
 
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
-use petcomp::dataset::{LabelSetup, Obstructed, Pictures, Plan, Sample, Sidecar, Split, generate};
+use petcomp::dataset::{LabelSetup, Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, generate};
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{CameraSource, Card, Exposure, Grade, Surface};
+use petcomp::scene::{CameraSource, Card, Cast, Exposure, Finish, Grade, Surface};
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -78,14 +78,26 @@ fn sample(k: u64) -> Result<Sample> {
         image: IMAGE,
         plate: "grey".into(),
         camera: CameraSource::Known(shot.camera),
-        surface: Surface { size: [0.8, 0.6] },
+        surface: Surface::new([0.8, 0.6]),
         objects: Vec::new(),
         lights: Vec::new(),
         ambient: LinearRgb::grey(1.0),
         environment: None,
         exposure: Exposure::default(),
+        cast: Cast::default(),
+        finish: Finish::default(),
     };
-    Ok(Sample { frame, deep, labels, drawn: scene.clone(), scene, scene_seed: 3, retries: 0 })
+    Ok(Sample {
+        frame,
+        deep,
+        labels,
+        drawn: scene.clone(),
+        scene,
+        scene_seed: 3,
+        rejected: vec![],
+        draws: vec![],
+        times: Times::default(),
+    })
 }
 
 fn classes() -> Vec<String> {
@@ -100,6 +112,7 @@ fn made(labels: &str) -> tempfile::TempDir {
     let mut plan = Plan {
         folder: dir.path().into(),
         count: 12,
+        numbers: Numbers::All,
         seed: 3,
         recipe: serde_json::json!({}),
         classes: setup.obstructed.classes(&classes()).unwrap(),

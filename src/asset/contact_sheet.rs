@@ -5,7 +5,7 @@ use crate::color::to_srgb8;
 use crate::filter;
 use crate::image::Image;
 use crate::label::draw::{self, TextSize};
-use crate::pixel::{LinearRgb, PremulRgba, Srgb8};
+use crate::pixel::{Film, LinearRgb, Srgb8};
 use rayon::prelude::*;
 
 /// Longer side of a cut-out on the sheet, pixels.
@@ -54,7 +54,7 @@ pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
 
 /// One cut-out over all backgrounds under a line of text.
 fn strip(photo: &Photo) -> Image<Srgb8> {
-    let cutout = small(photo.texture.base());
+    let cutout = small(photo.texture.to_film());
     let (w, h) = cutout.size();
     let record = &photo.record;
     let lines = 1 + record.doubts.len();
@@ -74,7 +74,7 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
         draw::text(&mut canvas, [0, (i * line_height) as isize], &fitting(text, width), ink, TextSize::Small);
     }
     for (i, background) in BACKGROUNDS.iter().enumerate() {
-        let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over(background(x, y).opaque()).color());
+        let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over_color(background(x, y)));
         draw::paste(&mut canvas, [i * (SIDE + GAP), text_height], &to_srgb8(&over));
     }
     canvas
@@ -86,14 +86,14 @@ fn fitting(text: &str, width: usize) -> String {
     text.chars().take(room).collect()
 }
 
-fn small(cutout: &Image<PremulRgba>) -> Image<PremulRgba> {
+fn small(cutout: Image<Film>) -> Image<Film> {
     let (w, h) = cutout.size();
     let longest = w.max(h).max(1);
     if longest <= SIDE {
-        return cutout.clone();
+        return cutout;
     }
     let side = |len: usize| (len * SIDE).div_ceil(longest).max(1);
-    filter::resize(cutout, side(w), side(h))
+    filter::resize(&cutout, side(w), side(h))
 }
 
 #[cfg(test)]
@@ -101,13 +101,13 @@ mod tests {
     use super::super::manifest::tests::photo;
     use super::*;
     use crate::asset::Asset;
-    use crate::filter::Pyramid;
+    use crate::pixel::PremulRgba;
     use std::sync::Arc;
 
     fn library(doubts: &[&str], count: usize) -> Library {
         let mut record = photo("a.exr");
         record.doubts = doubts.iter().map(|d| (*d).into()).collect();
-        let texture = Arc::new(Pyramid::new(Image::filled(480, 240, PremulRgba::TRANSPARENT)));
+        let texture = Image::filled(480, 240, PremulRgba::TRANSPARENT).into();
         let one = Photo { size: [0.4, 0.2], texture, outline_uv: Arc::new([]), record };
         let asset = Asset { name: "a".into(), class: 0, thickness: 0.01, mass: 0.02, photos: vec![one; count] };
         Library { classes: vec!["cap".into()], assets: vec![asset] }

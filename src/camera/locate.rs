@@ -41,6 +41,8 @@ mod tests {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: Exposure::default(),
+            cast: Default::default(),
+            finish: Default::default(),
         }
     }
 

@@ -49,6 +49,8 @@ pub use check::{Checked, Fault, check};
 pub use coco::{Coco, CocoMask};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use formats::{Extent, Format, LabelSetup};
+pub use generate::{Plan, generate};
+pub(crate) use journal::read as journal_lines;
 pub use formats::{Format, LabelSetup};
 pub use generate::{Plan, Progress, generate};
 pub use generate::{Plan, generate};

@@ -10,8 +10,8 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label;
 use crate::light;
-use crate::pixel::LinearRgb;
-use crate::render;
+use crate::pixel::{LinearRgb, PremulRgba};
+use crate::render::{self, DeepImage};
 use crate::scene::{Background, Choice, Drawn, Draws, Look, Scene, Shot, stock};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -129,14 +129,18 @@ impl Studio {
         let drawn = scene.clone();
         let (resolved, settle) = timed(|| self.resolve(scene));
         let (scene, shot) = resolved?;
-        let ((deep, frame), render) = timed(|| {
-            let deep = render::cast(&shot, &self.setup.render);
-            let frame = composite::frame(&deep, shot.plate.as_deref());
-            (deep, frame)
-        });
+        let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
         let (labels, label) = timed(|| label::label(&deep, &shot, &self.setup.labels.options()));
         let times = Times { settle, render, label, ..Times::default() };
         Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, rejected: vec![], draws: vec![], times })
+    }
+
+    /// Renders a shot and finishes its frame as the scene asks.
+    pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
+        let deep = render::cast(shot, &self.setup.render);
+        let frame = composite::frame(&deep, shot.plate.as_deref());
+        let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
+        (deep, frame)
     }
 
     /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its exposure.
@@ -147,7 +151,7 @@ impl Studio {
         let plate = self.plate(&scene.plate)?;
         let mut scene = self.rest(camera::locate(scene)?)?;
         if let Some(plate) = &plate {
-            scene = light::expose(scene, plate);
+            scene = light::match_plate(scene, plate);
         }
         let shot = scene.resolve(|object| Look::of(&self.library, object), plate, panorama(&scene)?)?;
         Ok((scene, shot))

@@ -30,11 +30,6 @@ impl DataYaml {
         self.path.as_deref().map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
-    /// Names of the classes.
-    pub(crate) fn names(&self) -> &[String] {
-        &self.names
-    }
-
     /// Number of classes.
     pub(crate) fn classes(&self) -> Option<usize> {
         self.nc.or(Some(self.names.len()).filter(|&n| n > 0))

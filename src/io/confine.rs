@@ -147,7 +147,8 @@ mod linux {
         let refused = SeccompAction::Errno(libc::EPERM as u32);
         let filter = SeccompFilter::new(rules, refused, SeccompAction::Allow, std::env::consts::ARCH.try_into()?)?;
         let program: BpfProgram = filter.try_into()?;
-        Ok(seccompiler::apply_filter(&program)?)
+        // OpenImageIO's libraries have started threads of their own by now.
+        Ok(seccompiler::apply_filter_all_threads(&program)?)
     }
 
     fn first_argument(value: u64) -> Result<SeccompRule, seccompiler::BackendError> {

@@ -2,7 +2,7 @@
 
 use super::orient::Orientation;
 use exif::{Exif, In, Tag, Value};
-use std::io::{BufRead, Cursor, Seek};
+use std::io::{BufRead, Seek};
 
 /// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -40,7 +40,7 @@ impl CameraNotes {
     #[cfg(feature = "oiio")]
     pub(super) fn has_associated_alpha(tiff: &[u8]) -> bool {
         const EXTRA_SAMPLES: Tag = Tag(exif::Context::Tiff, 338);
-        let exif = exif::Reader::new().read_from_container(&mut Cursor::new(tiff));
+        let exif = exif::Reader::new().read_from_container(&mut std::io::Cursor::new(tiff));
         let extra = exif.ok().and_then(|e| e.get_field(EXTRA_SAMPLES, In::PRIMARY)?.value.get_uint(0));
         extra == Some(1)
     }
@@ -93,6 +93,7 @@ mod tests {
     use super::*;
     use exif::experimental::Writer;
     use exif::{Field, Rational};
+    use std::io::Cursor;
 
     #[test]
     fn damaged_notes_are_no_notes() {

@@ -336,18 +336,18 @@ pub(super) fn encode(
     let mut out = Cursor::new(Vec::new());
     exr::prelude::Image::from_layer(layer).write().to_buffered(&mut out).map_err(|e| e.to_string())?;
     let mut bytes = out.into_inner();
-    sort_attributes(&mut bytes).ok_or("header of an unknown kind")?;
+    sort_attributes(&mut bytes, HEADER).ok_or("header of an unknown kind")?;
     Ok(bytes)
 }
 
 /// Start of the first attribute: behind the magic number and the version.
 const HEADER: usize = 8;
 
-/// Puts the attributes of a one-part header in the order of their names, as OpenEXR's own library does: the `exr` crate
-/// keeps them in a hash map, whose order differs from run to run.
-fn sort_attributes(file: &mut [u8]) -> Option<()> {
+/// Puts the attributes of the header that starts at `start` in the order of their names, as OpenEXR's own library does:
+/// the `exr` crate keeps them in a hash map, whose order differs from run to run. Returns where they end.
+pub(super) fn sort_attributes(file: &mut [u8], start: usize) -> Option<usize> {
     let mut attributes = Vec::new();
-    let mut at = HEADER;
+    let mut at = start;
     while *file.get(at)? != 0 {
         let kind = at + file[at..].iter().position(|&b| b == 0)? + 1;
         let size = kind + file.get(kind..)?.iter().position(|&b| b == 0)? + 1;
@@ -357,8 +357,8 @@ fn sort_attributes(file: &mut [u8]) -> Option<()> {
         at = end;
     }
     attributes.sort();
-    file[HEADER..at].copy_from_slice(&attributes.concat());
-    Some(())
+    file[start..at].copy_from_slice(&attributes.concat());
+    Some(at)
 }
 
 #[cfg(test)]

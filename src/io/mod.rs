@@ -44,6 +44,7 @@ mod confine;
 mod document;
 mod exif;
 pub mod exr;
+pub mod exr_parts;
 #[cfg(feature = "oiio")]
 mod ffi;
 mod format;
@@ -71,6 +72,7 @@ mod tiff;
 mod worker;
 mod write;
 
+pub use atomic::{copy, create_folder, relative, sync, write_through};
 pub use atomic::{copy, create_folder, relative, sync};
 pub use atomic::{create_folder, write_through};
 pub use document::{

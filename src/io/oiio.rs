@@ -32,7 +32,7 @@ impl std::fmt::Debug for Linked {
     }
 }
 
-/// For [`Fallback::InProcess`](super::Fallback::InProcess): a program that calls this links OpenImageIO.
+/// For [`Fallback::InProcess`]: a program that calls this links OpenImageIO.
 pub fn in_process() -> Linked {
     Linked(|source, limits, ask| match ask {
         Ask::Header => shape(source, limits).map(Told::Shape),

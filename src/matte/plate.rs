@@ -18,7 +18,8 @@ use serde::{Deserialize, Serialize};
 pub struct PlateOptions {
     /// Highest degree of the polynomial, 0 to 6. Default: 4.
     pub max_degree: usize,
-    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.1.
+    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6: around
+    /// the object only, a higher degree fits shadows and swings beneath it.
     pub least_gain: f64,
     /// An empty-screen photo may be shifted by so many pixels. Default: 8.
     pub max_shift_px: f64,
@@ -29,7 +30,7 @@ pub struct PlateOptions {
 
 impl Default for PlateOptions {
     fn default() -> Self {
-        Self { max_degree: 4, least_gain: 0.1, max_shift_px: 8.0, max_mismatch: 0.05 }
+        Self { max_degree: 4, least_gain: 0.6, max_shift_px: 8.0, max_mismatch: 0.05 }
     }
 }
 
@@ -56,7 +57,7 @@ impl ScreenPlate {
     ///
     /// # Method
     /// The logarithm of each channel is a polynomial of the position, fitted to the means of small cells by iteratively
-    /// reweighted least squares with [Tukey]'s biweight, so that shadows and dirt do not count. Light falls off by
+    /// reweighted least squares with [Tukey]'s biweight, narrower on the dark side, so that shadows and dirt do not count. Light falls off by
     /// factors and never goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
     /// `least_gain` in the residual of cells that were left out of the fit.
     ///

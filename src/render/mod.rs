@@ -19,13 +19,16 @@ mod definition;
 mod four;
 mod half_plane;
 mod irradiance;
+mod lattice;
 mod layers;
 mod options;
 mod pixel_filter;
+mod receiver;
 mod reference;
 mod shadow;
 mod source;
 mod texture;
+mod through;
 mod view;
 
 pub use cast::cast;

@@ -1,5 +1,6 @@
 //! How much work goes into a picture.
 
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
 
 /// A named point on the curve of error against time.
@@ -15,6 +16,8 @@ pub enum Quality {
     Good,
     /// For comparisons.
     High,
+    /// For holding other pictures against.
+    Reference,
 }
 
 /// How finely a picture is sampled; the same numbers give the same bits.
@@ -32,6 +35,15 @@ pub struct RenderOptions {
 }
 
 impl Quality {
+    /// All of them with their names, the quickest first.
+    pub const ALL: [(&'static str, Self); 5] = [
+        ("draft", Self::Draft),
+        ("fast", Self::Fast),
+        ("good", Self::Good),
+        ("high", Self::High),
+        ("reference", Self::Reference),
+    ];
+
     /// The numbers behind the name: points on the measured curve of error (against Cycles) over run time.
     pub fn options(self) -> RenderOptions {
         let [subsamples, light_samples, ambient_samples] = match self {
@@ -39,12 +51,14 @@ impl Quality {
             Self::Fast => [2, 3, 16],
             Self::Good => [2, 4, 36],
             Self::High => [3, 6, 36],
+            Self::Reference => [6, 6, 100],
         };
         let cell_px = match self {
             Self::Draft => 2.0,
             Self::Fast => 1.5,
             Self::Good => 1.0,
             Self::High => 0.66,
+            Self::Reference => 0.33,
         };
         RenderOptions { subsamples, light_samples, ambient_samples, cell_px }
     }
@@ -66,6 +80,18 @@ impl RenderOptions {
             ambient_samples: self.ambient_samples.clamp(1, 4096),
             cell_px,
         }
+    }
+}
+
+impl std::str::FromStr for Quality {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        let known = Self::ALL.iter().find(|(n, _)| *n == name);
+        known.map(|&(_, quality)| quality).ok_or_else(|| {
+            let names = Self::ALL.map(|(n, _)| n).join(", ");
+            Error::value("quality", format!("\"{name}\", expected one of {names}"))
+        })
     }
 }
 

@@ -6,7 +6,7 @@ use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Depth, LinearRgb, Mix, PremulRgba};
 use crate::render::pixel_filter::quantiles;
-use crate::render::source::{Kind, Lamp, Source, lamps};
+use crate::render::source::{Kind, Lamp, Lamps, Source};
 use crate::render::view::{Seen, Sheet, View, sheets};
 use crate::render::{DeepImage, DeepSample, RenderOptions};
 use crate::scene::{Card, Shot};
@@ -46,7 +46,7 @@ struct World<'a> {
 impl<'a> World<'a> {
     fn of(shot: &'a Shot, options: &RenderOptions) -> Self {
         let view = View::of(&shot.camera);
-        let lit = |normal: &Vector3<f64>| lamps(shot, options, normal);
+        let lit = |normal: &Vector3<f64>| Lamps::of(shot, options, normal).all();
         let facing = |(card, sheet): (&'a Card, Sheet)| {
             let seen = Seen::of(&sheet, &view);
             let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));

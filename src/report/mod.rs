@@ -10,6 +10,7 @@ pub mod experiments;
 mod histogram;
 pub mod matte;
 mod page;
+pub mod render;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod table;

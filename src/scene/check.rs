@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::geom::UnitQuaternion;
 use crate::pixel::LinearRgb;
 use crate::scene::hull::turn;
-use crate::scene::{AreaLight, CameraSource, Exposure, Object, Placement, Scene, Surface};
+use crate::scene::{AreaLight, CameraSource, Cast, Exposure, Object, Placement, Scene, Surface};
 use std::fmt::Debug;
 
 /// How far the norm of a quaternion may be from 1: what six written decimals leave.
@@ -27,10 +27,16 @@ impl Scene {
         each(&self.lights, "lights", check_light)?;
         expect_color(self.ambient, "ambient")?;
         self.environment.as_ref().map_or(Ok(()), |map| map.check("environment"))?;
+        check_cast(&self.cast)?;
+        self.finish.check("finish")?;
         match self.exposure {
             Exposure::Ev(ev) => expect(ev.is_finite(), "exposure.ev", ev, "a finite number"),
             Exposure::MatchPlate { gain_ev } => {
                 expect(gain_ev.is_finite(), "exposure.match_plate.gain_ev", gain_ev, "a finite number")
+            }
+            Exposure::MatchSurface { albedo, gain_ev } => {
+                expect(is_length(albedo), "exposure.match_surface.albedo", albedo, "a number above 0")?;
+                expect(gain_ev.is_finite(), "exposure.match_surface.gain_ev", gain_ev, "a finite number")
             }
         }
     }
@@ -68,6 +74,15 @@ fn expect_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
 fn expect_color(color: LinearRgb, at: &str) -> Result<()> {
     let LinearRgb { r, g, b } = color;
     expect([r, g, b].iter().all(|x| x.is_finite() && *x >= 0.0), at, [r, g, b], "three numbers of at least 0")
+}
+
+fn check_cast(cast: &Cast) -> Result<()> {
+    match *cast {
+        Cast::Known(color) => expect_color(color, "cast.known"),
+        Cast::MatchSurface { share } => {
+            expect(share.is_finite(), "cast.match_surface.share", share, "a finite number, 0 to 1 as a rule")
+        }
+    }
 }
 
 fn check_camera(camera: &CameraSource) -> Result<()> {
@@ -177,6 +192,8 @@ mod tests {
             ambient: LinearRgb::grey(0.5),
             environment: None,
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
+            cast: Default::default(),
+            finish: Default::default(),
         }
     }
 

@@ -6,9 +6,11 @@
 //! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
 
 mod check;
+pub mod cycles;
 mod draw;
 mod environment;
 mod fall;
+mod finish;
 mod hull;
 mod light;
 mod limit;
@@ -22,11 +24,13 @@ mod stock;
 mod variation;
 
 pub use draw::{Distribution, DrawLog, Drawn, Draws};
+pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
-pub use light::{AreaLight, Exposure, LightShape};
+pub use finish::{Finish, FinishRanges, Noise, white_balance};
+pub use light::{AreaLight, Cast, Exposure, LightShape};
 pub use limit::Limit;
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
@@ -69,6 +73,12 @@ pub struct Scene {
     /// How bright rendered light is on the plate.
     #[serde(default)]
     pub exposure: Exposure,
+    /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings bring their own.
+    #[serde(default, skip_serializing_if = "Cast::is_white")]
+    pub cast: Cast,
+    /// What happens to the finished frame.
+    #[serde(default, skip_serializing_if = "Finish::is_nothing")]
+    pub finish: Finish,
 }
 
 /// A labelled rectangle of known size: the plane `z = 0`, centred on the world's origin.

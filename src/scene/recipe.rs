@@ -1,11 +1,13 @@
 //! Recipe: the distributions that scenes are drawn from.
 
+use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
+use crate::scene::finish::KELVIN;
 use crate::scene::stack::{Column, Start};
 use crate::scene::{
-    AreaLight, CameraSource, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, Grade, LightShape, Limit, Object,
-    Range, Scene, SettleOptions, Source, Surface,
+    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, FinishRanges, Grade, LightShape,
+    Limit, Object, Range, Scene, SettleOptions, Source, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -52,6 +54,14 @@ pub struct Recipe {
     pub restitution: Range,
     /// What falls in place of a cut-out. Default: `box`.
     pub collider: Collider,
+    /// Share of light that the surface reflects, where it is known: the exposure is then matched to the surface instead of
+    /// the plate's white. Default: not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface_albedo: Option<f64>,
+    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
+    pub cast: Cast,
+    /// What happens to the finished frame. Default: nothing.
+    pub finish: FinishRanges,
     /// How objects come to rest.
     pub settle: SettleOptions,
 }
@@ -139,6 +149,9 @@ pub struct LightRanges {
     pub power: Range,
     /// Red, green and blue, scene-linear. Default: `[1, 1, 1]`.
     pub color: [Range; 3],
+    /// Colour temperature, kelvin, 1667 to 25 000, on top of `color`; power keeps its luminance. Default: that of white.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_k: Option<Range>,
 }
 
 /// An asset as a recipe sees it: what may be chosen, without its pictures.
@@ -186,6 +199,9 @@ impl Default for Recipe {
             friction: Range::fixed(Surface::new([0.0; 2]).friction),
             restitution: Range::fixed(0.0),
             collider: Collider::Box,
+            surface_albedo: None,
+            cast: Cast::default(),
+            finish: FinishRanges::default(),
             settle: SettleOptions::default(),
         }
     }
@@ -207,6 +223,7 @@ impl Default for LightRanges {
             size: Range::new(0.05, 0.6),
             power: Range::fixed(10.0),
             color: [Range::fixed(1.0); 3],
+            temperature_k: None,
         }
     }
 }
@@ -269,7 +286,9 @@ impl Recipe {
             ambient: ambient(&lights, self.ambient.draw(&draws, "ambient")),
             lights,
             environment: self.environment.draw(&draws),
-            exposure: Exposure::MatchPlate { gain_ev: self.gain_ev.draw(&draws, "gain_ev") },
+            exposure: self.exposure(self.gain_ev.draw(&draws, "gain_ev")),
+            cast: self.cast,
+            finish: self.finish.draw(&draws),
         };
         scene.check()?;
         Ok(scene)
@@ -293,7 +312,18 @@ impl Recipe {
         self.gain_ev.check("gain_ev", -32.0, 32.0)?;
         self.friction.check("friction", 0.0, any)?;
         self.restitution.check("restitution", 0.0, 1.0)?;
+        if let Some(albedo) = self.surface_albedo {
+            Range::fixed(albedo).check_positive("surface_albedo")?;
+        }
+        self.finish.check()?;
         self.settle.check()
+    }
+
+    fn exposure(&self, gain_ev: f64) -> Exposure {
+        match self.surface_albedo {
+            None => Exposure::MatchPlate { gain_ev },
+            Some(albedo) => Exposure::MatchSurface { albedo, gain_ev },
+        }
     }
 
     /// Assets and photos of one selection, at their own size and colour.
@@ -363,13 +393,14 @@ impl LightRanges {
         let of = |range: &Range, name: &str| range.draw(draws, &format!("{path}.{name}"));
         let (offset, azimuth) = (of(&self.offset, "offset"), of(&self.azimuth_deg, "azimuth_deg").to_radians());
         let color = [0, 1, 2].map(|c| of(&self.color[c], &format!("color[{c}]")) as f32);
+        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| planckian(of(&range, "temperature_k")));
         AreaLight {
             shape: self.shape,
             position: [offset * libm::cos(azimuth), offset * libm::sin(azimuth), of(&self.height, "height")],
             target: [0.0; 3],
             size: [of(&self.size, "size"); 2],
             power: of(&self.power, "power"),
-            color: LinearRgb::new(color[0], color[1], color[2]),
+            color: LinearRgb::from(color) * glow,
         }
     }
 
@@ -379,6 +410,9 @@ impl LightRanges {
         self.azimuth_deg.check(&format!("{at}.azimuth_deg"), -f64::INFINITY, f64::INFINITY)?;
         self.size.check_positive(&format!("{at}.size"))?;
         self.power.check(&format!("{at}.power"), 0.0, f64::INFINITY)?;
+        if let Some(range) = &self.temperature_k {
+            range.check(&format!("{at}.temperature_k"), KELVIN[0], KELVIN[1])?;
+        }
         (0..3).try_for_each(|c| self.color[c].check(&format!("{at}.color[{c}]"), 0.0, f64::INFINITY))
     }
 }

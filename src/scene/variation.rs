@@ -121,8 +121,13 @@ mod tests {
             focal_px: Some(55.0),
         };
         let place = |name: &str| Background { name: name.into(), size: [0.6, 0.4], camera };
-        let choice =
-            |i| Choice { asset: format!("b{i}"), photo_sizes: vec![[0.2, 0.07]; 3], thickness: 0.005, mass: 0.03 };
+        let choice = |i| Choice {
+            asset: format!("b{i}"),
+            photo_sizes: vec![[0.2, 0.07]; 3],
+            photo_outlines: vec![],
+            thickness: 0.005,
+            mass: 0.03,
+        };
         let stock: Vec<Choice> = (0..9).map(choice).collect();
         (0..120).map(|k| recipe.scene(5, k, &[place("a"), place("b")], &stock).unwrap()).collect()
     }

@@ -17,9 +17,18 @@ const TURNS: [f32; 2] = [0.4, 0.7];
 /// Share of the object below which nothing is said.
 const WORTH_SAYING: f32 = 0.002;
 
-/// Makes what is painted in the screen's hue opaque.
-pub(super) fn make_opaque(factors: &mut Image<Factor>, inside: &Image<Coverage>) -> Option<Remark> {
-    let bright = factors.map(|f| f.raw > PAINTED);
+/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest channel, it may be.
+const SCREEN: f32 = 0.06;
+
+/// Makes what is painted in the screen's hue opaque; bare screen that a wide mask lets in is not.
+pub(super) fn make_opaque(
+    factors: &mut Image<Factor>,
+    photo: &Image<LinearRgb>,
+    plate: &Image<LinearRgb>,
+    inside: &Image<Coverage>,
+) -> Option<Remark> {
+    let bare = photo.zip_map(plate, |p, k| is_screen(p.into(), k.into()));
+    let bright = factors.zip_map(&bare, |f, bare| f.raw > PAINTED && !bare);
     if !bright.pixels().iter().any(|b| *b) {
         return None;
     }
@@ -34,6 +43,14 @@ pub(super) fn make_opaque(factors: &mut Image<Factor>, inside: &Image<Coverage>)
     }
     let share = share(paint.pixels().iter().map(|p| *p > 0.5), inside);
     (share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
+}
+
+/// A pixel is the screen in some shade.
+fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
+    let strongest = screen.into_iter().fold(0.0, f32::max);
+    (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= SCREEN * strongest)
 }
 
 /// Reach of the surroundings that a clipped pixel is filled from, standard deviation in pixels.

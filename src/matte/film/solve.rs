@@ -58,7 +58,8 @@ impl Solver {
         let reflected = mixed(pixel).max(0.0);
         let gain = (through[self.key] - mixed(through)).max(f32::MIN_POSITIVE);
         let raw = (pixel[self.key] - mixed(pixel)) / gain;
-        let variance = (libm::powf(self.reflection_error * reflected, 2.0) + self.noise * self.noise) / (gain * gain);
+        let reflection = self.reflection_error * reflected;
+        let variance = (reflection * reflection + self.noise * self.noise) / (gain * gain);
         let prior = self.spread * self.spread;
         let drawn = (raw * prior + self.expected(pixel, reflected) * variance) / (prior + variance);
         // Nothing reflects less than no light: no channel shows more screen than light.

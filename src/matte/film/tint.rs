@@ -32,9 +32,9 @@ const NOISE: [f32; 2] = [0.004, 0.05];
 /// Misfit beyond which a pixel is something else than plastic.
 const OUTLIER: f32 = 25.0;
 /// Weight of thickness: misfit that plastic twice as see-through as it should be counts for.
-const THICKNESS: f32 = 2.0;
+const THICKNESS: f32 = 1.0;
 /// Misfit by which a dye must be better than clear plastic.
-const DYED: f32 = 0.1;
+const DYED: f32 = 0.4;
 /// How much the light that plastic scatters has of its tint: as if it went halfway through.
 const BODY: f32 = 0.5;
 

@@ -23,7 +23,7 @@ const CURVE: [[f32; 2]; 10] = [
     [1.45, 1.05],
 ];
 /// From the first transmittance on to the second a pixel passes for bare screen.
-const BARE: [f32; 2] = [0.92, 0.99];
+const BARE: [f32; 2] = [0.9, 0.97];
 
 /// View transmittance from the measured one, channel by channel, for plastic that where it lies flat measures `flat`.
 pub(in crate::matte) fn view(transmittance: LinearRgb, flat: LinearRgb) -> LinearRgb {

@@ -4,7 +4,7 @@ use crate::image::Image;
 use crate::pixel::LinearRgb;
 
 /// Cells along the longer side of a picture: enough for any smooth screen, few enough to be fitted in no time.
-const ALONG: usize = 64;
+const ALONG: usize = 48;
 /// A cell counts if at least this share of its pixels shows the screen.
 const LEAST_SHARE: f64 = 0.5;
 

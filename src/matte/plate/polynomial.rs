@@ -18,9 +18,12 @@ pub(super) struct Polynomial {
 /// A channel that is darker than this share of the brightest is held there: the logarithm of nothing is not fitted.
 const DARKEST: f64 = 1e-4;
 /// Rounds of reweighting.
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 8;
 /// Residual in standard deviations beyond which a cell does not count at all (Tukey's biweight, 95 % efficient).
 const TUKEY: f64 = 4.685;
+/// The same for what is darker than the fit, in standard deviations of what is brighter: objects darken the screen around
+/// them far and wide and never brighten it, so that the brighter cells tell the noise, and the darker the shadow.
+const SHADOWED: f64 = 1.5;
 /// Relative noise of a cell below which nothing is an outlier: the coding of an 8-bit picture.
 const FINEST: f64 = 2e-3;
 /// Cells a coefficient, at least.
@@ -28,22 +31,26 @@ const CELLS_A_COEFFICIENT: usize = 4;
 /// Every so many-th cell is left out of the fit that chooses the degree.
 const LEFT_OUT: usize = 3;
 
-/// A cell as the fit sees it.
+/// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
 struct Sample {
-    at: [f64; 2],
+    basis: Vec<f64>,
     log: [f64; 3],
 }
 
 impl Polynomial {
     pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
-        let samples = samples(cells, size)?;
+        let samples = samples(cells, size, opts.max_degree)?;
         let most = |degree: usize| samples.len() >= CELLS_A_COEFFICIENT * terms(degree);
         let degrees: Vec<usize> = (0..=opts.max_degree).filter(|&d| d == 0 || most(d)).collect();
-        let errors: Vec<f64> = degrees.iter().map(|&degree| left_out_error(&samples, degree)).collect();
+        let (left, asked): (Vec<_>, Vec<_>) = samples.iter().enumerate().partition(|(i, _)| i % LEFT_OUT == 0);
+        let strip = |part: Vec<(usize, _)>| part.into_iter().map(|(_, s)| s).collect::<Vec<&Sample>>();
+        let (left, asked) = (strip(left), strip(asked));
+        let errors: Vec<f64> = degrees.iter().map(|&degree| left_out_error(&asked, &left, degree)).collect();
+        let all: Vec<&Sample> = samples.iter().collect();
         let best = errors.iter().copied().fold(f64::MAX, f64::min).max(FINEST);
         let enough = errors.iter().position(|e| *e <= best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE));
         let degree = degrees[enough.unwrap_or(degrees.len() - 1)];
-        Ok(Self { degree, coefficients: [0, 1, 2].map(|c| robust(&samples, degree, c)) })
+        Ok(Self { degree, coefficients: [0, 1, 2].map(|c| robust(&all, degree, c)) })
     }
 
     /// The screen in every pixel.
@@ -86,7 +93,7 @@ fn place([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
     [(x - 0.5 * w as f64) / half, (y - 0.5 * h as f64) / half]
 }
 
-fn samples(cells: &[Cell], size: (usize, usize)) -> Result<Vec<Sample>> {
+fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<Sample>> {
     let brightest = cells.iter().flat_map(|cell| cell.color).fold(0.0, f64::max);
     if cells.is_empty() {
         return Err(refused("the object leaves no background to fit the screen to"));
@@ -94,60 +101,62 @@ fn samples(cells: &[Cell], size: (usize, usize)) -> Result<Vec<Sample>> {
     if brightest <= 0.0 {
         return Err(refused("the background is black; a screen plate needs light on the screen"));
     }
-    let log = |cell: &Cell| cell.color.map(|c| libm::log(c.max(DARKEST * brightest)));
-    Ok(cells.iter().map(|cell| Sample { at: place(cell.at_px, size), log: log(cell) }).collect())
+    let exponents = exponents(max_degree);
+    let sample = |cell: &Cell| {
+        let [u, v] = place(cell.at_px, size);
+        Sample {
+            basis: exponents.iter().map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32)).collect(),
+            log: cell.color.map(|c| libm::log(c.max(DARKEST * brightest))),
+        }
+    };
+    Ok(cells.iter().map(sample).collect())
 }
 
-/// Median absolute error of the cells that a fit to the others leaves, of the channel that is fitted worst.
-fn left_out_error(samples: &[Sample], degree: usize) -> f64 {
-    let (asked, left): (Vec<_>, Vec<_>) = samples.iter().enumerate().partition(|(i, _)| i % LEFT_OUT != 0);
-    let strip = |part: Vec<(usize, &Sample)>| -> Vec<Sample> {
-        part.into_iter().map(|(_, s)| Sample { at: s.at, log: s.log }).collect()
-    };
-    let (asked, left) = (strip(asked), strip(left));
+/// Median absolute error of the cells that a fit to the others leaves, of the brightest channel: the others have its shape
+/// and more noise.
+fn left_out_error(asked: &[&Sample], left: &[&Sample], degree: usize) -> f64 {
     if asked.len() < terms(degree) {
         return f64::MAX;
     }
-    let channel = |c: usize| {
-        let k = robust(&asked, degree, c);
-        median(left.iter().map(|s| (s.log[c] - value(&k, s.at, degree)).abs())).unwrap_or(f64::MAX)
-    };
-    (0..3).map(channel).fold(0.0, f64::max)
+    let brightness = |c: usize| asked.iter().map(|s| s.log[c]).sum::<f64>();
+    let brightest = (1..3).fold(0, |best, c| if brightness(c) > brightness(best) { c } else { best });
+    let k = robust(asked, degree, brightest);
+    median(left.iter().map(|s| (s.log[brightest] - value(&k, s)).abs())).unwrap_or(f64::MAX)
 }
 
-fn value(k: &DVector<f64>, [u, v]: [f64; 2], degree: usize) -> f64 {
-    exponents(degree).iter().zip(k.iter()).map(|(&[i, j], k)| k * u.powi(i as i32) * v.powi(j as i32)).sum()
+/// The polynomial where a sample is; the basis may go on to higher degrees.
+fn value(k: &DVector<f64>, sample: &Sample) -> f64 {
+    k.iter().zip(&sample.basis).map(|(k, b)| k * b).sum()
 }
 
 /// Iteratively reweighted least squares for one channel.
-fn robust(samples: &[Sample], degree: usize, channel: usize) -> DVector<f64> {
-    let basis: Vec<DVector<f64>> = samples
-        .iter()
-        .map(|s| {
-            let monomial = |&[i, j]: &[usize; 2]| s.at[0].powi(i as i32) * s.at[1].powi(j as i32);
-            DVector::from_vec(exponents(degree).iter().map(monomial).collect())
-        })
-        .collect();
-    let logs: Vec<f64> = samples.iter().map(|s| s.log[channel]).collect();
+fn robust(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
     let mut weights = vec![1.0; samples.len()];
     let mut k = DVector::zeros(terms(degree));
     for _ in 0..ROUNDS {
-        k = solved(&basis, &logs, &weights);
-        let residuals: Vec<f64> = basis.iter().zip(&logs).map(|(b, log)| log - b.dot(&k)).collect();
-        let sigma = SIGMA_OF_MEDIAN * median(residuals.iter().map(|r| r.abs())).unwrap_or(0.0);
-        let reach = TUKEY * sigma.max(FINEST);
-        weights = residuals.iter().map(|r| (1.0 - (r / reach).powi(2)).max(0.0).powi(2)).collect();
+        k = solved(samples, channel, &weights, terms(degree));
+        let residuals: Vec<f64> = samples.iter().map(|s| s.log[channel] - value(&k, s)).collect();
+        let spread = |set: &dyn Fn(f64) -> bool| {
+            let chosen = residuals.iter().filter(|r| set(**r)).map(|r| r.abs());
+            (SIGMA_OF_MEDIAN * median(chosen).unwrap_or(0.0)).max(FINEST)
+        };
+        let (above, below) = (TUKEY * spread(&|_| true), SHADOWED * spread(&|r| r > 0.0));
+        let reach = |r: f64| if r > 0.0 { above } else { below };
+        weights = residuals.iter().map(|r| (1.0 - (r / reach(*r)).powi(2)).max(0.0).powi(2)).collect();
     }
     k
 }
 
-/// Weighted least squares, a trace of the identity added so that too few cells are no disaster.
-fn solved(basis: &[DVector<f64>], values: &[f64], weights: &[f64]) -> DVector<f64> {
-    let n = basis.first().map_or(0, DVector::len);
+/// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
+fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
     let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE, DVector::zeros(n));
-    for ((b, value), weight) in basis.iter().zip(values).zip(weights) {
-        normal.ger(*weight, b, b, 1.0);
-        right.axpy(weight * value, b, 1.0);
+    for (sample, weight) in samples.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        for i in 0..n {
+            let scaled = weight * sample.basis[i];
+            right[i] += scaled * sample.log[channel];
+            // The lower half is all that Cholesky reads.
+            (0..=i).for_each(|j| normal[(i, j)] += scaled * sample.basis[j]);
+        }
     }
     normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
 }

@@ -3,6 +3,7 @@
 mod camera;
 mod experiments;
 mod matte;
+mod render;
 mod settle;
 
 use crate::common::Common;
@@ -19,6 +20,8 @@ pub(crate) enum Command {
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
     Matte(matte::Args),
+    /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
+    Render(render::Args),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -28,5 +31,6 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Stability(args) => settle::run_stability(args, common),
         Command::Experiments(args) => experiments::run(args, common),
         Command::Matte(args) => matte::run(args, common),
+        Command::Render(args) => render::run(args, common),
     }
 }
