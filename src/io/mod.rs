@@ -73,8 +73,6 @@ mod worker;
 mod write;
 
 pub use atomic::{copy, create_folder, relative, sync, write_through};
-pub use atomic::{copy, create_folder, relative, sync};
-pub use atomic::{create_folder, write_through};
 pub use document::{
     from_overrides, parse_json, parse_toml, read_document, read_json, read_text, read_toml, read_toml_with,
     write_document, write_json, write_text, write_toml,
@@ -90,9 +88,7 @@ pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 pub use serve::serve as serve_worker;
 #[cfg(feature = "oiio")]
 pub use worker::worker_version;
-pub use worker::{serve as serve_worker, worker_version};
 pub use write::{Bits, Compression, ToFile, WriteOptions, jpeg_bytes, write, write_with};
-pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
 
 use crate::{Error, Image, Result};
 use exif::CameraNotes;
