@@ -125,7 +125,6 @@ mod tests {
             asset: format!("b{i}"),
             photo_sizes: vec![[0.2, 0.07]; 3],
             photo_outlines: vec![],
-            photo_outlines: vec![],
             thickness: 0.005,
             mass: 0.03,
         };
