@@ -97,7 +97,7 @@ impl Summary {
     pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
         let recipe: Recipe = serde_json::from_value(self.identity["recipe"]["scene"].clone()).ok()?;
         let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
-        let pointer = format!("/{}", key.replace('.', "/").replace('[', "/").replace(']', ""));
+        let pointer = format!("/{}", key.replace(['.', '['], "/").replace(']', ""));
         let value = recipe.pointer(&pointer)?;
         let number = |value: &Value| value.as_f64();
         let range = match value {

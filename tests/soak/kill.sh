@@ -9,11 +9,12 @@ recipe=$1 kills=${2:-200} images=${3:-300}
 petcomp=${PETCOMP:-target/release/petcomp}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-make() { "$petcomp" -q dataset generate "$recipe" -n "$images" --seed 11 --set 'scene.image=[128,96]' -o "$1"; }
+# No function: the background process must be the program itself, for the kill to hit it and not a shell around it.
+job=("$petcomp" -q dataset generate "$recipe" -n "$images" --seed 11 --set 'scene.image=[128,96]')
 same() { diff -r --exclude='.*' "$work/whole" "$1" > "$work/diff" || { head "$work/diff"; echo "differs after $killed kills"; exit 1; }; }
 
 start=$(date +%s%N)
-make "$work/whole"
+"${job[@]}" -o "$work/whole"
 whole_ms=$((($(date +%s%N) - start) / 1000000))
 echo "unbroken run: $images images in $whole_ms ms"
 killed=0 jobs=0
@@ -21,13 +22,19 @@ while [ "$killed" -lt "$kills" ]; do
   jobs=$((jobs + 1)) folder=$work/job
   rm -rf "$folder"
   while [ "$killed" -lt "$kills" ]; do
-    make "$folder" 2> /dev/null & pid=$!
+    "${job[@]}" -o "$folder" 2> "$work/log" & pid=$!
     # A random moment of a sixth of the unbroken run, so that each job takes several kills.
     sleep "$(awk -v s="$RANDOM" -v m="$whole_ms" 'BEGIN { printf "%.3f", s / 32768 * m / 6000 }')"
-    if kill -9 "$pid" 2> /dev/null; then killed=$((killed + 1)); fi
-    if wait "$pid" 2> /dev/null; then break; fi
+    kill -9 "$pid" 2> /dev/null || true
+    status=0
+    wait "$pid" 2> /dev/null || status=$?
+    case $status in
+      0) break ;;
+      137) killed=$((killed + 1)) ;;
+      *) cat "$work/log"; echo "status $status, expected a kill or success"; exit 1 ;;
+    esac
   done
-  "$petcomp" -q dataset generate "$recipe" -n "$images" --seed 11 --set 'scene.image=[128,96]' -o "$folder" --resume
+  "${job[@]}" -o "$folder" --resume
   same "$folder"
   echo "job $jobs: equal after $killed kills in all"
 done
