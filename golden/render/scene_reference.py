@@ -759,7 +759,7 @@ class Builder:
             link(color, hsv.inputs["Color"])
             color = hsv.outputs["Color"]
         if "film" in look:
-            return self.film(nt, color, look["film"], vector)
+            return self.film(nt, q, color, look["film"], vector)
         alpha = tex.outputs["Alpha"]
         if q["opacity"] != 1.0:
             mul = new("ShaderNodeMath")
@@ -785,7 +785,7 @@ class Builder:
         link(diffuse.outputs[0], mix.inputs[2])
         return mix.outputs[0]
 
-    def film(self, nt, color, path, vector):
+    def film(self, nt, q, color, path, vector):
         """Adds what the film reflects to what it lets pass, channel by channel."""
         new, link = nt.nodes.new, nt.links.new
         opacity = self.texture(nt, path, "packed", "linear", vector)
@@ -793,8 +793,17 @@ class Builder:
         passes.operation = "SUBTRACT"
         passes.inputs[0].default_value = (1.0, 1.0, 1.0)
         link(opacity.outputs["Color"], passes.inputs[1])
+        through = passes.outputs[0]
+        if q["hue_shift"] or q["saturation"] != 1.0:
+            # A film that is tinted otherwise tints otherwise what is seen through it; value is of what it adds alone.
+            hsv = new("ShaderNodeHueSaturation")
+            hsv.inputs["Hue"].default_value = (0.5 + q["hue_shift"] / 360.0) % 1.0
+            hsv.inputs["Saturation"].default_value = q["saturation"]
+            hsv.inputs["Fac"].default_value = 1.0
+            link(through, hsv.inputs["Color"])
+            through = hsv.outputs["Color"]
         clear = new("ShaderNodeBsdfTransparent")
-        link(passes.outputs[0], clear.inputs["Color"])
+        link(through, clear.inputs["Color"])
         diffuse = new("ShaderNodeBsdfDiffuse")
         diffuse.inputs["Roughness"].default_value = 0.0
         link(color, diffuse.inputs["Color"])

@@ -389,7 +389,8 @@ mod tests {
         };
         let (rows, golden) = write(folder.path(), &options).unwrap();
         assert_eq!((rows.len(), golden.len()), (Quality::ALL.len(), 0));
-        assert!(rows.iter().all(|row| row.cpu_seconds > 0.0 && row.quadrature.unwrap().rmse < 0.1));
+        // So small a picture may be done before the system's clock of CPU time moves.
+        assert!(rows.iter().all(|row| row.cpu_seconds >= 0.0 && row.quadrature.unwrap().rmse < 0.1));
         let text = io::read_text(folder.path().join("render.md")).unwrap();
         assert!(text.contains("Cycles' own curve is not there") && folder.path().join("render.svg").exists());
     }
