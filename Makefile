@@ -1,7 +1,8 @@
 # make demo   a labelled sample dataset from the photographs in this repository
 # make test   every test
-# make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
+#
+# make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 
 CARGO     := cargo
 SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
@@ -12,11 +13,10 @@ PYTHON    := $(CURDIR)/target/python/bin/python
 # Each set of features that stands alone; the first, empty one builds without a C++ compiler.
 FEATURES  := "" markers oiio settle
 
-.PHONY: demo test lint bench golden formats python packages blender
 # Seconds for each door of fuzz/.
 FUZZ      := 60
 
-.PHONY: demo test lint bench golden packages blender soak soak-dataset fuzz
+.PHONY: demo test lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins
@@ -25,8 +25,8 @@ demo: packages
 test: packages python
 	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked
 	@for f in $(FEATURES); do \
-	  echo "tests with features [$$f] alone"; \
-	  $(CARGO) test --release --locked --no-default-features --features "$$f" --lib --quiet || exit 1; \
+	  echo "features [$$f] alone"; \
+	  $(CARGO) check --release --locked --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
 
 # 100,000 damaged pictures.

@@ -16,6 +16,7 @@ blend() { blender -b --factory-startup --python-use-system-env -noaudio -P "$@";
 
 environment colour colour-science==0.4.7 numpy
 environment likeness scikit-image==0.26.0 flip-evaluator==1.7 numpy
+environment eval numpy pycocotools==2.0.11 yolov5==7.0.14 'setuptools<80'
 environment bpy42 bpy==4.2.0
 environment bpy45 bpy==4.5.15
 
@@ -28,6 +29,8 @@ echo "colour"
 blend golden/color/shift_hsv.py
 echo "diff: these two numbers stand in the tests of src/diff"
 "$tools/likeness/bin/python" golden/diff/reference.py
+echo "eval"
+"$tools/eval/bin/python" golden/eval/reference.py
 echo "camera"
 blend golden/camera/camera_reference.py -- --per-case 16 --seed 1 --out golden/camera
 echo "matte"

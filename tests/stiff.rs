@@ -141,7 +141,8 @@ impl Quality {
         let (w, h) = mask.size();
         let columns = || (0..w).filter(|&x| (0..h).any(|y| mask[(x, y)]));
         let rows = || (0..h).filter(|&y| (0..w).any(|x| mask[(x, y)]));
-        let truth = [columns().next(), rows().next(), columns().last().map(|x| x + 1), rows().last().map(|y| y + 1)];
+        let truth =
+            [columns().next(), rows().next(), columns().next_back().map(|x| x + 1), rows().next_back().map(|y| y + 1)];
         let hull = &cut.segmentation.hull;
         let least = |of: fn(&petcomp::geom::Point2<f64>) -> f64| hull.iter().map(of).fold(f64::MAX, f64::min);
         let sides = [least(|p| p.x), least(|p| p.y), -least(|p| -p.x), -least(|p| -p.y)];
@@ -177,7 +178,7 @@ fn assert_right_or_told(take: &Take) {
 }
 
 fn refusal(take: &Take) -> String {
-    take.cut().err().expect("a photo that must be refused").to_string()
+    take.cut().expect_err("a photo that must be refused").to_string()
 }
 
 #[test]

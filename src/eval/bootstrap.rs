@@ -73,7 +73,7 @@ mod tests {
     fn an_interval_holds_its_value_and_shrinks_with_more_images() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
         let some = |n: usize| -> Vec<Sheet> {
-            let seen = |i: usize| if i % 3 == 0 { vec![] } else { vec![found(0, b, 0.5)] };
+            let seen = |i: usize| if i.is_multiple_of(3) { vec![] } else { vec![found(0, b, 0.5)] };
             (0..n).map(|i| sheet(vec![there(0, b)], seen(i))).collect()
         };
         let [few, many] = [12, 300].map(|n| bootstrap(&some(n), Definition::Coco, 200, 7));

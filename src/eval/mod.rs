@@ -201,7 +201,7 @@ pub(crate) mod tests {
             let weighted = evaluate(&[good.clone(), bad.clone()], definition, &[2, 1]);
             assert!((twice.map() - weighted.map()).abs() < 1e-12, "{definition:?}");
             let without = evaluate(&[good.clone(), bad.clone()], definition, &[0, 1]);
-            assert_eq!(without.map(), evaluate(&[bad.clone()], definition, &[]).map());
+            assert_eq!(without.map(), evaluate(std::slice::from_ref(&bad), definition, &[]).map());
         }
     }
 

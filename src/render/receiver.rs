@@ -85,7 +85,7 @@ impl Studio<'_> {
         let rows = cut(union(fine.rows.clone(), doubled(&coarse.rows)), view.height);
         let columns = cut(union(fine.columns.clone(), doubled(&coarse.columns)), view.width);
         let seen = rows.len() > 1 && columns.len() > 1;
-        seen.then(|| Lit { fine: Receiver { rows, columns, ..fine }, coarse, relative: true })
+        seen.then_some(Lit { fine: Receiver { rows, columns, ..fine }, coarse, relative: true })
     }
 
     fn surface_on(&self, lattice: &Lattice, some: impl Fn(&Lamps) -> &[Lamp]) -> Option<Receiver> {

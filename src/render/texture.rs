@@ -1,5 +1,8 @@
 //! Textures made ready for one picture: one level of detail, a transparent border, the card's colours.
 
+#![expect(clippy::needless_range_loop, reason = "several arrays in step, which vectorises")]
+#![expect(clippy::manual_clamp, reason = "takes a number that is none to 0")]
+
 use crate::asset::Texture;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};

@@ -1,5 +1,7 @@
 //! What passes through the layers of a block so far, for each sub-sample, and a row of one more layer.
 
+#![expect(clippy::manual_clamp, reason = "takes a number that is none to 0")]
+
 use crate::render::four::Four;
 use crate::render::lattice::Place;
 use crate::render::layers::{Block, Layer};

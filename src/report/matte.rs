@@ -245,12 +245,13 @@ pub fn details(rows: &[Row]) -> Table {
 
 /// Error against run time, a point per method: over backgrounds lit by themselves, and in the object's own shadow.
 pub fn chart(summaries: &[Summary]) -> String {
-    let errors: [(&str, fn(&Score) -> f64); 2] =
+    type Error = fn(&Score) -> f64;
+    let errors: [(&str, Error); 2] =
         [("new background, lit by itself", |s| s.mae_lit), ("new background, shaded by the object", |s| s.mae_shaded)];
     let across = Axis::over_decades("run time per photo, one thread, ms", summaries.iter().map(|s| s.time_ms));
     let both = errors.iter().flat_map(|(_, error)| summaries.iter().map(|s| error(&s.score)));
     let up = Axis::over_decades("mean absolute error, linear light", both);
-    let chart = |(title, error): (&str, fn(&Score) -> f64)| Chart {
+    let chart = |(title, error): (&str, Error)| Chart {
         title: title.into(),
         names: summaries.iter().map(|s| s.method.name().into()).collect(),
         across: across.clone(),

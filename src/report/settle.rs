@@ -196,15 +196,16 @@ pub fn table(rows: &[Row]) -> Table {
 
 /// The sweep as charts against run time: worst overlap, energy rise, and error of the stack; a ring where the default is.
 pub fn charts(rows: &[Row]) -> Vec<Chart> {
+    type Error = fn(&Row) -> f64;
     let usual = SettleOptions::default();
     let swept: Vec<&Row> = rows.iter().filter(|r| r.ccd == usual.ccd).collect();
     let across = Axis::over_decades("time of a heap of 20, ms", swept.iter().map(|r| r.wall_ms));
-    let errors: [(&str, fn(&Row) -> f64); 3] = [
+    let errors: [(&str, Error); 3] = [
         ("worst overlap, mm", |r| r.overlap_mm[1]),
         ("worst energy rise, %", |r| r.energy_percent[1]),
         ("error of a stack, mm", |r| r.stack_mm),
     ];
-    let chart = |(title, error): (&str, fn(&Row) -> f64)| Chart {
+    let chart = |(title, error): (&str, Error)| Chart {
         title: format!("{title}, against time"),
         names: RATES.map(|rate| format!("1/{rate} s: 1, 2, 4, 8 iterations")).into(),
         across: across.clone(),

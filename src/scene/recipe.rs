@@ -31,6 +31,8 @@ pub struct Recipe {
     pub photos: Limit,
     /// Objects in a scene. Default: `[4, 12]`.
     pub objects: Range,
+    /// Share of the scenes that stay empty: pictures of the place alone, 0 to 1. Default: 0.
+    pub negatives: f64,
     /// How many different choices of objects there are. Default: `"unique"`, a new one for every scene.
     pub selections: Selections,
     /// Factor on an object's size and thickness, its mass following. Default: `[0.9, 1.1]`.
@@ -188,6 +190,7 @@ impl Default for Recipe {
             viewpoints: Limit::All,
             photos: Limit::All,
             objects: Range::new(4.0, 12.0),
+            negatives: 0.0,
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
             start: Start::default(),
@@ -265,7 +268,8 @@ impl Recipe {
         self.check()?;
         let draws = Draws::new(seed, k).logged(log);
         let background = pick_background(&draws, backgrounds)?;
-        let mut objects = self.choose(seed, k, log, stock)?;
+        let empty = self.negatives > 0.0 && Range::new(0.0, 1.0).draw(&draws, "negative") < self.negatives;
+        let mut objects = if empty { Vec::new() } else { self.choose(seed, k, log, stock)? };
         for (i, object) in objects.iter_mut().enumerate() {
             self.vary(object, &draws, &format!("objects[{i}]"));
         }
@@ -301,6 +305,7 @@ impl Recipe {
             return Err(Error::value("image", format!("{:?}, expected two numbers above 0", self.image)));
         }
         self.objects.check_count("objects", MOST_OBJECTS)?;
+        Range::fixed(self.negatives).check("negatives", 0.0, 1.0)?;
         self.scale.check_positive("scale")?;
         self.start.check()?;
         self.grade.hue_deg.check("grade.hue_deg", -any, any)?;
@@ -481,6 +486,17 @@ mod tests {
     #[test]
     fn an_empty_file_is_the_default() {
         assert_eq!(toml::from_str::<Recipe>("").unwrap(), Recipe::default());
+    }
+
+    #[test]
+    fn negatives_are_empty_and_leave_the_other_scenes_as_they_are() {
+        let recipe = Recipe { negatives: 0.25, ..Recipe::default() };
+        let empty: Vec<u64> = (0..200).filter(|&k| scene(&recipe, k).objects.is_empty()).collect();
+        // Binomial: 50 +- 6.1; four standard deviations.
+        assert!((26..=74).contains(&empty.len()), "{}", empty.len());
+        let k = (0..200).find(|k| !empty.contains(k)).unwrap();
+        assert_eq!(scene(&recipe, k), scene(&Recipe::default(), k));
+        assert!(Recipe { negatives: 1.5, ..Recipe::default() }.check().unwrap_err().to_string().starts_with("negatives"));
     }
 
     #[test]

@@ -84,7 +84,7 @@ impl Drop<'_> {
         let add = |&i: &usize| self.add(&mut world, &self.scene.objects[i], self.heights[i], &units);
         let bodies: Vec<RigidBodyHandle> = members.iter().map(add).collect();
         let ids: Vec<usize> = members.iter().map(|i| i + 1).collect();
-        run::Run { world, bodies, ids, units, options: self.options, sample_every: self.sample_every }.to_rest()
+        run::Run { world, bodies, ids, units, options: self.options, sample_every: self.sample_every }.until_rest()
     }
 
     fn empty_world(&self) -> PhysicsWorld {

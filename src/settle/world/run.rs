@@ -36,7 +36,7 @@ pub(super) struct Run<'a> {
 
 impl Run<'_> {
     /// Steps until everything rests or the time is over.
-    pub(super) fn to_rest(mut self) -> Fall {
+    pub(super) fn until_rest(mut self) -> Fall {
         let steps = (self.options.time_limit / self.options.step).ceil() as usize;
         let (mut stillness, mut energy, mut fall) = (Stillness::default(), Energy::of(&self), Fall::default());
         fall.swept = [[f64::INFINITY, -f64::INFINITY]; 2];
