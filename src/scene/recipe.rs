@@ -496,7 +496,9 @@ mod tests {
         assert!((26..=74).contains(&empty.len()), "{}", empty.len());
         let k = (0..200).find(|k| !empty.contains(k)).unwrap();
         assert_eq!(scene(&recipe, k), scene(&Recipe::default(), k));
-        assert!(Recipe { negatives: 1.5, ..Recipe::default() }.check().unwrap_err().to_string().starts_with("negatives"));
+        assert!(
+            Recipe { negatives: 1.5, ..Recipe::default() }.check().unwrap_err().to_string().starts_with("negatives")
+        );
     }
 
     #[test]
