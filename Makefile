@@ -1,5 +1,6 @@
 # make demo   a labelled sample dataset from the photographs in this repository
 # make test   every test
+# make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 
 CARGO     := cargo
@@ -7,26 +8,61 @@ SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 BUILD     := g++ pkg-config libopenimageio-dev
 BLENDER   := blender python3-numpy python3-venv
 OUT       := demo
+PYTHON    := $(CURDIR)/target/python/bin/python
 # Each set of features that stands alone; the first, empty one builds without a C++ compiler.
 FEATURES  := "" markers oiio settle
 
-.PHONY: demo test lint bench golden packages blender
+.PHONY: demo test train-test lint bench golden formats python packages blender
+# Seconds for each door of fuzz/.
+FUZZ      := 60
+
+.PHONY: demo test lint bench golden packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins
 	target/release/petcomp demo -o $(OUT)
 
-test: packages
-	$(CARGO) test --release --locked
+test: packages python
+	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked
 	@for f in $(FEATURES); do \
 	  echo "tests with features [$$f] alone"; \
 	  $(CARGO) test --release --locked --no-default-features --features "$$f" --lib --quiet || exit 1; \
 	done
 
+# 100,000 damaged pictures.
+soak: packages
+	$(CARGO) test --release --locked --test io -- --ignored --nocapture sweep::soak
+
+# Kills, a full disk and a Slurm of one machine; what comes out must be what an unbroken run gives.
+soak-dataset: demo
+	tests/soak/kill.sh $(OUT)/recipe.toml 200
+	tests/soak/disk_full.sh $(OUT)/recipe.toml
+	tests/cluster/slurm.sh $(OUT)/recipe.toml
+
+# By cargo-fuzz and a nightly compiler where they are (`cargo install cargo-fuzz`, `rustup toolchain install nightly`);
+# by seeds and chance on the stable one otherwise.
+fuzz: packages
+	@if $(CARGO) +nightly fuzz --version >/dev/null 2>&1; then \
+	  cd fuzz && for door in label recipe journal worker header; do \
+	    $(CARGO) +nightly fuzz run --sanitizer none $$door -- -max_total_time=$(FUZZ) -timeout=5 -rss_limit_mb=1024 || exit 1; \
+	  done; \
+	else \
+	  echo "no cargo-fuzz with a nightly compiler here: seeds and chance instead"; \
+	  $(CARGO) test --release --locked --test io -- --ignored --nocapture fuzz::; \
+	fi
+
+# The trainer (burn takes minutes to compile): learns sixteen images by heart.
+train-test: packages
+	$(CARGO) test --release --locked --no-default-features --features train --lib -- train::detector
+
 lint: packages
 	$(CARGO) fmt --check
 	$(CARGO) clippy --release --locked --all-targets -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib
+
+# Only the tests that ask the programs that datasets are written for, and what those say.
+formats: packages python
+	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked --test formats -- --nocapture
 
 bench: packages
 	$(CARGO) bench --locked
@@ -34,6 +70,12 @@ bench: packages
 # Remakes every reference with the other programs; `git diff --stat golden` then shows whether they moved.
 golden: blender
 	golden/make.sh
+
+# pycocotools and webdataset, for the tests that ask them; where they cannot be had the tests say so and pass.
+python:
+	@[ -x $(PYTHON) ] || { ($(call install,python3-venv)) && python3 -m venv target/python && \
+	  $(PYTHON) -m pip install --quiet --retries 1 pycocotools webdataset; } || \
+	  { rm -rf target/python; echo "pycocotools cannot be installed: its tests are skipped"; }
 
 packages:
 	@$(call install,$(BUILD))

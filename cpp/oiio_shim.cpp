@@ -1,5 +1,6 @@
 #include "petcomp/cpp/oiio_shim.h"
 
+#include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <stdexcept>
 #include <string>
@@ -13,17 +14,23 @@ using OIIO::ImageInput;
 using OIIO::ImageOutput;
 using OIIO::ImageSpec;
 using OIIO::TypeDesc;
+using OIIO::Filesystem::IOMemReader;
+using OIIO::Filesystem::IOProxy;
+
+// Readers that petcomp asks for.
+const char *const FORMATS[] = {"openexr", "png", "jpeg", "tiff", "hdr", "dpx", "cineon"};
 
 // The library's own words, which can be missing.
 [[noreturn]] void fail(std::string said, const char *otherwise) {
     throw std::runtime_error(said.empty() ? otherwise : said);
 }
 
-// Integers up to 16 bits stay as they are, everything else becomes float.
+// Integers up to 16 bits and halves stay as they are, everything else becomes float.
 TypeDesc handed_over(const ImageSpec &spec) {
     switch (spec.format.basetype) {
     case TypeDesc::UINT8: return TypeDesc::UINT8;
     case TypeDesc::UINT16: return TypeDesc::UINT16;
+    case TypeDesc::HALF: return TypeDesc::HALF;
     default: return TypeDesc::FLOAT;
     }
 }
@@ -55,26 +62,37 @@ bool row_by_row(const ImageInput &input, const ImageSpec &spec) {
 
 } // namespace
 
-Reader::Reader(std::unique_ptr<ImageInput> input) : input_(std::move(input)) {}
+Reader::Reader(std::unique_ptr<IOMemReader> bytes, std::unique_ptr<ImageInput> input)
+    : bytes_(std::move(bytes)), input_(std::move(input)) {}
 Reader::~Reader() = default;
 
 void start() {
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
     OIIO::attribute("try_all_readers", 0);
+    // Whatever a reader loads when it is first made is loaded now: later no file can be opened.
+    for (const char *format : FORMATS)
+        ImageInput::create(format);
 }
 
 rust::String version() { return rust::String(OIIO_VERSION_STRING); }
 
-std::unique_ptr<Reader> open(rust::Str path, rust::Str format) {
+std::unique_ptr<Reader> open(rust::Str path, rust::Str format, rust::Slice<const uint8_t> bytes) {
     auto input = ImageInput::create(std::string(format));
     if (!input)
         fail(OIIO::geterror(), "no reader for this format");
     input->threads(1);
+    ImageSpec config = as_it_is();
+    std::unique_ptr<IOMemReader> memory;
+    if (input->supports("ioproxy")) {
+        memory = std::make_unique<IOMemReader>(const_cast<uint8_t *>(bytes.data()), bytes.size());
+        IOProxy *proxy = memory.get();
+        config.attribute("oiio:ioproxy", TypeDesc::PTR, &proxy);
+    }
     ImageSpec spec;
-    if (!input->open(std::string(path), spec, as_it_is()))
+    if (!input->open(std::string(path), spec, config))
         fail(input->geterror(), "cannot be opened");
-    return std::make_unique<Reader>(std::move(input));
+    return std::make_unique<Reader>(std::move(memory), std::move(input));
 }
 
 Layout layout(const Reader &reader) {
@@ -93,6 +111,7 @@ Layout layout(const Reader &reader) {
     for (int c = 0; c < spec.nchannels; ++c)
         out.channels.push_back(std::string(spec.channel_name(c)));
     out.bytes = int32_t(handed_over(spec).size());
+    out.half = handed_over(spec) == TypeDesc::HALF;
     out.color_space = std::string(spec.get_string_attribute("oiio:ColorSpace"));
     return out;
 }

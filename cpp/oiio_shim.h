@@ -23,6 +23,9 @@ static void trycatch(Try &&func, Fail &&fail) noexcept try {
 
 OIIO_NAMESPACE_BEGIN
 class ImageInput;
+namespace Filesystem {
+class IOMemReader;
+}
 OIIO_NAMESPACE_END
 
 namespace petcomp {
@@ -33,17 +36,19 @@ struct Note;
 // A picture file that is open for reading.
 class Reader {
   public:
-    explicit Reader(std::unique_ptr<OIIO::ImageInput> input);
+    Reader(std::unique_ptr<OIIO::Filesystem::IOMemReader> bytes, std::unique_ptr<OIIO::ImageInput> input);
     ~Reader();
     OIIO::ImageInput &input() const { return *input_; }
 
   private:
+    // In this order: the input is closed first.
+    std::unique_ptr<OIIO::Filesystem::IOMemReader> bytes_;
     std::unique_ptr<OIIO::ImageInput> input_;
 };
 
 void start();
 rust::String version();
-std::unique_ptr<Reader> open(rust::Str path, rust::Str format);
+std::unique_ptr<Reader> open(rust::Str path, rust::Str format, rust::Slice<const uint8_t> bytes);
 Layout layout(const Reader &reader);
 void read(const Reader &reader, rust::Slice<uint8_t> samples);
 void write(rust::Str path, rust::Str format, const Layout &layout, rust::Slice<const uint8_t> samples,

@@ -15,6 +15,7 @@ environment() {
 blend() { blender -b --factory-startup --python-use-system-env -noaudio -P "$@"; }
 
 environment colour colour-science==0.4.7 numpy
+environment likeness scikit-image==0.26.0 flip-evaluator==1.7 numpy
 environment bpy42 bpy==4.2.0
 environment bpy45 bpy==4.5.15
 
@@ -25,6 +26,8 @@ for name in colour bpy42 bpy45; do "$tools/$name/bin/python" -m pip freeze | gre
 echo "colour"
 "$tools/colour/bin/python" golden/color/reference.py
 blend golden/color/shift_hsv.py
+echo "diff: these two numbers stand in the tests of src/diff"
+"$tools/likeness/bin/python" golden/diff/reference.py
 echo "camera"
 blend golden/camera/camera_reference.py -- --per-case 16 --seed 1 --out golden/camera
 echo "matte"

@@ -10,6 +10,8 @@ pub mod diff;
 mod error;
 pub mod eval;
 pub mod filter;
+#[doc(hidden)]
+pub mod fuzzing;
 pub mod geom;
 mod image;
 pub mod io;

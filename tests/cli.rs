@@ -230,12 +230,28 @@ fn a_scene_goes_through_the_stages_one_by_one() {
     desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
     desk.ok(&["scene", "draw", "demo/recipe.toml", "-k", "3", "--seed", "5", "-o", "scene.toml"]);
     desk.ok(&["scene", "check", "scene.toml"]);
-    desk.ok(&["settle", "scene.toml", "-o", "rest.json"]);
+    desk.ok(&["settle", "scene.toml", "-o", "rest.json", "--trace", "fall.csv", "--preview", "rest.png"]);
+    assert!(std::fs::read_to_string(desk.path("fall.csv")).is_ok_and(|csv| csv.starts_with("seconds,object,x,y,z,")));
+    assert!(desk.path("rest.png").exists());
     desk.ok(&["render", "rest.json", "demo/recipe.toml", "-o", "frame.exr"]);
     desk.ok(&["render", "scene.toml", "demo/recipe.toml", "-o", "again.exr"]);
     desk.ok(&["diff", "frame.exr", "again.exr"]);
     desk.ok(&["label", "rest.json", "demo/recipe.toml", "-o", "labels.json", "--overlay", "overlay.png"]);
     assert!(desk.path("overlay.png").exists());
+
+    // The same picture in parts, at another quality, and for Blender.
+    let parts = ["render", "rest.json", "demo/recipe.toml", "-o", "parts.exr", "--quality", "draft"];
+    desk.ok(&[&parts[..], &["--aov", "beauty,id,depth,cryptomatte,layers", "--preview", "look.png"]].concat());
+    assert!(desk.path("look.png").exists());
+    let told = text(&desk.run(&["diff", "frame.exr", "parts.exr"]).stdout);
+    assert!(told.contains("SSIM = 0.9") && told.contains("FLIP = 0.0"), "{told}");
+    assert!(text(&desk.run(&[&parts[..], &["--aov", "normals"]].concat()).stderr).contains("expected some of beauty"));
+    desk.ok(&["scene", "export", "rest.json", "demo/recipe.toml", "--to", "cycles", "blender"]);
+    assert!(
+        ["scene.json", "plate.exr", "card_1.exr", "scene_reference.py"]
+            .iter()
+            .all(|f| desk.path("blender").join(f).exists())
+    );
 }
 
 #[test]

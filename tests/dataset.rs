@@ -2,14 +2,15 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, SheetOptions, Sidecar, Split,
-    SplitOrder, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
+    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, Shard,
+    SheetOptions, Sidecar, Split, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, mend,
+    merge,
 };
 use petcomp::geom::{Point2, Pose, Vector2};
-use petcomp::label::{BBox, Labels, ObjectLabel};
+use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
 use petcomp::render::DeepImage;
 use petcomp::scene::{CameraSource, Exposure, Surface};
-use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
+use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io, report};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -27,12 +28,14 @@ fn scene(k: u64) -> Scene {
         image: IMAGE,
         plate: "tray".into(),
         camera: CameraSource::Known(camera),
-        surface: Surface { size: [0.4, 0.3] },
+        surface: Surface::new([0.4, 0.3]),
         objects: Vec::new(),
         lights: Vec::new(),
         ambient: LinearRgb::grey(0.1),
         environment: None,
         exposure: Exposure::default(),
+        cast: Default::default(),
+        finish: Default::default(),
     }
 }
 
@@ -46,10 +49,17 @@ fn object(id: u32, class: u32, [x, y]: [f64; 2], covered_by: &[u32]) -> ObjectLa
         outline_px: vec![corners.map(|[x, y]| Point2::new(x, y)).to_vec()],
         amodal_box: b,
         visible_box: b,
+        amodal_mask: mask(&b),
+        visible_mask: mask(&b),
         visible_fraction: 1.0,
         covered_by: covered_by.iter().map(|&id| ObjectId(id)).collect(),
         ..ObjectLabel::default()
     }
+}
+
+fn mask(b: &BBox) -> Mask {
+    let inside = |v: u32, from: f64, to: f64| (from..to).contains(&f64::from(v));
+    Mask::from_fn(IMAGE, |x, y| inside(x, b.x0, b.x1) && inside(y, b.y0, b.y1))
 }
 
 /// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the first.
@@ -61,14 +71,27 @@ fn sample(k: u64) -> Result<Sample> {
     let objects = (0..k % 4).map(|i| object(i as u32 + 1, (k + i) as u32 % 3, place(i), under(i)));
     let labels = Labels { image: IMAGE, objects: objects.collect() };
     let drawn = Scene { exposure: Exposure::MatchPlate { gain_ev: 0.1 }, ..scene(k) };
-    let retries = (k % 3) as u32;
-    Ok(Sample { frame, deep: DeepImage::default(), labels, drawn, scene: scene(k), scene_seed: k ^ 7, retries })
+    let rejected = vec!["two bodies overlap".to_owned(); (k % 3) as usize];
+    let nothing = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
+    let deep = DeepImage::from_pixels(nothing, vec![vec![]; frame.pixels().len()]);
+    Ok(Sample {
+        frame,
+        deep,
+        labels,
+        drawn,
+        scene: scene(k),
+        scene_seed: k ^ 7,
+        rejected,
+        draws: vec![],
+        times: Times::default(),
+    })
 }
 
 fn plan(folder: &Path, count: u64) -> Plan {
     Plan {
         folder: folder.into(),
         count,
+        numbers: Numbers::All,
         seed: 7,
         recipe: serde_json::json!({ "objects": { "count": [5, 30] }, "hue_deg": 0.1 }),
         classes: ["cap_label", "cap", "label"].map(String::from).to_vec(),
@@ -76,6 +99,18 @@ fn plan(folder: &Path, count: u64) -> Plan {
         obstructed: Obstructed::Drop,
         writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default()), Box::new(Sidecar)],
     }
+}
+
+/// The same with every format.
+fn full_plan(folder: &Path, count: u64) -> Plan {
+    let formats = r#"formats = ["yolo", "coco", "voc", "webdataset", "layers"]
+        webdataset = { samples = 3 }"#;
+    let labels: LabelSetup = toml::from_str(formats).unwrap();
+    let mut plan = plan(folder, count);
+    plan.writers.truncate(1);
+    plan.writers.push(Box::new(Sidecar));
+    plan.writers.extend(labels.writers(&Pictures::default()));
+    plan
 }
 
 fn make(plan: &Plan) -> Result<Report> {
@@ -86,15 +121,16 @@ fn threads<T: Send>(n: usize, f: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
 }
 
-/// Every file below a folder and its bytes.
+/// Every file below a folder and its bytes, but for the lock and the notes of how long runs took.
 fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(dir) = folders.pop() {
         for entry in std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()) {
+            let hidden = entry.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
             if entry.is_dir() {
                 folders.push(entry);
-            } else {
+            } else if !hidden {
                 files.insert(entry.strip_prefix(folder).unwrap().into(), std::fs::read(&entry).unwrap());
             }
         }
@@ -130,18 +166,18 @@ fn a_dataset_has_the_files_that_trainers_read() {
 #[test]
 fn the_bytes_are_the_same_at_any_number_of_threads() {
     let (one, four) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    threads(1, || make(&plan(one.path(), 40))).unwrap();
-    threads(4, || make(&plan(four.path(), 40))).unwrap();
+    threads(1, || make(&full_plan(one.path(), 40))).unwrap();
+    threads(4, || make(&full_plan(four.path(), 40))).unwrap();
     assert_eq!(bytes(one.path()), bytes(four.path()));
 }
 
 #[test]
 fn a_stopped_run_goes_on_to_the_same_bytes() {
     let (whole, broken) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    make(&plan(whole.path(), 30)).unwrap();
+    make(&full_plan(whole.path(), 30)).unwrap();
     let stop = AtomicBool::new(false);
     let after_some = |p: Progress| stop.store(p.made >= 7, Ordering::Relaxed);
-    let e = threads(3, || generate(&plan(broken.path(), 30), sample, &after_some, &stop)).unwrap_err();
+    let e = threads(3, || generate(&full_plan(broken.path(), 30), sample, &after_some, &stop)).unwrap_err();
     assert!(matches!(e, Error::Interrupted { .. }) && e.to_string().contains("of 30 samples are in"), "{e}");
 
     // What a kill may leave: a torn line, half a file, a temporary file, a file whose line never came.
@@ -159,9 +195,9 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
         made.fetch_add(1, Ordering::Relaxed);
         sample(k)
     };
-    let report = generate(&plan(broken.path(), 30), counted, &|_| {}, &AtomicBool::new(false)).unwrap();
+    let report = generate(&full_plan(broken.path(), 30), counted, &|_| {}, &AtomicBool::new(false)).unwrap();
     assert_eq!((report.made, made.into_inner()), (30 - finished as u64 + 2, 30 - finished as u64 + 2));
-    assert_eq!(report, Report { made: report.made, ..make(&plan(whole.path(), 30)).unwrap() });
+    assert_eq!(report, Report { made: report.made, ..make(&full_plan(whole.path(), 30)).unwrap() });
     assert_eq!(bytes(whole.path()), bytes(broken.path()));
 }
 
@@ -179,9 +215,9 @@ fn a_finished_dataset_is_left_alone() {
 #[test]
 fn a_dataset_may_grow() {
     let (grown, at_once) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    make(&plan(grown.path(), 5)).unwrap();
-    assert_eq!(make(&plan(grown.path(), 12)).unwrap().made, 7);
-    make(&plan(at_once.path(), 12)).unwrap();
+    make(&full_plan(grown.path(), 5)).unwrap();
+    assert_eq!(make(&full_plan(grown.path(), 12)).unwrap().made, 7);
+    make(&full_plan(at_once.path(), 12)).unwrap();
     assert_eq!(bytes(grown.path()), bytes(at_once.path()));
 }
 
@@ -280,11 +316,27 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
 }
 
 #[test]
-fn segments_hold_outlines_and_jpegs_are_accepted() {
+fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
+    let dir = tempfile::tempdir().unwrap();
+    let circle = |k| {
+        let mut s = sample(k)?;
+        s.labels.objects =
+            [(1, 3), (2, 1), (3, 2)].map(|(id, over)| object(id, 0, [6.0 * id as f64; 2], &[over])).into();
+        s.labels.objects.push(object(4, 1, [40.0; 2], &[]));
+        Ok(s)
+    };
+    let report = generate(&plan(dir.path(), 2), circle, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!((report.knotted, report.objects, report.labelled), (6, 8, 2));
+    let record: Record = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
+    assert_eq!((record.knotted, record.topmost), ([1, 2, 3].map(ObjectId).to_vec(), vec![ObjectId(4)]));
+}
+
+#[test]
+fn segments_hold_borders_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);
     plan.writers = vec![
-        Box::new(Pictures { format: PictureFormat::Jpg, exr: true }),
+        Box::new(Pictures { format: PictureFormat::Jpg, exr: true, ..Pictures::default() }),
         Box::new(Yolo { task: YoloTask::Segment, ..Yolo::default() }),
     ];
     make(&plan).unwrap();
@@ -392,4 +444,151 @@ fn a_writer_of_one_s_own_takes_part() {
     let dir = tempfile::tempdir().unwrap();
     make(&Plan { writers: vec![Box::new(Count)], ..plan(dir.path(), 4) }).unwrap();
     assert_eq!(text(dir.path(), "3.txt"), "2");
+}
+
+fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
+    Plan { numbers: Numbers::Shard(Shard::new(index, of).unwrap()), ..full_plan(folder, count) }
+}
+
+/// Shards of 20 samples in every format, made in an order of their own.
+fn shards(dir: &Path) -> Vec<PathBuf> {
+    let folders: Vec<PathBuf> = (1..=3).map(|i| dir.join(format!("shard-{i}"))).collect();
+    for i in [2, 0, 1] {
+        make(&shard(&folders[i], 20, i as u64 + 1, 3)).unwrap();
+    }
+    folders
+}
+
+fn joined(shards: &[PathBuf], folder: &Path) -> Result<Report> {
+    merge(shards, folder, &|_| {}, &AtomicBool::new(false))
+}
+
+#[test]
+fn merged_shards_are_the_bytes_of_one_run() {
+    let (whole, dir) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    make(&full_plan(whole.path(), 20)).unwrap();
+    let mut folders = shards(dir.path());
+    folders.reverse();
+    let merged = dir.path().join("merged");
+    let report = joined(&folders, &merged).unwrap();
+    assert_eq!((report.images, report.made), (20, 20));
+    assert_eq!(bytes(whole.path()), bytes(&merged));
+    assert_eq!(joined(&folders, &merged).unwrap().made, 0);
+}
+
+#[test]
+fn shards_that_do_not_make_a_whole_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = shards(dir.path());
+    let refused = |folders: &[PathBuf]| joined(folders, &dir.path().join("merged")).unwrap_err().to_string();
+    assert_eq!(refused(&folders[..2]), "shards: shard 3/3 is missing");
+    assert_eq!(refused(&[]), "shards: none, expected their folders");
+    let twice = [folders.clone(), vec![folders[0].clone()]].concat();
+    assert!(refused(&twice).contains("is shard 1/3, as "));
+
+    let whole = dir.path().join("whole");
+    make(&plan(&whole, 3)).unwrap();
+    assert!(refused(&[whole]).ends_with("is a whole dataset, expected a shard"));
+
+    let other = dir.path().join("other");
+    make(&Plan { seed: 8, ..shard(&other, 20, 3, 3) }).unwrap();
+    let mixed = refused(&[folders[0].clone(), folders[1].clone(), other]);
+    assert!(mixed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"), "{mixed}");
+
+    let journal = folders[1].join("index.jsonl");
+    let lines = std::fs::read_to_string(&journal).unwrap();
+    std::fs::write(&journal, lines.lines().skip(1).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    assert!(refused(&folders).contains("shard-2: sample 1 is missing: finish this shard first"));
+    std::fs::write(&journal, lines).unwrap();
+
+    let damaged = folders[0].join("labels/train/000003.txt");
+    let size = std::fs::metadata(&damaged).unwrap().len();
+    std::fs::write(&damaged, vec![b'7'; size as usize]).unwrap();
+    assert!(refused(&folders).contains("000003.txt: has other bytes than when it was written"));
+}
+
+#[test]
+fn one_sample_is_made_again_alone_and_the_others_are_left() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let before = bytes(dir.path());
+    std::fs::write(dir.path().join("labels/train/000007.txt"), b"").unwrap();
+    let made = std::sync::Mutex::new(Vec::new());
+    let counted = |k| {
+        made.lock().unwrap().push(k);
+        sample(k)
+    };
+    let one = Plan { numbers: Numbers::One(7), ..plan(dir.path(), 12) };
+    generate(&one, counted, &|_| {}, &AtomicBool::new(false)).unwrap();
+    assert_eq!(made.into_inner().unwrap(), [7]);
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn what_was_damaged_at_its_size_is_found_and_made_again() {
+    let dir = tempfile::tempdir().unwrap();
+    // More than the last lines, whose files every run compares.
+    make(&plan(dir.path(), 600)).unwrap();
+    let before = bytes(dir.path());
+    let image = dir.path().join("images/train/000002.png");
+    let size = std::fs::metadata(&image).unwrap().len();
+    std::fs::write(&image, vec![0; size as usize]).unwrap();
+    assert_eq!(mend(dir.path()).unwrap(), (599, 1));
+    assert_eq!(make(&plan(dir.path(), 600)).unwrap().made, 1);
+    assert_eq!(before, bytes(dir.path()));
+    assert!(mend(&dir.path().join("images")).unwrap_err().to_string().contains("begun before"));
+}
+
+#[test]
+fn an_image_that_looks_like_a_trained_one_is_a_leak() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let train: Image<LinearRgb> = io::read(dir.path().join("images/train/000006.png")).unwrap();
+    let brighter = train.map(|p| p.scale(1.001));
+    io::write(dir.path().join("images/val/000005.png"), &brighter).unwrap();
+    let found = faults(dir.path()).join("\n");
+    assert!(found.contains("images/val/000005.png: leak: differs from images/train/000006.png"), "{found}");
+}
+
+#[test]
+fn the_classes_balance_and_box_sizes_are_counted() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let checked = check(dir.path()).unwrap();
+    let table = checked.balance();
+    assert_eq!(table.rows.len(), 3);
+    assert_eq!(table.rows[0][4], "18.8 / 18.8 / 18.8 %");
+    assert!(checked.remarks().iter().all(|remark| remark.starts_with("class ")), "{:?}", checked.remarks());
+}
+
+/// The page as a browser sees it after a script has clicked: the text of the document's title.
+fn browse(page: &str, script: &str) -> Option<String> {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("page.html");
+    let page = page.replace("</body>", &format!("<script>{script}</script></body>"));
+    std::fs::write(&file, page).unwrap();
+    let mut command = std::process::Command::new("chromium");
+    command.args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"]);
+    command.arg(format!("--user-data-dir={}", dir.path().join("profile").display())).arg(&file);
+    let output = command.output().ok()?;
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let title = dom.split("<title>").nth(1)?.split("</title>").next()?;
+    Some(title.to_owned())
+}
+
+#[test]
+fn a_browser_shows_the_report_and_its_switches_work() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let page = report::dataset::page(dir.path(), 6).unwrap().document();
+    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+    let script = "const shown = id => getComputedStyle(document.querySelector('.' + id)).display != 'none';\
+        const before = [shown('boxes'), shown('masks')];\
+        document.getElementById('boxes').click(); document.getElementById('masks').click();\
+        const pictures = [...document.images].filter(i => i.complete && i.naturalWidth == 64).length;\
+        document.title = [before, shown('boxes'), shown('masks'), pictures, document.querySelectorAll('.boxes rect').length].join();";
+    match browse(&page, script) {
+        Some(title) => assert_eq!(title, "true,false,false,true,6,3"),
+        None => eprintln!("skipped: no chromium here (Debian: chromium)"),
+    }
 }

@@ -3,7 +3,7 @@
 use geo::Contains;
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
-use petcomp::label::{AmodalBox, BBox, LabelOptions, Labels, knotted, label};
+use petcomp::label::{AmodalBox, BBox, DepthRange, LabelOptions, Labels, ObjectLabel, knotted, label};
 use petcomp::render::{DeepImage, DeepSample};
 use petcomp::scene::{Card, Grade};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
@@ -125,6 +125,17 @@ fn area(rings: &[Vec<Point2<f64>>]) -> f64 {
     rings.iter().map(ring).sum()
 }
 
+/// How far a convex outline may reach beyond the outermost pixels that rays hit, pixels.
+///
+/// Rays hit every disc of radius `r = 1 / (sqrt(2) RAYS)`. The outline holds a disc of radius area / perimeter, so
+/// shrunk towards any of its points it holds one of radius `r`, as much nearer to that point as it is smaller.
+fn missed(object: &ObjectLabel) -> f64 {
+    let b = &object.amodal_box;
+    let radius = 1.0 / (std::f64::consts::SQRT_2 * RAYS as f64);
+    let perimeter = 2.0 * (b.width() + b.height());
+    radius * perimeter * b.width().hypot(b.height()) / area(&object.outline_px)
+}
+
 fn off(a: &BBox, b: &BBox) -> f64 {
     [a.x0 - b.x0, a.y0 - b.y0, a.x1 - b.x1, a.y1 - b.y1].into_iter().map(f64::abs).fold(0.0, f64::max)
 }
@@ -182,8 +193,7 @@ proptest! {
             // rounds up and down alike: half a ray's width along the border bounds the error.
             let border = 2.0 * (object.amodal_box.width() + object.amodal_box.height());
             prop_assert!((area(&object.outline_px) - counted).abs() <= 0.5 * border / RAYS as f64 + 0.1);
-            // The outline ends inside the outermost pixels that rays hit, or less than a ray's distance outside.
-            prop_assert!(around.is_empty() || off(&object.amodal_box, &around) <= 1.0 + 1.0 / RAYS as f64);
+            prop_assert!(around.is_empty() || off(&object.amodal_box, &around) <= 1.0 + missed(&object));
         }
     }
 
@@ -263,6 +273,23 @@ fn a_tilted_card_is_compared_where_the_two_overlap() {
     let found = labels(&shot([tilted, small]), &LabelOptions::default());
     assert!(found.objects[0].is_topmost());
     assert_eq!(found.objects[1].covered_by, [ObjectId(1)]);
+}
+
+#[test]
+fn masks_and_depth_are_those_of_the_card() {
+    // Card 2 hides the right half of card 1: its left edge is at x = 0, the picture's middle.
+    let cards = [(1, 0.0, [0.2, 0.2]), (2, 0.1, [0.2, 0.4])]
+        .map(|(id, x, size)| card(id, [x, 0.0, 0.1 * f64::from(id)], [0.0; 3], size, &WHOLE));
+    let found = labels(&shot(cards), &LabelOptions::default());
+    let [below, above] = [&found.objects[0], &found.objects[1]];
+    // 0.2 m seen from 0.9 m with 100 pixels a metre at one metre; edges cut pixels in part.
+    let (side, edge) = (20.0 / 0.9, 48.0);
+    assert!((below.amodal_mask.area() as f64 - side * side).abs() < 4.0 * side);
+    assert_eq!(above.amodal_mask, above.visible_mask);
+    assert!(below.visible_mask.pixels().all(|(x, _)| f64::from(x) <= edge));
+    assert!((below.visible_pixel_fraction - 0.5).abs() < 0.05 && (below.visible_fraction - 0.5).abs() < 0.02);
+    let DepthRange { near, mean, far } = below.depth;
+    assert!([near, mean, far].iter().all(|depth| (depth - 0.9).abs() < 1e-6), "{:?}", below.depth);
 }
 
 #[test]
@@ -346,4 +373,5 @@ fn film_seen_through_film_counts_as_seen() {
     let found = label(&deep, &scene, &LabelOptions::default());
     assert!((found.objects[1].visible_fraction - 0.6).abs() < 1e-6);
     assert_eq!(found.objects[1].visible_box, BBox { x0: 2.0, y0: 1.0, x1: 3.0, y1: 2.0 });
+    assert_eq!(found.objects[1].visible_pixel_fraction, 1.0);
 }

@@ -47,7 +47,10 @@ quads*        list of {id* (1..65535), size*, pose (needed unless simulated),
               texture* (path), alpha ("premultiplied" | "straight"),
               encoding ("linear" | "srgb"), hue_shift (degrees, 0),
               saturation (1), value (1), opacity (1), thickness (0.01 m),
-              mass (0.03 kg)}.
+              mass (0.03 kg), film (path of an RGB EXR of opacity per channel,
+              1 - view transmittance; the texture's colour is then what the
+              film adds and its alpha is not used), back ({texture*, film}:
+              what the other side shows, right way round as seen from there)}.
 lights        list of {shape ("rectangle" | "square" | "disk" | "ellipse"),
               size* ([u, v] or number), power*, color ([1, 1, 1]) and either
               pose (4x4) or position* and target ([0, 0, 0])}.
@@ -292,7 +295,7 @@ def load_scene(path, needs_pose):
     for n, q in enumerate(raw["quads"]):
         where = "quads[%d]" % n
         _keys(q, ("id", "size", "pose", "texture", "alpha", "encoding", "hue_shift", "saturation",
-                  "value", "opacity", "thickness", "mass"), where)
+                  "value", "opacity", "thickness", "mass", "film", "back"), where)
         for key in ("id", "size", "texture"):
             if key not in q:
                 _fail(where, "missing key: %s" % key)
@@ -316,6 +319,15 @@ def load_scene(path, needs_pose):
             "thickness": _number(q.get("thickness", 0.01), where + ".thickness", 1e-5),
             "mass": _number(q.get("mass", 0.03), where + ".mass", 1e-6),
         }
+        if "film" in q:
+            quad["film"] = _path(q["film"], base, where + ".film")
+        if "back" in q:
+            b = _keys(q["back"], ("texture", "film"), where + ".back")
+            back = _path(b.get("texture"), base, where + ".back.texture")
+            quad["back"] = {"texture": back, "encoding": quad["encoding"],
+                            "alpha": "premultiplied" if back.lower().endswith(".exr") else "straight"}
+            if "film" in b:
+                quad["back"]["film"] = _path(b["film"], base, where + ".back.film")
         if "pose" in q:
             quad["pose"] = _rigid(_matrix(q["pose"], 4, 4, where + ".pose"), where + ".pose")
         elif needs_pose:
@@ -385,6 +397,9 @@ def load_scene(path, needs_pose):
                              "material.extension"),
     }
 
+    if out["material"]["model"] != "mix" and any(has_film(q) for q in out["quads"]):
+        _fail("material.model", "film needs mix")
+
     p = _keys(raw.get("physics", {}), ("frames", "fps", "substeps", "iterations", "gravity",
                                        "friction", "restitution", "linear_damping",
                                        "angular_damping", "wall_height", "wall_thickness", "gap",
@@ -411,6 +426,11 @@ def load_scene(path, needs_pose):
         "rest_speed": _number(p.get("rest_speed", 0.0), "physics.rest_speed", 0.0),
     }
     return out
+
+
+def has_film(quad):
+    """Either side of a quad lets each channel pass differently."""
+    return "film" in quad or "film" in quad.get("back", {})
 
 
 def load_poses(path, spec):
@@ -684,7 +704,7 @@ class Builder:
             img.colorspace_settings.name = "sRGB"
         else:
             img.colorspace_settings.name = "Linear" if "Linear" in names else "Linear Rec.709"
-        img.alpha_mode = "PREMUL" if alpha == "premultiplied" else "STRAIGHT"
+        img.alpha_mode = {"premultiplied": "PREMUL", "packed": "CHANNEL_PACKED"}.get(alpha, "STRAIGHT")
         return img
 
     def quad_material(self, q):
@@ -692,14 +712,43 @@ class Builder:
         mat.use_nodes = True
         nt = mat.node_tree
         nt.nodes.clear()
-        new, link = nt.nodes.new, nt.links.new
+        out = nt.nodes.new("ShaderNodeOutputMaterial")
+        surface = self.side(nt, q, q, "texture")
+        if "back" in q:
+            # Seen from behind, the texture of the back is the right way round: u runs the other way.
+            uv = nt.nodes.new("ShaderNodeUVMap")
+            turn = nt.nodes.new("ShaderNodeMapping")
+            turn.inputs["Location"].default_value = (1.0, 0.0, 0.0)
+            turn.inputs["Scale"].default_value = (-1.0, 1.0, 1.0)
+            nt.links.new(uv.outputs[0], turn.inputs["Vector"])
+            back = self.side(nt, q, q["back"], "back_texture", turn.outputs[0])
+            seen = nt.nodes.new("ShaderNodeNewGeometry")
+            either = nt.nodes.new("ShaderNodeMixShader")
+            nt.links.new(seen.outputs["Backfacing"], either.inputs[0])
+            nt.links.new(surface, either.inputs[1])
+            nt.links.new(back, either.inputs[2])
+            surface = either.outputs[0]
+        nt.links.new(surface, out.inputs["Surface"])
+        return mat
+
+    def texture(self, nt, path, alpha, encoding, vector):
         m = self.spec["material"]
-        out = new("ShaderNodeOutputMaterial")
-        tex = new("ShaderNodeTexImage")
-        tex.name = "texture"
-        tex.image = self.image(q["texture"], q["alpha"], q["encoding"])
+        tex = nt.nodes.new("ShaderNodeTexImage")
+        tex.image = self.image(path, alpha, encoding)
         tex.interpolation = {"linear": "Linear", "closest": "Closest", "cubic": "Cubic"}[m["filter"]]
         tex.extension = m["extension"].upper()
+        if vector is not None:
+            nt.links.new(vector, tex.inputs["Vector"])
+        return tex
+
+    def side(self, nt, q, look, name, vector=None):
+        """What one side of a quad shows; `look` holds its texture and, for a film, its opacity."""
+        new, link = nt.nodes.new, nt.links.new
+        m = self.spec["material"]
+        # The colour of a film is what it adds, whatever its alpha says: it must not be divided by it.
+        alpha_mode = "packed" if "film" in look else look["alpha"]
+        tex = self.texture(nt, look["texture"], alpha_mode, look["encoding"], vector)
+        tex.name = name
         color = tex.outputs["Color"]
         if q["hue_shift"] or q["saturation"] != 1.0 or q["value"] != 1.0:
             hsv = new("ShaderNodeHueSaturation")
@@ -709,6 +758,8 @@ class Builder:
             hsv.inputs["Fac"].default_value = 1.0
             link(color, hsv.inputs["Color"])
             color = hsv.outputs["Color"]
+        if "film" in look:
+            return self.film(nt, color, look["film"], vector)
         alpha = tex.outputs["Alpha"]
         if q["opacity"] != 1.0:
             mul = new("ShaderNodeMath")
@@ -720,21 +771,37 @@ class Builder:
             bsdf = new("ShaderNodeBsdfPrincipled")
             link(color, bsdf.inputs["Base Color"])
             link(alpha, bsdf.inputs["Alpha"])
-            name = "Specular" if "Specular" in bsdf.inputs else "Specular IOR Level"
-            bsdf.inputs[name].default_value = m["specular"]
+            specular = "Specular" if "Specular" in bsdf.inputs else "Specular IOR Level"
+            bsdf.inputs[specular].default_value = m["specular"]
             bsdf.inputs["Roughness"].default_value = m["roughness"]
-            link(bsdf.outputs[0], out.inputs["Surface"])
-        else:
-            diffuse = new("ShaderNodeBsdfDiffuse")
-            diffuse.inputs["Roughness"].default_value = 0.0
-            clear = new("ShaderNodeBsdfTransparent")
-            mix = new("ShaderNodeMixShader")
-            link(color, diffuse.inputs["Color"])
-            link(alpha, mix.inputs[0])
-            link(clear.outputs[0], mix.inputs[1])
-            link(diffuse.outputs[0], mix.inputs[2])
-            link(mix.outputs[0], out.inputs["Surface"])
-        return mat
+            return bsdf.outputs[0]
+        diffuse = new("ShaderNodeBsdfDiffuse")
+        diffuse.inputs["Roughness"].default_value = 0.0
+        clear = new("ShaderNodeBsdfTransparent")
+        mix = new("ShaderNodeMixShader")
+        link(color, diffuse.inputs["Color"])
+        link(alpha, mix.inputs[0])
+        link(clear.outputs[0], mix.inputs[1])
+        link(diffuse.outputs[0], mix.inputs[2])
+        return mix.outputs[0]
+
+    def film(self, nt, color, path, vector):
+        """Adds what the film reflects to what it lets pass, channel by channel."""
+        new, link = nt.nodes.new, nt.links.new
+        opacity = self.texture(nt, path, "packed", "linear", vector)
+        passes = new("ShaderNodeVectorMath")
+        passes.operation = "SUBTRACT"
+        passes.inputs[0].default_value = (1.0, 1.0, 1.0)
+        link(opacity.outputs["Color"], passes.inputs[1])
+        clear = new("ShaderNodeBsdfTransparent")
+        link(passes.outputs[0], clear.inputs["Color"])
+        diffuse = new("ShaderNodeBsdfDiffuse")
+        diffuse.inputs["Roughness"].default_value = 0.0
+        link(color, diffuse.inputs["Color"])
+        both = new("ShaderNodeAddShader")
+        link(diffuse.outputs[0], both.inputs[0])
+        link(clear.outputs[0], both.inputs[1])
+        return both.outputs[0]
 
     def add_quads(self):
         for q in self.spec["quads"]:
@@ -1000,6 +1067,34 @@ class Builder:
             wanted.append(("Shadow Catcher", "catcher"))
         return self.render_passes(folder, wanted)
 
+    def passing(self, folder):
+        """What all quads together let pass, per channel: seen against a white world, without any light on them.
+
+        Changes the scene for good; comes last.
+        """
+        s = self.scene
+        for obj in self.quads:
+            nt = obj.data.materials[0].node_tree
+            for node in nt.nodes:
+                if node.bl_idname == "ShaderNodeBsdfDiffuse":
+                    for wire in list(node.inputs["Color"].links):
+                        nt.links.remove(wire)
+                    node.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+        self.ground.hide_render = True
+        self.ground.is_shadow_catcher = False
+        for obj in self.bpy.data.objects:
+            if obj.type == "LIGHT":
+                obj.hide_render = True
+        nt = s.world.node_tree
+        nt.nodes.clear()
+        out = nt.nodes.new("ShaderNodeOutputWorld")
+        back = nt.nodes.new("ShaderNodeBackground")
+        back.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+        nt.links.new(back.outputs[0], out.inputs["Surface"])
+        s.render.film_transparent = False
+        s.view_layers[0].cycles.use_pass_shadow_catcher = False
+        return self.render_passes(folder, [("Image", "passing")])["passing"]
+
     def aux(self, folder, id_alpha):
         """id, depth and position at pixel centres: one sample, binary alpha."""
         s = self.scene
@@ -1058,17 +1153,20 @@ def compose(passes, plate, mode):
     With the Shadow Catcher pass requested, Combined holds the quads alone:
     premultiplied radiance M and coverage a, both pixel filtered.  (Without that
     pass Blender folds a grey version of the shadow into the alpha instead.)
-    beauty = M + (1 - a) * S * plate, S being the Shadow Catcher pass.
+    beauty = M + passing * S * plate, S being the Shadow Catcher pass and passing
+    1 - a, or a colour of its own where there is film.
     """
     import numpy as np
     comb = passes["combined"].astype(np.float64)
     radiance = comb[..., :3]
+    # Film lets each channel pass differently; Blender's alpha is the mean of them.
+    passing = passes.get("passing", 1.0 - comb[..., 3:])[..., :3]
     shadow = (passes["catcher"][..., :3].astype(np.float64) if mode == "catcher"
               else np.ones_like(radiance))
     through = np.clip(1.0 - comb[..., 3], 0.0, 1.0)
     beauty = radiance.copy()
     if plate is not None:
-        beauty += plate[..., :3] * shadow * through[..., None]
+        beauty += plate[..., :3] * shadow * np.clip(passing, 0.0, 1.0)
     one = np.ones(comb.shape[:2] + (1,))
     pack = lambda a: np.concatenate(a, axis=2).astype(np.float32)
     return (pack([beauty, one]), pack([radiance, 1.0 - through[..., None]]), pack([shadow, one]))
@@ -1116,9 +1214,19 @@ def run(args, spec):
             plate = resample_area(plate, r["width"], r["height"])
         clock.mark("load_plate")
 
+    passes = {}
     if not args.no_beauty:
         passes = build.beauty(out_dir)
         clock.mark("render_beauty")
+    if args.aux:
+        aux = build.aux(out_dir, args.id_alpha)
+        for name, img in aux.items():
+            write_pixels(bpy, build.scene, os.path.join(out_dir, name + ".exr"), img)
+        clock.mark("aux")
+    if not args.no_beauty:
+        if any(has_film(q) for q in spec["quads"]):
+            passes["passing"] = build.passing(out_dir)
+            clock.mark("render_passing")
         beauty, matte, shadow = compose(passes, plate, spec["ground"]["mode"])
         write_pixels(bpy, build.scene, os.path.join(out_dir, "beauty.exr"), beauty)
         write_pixels(bpy, build.scene, os.path.join(out_dir, "matte.exr"), matte)
@@ -1130,12 +1238,6 @@ def run(args, spec):
             write_pixels(bpy, build.scene, os.path.join(out_dir, "beauty.png"),
                          linear_to_srgb(beauty).astype(np.float32), "PNG")
         clock.mark("compose_and_save")
-
-    if args.aux:
-        aux = build.aux(out_dir, args.id_alpha)
-        for name, img in aux.items():
-            write_pixels(bpy, build.scene, os.path.join(out_dir, name + ".exr"), img)
-        clock.mark("aux")
 
     try:
         import resource

@@ -1,13 +1,13 @@
 //! Putting photos into an asset folder.
 
+use super::files;
 use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_name, check_positive};
-use super::size::oriented_size;
-use super::thumbnail::thumbnail;
+use super::measure::Measured;
+use super::screen_source::ScreenSource;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
 use crate::error::{Error, Result};
-use crate::geom::Point2;
 use crate::io;
-use crate::matte::{CutOut, CutOutOptions, cut_out};
+use crate::matte::{CutOut, CutOutOptions, Remark, cut_out_on};
 use std::path::Path;
 
 /// What is known of a photo that is not in the photo.
@@ -23,6 +23,8 @@ pub struct AddPhoto {
     pub thickness: f64,
     /// Mass, kilograms.
     pub mass: f64,
+    /// What it was photographed on.
+    pub screen: ScreenSource,
     /// How it is cut out.
     pub options: CutOutOptions,
 }
@@ -34,6 +36,8 @@ pub enum Scale {
     PxPerMetre(f64),
     /// Length of the object along its longest side, metres.
     Length(f64),
+    /// Length and width of the object, longest first, metres.
+    Size([f64; 2]),
 }
 
 impl AddPhoto {
@@ -45,6 +49,7 @@ impl AddPhoto {
             scale,
             thickness: DEFAULT_THICKNESS,
             mass: DEFAULT_MASS,
+            screen: ScreenSource::Auto,
             options: CutOutOptions::default(),
         }
     }
@@ -60,6 +65,13 @@ impl AddPhoto {
         match self.scale {
             Scale::PxPerMetre(scale) => check_positive("px_per_metre", scale)?,
             Scale::Length(length) => check_positive("length", length)?,
+            Scale::Size([length, width]) => {
+                check_positive("length", length)?;
+                check_positive("width", width)?;
+                if width > length {
+                    return Err(Error::value("width", format!("{width}, expected at most the length of {length}")));
+                }
+            }
         }
         check_positive("thickness", self.thickness)?;
         check_positive("mass", self.mass)
@@ -102,20 +114,21 @@ pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
     }
 }
 
-/// Cuts the object out of a photo and writes cut-out and thumbnail.
+/// Cuts the object out of a photo and writes cut-out, outline and thumbnail.
 pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<PhotoRecord> {
     let picture = io::read(photo)?;
-    let cut = cut_out(&picture, &add.options).map_err(|e| match e {
-        Error::Photo { .. } => e.in_file(photo),
+    let empty = add.screen.empty()?;
+    let options = CutOutOptions { screen: add.screen.color().or(add.options.screen), ..add.options.clone() };
+    let cut = cut_out_on(&picture, empty.as_ref(), &options).map_err(|e| match e {
+        Error::Photo { what } => Error::Photo { what: format!("{}: {what}", photo.display()) },
         other => other,
     })?;
     for remark in &cut.remarks {
-        log::warn!("{}: {remark}", photo.display());
+        log::info!("{}: {remark}", photo.display());
     }
     let file = cut_out_file(photo, add);
     io::create_folder(folder.join(&add.asset))?;
-    io::write(folder.join(&file), &cut.image)?;
-    io::write(folder.join(&file).with_extension("png"), &thumbnail(&cut.image))?;
+    files::write(&folder.join(&file), &cut)?;
     Ok(record(&cut, add, file, photo))
 }
 
@@ -132,28 +145,24 @@ fn stem(photo: &Path) -> String {
 }
 
 fn record(cut: &CutOut, add: &AddPhoto, file: String, photo: &Path) -> PhotoRecord {
-    let px = oriented_size(&cut.hull);
-    let px_per_metre = match add.scale {
-        Scale::PxPerMetre(scale) => scale * cut.scale,
-        Scale::Length(length) => px[0] / length,
-    };
-    let (w, h) = cut.image.size();
-    let metres = |px: f64| px / px_per_metre;
+    let measured = Measured::of(cut, add.scale);
+    let (w, h) = cut.film.size();
+    let doubts = cut.remarks.iter().filter(|r| r.is_doubt()).map(Remark::to_string).chain(measured.doubt);
     PhotoRecord {
         file,
         source: photo.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        px_per_metre,
-        size_m: [w as f64, h as f64].map(metres),
-        object_m: px.map(metres),
+        px_per_metre: measured.px_per_metre,
+        size_m: [w as f64, h as f64].map(|px| px / measured.px_per_metre),
+        object_m: measured.object_m,
+        error_m: measured.error_m,
+        hull_m: measured.hull_m,
         screen: cut.screen,
         matte: cut.method,
         residue: f64::from(cut.residue),
+        unevenness: f64::from(cut.unevenness),
+        confidence: cut.segmentation.confidence.value(),
+        doubts: doubts.collect(),
         truncated: cut.segmentation.touches.contains(&true),
-        outline_px: cut.hull.iter().map(|p: &Point2<f64>| [p.x, p.y].map(thousandths)).collect(),
+        outline_px: cut.hull.iter().map(files::rounded).collect(),
     }
-}
-
-/// As exact as a pixel coordinate needs to be in a file that people read.
-fn thousandths(px: f64) -> f64 {
-    (px * 1000.0).round() / 1000.0
 }

@@ -48,19 +48,38 @@ pub struct PhotoRecord {
     pub px_per_metre: f64,
     /// Width and height of the whole cut-out, metres.
     pub size_m: [f64; 2],
-    /// Length and width of the object's hull, however it is turned, metres.
+    /// Length and width of the object's tight outline, however it is turned, metres.
     pub object_m: [f64; 2],
+    /// Standard error of these, metres: of the outline, not of the scale.
+    #[serde(default)]
+    pub error_m: f64,
+    /// Length and width of its convex hull, metres; 0 where nobody has measured them.
+    #[serde(default)]
+    pub hull_m: [f64; 2],
     /// Colour of the screen, scene-linear.
     pub screen: LinearRgb,
     /// Where the matte came from.
     pub matte: MatteMethod,
     /// Mean matte that the key left on the screen, where it should be 0.
     pub residue: f64,
+    /// How uneven the screen was: 1 minus darkest over brightest.
+    #[serde(default)]
+    pub unevenness: f64,
+    /// How far the outline can be believed, 0 to 1; 1 where a person has looked.
+    #[serde(default = "certain")]
+    pub confidence: f64,
+    /// Why a person should look at this cut-out; empty where nothing is odd.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<String>,
     /// The object reached a border of the photo: part of it is missing.
     #[serde(default)]
     pub truncated: bool,
     /// Convex hull in pixels of the cut-out, clockwise as seen.
     pub outline_px: Vec<[f64; 2]>,
+}
+
+fn certain() -> f64 {
+    1.0
 }
 
 /// The classes of bottles, in the order of the paper.
@@ -227,9 +246,14 @@ pub(super) mod tests {
             px_per_metre: 100.0,
             size_m: [0.4, 0.2],
             object_m: [0.35, 0.15],
+            error_m: 0.001,
+            hull_m: [0.35, 0.15],
             screen: LinearRgb::new(0.1, 0.5, 0.1),
-            matte: MatteMethod::Key,
+            matte: MatteMethod::Physical,
             residue: 0.01,
+            unevenness: 0.1,
+            confidence: 0.9,
+            doubts: Vec::new(),
             truncated: false,
             outline_px: vec![[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]],
         }

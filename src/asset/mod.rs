@@ -1,7 +1,8 @@
 //! Asset: a cut-out with its real size, outline and class, kept in a folder with one manifest.
 //!
 //! An asset folder holds `assets.toml` ([`Manifest`]) and, in a folder for each asset, its cut-outs (half-float EXR,
-//! premultiplied, scene-linear) with a thumbnail PNG beside each. The manifest is written last and whole, so that a
+//! scene-linear: `R G B A` premultiplied, `TR TG TB` transmittance as measured, `VR VG VB` that of the line of sight) with
+//! a thumbnail PNG and its outline (`NAME.outline.json`, [`OutlineFile`]) beside each. The manifest is written last and whole, so that a
 //! folder never names a picture that is not there.
 //!
 //! ```text
@@ -9,19 +10,28 @@
 //! ```
 
 mod build;
+mod contact_sheet;
+mod files;
 mod folder;
 mod library;
 mod manifest;
+mod measure;
+mod moments;
 mod panorama;
+mod screen_source;
 mod size;
 mod texture;
 mod thumbnail;
 
 pub use build::{Built, List, ListedPhoto, build};
+pub use contact_sheet::contact_sheet;
+pub use files::OutlineFile;
 pub use folder::{AddPhoto, Scale, add_photo};
 pub use library::{Asset, Library, Photo};
 pub use manifest::{AssetRecord, Manifest, PhotoRecord, default_classes};
+pub use moments::{Moments, Piece};
 pub use panorama::{Panorama, direction_to_uv, uv_to_direction};
+pub use screen_source::ScreenSource;
 pub use size::oriented_size;
 pub use texture::Texture;
 

@@ -1,5 +1,6 @@
 //! A picture of everything around: an equirectangular environment map.
 
+use super::moments::{Piece, Sums};
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
@@ -7,6 +8,7 @@ use crate::io;
 use crate::pixel::{LinearRgb, Mix};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// Radiance from every direction, as an equirectangular picture, scene-linear.
 ///
@@ -14,6 +16,8 @@ use std::path::Path;
 #[derive(Debug)]
 pub struct Panorama {
     image: Image<LinearRgb>,
+    /// Made when light is first asked for.
+    sums: OnceLock<Sums>,
 }
 
 impl Panorama {
@@ -31,7 +35,7 @@ impl Panorama {
             let what = format!("{:?} at ({x}, {y}), expected numbers of at least 0", image.pixels()[i]);
             return Err(Error::value("environment", what));
         }
-        Ok(Self { image })
+        Ok(Self { image, sums: OnceLock::new() })
     }
 
     /// Reads a panorama from a file, an HDR or EXR as a rule.
@@ -53,7 +57,11 @@ impl Panorama {
     /// # Method
     /// Bilinear between texel centres, around in `u`, the outermost row going on in `v`.
     pub fn radiance(&self, direction: &Vector3<f64>) -> LinearRgb {
-        let [u, v] = direction_to_uv(direction);
+        self.at(direction_to_uv(direction))
+    }
+
+    /// Radiance at a place of the picture.
+    pub(super) fn at(&self, [u, v]: [f64; 2]) -> LinearRgb {
         let (width, height) = self.image.size();
         let x = u * width as f64 - 0.5;
         let y = (v * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
@@ -67,6 +75,37 @@ impl Panorama {
             .add_scaled(s * (1.0 - t), corner(1, 0))
             .add_scaled((1.0 - s) * t, corner(0, 1))
             .add_scaled(s * t, corner(1, 1))
+    }
+
+    /// The panorama cut into at most `count` (at least 2) rectangles, small where light is strong and uneven.
+    ///
+    /// # Method
+    /// Whichever rectangle would make the largest error in shadows, were all its light to come from one direction, is cut
+    /// in two where that leaves the least; so a sun ends up alone. More pieces cut fewer pieces further. As median cut
+    /// [Debevec 2005], with the error of shadow edges for the energy.
+    ///
+    /// [Debevec 2005]: https://doi.org/10.1145/1187297.1187387
+    pub fn pieces(&self, count: usize) -> Vec<Piece> {
+        self.sums().pieces(count)
+    }
+
+    /// The panorama in even rectangles, `rows` of twice as many.
+    pub(crate) fn even(&self, rows: usize) -> Vec<Piece> {
+        self.sums().even(rows)
+    }
+
+    /// Irradiance on a receiver with this unit normal, nothing in the way; red, green, blue.
+    pub fn irradiance(&self, normal: &Vector3<f64>) -> [f64; 3] {
+        self.sums().irradiance(normal)
+    }
+
+    fn sums(&self) -> &Sums {
+        if let Some(sums) = self.sums.get() {
+            return sums;
+        }
+        // Summed before the cell is locked: the work is parallel, and a thread that waits may come back here.
+        let sums = Sums::of(self);
+        self.sums.get_or_init(|| sums)
     }
 }
 

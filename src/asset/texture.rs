@@ -56,6 +56,14 @@ impl Texture {
         }
     }
 
+    /// The full picture as film.
+    pub fn to_film(&self) -> Image<Film> {
+        match self {
+            Self::Rgba(pyramid) => pyramid.base().map(Film::from),
+            Self::Film(pyramid) => pyramid.base().clone(),
+        }
+    }
+
     /// CRC-32 of the texels at full detail.
     pub fn checksum(&self) -> u32 {
         match self {

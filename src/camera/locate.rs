@@ -35,12 +35,14 @@ mod tests {
             image: [640, 480],
             plate: "bg0000".into(),
             camera: CameraSource::Rectangle { corners_px, photo: [1280, 960], focal_px: Some(1374.852) },
-            surface: Surface { size: [0.56, 0.37] },
+            surface: Surface::new([0.56, 0.37]),
             objects: Vec::new(),
             lights: Vec::new(),
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: Exposure::default(),
+            cast: Default::default(),
+            finish: Default::default(),
         }
     }
 

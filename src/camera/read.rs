@@ -11,10 +11,14 @@ const ZOOMED_SIGMA: f64 = 0.25;
 /// Reads a label (`NAME.label.json`), with what its photo knows of the focal length where it says nothing itself.
 ///
 /// # Errors
-/// A file that cannot be read or understood; a photo of another size than the label says.
+/// A file that cannot be read or understood; a photo that does not lie with its label, or has another size than it says.
 pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
-    with_photo(io::read_json(path)?, path)
+    let label: Label = io::read_json(path)?;
+    if !label.image.file.is_empty() {
+        io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
+    }
+    with_photo(label, path)
 }
 
 /// A label that was read from `path`, with the focal length of its photo's EXIF data where it says nothing itself; as it

@@ -11,6 +11,7 @@
 mod hsv;
 mod quantize;
 mod space;
+mod temperature;
 mod transfer;
 mod ycbcr;
 
@@ -19,6 +20,7 @@ pub use quantize::{
     decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16, from_srgb8, to_srgb8,
 };
 pub use space::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, xyz_from_rgb};
+pub use temperature::planckian;
 pub use transfer::{Curve, linear_to_srgb, srgb_to_linear};
 pub use ycbcr::{CodeRange, Ycbcr};
 

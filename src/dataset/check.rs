@@ -2,11 +2,14 @@
 
 use crate::dataset::Part;
 use crate::dataset::journal::{Finished, JOURNAL, Line};
+use crate::dataset::listing::is_image;
+use crate::dataset::near::{NEAR_CODES, Thumbnail, nearest};
 use crate::dataset::yolo::LEAST_SIDE_PX;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::error::{Error, Result};
 use crate::io;
 use crate::pixel::PremulRgba;
+use crate::report::Table;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -31,7 +34,7 @@ impl fmt::Display for Fault {
 }
 
 /// What [`check`] found.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checked {
     /// Everything that is wrong, in order of file and line; empty for a good dataset.
     pub faults: Vec<Fault>,
@@ -39,12 +42,82 @@ pub struct Checked {
     pub images: usize,
     /// Rows of label files for each class, in order.
     pub rows: Vec<usize>,
+    /// What stands in each good row of boxes.
+    pub boxes: Vec<CheckedBox>,
+    /// Names of the classes, in order.
+    pub classes: Vec<String>,
+}
+
+/// A row of a label file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CheckedBox {
+    /// Part that its image belongs to.
+    pub part: Part,
+    /// Its class.
+    pub class: usize,
+    /// Width and height as shares of the image's; none of an outline.
+    pub sides: Option<[f64; 2]>,
+}
+
+/// Boxes with less than this share of the image's width or height are told as small.
+const SMALL_SIDE: f64 = 0.01;
+
+/// A class with less than this share of the labels is told as rare.
+const RARE: f64 = 0.02;
+
+impl Checked {
+    /// For each class its labels in both parts and the sizes of its boxes.
+    pub fn balance(&self) -> Table {
+        let mut table = Table::new(["class", "train", "val", "share", "box width", "box height"]);
+        for class in 0..self.rows.len() {
+            let of = |part| self.boxes.iter().filter(|b| b.class == class && b.part == part).count().to_string();
+            let share = 100.0 * self.rows[class] as f64 / self.boxes.len().max(1) as f64;
+            let [width, height] = [0, 1].map(|side| self.spread(class, side));
+            let name = self.classes.get(class).cloned().unwrap_or_else(|| class.to_string());
+            table.push([name, of(Part::Train), of(Part::Val), format!("{share:.1} %"), width, height]);
+        }
+        table
+    }
+
+    /// Smallest, middle and largest side of a class's boxes, percent of the image.
+    fn spread(&self, class: usize, side: usize) -> String {
+        let of = self.boxes.iter().filter(|b| b.class == class).filter_map(|b| b.sides.map(|sides| sides[side]));
+        let mut sides: Vec<f64> = of.map(|side| 100.0 * side).collect();
+        sides.sort_by(f64::total_cmp);
+        match sides.as_slice() {
+            [] => "-".into(),
+            [low, ..] => format!("{low:.1} / {:.1} / {:.1} %", sides[sides.len() / 2], sides[sides.len() - 1]),
+        }
+    }
+
+    /// What is no fault but worth knowing: classes without labels or with few, boxes that are very small.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        for (class, name) in self.classes.iter().enumerate() {
+            for part in Part::ALL {
+                if !self.boxes.iter().any(|b| b.class == class && b.part == part) {
+                    remarks.push(format!("class \"{name}\" has no label in {}", part.name()));
+                }
+            }
+            let rows = self.rows.get(class).copied().unwrap_or(0);
+            if rows > 0 && (rows as f64) < RARE * self.boxes.len() as f64 {
+                remarks.push(format!("class \"{name}\" has only {rows} of {} labels", self.boxes.len()));
+            }
+        }
+        let small = |b: &&CheckedBox| b.sides.is_some_and(|sides| sides.iter().any(|side| *side < SMALL_SIDE));
+        let small = self.boxes.iter().filter(small).count();
+        if small > 0 {
+            remarks.push(format!("{small} boxes are below {:.0} % of the image's side", 100.0 * SMALL_SIDE));
+        }
+        remarks
+    }
 }
 
 /// Checks a YOLO dataset as YOLOv5 and Ultralytics do on loading it, and more strictly where they only warn.
 ///
 /// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders exist and hold images;
-/// * every image decodes to its end and has sides of at least 10 pixels; no two have the same bytes;
+/// * every image decodes to its end and has sides of at least 10 pixels; no two that show something have the same bytes;
+/// * no image for validation looks like one for training ([`NEAR_CODES`]), unless it shows nothing;
 /// * every image has a label file and every label file an image;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), a whole class number below `nc`, shares in
 ///   0..1, sides above 0, and no twin in the same file;
@@ -59,23 +132,30 @@ pub fn check(folder: &Path) -> Result<Checked> {
     let mut all = Findings { folder, faults: Vec::new() };
     let yaml = all.data_yaml();
     let mut images = Vec::new();
+    let mut parts = Vec::new();
     for part in Part::ALL {
         images.extend(all.images(yaml.folder(part)));
+        parts.resize(images.len(), part);
     }
     let looked: Vec<_> = images.par_iter().map(|image| look(folder, image, yaml.classes())).collect();
     let mut rows = vec![0; yaml.classes().unwrap_or(0)];
+    let mut boxes = Vec::new();
     let mut same: BTreeMap<(u64, u32), &Path> = BTreeMap::new();
-    for (image, look) in images.iter().zip(&looked) {
+    for ((image, look), &part) in images.iter().zip(&looked).zip(&parts) {
         all.faults.extend(look.faults.iter().cloned());
-        look.classes.iter().for_each(|&class| rows[class] += 1);
-        if let Some(twin) = look.bytes.and_then(|bytes| same.insert(bytes, image)) {
+        look.rows.iter().for_each(|(class, _)| rows[*class] += 1);
+        boxes.extend(look.rows.iter().map(|&(class, sides)| CheckedBox { part, class, sides }));
+        // Pictures of an empty place are alike, and rightly so.
+        let twin = look.bytes.filter(|_| !look.is_empty).and_then(|bytes| same.insert(bytes, image));
+        if let Some(twin) = twin {
             all.add(image, None, format!("the same bytes as {}", twin.display()));
         }
     }
+    all.leaks(&images, &looked, &parts);
     all.orphans(&images, &yaml);
     all.journal(&images);
     all.faults.sort();
-    Ok(Checked { faults: all.faults, images: images.len(), rows })
+    Ok(Checked { faults: all.faults, images: images.len(), rows, boxes, classes: yaml.names().to_vec() })
 }
 
 /// Faults found so far.
@@ -124,6 +204,23 @@ impl Findings<'_> {
                 list(self.folder, &labels).into_iter().filter(|path| path.extension().is_some_and(|e| e == "txt"));
             for orphan in texts.filter(|path| !wanted.contains(path)) {
                 self.add(orphan, None, "no image of this name");
+            }
+        }
+    }
+
+    /// Images for validation that look like one that is trained on.
+    fn leaks(&mut self, images: &[PathBuf], looked: &[Look], parts: &[Part]) {
+        let of = |part: Part| -> (Vec<usize>, Vec<Thumbnail>) {
+            let those = (0..images.len()).filter(|&i| parts[i] == part && !looked[i].is_empty);
+            those.filter_map(|i| Some((i, looked[i].small.clone()?))).unzip()
+        };
+        let ((train, train_small), (val, val_small)) = (of(Part::Train), of(Part::Val));
+        for (i, j, codes) in nearest(&train_small, &val_small, NEAR_CODES) {
+            let (image, twin) = (&images[val[i]], &images[train[j]]);
+            // The same bytes are told already.
+            if looked[val[i]].bytes != looked[train[j]].bytes {
+                let what = format!("leak: differs from {} by {codes:.2} of 255 only", twin.display());
+                self.add(image, None, what);
             }
         }
     }
@@ -177,11 +274,6 @@ fn list(folder: &Path, below: &str) -> Vec<PathBuf> {
     files
 }
 
-fn is_image(path: &Path) -> bool {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    extension.is_some_and(|e| ["png", "jpg", "jpeg", "tif", "tiff"].contains(&e.as_str()))
-}
-
 /// The label file of an image, where trainers look for it: the last folder `images` becomes `labels`.
 fn label_of(image: &Path) -> PathBuf {
     let parts: Vec<_> = image.iter().collect();
@@ -194,8 +286,12 @@ fn label_of(image: &Path) -> PathBuf {
 #[derive(Default)]
 struct Look {
     faults: Vec<Fault>,
-    /// Class of each good row.
-    classes: Vec<usize>,
+    /// Class of each good row, and the sides of its box.
+    rows: Vec<(usize, Option<[f64; 2]>)>,
+    /// There is nothing in it.
+    is_empty: bool,
+    /// A small copy, if it can be read.
+    small: Option<Thumbnail>,
     /// Size and checksum of the image's file.
     bytes: Option<(u64, u32)>,
 }
@@ -208,7 +304,7 @@ fn look(folder: &Path, image: &Path, class_count: Option<usize>) -> Look {
             let (w, h) = picture.size();
             look.faults.push(fault(image, None, format!("{w} x {h} pixels, expected at least {LEAST_SIDE_PX} a side")));
         }
-        Ok(_) => {}
+        Ok(picture) => look.small = Some(Thumbnail::of(&picture.map(|p| p.color()))),
     }
     look.bytes = Finished::of(folder, image).ok().map(|file| (file.bytes, file.crc32));
     let label = label_of(image);
@@ -216,13 +312,16 @@ fn look(folder: &Path, image: &Path, class_count: Option<usize>) -> Look {
         Err(_) => {
             look.faults.push(fault(label, None, format!("missing or not text, but there is {}", image.display())))
         }
-        Ok(text) => look.rows(&label, &text, class_count),
+        Ok(text) => {
+            look.is_empty = text.trim().is_empty();
+            look.read(&label, &text, class_count);
+        }
     }
     look
 }
 
 impl Look {
-    fn rows(&mut self, label: &Path, text: &str, class_count: Option<usize>) {
+    fn read(&mut self, label: &Path, text: &str, class_count: Option<usize>) {
         let rows: Vec<(usize, Vec<&str>)> =
             text.lines().enumerate().map(|(i, line)| (i + 1, line.split_whitespace().collect())).collect();
         let rows: Vec<_> = rows.into_iter().filter(|(_, row): &(_, Vec<_>)| !row.is_empty()).collect();
@@ -236,7 +335,8 @@ impl Look {
                     self.faults.push(fault(label, Some(i), "the same row stands above"));
                 }
                 Ok(values) => {
-                    self.classes.extend(class_count.map(|_| values[0] as usize));
+                    let sides = (!outlines).then(|| [values[3], values[4]]);
+                    self.rows.extend(class_count.map(|_| (values[0] as usize, sides)));
                     known.push(values);
                 }
             }

@@ -1,6 +1,6 @@
 //! A dataset's folder: claimed by one run at a time, and only for the plan that it was begun with.
 
-use crate::dataset::{Plan, SplitOrder};
+use crate::dataset::{Numbers, Plan, Shard, SplitOrder};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -29,6 +29,7 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
         return Err(Error::file(folder, format!("is not empty and has no {IDENTITY}, expected a new or empty folder")));
     }
     io::create_folder(folder)?;
+    io::refuse_links(folder)?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
@@ -38,6 +39,14 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     io::write_json(folder.join(IDENTITY), &now)?;
     plan.writers.iter().try_for_each(|writer| writer.begin(folder, &plan.classes))?;
     Ok(Claim { _lock: lock })
+}
+
+/// Claims the folder of a dataset that was begun before.
+pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
+    match identity(folder)? {
+        Some(_) => Ok(Claim { _lock: lock(folder)? }),
+        None => Err(Error::file(folder, format!("no {IDENTITY}, expected a dataset that was begun before"))),
+    }
 }
 
 /// What a folder was made from; none where it is no dataset yet.
@@ -91,6 +100,9 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
         "writers": plan.writers.iter().map(|writer| writer.settings()).collect::<Vec<_>>(),
         "recipe": plan.recipe,
     });
+    if let Numbers::Shard(Shard { index, of }) = plan.numbers {
+        identity["shard"] = json!({ "index": index, "of": of, "count": plan.count });
+    }
     if plan.split.order == SplitOrder::Consecutive {
         identity["count"] = plan.count.into();
     }
@@ -98,7 +110,7 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
 }
 
 /// Compares two documents and names the first field in which they differ.
-fn same(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
+pub(crate) fn same(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
     match (before, now) {
         (Value::Object(a), Value::Object(b)) => same_keys(a, b, at),
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {

@@ -1,7 +1,7 @@
 //! The part of a recipe that says how labels are made and written: its table `[labels]`.
 
-use crate::dataset::{Obstructed, Writer, Yolo};
-use crate::label::{AmodalBox, LabelOptions};
+use crate::dataset::{Coco, Layers, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
+use crate::label::{AmodalBox, BBox, LabelOptions, Mask, ObjectLabel};
 use serde::{Deserialize, Serialize};
 
 /// How labels are made and written: the table `[labels]` of a recipe.
@@ -22,14 +22,51 @@ pub struct LabelSetup {
     pub formats: Vec<Format>,
     /// Settings of YOLO.
     pub yolo: Yolo,
+    /// Settings of COCO.
+    pub coco: Coco,
+    /// Settings of Pascal VOC.
+    pub voc: Voc,
+    /// Settings of WebDataset.
+    pub webdataset: WebDataset,
+    /// Settings of the EXR files with layers.
+    pub layers: Layers,
 }
 
 /// A layout of labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "lowercase")]
 pub enum Format {
     /// [`Yolo`].
     Yolo,
+    /// [`Coco`].
+    Coco,
+    /// [`Voc`].
+    Voc,
+    /// [`Layers`].
+    Layers,
+    /// [`WebDataset`].
+    WebDataset,
+}
+
+/// How much of an object a label tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Extent {
+    /// The whole object as far as it lies in the picture.
+    #[default]
+    Amodal,
+    /// What is seen of it; an object of which nothing is seen has no label.
+    Visible,
+}
+
+impl Extent {
+    /// Box and mask of an object.
+    pub fn of(self, object: &ObjectLabel) -> (BBox, &Mask) {
+        match self {
+            Self::Amodal => (object.amodal_box, &object.amodal_mask),
+            Self::Visible => (object.visible_box, &object.visible_mask),
+        }
+    }
 }
 
 impl Default for LabelSetup {
@@ -42,6 +79,10 @@ impl Default for LabelSetup {
             amodal,
             formats: vec![Format::Yolo],
             yolo: Yolo::default(),
+            coco: Coco::default(),
+            voc: Voc::default(),
+            webdataset: WebDataset::default(),
+            layers: Layers::default(),
         }
     }
 }
@@ -52,17 +93,40 @@ impl LabelSetup {
         LabelOptions { amodal: self.amodal, alpha_threshold: self.alpha_threshold, overlap_iou: self.overlap_iou }
     }
 
-    /// The writers of the layouts, each once, in the order in which [`Format`] lists them.
-    pub fn writers(&self) -> Vec<Box<dyn Writer>> {
+    /// The writers of the layouts, each once, in the order in which [`Format`] lists them: [`WebDataset`] packs what the
+    /// others write.
+    pub fn writers(&self, pictures: &Pictures) -> Vec<Box<dyn Writer>> {
         let mut formats = self.formats.clone();
         formats.sort();
         formats.dedup();
-        formats.into_iter().map(|format| self.writer(format)).collect()
+        formats.into_iter().map(|format| self.writer(format, pictures)).collect()
     }
 
-    fn writer(&self, format: Format) -> Box<dyn Writer> {
+    fn writer(&self, format: Format, pictures: &Pictures) -> Box<dyn Writer> {
         match format {
             Format::Yolo => Box::new(self.yolo),
+            Format::Coco => Box::new(Coco { pictures: pictures.format, ..self.coco }),
+            Format::Voc => Box::new(Voc { pictures: pictures.format, ..self.voc }),
+            Format::Layers => Box::new(self.layers),
+            Format::WebDataset => Box::new(self.webdataset),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_written_once_and_archives_last() {
+        let asked: LabelSetup = toml::from_str(r#"formats = ["webdataset", "coco", "yolo", "coco"]"#).unwrap();
+        let names = asked.writers(&Pictures::default()).iter().map(|w| w.settings()).collect::<Vec<_>>();
+        let keys: Vec<_> = names.iter().flat_map(|s| s.as_object().unwrap().keys().cloned()).collect();
+        assert_eq!(keys, ["yolo", "coco", "webdataset"]);
+    }
+
+    #[test]
+    fn the_defaults_of_the_table_are_those_of_the_labels() {
+        assert_eq!(LabelSetup::default().options(), LabelOptions::default());
     }
 }

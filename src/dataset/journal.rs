@@ -4,10 +4,11 @@
 //! the order in which samples finish; [`Journal::close`] puts them in order of number, so a finished folder does not tell
 //! how it was made.
 
-use crate::dataset::{Entry, Part, Written};
+use crate::dataset::{Entry, Part, Written, folder};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::knotted;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -62,7 +63,7 @@ impl Line {
             part: entry.part,
             classes,
             knotted: knotted(&entry.sample.labels.objects).len() as u64,
-            retries: entry.sample.retries,
+            retries: entry.sample.rejected.len() as u32,
             files: files.iter().map(|path| Finished::of(folder, path)).collect::<Result<_>>()?,
         })
     }
@@ -71,6 +72,11 @@ impl Line {
     pub(crate) fn written(&self) -> Written {
         let files = self.files.iter().map(|file| file.path.split('/').collect()).collect();
         Written { k: self.k, part: self.part, files }
+    }
+
+    /// Every file is there with its very bytes.
+    fn is_whole(&self, folder: &Path) -> bool {
+        self.files.iter().all(|file| Finished::of(folder, Path::new(&file.path)).is_ok_and(|found| found == *file))
     }
 
     /// Every file is there in its full size.
@@ -89,6 +95,9 @@ impl Finished {
     }
 }
 
+/// Lines whose files may not be on the disk yet: a run brings everything there at least this often.
+const UNSURE: usize = 2 * 256;
+
 /// An open journal.
 pub(crate) struct Journal {
     path: PathBuf,
@@ -98,13 +107,19 @@ pub(crate) struct Journal {
 
 impl Journal {
     /// Opens the journal of a folder, or starts one. Lines that are torn, or whose files are not there, are forgotten.
+    ///
+    /// What was written last may not have reached the disk when a machine went down: the files of the last lines are
+    /// compared by checksum.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(JOURNAL);
         let fail = |e: std::io::Error| Error::file(&path, e);
         let mut file = OpenOptions::new().read(true).append(true).create(true).open(&path).map_err(fail)?;
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(fail)?;
-        let lines = read(&text).filter(|line| line.holds(folder)).map(|line| (line.k, line)).collect();
+        let told: Vec<Line> = read(&text).collect();
+        let last = told.len().saturating_sub(UNSURE);
+        let holds = |(i, line): &(usize, Line)| if *i < last { line.holds(folder) } else { line.is_whole(folder) };
+        let lines = told.into_iter().enumerate().filter(holds).map(|(_, line)| (line.k, line)).collect();
         if text.last().is_some_and(|&end| end != b'\n') {
             log::warn!("{}: the last line is torn; its sample is made again", path.display());
             file.write_all(b"\n").map_err(fail)?;
@@ -125,9 +140,9 @@ impl Journal {
         Ok(())
     }
 
-    /// Number of finished samples below `count`.
-    pub(crate) fn count(&self, count: u64) -> u64 {
-        self.lines.range(..count).count() as u64
+    /// Number of finished samples below `count` that are wanted.
+    pub(crate) fn count(&self, count: u64, wanted: impl Fn(u64) -> bool) -> u64 {
+        self.lines.range(..count).filter(|(k, _)| wanted(**k)).count() as u64
     }
 
     /// Puts the lines in order and returns those of the samples below `count`.
@@ -137,6 +152,20 @@ impl Journal {
         self.lines.split_off(&count);
         Ok(self.lines.into_values().collect())
     }
+}
+
+/// Looks whether the files of a dataset are as they were written, and has those made again that are not: returns how many
+/// samples are good and how many the next run makes again.
+///
+/// # Errors
+/// A folder that holds no dataset, or that a run is writing.
+pub fn mend(folder: &Path) -> Result<(usize, usize)> {
+    let _lock = folder::reclaim(folder)?;
+    let lines = lines_of(folder)?;
+    let whole: Vec<&Line> = lines.par_iter().filter(|line| line.is_whole(folder)).collect();
+    let text: String = whole.iter().map(|line| line_text(line)).collect();
+    io::write_text(folder.join(JOURNAL), &text)?;
+    Ok((whole.len(), lines.len() - whole.len()))
 }
 
 /// The lines of a folder's journal, in order of number.

@@ -3,8 +3,8 @@
 //! A [`Studio`] opens what a recipe file ([`Setup`]) names and makes sample `k` of it: draws the scene, lets it settle,
 //! lights, renders and labels it.
 //!
-//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Yolo`]
-//! the labels, [`Sidecar`] everything that was drawn. Sample `k` has the same files, to the byte, whatever the number of
+//! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Sidecar`]
+//! everything that was drawn, [`Yolo`], [`Coco`], [`Voc`], [`WebDataset`] and [`Layers`] the labels. Sample `k` has the same files, to the byte, whatever the number of
 //! threads, and after any interruption:
 //!
 //! ```text
@@ -17,34 +17,59 @@
 //! ```
 
 mod check;
+mod coco;
 mod contact_sheet;
 mod folder;
 mod formats;
 mod generate;
 mod journal;
+mod layers;
+mod listing;
+mod merge;
+mod near;
 mod obstructed;
 mod pictures;
 mod place;
+mod run;
 mod setup;
+mod shard;
+mod sharing;
 mod sidecar;
 mod split;
 mod studio;
+mod summary;
+mod times;
+mod voc;
+mod webdataset;
 mod yolo;
 mod yolo_set;
 mod yolo_yaml;
 
 pub use check::{Checked, Fault, check};
+pub use coco::{Coco, CocoMask};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
-pub use formats::{Format, LabelSetup};
-pub use generate::{Plan, Progress, generate};
-pub use journal::{ClassCount, Report};
+pub use formats::{Extent, Format, LabelSetup};
+pub use generate::{Plan, generate};
+pub(crate) use journal::read as journal_lines;
+pub use journal::{ClassCount, Report, mend};
+pub use layers::Layers;
+pub use listing::Listing;
+pub use merge::merge;
+pub use near::{NEAR_CODES, Near};
 pub use obstructed::{Labelled, OBSTRUCTED, Obstructed};
 pub use pictures::{PictureFormat, Pictures};
+pub use run::Progress;
 pub use setup::Setup;
+pub use shard::{Numbers, Shard, ShardChoice};
+pub use sharing::{Group, Leaks, Sharing};
 pub use sidecar::{Record, Sidecar};
 pub use split::{Part, Split, SplitOrder};
 pub use studio::Studio;
-pub use yolo::{Yolo, YoloBox, YoloTask};
+pub use summary::{Shown, Summary};
+pub use times::Times;
+pub use voc::Voc;
+pub use webdataset::WebDataset;
+pub use yolo::{Yolo, YoloTask};
 pub use yolo_set::YoloSet;
 
 use crate::error::Result;
@@ -52,7 +77,7 @@ use crate::image::Image;
 use crate::label::Labels;
 use crate::pixel::PremulRgba;
 use crate::render::DeepImage;
-use crate::scene::Scene;
+use crate::scene::{Drawn, Scene};
 use std::path::{Path, PathBuf};
 
 /// One finished picture and all that is known of it.
@@ -70,8 +95,12 @@ pub struct Sample {
     pub scene: Scene,
     /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
     pub scene_seed: u64,
-    /// Scenes that were drawn and thrown away before this one.
-    pub retries: u32,
+    /// Why each scene that was drawn before this one was thrown away.
+    pub rejected: Vec<String>,
+    /// Every draw that the scene was made with, in order.
+    pub draws: Vec<Drawn>,
+    /// How long it took; in no file of the dataset.
+    pub times: Times,
 }
 
 /// A sample and its place in the dataset: what a [`Writer`] writes.
@@ -109,6 +138,17 @@ pub struct Written {
     pub part: Part,
     /// Its files below the dataset's folder, those of all writers, in their order.
     pub files: Vec<PathBuf>,
+}
+
+impl Written {
+    /// The sample's file in a folder of the dataset: the first of `coco` is the one that COCO joins.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
+        let found = self.files.iter().find(|file| file.starts_with(kind)).map(PathBuf::as_path);
+        found.ok_or_else(|| std::io::Error::other(format!("sample {} has no file in {kind}", self.k)))
+    }
 }
 
 /// A layout that a dataset is written in.

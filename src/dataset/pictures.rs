@@ -2,19 +2,28 @@
 
 use crate::dataset::{Entry, Part, Writer};
 use crate::error::Result;
-use crate::io;
+use crate::io::{self, WriteOptions};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Writes `images/{train,val}/NNNNNN.png` or `.jpg`, 8-bit sRGB, on black where nothing lies behind the objects, and on
 /// request the scene-linear picture beside it as `exr/{train,val}/NNNNNN.exr`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pictures {
     /// Format. Default: `png`.
     pub format: PictureFormat,
+    /// Quality of a `jpg`, 1 to 100. Default: 95.
+    pub jpeg_quality: u8,
     /// Also write the scene-linear picture with its alpha. Default: no.
     pub exr: bool,
+}
+
+impl Default for Pictures {
+    fn default() -> Self {
+        let format = PictureFormat::default();
+        Self { format, jpeg_quality: WriteOptions::default().jpeg_quality, exr: false }
+    }
 }
 
 /// Format of the images that trainers read.
@@ -29,7 +38,7 @@ pub enum PictureFormat {
 }
 
 impl PictureFormat {
-    fn extension(self) -> &'static str {
+    pub(crate) fn extension(self) -> &'static str {
         match self {
             Self::Png => "png",
             Self::Jpg => "jpg",
@@ -52,7 +61,8 @@ impl Writer for Pictures {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let mut paths = vec![entry.path("images", self.format.extension())];
-        io::write(folder.join(&paths[0]), &entry.sample.frame.map(|p| p.color()))?;
+        let options = WriteOptions { jpeg_quality: self.jpeg_quality, ..WriteOptions::default() };
+        io::write_with(folder.join(&paths[0]), &entry.sample.frame.map(|p| p.color()), &options)?;
         if self.exr {
             let exr = entry.path("exr", "exr");
             io::write(folder.join(&exr), &entry.sample.frame)?;

@@ -1,10 +1,11 @@
 //! The file that a dataset is made from.
 
+use crate::dataset::yolo::LEAST_SIDE_PX;
 use crate::dataset::{LabelSetup, Pictures, Split};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io;
 use crate::render::RenderOptions;
-use crate::scene::Recipe;
+use crate::scene::{Ablation, Recipe};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -56,5 +57,117 @@ impl Setup {
         setup.assets = folder.join(&setup.assets);
         setup.backgrounds = folder.join(&setup.backgrounds);
         Ok(setup)
+    }
+
+    /// A recipe file that says what every default is, with its unit: to be changed by hand.
+    pub fn template() -> &'static str {
+        include_str!("template.toml")
+    }
+
+    /// Writes a recipe file that gives this setup when it is read.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
+        let folder = absolute(path.parent().unwrap_or(Path::new("")))?;
+        let mut setup = self.clone();
+        setup.assets = io::relative(&absolute(&setup.assets)?, &folder);
+        setup.backgrounds = io::relative(&absolute(&setup.backgrounds)?, &folder);
+        io::write_toml(path, &setup)
+    }
+
+    /// The same in pictures of half the width and height, for a first look: the same scenes.
+    pub fn preview(mut self) -> Self {
+        self.scene.image = self.scene.image.map(|side| (side / 2).max(LEAST_SIDE_PX));
+        self
+    }
+
+    /// The setups of the paper's ablations: this one with one source of variation after another switched off, the scenes
+    /// in pairs.
+    pub fn ablations(&self) -> impl Iterator<Item = (Ablation, Self)> {
+        Ablation::PAPER.into_iter().map(|ablation| {
+            let mut setup = self.clone();
+            setup.scene.off.extend(ablation.off);
+            setup.scene.off.sort();
+            setup.scene.off.dedup();
+            (ablation, setup)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toml::{Table, Value};
+
+    /// Whole numbers and broken ones that are equal are the same.
+    fn same(a: &Value, b: &Value) -> bool {
+        match (a, b) {
+            (Value::Integer(a), Value::Float(b)) | (Value::Float(b), Value::Integer(a)) => *a as f64 == *b,
+            (Value::Array(a), Value::Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)),
+            _ => a == b,
+        }
+    }
+
+    /// What one table says and the other does not.
+    fn missing(from: &Table, all: &Table, at: &str) -> Vec<String> {
+        let key = |key: &String| if at.is_empty() { key.clone() } else { format!("{at}.{key}") };
+        let of = |(name, value): (&String, &Value)| match (value, from.get(name)) {
+            (Value::Table(all), Some(Value::Table(from))) => missing(from, all, &key(name)),
+            (Value::Array(all), Some(Value::Array(from))) if all.first().is_some_and(Value::is_table) => {
+                let pairs = from.iter().zip(all).filter_map(|(from, all)| Some((from.as_table()?, all.as_table()?)));
+                pairs.flat_map(|(from, all)| missing(from, all, &key(name))).collect()
+            }
+            (all, Some(from)) if same(all, from) => vec![],
+            (all, _) => vec![format!("{} = {all}", key(name))],
+        };
+        all.iter().flat_map(of).collect()
+    }
+
+    /// A new key in a recipe needs a line in src/dataset/template.toml.
+    #[test]
+    fn the_template_tells_every_default() {
+        let bare = |line: &str| {
+            let key = line.strip_prefix('#').filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase()));
+            key.unwrap_or(line).to_owned()
+        };
+        let template: Vec<String> = Setup::template().lines().map(bare).collect();
+        let told: Table = template.join("\n").parse().unwrap();
+        let all = Table::try_from(Setup::default()).unwrap();
+        assert_eq!(missing(&told, &all, ""), [""; 0], "not in template.toml, or otherwise");
+        assert_eq!(missing(&all, &told, ""), [""; 0], "only in template.toml");
+        assert_eq!(toml::from_str::<Setup>(Setup::template()).unwrap(), Setup::default());
+    }
+
+    #[test]
+    fn a_written_recipe_gives_the_same_setup_from_another_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        io::write_text(dir.path().join("recipe.toml"), "assets = 'a/b'\n[scene]\nobjects = 3\noff = ['light']\n")
+            .unwrap();
+        let setup = Setup::read(dir.path().join("recipe.toml"), &[]).unwrap();
+        io::create_folder(dir.path().join("x/y")).unwrap();
+        setup.write(dir.path().join("x/y/recipe.toml")).unwrap();
+        let text = io::read_text(dir.path().join("x/y/recipe.toml")).unwrap();
+        assert!(text.contains("assets = \"../../a/b\""), "{text}");
+        let again = Setup::read(dir.path().join("x/y/recipe.toml"), &[]).unwrap();
+        assert_eq!((again.scene, again.labels), (setup.scene, setup.labels));
+    }
+
+    #[test]
+    fn the_ablations_are_the_paper_s() {
+        let base = Setup::default();
+        let names: Vec<_> = base.ablations().map(|(ablation, setup)| (ablation.name, setup.scene.off.len())).collect();
+        assert_eq!(names.len(), 7);
+        assert_eq!((names[0], names[6]), (("all", 0), ("all_off", 5)));
+    }
+
+    #[test]
+    fn a_wrong_key_is_answered_with_the_right_one() {
+        let dir = tempfile::tempdir().unwrap();
+        io::write_text(dir.path().join("recipe.toml"), "[scene]\nobject = 3\n").unwrap();
+        let told = Setup::read(dir.path().join("recipe.toml"), &[]).unwrap_err().to_string();
+        assert!(told.ends_with("scene: unknown key \"object\", did you mean \"objects\"?"), "{told}");
     }
 }

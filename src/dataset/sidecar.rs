@@ -7,6 +7,7 @@ use crate::label::{Labels, knotted};
 use crate::pixel::ObjectId;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Writes `scenes/{train,val}/NNNNNN.json`, a [`Record`] each: label formats forget most of what is known of a picture,
@@ -33,13 +34,15 @@ pub struct Record {
     pub labelled: Vec<ObjectId>,
     /// Objects that nothing lies over, by the topmost rule.
     pub topmost: Vec<ObjectId>,
-    /// Objects that lie over each other in a circle, or between two circles.
+    /// Objects that lie over each other in a circle.
     pub knotted: Vec<ObjectId>,
-    /// Scenes that were drawn and thrown away before this one.
-    pub retries: u32,
+    /// Why each scene that was drawn before this one was thrown away.
+    pub rejected: Vec<String>,
+    /// Every drawn value by the name of its draw.
+    pub draws: BTreeMap<String, f64>,
     /// What is where in the picture.
     pub labels: Labels,
-    /// Every value as it was drawn: objects still in the air, exposure still open.
+    /// What the draws gave: objects still in the air, exposure still open.
     pub drawn: Scene,
     /// What the picture was made from: camera, resting poses, lights, exposure.
     pub scene: Scene,
@@ -67,7 +70,7 @@ impl Writer for Sidecar {
 impl Record {
     /// What there is to say of an entry.
     fn of(entry: &Entry<'_>) -> Self {
-        let Sample { labels, drawn, scene, scene_seed, retries, .. } = entry.sample;
+        let Sample { labels, drawn, scene, scene_seed, rejected, draws, .. } = entry.sample;
         Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
             recipe_hash: entry.recipe_hash.to_owned(),
@@ -78,7 +81,8 @@ impl Record {
             labelled: entry.labelled.iter().map(|label| label.object.id).collect(),
             topmost: labels.objects.iter().filter(|object| object.is_topmost()).map(|object| object.id).collect(),
             knotted: knotted(&labels.objects),
-            retries: *retries,
+            rejected: rejected.clone(),
+            draws: draws.iter().map(|draw| (draw.path.clone(), draw.value)).collect(),
             labels: labels.clone(),
             drawn: drawn.clone(),
             scene: scene.clone(),

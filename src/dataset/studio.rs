@@ -4,14 +4,15 @@ use crate::asset::{Asset, Library, Panorama};
 use crate::camera;
 use crate::composite;
 use crate::dataset::place::Place;
-use crate::dataset::{Plan, Sample, Setup, Sidecar, Writer};
+use crate::dataset::times::timed;
+use crate::dataset::{Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label;
 use crate::light;
-use crate::pixel::LinearRgb;
-use crate::render;
-use crate::scene::{Background, Choice, Draws, Look, Scene, Shot, stock};
+use crate::pixel::{LinearRgb, PremulRgba};
+use crate::render::{self, DeepImage};
+use crate::scene::{Background, Choice, Drawn, Draws, Look, Scene, Shot, stock};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -27,7 +28,7 @@ pub struct Studio {
 }
 
 /// Scenes that will not settle are drawn again this often.
-const REDRAWS: u32 = 8;
+const REDRAWS: usize = 8;
 
 impl Studio {
     /// Opens the folders that a setup names.
@@ -58,12 +59,12 @@ impl Studio {
     /// Classes that the setup's policy for obstructed objects cannot add to.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         let labels = &self.setup.labels;
-        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures)];
-        writers.extend(labels.writers());
-        writers.push(Box::new(Sidecar));
+        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
+        writers.extend(labels.writers(&self.setup.pictures));
         Ok(Plan {
             folder: folder.into(),
             count,
+            numbers: Numbers::All,
             seed,
             recipe: self.fingerprint(),
             classes: labels.obstructed.classes(&self.library.classes)?,
@@ -89,7 +90,15 @@ impl Studio {
     /// # Errors
     /// As [`Recipe::scene`](crate::scene::Recipe::scene).
     pub fn draw(&self, seed: u64, k: u64) -> Result<Scene> {
-        self.setup.scene.scene(seed, k, &self.backgrounds, &self.stock)
+        self.explain(seed, k).map(|(scene, _)| scene)
+    }
+
+    /// Scene `k` and every draw that it is made with, in order.
+    ///
+    /// # Errors
+    /// As [`draw`](Self::draw).
+    pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
+        self.setup.scene.explained(seed, k, &self.backgrounds, &self.stock)
     }
 
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.
@@ -97,15 +106,15 @@ impl Studio {
     /// # Errors
     /// Files that cannot be read; objects that would not come to rest in any of several scenes.
     pub fn sample(&self, seed: u64, k: u64) -> Result<Sample> {
-        let mut retries = 0;
+        let mut rejected = Vec::new();
         loop {
-            let scene_seed = redraw_seed(seed, k, retries);
-            let scene = self.draw(scene_seed, k)?;
+            let scene_seed = redraw_seed(seed, k, rejected.len());
+            let (scene, draws) = self.explain(scene_seed, k)?;
             match self.take(scene) {
-                Ok(sample) => return Ok(Sample { retries, scene_seed, ..sample }),
-                Err(Error::Unsettled { what }) if retries < REDRAWS => {
+                Ok(sample) => return Ok(Sample { rejected, draws, scene_seed, ..sample }),
+                Err(Error::Unsettled { what }) if rejected.len() < REDRAWS => {
                     log::info!("scene {k} is drawn again: {what}");
-                    retries += 1;
+                    rejected.push(what);
                 }
                 Err(error) => return Err(error),
             }
@@ -118,11 +127,20 @@ impl Studio {
     /// As the stages: no camera, no rest, a name that is not in the folders.
     pub fn take(&self, scene: Scene) -> Result<Sample> {
         let drawn = scene.clone();
-        let (scene, shot) = self.resolve(scene)?;
-        let deep = render::cast(&shot, &self.setup.render);
+        let (resolved, settle) = timed(|| self.resolve(scene));
+        let (scene, shot) = resolved?;
+        let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
+        let (labels, label) = timed(|| label::label(&deep, &shot, &self.setup.labels.options()));
+        let times = Times { settle, render, label, ..Times::default() };
+        Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, rejected: vec![], draws: vec![], times })
+    }
+
+    /// Renders a shot and finishes its frame as the scene asks.
+    pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
+        let deep = render::cast(shot, &self.setup.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
-        let labels = label::label(&deep, &shot, &self.setup.labels.options());
-        Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, retries: 0 })
+        let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
+        (deep, frame)
     }
 
     /// Finds out what is unknown in a scene: its camera, where its objects come to rest, its exposure.
@@ -133,7 +151,7 @@ impl Studio {
         let plate = self.plate(&scene.plate)?;
         let mut scene = self.rest(camera::locate(scene)?)?;
         if let Some(plate) = &plate {
-            scene = light::expose(scene, plate);
+            scene = light::match_plate(scene, plate);
         }
         let shot = scene.resolve(|object| Look::of(&self.library, object), plate, panorama(&scene)?)?;
         Ok((scene, shot))
@@ -174,7 +192,7 @@ fn checksums(asset: &Asset) -> Vec<u32> {
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.
-fn redraw_seed(seed: u64, k: u64, n: u32) -> u64 {
+fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
     match n {
         0 => seed,
         n => Draws::new(seed, k).bits(&format!("redraw[{n}]")),

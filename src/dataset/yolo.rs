@@ -1,11 +1,11 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Entry, Labelled, Part, Writer};
+use crate::dataset::{Entry, Extent, Labelled, Part, Writer};
 use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::io;
-use crate::label::BBox;
+use crate::label::{BBox, trace};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,8 @@ pub(crate) const LEAST_SIDE_PX: u32 = 10;
 /// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
 ///
 /// Rows of `detect` are `class cx cy w h`, of `segment` `class x1 y1 x2 y2 ...`; positions are shares of the image's
-/// width and height, 0 to 1, six decimals. An image without objects has an empty file; equal rows are written once.
+/// width and height, 0 to 1, six decimals. An image without objects has an empty file; equal rows are written once; objects
+/// that are to be ignored have none.
 ///
 /// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks for them beside the
 /// file; YOLOv5 wants `path:` added, or to be started with the dataset as its working folder.
@@ -25,8 +26,8 @@ pub(crate) const LEAST_SIDE_PX: u32 = 10;
 pub struct Yolo {
     /// What is learned. Default: `detect`.
     pub task: YoloTask,
-    /// Which box a row of `detect` holds. Default: `amodal`.
-    pub boxes: YoloBox,
+    /// Whether rows tell of the whole object or of what is seen. Default: `amodal`.
+    pub boxes: Extent,
 }
 
 /// What a row tells.
@@ -36,19 +37,8 @@ pub enum YoloTask {
     /// A box.
     #[default]
     Detect,
-    /// The outline; one row per part, where the picture's edge cuts an object into several.
+    /// The border of the mask, along the edges of its pixels: one closed line, holes and parts joined by slits.
     Segment,
-}
-
-/// Which box a row holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum YoloBox {
-    /// Around the whole object as far as it lies in the picture.
-    #[default]
-    Amodal,
-    /// Around what is seen of it; an object of which nothing is seen has no row.
-    Visible,
 }
 
 impl Writer for Yolo {
@@ -83,7 +73,7 @@ impl Yolo {
     fn rows(&self, entry: &Entry<'_>) -> String {
         let image = entry.sample.labels.image.map(f64::from);
         let mut rows: Vec<String> = Vec::new();
-        for row in entry.labelled.iter().filter(|label| !label.ignored).flat_map(|label| self.rows_of(label, image)) {
+        for row in entry.labelled.iter().filter(|label| !label.ignored).filter_map(|label| self.row_of(label, image)) {
             if !rows.contains(&row) {
                 rows.push(row);
             }
@@ -91,15 +81,13 @@ impl Yolo {
         rows.concat()
     }
 
-    fn rows_of(&self, &Labelled { object, class, .. }: &Labelled<'_>, image: [f64; 2]) -> Vec<String> {
-        let chosen = match self.boxes {
-            YoloBox::Amodal => object.amodal_box,
-            YoloBox::Visible => object.visible_box,
-        };
+    fn row_of(&self, &Labelled { object, class, .. }: &Labelled<'_>, image: [f64; 2]) -> Option<String> {
+        let (chosen, mask) = self.boxes.of(object);
         match self.task {
-            _ if chosen.is_empty() => Vec::new(),
-            YoloTask::Detect => vec![box_row(class, &chosen, image)],
-            YoloTask::Segment => object.outline_px.iter().map(|ring| ring_row(class, ring, image)).collect(),
+            _ if chosen.is_empty() => None,
+            YoloTask::Detect => Some(box_row(class, &chosen, image)),
+            YoloTask::Segment if mask.is_empty() => None,
+            YoloTask::Segment => Some(ring_row(class, &trace::polygon(mask), image)),
         }
     }
 }

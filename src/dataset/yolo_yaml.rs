@@ -30,21 +30,26 @@ impl DataYaml {
         self.path.as_deref().map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
-    /// Names of the classes.
-    pub(crate) fn names(&self) -> &[String] {
-        &self.names
-    }
-
     /// Number of classes.
     pub(crate) fn classes(&self) -> Option<usize> {
         self.nc.or(Some(self.names.len()).filter(|&n| n > 0))
     }
 
+    /// Names of the classes, in order.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// The text of a `data.yaml` for our folders.
     pub(crate) fn write(classes: &[String]) -> String {
+        Self::write_with(classes, |part| format!("images/{part}"))
+    }
+
+    /// The text of a `data.yaml` whose parts lie where `place` says.
+    pub(crate) fn write_with(classes: &[String], place: impl Fn(&str) -> String) -> String {
         let mut yaml = String::from("# Folders are relative to this file. YOLOv5: add a line `path: <this folder>`.\n");
         for part in Part::ALL {
-            yaml += &format!("{0}: images/{0}\n", part.name());
+            yaml += &format!("{}: {}\n", part.name(), place(part.name()));
         }
         yaml += &format!("nc: {}\nnames:\n", classes.len());
         for (i, name) in classes.iter().enumerate() {

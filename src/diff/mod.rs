@@ -9,10 +9,17 @@
 //! assert_eq!(diff::compare(&a, &b, &loose).verdict, diff::Verdict::Match);
 //! ```
 
+mod correlate;
+mod flip;
+mod likeness;
 mod report;
+mod ssim;
 mod view;
 
+pub use flip::flip;
+pub use likeness::Likeness;
 pub use report::{Largest, Report, Verdict};
+pub use ssim::ssim;
 pub use view::{absolute_difference, difference, triple};
 
 use crate::image::Image;

@@ -1,13 +1,21 @@
-//! Whole files or none: everything is written beside its place and then moved there.
+//! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
 
 use super::format::reason;
 use crate::{Error, Result};
 use std::fs::Permissions;
-use std::io::Write;
-use std::path::Path;
+use std::io::{BufWriter, Write};
+use std::path::{Component, Path, PathBuf};
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_through(path, |file| file.write_all(bytes))
+}
+
+/// Writes a file piece by piece: nothing of it is there before `fill` has written all of it.
+///
+/// # Errors
+/// [`Error::File`] with what `fill` or the system says.
+pub fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let failed = |e: std::io::Error| Error::file(path, format!("cannot be written: {}", reason(&e)));
     if path.is_dir() {
         return Err(Error::file(path, "cannot be written: is a folder"));
@@ -17,9 +25,51 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
         std::io::ErrorKind::NotFound => Error::file(path, format!("cannot be written: no folder {}", folder.display())),
         _ => failed(e),
     })?;
-    file.write_all(bytes).map_err(failed)?;
+    let mut pieces = BufWriter::new(&mut file);
+    fill(&mut pieces).and_then(|()| pieces.flush()).map_err(failed)?;
+    drop(pieces);
+    // Before it gets its name: after a power cut there is the old file or the new one.
+    file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|e| failed(e.error))?;
+    sync_folder(folder).map_err(failed)
+}
+
+/// Puts the names in a folder on the disk.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    match std::fs::File::open(folder)?.sync_all() {
+        // Some file systems have no such thing.
+        Err(e) if e.kind() == std::io::ErrorKind::InvalidInput => Ok(()),
+        done => done,
+    }
+}
+
+/// Other systems write names by themselves.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> std::io::Result<()> {
     Ok(())
+}
+
+/// Copies a file in one step: readers see the old one or the new one, never a part.
+///
+/// # Errors
+/// [`Error::File`] for the one that cannot be read or written.
+pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<()> {
+    let (from, to) = (from.as_ref(), to.as_ref());
+    let bytes = std::fs::read(from).map_err(|e| Error::file(from, reason(&e)))?;
+    write_bytes(to, &bytes)
+}
+
+/// Brings everything that was written to the file system of a folder to the disk, so that it outlives a power cut.
+///
+/// Where it cannot be done nothing is lost but time: what is not there is made again.
+pub fn sync(folder: impl AsRef<Path>) {
+    #[cfg(target_os = "linux")]
+    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?)) {
+        log::debug!("{}: syncfs: {e}", folder.as_ref().display());
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = folder;
 }
 
 /// A new file that vanishes if it is not moved to its place, readable like any other file of the user.
@@ -29,6 +79,13 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
     builder.tempfile_in(folder)
+}
+
+/// The way from a folder to a file or folder, both absolute.
+pub fn relative(to: &Path, from: &Path) -> PathBuf {
+    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(to.components().skip(shared)).collect()
 }
 
 /// Makes a folder, and those above it; one that is there already is fine.

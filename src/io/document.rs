@@ -4,6 +4,7 @@ use super::atomic::write_bytes;
 use super::format::read_regular;
 use super::overrides::Override;
 use super::raster::one_line;
+use super::soundness::{endless_number, unique_keys};
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -34,7 +35,8 @@ pub fn read_toml_with<T: DeserializeOwned>(path: impl AsRef<Path>, overrides: &[
     let mut document: toml::Table = read_toml(path)?;
     overrides.iter().try_for_each(|o| o.apply(&mut document)).map_err(|e| e.in_file(path))?;
     let text = toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
-    parse_toml(&text).map_err(|e| e.in_file(path))
+    // Lines of that text are not those of the file.
+    parse_toml_lines(&text, |_| None).map_err(|e| e.in_file(path))
 }
 
 /// Settings from overrides alone: all of them lie in the table of that name.
@@ -123,19 +125,36 @@ pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
     write_bytes(path.as_ref(), text.as_bytes())
 }
 
-fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+/// Takes a TOML document in that is a text already.
+///
+/// # Errors
+/// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that do not fit.
+pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+    parse_toml_lines(text, |byte| Some(line_of(text, byte)))
+}
+
+/// `line` tells the line of a byte, if that means something to the person who wrote the document.
+fn parse_toml_lines<T: DeserializeOwned>(text: &str, line: impl Fn(usize) -> Option<usize>) -> Result<T> {
     let mistake = |e: toml::de::Error, at: String| {
-        let line = e.span().map(|span| line_of(text, span.start));
+        let line = e.span().and_then(|span| line(span.start));
         Mistake { at, line, what: e.message().into() }.into_error()
     };
     let document = toml::Deserializer::parse(text).map_err(|e| mistake(e, String::new()))?;
+    if let Some((number, span)) = endless_number(text) {
+        let what = format!("{number}, expected a finite number");
+        return Err(Mistake { at: String::new(), line: line(span.start), what }.into_error());
+    }
     serde_path_to_error::deserialize(document).map_err(|e| {
         let at = e.path().to_string();
         mistake(e.into_inner(), at)
     })
 }
 
-fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+/// Takes a JSON document in that is a text already.
+///
+/// # Errors
+/// As [`parse_toml`].
+pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     let mistake = |e: &serde_json::Error, at: String| {
         let said = e.to_string();
         let what = said.split(" at line ").next().unwrap_or_default().into();
@@ -143,6 +162,7 @@ fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
         let line = Some(e.line()).filter(|&line| line > 0);
         Mistake { at, line, what }.into_error()
     };
+    unique_keys(text).map_err(|e| mistake(&e, String::new()))?;
     let mut document = serde_json::Deserializer::from_str(text);
     let value =
         serde_path_to_error::deserialize(&mut document).map_err(|e| mistake(e.inner(), e.path().to_string()))?;
@@ -179,7 +199,8 @@ impl Mistake {
         match (at, line.as_str()) {
             ("" | "." | "?", "") => Error::value("document", what),
             ("" | "." | "?", line) => Error::value(line, what),
-            (at, _) => Error::value(at, what),
+            (at, "") => Error::value(at, what),
+            (at, line) => Error::value(at, format!("{what} ({line})")),
         }
     }
 }
@@ -246,11 +267,11 @@ mod tests {
     #[test]
     fn an_unknown_key_is_met_with_the_one_that_was_meant() {
         let expected = "objects: unknown key \"cuont\", did you mean \"count\"?";
-        assert_eq!(toml("seed = 1\n[objects]\ncuont = 3\n"), format!("recipe.toml: {expected}"));
-        assert_eq!(json(r#"{"seed": 1, "objects": {"cuont": 3}}"#), format!("recipe.json: {expected}"));
+        assert_eq!(toml("seed = 1\n[objects]\ncuont = 3\n"), format!("recipe.toml: {expected} (line 3)"));
+        assert_eq!(json(r#"{"seed": 1, "objects": {"cuont": 3}}"#), format!("recipe.json: {expected} (line 1)"));
         assert_eq!(
             toml("seed = 1\n[objects]\ncount = 3\n[[lights]]\ncount = 1\ncolour = 2"),
-            "recipe.toml: lights[0]: unknown key \"colour\", expected one of count, size_m"
+            "recipe.toml: lights[0]: unknown key \"colour\", expected one of count, size_m (line 6)"
         );
     }
 
@@ -262,8 +283,9 @@ mod tests {
     #[test]
     fn a_value_of_the_wrong_kind_is_named_with_its_field() {
         let expected = "objects.count: invalid type: string \"three\", expected u32";
-        assert_eq!(toml("seed = 1\n[objects]\ncount = \"three\""), format!("recipe.toml: {expected}"));
-        assert_eq!(json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}"), format!("recipe.json: {expected}"));
+        assert_eq!(toml("seed = 1\n[objects]\ncount = \"three\""), format!("recipe.toml: {expected} (line 3)"));
+        let json = json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}");
+        assert_eq!(json, format!("recipe.json: {expected} (line 1)"));
     }
 
     #[test]
@@ -281,7 +303,7 @@ mod tests {
 
     #[test]
     fn a_missing_key_is_named() {
-        assert_eq!(toml("seed = 1\n[objects]\n"), "recipe.toml: objects: missing key \"count\"");
+        assert_eq!(toml("seed = 1\n[objects]\n"), "recipe.toml: objects: missing key \"count\" (line 2)");
     }
 
     #[test]
@@ -291,6 +313,34 @@ mod tests {
         let e = json("{\"seed\": 1,\n x}");
         assert!(e.starts_with("recipe.json: line 2: ") && !e.contains('\n'), "{e}");
         assert!(json("{} {}").contains("missing key") || json("{} {}").contains("line"));
+    }
+
+    #[test]
+    fn what_no_document_may_hold_is_named_with_its_line() {
+        let e = json("{\"seed\": 1,\n\"objects\": {\"count\": 3},\n\"seed\": 2}");
+        assert_eq!(e, "recipe.json: line 3: key \"seed\" twice");
+        assert!(toml("seed = 1\nseed = 2").starts_with("recipe.toml: line 2: duplicate key"));
+        let e = toml("seed = 1\n[objects]\ncount = 1\nsize_m = -inf");
+        assert_eq!(e, "recipe.toml: line 4: -inf, expected a finite number");
+        assert!(json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": 1e999}}").contains("out of range"));
+        assert!(json("{\"seed\": NaN}").contains("line 1"));
+        let infinite = ["objects.size_m=inf".parse::<Override>(), "a=[1, { b = nan }]".parse()];
+        assert!(infinite.into_iter().all(|o| o.unwrap_err().to_string().contains("expected a finite number")));
+    }
+
+    #[test]
+    fn nesting_without_end_is_an_error_and_not_a_crash() {
+        for depth in [200, 1_000_000] {
+            let e = json(&"[".repeat(depth));
+            assert!(e.contains("recursion limit"), "{e}");
+            let objects = "{\"a\":".repeat(depth);
+            assert!(json(&objects).contains("recursion limit"));
+        }
+        for text in ["[", "{a=", "[["] {
+            let e = toml(&format!("a = {}", text.repeat(100_000)));
+            assert!(e.len() < 300 && !e.contains('\n'), "{e}");
+        }
+        assert!(toml(&format!("[{}a]", "a.".repeat(100_000))).len() < 300);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::orient::Orientation;
 use exif::{Exif, In, Tag, Value};
+use std::io::{BufRead, Seek};
 
 /// Diagonal of 36 mm x 24 mm film, which equivalents of focal lengths refer to, millimetres.
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
@@ -28,9 +29,8 @@ impl Default for CameraNotes {
 
 impl CameraNotes {
     /// The notes in a JPEG, TIFF or PNG file. A photo without notes, or with damaged ones, is as good as another.
-    pub(super) fn of_file(bytes: &[u8]) -> Self {
-        let mut cursor = std::io::Cursor::new(bytes);
-        match exif::Reader::new().read_from_container(&mut cursor) {
+    pub(super) fn of_file(mut file: impl BufRead + Seek) -> Self {
+        match exif::Reader::new().read_from_container(&mut file) {
             Ok(exif) => Self::of(&exif),
             Err(_) => Self::default(),
         }
@@ -93,11 +93,12 @@ mod tests {
     use super::*;
     use exif::experimental::Writer;
     use exif::{Field, Rational};
+    use std::io::Cursor;
 
     #[test]
     fn damaged_notes_are_no_notes() {
-        assert_eq!(CameraNotes::of_file(b"\xff\xd8\xff\xe1\x00\x08Exif\0\0II"), CameraNotes::default());
-        assert_eq!(CameraNotes::of_file(b""), CameraNotes::default());
+        assert_eq!(CameraNotes::of_file(Cursor::new(b"\xff\xd8\xff\xe1\x00\x08Exif\0\0II")), CameraNotes::default());
+        assert_eq!(CameraNotes::of_file(Cursor::new(b"")), CameraNotes::default());
     }
 
     fn notes(fields: &[(Tag, Value)]) -> CameraNotes {
@@ -107,7 +108,7 @@ mod tests {
         fields.iter().for_each(|f| writer.push_field(f));
         let mut tiff = std::io::Cursor::new(Vec::new());
         writer.write(&mut tiff, false).unwrap();
-        CameraNotes::of_file(tiff.get_ref())
+        CameraNotes::of_file(Cursor::new(tiff.get_ref()))
     }
 
     fn rational(num: u32, denom: u32) -> Value {

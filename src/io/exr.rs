@@ -7,7 +7,7 @@ use super::atomic::write_bytes;
 use super::header::{Header, Notes};
 use super::limits::{Demand, Limits, at_most};
 use super::raster::{Raster, Refusal, Samples, Wanted};
-use super::{Compression, Format, Source};
+use super::{Compression, Format, ReadOptions, Source, Window};
 use crate::color::{ColorMatrix, RgbSpace, rgb_from_rgb};
 use crate::{Error, Result};
 use exr::meta::attribute::Chromaticities;
@@ -16,7 +16,7 @@ use exr::prelude::{
     ReadLayers, Text, Vec2, WritableImage, f16,
 };
 use half::slice::HalfFloatSliceExt;
-use std::io::Cursor;
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
 type Part = Layer<AnyChannels<FlatSamples>>;
@@ -61,12 +61,29 @@ pub fn write_channels(
     write_bytes(path, &bytes)
 }
 
+/// As [`write_channels`], with half floats.
+///
+/// # Errors
+/// Those of [`write_channels`].
+pub fn write_half_channels(
+    path: impl AsRef<Path>,
+    size: (usize, usize),
+    channels: &[(&str, &[f32])],
+    metadata: &[(String, String)],
+) -> Result<()> {
+    let path = path.as_ref();
+    let halves = |samples: &[f32]| FlatSamples::F16(samples.iter().map(|&v| half::f16::from_f32(v)).collect());
+    let planes = channels.iter().map(|&(name, samples)| (name, halves(samples))).collect();
+    let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
+    write_bytes(path, &bytes)
+}
+
 /// Reads every channel of the first part of an EXR file, and the picture's size.
 ///
 /// # Errors
 /// [`Error::File`] for a file that cannot be opened, is not an EXR, is damaged or goes beyond the default [`Limits`].
 pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Channel>)> {
-    let (path, limits) = (path.as_ref(), Limits::default());
+    let (path, limits) = (path.as_ref(), ReadOptions::default().limits);
     let source = Source::open(path, &limits)?;
     if source.format != Format::Exr {
         return Err(Error::file(path, format!("is {}, expected an EXR", source.format.name())));
@@ -97,15 +114,19 @@ fn size_of(window: IntegerBounds) -> (usize, usize) {
 }
 
 /// The headers alone, checked against the limits: data and display window of every part, and their sum.
-fn check(bytes: &[u8], limits: &Limits) -> std::result::Result<MetaData, Refusal> {
-    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+fn check(file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Result<MetaData, Refusal> {
+    let meta = MetaData::read_from_buffered(BufReader::new(file.take(limits.metadata_bytes)), false);
+    if meta.is_err() && file_bytes > limits.metadata_bytes {
+        at_most(file_bytes, limits.metadata_bytes, "bytes without an end of the header", "metadata_bytes")?;
+    }
+    let meta = meta?;
     at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
     let mut total = 0_u64;
     for header in &meta.headers {
         let channels = header.channels.list.len() as u64;
         let bytes_per_pixel = header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample() as u64).sum();
         for size in [header.layer_size, header.shared_attributes.display_window.size] {
-            let (width, height, file_bytes) = (size.x() as u64, size.y() as u64, bytes.len() as u64);
+            let (width, height) = (size.x() as u64, size.y() as u64);
             limits.check(Demand { width, height, channels, bytes_per_pixel, file_bytes })?;
         }
         total += header.layer_size.area() as u64 * bytes_per_pixel;
@@ -118,7 +139,7 @@ fn check(bytes: &[u8], limits: &Limits) -> std::result::Result<MetaData, Refusal
 }
 
 fn read_parts(bytes: &[u8], limits: &Limits) -> std::result::Result<Parts, Refusal> {
-    check(bytes, limits)?;
+    check(bytes, bytes.len() as u64, limits)?;
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -152,10 +173,13 @@ fn to_rec709(named: Chromaticities) -> std::result::Result<Option<ColorMatrix>, 
     Ok((!same).then(|| rgb_from_rgb(&ours, &space).into()))
 }
 
-pub(super) fn header(bytes: &[u8], limits: &Limits) -> std::result::Result<Header, Refusal> {
-    let meta = check(bytes, limits)?;
+pub(super) fn header(file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Result<Header, Refusal> {
+    let meta = check(file, file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
-    let (width, height) = size_of(first.shared_attributes.display_window);
+    let shown = first.shared_attributes.display_window;
+    let (width, height) = size_of(shown);
+    let at = |v: i32, origin: i32| i64::from(v) - i64::from(origin);
+    let position = first.own_attributes.layer_position;
     let list = &first.channels.list;
     Ok(Header {
         format: Format::Exr,
@@ -163,10 +187,10 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> std::result::Result<Heade
         height,
         channels: in_usual_order(list.iter().map(|c| c.name.to_string()).collect()),
         bits: list.iter().map(|c| 8 * c.sample_type.bytes_per_sample() as u32).max().unwrap_or(0),
-        focal_35mm: None,
-        digital_zoom: false,
-        cropped: false,
+        data_at: [at(position.x(), shown.position.x()), at(position.y(), shown.position.y())],
+        data_size: [first.layer_size.x(), first.layer_size.y()],
         metadata: texts(first),
+        ..Header::default()
     })
 }
 
@@ -190,7 +214,12 @@ fn texts(header: &exr::meta::header::Header) -> Notes {
 }
 
 /// The wanted channels of the first part that has them.
-pub(super) fn decode(bytes: &[u8], limits: &Limits, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+pub(super) fn decode(
+    bytes: &[u8],
+    limits: &Limits,
+    wanted: Wanted,
+    shown: Window,
+) -> std::result::Result<Raster, Refusal> {
     let Parts { parts, window, to_rec709 } = read_parts(bytes, limits)?;
     let mut refused = "no part with pixels".to_string();
     for part in &parts {
@@ -206,6 +235,10 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits, wanted: Wanted) -> std::resu
             }
         };
         let planes: Vec<_> = picked.iter().map(|&i| &part.channel_data.list[i].sample_data).collect();
+        let window = match shown {
+            Window::Display => window,
+            Window::Data => IntegerBounds::new(part.attributes.layer_position, part.size),
+        };
         let (width, height) = size_of(window);
         let mut samples = interleaved(part, &planes, window);
         if let (Wanted::Color | Wanted::Film, 3.., Some(matrix)) = (wanted, planes.len(), &to_rec709) {
@@ -303,18 +336,18 @@ pub(super) fn encode(
     let mut out = Cursor::new(Vec::new());
     exr::prelude::Image::from_layer(layer).write().to_buffered(&mut out).map_err(|e| e.to_string())?;
     let mut bytes = out.into_inner();
-    sort_attributes(&mut bytes).ok_or("header of an unknown kind")?;
+    sort_attributes(&mut bytes, HEADER).ok_or("header of an unknown kind")?;
     Ok(bytes)
 }
 
 /// Start of the first attribute: behind the magic number and the version.
 const HEADER: usize = 8;
 
-/// Puts the attributes of a one-part header in the order of their names, as OpenEXR's own library does: the `exr` crate
-/// keeps them in a hash map, whose order differs from run to run.
-fn sort_attributes(file: &mut [u8]) -> Option<()> {
+/// Puts the attributes of the header that starts at `start` in the order of their names, as OpenEXR's own library does:
+/// the `exr` crate keeps them in a hash map, whose order differs from run to run. Returns where they end.
+pub(super) fn sort_attributes(file: &mut [u8], start: usize) -> Option<usize> {
     let mut attributes = Vec::new();
-    let mut at = HEADER;
+    let mut at = start;
     while *file.get(at)? != 0 {
         let kind = at + file[at..].iter().position(|&b| b == 0)? + 1;
         let size = kind + file.get(kind..)?.iter().position(|&b| b == 0)? + 1;
@@ -324,8 +357,8 @@ fn sort_attributes(file: &mut [u8]) -> Option<()> {
         at = end;
     }
     attributes.sort();
-    file[HEADER..at].copy_from_slice(&attributes.concat());
-    Some(())
+    file[start..at].copy_from_slice(&attributes.concat());
+    Some(at)
 }
 
 #[cfg(test)]
@@ -340,7 +373,7 @@ mod tests {
     fn attributes_are_in_the_order_of_their_names() {
         let file = || encode((2, 1), vec![("Z", floats(vec![1.0, 2.0]))], Compression::Zip, &notes(12)).unwrap();
         assert_eq!(file(), file());
-        let meta = header(&file(), &Limits::default()).unwrap();
+        let meta = header(file().as_slice(), 10_000, &Limits::default()).unwrap();
         assert_eq!(meta.metadata.len(), 12);
         let text = String::from_utf8_lossy(&file()).into_owned();
         assert!(text.find("channels").unwrap() < text.find("compression").unwrap());
@@ -369,7 +402,7 @@ mod tests {
         let read = |image: &exr::prelude::Image<_>| {
             let mut out = Cursor::new(Vec::new());
             WritableImage::write(image).to_buffered(&mut out).unwrap();
-            decode(out.get_ref(), &Limits::default(), Wanted::Color)
+            decode(out.get_ref(), &Limits::default(), Wanted::Color, Window::Display)
         };
         let Samples::F32(rgb) = read(&image).unwrap().samples else { panic!("not floats") };
         for (v, expected) in rgb.iter().zip([0.18, 0.5, 0.9]) {
@@ -394,8 +427,12 @@ mod tests {
         image.attributes.display_window = IntegerBounds::from_dimensions(Vec2(2, 3));
         let mut out = Cursor::new(Vec::new());
         image.write().to_buffered(&mut out).unwrap();
-        let raster = decode(out.get_ref(), &Limits::default(), Wanted::Coverage).unwrap();
+        let raster = decode(out.get_ref(), &Limits::default(), Wanted::Coverage, Window::Display).unwrap();
         assert_eq!((raster.width, raster.height), (2, 3));
         assert_eq!(raster.samples, Samples::F32(vec![0.0, 0.0, 2.0, 0.0, 4.0, 0.0]));
+        let kept = decode(out.get_ref(), &Limits::default(), Wanted::Coverage, Window::Data).unwrap();
+        assert_eq!((kept.width, kept.height, kept.samples), (2, 2, Samples::F32(vec![1.0, 2.0, 3.0, 4.0])));
+        let told = header(out.get_ref().as_slice(), 1_000, &Limits::default()).unwrap();
+        assert_eq!((told.width, told.height, told.data_at, told.data_size), (2, 3, [-1, 1], [2, 2]));
     }
 }

@@ -17,9 +17,9 @@ mod bridge {
         data_width: i64,
         data_height: i64,
         channels: Vec<String>,
-        /// Bytes of a sample as handed over: 1 and 2 are integers, 4 is float.
+        /// Bytes of a sample as handed over: 1 and 2 are integers, or halves; 4 is float.
         bytes: i32,
-        /// Floats are stored as halves; for writing.
+        /// Reading: samples are halves. Writing: floats are to be stored as halves.
         half: bool,
         /// Colours are multiplied by alpha; for writing.
         premultiplied: bool,
@@ -37,18 +37,19 @@ mod bridge {
     unsafe extern "C++" {
         include!("petcomp/cpp/oiio_shim.h");
 
-        type Reader;
+        type Reader<'a>;
 
         /// Sets what is set once for the whole process: one thread, no guessing of readers.
         fn start() -> Result<()>;
         /// The version that the shim was compiled with.
         fn version() -> String;
-        /// Opens a file with the reader of a format, and no other.
-        fn open(path: &str, format: &str) -> Result<UniquePtr<Reader>>;
+        /// Opens a file with the reader of a format, and no other: out of memory, or by its path where the reader
+        /// knows only files.
+        fn open<'a>(path: &str, format: &str, bytes: &'a [u8]) -> Result<UniquePtr<Reader<'a>>>;
         /// The shape of the first picture in the file.
-        fn layout(reader: &Reader) -> Result<Layout>;
+        fn layout(reader: &Reader<'_>) -> Result<Layout>;
         /// Its samples, channels interleaved, native byte order; the buffer has to fit exactly.
-        fn read(reader: &Reader, samples: &mut [u8]) -> Result<()>;
+        fn read(reader: &Reader<'_>, samples: &mut [u8]) -> Result<()>;
         /// Writes a picture with the writer of a format.
         fn write(path: &str, format: &str, layout: &Layout, samples: &[u8], notes: &[Note]) -> Result<()>;
         /// Throws something that is no `std::exception`: proves that the border holds.

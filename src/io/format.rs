@@ -1,10 +1,10 @@
 //! Which kind of file it is, by its first bytes, and how it is opened.
 
-use super::limits::{Limits, at_most};
+use super::limits::{Limits, affordable, at_most};
 use crate::{Error, Result};
-use std::fs::File;
-use std::io::Read;
-use std::path::Path;
+use std::fs::{File, Metadata};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
 
 /// The kinds of picture file that are read and written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,41 +84,86 @@ impl Format {
 
 /// A whole file in memory, and what its content says it is.
 pub(super) struct Source {
+    pub(super) path: PathBuf,
     pub(super) bytes: Vec<u8>,
     pub(super) format: Format,
 }
 
-impl Source {
-    /// Reads a picture file that is worth decoding: regular, not empty, of a known kind, not larger than allowed.
+/// A file that is open at its first byte, and what that says it is.
+pub(super) struct Opened {
+    pub(super) file: BufReader<File>,
+    pub(super) bytes: u64,
+    pub(super) format: Format,
+}
+
+impl Opened {
+    /// Opens a picture file that is worth decoding: regular, not empty, of a known kind, not larger than allowed.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        let bytes = read_regular(path, limits.file_bytes, "picture")?;
-        if bytes.is_empty() {
-            return Err(Error::file(path, "empty file (0 bytes), expected a picture"));
-        }
-        let format = Format::of_bytes(&bytes).ok_or_else(|| {
-            let start = beginning(&bytes);
-            Error::file(
-                path,
-                format!("not a picture petcomp reads (starts with {start}), expected EXR, PNG, JPEG, TIFF or HDR"),
-            )
-        })?;
-        Ok(Self { bytes, format })
+        let (file, bytes) = open_regular(path, limits.file_bytes, "picture")?;
+        let mut file = BufReader::new(file);
+        let start = file.fill_buf().map_err(|e| Error::file(path, reason(&e)))?;
+        let format = recognized(path, start).map_err(|e| Error::file(path, e))?;
+        Ok(Self { file, bytes, format })
     }
 }
 
-/// The bytes of a regular file: a FIFO would block, a device never ends.
+impl Source {
+    /// Reads a picture file that is worth decoding.
+    pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
+        let Opened { file, bytes, format } = Opened::open(path, limits)?;
+        let bytes = all_of(file, bytes, limits.file_bytes).map_err(|e| Error::file(path, e))?;
+        Ok(Self { path: path.into(), bytes, format })
+    }
+}
+
+/// The kind of a file by its first bytes. Film scans are read only under a name of their own: OpenImageIO has to read
+/// them, and what is called otherwise was not meant to be one.
+fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> {
+    const EXPECTED: &str = "expected EXR, PNG, JPEG, TIFF or HDR";
+    if start.is_empty() {
+        return Err("empty file (0 bytes), expected a picture".into());
+    }
+    match Format::of_bytes(start) {
+        Some(format @ (Format::Dpx | Format::Cineon)) if Format::of_extension(path) != Some(format) => {
+            Err(format!("is {} under another name, {EXPECTED}", format.name()))
+        }
+        Some(format) => Ok(format),
+        None => Err(format!("not a picture petcomp reads (starts with {}), {EXPECTED}", beginning(start))),
+    }
+}
+
+/// Opens a regular file, and no other: a FIFO would block, a device never ends. Also gives its length.
+pub(super) fn open_regular(path: &Path, most: u64, expected: &str) -> Result<(File, u64)> {
+    let failed = |e: std::io::Error| Error::file(path, reason(&e));
+    // Looked at before it is opened, because opening may wait, and after, because it may be another by then.
+    regular(&std::fs::metadata(path).map_err(failed)?, expected).map_err(|e| Error::file(path, e))?;
+    let file = File::open(path).map_err(failed)?;
+    let meta = file.metadata().map_err(failed)?;
+    regular(&meta, expected)
+        .and_then(|()| at_most(meta.len(), most, "bytes", "file_bytes"))
+        .map_err(|e| Error::file(path, e))?;
+    Ok((file, meta.len()))
+}
+
+fn regular(meta: &Metadata, expected: &str) -> std::result::Result<(), String> {
+    match (meta.is_dir(), meta.is_file()) {
+        (true, _) => Err(format!("is a folder, expected a {expected}")),
+        (_, false) => Err(format!("not a regular file, expected a {expected}")),
+        _ => Ok(()),
+    }
+}
+
+/// The bytes of a regular file.
 pub(super) fn read_regular(path: &Path, most: u64, expected: &str) -> Result<Vec<u8>> {
-    let meta = std::fs::metadata(path).map_err(|e| Error::file(path, reason(&e)))?;
-    if meta.is_dir() {
-        return Err(Error::file(path, format!("is a folder, expected a {expected}")));
-    }
-    if !meta.is_file() {
-        return Err(Error::file(path, format!("not a regular file, expected a {expected}")));
-    }
-    at_most(meta.len(), most, "bytes", "file_bytes").map_err(|e| Error::file(path, e))?;
-    let file = File::open(path).map_err(|e| Error::file(path, reason(&e)))?;
-    let mut bytes = Vec::with_capacity(usize::try_from(meta.len()).unwrap_or(0));
-    file.take(most).read_to_end(&mut bytes).map_err(|e| Error::file(path, reason(&e)))?;
+    let (file, bytes) = open_regular(path, most, expected)?;
+    all_of(file, bytes, most).map_err(|e| Error::file(path, e))
+}
+
+/// What is left of a file that had so many bytes when it was opened, and may have grown.
+fn all_of(file: impl Read, told: u64, most: u64) -> std::result::Result<Vec<u8>, String> {
+    affordable(told)?;
+    let mut bytes = Vec::with_capacity(usize::try_from(told).unwrap_or(0));
+    file.take(most).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
     Ok(bytes)
 }
 

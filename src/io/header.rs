@@ -12,6 +12,10 @@ pub struct Header {
     pub width: usize,
     /// Rows of the upright picture.
     pub height: usize,
+    /// Column and row of the first stored pixel, seen from the picture's first one. Other than (0, 0) only in EXR.
+    pub data_at: [i64; 2],
+    /// Columns and rows that are stored: those of the picture, but for EXR, whose data window may be any other.
+    pub data_size: [usize; 2],
     /// Names of the channels, `R G B A` first where they are there.
     pub channels: Vec<String>,
     /// Bits of a sample: 8 and 16 are display-encoded integers (16 in an EXR: half floats), 32 is float.
@@ -25,6 +29,24 @@ pub struct Header {
     pub cropped: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
+}
+
+impl Default for Header {
+    fn default() -> Self {
+        Self {
+            format: Format::Png,
+            width: 0,
+            height: 0,
+            data_at: [0; 2],
+            data_size: [0; 2],
+            channels: Vec::new(),
+            bits: 0,
+            focal_35mm: None,
+            digital_zoom: false,
+            cropped: false,
+            metadata: Vec::new(),
+        }
+    }
 }
 
 /// Named texts.

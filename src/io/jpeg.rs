@@ -1,16 +1,19 @@
 //! JPEG: 8 bits, display-encoded, no alpha.
 
 use super::header::{Header, Notes, lines_of_notes, notes_of_lines};
-use super::limits::{Demand, Limits};
+use super::limits::{Demand, Limits, at_most};
 use super::raster::{Raster, Refusal, Samples, usual_names};
 use crate::io::Format;
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
 use image::{ExtendedColorType, ImageDecoder, ImageError};
-use std::io::Cursor;
+use std::io::{Cursor, Read};
 
 const EOI: u8 = 0xd9;
 const SOS: u8 = 0xda;
 const COM: u8 = 0xfe;
+const APP2: u8 = 0xe2;
+/// First bytes of a segment with a part of a colour profile (ICC.1:2022, B.4); its number and their count follow.
+const ICC: &[u8] = b"ICC_PROFILE\0";
 
 impl From<ImageError> for Refusal {
     fn from(e: ImageError) -> Self {
@@ -21,38 +24,77 @@ impl From<ImageError> for Refusal {
     }
 }
 
-fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
+/// The part of a file in front of its first scan: everything that is known before pixels.
+pub(super) fn head(file: &mut impl Read, limits: &Limits) -> Result<Vec<u8>, Refusal> {
+    let cut = |_| "truncated JPEG (no picture)";
+    let mut bytes = vec![0; 2];
+    file.read_exact(&mut bytes).map_err(cut)?;
+    loop {
+        let at = bytes.len();
+        bytes.resize(at + 4, 0);
+        file.read_exact(&mut bytes[at..at + 2]).map_err(cut)?;
+        // Bytes of padding in front of a marker.
+        while bytes[at + 1] == 0xff {
+            file.read_exact(&mut bytes[at + 1..at + 2]).map_err(cut)?;
+        }
+        let marker = bytes[at + 1];
+        if bytes[at] != 0xff || marker == EOI {
+            return Err("damaged JPEG: no picture".into());
+        }
+        file.read_exact(&mut bytes[at + 2..]).map_err(cut)?;
+        let length = usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]])).max(2);
+        bytes.resize(at + 2 + length, 0);
+        file.read_exact(&mut bytes[at + 4..]).map_err(cut)?;
+        at_most(bytes.len() as u64, limits.metadata_bytes, "bytes in front of the picture", "metadata_bytes")?;
+        if marker == SOS {
+            return Ok(bytes);
+        }
+    }
+}
+
+fn open<'a>(bytes: &'a [u8], file_bytes: u64, limits: &Limits) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
     let decoder = JpegDecoder::new(Cursor::new(bytes))?;
     let (width, height) = decoder.dimensions();
     let channels = u64::from(decoder.color_type().channel_count());
-    let (width, height, file_bytes) = (width.into(), height.into(), bytes.len() as u64);
+    let (width, height) = (width.into(), height.into());
     limits.check(Demand { width, height, channels, bytes_per_pixel: channels, file_bytes })?;
     Ok(decoder)
 }
 
-pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
-    let decoder = open(bytes, limits)?;
+/// `start` is the file's [`head`] at least.
+pub(super) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
+    let decoder = open(start, file_bytes, limits)?;
     let (width, height) = decoder.dimensions();
-    let comments = segments(bytes).filter(|s| s.marker == COM).map(|s| String::from_utf8_lossy(s.data).into_owned());
+    let comments = segments(start).filter(|s| s.marker == COM).map(|s| String::from_utf8_lossy(s.data).into_owned());
     Ok(Header {
         format: Format::Jpeg,
         width: width as usize,
         height: height as usize,
         channels: usual_names(decoder.color_type().channel_count().into()).unwrap_or_default(),
         bits: 8,
-        focal_35mm: None,
-        digital_zoom: false,
-        cropped: false,
         metadata: comments.flat_map(|text| notes_of_lines(&text)).collect(),
+        ..Header::default()
     })
+}
+
+/// The embedded colour profile, which segments of 64 KiB hold in parts.
+pub(super) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
+    let parts = segments(bytes).take_while(|s| s.marker != SOS).filter(|s| s.marker == APP2);
+    let numbered = |s: Segment<'_>| {
+        s.data.strip_prefix(ICC)?.split_first_chunk().map(|(&[number, _], part)| (number, part.to_vec()))
+    };
+    let mut parts: Vec<(u8, Vec<u8>)> = parts.filter_map(numbered).collect();
+    parts.sort_by_key(|&(number, _)| number);
+    (!parts.is_empty()).then(|| parts.into_iter().flat_map(|(_, part)| part).collect())
 }
 
 /// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is looked at first.
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
-    let decoder = open(bytes, limits)?;
+    head(&mut &bytes[..], limits)?;
     if !segments(bytes).any(|s| s.marker == EOI) {
         return Err("truncated JPEG (no end marker)".into());
     }
+    let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
     let names = usual_names(decoder.color_type().channel_count().into()).ok_or("channels of an unknown kind")?;
     let mut data = vec![0; usize::try_from(decoder.total_bytes()).map_err(|_| "size overflows")?];
@@ -149,7 +191,9 @@ mod tests {
     fn comments_come_back() {
         let notes = vec![("petcomp:seed".to_string(), "17".to_string())];
         let bytes = encode((8, 8), &[90; 8 * 8 * 3], 90, &notes).unwrap();
-        assert_eq!(header(&bytes, &Limits::default()).unwrap().metadata, notes);
+        let start = head(&mut &bytes[..], &Limits::default()).unwrap();
+        assert!(start.len() < bytes.len());
+        assert_eq!(header(&start, bytes.len() as u64, &Limits::default()).unwrap().metadata, notes);
         assert!(decode(&bytes, &Limits::default()).is_ok());
     }
 }

@@ -3,6 +3,9 @@
 //! A damaged or hostile header of 60 bytes can ask for 245 GB, and an allocation that fails aborts the process: so sizes
 //! are checked first, in arithmetic that cannot wrap.
 
+use crate::{Error, Result};
+use std::str::FromStr;
+
 /// Bounds on what a picture file may ask for; a file beyond them is refused before its pixels are touched.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -23,6 +26,8 @@ pub struct Limits {
     pub metadata_bytes: u64,
     /// Parts of a multi-part EXR. Default: 1,024.
     pub parts: u64,
+    /// Wall-clock seconds for a file in the OpenImageIO worker, and one more for each 10 million pixels. Default: 10.
+    pub seconds: u64,
 }
 
 /// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very well.
@@ -39,7 +44,63 @@ impl Default for Limits {
             file_bytes: 1 << 30,
             metadata_bytes: 64 << 20,
             parts: 1_024,
+            seconds: 10,
         }
+    }
+}
+
+/// What `K`, `M` and `G` behind a number stand for.
+const SUFFIXES: [(char, u64); 3] = [('K', 1 << 10), ('M', 1 << 20), ('G', 1 << 30)];
+
+/// A new value for one limit: `side=65536`, `decoded_bytes=4G`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Raise {
+    name: String,
+    value: u64,
+}
+
+impl FromStr for Raise {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, number) =
+            text.split_once('=').ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
+        let unit = SUFFIXES.iter().find(|(suffix, _)| number.ends_with(*suffix));
+        let (digits, factor) = unit.map_or((number, 1), |&(suffix, factor)| (number.trim_end_matches(suffix), factor));
+        let value = digits.parse().ok().and_then(|v: u64| v.checked_mul(factor));
+        let value =
+            value.ok_or_else(|| Error::value(name, format!("{number:?}, expected a number such as 65536 or 4G")))?;
+        let raise = Self { name: name.into(), value };
+        Limits::default().with(&raise)?;
+        Ok(raise)
+    }
+}
+
+impl Limits {
+    /// These limits with another value for one of them.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for a name that no limit has.
+    pub fn with(mut self, raise: &Raise) -> Result<Self> {
+        let mut named: [(&str, &mut u64); 9] = [
+            ("side", &mut self.side),
+            ("pixels", &mut self.pixels),
+            ("channels", &mut self.channels),
+            ("decoded_bytes", &mut self.decoded_bytes),
+            ("ratio", &mut self.ratio),
+            ("file_bytes", &mut self.file_bytes),
+            ("metadata_bytes", &mut self.metadata_bytes),
+            ("parts", &mut self.parts),
+            ("seconds", &mut self.seconds),
+        ];
+        match named.iter_mut().find(|(name, _)| *name == raise.name) {
+            Some((_, limit)) => **limit = raise.value,
+            None => {
+                let known = named.map(|(name, _)| name).join(", ");
+                return Err(Error::value(&raise.name, format!("no such limit, expected one of {known}")));
+            }
+        }
+        Ok(self)
     }
 }
 
@@ -55,7 +116,7 @@ pub(super) struct Demand {
 
 impl Limits {
     /// Refuses what cannot be right or is too much; the text names the limit.
-    pub(super) fn check(&self, d: Demand) -> Result<(), String> {
+    pub(super) fn check(&self, d: Demand) -> std::result::Result<(), String> {
         let Demand { width, height, .. } = d;
         if width == 0 || height == 0 || d.channels == 0 {
             return Err(format!("{width} x {height} pixels with {} channels, expected at least 1 of each", d.channels));
@@ -69,13 +130,22 @@ impl Limits {
         if bytes > RATIO_FREE_BYTES {
             at_most(bytes / d.file_bytes.max(1), self.ratio, "decoded bytes for each byte of the file", "ratio")?;
         }
-        Ok(())
+        affordable(bytes)
     }
 }
 
 /// One limit: `what` is counted, `name` is the field to raise.
-pub(super) fn at_most(count: u64, limit: u64, what: &str, name: &str) -> Result<(), String> {
-    if count <= limit { Ok(()) } else { Err(format!("{count} {what}, over the limit of {limit} (Limits::{name})")) }
+pub(super) fn at_most(count: u64, limit: u64, what: &str, name: &str) -> std::result::Result<(), String> {
+    if count <= limit {
+        return Ok(());
+    }
+    Err(format!("{count} {what}, over the limit of {limit} (Limits::{name}; --limit {name}=N)"))
+}
+
+/// Refuses what the system has no memory for, as far as it says so: an allocation that fails ends the process.
+pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
+    let fits = usize::try_from(bytes).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
+    if fits { Ok(()) } else { Err(format!("needs {} MiB of memory, more than the system gives", bytes >> 20)) }
 }
 
 #[cfg(test)]
@@ -104,6 +174,24 @@ mod tests {
         let all = Limits { side: u64::MAX, pixels: u64::MAX, ..Default::default() };
         assert!(all.check(demand(u64::MAX, u64::MAX)).is_err());
         assert!(all.check(demand(u64::MAX / 8, 1)).is_err());
+    }
+
+    #[test]
+    fn every_limit_has_a_name() {
+        let json = serde_json::to_value(Limits::default()).unwrap();
+        for name in json.as_object().unwrap().keys() {
+            let raised = Limits::default().with(&format!("{name}=3K").parse().unwrap()).unwrap();
+            assert_eq!(serde_json::to_value(raised).unwrap()[name], 3072);
+        }
+        for bad in ["side", "side=x", "side=99999999999G", "sides=3", "side=-1", "side=G"] {
+            assert!(bad.parse::<Raise>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn more_than_there_is_is_not_attempted() {
+        assert!(affordable(1 << 20).is_ok());
+        assert!(affordable(u64::MAX).unwrap_err().contains("more than the system gives"));
     }
 
     #[test]

@@ -8,17 +8,43 @@
 //! | half and float (EXR, TIFF, HDR) | taken as scene-linear Rec. 709 | EXR premultiplied, TIFF as it says | as it is |
 //!
 //! Premultiplication happens here, in linear light. The orientation noted by a camera is applied. An EXR is cropped or
-//! padded with zeros from its data window to its display window. An EXR that names other primaries is converted; embedded ICC profiles are not
-//! applied.
+//! padded with zeros from its data window to its display window ([`Window`] keeps the former), and converted if it names
+//! other primaries. A colour profile (ICC) of primaries and curves, such as Display P3 or Adobe RGB, is applied to display
+//! codes; others are named in a warning and the codes taken for sRGB. Inks (CMYK) are multiplied. Samples that are infinite or no
+//! number are counted in a warning, and become codes of 0 or full where integers are written.
 //!
-//! Sizes are checked against [`Limits`] before anything is allocated, decoders that panic are caught, and truncated JPEGs,
-//! which decoders take for grey pictures, are refused. Files are written beside their place and moved there: whole or
-//! not at all.
+//! # What is promised of files that nobody vouches for
+//!
+//! No file that is handed to petcomp kills it, hangs it, takes the machine's memory or gets out of its folder; what can be
+//! read is read right, what cannot is named in one line.
+//!
+//! * **What is opened.** Regular files only, by content and not by name: EXR, PNG, JPEG, TIFF, Radiance HDR; DPX and Cineon
+//!   only under their own names.
+//! * **What a file may ask for** is in [`Limits`], and checked before pixels are touched, in arithmetic that cannot wrap: by default
+//!   32,768 pixels along a side, 128 Mi in all, 64 channels, 1 GiB decoded, 10,000 times the file above 64 MiB, 64 MiB that
+//!   is not pixels. Memory that the system does not give is not attempted.
+//! * **Who decodes.** Decoders in Rust, in this process; one that panics has met a damaged file. What they do not know goes
+//!   to OpenImageIO in a worker process, which gets the file's bytes and gives samples through pipes. It may open no file
+//!   (Landlock, seccomp, file size 0), start nothing, connect nowhere, has memory for the file in hand, and is killed when it takes more
+//!   than [`Limits::seconds`]. A file on which two workers die is named with the signal. The worker is not believed either.
+//! * **What is written** stands beside its place first, is put on the disk, and is moved there: whole or not at all. A link in
+//!   the way is replaced, not followed; [`refuse_links`] and [`clean_name`] keep outputs in their folder. No metadata of an input
+//!   gets into an output, so neither places (GPS) nor serial numbers do.
+//! * **Documents** (JSON, TOML) are at most 64 MiB and nested 80 to 128 deep, without a key twice or a number that is not finite;
+//!   a mistake is named with its line.
+//!
+//! Not promised: that decoders have no mistakes ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
+//! and Debian does not mend them), that a kernel without Landlock or seccomp confines as well (one warning says so), that
+//! the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
+//! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be told from real ones.
 
 mod atomic;
+#[cfg(feature = "oiio")]
+mod confine;
 mod document;
 mod exif;
 pub mod exr;
+pub mod exr_parts;
 #[cfg(feature = "oiio")]
 mod ffi;
 mod format;
@@ -30,36 +56,54 @@ mod limits;
 pub mod oiio;
 mod orient;
 mod overrides;
+#[cfg(feature = "oiio")]
+mod patience;
+mod place;
 mod png;
+mod profile;
+#[cfg(feature = "oiio")]
+mod protocol;
 mod raster;
+#[cfg(feature = "oiio")]
+mod serve;
+mod soundness;
 mod tiff;
 #[cfg(feature = "oiio")]
 mod worker;
 mod write;
 
-pub use atomic::create_folder;
+pub use atomic::{copy, create_folder, relative, sync, write_through};
 pub use document::{
-    from_overrides, read_document, read_json, read_text, read_toml, read_toml_with, write_document, write_json,
-    write_text, write_toml,
+    from_overrides, parse_json, parse_toml, read_document, read_json, read_text, read_toml, read_toml_with,
+    write_document, write_json, write_text, write_toml,
 };
 pub use format::Format;
 pub use header::Header;
-pub use limits::Limits;
+pub use limits::{Limits, Raise};
 pub use overrides::Override;
+pub use place::{below, clean_name, refuse_links};
 pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
-pub use worker::{serve as serve_worker, worker_version};
-pub use write::{Bits, Compression, ToFile, WriteOptions, write, write_with};
+pub use serve::serve as serve_worker;
+#[cfg(feature = "oiio")]
+pub use worker::worker_version;
+pub use write::{Bits, Compression, ToFile, WriteOptions, jpeg_bytes, write, write_with};
 
 use crate::{Error, Image, Result};
 use exif::CameraNotes;
-use format::Source;
+use format::{Opened, Source};
+use limits::affordable;
+use profile::Profile;
+#[cfg(feature = "oiio")]
+use protocol::{Ask, Sample, Shape, Told};
 use raster::{Opaque, Raster, Refusal, Wanted};
+use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::OnceLock;
 
-/// Reads a picture as the pixels asked for, with the default [`Limits`].
+/// Reads a picture as the pixels asked for, with the default [`ReadOptions`].
 ///
 /// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is dropped. `PremulRgba` and
 /// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or its `A`, or its
@@ -73,22 +117,59 @@ pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
 }
 
 /// What reads the kinds of file that the Rust decoders do not know.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub enum Fallback {
     /// Nothing: such files are refused.
     Nothing,
     /// OpenImageIO in a process of its own, where petcomp was built with the feature `oiio`.
     #[default]
     Worker,
+    /// OpenImageIO in this process, for people who trust their files: [`oiio::in_process`].
+    #[cfg(feature = "oiio")]
+    InProcess(oiio::Linked),
+}
+
+/// Which part of an EXR is the picture. Other formats have only one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Window {
+    /// What is meant to be shown: stored pixels outside are cut, missing ones are transparent black.
+    #[default]
+    Display,
+    /// What is stored, wherever it lies: [`Header::data_at`].
+    Data,
 }
 
 /// How a picture is read.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct ReadOptions {
     /// What a file may ask for. Default: [`Limits::default`].
     pub limits: Limits,
     /// What reads other kinds of file. Default: [`Fallback::Worker`].
     pub fallback: Fallback,
+    /// Which part of an EXR is read. Default: [`Window::Display`].
+    pub window: Window,
+}
+
+/// What a program chose for all its files.
+static CHOSEN: OnceLock<ReadOptions> = OnceLock::new();
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        let built_in = || Self { limits: Limits::default(), fallback: Fallback::default(), window: Window::default() };
+        CHOSEN.get().cloned().unwrap_or_else(built_in)
+    }
+}
+
+impl ReadOptions {
+    /// Makes these the default of this process, for every file that a stage reads by itself. Decides which files are
+    /// read, never what is in them; for programs, once, at their start.
+    ///
+    /// # Errors
+    /// [`Error::Value`] when it was done before.
+    pub fn make_default(self) -> Result<()> {
+        CHOSEN.set(self).map_err(|_| Error::value("read options", "the defaults were chosen before"))
+    }
 }
 
 /// Reads a picture as [`read`] does, under conditions of the caller's.
@@ -98,18 +179,41 @@ pub struct ReadOptions {
 pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
     let (path, limits) = (path.as_ref(), &options.limits);
     let source = Source::open(path, limits)?;
-    let raster = match caught(|| decode(&source, limits, P::WANTED)) {
-        Err(Refusal::Unsupported(what)) if options.fallback == Fallback::Worker => {
-            elsewhere(path, &source, what, limits, P::WANTED)?
-        }
-        decoded => decoded.map_err(|e| Error::file(path, e))?,
+    let raster = match caught(|| decode(&source, options, P::WANTED)) {
+        Err(Refusal::Unsupported(what)) => elsewhere(&source, what, options, P::WANTED),
+        decoded => decoded,
     };
-    upright(&raster, &source).map_err(|e| Error::file(path, e))
+    raster.and_then(|raster| Ok(upright(&raster, &source, limits)?)).map_err(|e| Error::file(path, e))
 }
 
 /// Gives samples their meaning and turns the picture the way the camera was held.
-fn upright<P: FromFile>(raster: &Raster, source: &Source) -> std::result::Result<Image<P>, String> {
-    Ok(camera_notes(source).orientation.apply(P::from_raster(&Opaque(raster))?))
+fn upright<P: FromFile>(raster: &Raster, source: &Source, limits: &Limits) -> std::result::Result<Image<P>, String> {
+    affordable((raster.width as u64).saturating_mul(raster.height as u64).saturating_mul(size_of::<P>() as u64))?;
+    let profile = match P::WANTED {
+        Wanted::Color | Wanted::Film => profile_of(raster, source, limits),
+        Wanted::Coverage | Wanted::Depth => None,
+    };
+    // Endless depth is where nothing is.
+    let wild = if P::WANTED == Wanted::Depth { 0 } else { raster.not_finite() };
+    if wild > 0 {
+        log::warn!("{}: {wild} samples are infinite or no number", source.path.display());
+    }
+    Ok(camera_notes(source).orientation.apply(P::from_raster(&Opaque(raster, profile.as_ref()))?))
+}
+
+/// The colour profile of display codes, where there is one other than sRGB.
+fn profile_of(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profile> {
+    match caught(|| Ok(Profile::of_file(source, limits)?)) {
+        Ok(Some(_)) if !raster.display_encoded => {
+            log::warn!("{}: has a colour profile, but float samples; taken for linear Rec. 709", source.path.display());
+            None
+        }
+        Ok(profile) => profile,
+        Err(e) => {
+            log::warn!("{}: has {e}; taken for sRGB", source.path.display());
+            None
+        }
+    }
 }
 
 /// Reads what a file says about its picture, without the pixels.
@@ -117,40 +221,76 @@ fn upright<P: FromFile>(raster: &Raster, source: &Source) -> std::result::Result
 /// # Errors
 /// [`Error::File`] as [`read`].
 pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
-    let (path, limits) = (path.as_ref(), Limits::default());
-    let source = Source::open(path, &limits)?;
-    let mut header = caught(|| header(&source, &limits)).map_err(|e| Error::file(path, e))?;
-    let notes = camera_notes(&source);
+    let (path, options) = (path.as_ref(), ReadOptions::default());
+    let mut opened = Opened::open(path, &options.limits)?;
+    let Opened { file, bytes, format } = &mut opened;
+    let (mut header, notes) = match caught(|| header(file, *bytes, *format, &options.limits)) {
+        Err(Refusal::Unsupported(what)) => header_elsewhere(path, what, &options)?,
+        header => header.map_err(|e| Error::file(path, e))?,
+    };
     header.cropped = notes.taken_in_another_shape([header.width, header.height]);
     (header.width, header.height) = notes.orientation.size((header.width, header.height));
+    if header.data_size == [0; 2] {
+        header.data_size = [header.width, header.height];
+    }
     (header.focal_35mm, header.digital_zoom) = (notes.focal_35mm, notes.digital_zoom);
     Ok(header)
+}
+
+/// The header of a file in memory, for fuzzing: nothing is caught.
+pub(crate) fn header_of(bytes: &[u8]) -> std::result::Result<Header, String> {
+    let format = Format::of_bytes(bytes).ok_or("no picture")?;
+    let told = header(&mut Cursor::new(bytes), bytes.len() as u64, format, &Limits::default());
+    told.map(|(header, _)| header).map_err(|e| e.to_string())
+}
+
+/// What a worker says, for fuzzing.
+#[cfg(feature = "oiio")]
+pub(crate) fn worker_answer(bytes: &[u8]) -> bool {
+    let mut from = bytes;
+    let shape = protocol::receive_shape(&mut from, &Limits::default(), bytes.len() as u64);
+    shape.ok().and_then(|shape| protocol::receive_samples(&mut from, shape.ok()?).ok()).is_some()
 }
 
 /// What the camera noted; EXR and HDR have no place for it.
 fn camera_notes(source: &Source) -> CameraNotes {
     match source.format {
         Format::Jpeg | Format::Tiff | Format::Png => {
-            caught(|| Ok(CameraNotes::of_file(&source.bytes))).unwrap_or_default()
+            caught(|| Ok(CameraNotes::of_file(Cursor::new(&source.bytes)))).unwrap_or_default()
         }
         _ => CameraNotes::default(),
     }
 }
 
-fn header(source: &Source, limits: &Limits) -> std::result::Result<Header, Refusal> {
-    match source.format {
-        Format::Exr => exr::header(&source.bytes, limits),
-        Format::Png => png::header(&source.bytes, limits),
-        Format::Jpeg => jpeg::header(&source.bytes, limits),
-        Format::Tiff => tiff::header(&source.bytes, limits),
-        Format::Hdr => hdr::header(&source.bytes, limits),
-        other => Err(Refusal::Unsupported(format!("{} headers are not read", other.name()))),
-    }
+/// What stands in front of the pixels, and no more of the file than that takes.
+fn header<R: BufRead + Seek>(
+    file: &mut R,
+    bytes: u64,
+    format: Format,
+    limits: &Limits,
+) -> std::result::Result<(Header, CameraNotes), Refusal> {
+    let header = match format {
+        Format::Exr => exr::header(&mut *file, bytes, limits)?,
+        Format::Hdr => hdr::header(&mut *file, bytes, limits)?,
+        Format::Png => png::header(&mut *file, bytes, limits)?,
+        Format::Tiff => tiff::header(&mut *file, bytes, limits)?,
+        Format::Jpeg => {
+            let start = jpeg::head(file, limits)?;
+            return Ok((jpeg::header(&start, bytes, limits)?, CameraNotes::of_file(Cursor::new(&start))));
+        }
+        other => return Err(Refusal::Unsupported(format!("{} needs OpenImageIO", other.name()))),
+    };
+    let notes = match format {
+        Format::Png | Format::Tiff if file.rewind().is_ok() => CameraNotes::of_file(file),
+        _ => CameraNotes::default(),
+    };
+    Ok((header, notes))
 }
 
-fn decode(source: &Source, limits: &Limits, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+fn decode(source: &Source, options: &ReadOptions, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+    let limits = &options.limits;
     match source.format {
-        Format::Exr => exr::decode(&source.bytes, limits, wanted),
+        Format::Exr => exr::decode(&source.bytes, limits, wanted, options.window),
         Format::Png => png::decode(&source.bytes, limits),
         Format::Jpeg => jpeg::decode(&source.bytes, limits),
         Format::Tiff => tiff::decode(&source.bytes, limits),
@@ -166,13 +306,67 @@ fn caught<T>(f: impl FnOnce() -> std::result::Result<T, Refusal>) -> std::result
 
 /// Another decoder for what ours do not know.
 #[cfg(feature = "oiio")]
-fn elsewhere(path: &Path, source: &Source, _: String, limits: &Limits, wanted: Wanted) -> Result<Raster> {
-    let raster = worker::decode(path, source, limits, wanted).map_err(|e| Error::file(path, e))?;
-    Ok(oiio::associated(raster, source))
+fn elsewhere(
+    source: &Source,
+    what: String,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> std::result::Result<Raster, Refusal> {
+    match told(source, what, options, Ask::Pixels { wanted, window: options.window })? {
+        Told::Raster(raster) => Ok(oiio::associated(raster, source)),
+        Told::Shape(_) => Err("OpenImageIO gave no pixels".into()),
+    }
+}
+
+/// What the other decoder says of a header.
+#[cfg(feature = "oiio")]
+fn header_elsewhere(path: &Path, what: String, options: &ReadOptions) -> Result<(Header, CameraNotes)> {
+    let source = Source::open(path, &options.limits)?;
+    let told = told(&source, what, options, Ask::Header).map_err(|e| Error::file(path, e))?;
+    let Told::Shape(Shape { width, height, names, sample, .. }) = told else {
+        return Err(Error::file(path, "OpenImageIO gave no header"));
+    };
+    let bits = 8 * Sample::bytes(sample);
+    let header = Header { format: source.format, width, height, channels: names, bits, ..Header::default() };
+    Ok((header, camera_notes(&source)))
+}
+
+#[cfg(feature = "oiio")]
+fn told(source: &Source, what: String, options: &ReadOptions, ask: Ask) -> std::result::Result<Told, Refusal> {
+    match options.fallback {
+        Fallback::Nothing => Err(Refusal::Unsupported(what)),
+        Fallback::Worker => worker::ask(source, &options.limits, ask),
+        Fallback::InProcess(linked) => (linked.0)(source, &options.limits, ask),
+    }
+}
+
+/// Every pixel by OpenImageIO, even those that ours could read.
+#[cfg(feature = "oiio")]
+fn read_by<P: FromFile>(fallback: Fallback, path: &Path, options: &ReadOptions) -> Result<Image<P>> {
+    let source = Source::open(path, &options.limits)?;
+    let options = ReadOptions { fallback, ..options.clone() };
+    let raster = elsewhere(&source, String::new(), &options, P::WANTED);
+    raster.and_then(|r| Ok(upright(&r, &source, &options.limits)?)).map_err(|e| Error::file(path, e))
+}
+
+/// Reads a picture through the OpenImageIO worker, even one that the Rust decoders could read: for comparisons.
+///
+/// # Errors
+/// As [`read_with`].
+#[cfg(feature = "oiio")]
+#[doc(hidden)]
+pub fn read_in_worker<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
+    read_by(Fallback::Worker, path.as_ref(), options)
 }
 
 /// Without OpenImageIO there is no other decoder.
 #[cfg(not(feature = "oiio"))]
-fn elsewhere(path: &Path, _: &Source, what: String, _: &Limits, _: Wanted) -> Result<Raster> {
+fn elsewhere(_: &Source, what: String, _: &ReadOptions, _: Wanted) -> std::result::Result<Raster, Refusal> {
+    Err(Refusal::Unsupported(format!("{what} (petcomp was built without OpenImageIO)")))
+}
+
+/// Without OpenImageIO there is no other decoder.
+#[cfg(not(feature = "oiio"))]
+fn header_elsewhere(path: &Path, what: String, _: &ReadOptions) -> Result<(Header, CameraNotes)> {
     Err(Error::file(path, format!("{what} (petcomp was built without OpenImageIO)")))
 }

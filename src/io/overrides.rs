@@ -20,7 +20,20 @@ impl FromStr for Override {
             return Err(Error::value(text, "no value, expected KEY=VALUE"));
         };
         let parsed = format!("value = {value}").parse::<toml::Table>().ok().and_then(|mut t| t.remove("value"));
-        Ok(Self { path: path.trim().to_owned(), value: parsed.unwrap_or_else(|| Value::String(value.to_owned())) })
+        let value = parsed.unwrap_or_else(|| Value::String(value.to_owned()));
+        match is_finite(&value) {
+            true => Ok(Self { path: path.trim().to_owned(), value }),
+            false => Err(Error::value(path.trim(), format!("{value}, expected a finite number"))),
+        }
+    }
+}
+
+fn is_finite(value: &Value) -> bool {
+    match value {
+        Value::Float(number) => number.is_finite(),
+        Value::Array(list) => list.iter().all(is_finite),
+        Value::Table(table) => table.values().all(is_finite),
+        _ => true,
     }
 }
 

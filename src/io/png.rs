@@ -6,9 +6,7 @@ use super::raster::{Raster, Refusal, Samples, usual_names};
 use super::write::{Coded, Codes};
 use crate::io::Format;
 use png::{BitDepth, ColorType, Transformations};
-use std::io::Cursor;
-
-type Reader<'a> = png::Reader<Cursor<&'a [u8]>>;
+use std::io::{BufRead, Cursor, Seek};
 
 impl From<png::DecodingError> for Refusal {
     fn from(e: png::DecodingError) -> Self {
@@ -18,9 +16,9 @@ impl From<png::DecodingError> for Refusal {
 }
 
 /// The file up to its pixels, checked against the limits.
-fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Reader<'a>, Refusal> {
+fn open<R: BufRead + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<png::Reader<R>, Refusal> {
     let most = png::Limits { bytes: usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX) };
-    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), most);
+    let mut decoder = png::Decoder::new_with_limits(file, most);
     decoder.set_transformations(Transformations::EXPAND);
     decoder.read_header_info()?;
     let reader = decoder.read_info()?;
@@ -28,12 +26,12 @@ fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Reader<'a>, Refusal> {
     let channels = color.samples() as u64;
     let (width, height) = (u64::from(reader.info().width), u64::from(reader.info().height));
     let bytes_per_pixel = channels * if depth == BitDepth::Sixteen { 2 } else { 1 };
-    limits.check(Demand { width, height, channels, bytes_per_pixel, file_bytes: bytes.len() as u64 })?;
+    limits.check(Demand { width, height, channels, bytes_per_pixel, file_bytes })?;
     Ok(reader)
 }
 
-pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
-    let reader = open(bytes, limits)?;
+pub(super) fn header(file: impl BufRead + Seek, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
+    let reader = open(file, file_bytes, limits)?;
     let (info, (color, depth)) = (reader.info(), reader.output_color_type());
     let mut metadata: Notes = Vec::new();
     metadata.extend(info.uncompressed_latin1_text.iter().map(|t| note(&t.keyword, &t.text)));
@@ -44,15 +42,20 @@ pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
         height: info.height as usize,
         channels: usual_names(color.samples()).unwrap_or_default(),
         bits: if depth == BitDepth::Sixteen { 16 } else { 8 },
-        focal_35mm: None,
-        digital_zoom: false,
-        cropped: false,
         metadata,
+        ..Header::default()
     })
 }
 
+/// The embedded colour profile; a chunk that names sRGB goes before it (PNG 3rd edition, 4.3).
+pub(super) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
+    let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
+    let info = reader.info();
+    if info.srgb.is_some() { None } else { Some(info.icc_profile.as_ref()?.to_vec()) }
+}
+
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
-    let mut reader = open(bytes, limits)?;
+    let mut reader = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     let (color, depth) = reader.output_color_type();
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     let names = usual_names(color.samples()).ok_or("channels of an unknown kind")?;

@@ -3,8 +3,10 @@
 //! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples are scene-linear, unless
 //! the file says otherwise. A matte or a depth is never display-encoded.
 
+use super::profile::Profile;
 use crate::color::{decode_srgb8, decode_srgb16, srgb_to_linear};
 use crate::{Coverage, Depth, Film, Image, LinearRgb, PremulRgba, Srgb8, StraightRgba};
+use half::f16;
 use rayon::prelude::*;
 
 /// Samples of a picture, channels interleaved, rows from the top.
@@ -12,7 +14,14 @@ use rayon::prelude::*;
 pub(super) enum Samples {
     U8(Vec<u8>),
     U16(Vec<u16>),
+    F16(Vec<f16>),
     F32(Vec<f32>),
+}
+
+impl Samples {
+    pub(super) fn are_float(&self) -> bool {
+        matches!(self, Self::F16(_) | Self::F32(_))
+    }
 }
 
 /// What a decoder hands over.
@@ -123,9 +132,9 @@ pub trait FromFile: Copy + Send + Sync + Default + 'static {
     fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String>;
 }
 
-/// A [`Raster`] that only `io` can look into.
+/// A [`Raster`] that only `io` can look into, and what its file says of its colours.
 #[derive(Debug)]
-pub struct Opaque<'a>(pub(super) &'a Raster);
+pub struct Opaque<'a>(pub(super) &'a Raster, pub(super) Option<&'a Profile>);
 
 /// Colour with alpha in whichever form the file has it.
 trait Colored: Copy + Send {
@@ -170,7 +179,7 @@ impl Colored for LinearRgb {
 impl FromFile for PremulRgba {
     const WANTED: Wanted = Wanted::Color;
     fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        raster.0.colors()
+        raster.0.colors(raster.1)
     }
 }
 
@@ -183,8 +192,12 @@ impl FromFile for Film {
             (Samples::F32(v), &[r, g, b, tr, tg, tb]) => {
                 Ok(raster.0.each(v, |px| Film::new([px[r], px[g], px[b]].into(), [px[tr], px[tg], px[tb]].into())))
             }
+            (Samples::F16(v), &[r, g, b, tr, tg, tb]) => Ok(raster.0.each(v, |px| {
+                let three = |at: [usize; 3]| at.map(|i| f32::from(px[i])).into();
+                Film::new(three([r, g, b]), three([tr, tg, tb]))
+            })),
             _ => {
-                let rgba: Image<PremulRgba> = raster.0.colors()?;
+                let rgba: Image<PremulRgba> = raster.0.colors(raster.1)?;
                 Ok(Image::from_vec(rgba.width(), rgba.height(), rgba.pixels().iter().map(|&p| p.into()).collect()))
             }
         }
@@ -194,7 +207,7 @@ impl FromFile for Film {
 impl FromFile for StraightRgba {
     const WANTED: Wanted = Wanted::Color;
     fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        raster.0.colors()
+        raster.0.colors(raster.1)
     }
 }
 
@@ -202,7 +215,7 @@ impl FromFile for LinearRgb {
     const WANTED: Wanted = Wanted::Color;
     fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
         raster.0.refuse_transparency()?;
-        raster.0.colors()
+        raster.0.colors(raster.1)
     }
 }
 
@@ -216,11 +229,17 @@ impl FromFile for Coverage {
 impl FromFile for Depth {
     const WANTED: Wanted = Wanted::Depth;
     fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        if !matches!(raster.0.samples, Samples::F32(_)) {
+        if !raster.0.samples.are_float() {
             return Err("integer samples, expected a depth in float (metres)".into());
         }
         raster.0.single(Self::WANTED, Depth)
     }
+}
+
+/// Where the channels of a colour stand in a pixel.
+struct Channels {
+    color: [usize; 3],
+    alpha: Option<usize>,
 }
 
 /// What counts as opaque: half floats next to 1 are 0.0005 apart.
@@ -238,35 +257,51 @@ impl Raster {
         Err(format!("{clear} pixels with alpha below 1, expected an opaque picture (put it over a background first)"))
     }
 
-    fn colors<P: Colored>(&self) -> Result<Image<P>, String> {
+    fn colors<P: Colored>(&self, profile: Option<&Profile>) -> Result<Image<P>, String> {
         let picked = Wanted::Color.pick(&self.names)?;
-        let [r, g, b] = [picked[0], picked[1], picked[2]];
-        let alpha = picked.get(3).copied();
-        Ok(match &self.samples {
-            Samples::U8(v) => {
-                self.decoded(v, [r, g, b], alpha, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into())
+        let at = Channels { color: [picked[0], picked[1], picked[2]], alpha: picked.get(3).copied() };
+        let light = |display: [f32; 3]| profile.map_or_else(|| display.map(srgb_to_linear), |p| p.light(display));
+        Ok(match (&self.samples, profile) {
+            (Samples::U8(v), None) => {
+                self.decoded(v, &at, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into(), light)
             }
-            Samples::U16(v) => self.decoded(v, [r, g, b], alpha, 65_535.0, |codes| codes.map(decode_srgb16)),
-            Samples::F32(v) => self.decoded(v, [r, g, b], alpha, 1.0, |values| values.map(srgb_to_linear)),
+            (Samples::U16(v), None) => self.decoded(v, &at, 65_535.0, |codes| codes.map(decode_srgb16), light),
+            (Samples::U8(v), Some(p)) => {
+                self.decoded(v, &at, 255.0, |c| p.light(c.map(|c| f32::from(c) / 255.0)), light)
+            }
+            (Samples::U16(v), Some(p)) => {
+                self.decoded(v, &at, 65_535.0, |c| p.light(c.map(|c| f32::from(c) / 65_535.0)), light)
+            }
+            (Samples::F16(v), _) => self.decoded(v, &at, 1.0, |c| light(c.map(f32::from)), light),
+            (Samples::F32(v), _) => self.decoded(v, &at, 1.0, light, light),
         })
     }
 
-    /// Colours out of samples whose alpha is 1 at `full` and whose display codes `decode` knows.
+    /// Colours out of samples whose alpha is 1 at `full`; `decode` knows their display codes, `light` display values.
     fn decoded<T: Copy + Sync + Into<f32>, P: Colored>(
         &self,
         samples: &[T],
-        [r, g, b]: [usize; 3],
-        alpha: Option<usize>,
+        at: &Channels,
         full: f32,
         decode: impl Fn([T; 3]) -> [f32; 3] + Sync + Send,
+        light: impl Fn([f32; 3]) -> [f32; 3] + Sync + Send,
     ) -> Image<P> {
-        let a = |px: &[T]| alpha.map_or(1.0, |i| px[i].into() / full);
-        let plain = |px: &[T]| [r, g, b].map(|i| px[i].into() / full);
-        match (self.display_encoded, self.premultiplied && alpha.is_some()) {
-            (true, false) => self.each(samples, |px| P::straight(decode([px[r], px[g], px[b]]), a(px))),
+        let a = |px: &[T]| at.alpha.map_or(1.0, |i| px[i].into() / full);
+        let plain = |px: &[T]| at.color.map(|i| px[i].into() / full);
+        match (self.display_encoded, self.premultiplied && at.alpha.is_some()) {
+            (true, false) => self.each(samples, |px| P::straight(decode(at.color.map(|i| px[i])), a(px))),
             (false, false) => self.each(samples, |px| P::straight(plain(px), a(px))),
             (false, true) => self.each(samples, |px| P::premultiplied(plain(px), a(px))),
-            (true, true) => self.each(samples, |px| P::straight(unassociated(plain(px), a(px)), a(px))),
+            (true, true) => self.each(samples, |px| P::straight(light(unassociated(plain(px), a(px))), a(px))),
+        }
+    }
+
+    /// Samples that are no number, or endless.
+    pub(super) fn not_finite(&self) -> usize {
+        match &self.samples {
+            Samples::F16(v) => v.par_iter().filter(|x| !x.is_finite()).count(),
+            Samples::F32(v) => v.par_iter().filter(|x| !x.is_finite()).count(),
+            Samples::U8(_) | Samples::U16(_) => 0,
         }
     }
 
@@ -283,6 +318,7 @@ impl Raster {
         match &self.samples {
             Samples::U8(v) => self.each(v, |px| make(f32::from(px[i]) / 255.0)),
             Samples::U16(v) => self.each(v, |px| make(f32::from(px[i]) / 65_535.0)),
+            Samples::F16(v) => self.each(v, |px| make(px[i].into())),
             Samples::F32(v) => self.each(v, |px| make(px[i])),
         }
     }
@@ -293,10 +329,10 @@ impl Raster {
     }
 }
 
-/// Linear straight colour from display codes that somebody multiplied by alpha as they were.
+/// Straight display values from those that somebody multiplied by alpha as they were.
 fn unassociated(encoded: [f32; 3], alpha: f32) -> [f32; 3] {
     let k = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
-    encoded.map(|v| srgb_to_linear((v * k).min(1.0)))
+    encoded.map(|v| (v * k).min(1.0))
 }
 
 /// Names of the channels of a picture of `count` channels without names of its own.
@@ -323,14 +359,14 @@ mod tests {
     #[test]
     fn alpha_multiplies_linear_light() {
         let half_white = raster(Samples::U8(vec![255, 255, 255, 128]), "R G B A", true, false);
-        let p = PremulRgba::from_raster(&Opaque(&half_white)).unwrap()[(0, 0)];
+        let p = PremulRgba::from_raster(&Opaque(&half_white, None)).unwrap()[(0, 0)];
         assert_eq!(p, PremulRgba::new(128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0));
     }
 
     #[test]
     fn premultiplied_display_codes_are_divided_before_they_are_decoded() {
         let grey = raster(Samples::U8(vec![64, 64, 64, 128]), "R G B A", true, true);
-        let p = PremulRgba::from_raster(&Opaque(&grey)).unwrap()[(0, 0)];
+        let p = PremulRgba::from_raster(&Opaque(&grey, None)).unwrap()[(0, 0)];
         let expected = srgb_to_linear(0.5) * 128.0 / 255.0;
         assert!((p.r - expected).abs() < 1e-6, "{p:?}");
     }
@@ -338,28 +374,28 @@ mod tests {
     #[test]
     fn an_opaque_alpha_is_dropped_and_a_transparent_one_refused() {
         let opaque = raster(Samples::U8(vec![255, 0, 0, 255]), "R G B A", true, false);
-        assert_eq!(LinearRgb::from_raster(&Opaque(&opaque)).unwrap()[(0, 0)], LinearRgb::new(1.0, 0.0, 0.0));
+        assert_eq!(LinearRgb::from_raster(&Opaque(&opaque, None)).unwrap()[(0, 0)], LinearRgb::new(1.0, 0.0, 0.0));
         let clear = raster(Samples::U8(vec![255, 0, 0, 254]), "R G B A", true, false);
-        assert!(LinearRgb::from_raster(&Opaque(&clear)).unwrap_err().contains("alpha"));
+        assert!(LinearRgb::from_raster(&Opaque(&clear, None)).unwrap_err().contains("alpha"));
     }
 
     #[test]
     fn masks_are_never_display_decoded() {
         let mask = raster(Samples::U8(vec![51]), "Y", true, false);
-        assert_eq!(Coverage::from_raster(&Opaque(&mask)).unwrap()[(0, 0)], Coverage(0.2));
+        assert_eq!(Coverage::from_raster(&Opaque(&mask, None)).unwrap()[(0, 0)], Coverage(0.2));
     }
 
     #[test]
     fn a_mask_of_three_channels_is_refused_with_what_was_expected() {
         let mask = raster(Samples::U8(vec![51; 3]), "R G B", true, false);
-        let e = Coverage::from_raster(&Opaque(&mask)).unwrap_err();
+        let e = Coverage::from_raster(&Opaque(&mask, None)).unwrap_err();
         assert_eq!(e, "has the channels R G B, expected one channel, or one named A or Y");
     }
 
     #[test]
     fn straight_colour_under_zero_alpha_is_kept() {
         let clear = raster(Samples::F32(vec![0.5, 0.25, 0.125, 0.0]), "R G B A", false, false);
-        let p = StraightRgba::from_raster(&Opaque(&clear)).unwrap()[(0, 0)];
+        let p = StraightRgba::from_raster(&Opaque(&clear, None)).unwrap()[(0, 0)];
         assert_eq!((p.r, p.g, p.b, p.a), (0.5, 0.25, 0.125, 0.0));
     }
 }

@@ -5,8 +5,7 @@ use super::limits::{Demand, Limits};
 use super::raster::{Raster, Refusal, Samples, usual_names};
 use super::write::{Coded, Codes};
 use crate::io::Format;
-use half::slice::HalfFloatSliceExt;
-use std::io::Cursor;
+use std::io::{Cursor, Read, Seek};
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::encoder::{TiffEncoder, TiffValue, colortype};
 use tiff::tags::{ExtraSamples, Tag};
@@ -27,54 +26,74 @@ impl From<TiffError> for Refusal {
     }
 }
 
-struct Opened<'a> {
-    decoder: Decoder<Cursor<&'a [u8]>>,
+struct Opened<R: Read + Seek> {
+    decoder: Decoder<R>,
     width: usize,
     height: usize,
     names: Vec<String>,
     bits: u8,
+    /// Stored as cyan, magenta, yellow and black.
+    inks: bool,
 }
 
-fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<Opened<'a>, Refusal> {
+fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Opened<R>, Refusal> {
     let mut most = tiff::decoder::Limits::default();
     most.decoding_buffer_size = usize::try_from(limits.decoded_bytes).unwrap_or(usize::MAX);
     most.intermediate_buffer_size = most.decoding_buffer_size;
     most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
-    let mut decoder = Decoder::new(Cursor::new(bytes))?.with_limits(most);
+    let mut decoder = Decoder::new(file)?.with_limits(most);
     let (width, height) = decoder.dimensions()?;
+    refuse_missing_palette(&mut decoder)?;
     let (channels, bits) = match decoder.colortype()? {
         ColorType::Gray(bits) => (1, bits),
         ColorType::GrayA(bits) => (2, bits),
         ColorType::RGB(bits) => (3, bits),
-        ColorType::RGBA(bits) => (4, bits),
+        ColorType::RGBA(bits) | ColorType::CMYK(bits) => (4, bits),
         other => return Err(Refusal::Unsupported(format!("unsupported TIFF: {other:?}"))),
     };
-    let (w, h, file_bytes) = (width.into(), height.into(), bytes.len() as u64);
+    let (w, h) = (width.into(), height.into());
     let bytes_per_pixel = channels * u64::from(bits).div_ceil(8);
     limits.check(Demand { width: w, height: h, channels, bytes_per_pixel, file_bytes })?;
-    let names = usual_names(channels as usize).ok_or("channels of an unknown kind")?;
-    Ok(Opened { decoder, width: width as usize, height: height as usize, names, bits })
+    let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
+    let names = usual_names(if inks { 3 } else { channels as usize }).ok_or("channels of an unknown kind")?;
+    Ok(Opened { decoder, width: width as usize, height: height as usize, names, bits, inks })
 }
 
-pub(super) fn header(bytes: &[u8], limits: &Limits) -> Result<Header, Refusal> {
-    let Opened { mut decoder, width, height, names, bits } = open(bytes, limits)?;
+/// TIFF 6.0, `PhotometricInterpretation` = 3: codes are places in a palette.
+const PALETTE: u16 = 3;
+
+/// OpenImageIO, which reads palettes, makes a black picture where there is none.
+fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
+    if decoder.find_tag_unsigned(Tag::PhotometricInterpretation)? != Some(PALETTE) {
+        return Ok(());
+    }
+    let bits = decoder.find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?.unwrap_or_default();
+    let colors = bits.first().and_then(|&bits| 1_usize.checked_shl(bits.into())).unwrap_or(0);
+    let entries = decoder.find_tag_unsigned_vec::<u16>(Tag::ColorMap)?.unwrap_or_default().len();
+    match entries == 3 * colors {
+        true => Ok(()),
+        false => Err(format!("damaged TIFF: a palette of {entries} entries, expected {}", 3 * colors).into()),
+    }
+}
+
+/// The embedded colour profile.
+pub(super) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
+    let mut most = tiff::decoder::Limits::default();
+    most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
+    // Of kinds of TIFF too that the decoder cannot read: OpenImageIO hands over their codes.
+    let mut decoder = Decoder::new(Cursor::new(bytes)).ok()?.with_limits(most);
+    decoder.get_tag_u8_vec(Tag::IccProfile).ok()
+}
+
+pub(super) fn header(file: impl Read + Seek, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
+    let Opened { mut decoder, width, height, names, bits, .. } = open(file, file_bytes, limits)?;
     let text = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
     let (bits, metadata) = (u32::from(bits), notes_of_lines(&text));
-    Ok(Header {
-        format: Format::Tiff,
-        width,
-        height,
-        channels: names,
-        bits,
-        focal_35mm: None,
-        digital_zoom: false,
-        cropped: false,
-        metadata,
-    })
+    Ok(Header { format: Format::Tiff, width, height, channels: names, bits, metadata, ..Header::default() })
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
-    let Opened { mut decoder, width, height, names, .. } = open(bytes, limits)?;
+    let Opened { mut decoder, width, height, names, inks, .. } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
     if decoder.image_buffer_layout()?.planes != 1 {
         return Err(Refusal::Unsupported("unsupported TIFF: separate planes".into()));
@@ -82,14 +101,21 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let samples = match decoder.read_image()? {
         DecodingResult::U8(v) => Samples::U8(v),
         DecodingResult::U16(v) => Samples::U16(v),
-        DecodingResult::F16(v) => Samples::F32(v.to_f32_vec()),
+        DecodingResult::F16(v) => Samples::F16(v),
         DecodingResult::F32(v) => Samples::F32(v),
         DecodingResult::F64(v) => Samples::F32(v.into_iter().map(|x| x as f32).collect()),
         _ => return Err(Refusal::Unsupported("unsupported TIFF: signed or long integer samples".into())),
     };
+    let samples = match samples {
+        Samples::U8(v) if inks => Samples::U8(left_by_inks(&v, u8::MAX.into())),
+        Samples::U16(v) if inks => Samples::U16(left_by_inks(&v, u16::MAX.into())),
+        _ if inks => return Err(Refusal::Unsupported("unsupported TIFF: inks in float".into())),
+        samples => samples,
+    };
     let (display_encoded, count) = match &samples {
         Samples::U8(v) => (true, v.len()),
         Samples::U16(v) => (true, v.len()),
+        Samples::F16(v) => (false, v.len()),
         Samples::F32(v) => (false, v.len()),
     };
     if count != width * height * names.len() {
@@ -97,6 +123,16 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     }
     let premultiplied = extra.first() == Some(&ASSOCIATED_ALPHA);
     Ok(Raster { width, height, names, samples, display_encoded, premultiplied })
+}
+
+/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded as the inks were; a colour
+/// profile would say it better, and is not applied to inks.
+fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: u64) -> Vec<T> {
+    let left = |ink: T, black: T| {
+        let product = (full - ink.into()) * (full - black.into());
+        T::try_from((product + full / 2) / full).unwrap_or_default()
+    };
+    inks.chunks_exact(4).flat_map(|px| [left(px[0], px[3]), left(px[1], px[3]), left(px[2], px[3])]).collect()
 }
 
 /// A whole file of integer codes; alpha is straight.

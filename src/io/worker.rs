@@ -1,86 +1,44 @@
-//! OpenImageIO in a process of its own: a file that crashes it ends that process and is named, and programs that never
-//! meet such a file never load it.
+//! OpenImageIO in processes of their own: a file that crashes it ends such a process and is named, and programs that
+//! never meet such a file never load it.
 //!
-//! The worker gets format, path, wanted channels and limits as arguments and answers on its standard output: a line of
-//! JSON, then the samples in little-endian order. The parent believes nothing: it checks the sizes itself, and kills a
-//! worker that takes too long.
+//! A worker lives as long as this program and answers one question at a time; there are as many as ever asked at once.
+//! One that dies is replaced and the file tried once more, one that takes too long is killed.
 
-use super::format::{Format, Source};
-use super::limits::{Demand, Limits};
-use super::raster::{Raster, Refusal, Samples, Wanted};
+use super::format::Source;
+use super::limits::Limits;
+use super::patience::Pipe;
+use super::protocol::{self, Ask, Ready, Shape, Told};
+use super::raster::Refusal;
+use super::serve::VERSION;
 use crate::Error;
-use serde::{Deserialize, Serialize};
-use std::ffi::OsString;
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitCode, Stdio};
-use std::sync::mpsc;
-use std::time::Duration;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, Once, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Name of the worker program, looked for beside the running one.
 const PROGRAM: &str = "petcomp-oiio-worker";
 /// Names the worker program where it lies elsewhere.
 const PROGRAM_VARIABLE: &str = "PETCOMP_OIIO_WORKER";
-/// Asks the worker for its version instead.
-const VERSION: &str = "--version";
-/// Wall-clock time for any file, and for each further 10 million pixels that the limits allow to be asked for.
-const PATIENCE: Duration = Duration::from_secs(10);
-const PATIENCE_PER_10_MPX: Duration = Duration::from_secs(1);
-/// No answer has a longer first line.
-const LONGEST_LINE: u64 = 64 << 10;
+/// What of the environment a worker sees: OpenImageIO and OpenColorIO take settings from the rest.
+const ENVIRONMENT: [&str; 1] = ["LD_LIBRARY_PATH"];
+/// Time for loading 260 libraries on a busy machine.
+const START: Duration = Duration::from_secs(60);
+/// Pixels that earn a worker a further second.
+const PIXELS_PER_SECOND: u64 = 10_000_000;
+/// How often a file is tried.
+const TRIES: usize = 2;
 
-/// What a worker is asked.
-#[derive(Serialize, Deserialize)]
-struct Question {
-    format: String,
-    wanted: Wanted,
-    limits: Limits,
-}
+/// The workers of this program that have nothing to do.
+static IDLE: Pool = Pool { idle: Mutex::new(Vec::new()) };
 
-/// The first line of its answer.
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Answer {
-    Picture { width: usize, height: usize, names: Vec<String>, sample: Sample, display_encoded: bool },
-    Refused(String),
-}
-
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Sample {
-    U8,
-    U16,
-    F32,
-}
-
-impl Sample {
-    fn bytes(self) -> u64 {
-        match self {
-            Self::U8 => 1,
-            Self::U16 => 2,
-            Self::F32 => 4,
-        }
-    }
-}
-
-/// The picture as a worker sees it.
-pub(super) fn decode(path: &Path, source: &Source, limits: &Limits, wanted: Wanted) -> Result<Raster, Refusal> {
+/// What a worker says about a file.
+pub(super) fn ask(source: &Source, limits: &Limits, ask: Ask) -> Result<Told, Refusal> {
     let program = program().ok_or_else(|| {
         format!("needs OpenImageIO, and {PROGRAM} is not beside this program ({PROGRAM_VARIABLE} may name it)")
     })?;
-    let question = Question { format: source.format.name().into(), wanted, limits: limits.clone() };
-    let question = serde_json::to_string(&question).map_err(|e| e.to_string())?;
-    let child = Command::new(&program)
-        .arg(question)
-        .arg(path)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .map_err(|e| format!("needs OpenImageIO, and {} does not start: {e}", program.display()))?;
-    let megapixels = u32::try_from(limits.pixels / 10_000_000).unwrap_or(u32::MAX);
-    let patience = PATIENCE.saturating_add(PATIENCE_PER_10_MPX.saturating_mul(megapixels));
-    answer(child, limits, source.bytes.len() as u64, patience)
+    IDLE.ask(&program, source, limits, ask)
 }
 
 /// The OpenImageIO that the worker program links, as that tells it.
@@ -106,152 +64,238 @@ fn program() -> Option<PathBuf> {
     own.ancestors().skip(1).take(2).map(|folder| folder.join(&name)).find(|p| p.is_file())
 }
 
-/// Waits for the answer, and not longer than `patience`.
-fn answer(mut child: Child, limits: &Limits, file_bytes: u64, patience: Duration) -> Result<Raster, Refusal> {
-    let pipe = child.stdout.take().ok_or("no pipe to the OpenImageIO worker")?;
-    let (send, receive) = mpsc::channel();
-    let limits = limits.clone();
-    let reader = std::thread::spawn(move || {
-        // Nobody listens any more when the parent has lost patience.
-        let _ = send.send(receive_raster(pipe, &limits, file_bytes));
-    });
-    let received = receive.recv_timeout(patience);
-    if received.is_err() {
-        // It may have ended by itself in between.
-        let _ = child.kill();
+/// Workers that wait for a question.
+struct Pool {
+    idle: Mutex<Vec<Worker>>,
+}
+
+/// Why a worker gave no answer.
+#[derive(Debug)]
+enum Failure {
+    /// It ended, or spoke nonsense: the next one may do better.
+    Died(String),
+    /// It, and so the file, had its time.
+    Slow(Duration),
+}
+
+impl Pool {
+    fn ask(&self, program: &Path, source: &Source, limits: &Limits, ask: Ask) -> Result<Told, Refusal> {
+        let mut cause = String::new();
+        for attempt in 0..TRIES {
+            // The second try is for a worker that nothing has happened to yet.
+            let idle = if attempt == 0 { self.take(limits) } else { None };
+            let mut worker = match idle {
+                Some(worker) => worker,
+                None => Worker::start(program, limits)?,
+            };
+            match worker.answer(source, ask) {
+                Ok(answer) => {
+                    self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
+                    return answer;
+                }
+                Err(Failure::Slow(patience)) => {
+                    let seconds = patience.as_secs_f64();
+                    return Err(
+                        format!("unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)").into()
+                    );
+                }
+                Err(Failure::Died(how)) => {
+                    log::debug!("{}: OpenImageIO died on it ({how})", source.path.display());
+                    cause = how;
+                }
+            }
+        }
+        Err(format!("unreadable: OpenImageIO died on it {TRIES} times ({cause})").into())
     }
-    let status = child.wait().map_err(|e| e.to_string())?;
-    let _ = reader.join();
-    match received {
-        Err(_) => Err(format!("OpenImageIO took longer than {} s", patience.as_secs()).into()),
-        Ok(Ok(raster)) => Ok(raster),
-        Ok(Err(what)) => Err(death(status).unwrap_or(what).into()),
+
+    /// One that was started with these limits.
+    fn take(&self, limits: &Limits) -> Option<Worker> {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = idle.iter().rposition(|worker| worker.limits == *limits)?;
+        Some(idle.swap_remove(at))
     }
 }
 
-/// How the worker died, if it did not end by itself.
-fn death(status: std::process::ExitStatus) -> Option<String> {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        return Some(format!("unreadable: OpenImageIO died on it (signal {signal})"));
-    }
-    let _ = status;
-    None
+/// A running worker program; killed when it is dropped.
+struct Worker {
+    child: Child,
+    to: Pipe,
+    from: BufReader<Pipe>,
+    limits: Limits,
 }
 
-fn receive_raster(pipe: impl Read, limits: &Limits, file_bytes: u64) -> Result<Raster, String> {
-    let mut pipe = BufReader::new(pipe);
-    let mut line = String::new();
-    pipe.by_ref().take(LONGEST_LINE).read_line(&mut line).map_err(|_| "OpenImageIO worker: garbled answer")?;
-    match serde_json::from_str(&line).map_err(|_| "OpenImageIO worker: garbled answer")? {
-        Answer::Refused(what) => Err(what.lines().next().unwrap_or_default().into()),
-        Answer::Picture { width, height, names, sample, display_encoded } => {
-            let channels = names.len() as u64;
-            let bytes_per_pixel = channels * sample.bytes();
-            limits.check(Demand {
-                width: width as u64,
-                height: height as u64,
-                channels,
-                bytes_per_pixel,
-                file_bytes,
-            })?;
-            let samples = receive_samples(pipe, sample, width * height * names.len())?;
-            Ok(Raster { width, height, names, samples, display_encoded, premultiplied: false })
+impl Drop for Worker {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Worker {
+    fn start(program: &Path, limits: &Limits) -> Result<Self, Refusal> {
+        let not_started =
+            |e: std::io::Error| format!("needs OpenImageIO, and {} does not start: {e}", program.display());
+        let argument = serde_json::to_string(limits).map_err(|e| e.to_string())?;
+        let mut child = Command::new(program)
+            .arg(argument)
+            .env_clear()
+            .envs(ENVIRONMENT.iter().filter_map(|name| Some((name, std::env::var_os(name)?))))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(not_started)?;
+        let (stdin, stdout) = child.stdin.take().zip(child.stdout.take()).ok_or("no pipe to the OpenImageIO worker")?;
+        let (to, from) = (Pipe::new(stdin.into()), Pipe::new(stdout.into()));
+        let (to, from) = (to.map_err(not_started)?, BufReader::new(from.map_err(not_started)?));
+        let mut worker = Self { child, to, from, limits: limits.clone() };
+        let ready = worker.greeting().map_err(|e| {
+            let how = worker.how_it_died(&e);
+            format!("needs OpenImageIO, and {} does not start: {how}", program.display())
+        })?;
+        warn_of(&ready.missing);
+        Ok(worker)
+    }
+
+    fn greeting(&mut self) -> std::io::Result<Ready> {
+        self.from.get_mut().deadline = Instant::now() + START;
+        let ready: Ready = protocol::receive(&mut self.from)?;
+        if ready.petcomp != env!("CARGO_PKG_VERSION") {
+            return Err(std::io::Error::other(format!("belongs to petcomp {}", ready.petcomp)));
+        }
+        Ok(ready)
+    }
+
+    fn answer(&mut self, source: &Source, ask: Ask) -> Result<Result<Told, Refusal>, Failure> {
+        let started = Instant::now();
+        let mut patience = Duration::from_secs(self.limits.seconds);
+        self.wait_until(started + patience);
+        let shape = match self.ask_shape(source, ask).map_err(|e| self.failure(e, patience))? {
+            Ok(shape) if ask != Ask::Header => shape,
+            other => return Ok(other.map(Told::Shape)),
+        };
+        patience += patience_for(&shape);
+        self.wait_until(started + patience);
+        let raster = protocol::receive_samples(&mut self.from, shape).map_err(|e| self.failure(e, patience))?;
+        Ok(Ok(Told::Raster(raster)))
+    }
+
+    fn ask_shape(&mut self, source: &Source, ask: Ask) -> std::io::Result<Result<Shape, Refusal>> {
+        protocol::ask(&mut self.to, source.format, ask, &source.bytes)?;
+        protocol::receive_shape(&mut self.from, &self.limits, source.bytes.len() as u64)
+    }
+
+    fn wait_until(&mut self, deadline: Instant) {
+        self.to.deadline = deadline;
+        self.from.get_mut().deadline = deadline;
+    }
+
+    fn failure(&mut self, e: std::io::Error, patience: Duration) -> Failure {
+        match e.kind() {
+            ErrorKind::TimedOut => Failure::Slow(patience),
+            _ => Failure::Died(self.how_it_died(&e)),
+        }
+    }
+
+    /// The signal that ended it, or what else went wrong.
+    fn how_it_died(&mut self, e: &std::io::Error) -> String {
+        let closed = matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe);
+        if !closed {
+            let _ = self.child.kill();
+            return format!("garbled answer: {e}");
+        }
+        match self.child.wait() {
+            Ok(status) => match std::os::unix::process::ExitStatusExt::signal(&status) {
+                Some(signal) => format!("signal {signal}"),
+                None => status.to_string(),
+            },
+            Err(e) => e.to_string(),
         }
     }
 }
 
-fn receive_samples(mut pipe: impl Read, sample: Sample, count: usize) -> Result<Samples, String> {
-    let mut bytes = vec![0; count * sample.bytes() as usize];
-    pipe.read_exact(&mut bytes).map_err(|_| "OpenImageIO worker: answer ends too early")?;
-    Ok(match sample {
-        Sample::U8 => Samples::U8(bytes),
-        Sample::U16 => Samples::U16(bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect()),
-        Sample::F32 => {
-            Samples::F32(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
-        }
-    })
+fn patience_for(shape: &Shape) -> Duration {
+    Duration::from_secs((shape.width as u64).saturating_mul(shape.height as u64) / PIXELS_PER_SECOND)
 }
 
-/// The whole of the worker program: answers the question in its arguments.
-pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
-    let first = arguments.next();
-    if first.as_deref().is_some_and(|argument| argument == VERSION) {
-        let told = writeln!(std::io::stdout(), "OpenImageIO {}", super::oiio::version());
-        return if told.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE };
+/// Confinement that a worker could not have; said once.
+fn warn_of(missing: &[String]) {
+    static SAID: Once = Once::new();
+    if !missing.is_empty() {
+        SAID.call_once(|| {
+            log::warn!("the OpenImageIO worker is less confined than it could be: {}", missing.join("; "))
+        });
     }
-    let outcome = match (first, arguments.next()) {
-        (Some(question), Some(path)) => decode_as_asked(&question.to_string_lossy(), Path::new(&path)),
-        _ => Err(format!("{PROGRAM} is started by petcomp, with a question and a path").into()),
-    };
-    let sent = match outcome {
-        Ok(raster) => send_raster(&raster),
-        Err(what) => send_line(&Answer::Refused(what.to_string())),
-    };
-    if sent.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
-}
-
-fn decode_as_asked(question: &str, path: &Path) -> Result<Raster, Refusal> {
-    let Question { format, wanted, limits } = serde_json::from_str(question).map_err(|e| e.to_string())?;
-    let format = Format::of_name(&format).ok_or("a format of an unknown name")?;
-    let file_bytes = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
-    super::oiio::decode(path, format, file_bytes, &limits, wanted)
-}
-
-fn send_line(answer: &Answer) -> std::io::Result<()> {
-    let mut line = serde_json::to_vec(answer)?;
-    line.push(b'\n');
-    std::io::stdout().write_all(&line)
-}
-
-fn send_raster(raster: &Raster) -> std::io::Result<()> {
-    let (sample, bytes) = match &raster.samples {
-        Samples::U8(v) => (Sample::U8, v.clone()),
-        Samples::U16(v) => (Sample::U16, v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-        Samples::F32(v) => (Sample::F32, v.iter().flat_map(|x| x.to_le_bytes()).collect()),
-    };
-    let &Raster { width, height, ref names, display_encoded, .. } = raster;
-    send_line(&Answer::Picture { width, height, names: names.clone(), sample, display_encoded })?;
-    let mut out = std::io::stdout();
-    out.write_all(&bytes)?;
-    out.flush()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::raster::{Raster, Samples, Wanted};
+    use super::super::{Format, Window};
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
 
-    fn received(bytes: &[u8]) -> Result<Raster, String> {
-        receive_raster(bytes, &Limits::default(), 100)
+    /// A worker that greets and then does what a shell script says; `$n` counts how many were started in its folder.
+    fn asked(script: &str, limits: &Limits) -> Result<Raster, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("worker");
+        let text = format!(
+            "#!/bin/sh\necho x >>{count}\nn=$(wc -l <{count})\necho '{{\"petcomp\":\"{version}\",\"missing\":[]}}'\n{script}\n",
+            count = folder.path().join("count").display(),
+            version = env!("CARGO_PKG_VERSION"),
+        );
+        std::fs::write(&program, text).unwrap();
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
+        let pool = Pool { idle: Mutex::new(Vec::new()) };
+        let ask = Ask::Pixels { wanted: Wanted::Coverage, window: Window::Display };
+        match pool.ask(&program, &source, limits, ask) {
+            Ok(Told::Raster(raster)) => Ok(raster),
+            Ok(Told::Shape(shape)) => panic!("{shape:?}"),
+            Err(e) => Err(e.to_string()),
+        }
     }
 
-    const HEAD: &str = r#"{"picture":{"width":1,"height":1,"names":["Y"],"sample":"u16","display_encoded":true}}"#;
+    const GREY: &str =
+        r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
 
     #[test]
     fn an_answer_is_a_line_and_samples() {
-        let raster = received(format!("{HEAD}\n\x01\x02").as_bytes()).unwrap();
-        assert_eq!(raster.samples, Samples::U16(vec![0x0201]));
+        let raster = asked(&format!("{GREY}; sleep 5"), &Limits::default()).unwrap();
+        assert_eq!(raster.samples, Samples::U8(b"ab".to_vec()));
     }
 
     #[test]
-    fn a_worker_is_not_believed() {
-        assert!(received(b"").is_err());
-        assert!(received(b"nonsense\n").is_err());
-        assert!(received(format!("{HEAD}\n\x01").as_bytes()).unwrap_err().contains("too early"));
-        let huge = HEAD.replace("\"width\":1", "\"width\":999999999");
-        assert!(received(format!("{huge}\n").as_bytes()).unwrap_err().contains("Limits::side"));
-        assert_eq!(received(b"{\"refused\":\"why\"}\n").unwrap_err(), "why");
+    fn a_death_is_tried_again_and_the_second_one_named() {
+        let once = format!("[ $n = 1 ] && kill -SEGV $$; {GREY}; sleep 5");
+        assert!(asked(&once, &Limits::default()).is_ok());
+        let e = asked("kill -SEGV $$", &Limits::default()).unwrap_err();
+        assert_eq!(e, "unreadable: OpenImageIO died on it 2 times (signal 11)");
     }
 
-    #[cfg(unix)]
     #[test]
-    fn a_worker_that_hangs_is_killed_and_one_that_dies_is_named() {
-        let run = |script: &str| Command::new("sh").args(["-c", script]).stdout(Stdio::piped()).spawn().unwrap();
-        let wait = |script: &str| {
-            answer(run(script), &Limits::default(), 100, Duration::from_millis(200)).unwrap_err().to_string()
-        };
-        assert!(wait("exec sleep 30").contains("took longer"));
-        let long = answer(run("kill -SEGV $$"), &Limits::default(), 100, PATIENCE).unwrap_err().to_string();
-        assert_eq!(long, "unreadable: OpenImageIO died on it (signal 11)");
+    fn a_worker_that_hangs_is_killed() {
+        let limits = Limits { seconds: 0, ..Default::default() };
+        let e = asked("exec sleep 30", &limits).unwrap_err();
+        assert!(e.contains("took longer than 0 s (Limits::seconds)"), "{e}");
+    }
+
+    #[test]
+    fn nonsense_and_half_an_answer_are_deaths() {
+        let e = asked("echo nonsense; exec sleep 30", &Limits::default()).unwrap_err();
+        assert!(e.contains("garbled answer"), "{e}");
+        let half = GREY.replace("printf ab", "printf a");
+        assert!(asked(&half, &Limits::default()).unwrap_err().contains("exit status: 0"));
+    }
+
+    #[test]
+    fn a_program_that_is_no_worker_is_named() {
+        let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
+        let pool = Pool { idle: Mutex::new(Vec::new()) };
+        for program in ["/bin/true", "/bin/echo", "/no/such/program"] {
+            let e = pool.ask(Path::new(program), &source, &Limits::default(), Ask::Header).err().unwrap().to_string();
+            assert!(e.contains(program) && e.contains("does not start"), "{e}");
+        }
     }
 }

@@ -72,12 +72,9 @@ pub trait ToFile: Copy + Send + Sync {
     /// It means something in integers of 0 to 1.
     #[doc(hidden)]
     const CODED: bool = true;
-    /// Display-encoded straight 8-bit codes (a matte: as it is); as many as there are names count.
+    /// Display-encoded straight codes (a matte: as it is); as many as there are names count.
     #[doc(hidden)]
-    fn codes8(self) -> [u8; 4];
-    /// The same in 16 bits.
-    #[doc(hidden)]
-    fn codes16(self) -> [u16; 4];
+    fn codes<C: Code>(self) -> [C; 4];
     /// Scene-linear channels, colours multiplied by alpha.
     #[doc(hidden)]
     fn linear(self) -> [f32; CHANNELS];
@@ -94,23 +91,53 @@ fn first<const N: usize>(channels: [f32; N]) -> [f32; CHANNELS] {
 const COLOR: &[&str] = &["R", "G", "B"];
 const COLOR_ALPHA: &[&str] = &["R", "G", "B", "A"];
 
-/// The 8-bit code of 0 to 1 as it is; what is outside is clipped, NaN is 0.
-fn plain8(v: f32) -> u8 {
-    (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+/// An integer that stands for 0 to 1: what is outside is clipped, NaN is 0.
+pub trait Code: Copy + Default + Send {
+    #[doc(hidden)]
+    const FULL: Self;
+    /// The value as it is.
+    #[doc(hidden)]
+    fn plain(v: f32) -> Self;
+    /// Light as sRGB displays it.
+    #[doc(hidden)]
+    fn shown(light: LinearRgb) -> [Self; 3];
+    /// The same value as an 8-bit code.
+    #[doc(hidden)]
+    fn of8(code: u8) -> Self;
 }
 
-/// The 16-bit code of 0 to 1 as it is; what is outside is clipped, NaN is 0.
-fn plain16(v: f32) -> u16 {
-    (v.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16
+impl Code for u8 {
+    const FULL: Self = Self::MAX;
+    fn plain(v: f32) -> Self {
+        (v.clamp(0.0, 1.0) * 255.0 + 0.5) as Self
+    }
+    fn shown(light: LinearRgb) -> [Self; 3] {
+        let Srgb8 { r, g, b } = encode_srgb8(light);
+        [r, g, b]
+    }
+    fn of8(code: u8) -> Self {
+        code
+    }
+}
+
+impl Code for u16 {
+    const FULL: Self = Self::MAX;
+    fn plain(v: f32) -> Self {
+        (v.clamp(0.0, 1.0) * 65_535.0 + 0.5) as Self
+    }
+    fn shown(light: LinearRgb) -> [Self; 3] {
+        [light.r, light.g, light.b].map(encode_srgb16)
+    }
+    fn of8(code: u8) -> Self {
+        Self::from(code) * 257
+    }
 }
 
 impl ToFile for LinearRgb {
     const NAMES: &'static [&'static str] = COLOR;
-    fn codes8(self) -> [u8; 4] {
-        encode_srgb8(self).codes8()
-    }
-    fn codes16(self) -> [u16; 4] {
-        [encode_srgb16(self.r), encode_srgb16(self.g), encode_srgb16(self.b), u16::MAX]
+    fn codes<C: Code>(self) -> [C; 4] {
+        let [r, g, b] = C::shown(self);
+        [r, g, b, C::FULL]
     }
     fn linear(self) -> [f32; CHANNELS] {
         first([self.r, self.g, self.b])
@@ -119,13 +146,9 @@ impl ToFile for LinearRgb {
 
 impl ToFile for StraightRgba {
     const NAMES: &'static [&'static str] = COLOR_ALPHA;
-    fn codes8(self) -> [u8; 4] {
-        let [r, g, b, _] = LinearRgb::new(self.r, self.g, self.b).codes8();
-        [r, g, b, plain8(self.a)]
-    }
-    fn codes16(self) -> [u16; 4] {
-        let [r, g, b, _] = LinearRgb::new(self.r, self.g, self.b).codes16();
-        [r, g, b, plain16(self.a)]
+    fn codes<C: Code>(self) -> [C; 4] {
+        let [r, g, b] = C::shown(LinearRgb::new(self.r, self.g, self.b));
+        [r, g, b, C::plain(self.a)]
     }
     fn linear(self) -> [f32; CHANNELS] {
         self.to_premul().linear()
@@ -134,11 +157,8 @@ impl ToFile for StraightRgba {
 
 impl ToFile for PremulRgba {
     const NAMES: &'static [&'static str] = COLOR_ALPHA;
-    fn codes8(self) -> [u8; 4] {
-        self.to_straight().codes8()
-    }
-    fn codes16(self) -> [u16; 4] {
-        self.to_straight().codes16()
+    fn codes<C: Code>(self) -> [C; 4] {
+        self.to_straight().codes()
     }
     fn linear(self) -> [f32; CHANNELS] {
         first([self.r, self.g, self.b, self.a])
@@ -149,11 +169,8 @@ impl ToFile for Film {
     /// Programs that know no film see the grey one: `A`.
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A", "TR", "TG", "TB"];
     const CODED: bool = false;
-    fn codes8(self) -> [u8; 4] {
-        self.to_rgba().codes8()
-    }
-    fn codes16(self) -> [u16; 4] {
-        self.to_rgba().codes16()
+    fn codes<C: Code>(self) -> [C; 4] {
+        self.to_rgba().codes()
     }
     fn linear(self) -> [f32; CHANNELS] {
         let (PremulRgba { r, g, b, a }, t) = (self.to_rgba(), self.transmittance());
@@ -163,11 +180,8 @@ impl ToFile for Film {
 
 impl ToFile for Coverage {
     const NAMES: &'static [&'static str] = &["Y"];
-    fn codes8(self) -> [u8; 4] {
-        [plain8(self.0); 4]
-    }
-    fn codes16(self) -> [u16; 4] {
-        [plain16(self.0); 4]
+    fn codes<C: Code>(self) -> [C; 4] {
+        [C::plain(self.0); 4]
     }
     fn linear(self) -> [f32; CHANNELS] {
         first([self.0])
@@ -177,11 +191,8 @@ impl ToFile for Coverage {
 impl ToFile for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
     const CODED: bool = false;
-    fn codes8(self) -> [u8; 4] {
-        [plain8(self.0); 4]
-    }
-    fn codes16(self) -> [u16; 4] {
-        [plain16(self.0); 4]
+    fn codes<C: Code>(self) -> [C; 4] {
+        [C::plain(self.0); 4]
     }
     fn linear(self) -> [f32; CHANNELS] {
         first([self.0])
@@ -190,11 +201,8 @@ impl ToFile for Depth {
 
 impl ToFile for Srgb8 {
     const NAMES: &'static [&'static str] = COLOR;
-    fn codes8(self) -> [u8; 4] {
-        [self.r, self.g, self.b, u8::MAX]
-    }
-    fn codes16(self) -> [u16; 4] {
-        self.codes8().map(|code| u16::from(code) * 257)
+    fn codes<C: Code>(self) -> [C; 4] {
+        [self.r, self.g, self.b, u8::MAX].map(C::of8)
     }
     fn linear(self) -> [f32; CHANNELS] {
         decode_srgb8(self).linear()
@@ -203,11 +211,8 @@ impl ToFile for Srgb8 {
 
 impl ToFile for Srgba8 {
     const NAMES: &'static [&'static str] = COLOR_ALPHA;
-    fn codes8(self) -> [u8; 4] {
-        [self.r, self.g, self.b, self.a]
-    }
-    fn codes16(self) -> [u16; 4] {
-        self.codes8().map(|code| u16::from(code) * 257)
+    fn codes<C: Code>(self) -> [C; 4] {
+        [self.r, self.g, self.b, self.a].map(C::of8)
     }
     fn linear(self) -> [f32; CHANNELS] {
         let LinearRgb { r, g, b } = decode_srgb8(Srgb8 { r: self.r, g: self.g, b: self.b });
@@ -246,8 +251,8 @@ pub(super) fn flat<P: ToFile, T: Copy + Default + Send, const N: usize>(
 fn coded<P: ToFile>(image: &Image<P>, bits: Bits) -> Coded<'static> {
     let (width, height) = image.size();
     let codes = match bits {
-        Bits::Sixteen => Codes::U16(flat(image, P::codes16)),
-        _ => Codes::U8(flat(image, P::codes8)),
+        Bits::Sixteen => Codes::U16(flat(image, P::codes::<u16>)),
+        _ => Codes::U8(flat(image, P::codes::<u8>)),
     };
     Coded { width, height, names: P::NAMES, codes }
 }
@@ -273,6 +278,15 @@ pub fn write_with<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>, options: 
     let path = path.as_ref();
     let bytes = encode(path, image, options).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
+}
+
+/// The bytes of a JPEG file.
+///
+/// # Errors
+/// An image without pixels, or with transparent ones.
+pub fn jpeg_bytes<P: ToFile>(image: &Image<P>) -> Result<Vec<u8>> {
+    let options = WriteOptions::default();
+    encode(Path::new("picture.jpg"), image, &options).map_err(|what| Error::value("picture", what))
 }
 
 fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> std::result::Result<Vec<u8>, String> {
@@ -320,7 +334,7 @@ fn encode_jpeg<P: ToFile>(image: &Image<P>, options: &WriteOptions) -> std::resu
     if !(1..=100).contains(&options.jpeg_quality) {
         return Err(format!("jpeg quality {}, expected 1 to 100", options.jpeg_quality));
     }
-    let mut codes = flat(image, P::codes8);
+    let mut codes = flat(image, P::codes::<u8>);
     if P::NAMES.len() == 4 {
         if codes.iter().skip(3).step_by(4).any(|&a| a != 255) {
             return Err("transparent pixels, and JPEG has no alpha: expected .png or .exr".into());

@@ -10,6 +10,7 @@ mod outline;
 pub(crate) mod overlay;
 mod rle;
 mod topmost;
+pub mod trace;
 mod visibility;
 
 pub use bbox::BBox;

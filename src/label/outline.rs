@@ -95,3 +95,115 @@ fn picture(camera: &Camera) -> Polygon<f64> {
     let corners = [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)];
     Polygon::new(LineString::from(corners.to_vec()), Vec::new())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Pose, Quad, UnitQuaternion, Vector2};
+    use crate::image::Image;
+    use crate::pixel::{ObjectId, PremulRgba};
+    use crate::scene::Grade;
+    use geo::Contains;
+    use proptest::prelude::*;
+    use std::sync::Arc;
+
+    /// Outlines have their corners on a grid of so many cells a side, so that they often touch, cross themselves, run
+    /// back along themselves, and share edges.
+    const GRID: u32 = 8;
+
+    /// Pixels of a cell; a card fills the picture.
+    const CELL: f64 = 5.0;
+
+    const SIDE: f64 = CELL * GRID as f64;
+
+    fn camera() -> Camera {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Camera {
+            image: [SIDE as u32; 2],
+            focal_px: Vector2::new(SIDE, SIDE),
+            principal_px: Point2::new(0.5 * SIDE, 0.5 * SIDE),
+            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        }
+    }
+
+    /// The part of the picture inside an outline on the grid.
+    fn on_grid(corners: &[[u32; 2]]) -> MultiPolygon<f64> {
+        let uv = |&[x, y]: &[u32; 2]| Point2::new(f64::from(x) / f64::from(GRID), f64::from(y) / f64::from(GRID));
+        let card = Card {
+            id: ObjectId(1),
+            class: 0,
+            quad: Quad { world_from_card: Pose::identity(), size: [1.0; 2] },
+            texture: Image::filled(1, 1, PremulRgba::default()).into(),
+            back: None,
+            outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
+            grade: Grade::default(),
+        };
+        region(&card, &camera())
+    }
+
+    /// Times that an outline winds around a point, by crossings of the line to its right.
+    fn winding(corners: &[[u32; 2]], p: Point2<f64>) -> i32 {
+        let px = |&[x, y]: &[u32; 2]| Point2::new(CELL * f64::from(x), CELL * f64::from(y));
+        corners.iter().zip(corners.iter().cycle().skip(1)).fold(0, |n, (a, b)| {
+            let (a, b) = (px(a), px(b));
+            let is_right = (p.y - a.y) * (b.x - a.x) / (b.y - a.y) + a.x > p.x;
+            match (a.y <= p.y, b.y <= p.y) {
+                (true, false) if is_right => n + 1,
+                (false, true) if is_right => n - 1,
+                _ => n,
+            }
+        })
+    }
+
+    /// Points between pixels' centres, away from every line through two points of the grid by more than rounding.
+    fn points() -> impl Iterator<Item = Point2<f64>> {
+        let along = |i: u32| f64::from(i) + 0.514_285_7;
+        (0..SIDE as u32).flat_map(move |y| (0..SIDE as u32).map(move |x| Point2::new(along(x), along(y) + 0.003_1)))
+    }
+
+    fn outline() -> impl Strategy<Value = Vec<[u32; 2]>> {
+        prop::collection::vec(prop::array::uniform2(0..=GRID), 3..10)
+    }
+
+    fn holds(region: &MultiPolygon<f64>, p: Point2<f64>) -> bool {
+        region.contains(&geo::Point::new(p.x, p.y))
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_an_outline_winds_around_is_inside(corners in outline()) {
+            let found = on_grid(&corners);
+            let mut count = 0.0;
+            for p in points() {
+                let is_inside = winding(&corners, p) != 0;
+                prop_assert_eq!(holds(&found, p), is_inside, "{:?}", p);
+                count += f64::from(u8::from(is_inside));
+            }
+            // A raster of one point a pixel is off by less than half a pixel for each pixel of border.
+            let border = 2.0 * SIDE * corners.len() as f64;
+            prop_assert!((found.unsigned_area() - count).abs() <= 0.5 * border);
+        }
+
+        #[test]
+        fn an_overlap_is_what_both_outlines_hold(a in outline(), b in outline()) {
+            let (ra, rb) = (on_grid(&a), on_grid(&b));
+            let shared = overlap(&ra, &rb);
+            for p in points() {
+                prop_assert_eq!(holds(&shared, p), winding(&a, p) != 0 && winding(&b, p) != 0, "{:?}", p);
+            }
+            // The grid that `geo` snaps to moves corners by less than 1e-7 pixels here.
+            prop_assert!((overlap(&rb, &ra).unsigned_area() - shared.unsigned_area()).abs() < 1e-4);
+            prop_assert!((overlap(&ra, &ra).unsigned_area() - ra.unsigned_area()).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn outlines_that_touch_in_an_edge_or_a_corner_share_nothing() {
+        let square = |x: u32, y: u32| on_grid(&[[x, y], [x + 2, y], [x + 2, y + 2], [x, y + 2]]);
+        let middle = square(3, 3);
+        for (x, y) in [(1, 3), (5, 3), (3, 1), (3, 5), (1, 1), (5, 5), (1, 2), (5, 4)] {
+            assert_eq!(overlap(&middle, &square(x, y)).unsigned_area(), 0.0, "{x} {y}");
+        }
+        assert_eq!(overlap(&middle, &square(4, 4)).unsigned_area(), CELL * CELL);
+    }
+}

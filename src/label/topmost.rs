@@ -14,6 +14,7 @@ use crate::label::{ObjectLabel, Silhouette};
 use crate::pixel::ObjectId;
 use crate::scene::Card;
 use geo::{Area, Centroid, MultiPolygon};
+use std::collections::BTreeSet;
 
 /// For each object, the ids of those that lie over it, in order of id.
 ///
@@ -38,21 +39,20 @@ pub(crate) fn covers(objects: &[Silhouette<'_>], camera: &Camera, iou: f64) -> V
     over
 }
 
-/// The objects that lie in a knot: A over B over C over A. Each of them lies on a cycle, or between two.
-///
-/// Found by taking away, again and again, what lies under nothing and what lies over nothing.
+/// The objects that lie in a knot: each lies, through others, over itself (A over B over C over A).
 pub fn knotted(objects: &[ObjectLabel]) -> Vec<ObjectId> {
-    let mut left: Vec<&ObjectLabel> = objects.iter().collect();
-    loop {
-        let has = |id: ObjectId| left.iter().any(|o| o.id == id);
-        let is_over_one = |id: ObjectId| left.iter().any(|o| o.covered_by.contains(&id));
-        let in_between = |o: &&ObjectLabel| o.covered_by.iter().any(|&id| has(id)) && is_over_one(o.id);
-        let kept: Vec<_> = left.iter().copied().filter(in_between).collect();
-        if kept.len() == left.len() {
-            return left.iter().map(|o| o.id).collect();
-        }
-        left = kept;
+    objects.iter().map(|o| o.id).filter(|&id| above(objects, id).contains(&id)).collect()
+}
+
+/// All that lies over an object, directly or through others.
+fn above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
+    let mut found = BTreeSet::new();
+    let mut next = vec![id];
+    while let Some(below) = next.pop() {
+        let over = objects.iter().filter(|o| o.id == below).flat_map(|o| &o.covered_by).copied();
+        next.extend(over.filter(|&id| found.insert(id)).collect::<Vec<_>>());
     }
+    found
 }
 
 /// Centroid of the overlap of a pair; none where they are no pair.
@@ -70,4 +70,30 @@ fn nearness(card: &Card, camera: &Camera, px: Point2<f64>) -> f64 {
     let ray = camera.ray(px);
     let distance = plane.offset - plane.normal.dot(&ray.origin.coords);
     plane.normal.dot(&ray.direction) / distance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn objects(covered_by: &[&[u32]]) -> Vec<ObjectLabel> {
+        let object = |(i, over): (usize, &&[u32])| ObjectLabel {
+            id: ObjectId(i as u32 + 1),
+            covered_by: over.iter().map(|&id| ObjectId(id)).collect(),
+            ..ObjectLabel::default()
+        };
+        covered_by.iter().enumerate().map(object).collect()
+    }
+
+    #[test]
+    fn what_lies_between_two_circles_is_in_none() {
+        // 1 over 2 over 3 over 1; 4 under that circle; 5 over 6 over 5 under 4.
+        let all = objects(&[&[3], &[1], &[2], &[1], &[4, 6], &[5]]);
+        assert_eq!(knotted(&all), [1, 2, 3, 5, 6].map(ObjectId));
+    }
+
+    #[test]
+    fn a_stack_has_no_knot_even_if_an_object_above_is_not_in_the_picture() {
+        assert!(knotted(&objects(&[&[2, 3], &[3, 99], &[]])).is_empty());
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
-use crate::light::irradiance;
+use crate::light::{irradiance, match_cast, match_noise, surface_color};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
 use std::f64::consts::PI;
@@ -12,18 +12,32 @@ use std::f64::consts::PI;
 /// High, since white is the bright end; not the maximum, since a highlight or a dead pixel is not paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
-/// Turns [`Exposure::MatchPlate`] into [`Exposure::Ev`]; a scene whose exposure is known comes back as it is.
+/// Finds out what a scene leaves to its plate: the colour of the light, the exposure, the noise.
+///
+/// A scene that leaves nothing comes back as it is.
+pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    match_noise(expose(match_cast(scene, plate), plate), plate)
+}
+
+/// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene whose exposure is known comes back as it is.
 ///
 /// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with nothing in their way, gets
 /// the luminance of [`plate_white`], times `2^gain_ev`.
 ///
 /// This is an assumption, not a measurement: one photograph does not tell which of its pixels are white paper. It holds
 /// where the photo was exposed for the place and shows something bright; the surface itself is not asked, since a tray
-/// may be of any grey. `gain_ev` is there to say otherwise. Without any light in the scene, or on a black plate, the
+/// may be of any grey. Where that grey is known, `MatchSurface` is the better choice. `gain_ev` is there to say otherwise. Without any light in the scene, or on a black plate, the
 /// exposure is `gain_ev` alone.
 pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let Exposure::MatchPlate { gain_ev } = scene.exposure else { return scene };
-    let ratio = f64::from(plate_white(plate)) / f64::from(white_card(&scene));
+    let (wanted, gain_ev) = match scene.exposure {
+        Exposure::Ev(_) => return scene,
+        Exposure::MatchPlate { gain_ev } => (f64::from(plate_white(plate)), gain_ev),
+        Exposure::MatchSurface { albedo, gain_ev } => {
+            let surface = surface_color(&scene, plate).unwrap_or_default();
+            (f64::from(surface.luminance()) / albedo, gain_ev)
+        }
+    };
+    let ratio = wanted / f64::from(white_card(&scene));
     let match_ev = if ratio > 0.0 && ratio.is_finite() { libm::log2(ratio) } else { 0.0 };
     Scene { exposure: Exposure::Ev(match_ev + gain_ev), ..scene }
 }
@@ -62,12 +76,14 @@ mod tests {
                 photo: [80, 60],
                 focal_px: None,
             },
-            surface: Surface { size: [0.4, 0.3] },
+            surface: Surface::new([0.4, 0.3]),
             objects: Vec::new(),
             lights: vec![square()],
             ambient: LinearRgb::grey(0.1),
             environment: None,
             exposure,
+            cast: Default::default(),
+            finish: Default::default(),
         }
     }
 
@@ -98,6 +114,20 @@ mod tests {
         };
         let card = 2.975061 / PI + 0.1;
         assert!((card * libm::exp2(ev) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_card_as_grey_as_the_surface_gets_the_surface_s_brightness() {
+        let plate = Image::filled(40, 30, LinearRgb::grey(0.3));
+        let exposure = Exposure::MatchSurface { albedo: 0.5, gain_ev: 0.0 };
+        let scene = Scene {
+            lights: Vec::new(),
+            ambient: LinearRgb::grey(0.2),
+            exposure,
+            ..crate::light::surface::tests::scene(Default::default())
+        };
+        let Exposure::Ev(ev) = expose(scene, &plate).exposure else { panic!("still unknown") };
+        assert!((0.2 * 0.5 * libm::exp2(ev) - 0.3).abs() < 1e-6);
     }
 
     #[test]

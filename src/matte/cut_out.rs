@@ -1,14 +1,17 @@
-//! Cut-out: segmentation, screen colour and key in one go, trimmed to the object.
+//! Cut-out: segmentation, screen plate and matte in one go, trimmed to the object.
 
+use super::film::{FilmOptions, film};
 use super::key::{KeyOptions, Keying, Screen};
+use super::outline::Outline;
+use super::plate::{PlateOptions, ScreenPlate};
 use super::remark::Remark;
-use super::screen::{screen_color, screen_pixels};
+use super::screen::{is_keyable, screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
 use crate::image::{Image, Roi};
-use crate::pixel::{Coverage, LinearRgb, PremulRgba};
+use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
 use serde::{Deserialize, Serialize};
 
 /// How a photo becomes a cut-out.
@@ -17,14 +20,21 @@ use serde::{Deserialize, Serialize};
 pub struct CutOutOptions {
     /// How the object is found.
     pub segment: SegmentOptions,
-    /// How it is keyed.
+    /// How the screen is fitted.
+    pub plate: PlateOptions,
+    /// How film is solved for.
+    pub film: FilmOptions,
+    /// How the object is keyed, where that is asked for.
     pub key: KeyOptions,
-    /// Where the matte comes from; nothing = from the key where the screen has a colour. Default: nothing.
+    /// Colour of an evenly lit screen, scene-linear; nothing = fitted to the photo. Default: nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub screen: Option<LinearRgb>,
+    /// Where the matte comes from; nothing = physical where the screen has a colour. Default: nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<MatteMethod>,
-    /// What the matte of a key is cut to. Default: `tight`.
+    /// What a matte is cut to. Default: `tight`.
     pub within: Within,
-    /// Softness of the edge that the cut makes, standard deviation in pixels. Default: 0.8.
+    /// Softness of the edge that the cut makes, standard deviation in pixels. Default: 0.6.
     pub soften_px: f32,
     /// Empty pixels kept around the hull. Default: 4.
     pub margin_px: usize,
@@ -36,10 +46,13 @@ impl Default for CutOutOptions {
     fn default() -> Self {
         Self {
             segment: SegmentOptions::default(),
+            plate: PlateOptions::default(),
+            film: FilmOptions::default(),
             key: KeyOptions::default(),
+            screen: None,
             method: None,
             within: Within::Tight,
-            soften_px: 0.8,
+            soften_px: 0.6,
             margin_px: 4,
             longest_side: 2048,
         }
@@ -50,13 +63,15 @@ impl Default for CutOutOptions {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatteMethod {
-    /// From the screen's colour: see-through plastic is see-through.
+    /// From reflected light and transmittance, solved for in every pixel: see-through plastic keeps its own light only.
+    Physical,
+    /// From the screen's colour, as Blender's Keying node does: see-through plastic is see-through.
     Key,
     /// From the object's outline alone: nothing is see-through, and what shines through is part of the object.
     Outline,
 }
 
-/// What a key's matte is cut to.
+/// What a matte is cut to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Within {
@@ -70,31 +85,42 @@ pub enum Within {
 /// An object without its background.
 #[derive(Clone, Debug)]
 pub struct CutOut {
-    /// The object, premultiplied, scene-linear, trimmed to its hull and a margin.
-    pub image: Image<PremulRgba>,
-    /// Convex hull of the object in pixels of `image`, clockwise as seen.
+    /// The object's own light and what it lets through, scene-linear, trimmed to its hull and a margin.
+    pub film: Image<Film>,
+    /// Transmittance as measured, the object's own shadow on the screen included; 1 outside. Of the size of `film`.
+    pub transmittance: Image<LinearRgb>,
+    /// Expected error of the transmittance, 0 to 1. Of the size of `film`.
+    pub uncertainty: Image<Coverage>,
+    /// Convex hull of the object in pixels of `film`, clockwise as seen.
     pub hull: Vec<Point2<f64>>,
-    /// The part of the photo that `image` shows.
+    /// Tight outline of the object in pixels of `film`.
+    pub outline: Outline,
+    /// The part of the photo that `film` shows.
     pub roi: Roi,
-    /// Pixels of `image` for one pixel of the photo: 1 unless the cut-out had to be reduced.
+    /// Pixels of `film` for one pixel of the photo: 1 unless the cut-out had to be reduced.
     pub scale: f64,
-    /// Colour of the screen, scene-linear.
+    /// Mean colour of the screen, scene-linear.
     pub screen: LinearRgb,
+    /// How uneven the screen is: 1 minus darkest over brightest.
+    pub unevenness: f32,
     /// Where the matte came from.
     pub method: MatteMethod,
-    /// Mean matte that the key leaves on the screen far from the object, where it should be 0; 0 for an outline.
+    /// Mean matte on the screen outside the object, where it should be 0.
     pub residue: f32,
-    /// What a person should know, of the segmentation and of the key.
+    /// What a person should know, of the segmentation, the screen and the matte.
     pub remarks: Vec<Remark>,
     /// Where the object was found in the photo.
     pub segmentation: Segmentation,
 }
 
-/// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
-/// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
-const KEYABLE: f32 = 0.3;
-/// A key that leaves more than this of the screen is worth a remark: what it leaves veils the object, too. An even screen
-/// leaves 0.01 to 0.12 with one key colour for the whole picture.
+impl CutOut {
+    /// The cut-out with one alpha for all channels.
+    pub fn to_rgba(&self) -> Image<PremulRgba> {
+        self.film.map(Film::to_rgba)
+    }
+}
+
+/// A matte that leaves more than this of the screen is worth a remark: what it leaves veils the object, too.
 const RESIDUE: f32 = 0.2;
 
 /// Cuts the one object out of a photo on a uniform screen or board.
@@ -102,30 +128,57 @@ const RESIDUE: f32 = 0.2;
 /// `photo` is scene-linear. A screen too grey to be keyed gives a matte from the outline, and a [`Remark`].
 ///
 /// # Errors
-/// Those of [`segment`]; [`Error::Value`] (`key.clip_black`, `soften_px`, ..) for an option that cannot be right.
+/// Those of [`segment`] and of [`ScreenPlate::fit`]; [`Error::Value`] (`key.clip_black`, `soften_px`, ..) for an option
+/// that cannot be right.
 pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut> {
+    cut_out_on(photo, None, opts)
+}
+
+/// As [`cut_out`], with a photo of the empty screen where there is one.
+///
+/// # Errors
+/// Those of [`cut_out`] and of [`ScreenPlate::from_photo`].
+pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, opts: &CutOutOptions) -> Result<CutOut> {
     opts.check()?;
     let segmentation = segment(photo, &opts.segment).map_err(|e| e.within("segment"))?;
-    let screen = screen_color(photo, &segmentation.mask)?;
+    let plate = plate(photo, empty, &segmentation, opts)?;
+    let screen = plate.color();
     let method = opts.method.unwrap_or_else(|| method_for(screen));
-    let (whole, residue) = match method {
-        MatteMethod::Key => keyed(photo, screen, &segmentation, opts)?,
-        MatteMethod::Outline => {
-            let matte = softened(&segmentation.tight, opts.soften_px);
-            (photo.zip_map(&matte, |p, m| p.opaque().masked(m)), 0.0)
-        }
+    let cut = match opts.within {
+        Within::Tight => softened(&segmentation.tight, opts.soften_px),
+        Within::Hull => softened(&segmentation.mask, opts.soften_px),
+    };
+    let matted = match method {
+        MatteMethod::Physical => Matted::physical(photo, &plate, &cut, opts)?,
+        MatteMethod::Key => Matted::keyed(photo, &plate, &segmentation, &cut, opts)?,
+        MatteMethod::Outline => Matted::grey(photo.zip_map(&cut, |p, m| p.opaque().masked(m)), 0.0),
     };
     let roi = trimmed(&segmentation.hull, opts.margin_px, photo.size());
-    let (image, scale) = reduced(whole.crop(roi), opts.longest_side);
+    let scale = (opts.longest_side as f64 / roi.width.max(roi.height) as f64).min(1.0);
     let corner = Point2::new(roi.x as f64, roi.y as f64);
-    let hull = segmentation.hull.iter().map(|p| ((p - corner) * scale).into()).collect();
+    let moved = |p: Point2<f64>| Point2::from((p - corner) * scale);
     let mut remarks = segmentation.remarks.clone();
+    remarks.extend(matted.remarks);
     match method {
         MatteMethod::Outline if opts.method.is_none() => remarks.push(Remark::GreyScreen(screen)),
-        MatteMethod::Key if residue > RESIDUE => remarks.push(Remark::Residue(residue)),
+        _ if matted.residue > RESIDUE => remarks.push(Remark::Residue(matted.residue)),
         _ => {}
     }
-    Ok(CutOut { image, hull, roi, scale, screen, method, residue, remarks, segmentation })
+    Ok(CutOut {
+        film: reduced(matted.film.crop(roi), scale),
+        transmittance: reduced(matted.transmittance.crop(roi), scale),
+        uncertainty: reduced(matted.uncertainty.crop(roi), scale),
+        hull: segmentation.hull.iter().map(|p| moved(*p)).collect(),
+        outline: segmentation.outline.map(moved),
+        roi,
+        scale,
+        screen,
+        unevenness: plate.unevenness,
+        method,
+        residue: matted.residue,
+        remarks,
+        segmentation,
+    })
 }
 
 impl CutOutOptions {
@@ -136,34 +189,80 @@ impl CutOutOptions {
         if self.longest_side < 16 {
             return Err(Error::value("longest_side", format!("{}, expected at least 16", self.longest_side)));
         }
+        if let Some(screen) = self.screen.filter(|c| !c.is_finite() || [c.r, c.g, c.b].iter().any(|v| *v < 0.0)) {
+            return Err(Error::value("screen", format!("{screen:?}, expected numbers of at least 0")));
+        }
         Ok(())
     }
 }
 
-fn method_for(screen: LinearRgb) -> MatteMethod {
-    let mut channels: [f32; 3] = screen.into();
-    channels.sort_by(f32::total_cmp);
-    let [low, mid, high] = channels;
-    let others = 0.5 * (low + mid);
-    if high > 0.0 && (high - others) / high >= KEYABLE {
-        return MatteMethod::Key;
-    }
-    MatteMethod::Outline
-}
-
-fn keyed(
+fn plate(
     photo: &Image<LinearRgb>,
-    screen: LinearRgb,
+    empty: Option<&Image<LinearRgb>>,
     found: &Segmentation,
     opts: &CutOutOptions,
-) -> Result<(Image<PremulRgba>, f32)> {
-    let keyed = Keying::new(photo, Screen::Color(screen)).run(&opts.key).map_err(|e| e.within("key"))?;
-    let residue = mean(&keyed.matte, &screen_pixels(&found.mask));
-    let cut = match opts.within {
-        Within::Tight => softened(&found.tight, opts.soften_px),
-        Within::Hull => softened(&found.mask, opts.soften_px),
-    };
-    Ok((keyed.cutout.zip_map(&cut, |p, m| p.masked(m)), residue))
+) -> Result<ScreenPlate> {
+    let background = screen_pixels(&found.mask);
+    match (empty, opts.screen) {
+        (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &opts.plate),
+        (None, Some(color)) => Ok(ScreenPlate::even(color, photo.size())),
+        // A margin around a large object may leave nothing; the mask alone then leaves a rim, which gives a colour.
+        (None, None) if !background.pixels().contains(&true) => {
+            Ok(ScreenPlate::even(screen_color(photo, &found.mask)?, photo.size()))
+        }
+        (None, None) => ScreenPlate::fit(photo, &background, &opts.plate).map_err(|e| e.within("plate")),
+    }
+}
+
+fn method_for(screen: LinearRgb) -> MatteMethod {
+    if is_keyable(screen) { MatteMethod::Physical } else { MatteMethod::Outline }
+}
+
+/// What a method makes of the whole photo.
+struct Matted {
+    film: Image<Film>,
+    transmittance: Image<LinearRgb>,
+    uncertainty: Image<Coverage>,
+    residue: f32,
+    remarks: Vec<Remark>,
+}
+
+impl Matted {
+    fn physical(
+        photo: &Image<LinearRgb>,
+        plate: &ScreenPlate,
+        cut: &Image<Coverage>,
+        opts: &CutOutOptions,
+    ) -> Result<Self> {
+        let solved = film(photo, plate, cut, &opts.film).map_err(|e| e.within("film"))?;
+        let outside = cut.map(|c| c.0 == 0.0);
+        let residue = mean(&solved.film.map(|f| Coverage(f.to_rgba().a)), &outside);
+        let (transmittance, uncertainty) = (solved.transmittance, solved.uncertainty);
+        Ok(Self { film: solved.film, transmittance, uncertainty, residue, remarks: solved.remarks })
+    }
+
+    fn keyed(
+        photo: &Image<LinearRgb>,
+        plate: &ScreenPlate,
+        found: &Segmentation,
+        cut: &Image<Coverage>,
+        opts: &CutOutOptions,
+    ) -> Result<Self> {
+        let keyed = Keying::new(photo, Screen::Plate(&plate.image)).run(&opts.key).map_err(|e| e.within("key"))?;
+        let residue = mean(&keyed.matte, &screen_pixels(&found.mask));
+        Ok(Self::grey(keyed.cutout.zip_map(cut, |p, m| p.masked(m)), residue))
+    }
+
+    /// A cut-out of one alpha for all channels, which is taken for the transmittance as well.
+    fn grey(image: Image<PremulRgba>, residue: f32) -> Self {
+        Self {
+            film: image.map(Film::from),
+            transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
+            uncertainty: Image::new(image.width(), image.height()),
+            residue,
+            remarks: Vec::new(),
+        }
+    }
 }
 
 fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
@@ -185,15 +284,13 @@ fn trimmed(hull: &[Point2<f64>], margin_px: usize, (w, h): (usize, usize)) -> Ro
     Roi::spanning(range(|p| p.x, w), range(|p| p.y, h)).grown(margin_px, w, h)
 }
 
-/// A picture no larger than `longest`, and its pixels for one of before.
-fn reduced(image: Image<PremulRgba>, longest: usize) -> (Image<PremulRgba>, f64) {
-    let (w, h) = image.size();
-    if w.max(h) <= longest {
-        return (image, 1.0);
+/// A picture made smaller by a factor.
+fn reduced<P: Mix>(image: Image<P>, scale: f64) -> Image<P> {
+    if scale >= 1.0 {
+        return image;
     }
-    let scale = longest as f64 / w.max(h) as f64;
     let side = |len: usize| ((len as f64 * scale).round() as usize).max(1);
-    (filter::resize(&image, side(w), side(h)), scale)
+    filter::resize(&image, side(image.width()), side(image.height()))
 }
 
 #[cfg(test)]
@@ -213,11 +310,12 @@ mod tests {
     #[test]
     fn a_coloured_screen_is_keyed_and_gone() {
         let cut = cut_out(&slab(GREEN), &CutOutOptions::default()).unwrap();
-        assert_eq!(cut.method, MatteMethod::Key);
+        assert_eq!(cut.method, MatteMethod::Physical);
         assert!((cut.screen.g - GREEN.g).abs() < 1e-6 && cut.residue < 1e-6);
-        let (w, h) = cut.image.size();
-        assert_eq!(cut.image[(0, 0)], PremulRgba::TRANSPARENT);
-        assert!((cut.image[(w / 2, h / 2)].a - 1.0).abs() < 1e-5);
+        let image = cut.to_rgba();
+        let (w, h) = image.size();
+        assert_eq!(image[(0, 0)], PremulRgba::TRANSPARENT);
+        assert!((image[(w / 2, h / 2)].a - 1.0).abs() < 1e-5);
         assert!(w.abs_diff(68) <= 2 && h.abs_diff(38) <= 2, "{w} x {h}: the slab and 4 pixels around it");
     }
 
@@ -225,9 +323,10 @@ mod tests {
     fn a_white_board_gives_an_opaque_object() {
         let cut = cut_out(&slab(LinearRgb::new(0.6, 0.62, 0.7)), &CutOutOptions::default()).unwrap();
         assert_eq!(cut.method, MatteMethod::Outline);
-        let centre = cut.image[(cut.image.width() / 2, cut.image.height() / 2)];
+        let image = cut.to_rgba();
+        let centre = image[(image.width() / 2, image.height() / 2)];
         assert!((centre.a - 1.0).abs() < 1e-5 && (centre.r - 0.5).abs() < 1e-5);
-        assert_eq!(cut.image[(0, 0)].a, 0.0);
+        assert_eq!(image[(0, 0)].a, 0.0);
     }
 
     #[test]
@@ -235,7 +334,7 @@ mod tests {
         let whole = cut_out(&slab(GREEN), &CutOutOptions::default()).unwrap();
         let left = |cut: &CutOut| cut.hull.iter().map(|p| p.x).fold(f64::MAX, f64::min);
         assert!((left(&whole) + whole.roi.x as f64 - 30.0).abs() <= 1.0);
-        let half = CutOutOptions { longest_side: whole.image.width() / 2, ..Default::default() };
+        let half = CutOutOptions { longest_side: whole.film.width() / 2, ..Default::default() };
         let half = cut_out(&slab(GREEN), &half).unwrap();
         assert!((left(&half) - 0.5 * left(&whole)).abs() < 0.1 && (half.scale - 0.5).abs() < 0.01);
     }
@@ -249,8 +348,8 @@ mod tests {
         assert_eq!((opts.within, opts.segment.first_threshold), (Within::Hull, super::super::Threshold::Noise(8.0)));
         let back: CutOutOptions = toml::from_str(&toml::to_string(&opts).unwrap()).unwrap();
         assert_eq!(back, opts);
-        let wrong = CutOutOptions { segment: SegmentOptions { levels: 99, ..Default::default() }, ..opts };
+        let wrong = CutOutOptions { segment: SegmentOptions { levels: Some(99), ..Default::default() }, ..opts };
         let said = cut_out(&slab(GREEN), &wrong).unwrap_err().to_string();
-        assert_eq!(said, "segment.levels: 99, expected 2 to 8");
+        assert_eq!(said, "segment.levels: Some(99), expected 2 to 8");
     }
 }

@@ -23,7 +23,49 @@ pub enum Remark {
         .0.r, .0.g, .0.b
     )]
     GreyScreen(LinearRgb),
+    /// Searches at other depths found another outline: they overlap with this one by this share.
+    #[error("the outline is unsure: searches at other depths agree with it to {:.0} %", 100.0 * .0)]
+    Unstable(f64),
+    /// Only this share of the outline lies on edges.
+    #[error("the outline is unsure: only {:.0} % of it lies on edges; is the object in focus, and is all of it seen?", 100.0 * .0)]
+    Unsupported(f64),
     /// The key leaves this share of the screen.
     #[error("the key leaves {:.0} % of the screen: uneven light, or an object of the screen's hue", 100.0 * .0)]
     Residue(f32),
+    /// This share of the object is brighter in the screen's hue than plastic in front of the screen can be.
+    #[error(
+        "{:.1} % of the object has the screen's hue: taken for opaque, but photograph it on another screen colour to be sure",
+        100.0 * .0
+    )]
+    ScreenHue(f32),
+    /// This share of the object is clipped: brighter than the camera can tell.
+    #[error("{:.1} % of the object is clipped: its transmittance there is that of its surroundings", 100.0 * .0)]
+    Clipped(f32),
+    /// The object lay elsewhere in another photo, pixels right and down; it was moved back.
+    #[error("photo {photo} lies ({:.2}, {:.2}) pixels off the first; it was moved back", .shift_px[0], .shift_px[1])]
+    Moved {
+        /// Which photo, counted from 1.
+        photo: usize,
+        /// How far it lay off.
+        shift_px: [f64; 2],
+    },
+    /// The screens do not differ in this channel.
+    #[error("the screens are too alike in {0}: its transmittance is told from the other channels")]
+    Undetermined(&'static str),
+}
+
+/// Share of the object in the screen's hue from which a person should look: a cap.
+const LEAST_HUE_SHARE: f32 = 0.02;
+
+impl Remark {
+    /// A person should look at the cut-out: it may be wrong. Otherwise it is merely less than it could be.
+    pub fn is_doubt(&self) -> bool {
+        match self {
+            Self::LeftOut { .. } | Self::Truncated(_) | Self::Residue(_) | Self::Unstable(_) | Self::Unsupported(_) => {
+                true
+            }
+            Self::ScreenHue(share) => *share > LEAST_HUE_SHARE,
+            Self::GreyScreen(_) | Self::Clipped(_) | Self::Moved { .. } | Self::Undetermined(_) => false,
+        }
+    }
 }

@@ -46,6 +46,24 @@ fn mean(photo: &Image<LinearRgb>, set: &Image<bool>) -> Option<LinearRgb> {
     (count > 0).then(|| sum.map(|s| (s / count as f64) as f32).into())
 }
 
+/// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
+/// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
+const KEYABLE: f32 = 0.3;
+
+/// The screen has enough colour to tell it from what is in front of it.
+pub(super) fn is_keyable(screen: LinearRgb) -> bool {
+    let mut channels: [f32; 3] = screen.into();
+    channels.sort_by(f32::total_cmp);
+    let [low, mid, high] = channels;
+    high > 0.0 && (high - 0.5 * (low + mid)) / high >= KEYABLE
+}
+
+/// Which channel of a colour is the largest; of equal ones the first.
+pub(super) fn strongest_channel(color: LinearRgb) -> usize {
+    let channels: [f32; 3] = color.into();
+    (1..3).fold(0, |best, c| if channels[c] > channels[best] { c } else { best })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,10 +1,14 @@
 //! A shot becomes deep samples, fast.
 
+use crate::asset::Texture;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
-use crate::render::irradiance::{Lattice, Map, Receiver, maps};
+use crate::render::half_plane::sides;
+use crate::render::irradiance::{Map, maps};
+use crate::render::lattice::Lattice;
 use crate::render::layers::{Block, Ground, Layer, Painted, Samples, Stack};
 use crate::render::pixel_filter::{left_over_sigma, quantiles};
+use crate::render::receiver::Studio;
 use crate::render::shadow::{Casters, rows_and_columns};
 use crate::render::texture::Baked;
 use crate::render::view::{Seen, Sheet, View, sheets};
@@ -13,7 +17,7 @@ use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 
 /// Side of the blocks that the picture is put together from, pixels.
-const TILE: usize = 16;
+const TILE: usize = 32;
 
 /// Sub-samples a side from which on a sharper level of detail pays.
 const DENSE: usize = 4;
@@ -32,15 +36,17 @@ const DENSE: usize = 4;
 pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let view = View::of(&shot.camera);
-    let lattice = Lattice::new(&view, options.cell_px);
     let offsets = quantiles(options.subsamples);
     let cards = sheets(shot);
     let casters = Casters::new(&cards, Sheet::surface(shot.catcher));
+    let tinted = casters.tinted;
+    let [fine, coarse] = [1.0, 2.0].map(|scale| Lattice::new(&view, scale * options.cell_px));
+    let studio = Studio { fine, coarse, casters, shot, options };
 
     let looks: Vec<_> = cards.par_iter().map(|(card, sheet)| Look::of(card, sheet, &view, &offsets)).collect();
     let receiver = |k: usize| match looks.get(k) {
-        Some(look) => Receiver::card(k, look.as_ref()?.texture.grid.reach, &lattice, &casters, shot, &options),
-        None => Receiver::surface(&lattice, &casters, shot, &options),
+        Some(look) => studio.card(k, look.as_ref()?.texture.grid.reach),
+        None => studio.surface(),
     };
     let receivers: Vec<_> = (0..=cards.len()).into_par_iter().map(receiver).collect();
     let mut lights = maps(&receivers);
@@ -48,11 +54,17 @@ pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let share = lights.pop().flatten();
     let together = cards.iter().zip(looks).zip(lights);
     let layers = together.filter_map(|(((card, _), look), light)| Some(look?.layer(card, light?))).collect();
-    let ground = Ground { seen: Seen::of(&casters.surface, &view), share };
-    let samples =
-        Samples { columns: lattice.places(view.width, &offsets), rows: lattice.places(view.height, &offsets), offsets };
-    let stack = Stack { layers, ground, samples, exposure: shot.exposure };
+    let ground = Ground { seen: Seen::of(&studio.casters.surface, &view), share };
+    let stack =
+        Stack { layers, ground, samples: samples(&view, &fine, offsets, &options), exposure: shot.exposure, tinted };
     assemble(&view, &tiles(&view).into_par_iter().map(|tile| stack.paint(tile)).collect::<Vec<_>>())
+}
+
+/// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
+fn samples(view: &View, lattice: &Lattice, offsets: Vec<f64>, options: &RenderOptions) -> Samples {
+    let each = options.cell_px < 1.0;
+    let places = |pixels: usize| lattice.places(pixels, if each { &offsets } else { &[0.0] });
+    Samples { columns: places(view.width), rows: places(view.height), each, offsets }
 }
 
 /// A card in the picture, before it is lit.
@@ -71,22 +83,33 @@ impl Look {
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
-        let texture = Baked::new(card, level(card, sheet, &seen, view, offsets));
+        let (seen, texture) = side(card, sheet, seen, view);
+        let texture = Baked::new(texture, &card.grade, level(texture, sheet, &seen, view, offsets));
         let (rows, columns) = rows_and_columns(sheet, texture.grid.reach, view);
         Some(Self { seen, texture, columns, rows })
     }
 
     fn layer(self, card: &Card, light: Map) -> Layer {
         let Self { seen, texture, columns, rows } = self;
-        Layer { id: card.id, seen, texture, light, columns, rows }
+        let sides = sides(&seen.u, &seen.v, &seen.w, texture.grid.reach);
+        Layer { id: card.id, seen, texture, light, sides, columns, rows }
+    }
+}
+
+/// The side of a card that is turned to the eye, and how it lies.
+fn side<'a>(card: &'a Card, sheet: &Sheet, seen: Seen, view: &View) -> (Seen, &'a Texture) {
+    let from_behind = sheet.normal.dot(&(view.eye - sheet.center)) < 0.0;
+    match &card.back {
+        Some(back) if from_behind => (Seen { u: seen.w - seen.u, ..seen }, back),
+        _ => (seen, &card.texture),
     }
 }
 
 /// Level of detail by matching variance: what sub-samples leave of the pixel's window, the texture's own filter covers.
 ///
 /// A level read bilinearly has variance `4^level / 4` texels.
-fn level(card: &Card, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[f64]) -> f64 {
-    let (width, height) = card.texture.size();
+fn level(texture: &Texture, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[f64]) -> f64 {
+    let (width, height) = texture.size();
     let texels = (width * height) as f64;
     let per_pixel = seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
     let dense = if offsets.len() >= DENSE { 0.25 } else { 0.0 };
@@ -109,7 +132,9 @@ fn assemble(view: &View, painted: &[Painted]) -> DeepImage {
             shadow.row_mut(y)[p.block.x.clone()].copy_from_slice(line);
         }
     }
-    DeepImage::from_samples(shadow, painted.iter().flat_map(|p| &p.samples).copied())
+    let paintings = || painted.iter().map(|p| &p.painting);
+    let samples = paintings().flat_map(|p| &p.samples).copied();
+    DeepImage::from_samples(shadow, samples, paintings().flat_map(|p| &p.tints).copied())
 }
 
 #[cfg(test)]

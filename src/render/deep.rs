@@ -70,13 +70,14 @@ impl DeepImage {
     /// Assembles a picture from samples in any order of pixels, each with its column and row; those of one pixel come
     /// front to back.
     ///
-    /// `shadow` has the picture's size.
+    /// `shadow` has the picture's size; `tints` come in the order of the samples, or there are none.
     ///
     /// # Panics
     /// When a sample lies outside the picture, or when there are more than `u32` can count.
     pub(crate) fn from_samples(
         shadow: Image<LinearRgb>,
         samples: impl Iterator<Item = (u32, u32, DeepSample)> + Clone,
+        tints: impl Iterator<Item = LinearRgb>,
     ) -> Self {
         let (width, height) = shadow.size();
         let pixel = |x: u32, y: u32| y as usize * width + x as usize;
@@ -85,14 +86,19 @@ impl DeepImage {
         samples.clone().for_each(|(x, y, _)| ends[pixel(x, y) + 1] += 1);
         (0..width * height).for_each(|i| ends[i + 1] += ends[i]);
         let mut placed = vec![DeepSample::default(); ends.last().map_or(0, |&n| n as usize)];
+        let mut tints = tints.peekable();
+        let mut placed_tints = vec![LinearRgb::BLACK; if tints.peek().is_some() { placed.len() } else { 0 }];
         for (x, y, sample) in samples {
             let next = &mut ends[pixel(x, y)];
             placed[*next as usize] = sample;
+            if let Some(tint) = tints.next() {
+                placed_tints[*next as usize] = tint;
+            }
             *next += 1;
         }
         ends.rotate_right(1);
         ends[0] = 0;
-        Self { width, height, starts: ends, samples: placed, tints: Vec::new(), shadow }
+        Self { width, height, starts: ends, samples: placed, tints: placed_tints, shadow }
     }
 
     /// Number of columns.
@@ -134,6 +140,12 @@ impl DeepImage {
     fn range(&self, x: usize, y: usize) -> std::ops::Range<usize> {
         let i = y * self.width + x;
         self.starts[i] as usize..self.starts[i + 1] as usize
+    }
+
+    /// The same picture with other factors on the plate, computed from column, row and factor.
+    pub(crate) fn map_shadow(self, f: impl Fn(usize, usize, LinearRgb) -> LinearRgb + Sync) -> Self {
+        let shadow = Image::from_fn(self.width, self.height, |x, y| f(x, y, self.shadow[(x, y)]));
+        Self { shadow, ..self }
     }
 
     /// The factor on the plate, per channel.

@@ -1,13 +1,14 @@
 //! The definition's own tests: the numbers that both ways of rendering must hit.
 
+use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::composite;
 use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::light;
-use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, Quality, RenderOptions, cast, check, reference};
-use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
+use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
+use crate::render::{DeepImage, Quality, RenderOptions, cast, check, interreflect, reference};
+use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -407,6 +408,9 @@ fn awkward() -> Vec<(&'static str, Shot)> {
             "light without size",
             one(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))).with_light(AreaLight { size: [0.0; 2], ..square_light() }),
         ),
+        ("a black map", base().with_environment(surroundings(Image::filled(4, 2, LinearRgb::BLACK), 0.0))),
+        ("a map of one pixel", base().with_environment(surroundings(Image::filled(1, 1, LinearRgb::WHITE), f64::MAX))),
+        ("film", tinted(Texture::from)),
         ("dark", Shot::new(above(16, 12, 20.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8)))),
         ("no picture", Shot { camera: above(0, 0, 20.0), ..one(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))) }),
     ]
@@ -424,6 +428,158 @@ fn awkward_shots_give_defined_pictures() {
     }
 }
 
+/// A card whose film keeps back most of the green, over a card with alpha, with a back of its own.
+fn tinted(make: impl Fn(Image<Film>) -> Texture) -> Shot {
+    let film = Image::from_fn(32, 24, |x, y| {
+        let cover = if (4..28).contains(&x) && (3..21).contains(&y) { 1.0 } else { 0.0 };
+        Film {
+            color: LinearRgb::new(0.1, 0.05, 0.02).scale(cover),
+            opacity: LinearRgb::new(0.2, 0.8, 0.5).scale(cover),
+        }
+    });
+    let mut shot = pile();
+    shot.cards.truncate(2);
+    shot.cards[0].texture = make(film);
+    shot
+}
+
+#[test]
+fn grey_film_gives_the_bits_of_alpha() {
+    let grey = |film: Image<Film>| film.map(|f| Film { opacity: LinearRgb::grey(f.opacity.g), ..f });
+    let as_alpha = tinted(|film| grey(film).into());
+    let as_film = tinted(|film| Texture::Film(Arc::new(crate::filter::Pyramid::new(grey(film)))));
+    for way in [cast, reference] {
+        let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &Quality::Fast.options()));
+        assert_eq!(a.shadow(), b.shadow());
+        assert_eq!(composite::frame(&a, Some(&plate(64, 48))), composite::frame(&b, Some(&plate(64, 48))));
+        let tinted = |deep: &DeepImage| (0..48).any(|y| (0..64).any(|x| !deep.tints(x, y).is_empty()));
+        assert!(!tinted(&a) && tinted(&b));
+    }
+}
+
+#[test]
+fn film_tints_what_is_behind_and_its_shadow() {
+    let film = Film { color: LinearRgb::BLACK, opacity: LinearRgb::new(0.2, 0.8, 0.5) };
+    let mut card = level(1, [0.0, 0.0, 0.1], 4.0, grey(1.0));
+    card.texture = Image::filled(256, 256, film).into();
+    let shot = Shot::new(above(5, 5, 50.0)).with_light(square_light()).with_card(card);
+    for way in [cast, reference] {
+        let deep = way(&shot, &RenderOptions::default());
+        let (s, flat) = (deep.shadow()[(2, 2)], deep.flat(2, 2));
+        assert!((s.r - 0.8).abs() < 1e-5 && (s.g - 0.2).abs() < 1e-5 && (s.b - 0.5).abs() < 1e-5, "{s:?}");
+        assert!((flat.opacity.g - 0.8).abs() < 1e-5 && (deep.at(2, 2)[0].visible - 0.5).abs() < 1e-5);
+        let out = composite::frame(&deep, Some(&Image::filled(5, 5, LinearRgb::WHITE)));
+        assert!((out[(2, 2)].r - 0.64).abs() < 1e-4 && (out[(2, 2)].g - 0.04).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn both_ways_agree_on_film() {
+    let shot = tinted(Texture::from);
+    let [a, b] =
+        [cast, reference].map(|way| composite::frame(&way(&shot, &Quality::High.options()), Some(&plate(64, 48))));
+    assert!(difference(&a, &b) < 0.006, "{}", difference(&a, &b));
+}
+
+fn difference(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f64 {
+    let squares = a.pixels().iter().zip(b.pixels()).map(|(a, b)| f64::from((a.g - b.g).powi(2)));
+    (squares.sum::<f64>() / a.pixels().len() as f64).sqrt()
+}
+
+#[test]
+fn interreflection_brightens_the_surface_under_a_card_alone() {
+    // A wide white card of alpha 1/2 sends half of the light back: 1 / (1 - 0.8 * 0.5).
+    let shot = Shot::new(above(21, 21, 100.0)).with_ambient(LinearRgb::WHITE).with_card(level(
+        1,
+        [0.0, 0.0, 0.05],
+        0.1,
+        PremulRgba::new(0.5, 0.25, 0.0, 0.5),
+    ));
+    let plain = cast(&shot, &RenderOptions::default());
+    let bounced = interreflect(plain.clone(), &shot, LinearRgb::grey(0.8));
+    let gain = |x: usize| {
+        let (a, b) = (bounced.shadow()[(x, 10)], plain.shadow()[(x, 10)]);
+        [a.r / b.r, a.g / b.g, a.b / b.b]
+    };
+    let middle = gain(10);
+    assert!((middle[0] - 1.0 / 0.6).abs() < 2e-3 && (middle[1] - 1.25).abs() < 2e-3, "{middle:?}");
+    assert!((middle[2] - 1.0).abs() < 1e-6 && (gain(0)[0] - 1.0).abs() < 1e-3);
+    let black = interreflect(plain.clone(), &shot, LinearRgb::BLACK);
+    assert!(same(&black, &plain), "a black surface sends nothing back");
+}
+
+#[test]
+fn a_card_turned_over_shows_its_back_the_right_way_round() {
+    let half = |left: f32, right: f32| {
+        Image::from_fn(64, 64, move |x, _| {
+            let v = if x < 32 { left } else { right };
+            PremulRgba::new(v, v, v, 1.0)
+        })
+    };
+    let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), PI);
+    let mut turned = card(1, [0.0; 3], over, [0.4; 2], half(0.1, 0.2));
+    let lit = |card: &Card| Shot::new(above(41, 41, 100.0)).with_ambient(LinearRgb::WHITE).with_card(card.clone());
+    for way in [cast, reference] {
+        let at = |card: &Card, x: usize| way(&lit(card), &RenderOptions::default()).at(x, 20)[0].light.g;
+        // Seen through, the front is mirrored.
+        turned.back = None;
+        assert!((at(&turned, 10) - 0.2).abs() < 1e-4 && (at(&turned, 30) - 0.1).abs() < 1e-4);
+        turned.back = Some(half(0.6, 0.8).into());
+        assert!((at(&turned, 10) - 0.6).abs() < 1e-4 && (at(&turned, 30) - 0.8).abs() < 1e-4);
+    }
+}
+
+fn surroundings(image: Image<LinearRgb>, rotation: f64) -> EnvironmentMap {
+    EnvironmentMap { panorama: Arc::new(Panorama::new(image).unwrap()), rotation, strength: 1.0 }
+}
+
+#[test]
+fn an_even_map_lights_as_the_constant_environment_does() {
+    let radiance = LinearRgb::new(0.5, 1.0, 2.0);
+    let shot = Shot::new(above(5, 5, 400.0)).with_card(level(1, [0.0, 0.0, 0.1], 1.0, grey(1.0)));
+    let shot = shot.with_environment(surroundings(Image::filled(16, 8, radiance), 0.3));
+    for way in [cast, reference] {
+        let c = way(&shot, &Quality::Fast.options()).at(2, 2)[0].light;
+        assert!((c.r - 0.25).abs() < 1e-3 && (c.b - 1.0).abs() < 4e-3, "{c:?}");
+    }
+}
+
+/// A sun of a few texels at 45 degrees over `+x` in a dim sky.
+fn sun(rotation: f64) -> EnvironmentMap {
+    let value = |x: usize, y: usize| if (255..257).contains(&x) && (63..65).contains(&y) { 4000.0 } else { 0.2 };
+    surroundings(Image::from_fn(512, 256, |x, y| LinearRgb::grey(value(x, y))), rotation)
+}
+
+#[test]
+fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
+    for rotation in [0.0, 0.5 * PI, 2.0] {
+        let shot = Shot::new(above(81, 81, 100.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.1, grey(1.0)));
+        let shot = shot.with_environment(sun(rotation));
+        // A direction of the world is turned by the rotation before it is looked up: the sun stands at minus that.
+        let (sin, cos) = libm::sincos(-rotation);
+        let (x, y) = (-0.1 * cos, -0.1 * sin);
+        let pixel = ((40.5 + 100.0 * x) as usize, (40.5 - 100.0 * y) as usize);
+        let across = ((40.5 - 100.0 * x) as usize, (40.5 + 100.0 * y) as usize);
+        for way in [cast, reference] {
+            let options = RenderOptions { ambient_samples: 128, subsamples: 1, ..Quality::Good.options() };
+            let deep = way(&shot, &options);
+            let (dark, bright) = (deep.shadow()[pixel].g, deep.shadow()[across].g);
+            assert!(dark < 0.6 && bright > 0.9, "{rotation}: {dark} and {bright}");
+        }
+    }
+}
+
+#[test]
+fn both_ways_agree_under_a_map() {
+    let mut shot = pile().with_environment(sun(1.0));
+    shot.ambient = LinearRgb::BLACK;
+    let options = RenderOptions { ambient_samples: 400, ..Quality::High.options() };
+    let exact = RenderOptions { ambient_samples: 3200, subsamples: 2, light_samples: 3, cell_px: 1.0 };
+    let a = composite::frame(&cast(&shot, &options), Some(&plate(64, 48)));
+    let b = composite::frame(&reference(&shot, &exact), Some(&plate(64, 48)));
+    assert!(difference(&a, &b) < 0.012, "{}", difference(&a, &b));
+}
+
 #[test]
 fn options_out_of_range_are_brought_into_it() {
     let none = RenderOptions { subsamples: 0, light_samples: 0, ambient_samples: 0, cell_px: f64::NAN };
@@ -438,6 +594,12 @@ fn what_cannot_be_rendered_is_refused_at_the_door() {
     assert!(check(&with(grey(1.0))).is_ok());
     assert!(message(&with(PremulRgba::new(f32::NAN, 0.0, 0.0, 1.0))).starts_with("cards[0]: texture has a value"));
     assert!(message(&with(PremulRgba::new(0.0, 0.0, 0.0, 1.5))).contains("alpha 1.5"));
+    let film = Film { color: LinearRgb::BLACK, opacity: LinearRgb::new(0.0, f32::NAN, 0.0) };
+    let mut backed = with(grey(1.0));
+    backed.cards[0].back = Some(Image::filled(2, 2, film).into());
+    assert!(message(&backed).starts_with("cards[0]: back: texture has a value"), "{}", message(&backed));
+    let turned = with(grey(1.0)).with_environment(surroundings(Image::filled(2, 1, LinearRgb::WHITE), f64::NAN));
+    assert!(message(&turned).starts_with("environment"));
     let twice = with(grey(1.0)).with_card(level(1, [0.0; 3], 0.2, grey(1.0)));
     assert!(message(&twice).contains("id 1 is used twice"));
     let mut small = with(grey(1.0));

@@ -44,6 +44,14 @@ impl Four {
     }
 }
 
+impl From<LinearRgb> for Four {
+    /// With nothing as the fourth.
+    #[inline(always)]
+    fn from(c: LinearRgb) -> Self {
+        Self([c.r, c.g, c.b, 0.0])
+    }
+}
+
 impl From<PremulRgba> for Four {
     #[inline(always)]
     fn from(p: PremulRgba) -> Self {

@@ -8,15 +8,14 @@ use crate::geom::Vector3;
 use crate::pixel::{Depth, LinearRgb, ObjectId};
 use crate::render::DeepSample;
 use crate::render::four::Four;
-use crate::render::half_plane::{sides, span};
-use crate::render::irradiance::{Map, Place};
-use crate::render::texture::Baked;
+use crate::render::half_plane::{sides, span, whole};
+use crate::render::irradiance::Map;
+use crate::render::lattice::Place;
+use crate::render::texture::{Baked, Linear, mean};
+use crate::render::through::{LayerRow, Through};
 use crate::render::view::Seen;
 use std::f32::consts::PI;
 use std::ops::Range;
-
-/// What is behind this little transmittance is not worth shading.
-const OPAQUE: f32 = 1e-4;
 
 /// A card in the picture.
 #[derive(Debug)]
@@ -29,6 +28,8 @@ pub(super) struct Layer {
     pub(super) texture: Baked,
     /// Light on it.
     pub(super) light: Map,
+    /// Where it ends, its texture's soft border included.
+    pub(super) sides: [Vector3<f64>; 5],
     /// Pixels it may touch.
     pub(super) columns: Range<usize>,
     /// Pixels it may touch.
@@ -40,10 +41,19 @@ pub(super) struct Layer {
 pub(super) struct Samples {
     /// Positions along each side of a pixel, from its centre.
     pub(super) offsets: Vec<f64>,
-    /// Places in the lattice, sub-sample by sub-sample.
+    /// Light is looked up for each sub-sample, not for each pixel: where the lattice is finer than pixels are.
+    pub(super) each: bool,
+    /// Places in the lattice: sub-sample by sub-sample, or the middles of pixels.
     pub(super) columns: Vec<Place>,
-    /// Places in the lattice, sub-sample by sub-sample.
+    /// Places in the lattice, the same way.
     pub(super) rows: Vec<Place>,
+}
+
+impl Samples {
+    /// Places along a side of a pixel.
+    fn per_side(&self) -> usize {
+        if self.each { self.offsets.len() } else { 1 }
+    }
 }
 
 /// The plane under the cards.
@@ -66,6 +76,8 @@ pub(super) struct Stack {
     pub(super) samples: Samples,
     /// Factor on light.
     pub(super) exposure: f32,
+    /// Some layer is film.
+    pub(super) tinted: bool,
 }
 
 /// A rectangle of pixels.
@@ -77,19 +89,28 @@ pub(super) struct Block {
     pub(super) y: Range<usize>,
 }
 
+/// Deep samples in any order of pixels, front to back for each.
+#[derive(Debug, Default)]
+pub(super) struct Painting {
+    /// Column, row and sample.
+    pub(super) samples: Vec<(u32, u32, DeepSample)>,
+    /// What each sample hides, per channel; empty where no layer is film.
+    pub(super) tints: Vec<LinearRgb>,
+}
+
 /// A block's result.
 #[derive(Debug)]
 pub(super) struct Painted {
     /// Which pixels.
     pub(super) block: Block,
-    /// Column, row and sample; front to back for each pixel.
-    pub(super) samples: Vec<(u32, u32, DeepSample)>,
+    /// Samples and their tints.
+    pub(super) painting: Painting,
     /// The plate's factor, row by row; none where it is 1 everywhere.
     pub(super) shadow: Option<Vec<LinearRgb>>,
 }
 
 impl Block {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.x.len() * self.y.len()
     }
 
@@ -128,12 +149,12 @@ impl Stack {
     /// Everything that is to know about a block.
     pub(super) fn paint(&self, block: Block) -> Painted {
         let layers: Vec<_> = (0..self.layers.len()).filter(|&k| self.layers[k].touches(&block)).collect();
-        let mut samples = Vec::new();
+        let mut painting = Painting::default();
         let mut shadow = self.may_be_shadowed(&block).then(|| vec![LinearRgb::WHITE; block.len()]);
         if !layers.is_empty() || shadow.is_some() {
-            self.split(&block, &block, &layers, &mut samples, &mut shadow);
+            self.split(&block, &block, &layers, &mut painting, &mut shadow);
         }
-        Painted { block, samples, shadow }
+        Painted { block, painting, shadow }
     }
 
     fn split(
@@ -141,7 +162,7 @@ impl Stack {
         whole: &Block,
         part: &Block,
         layers: &[usize],
-        samples: &mut Vec<(u32, u32, DeepSample)>,
+        painting: &mut Painting,
         shadow: &mut Option<Vec<LinearRgb>>,
     ) {
         let mut layers: Vec<_> = layers.iter().copied().filter(|&k| self.layers[k].touches(part)).collect();
@@ -150,9 +171,9 @@ impl Stack {
         // A stable sort: cards that coincide stay in the order of their ids.
         layers.sort_by(|&a, &b| self.layers[b].nearness(&middle).total_cmp(&self.layers[a].nearness(&middle)));
         if part.len() > 1 && !self.sorted_everywhere(&layers, &corners) {
-            return part.halves().iter().for_each(|half| self.split(whole, half, &layers, samples, shadow));
+            return part.halves().iter().for_each(|half| self.split(whole, half, &layers, painting, shadow));
         }
-        let through = self.walk(part, &layers, samples);
+        let through = self.walk(part, &layers, painting);
         if let Some(shadow) = shadow {
             self.shade_ground(whole, part, &through, shadow);
         }
@@ -163,154 +184,195 @@ impl Stack {
         layers.windows(2).all(|pair| corners.iter().all(|p| nearer(pair[0], pair[1], p)))
     }
 
-    /// Walks a block's layers front to back; returns what passes through all of them, for each sub-sample.
-    fn walk(&self, block: &Block, layers: &[usize], out: &mut Vec<(u32, u32, DeepSample)>) -> Vec<f32> {
+    /// Walks a block's layers front to back; returns what passes through all of them.
+    fn walk(&self, block: &Block, layers: &[usize], out: &mut Painting) -> Through {
         let r = self.samples.offsets.len();
-        let mut through = vec![1.0; block.len() * r * r];
+        let mut through = Through::all(block, r, self.tinted);
+        let mut row = LayerRow::default();
         for &k in layers {
             let layer = &self.layers[k];
             for y in overlap(&block.y, &layer.rows) {
-                let row = &mut through[(y - block.y.start) * block.x.len() * r * r..][..block.x.len() * r * r];
-                self.walk_row(layer, &block.x, y, row, out);
+                self.walk_row(layer, block, y, &mut through, &mut row);
+                self.keep(layer, block, y, &row, out);
             }
         }
         through
     }
 
-    /// One row of one layer.
-    fn walk_row(
-        &self,
-        layer: &Layer,
-        columns: &Range<usize>,
-        y: usize,
-        through: &mut [f32],
-        out: &mut Vec<(u32, u32, DeepSample)>,
-    ) {
+    /// One row of one layer: every sub-sample's colour and opacity, added up by pixel.
+    fn walk_row(&self, layer: &Layer, block: &Block, y: usize, through: &mut Through, row: &mut LayerRow) {
         let offsets = &self.samples.offsets;
         let r = offsets.len();
-        let weight = 1.0 / (r * r) as f32;
-        let rows: Vec<_> = offsets.iter().map(|o| Line::of(layer, columns.start, y as f64 + 0.5 + o)).collect();
-        let low = rows.iter().map(|l| l.low).fold(f32::INFINITY, f32::min) - PIXEL_REACH;
-        let high = rows.iter().map(|l| l.high).fold(f32::NEG_INFINITY, f32::max) + PIXEL_REACH;
-        for (i, through) in through.chunks_exact_mut(r * r).enumerate() {
-            let center = i as f32 + 0.5;
-            if center < low || center > high {
-                continue;
-            }
-            let mut light = Four::ZERO;
-            let mut alpha = 0.0;
-            for (sy, (line, through)) in rows.iter().zip(through.chunks_exact_mut(r)).enumerate() {
-                for (sx, (offset, through)) in offsets.iter().zip(through).enumerate() {
-                    let x = center + *offset as f32;
-                    if x < line.low || x > line.high {
-                        continue;
-                    }
-                    let texel = line.texel(layer, x);
-                    let a = texel.alpha().clamp(0.0, 1.0);
-                    alpha += a;
-                    if *through > OPAQUE && a > 0.0 {
-                        let place = self.samples.columns[(columns.start + i) * r + sx];
-                        let e = layer.light.at(place, self.samples.rows[y * r + sy]);
-                        light = light.add_scaled(*through, texel.times(e));
-                    }
-                    *through *= 1.0 - a;
+        row.start(block.x.len(), self.tinted);
+        for (sy, offset_y) in offsets.iter().enumerate() {
+            let line = Line::of(layer, block.x.start, y as f64 + 0.5 + offset_y);
+            for (sx, offset_x) in offsets.iter().enumerate() {
+                let pixels = line.pixels(0.5 + *offset_x as f32, block.x.len());
+                if pixels.is_empty() {
+                    continue;
                 }
-            }
-            if alpha > 0.0 {
-                let x = columns.start + i;
-                out.push((x as u32, y as u32, self.sample(layer, x, y, light, (alpha * weight).min(1.0), weight)));
+                row.touched = join(&row.touched, &pixels);
+                if self.samples.each {
+                    let place = |i: usize| self.samples.columns[(block.x.start + i) * r + sx];
+                    row.light_between(layer, pixels.clone(), place, self.samples.rows[y * r + sy]);
+                }
+                let at = line.at(0.5 + *offset_x as f32 + pixels.start as f32);
+                let plane = sy * r + sx;
+                through.pass(layer, &at, plane, y - block.y.start, pixels, row);
             }
         }
     }
 
-    fn sample(&self, layer: &Layer, x: usize, y: usize, light: Four, alpha: f32, weight: f32) -> DeepSample {
+    /// Keeps what a row's pixels got from a layer.
+    fn keep(&self, layer: &Layer, block: &Block, y: usize, row: &LayerRow, out: &mut Painting) {
+        let r = self.samples.offsets.len();
+        let weight = 1.0 / (r * r) as f32;
+        for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
+            let x = block.x.start + i;
+            let light = match self.samples.each {
+                true => row.light[i],
+                false if row.light[i].alpha() > 0.0 => row.light[i].times(self.light_at(layer, x, y)),
+                false => row.light[i],
+            };
+            let hidden = if self.tinted { row.hidden[i].rgb() } else { LinearRgb::grey(row.light[i].alpha()) };
+            let (sample, tint) = self.sample(layer, [x, y], light, row.alpha[i] * weight, hidden.scale(weight));
+            out.samples.push((x as u32, y as u32, sample));
+            if self.tinted {
+                out.tints.push(tint);
+            }
+        }
+    }
+
+    /// Irradiance in the middle of a pixel.
+    #[inline(always)]
+    fn light_at(&self, layer: &Layer, x: usize, y: usize) -> Four {
+        layer.light.at(self.samples.columns[x], self.samples.rows[y])
+    }
+
+    fn sample(
+        &self,
+        layer: &Layer,
+        [x, y]: [usize; 2],
+        light: Four,
+        alpha: f32,
+        hidden: LinearRgb,
+    ) -> (DeepSample, LinearRgb) {
+        let r = self.samples.offsets.len();
+        let weight = 1.0 / (r * r) as f32;
         let w = layer.seen.w.dot(&Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0));
         let depth = if w > 0.0 { (layer.seen.height / w) as f32 } else { f32::MAX };
-        DeepSample {
+        let alpha = alpha.min(1.0);
+        let sample = DeepSample {
             object: layer.id,
             depth: Depth(depth),
             light: light.rgb().scale(weight * self.exposure / PI),
             alpha,
-            visible: (light.alpha() * weight).min(alpha),
-        }
+            visible: mean(hidden).min(alpha),
+        };
+        (sample, hidden.map(|h| h.min(1.0)))
     }
 
     fn may_be_shadowed(&self, block: &Block) -> bool {
         let Some(map) = &self.ground.share else { return false };
-        let r = self.samples.offsets.len();
+        let n = self.samples.per_side();
         let places =
-            |range: &Range<usize>, all: &[Place]| [all[range.start * r], all[range.end * r - 1]].map(|p| p.0 as usize);
+            |range: &Range<usize>, all: &[Place]| [all[range.start * n], all[range.end * n - 1]].map(|p| p.0 as usize);
         let [x, y] = [places(&block.x, &self.samples.columns), places(&block.y, &self.samples.rows)];
-        map.meets(x[0]..x[1] + 2, y[0]..y[1] + 2)
+        // A node more on either side: sub-samples reach beyond the middle of their pixel.
+        map.meets(x[0].saturating_sub(1)..x[1] + 3, y[0].saturating_sub(1)..y[1] + 3)
     }
 
     /// What shadows leave of the surface's light: the average over what is seen of it.
     ///
     /// The definition divides average irradiances; the unshadowed one is the same all over a pixel (to about 1e-4 of
     /// it), so that averaging the share itself is the same.
-    fn shade_ground(&self, whole: &Block, block: &Block, through: &[f32], shadow: &mut [LinearRgb]) {
+    fn shade_ground(&self, whole: &Block, block: &Block, through: &Through, shadow: &mut [LinearRgb]) {
         let (Some(map), Some(seen)) = (&self.ground.share, &self.ground.seen) else { return };
         let offsets = &self.samples.offsets;
-        let r = offsets.len();
         let edges = sides(&seen.u, &seen.v, &seen.w, [0.0; 2]);
-        let mut subs = through.chunks_exact(r);
-        let mut sums = vec![Four::ZERO; block.x.len()];
+        let reach = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()));
         for y in block.y.clone() {
-            sums.fill(Four::ZERO);
-            let mut rows = subs.by_ref().take(block.x.len() * r);
             let spans: Vec<_> = offsets.iter().map(|o| span(&edges, y as f64 + 0.5 + o)).collect();
-            for (i, sum) in sums.iter_mut().enumerate() {
-                let x = block.x.start + i;
-                for (sy, through) in rows.by_ref().take(r).enumerate() {
-                    let row = self.samples.rows[y * r + sy];
-                    for (sx, &t) in through.iter().enumerate() {
-                        let at = x as f64 + 0.5 + offsets[sx];
-                        let column = self.samples.columns[x * r + sx];
-                        let on_ground = at >= spans[sy].0 && at <= spans[sy].1 && map.holds(column, row);
-                        *sum = sum.add_scaled(t, if on_ground { map.at(column, row) } else { Four::ONE });
-                    }
-                }
-            }
+            let low = spans.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max) + reach;
+            let high = spans.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) - reach;
             let line = &mut shadow[(y - whole.y.start) * whole.x.len() + block.x.start - whole.x.start..];
-            line.iter_mut().zip(&sums).for_each(|(s, sum)| *s = mean(sum));
+            for (i, shadow) in line.iter_mut().take(block.x.len()).enumerate() {
+                let x = block.x.start + i;
+                let inside = x as f64 + 0.5 >= low && x as f64 + 0.5 <= high;
+                *shadow = if inside && !self.samples.each {
+                    self.share_at(map, x, y).rgb()
+                } else {
+                    self.mean_share(map, [x, y], &spans, through.of(i, y - block.y.start))
+                };
+            }
         }
+    }
+
+    /// The share in the middle of a pixel.
+    fn share_at(&self, map: &Map, x: usize, y: usize) -> Four {
+        let (column, row) = (self.samples.columns[x], self.samples.rows[y]);
+        if map.holds(column, row) { map.at(column, row) } else { Four::ONE }
+    }
+
+    /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the surface.
+    fn mean_share(
+        &self,
+        map: &Map,
+        [x, y]: [usize; 2],
+        spans: &[(f64, f64)],
+        through: impl Iterator<Item = Four>,
+    ) -> LinearRgb {
+        let (r, n) = (self.samples.offsets.len(), self.samples.per_side());
+        let (mut sum, mut weight) = (Four::ZERO, Four::ZERO);
+        for (sub, t) in through.enumerate() {
+            let (sx, sy) = (sub % r, sub / r);
+            let at = x as f64 + 0.5 + self.samples.offsets[sx];
+            let on_ground = at >= spans[sy].0 && at <= spans[sy].1;
+            let place = if self.samples.each { [x * n + sx, y * n + sy] } else { [x, y] };
+            let share = if on_ground { self.share_at(map, place[0], place[1]) } else { Four::ONE };
+            (sum, weight) = (sum.add_scaled(1.0, t.times(share)), weight.add_scaled(1.0, t));
+        }
+        ratio(&sum, &weight)
     }
 }
 
-/// The weighted mean of a share; 1 for no weight, and exactly 1 where the share is 1 all over.
-fn mean(sum: &Four) -> LinearRgb {
-    let weight = sum.alpha();
-    if weight > 0.0 { sum.rgb().map(|v| (v / weight).min(1.0)) } else { LinearRgb::WHITE }
+/// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
+fn ratio(sum: &Four, weight: &Four) -> LinearRgb {
+    let channel = |c: usize| if weight.0[c] > 0.0 { (sum.0[c] / weight.0[c]).min(1.0) } else { 1.0 };
+    LinearRgb::new(channel(0), channel(1), channel(2))
 }
-
-/// Half of the pixel's window, and a rounding more.
-const PIXEL_REACH: f32 = 1.6;
 
 /// A layer along one row of sub-samples; `x` counts pixels from the block's left edge.
 struct Line {
     low: f32,
     high: f32,
-    u: (f32, f32),
-    v: (f32, f32),
-    w: (f32, f32),
+    position: Linear,
 }
 
 impl Line {
     fn of(layer: &Layer, left: usize, y: f64) -> Self {
         let seen = &layer.seen;
-        let (low, high) = span(&sides(&seen.u, &seen.v, &seen.w, layer.texture.grid.reach), y);
+        let (low, high) = span(&layer.sides, y);
         let [u, v] = layer.texture.grid.rows(&seen.u, &seen.v, &seen.w);
         let first = Vector3::new(left as f64, y, 1.0);
         let linear = |row: &Vector3<f64>| (row.dot(&first) as f32, row.x as f32);
         let relative = |x: f64| (x - left as f64) as f32;
-        Self { low: relative(low), high: relative(high), u: linear(&u), v: linear(&v), w: linear(&seen.w) }
+        Self { low: relative(low), high: relative(high), position: [linear(&u), linear(&v), linear(&seen.w)] }
     }
 
-    #[inline(always)]
-    fn texel(&self, layer: &Layer, x: f32) -> Four {
-        let scale = 1.0 / (self.w.0 + self.w.1 * x);
-        layer.texture.at((self.u.0 + self.u.1 * x) * scale, (self.v.0 + self.v.1 * x) * scale)
+    /// The pixels whose sub-sample at this offset is on the layer.
+    fn pixels(&self, offset: f32, count: usize) -> Range<usize> {
+        whole(f64::from(self.low - offset), f64::from(self.high - offset), &(0..count))
     }
+
+    /// The same line, counted from `x`.
+    fn at(&self, x: f32) -> Linear {
+        self.position.map(|(start, step)| (start + step * x, step))
+    }
+}
+
+fn join(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    if a.is_empty() { b.clone() } else { a.start.min(b.start)..a.end.max(b.end) }
 }
 
 fn overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {

@@ -12,23 +12,30 @@
 
 mod cast;
 mod check;
+mod cryptomatte;
 mod deep;
 #[cfg(test)]
 mod definition;
 mod four;
 mod half_plane;
+mod interreflection;
 mod irradiance;
+mod lattice;
 mod layers;
 mod options;
 mod pixel_filter;
+mod receiver;
 mod reference;
 mod shadow;
 mod source;
 mod texture;
+mod through;
 mod view;
 
 pub use cast::cast;
 pub use check::check;
+pub use cryptomatte::Cryptomatte;
 pub use deep::{DeepImage, DeepSample};
+pub use interreflection::interreflect;
 pub use options::{Quality, RenderOptions};
 pub use reference::reference;

@@ -4,9 +4,10 @@ use crate::asset::Texture;
 use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
 use crate::image::Image;
-use crate::pixel::{Depth, LinearRgb, Mix, PremulRgba};
+use crate::pixel::{Depth, Film, LinearRgb, Mix};
 use crate::render::pixel_filter::quantiles;
-use crate::render::source::{Kind, Lamp, Source, lamps};
+use crate::render::source::{Kind, Lamp, Lamps, Source};
+use crate::render::texture::{graded_opacity, mean};
 use crate::render::view::{Seen, Sheet, View, sheets};
 use crate::render::{DeepImage, DeepSample, RenderOptions};
 use crate::scene::{Card, Shot};
@@ -23,8 +24,11 @@ pub fn reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let offsets = quantiles(options.subsamples);
     let (width, height) = (world.view.width, world.view.height);
     let pixel = |i: usize| world.pixel((i % width) as f64 + 0.5, (i / width) as f64 + 0.5, &offsets);
-    let (lists, shadow): (Vec<_>, Vec<_>) = (0..width * height).into_par_iter().map(pixel).unzip();
-    DeepImage::from_pixels(Image::from_vec(width, height, shadow), lists)
+    let (lists, shadow): (Vec<Vec<(DeepSample, LinearRgb)>>, Vec<_>) =
+        (0..width * height).into_par_iter().map(pixel).unzip();
+    let tints = lists.iter().flatten().filter(|_| world.tinted).map(|(_, tint)| *tint).collect();
+    let samples = lists.into_iter().map(|list| list.into_iter().map(|(sample, _)| sample).collect());
+    DeepImage::from_pixels(Image::from_vec(width, height, shadow), samples).with_tints(tints)
 }
 
 /// A card with everything that a ray asks of it.
@@ -41,24 +45,27 @@ struct World<'a> {
     cards: Vec<Facing<'a>>,
     surface: Option<Seen>,
     surface_lamps: Vec<Lamp>,
+    tinted: bool,
 }
 
 impl<'a> World<'a> {
     fn of(shot: &'a Shot, options: &RenderOptions) -> Self {
         let view = View::of(&shot.camera);
-        let lit = |normal: &Vector3<f64>| lamps(shot, options, normal);
+        let lit = |normal: &Vector3<f64>| Lamps::plain(shot, options, normal);
         let facing = |(card, sheet): (&'a Card, Sheet)| {
             let seen = Seen::of(&sheet, &view);
             let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));
             Facing { card, sheet, seen, lamps }
         };
         let surface = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
-        let cards = sheets(shot).into_iter().map(facing).collect();
-        Self { shot, view, cards, surface, surface_lamps: lit(&Vector3::z()) }
+        let cards: Vec<_> = sheets(shot).into_iter().map(facing).collect();
+        let is_film = |f: &Facing<'_>| f.card.texture.is_film() || f.card.back.as_ref().is_some_and(Texture::is_film);
+        let tinted = cards.iter().any(is_film);
+        Self { shot, view, cards, surface, surface_lamps: lit(&Vector3::z()), tinted }
     }
 
     /// Samples of one pixel and the factor on its plate.
-    fn pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<DeepSample>, LinearRgb) {
+    fn pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<(DeepSample, LinearRgb)>, LinearRgb) {
         let mut order: Vec<_> = (0..self.cards.len()).filter_map(|k| Some((k, self.depth(k, x, y)?))).collect();
         order.sort_by(|a, b| a.1.total_cmp(&b.1).then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id)));
         let mut samples: Vec<_> = order.iter().map(|&(k, depth)| self.empty_sample(k, depth)).collect();
@@ -67,15 +74,17 @@ impl<'a> World<'a> {
         for oy in offsets {
             for ox in offsets {
                 let through = self.walk(x + ox, y + oy, &order, weight, &mut samples);
-                self.shade_surface(x + ox, y + oy, through * weight, &mut shadow);
+                self.shade_surface(x + ox, y + oy, through.scale(weight), &mut shadow);
             }
         }
-        samples.retain(|s| s.alpha > 0.0);
+        samples.retain(|(s, _)| s.alpha > 0.0);
+        samples.iter_mut().for_each(|(s, hidden)| s.visible = mean(*hidden));
         (samples, shadow.value())
     }
 
-    fn empty_sample(&self, k: usize, depth: f64) -> DeepSample {
-        DeepSample { object: self.cards[k].card.id, depth: Depth(depth as f32), ..DeepSample::default() }
+    fn empty_sample(&self, k: usize, depth: f64) -> (DeepSample, LinearRgb) {
+        let sample = DeepSample { object: self.cards[k].card.id, depth: Depth(depth as f32), ..DeepSample::default() };
+        (sample, LinearRgb::BLACK)
     }
 
     /// Depth of a card's plane at a pixel position; as far as can be where it is behind the eye.
@@ -86,25 +95,33 @@ impl<'a> World<'a> {
     }
 
     /// Adds what the cards do along one ray, front to back; returns what passes through all of them.
-    fn walk(&self, x: f64, y: f64, order: &[(usize, f64)], weight: f32, samples: &mut [DeepSample]) -> f32 {
-        let mut through = 1.0;
-        for (&(k, _), sample) in order.iter().zip(samples) {
+    fn walk(
+        &self,
+        x: f64,
+        y: f64,
+        order: &[(usize, f64)],
+        weight: f32,
+        samples: &mut [(DeepSample, LinearRgb)],
+    ) -> LinearRgb {
+        let mut through = LinearRgb::WHITE;
+        for (&(k, _), (sample, hidden)) in order.iter().zip(samples) {
             let facing = &self.cards[k];
             let Some((seen, (uv, depth))) = facing.seen.as_ref().and_then(|s| Some((s, s.hit(x, y)?))) else {
                 continue;
             };
-            let texel = graded(texel(facing.card, uv), facing.card);
-            sample.alpha += weight * texel.a;
-            sample.visible += weight * through * texel.a;
+            let film = facing.texel(uv, &self.view.eye);
+            sample.alpha += weight * mean(film.opacity);
+            *hidden = hidden.add_scaled(weight, through * film.opacity);
             let point = self.view.eye + self.view.ray * Vector3::new(x, y, 1.0) * depth;
             let e = self.irradiance(&point, &seen.normal, &facing.lamps, Some(k)).1;
-            sample.light = sample.light.add_scaled(weight * through * self.shot.exposure / PI, texel.color() * e);
-            through *= 1.0 - texel.a;
+            let light = through * film.color * e;
+            sample.light = sample.light.add_scaled(weight * self.shot.exposure / PI, light);
+            through = through * film.transmittance();
         }
         through
     }
 
-    fn shade_surface(&self, x: f64, y: f64, weight: f32, shadow: &mut Ratio) {
+    fn shade_surface(&self, x: f64, y: f64, weight: LinearRgb, shadow: &mut Ratio) {
         let hit = self.surface.as_ref().and_then(|s| s.hit(x, y));
         let (open, shadowed) = match hit {
             None => (LinearRgb::BLACK, LinearRgb::BLACK),
@@ -114,11 +131,11 @@ impl<'a> World<'a> {
             }
         };
         if hit.is_none() || open == LinearRgb::BLACK {
-            shadow.outside += weight;
+            shadow.outside = shadow.outside + weight;
         }
-        shadow.weight += weight;
-        shadow.open = shadow.open.add_scaled(weight, open);
-        shadow.shadowed = shadow.shadowed.add_scaled(weight, shadowed);
+        shadow.weight = shadow.weight + weight;
+        shadow.open = shadow.open + weight * open;
+        shadow.shadowed = shadow.shadowed + weight * shadowed;
     }
 
     /// Irradiance without and with the other cards in the way.
@@ -134,21 +151,22 @@ impl<'a> World<'a> {
             for source in &lamp.sources {
                 let e = source.irradiance(p, n) as f32;
                 open = open.add_scaled(e, lamp.radiance);
-                shadowed = shadowed.add_scaled(e * self.passes(p, source, own), lamp.radiance);
+                shadowed = shadowed.add_scaled(e, self.passes(p, source, own) * lamp.radiance);
             }
         }
         (open, shadowed)
     }
 
     /// Share of a source's light that reaches a point.
-    fn passes(&self, p: &Vector3<f64>, source: &Source, own: Option<usize>) -> f32 {
+    fn passes(&self, p: &Vector3<f64>, source: &Source, own: Option<usize>) -> LinearRgb {
         if own.is_some() && matches!(source.kind, Kind::Sky { .. }) && self.surface_blocks(p, &source.at.xyz()) {
-            return 0.0;
+            return LinearRgb::BLACK;
         }
         let others = self.cards.iter().enumerate().filter(|&(k, _)| Some(k) != own);
-        others
-            .map(|(_, facing)| 1.0 - crossing(&facing.sheet, p, source).map_or(0.0, |uv| texel(facing.card, uv).a))
-            .product()
+        others.fold(LinearRgb::WHITE, |through, (_, facing)| match crossing(&facing.sheet, p, source) {
+            Some(uv) => through * facing.texel(uv, p).transmittance(),
+            None => through,
+        })
     }
 
     fn surface_blocks(&self, p: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
@@ -168,14 +186,28 @@ fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]
     (s > 0.0 && s < end && uv.iter().all(|c| (0.0..=1.0).contains(c))).then_some(uv)
 }
 
-/// Bilinear texel of a card's full texture; what lies outside counts as nothing.
-fn texel(card: &Card, [u, v]: [f64; 2]) -> PremulRgba {
-    let (width, height) = card.texture.size();
-    let (x, y) = (u * width as f64, v * height as f64);
-    match &card.texture {
-        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y),
-        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y).to_rgba(),
+impl Facing<'_> {
+    fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {
+        texel(self.card, &self.sheet, uv, from)
     }
+}
+
+/// What a card shows to whoever looks at it from a point: full detail, what lies outside counts as nothing.
+pub(super) fn texel(card: &Card, sheet: &Sheet, [u, v]: [f64; 2], from: &Vector3<f64>) -> Film {
+    let from_behind = sheet.normal.dot(&(from - sheet.center)) < 0.0;
+    let (texture, u) = match &card.back {
+        Some(back) if from_behind => (back, 1.0 - u),
+        _ => (&card.texture, u),
+    };
+    let (width, height) = texture.size();
+    let (x, y) = (u * width as f64, v * height as f64);
+    let film = match texture {
+        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y).into(),
+        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y),
+    };
+    let grade = &card.grade;
+    let color = crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value);
+    Film { color, opacity: graded_opacity(film.opacity, grade) }
 }
 
 /// A ratio of averages, per channel; 1 where there is nothing to average.
@@ -183,22 +215,19 @@ fn texel(card: &Card, [u, v]: [f64; 2]) -> PremulRgba {
 struct Ratio {
     open: LinearRgb,
     shadowed: LinearRgb,
-    outside: f32,
-    weight: f32,
+    outside: LinearRgb,
+    weight: LinearRgb,
 }
 
 impl Ratio {
     fn value(&self) -> LinearRgb {
-        let share = if self.weight > 0.0 { 1.0 - self.outside / self.weight } else { 0.0 };
-        let channel = |s: f32, o: f32| if o > 0.0 && s != o { 1.0 + share * (s / o - 1.0) } else { 1.0 };
-        let (s, o) = (self.shadowed, self.open);
-        LinearRgb::new(channel(s.r, o.r), channel(s.g, o.g), channel(s.b, o.b))
+        let of = |c: LinearRgb| <[f32; 3]>::from(c);
+        let (shadowed, open, outside, weight) = (of(self.shadowed), of(self.open), of(self.outside), of(self.weight));
+        let channel = |c: usize| {
+            let share = if weight[c] > 0.0 { 1.0 - outside[c] / weight[c] } else { 0.0 };
+            let lit = open[c] > 0.0 && shadowed[c] != open[c];
+            if lit { 1.0 + share * (shadowed[c] / open[c] - 1.0) } else { 1.0 }
+        };
+        LinearRgb::new(channel(0), channel(1), channel(2))
     }
-}
-
-/// The card's colour change on one premultiplied colour.
-fn graded(p: PremulRgba, card: &Card) -> PremulRgba {
-    let g = card.grade;
-    let c = crate::color::shift_hsv(p.color(), g.hue_deg, g.saturation, g.value);
-    PremulRgba::new(c.r, c.g, c.b, p.a)
 }

@@ -2,16 +2,19 @@
 
 use crate::geom::Vector3;
 use crate::light;
-use crate::pixel::LinearRgb;
+use crate::pixel::{LinearRgb, Mix};
 use crate::render::RenderOptions;
-use crate::scene::Shot;
+use crate::scene::{AreaLight, Shot};
 use nalgebra::{Matrix3, Vector4};
+use std::f64::consts::PI;
 
 /// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
     /// Where.
     pub(super) at: Vector4<f64>,
+    /// Side of the square of light that it stands for: metres, or radians of a direction.
+    pub(super) width: f64,
     /// What it does to a receiver that sees it.
     pub(super) kind: Kind,
 }
@@ -42,21 +45,80 @@ pub(super) struct Lamp {
     pub(super) sources: Vec<Source>,
 }
 
-/// The lamps that light a receiver with this unit normal: area lights in their order, then the environment.
-pub(super) fn lamps(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
-    let RenderOptions { light_samples, ambient_samples, .. } = *options;
-    let faces = shot.lights.iter().map(|l| {
-        let face = light::frame(l).normal;
-        let source =
-            |n: light::Node| Source { at: n.point.to_homogeneous(), kind: Kind::Face { normal: face, area: n.area } };
-        Lamp { radiance: light::radiance(l), sources: light::nodes(l, light_samples).into_iter().map(source).collect() }
-    });
+/// All that lights a receiver.
+#[derive(Clone, Debug)]
+pub(super) struct Lamps {
+    /// Area lights, in their order.
+    pub(super) faces: Vec<Lamp>,
+    /// What is all around: the constant environment, then the pieces of the map.
+    pub(super) sky: Vec<Lamp>,
+}
+
+impl Lamps {
+    /// What lights a receiver with this unit normal.
+    pub(super) fn of(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Self {
+        let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
+        let ambient = ambient(shot.ambient, options.ambient_samples, normal);
+        let map =
+            shot.environment.iter().flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
+        Self::from_parts(faces, ambient, map)
+    }
+
+    /// The same for a quadrature without cleverness: the map in even rectangles.
+    pub(super) fn plain(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
+        let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
+        let ambient = ambient(shot.ambient, options.ambient_samples, normal);
+        let map =
+            shot.environment.iter().flat_map(|map| pieces(light::sky_cells(map, options.ambient_samples, normal)));
+        let Self { faces, sky } = Self::from_parts(faces, ambient, map);
+        faces.into_iter().chain(sky).collect()
+    }
+
+    fn from_parts(faces: Vec<Lamp>, ambient: Lamp, map: impl Iterator<Item = Lamp>) -> Self {
+        let sky = std::iter::once(ambient).chain(map).collect();
+        let lit = |lamps: Vec<Lamp>| lamps.into_iter().filter(|lamp| lamp.radiance != LinearRgb::BLACK).collect();
+        Self { faces: lit(faces), sky: lit(sky) }
+    }
+
+    /// Irradiance of the sky where nothing is in its way.
+    pub(super) fn open_sky(&self) -> LinearRgb {
+        let shares = |lamp: &Lamp| lamp.sources.iter().map(Source::share).sum::<f64>() as f32;
+        self.sky.iter().fold(LinearRgb::BLACK, |sum, lamp| sum.add_scaled(shares(lamp), lamp.radiance))
+    }
+}
+
+fn face(light: &AreaLight, per_side: usize) -> Lamp {
+    let normal = light::frame(light).normal;
+    let source = |n: light::Node| Source {
+        at: n.point.to_homogeneous(),
+        width: n.area.sqrt(),
+        kind: Kind::Face { normal, area: n.area },
+    };
+    Lamp { radiance: light::radiance(light), sources: light::nodes(light, per_side).into_iter().map(source).collect() }
+}
+
+fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {
     let world_from_hemisphere = hemisphere(normal);
-    let share = std::f64::consts::PI / ambient_samples as f64;
-    let sky = light::ambient_directions(ambient_samples).into_iter();
-    let sky = sky.map(|d| Source { at: (world_from_hemisphere * d).to_homogeneous(), kind: Kind::Sky { share } });
-    let ambient = Lamp { radiance: shot.ambient, sources: sky.collect() };
-    faces.chain([ambient]).filter(|lamp| lamp.radiance != LinearRgb::BLACK).collect()
+    let share = PI / count as f64;
+    let source = |d: Vector3<f64>| Source {
+        at: (world_from_hemisphere * d).to_homogeneous(),
+        width: (share / d.z).sqrt(),
+        kind: Kind::Sky { share },
+    };
+    Lamp { radiance, sources: light::ambient_directions(count).into_iter().map(source).collect() }
+}
+
+/// The pieces of a map that a receiver sees: a lamp each, since each has a colour of its own.
+fn pieces(pieces: Vec<light::SkyPiece>) -> impl Iterator<Item = Lamp> {
+    let lamp = |piece: light::SkyPiece| Lamp {
+        radiance: piece.irradiance,
+        sources: vec![Source {
+            at: piece.direction.to_homogeneous(),
+            width: piece.width,
+            kind: Kind::Sky { share: 1.0 },
+        }],
+    };
+    pieces.into_iter().map(lamp)
 }
 
 /// Axes of a frame whose `z` is `normal`.
@@ -67,6 +129,11 @@ fn hemisphere(normal: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 impl Source {
+    /// Cosine times solid angle of a piece of the sky.
+    fn share(&self) -> f64 {
+        if let Kind::Sky { share } = self.kind { share } else { 0.0 }
+    }
+
     /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below a horizon.
     pub(super) fn irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         match self.kind {

@@ -43,6 +43,12 @@ impl Sheet {
         Self { center: Vector3::zeros(), x: Vector3::x(), y: Vector3::y(), normal: Vector3::z(), size }
     }
 
+    /// The same sheet, reaching further out on each side by shares of its size.
+    pub(super) fn grown(&self, reach: [f64; 2]) -> Self {
+        let grow = |k: usize| self.size[k] * (1.0 + 2.0 * reach[k]);
+        Self { size: [grow(0), grow(1)], ..*self }
+    }
+
     /// The four corners, in turn.
     pub(super) fn corners(&self) -> [Vector3<f64>; 4] {
         let (a, b) = (self.x * (0.5 * self.size[0]), self.y * (0.5 * self.size[1]));

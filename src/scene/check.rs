@@ -4,11 +4,14 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::UnitQuaternion;
 use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, CameraSource, Exposure, Object, Placement, Scene};
+use crate::scene::hull::turn;
+use crate::scene::{AreaLight, CameraSource, Cast, Exposure, Object, Placement, Scene, Surface};
 use std::fmt::Debug;
 
 /// How far the norm of a quaternion may be from 1: what six written decimals leave.
 const UNIT_TOLERANCE: f64 = 1e-5;
+/// How far a corner may be outside its card, as a share of the card: the same decimals.
+const OUTLINE_TOLERANCE: f64 = 1e-5;
 
 impl Scene {
     /// Fails on the first value that cannot be right, by its path: `objects[3].size: [0.0, 0.1], expected two lengths
@@ -16,15 +19,24 @@ impl Scene {
     pub fn check(&self) -> Result<()> {
         expect(self.image.iter().all(|&n| n > 0), "image", self.image, "two numbers above 0")?;
         expect_lengths(self.surface.size, "surface.size")?;
+        let Surface { friction, restitution, .. } = self.surface;
+        expect(friction.is_finite() && friction >= 0.0, "surface.friction", friction, "at least 0")?;
+        expect((0.0..=1.0).contains(&restitution), "surface.restitution", restitution, "0 to 1")?;
         check_camera(&self.camera)?;
         each(&self.objects, "objects", check_object)?;
         each(&self.lights, "lights", check_light)?;
         expect_color(self.ambient, "ambient")?;
         self.environment.as_ref().map_or(Ok(()), |map| map.check("environment"))?;
+        check_cast(&self.cast)?;
+        self.finish.check("finish")?;
         match self.exposure {
             Exposure::Ev(ev) => expect(ev.is_finite(), "exposure.ev", ev, "a finite number"),
             Exposure::MatchPlate { gain_ev } => {
                 expect(gain_ev.is_finite(), "exposure.match_plate.gain_ev", gain_ev, "a finite number")
+            }
+            Exposure::MatchSurface { albedo, gain_ev } => {
+                expect(is_length(albedo), "exposure.match_surface.albedo", albedo, "a number above 0")?;
+                expect(gain_ev.is_finite(), "exposure.match_surface.gain_ev", gain_ev, "a finite number")
             }
         }
     }
@@ -64,6 +76,15 @@ fn expect_color(color: LinearRgb, at: &str) -> Result<()> {
     expect([r, g, b].iter().all(|x| x.is_finite() && *x >= 0.0), at, [r, g, b], "three numbers of at least 0")
 }
 
+fn check_cast(cast: &Cast) -> Result<()> {
+    match *cast {
+        Cast::Known(color) => expect_color(color, "cast.known"),
+        Cast::MatchSurface { share } => {
+            expect(share.is_finite(), "cast.match_surface.share", share, "a finite number, 0 to 1 as a rule")
+        }
+    }
+}
+
 fn check_camera(camera: &CameraSource) -> Result<()> {
     match camera {
         CameraSource::Known(camera) => check_known_camera(camera),
@@ -95,6 +116,7 @@ fn check_object(object: &Object, at: &str) -> Result<()> {
     expect(!object.asset.is_empty(), &field("asset"), &object.asset, "the name of an asset")?;
     expect_lengths(object.size, &field("size"))?;
     expect(is_length(object.thickness), &field("thickness"), object.thickness, "a length above 0")?;
+    check_outline(&object.outline, object.size, &field("outline"))?;
     expect(is_length(object.mass), &field("mass"), object.mass, "a mass above 0")?;
     let grade = [object.grade.hue_deg, object.grade.saturation, object.grade.value].map(f64::from);
     expect_finite(&grade, &field("grade"))?;
@@ -111,6 +133,14 @@ fn check_object(object: &Object, at: &str) -> Result<()> {
     }
 }
 
+/// A convex polygon inside its card, or nothing.
+fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
+    let inside = |p: &[f64; 2]| (0..2).all(|axis| p[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE));
+    let around = outline.len() != 1 && outline.len() != 2 && outline.iter().all(inside);
+    let left = (0..outline.len()).all(|i| turn(outline, i) > 0.0);
+    expect(around && left, at, outline, "the corners of a convex polygon on the card, counter-clockwise")
+}
+
 fn check_light(light: &AreaLight, at: &str) -> Result<()> {
     let field = |name: &str| format!("{at}.{name}");
     expect_finite(&light.position, &field("position"))?;
@@ -125,7 +155,7 @@ fn check_light(light: &AreaLight, at: &str) -> Result<()> {
 mod tests {
     use super::*;
     use crate::geom::Pose;
-    use crate::scene::{Grade, LightShape, Surface};
+    use crate::scene::{Grade, LightShape};
 
     fn scene() -> Scene {
         let object = Object {
@@ -134,6 +164,7 @@ mod tests {
             back: None,
             size: [0.2, 0.1],
             thickness: 0.005,
+            outline: vec![],
             mass: 0.03,
             placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
             grade: Grade::default(),
@@ -155,12 +186,14 @@ mod tests {
                 photo: [10, 10],
                 focal_px: None,
             },
-            surface: Surface { size: [0.4, 0.3] },
+            surface: Surface::new([0.4, 0.3]),
             objects: vec![object.clone(), Object { placement: falling, ..object }],
             lights: vec![light],
             ambient: LinearRgb::grey(0.5),
             environment: None,
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
+            cast: Default::default(),
+            finish: Default::default(),
         }
     }
 
@@ -176,6 +209,11 @@ mod tests {
         let told = complaint(|s| s.objects[1].size = [0.0, 0.1]);
         assert_eq!(told, "objects[1].size: [0.0, 0.1], expected two lengths above 0");
         assert_eq!(complaint(|s| s.image = [0, 3]), "image: [0, 3], expected two numbers above 0");
+        let told = complaint(|s| s.surface.restitution = 1.5);
+        assert_eq!(told, "surface.restitution: 1.5, expected 0 to 1");
+        let clockwise = [[0.0, 0.0], [0.0, 0.05], [0.1, 0.0]];
+        let told = complaint(|s| s.objects[0].outline = clockwise.into());
+        assert!(told.starts_with("objects[0].outline: [[0.0, 0.0], "), "{told}");
         let told = complaint(|s| s.lights[0].power = f64::NAN);
         assert_eq!(told, "lights[0].power: NaN, expected at least 0");
     }

@@ -2,6 +2,9 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
+use std::fmt;
 
 /// Source of every random number of one scene: a draw is a pure function of `(seed, k, path)`.
 ///
@@ -13,16 +16,75 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 /// cryptographic, which does not matter: paths are few and it only has to keep them apart.
 ///
 /// [FNV]: http://www.isthe.com/chongo/tech/comp/fnv/
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Draws {
+#[derive(Clone, Copy, Debug)]
+pub struct Draws<'a> {
     seed: u64,
     k: u64,
+    log: Option<&'a DrawLog>,
 }
 
-impl Draws {
+/// Every draw made with it, in order: where a scene's numbers came from.
+#[derive(Clone, Debug, Default)]
+pub struct DrawLog(RefCell<Vec<Drawn>>);
+
+/// A draw and what came out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drawn {
+    /// Its name: `objects[2].grade.hue_deg`.
+    pub path: String,
+    /// What it was drawn from.
+    pub from: Distribution,
+    /// What came out; of a choice, its place in the list, from 0.
+    pub value: f64,
+}
+
+/// What a value is drawn from, every part of it equally likely.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// Numbers from the first to the second.
+    Uniform([f64; 2]),
+    /// Whole numbers from the first to the second, both included.
+    Whole([f64; 2]),
+    /// The places in a list of so many.
+    Choice(usize),
+}
+
+impl fmt::Display for Distribution {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Uniform([min, max]) if min == max => write!(f, "fixed"),
+            Self::Uniform([min, max]) => write!(f, "uniform [{min}, {max}]"),
+            Self::Whole([min, max]) if min == max => write!(f, "fixed"),
+            Self::Whole([min, max]) => write!(f, "whole [{min}, {max}]"),
+            Self::Choice(of) => write!(f, "one of {of}"),
+        }
+    }
+}
+
+impl DrawLog {
+    /// The draws so far.
+    pub fn into_draws(self) -> Vec<Drawn> {
+        self.0.into_inner()
+    }
+}
+
+impl<'a> Draws<'a> {
     /// The draws of scene `k` under `seed`; 0 is a seed like any other.
     pub fn new(seed: u64, k: u64) -> Self {
-        Self { seed, k }
+        Self { seed, k, log: None }
+    }
+
+    /// The same draws, each entered in a log.
+    pub fn logged(self, log: &'a DrawLog) -> Self {
+        Self { log: Some(log), ..self }
+    }
+
+    /// Enters a draw in the log, if there is one.
+    pub(super) fn note(&self, path: &str, from: Distribution, value: f64) {
+        if let Some(DrawLog(log)) = self.log {
+            log.borrow_mut().push(Drawn { path: path.to_owned(), from, value });
+        }
     }
 
     /// 64 uniform bits.
@@ -46,6 +108,16 @@ impl Draws {
     pub fn below(&self, path: &str, n: usize) -> usize {
         assert!(n > 0, "{path}: a choice from nothing");
         ((u128::from(self.bits(path)) * n as u128) >> 64) as usize
+    }
+
+    /// A place in a list of `n`, as [`below`](Self::below), noted in the log.
+    ///
+    /// # Panics
+    /// When `n` is 0.
+    pub fn choose(&self, path: &str, n: usize) -> usize {
+        let place = self.below(path, n);
+        self.note(path, Distribution::Choice(n), place as f64);
+        place
     }
 }
 
@@ -77,6 +149,19 @@ mod tests {
         assert_ne!(Draws::new(7, 4).unit("objects[2].grade.hue_deg"), first);
         assert_ne!(Draws::new(8, 3).unit("objects[2].grade.hue_deg"), first);
         assert_ne!(d.unit("objects[3].grade.hue_deg"), first);
+    }
+
+    #[test]
+    fn a_log_changes_nothing_and_forgets_nothing() {
+        let log = DrawLog::default();
+        let (plain, logged) = (Draws::new(7, 3), Draws::new(7, 3).logged(&log));
+        assert_eq!(plain.choose("background", 4), logged.choose("background", 4));
+        let hue = crate::scene::Range::new(-20.0, 20.0);
+        assert_eq!(hue.draw(&plain, "hue_deg"), hue.draw(&logged, "hue_deg"));
+        let drawn = log.into_draws();
+        let told: Vec<String> = drawn.iter().map(|d| format!("{} {}", d.path, d.from)).collect();
+        assert_eq!(told, ["background one of 4", "hue_deg uniform [-20, 20]"]);
+        assert_eq!(drawn[1].value, hue.draw(&plain, "hue_deg"));
     }
 
     #[test]

@@ -99,7 +99,7 @@ impl EnvironmentRanges {
             return None;
         }
         Some(Environment {
-            file: self.files[draws.below("environment.file", self.files.len())].clone(),
+            file: self.files[draws.choose("environment.file", self.files.len())].clone(),
             rotation_deg: self.rotation_deg.draw(draws, "environment.rotation_deg"),
             strength: self.strength.draw(draws, "environment.strength"),
         })

@@ -5,32 +5,38 @@ use crate::geom::{UnitQuaternion, Vector3};
 use crate::scene::Object;
 use serde::{Deserialize, Serialize};
 
+/// Longest time step that is believed. Of 150 heaps of 5 to 30 cards, 81 ended wrong at 1/120 s (cards that had passed through
+/// each other, 23 mm deep), and none overlapped by more than 0.3 mm at 1/240 s.
+const COARSEST_STEP: f64 = 1.0 / 240.0;
+
 /// How dropped objects come to rest.
-///
-/// Gravity is not among them: it only sets how fast a film of the fall would run, not where things come to lie.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SettleOptions {
     /// How. Default: `fall`.
     pub mode: SettleMode,
-    /// Coefficient of friction everywhere. Default: 0.5.
-    pub friction: f64,
-    /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
-    pub restitution: f64,
+    /// Gravity in the frame of the surface, m/s^2. Its strength only sets how long a fall takes, not where things come
+    /// to lie; its direction tilts the box. Default: `[0, 0, -9.81]`.
+    pub gravity: [f64; 3],
     /// Least thickness of a falling body, as a share of its longer side; thinner cards are drawn thin but fall as
     /// bodies of this thickness. Default: 0.01 (2 mm for 200 mm).
     pub thinnest: f64,
     /// Deepest overlap of two bodies at rest that is accepted, as a share of the typical card's longer side.
     /// Default: 0.0025 (0.5 mm for 200 mm).
     pub max_overlap: f64,
+    /// Most energy, potential and kinetic, that may appear from nothing between two steps, as a share of the drop's;
+    /// more is [`Verdict::Exploded`](crate::settle::Verdict::Exploded). Default: 0.01.
+    pub max_energy_rise: f64,
     /// Longest fall, seconds of a world in which the typical card is 200 mm long. Default: 30.
     pub time_limit: f64,
-    /// Tries before giving up; each starts from a higher stack. Default: 4.
+    /// Tries before giving up; each starts from heights of its own. Default: 4.
     pub attempts: u32,
-    /// Time step in the same seconds. Default: 1/480.
+    /// Time step in the same seconds, at most 1/240: with longer ones half of the heaps end wrong. Default: 1/480.
     pub step: f64,
     /// Iterations of the contact solver in each step. Default: 4.
     pub iterations: u32,
+    /// Times in a step that a body may be stopped at what it would fly through. Default: 1.
+    pub ccd: u32,
 }
 
 /// How dropped objects find their places.
@@ -48,14 +54,15 @@ impl Default for SettleOptions {
     fn default() -> Self {
         Self {
             mode: SettleMode::Fall,
-            friction: 0.5,
-            restitution: 0.0,
+            gravity: [0.0, 0.0, -9.81],
             thinnest: 0.01,
             max_overlap: 0.0025,
+            max_energy_rise: 0.01,
             time_limit: 30.0,
             attempts: 4,
             step: 1.0 / 480.0,
             iterations: 4,
+            ccd: 1,
         }
     }
 }
@@ -75,15 +82,17 @@ impl SettleOptions {
         };
         positive("thinnest", self.thinnest)?;
         positive("max_overlap", self.max_overlap)?;
+        positive("max_energy_rise", self.max_energy_rise)?;
         positive("time_limit", self.time_limit)?;
         positive("step", self.step)?;
+        if self.step > COARSEST_STEP {
+            return Err(Error::value("settle.step", format!("{}, expected at most {COARSEST_STEP:.6}", self.step)));
+        }
         positive("attempts", self.attempts.into())?;
         positive("iterations", self.iterations.into())?;
-        if !(self.friction >= 0.0 && self.friction.is_finite()) {
-            return Err(Error::value("settle.friction", format!("{}, expected at least 0", self.friction)));
-        }
-        if !(0.0..=1.0).contains(&self.restitution) {
-            return Err(Error::value("settle.restitution", format!("{}, expected 0 to 1", self.restitution)));
+        let [x, y, z] = self.gravity;
+        if !(z < 0.0 && [x, y, z].iter().all(|g| g.is_finite())) {
+            return Err(Error::value("settle.gravity", format!("{:?}, expected to point down", self.gravity)));
         }
         Ok(())
     }
@@ -113,7 +122,14 @@ mod tests {
     #[test]
     fn options_that_cannot_be_right_are_told() {
         assert!(SettleOptions::default().check().is_ok());
-        let wrong = SettleOptions { friction: f64::NAN, ..Default::default() };
-        assert_eq!(wrong.check().unwrap_err().to_string(), "settle.friction: NaN, expected at least 0");
+        let wrong = SettleOptions { step: f64::NAN, ..Default::default() };
+        assert_eq!(wrong.check().unwrap_err().to_string(), "settle.step: NaN, expected above 0");
+        let long = SettleOptions { step: 1.0 / 120.0, ..Default::default() };
+        assert_eq!(
+            long.check().unwrap_err().to_string(),
+            "settle.step: 0.008333333333333333, expected at most 0.004167"
+        );
+        let up = SettleOptions { gravity: [0.0, 0.0, 9.81], ..Default::default() };
+        assert_eq!(up.check().unwrap_err().to_string(), "settle.gravity: [0.0, 0.0, 9.81], expected to point down");
     }
 }

@@ -50,6 +50,40 @@ pub enum Exposure {
         /// Brighter (positive) or darker than the match.
         gain_ev: f64,
     },
+    /// Found by the `light` stage: a matte card of this albedo on the surface becomes as bright as the surface itself in
+    /// the plate, times `2^gain_ev`.
+    MatchSurface {
+        /// Share of light that the surface reflects, above 0.
+        albedo: f64,
+        /// Brighter (positive) or darker than the match.
+        gain_ev: f64,
+    },
+}
+
+/// Colour that all lights and the constant environment are multiplied with.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cast {
+    /// This one.
+    Known(LinearRgb),
+    /// Found by the `light` stage: that of the surface in the plate, to the power of `share`.
+    MatchSurface {
+        /// 0 keeps white light, 1 takes the surface for grey.
+        share: f64,
+    },
+}
+
+impl Default for Cast {
+    fn default() -> Self {
+        Self::Known(LinearRgb::WHITE)
+    }
+}
+
+impl Cast {
+    /// Nothing is changed.
+    pub fn is_white(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 impl Default for Exposure {

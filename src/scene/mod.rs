@@ -6,10 +6,14 @@
 //! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
 
 mod check;
+pub mod cycles;
 mod draw;
 mod environment;
 mod fall;
+mod finish;
+mod hull;
 mod light;
+mod limit;
 mod placement;
 mod range;
 mod recipe;
@@ -17,20 +21,25 @@ mod resolve;
 mod shot;
 mod stack;
 mod stock;
+mod variation;
 
-pub use draw::Draws;
+pub use draw::{Distribution, DrawLog, Drawn, Draws};
+pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 #[cfg(feature = "settle")]
 pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
-pub use light::{AreaLight, Exposure, LightShape};
+pub use finish::{Finish, FinishRanges, Noise, white_balance};
+pub use light::{AreaLight, Cast, Exposure, LightShape};
+pub use limit::Limit;
 pub use placement::{Grade, Object, Placement};
 pub use range::Range;
-pub use recipe::{Background, Choice, GradeRanges, LightRanges, Recipe, Selections};
+pub use recipe::{Background, Choice, Collider, GradeRanges, LightRanges, Recipe, Selections};
 pub use resolve::{CATCHER, Look};
 pub use shot::{Card, Shot};
 pub use stack::Start;
 pub use stock::stock;
+pub use variation::{Ablation, Source};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;
@@ -64,6 +73,12 @@ pub struct Scene {
     /// How bright rendered light is on the plate.
     #[serde(default)]
     pub exposure: Exposure,
+    /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings bring their own.
+    #[serde(default, skip_serializing_if = "Cast::is_white")]
+    pub cast: Cast,
+    /// What happens to the finished frame.
+    #[serde(default, skip_serializing_if = "Finish::is_nothing")]
+    pub finish: Finish,
 }
 
 /// A labelled rectangle of known size: the plane `z = 0`, centred on the world's origin.
@@ -72,6 +87,24 @@ pub struct Scene {
 pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
+    /// Coefficient of friction of everything that touches here, the cards among themselves too. Default: 0.5.
+    #[serde(default = "Surface::usual_friction")]
+    pub friction: f64,
+    /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
+    #[serde(default)]
+    pub restitution: f64,
+}
+
+impl Surface {
+    /// A surface of this width and height (metres), with the usual friction and no bounce.
+    pub const fn new(size: [f64; 2]) -> Self {
+        Self { size, friction: Self::usual_friction(), restitution: 0.0 }
+    }
+
+    /// Between plastics, and between plastic and wood: 0.2 to 0.6 in tables.
+    const fn usual_friction() -> f64 {
+        0.5
+    }
 }
 
 /// The camera, or the labelled rectangle it can be solved from.

@@ -19,6 +19,10 @@ pub struct Object {
     pub size: [f64; 2],
     /// Thickness of the body that falls, metres.
     pub thickness: f64,
+    /// Corners of the convex prism that falls, counter-clockwise, in the card's plane (x right, y up from its middle),
+    /// metres; empty where the whole card falls as a box.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outline: Vec<[f64; 2]>,
     /// Mass, kilograms.
     pub mass: f64,
     /// Where the card is, or from where it falls.

@@ -1,7 +1,7 @@
 //! What a recipe says instead of a number.
 
 use crate::error::{Error, Result};
-use crate::scene::Draws;
+use crate::scene::{Distribution, Draws};
 use serde::{Deserialize, Serialize};
 
 /// A quantity that is drawn anew wherever it is used: uniform between two numbers.
@@ -49,14 +49,23 @@ impl Range {
         Self { min: x, max: x }
     }
 
+    /// Its middle: what it is where it is not to vary.
+    pub fn middle(&self) -> Self {
+        Self::fixed((self.min + self.max) / 2.0)
+    }
+
     /// The value at a path.
     pub fn draw(&self, draws: &Draws, path: &str) -> f64 {
-        self.min + (self.max - self.min) * draws.unit(path)
+        let value = self.min + (self.max - self.min) * draws.unit(path);
+        draws.note(path, Distribution::Uniform([self.min, self.max]), value);
+        value
     }
 
     /// The whole number at a path, every one of `min..=max` equally likely.
     pub fn draw_count(&self, draws: &Draws, path: &str) -> usize {
-        self.min as usize + draws.below(path, (self.max - self.min) as usize + 1)
+        let count = self.min as usize + draws.below(path, (self.max - self.min) as usize + 1);
+        draws.note(path, Distribution::Whole([self.min, self.max]), count as f64);
+        count
     }
 
     /// Fails unless `lowest <= min <= max <= highest`, all finite.

@@ -1,11 +1,13 @@
 //! Recipe: the distributions that scenes are drawn from.
 
+use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
+use crate::scene::finish::KELVIN;
 use crate::scene::stack::{Column, Start};
 use crate::scene::{
-    AreaLight, CameraSource, Draws, EnvironmentRanges, Exposure, Grade, LightShape, Object, Range, Scene,
-    SettleOptions, Surface,
+    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, FinishRanges, Grade, LightShape,
+    Limit, Object, Range, Scene, SettleOptions, Source, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -21,6 +23,12 @@ const MOST_OBJECTS: usize = 10_000;
 pub struct Recipe {
     /// Width and height of the pictures, pixels. Default: `[640, 480]`.
     pub image: [u32; 2],
+    /// Sources of variation that are switched off; all other draws stay as they are. Default: none.
+    pub off: Vec<Source>,
+    /// Labelled photos of the place that are used, each a viewpoint: the first so many. Default: `"all"`.
+    pub viewpoints: Limit,
+    /// Photos of each asset that are used: the first so many. Default: `"all"`.
+    pub photos: Limit,
     /// Objects in a scene. Default: `[4, 12]`.
     pub objects: Range,
     /// How many different choices of objects there are. Default: `"unique"`, a new one for every scene.
@@ -40,8 +48,33 @@ pub struct Recipe {
     pub environment: EnvironmentRanges,
     /// Brighter or darker than the plate, EV. Default: `[-0.3, 0.3]`.
     pub gain_ev: Range,
+    /// Coefficient of friction in a scene, [`Surface::friction`]. Default: 0.5.
+    pub friction: Range,
+    /// Share of the speed that a bounce gives back, [`Surface::restitution`]. Default: 0.
+    pub restitution: Range,
+    /// What falls in place of a cut-out. Default: `box`.
+    pub collider: Collider,
+    /// Share of light that the surface reflects, where it is known: the exposure is then matched to the surface instead of
+    /// the plate's white. Default: not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface_albedo: Option<f64>,
+    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
+    pub cast: Cast,
+    /// What happens to the finished frame. Default: nothing.
+    pub finish: FinishRanges,
     /// How objects come to rest.
     pub settle: SettleOptions,
+}
+
+/// What falls in place of a cut-out, as thick as the asset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Collider {
+    /// A box around the whole card.
+    #[default]
+    Box,
+    /// A convex prism of the object's hull: cards come to lie closer, at some cost in time.
+    Hull,
 }
 
 /// How many different choices of objects there are; in files `"unique"` or a number above 0.
@@ -116,6 +149,9 @@ pub struct LightRanges {
     pub power: Range,
     /// Red, green and blue, scene-linear. Default: `[1, 1, 1]`.
     pub color: [Range; 3],
+    /// Colour temperature, kelvin, 1667 to 25 000, on top of `color`; power keeps its luminance. Default: that of white.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_k: Option<Range>,
 }
 
 /// An asset as a recipe sees it: what may be chosen, without its pictures.
@@ -125,6 +161,8 @@ pub struct Choice {
     pub asset: String,
     /// Width and height of the card of each of its photos, metres; at least one.
     pub photo_sizes: Vec<[f64; 2]>,
+    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are not known.
+    pub photo_outlines: Vec<Vec<[f64; 2]>>,
     /// Thickness, metres.
     pub thickness: f64,
     /// Mass, kilograms.
@@ -146,6 +184,9 @@ impl Default for Recipe {
     fn default() -> Self {
         Self {
             image: [640, 480],
+            off: Vec::new(),
+            viewpoints: Limit::All,
+            photos: Limit::All,
             objects: Range::new(4.0, 12.0),
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
@@ -155,6 +196,12 @@ impl Default for Recipe {
             ambient: Range::new(0.3, 0.8),
             environment: EnvironmentRanges::default(),
             gain_ev: Range::new(-0.3, 0.3),
+            friction: Range::fixed(Surface::new([0.0; 2]).friction),
+            restitution: Range::fixed(0.0),
+            collider: Collider::Box,
+            surface_albedo: None,
+            cast: Cast::default(),
+            finish: FinishRanges::default(),
             settle: SettleOptions::default(),
         }
     }
@@ -176,6 +223,7 @@ impl Default for LightRanges {
             size: Range::new(0.05, 0.6),
             power: Range::fixed(10.0),
             color: [Range::fixed(1.0); 3],
+            temperature_k: None,
         }
     }
 }
@@ -193,14 +241,39 @@ impl Recipe {
     /// A range that cannot be right; no background; no stock while objects are asked for; a card that fits the surface
     /// in no direction.
     pub fn scene(&self, seed: u64, k: u64, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
+        self.explained(seed, k, backgrounds, stock).map(|(scene, _)| scene)
+    }
+
+    /// Scene `k` and every draw that it was made with, in order.
+    ///
+    /// # Errors
+    /// As [`scene`](Self::scene).
+    pub fn explained(
+        &self,
+        seed: u64,
+        k: u64,
+        backgrounds: &[Background],
+        stock: &[Choice],
+    ) -> Result<(Scene, Vec<Drawn>)> {
+        let log = DrawLog::default();
+        let recipe = self.narrowed();
+        let scene = recipe.compose(seed, k, &log, recipe.viewpoints.of(backgrounds), stock)?;
+        Ok((scene, log.into_draws()))
+    }
+
+    fn compose(&self, seed: u64, k: u64, log: &DrawLog, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
         self.check()?;
-        let draws = Draws::new(seed, k);
+        let draws = Draws::new(seed, k).logged(log);
         let background = pick_background(&draws, backgrounds)?;
-        let mut objects = self.choose(seed, k, stock)?;
+        let mut objects = self.choose(seed, k, log, stock)?;
         for (i, object) in objects.iter_mut().enumerate() {
             self.vary(object, &draws, &format!("objects[{i}]"));
         }
-        let surface = Surface { size: background.size };
+        let surface = Surface {
+            size: background.size,
+            friction: self.friction.draw(&draws, "friction"),
+            restitution: self.restitution.draw(&draws, "restitution"),
+        };
         Column { surface, start: &self.start, options: &self.settle, draws: &draws }.stack(&mut objects)?;
         let lights: Vec<AreaLight> =
             self.lights.iter().enumerate().map(|(i, light)| light.draw(&draws, &format!("lights[{i}]"))).collect();
@@ -213,7 +286,9 @@ impl Recipe {
             ambient: ambient(&lights, self.ambient.draw(&draws, "ambient")),
             lights,
             environment: self.environment.draw(&draws),
-            exposure: Exposure::MatchPlate { gain_ev: self.gain_ev.draw(&draws, "gain_ev") },
+            exposure: self.exposure(self.gain_ev.draw(&draws, "gain_ev")),
+            cast: self.cast,
+            finish: self.finish.draw(&draws),
         };
         scene.check()?;
         Ok(scene)
@@ -235,17 +310,30 @@ impl Recipe {
         self.ambient.check("ambient", 0.0, any)?;
         self.environment.check()?;
         self.gain_ev.check("gain_ev", -32.0, 32.0)?;
+        self.friction.check("friction", 0.0, any)?;
+        self.restitution.check("restitution", 0.0, 1.0)?;
+        if let Some(albedo) = self.surface_albedo {
+            Range::fixed(albedo).check_positive("surface_albedo")?;
+        }
+        self.finish.check()?;
         self.settle.check()
     }
 
+    fn exposure(&self, gain_ev: f64) -> Exposure {
+        match self.surface_albedo {
+            None => Exposure::MatchPlate { gain_ev },
+            Some(albedo) => Exposure::MatchSurface { albedo, gain_ev },
+        }
+    }
+
     /// Assets and photos of one selection, at their own size and colour.
-    fn choose(&self, seed: u64, k: u64, stock: &[Choice]) -> Result<Vec<Object>> {
+    fn choose(&self, seed: u64, k: u64, log: &DrawLog, stock: &[Choice]) -> Result<Vec<Object>> {
         let selection = match self.selections {
             Selections::Unique => k,
             Selections::Of(0) => return Err(Error::value("selections", "0, expected at least 1")),
             Selections::Of(n) => k % n,
         };
-        let draws = Draws::new(seed, selection);
+        let draws = Draws::new(seed, selection).logged(log);
         let count = self.objects.draw_count(&draws, "selection.objects");
         if count > 0 && stock.is_empty() {
             return Err(Error::value("objects", format!("{count} asked for, but there is no asset to choose from")));
@@ -256,8 +344,8 @@ impl Recipe {
                 if left.is_empty() {
                     left = (0..stock.len()).collect();
                 }
-                let choice = &stock[left.swap_remove(draws.below(&format!("selection[{i}].asset"), left.len()))];
-                choice.object(&draws, &format!("selection[{i}].photo"))
+                let choice = &stock[left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))];
+                choice.object(&draws, &format!("selection[{i}].photo"), self.photos, self.collider)
             })
             .collect()
     }
@@ -265,6 +353,7 @@ impl Recipe {
     fn vary(&self, object: &mut Object, draws: &Draws, path: &str) {
         let scale = self.scale.draw(draws, &format!("{path}.scale"));
         object.size = object.size.map(|length| length * scale);
+        object.outline.iter_mut().for_each(|corner| *corner = corner.map(|length| length * scale));
         object.thickness *= scale;
         object.mass *= scale * scale * scale;
         object.grade = Grade {
@@ -276,17 +365,22 @@ impl Recipe {
 }
 
 impl Choice {
-    fn object(&self, draws: &Draws, path: &str) -> Result<Object> {
+    fn object(&self, draws: &Draws, path: &str, photos: Limit, collider: Collider) -> Result<Object> {
         if self.photo_sizes.is_empty() {
             return Err(Error::value(format!("assets.{}", self.asset), "no photo, expected at least one"));
         }
-        let photo = draws.below(path, self.photo_sizes.len());
+        let photo = draws.choose(path, photos.of(&self.photo_sizes).len());
+        let outline = match collider {
+            Collider::Box => Vec::new(),
+            Collider::Hull => self.photo_outlines.get(photo).cloned().unwrap_or_default(),
+        };
         Ok(Object {
             asset: self.asset.clone(),
             photo,
             back: None,
             size: self.photo_sizes[photo],
             thickness: self.thickness,
+            outline,
             mass: self.mass,
             placement: Start::unplaced(),
             grade: Grade::default(),
@@ -299,13 +393,14 @@ impl LightRanges {
         let of = |range: &Range, name: &str| range.draw(draws, &format!("{path}.{name}"));
         let (offset, azimuth) = (of(&self.offset, "offset"), of(&self.azimuth_deg, "azimuth_deg").to_radians());
         let color = [0, 1, 2].map(|c| of(&self.color[c], &format!("color[{c}]")) as f32);
+        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| planckian(of(&range, "temperature_k")));
         AreaLight {
             shape: self.shape,
             position: [offset * libm::cos(azimuth), offset * libm::sin(azimuth), of(&self.height, "height")],
             target: [0.0; 3],
             size: [of(&self.size, "size"); 2],
             power: of(&self.power, "power"),
-            color: LinearRgb::new(color[0], color[1], color[2]),
+            color: LinearRgb::from(color) * glow,
         }
     }
 
@@ -315,6 +410,9 @@ impl LightRanges {
         self.azimuth_deg.check(&format!("{at}.azimuth_deg"), -f64::INFINITY, f64::INFINITY)?;
         self.size.check_positive(&format!("{at}.size"))?;
         self.power.check(&format!("{at}.power"), 0.0, f64::INFINITY)?;
+        if let Some(range) = &self.temperature_k {
+            range.check(&format!("{at}.temperature_k"), KELVIN[0], KELVIN[1])?;
+        }
         (0..3).try_for_each(|c| self.color[c].check(&format!("{at}.color[{c}]"), 0.0, f64::INFINITY))
     }
 }
@@ -322,7 +420,7 @@ impl LightRanges {
 fn pick_background<'a>(draws: &Draws, backgrounds: &'a [Background]) -> Result<&'a Background> {
     match backgrounds.len() {
         0 => Err(Error::value("backgrounds", "none, expected at least one labelled photo")),
-        n => Ok(&backgrounds[draws.below("background", n)]),
+        n => Ok(&backgrounds[draws.choose("background", n)]),
     }
 }
 
@@ -365,6 +463,7 @@ mod tests {
         let choice = |i| Choice {
             asset: format!("b{i}"),
             photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
+            photo_outlines: vec![vec![[-0.1, -0.03], [0.1, -0.03], [0.0, 0.035]], vec![]],
             thickness: 0.005,
             mass: 0.03,
         };
@@ -503,6 +602,31 @@ mod tests {
             }
             let [x, y, z] = scene.lights[0].position;
             assert!((0.8..=1.6).contains(&z) && x.hypot(y) <= 0.8 + 1e-12);
+        }
+    }
+
+    #[test]
+    fn friction_and_bounce_are_drawn_for_a_scene() {
+        let recipe = Recipe { friction: Range::new(0.2, 0.6), restitution: Range::new(0.0, 0.3), ..Recipe::default() };
+        let drawn: Vec<Surface> = (0..50).map(|k| scene(&recipe, k).surface).collect();
+        assert!(drawn.iter().all(|s| (0.2..0.6).contains(&s.friction) && (0.0..0.3).contains(&s.restitution)));
+        assert!(drawn.iter().any(|s| s.friction < 0.25) && drawn.iter().any(|s| s.friction > 0.55));
+        let wrong = Recipe { restitution: Range::new(0.0, 1.2), ..Recipe::default() };
+        assert_eq!(
+            wrong.check().unwrap_err().to_string(),
+            "restitution: [0, 1.2], expected [min, max] between 0 and 1"
+        );
+    }
+
+    #[test]
+    fn hulls_fall_only_where_they_are_asked_for_and_known_and_grow_with_their_card() {
+        let with = |collider| scene(&Recipe { collider, objects: Range::fixed(9.0), ..Recipe::default() }, 2).objects;
+        let (boxes, hulls) = (with(Collider::Box), with(Collider::Hull));
+        assert!(boxes.iter().all(|object| object.outline.is_empty()));
+        assert!(hulls.iter().any(|object| object.photo == 0) && hulls.iter().any(|object| object.photo == 1));
+        for object in &hulls {
+            let top = object.outline.last().map(|corner| corner[1]);
+            assert_eq!(top, (object.photo == 0).then_some(0.035 * object.size[0] / 0.2), "{object:?}");
         }
     }
 

@@ -6,7 +6,9 @@ use crate::error::{Error, Result};
 use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::scene::{CameraSource, Card, EnvironmentMap, Exposure, Object, Placement, Scene, Shot};
+use crate::scene::{
+    AreaLight, CameraSource, Card, Cast, EnvironmentMap, Exposure, Noise, Object, Placement, Scene, Shot,
+};
 use std::sync::Arc;
 
 /// Shadows fall on the plane of the surface as far as this many times its sides: the extent of the reference scenes.
@@ -45,6 +47,7 @@ impl Scene {
         self.check()?;
         let camera = self.known_camera()?;
         let exposure = self.known_exposure()?;
+        let cast = self.known_cast()?;
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
@@ -67,8 +70,8 @@ impl Scene {
             plate,
             catcher: self.surface.size.map(|side| CATCHER * side),
             cards,
-            lights: self.lights.clone(),
-            ambient: self.ambient,
+            lights: self.lights.iter().map(|light| AreaLight { color: light.color * cast, ..*light }).collect(),
+            ambient: self.ambient * cast,
             environment: self.environment_map(panorama)?,
             exposure,
         })
@@ -97,9 +100,19 @@ impl Scene {
     fn known_exposure(&self) -> Result<f32> {
         match self.exposure {
             Exposure::Ev(ev) => Ok(libm::exp2(ev) as f32),
-            Exposure::MatchPlate { .. } => {
+            Exposure::MatchPlate { .. } | Exposure::MatchSurface { .. } => {
                 Err(Error::value("exposure", "still to be matched to the plate; light it first"))
             }
+        }
+    }
+
+    fn known_cast(&self) -> Result<LinearRgb> {
+        if self.finish.noise == Noise::MatchPlate {
+            return Err(Error::value("finish.noise", "still to be matched to the plate; light it first"));
+        }
+        match self.cast {
+            Cast::Known(color) => Ok(color),
+            Cast::MatchSurface { .. } => Err(Error::value("cast", "still to be matched to the plate; light it first")),
         }
     }
 
@@ -148,6 +161,7 @@ mod tests {
 
     fn scene() -> Scene {
         let object = Object {
+            outline: vec![],
             asset: "b1".into(),
             photo: 0,
             back: None,
@@ -161,12 +175,14 @@ mod tests {
             image: [8, 6],
             plate: String::new(),
             camera: CameraSource::Known(camera()),
-            surface: Surface { size: [0.4, 0.3] },
+            surface: Surface::new([0.4, 0.3]),
             objects: vec![object.clone(), object],
             lights: vec![],
             ambient: LinearRgb::WHITE,
             environment: None,
             exposure: Exposure::Ev(1.0),
+            cast: Default::default(),
+            finish: Default::default(),
         }
     }
 
@@ -196,6 +212,10 @@ mod tests {
         assert_eq!(told, "objects[1].placement: still falling; settle it first");
         let told = complaint(|s| s.exposure = Exposure::MatchPlate { gain_ev: 0.0 });
         assert_eq!(told, "exposure: still to be matched to the plate; light it first");
+        let told = complaint(|s| s.cast = Cast::MatchSurface { share: 1.0 });
+        assert_eq!(told, "cast: still to be matched to the plate; light it first");
+        let told = complaint(|s| s.finish.noise = Noise::MatchPlate);
+        assert_eq!(told, "finish.noise: still to be matched to the plate; light it first");
         let rectangle = CameraSource::Rectangle { corners_px: [[0.0; 2]; 4], photo: [8, 6], focal_px: None };
         assert_eq!(complaint(|s| s.camera = rectangle), "camera: still a rectangle in a photo; locate it first");
     }

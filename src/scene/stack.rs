@@ -62,7 +62,7 @@ pub(super) struct Column<'a> {
     pub(super) surface: Surface,
     pub(super) start: &'a Start,
     pub(super) options: &'a SettleOptions,
-    pub(super) draws: &'a Draws,
+    pub(super) draws: &'a Draws<'a>,
 }
 
 impl Column<'_> {
@@ -132,6 +132,7 @@ mod tests {
             back: None,
             size,
             thickness: 0.0002 * (i + 1) as f64,
+            outline: vec![],
             mass: 0.03,
             placement,
             grade: Grade::default(),
@@ -140,7 +141,7 @@ mod tests {
     }
 
     fn stacked(k: u64, start: &Start, mut objects: Vec<Object>) -> Result<Vec<Object>> {
-        let (surface, options) = (Surface { size: [0.4, 0.3] }, SettleOptions::default());
+        let (surface, options) = (Surface::new([0.4, 0.3]), SettleOptions::default());
         Column { surface, start, options: &options, draws: &Draws::new(3, k) }.stack(&mut objects)?;
         Ok(objects)
     }

@@ -1,6 +1,7 @@
 //! What a library of assets offers to recipes and to shots.
 
 use crate::asset::{Asset, Library};
+use crate::scene::hull::prism;
 use crate::scene::{Choice, Look, Object};
 
 /// The assets of a library as a recipe sees them, in the library's order.
@@ -13,6 +14,7 @@ impl From<&Asset> for Choice {
         Self {
             asset: asset.name.clone(),
             photo_sizes: asset.photos.iter().map(|photo| photo.size).collect(),
+            photo_outlines: asset.photos.iter().map(|photo| prism(&photo.outline_uv, photo.size)).collect(),
             thickness: asset.thickness,
             mass: asset.mass,
         }

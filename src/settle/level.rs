@@ -4,27 +4,48 @@
 //! simulation. The same closed form, each card on top of the highest one it meets, is the `flat` mode.
 
 use super::overlap::{Solid, depth, past_walls};
-use super::solids;
+use super::{rectangle, solids};
 use crate::geom::{Pose, UnitQuaternion};
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 use nalgebra::{Quaternion, Vector3};
 
-/// Where everything comes to rest if every card falls alone: in a column that no other card can reach, clear of the
-/// walls. None if any may meet another or a wall.
-pub(super) fn alone(scene: &Scene, options: &SettleOptions) -> Option<Vec<Pose>> {
+/// Where a card comes to rest that falls alone onto the bare surface, clear of the walls and of all that already lies
+/// there; none if it may touch anything.
+pub(super) fn alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Pose> {
     let bodies = leveled(scene, options);
-    let reach_each_other = |a: &Solid, b: &Solid| {
-        let apart = (a.center() - b.center()).xy().norm();
-        (a.falls || b.falls) && apart < a.half.norm() + b.half.norm()
-    };
-    let meet = (1..bodies.len()).any(|i| bodies[..i].iter().any(|other| reach_each_other(&bodies[i], other)));
-    let squeezed = bodies.iter().any(|s| s.falls && past_walls(s, scene.surface.size).iter().any(|&d| d > 0.0));
-    (!meet && !squeezed).then(|| bodies.iter().map(|solid| rested_on(solid, 0.0)).collect())
+    let straight_down = options.gravity[..2] == [0.0; 2];
+    let meets = bodies.iter().any(|other| !other.falls && reach_each_other(&bodies[i], other));
+    let squeezed = past_walls(&bodies[i], scene.surface.size).iter().any(|&d| d > 0.0);
+    (straight_down && !meets && !squeezed).then(|| rested_on(&bodies[i], 0.0))
+}
+
+/// The falling objects, in groups that stand in columns of their own: however they turn in place, no card can touch one
+/// of another group.
+pub(super) fn columns(scene: &Scene, options: &SettleOptions) -> Vec<Vec<usize>> {
+    let bodies = leveled(scene, options);
+    let mut columns: Vec<Vec<usize>> = Vec::new();
+    for i in (0..bodies.len()).filter(|&i| bodies[i].falls) {
+        let meets = |column: &Vec<usize>| column.iter().any(|&j| reach_each_other(&bodies[i], &bodies[j]));
+        let (joined, mut apart): (Vec<_>, Vec<_>) = columns.into_iter().partition(meets);
+        let mut column: Vec<usize> = joined.into_iter().flatten().chain([i]).collect();
+        column.sort_unstable();
+        apart.push(column);
+        columns = apart;
+    }
+    columns.sort();
+    columns
+}
+
+/// Whether two bodies may touch, seen from above, however they turn in place.
+fn reach_each_other(a: &Solid, b: &Solid) -> bool {
+    (a.center() - b.center()).xy().norm() < a.half.norm() + b.half.norm()
 }
 
 /// Everything level on the surface, in the order of the heights it starts from, each on top of the highest it meets.
 ///
 /// Cards that already are at rest count as the upright boxes around them. A card that reaches through a wall is moved in.
+///
+/// The poses of the objects that fall, in their order.
 pub(super) fn flat(scene: &Scene, options: &SettleOptions) -> Vec<Pose> {
     let mut bodies = leveled(scene, options);
     let mut lying: Vec<Solid> = bodies.iter().filter(|solid| !solid.falls).map(upright_box).collect();
@@ -35,9 +56,9 @@ pub(super) fn flat(scene: &Scene, options: &SettleOptions) -> Vec<Pose> {
         let below = lying.iter().filter(|other| footprints_meet(&solid, other));
         let bottom = below.map(|other| other.center().z + other.half.z).fold(0.0, f64::max);
         bodies[i].world_from_body = rested_on(&solid, bottom);
-        lying.push(bodies[i]);
+        lying.push(bodies[i].clone());
     }
-    bodies.iter().map(|solid| solid.world_from_body).collect()
+    bodies.iter().filter(|solid| solid.falls).map(|solid| solid.world_from_body).collect()
 }
 
 /// The bodies, those that fall turned level where they start.
@@ -74,7 +95,7 @@ fn rested_on(solid: &Solid, bottom: f64) -> Pose {
 }
 
 fn moved_in(solid: &Solid, surface: [f64; 2]) -> Solid {
-    let mut moved = *solid;
+    let mut moved = solid.clone();
     for (axis, past) in past_walls(solid, surface).into_iter().enumerate() {
         let at = &mut moved.world_from_body.translation.vector[axis];
         *at -= past.max(0.0).copysign(*at);
@@ -83,16 +104,17 @@ fn moved_in(solid: &Solid, surface: [f64; 2]) -> Solid {
 }
 
 fn upright_box(solid: &Solid) -> Solid {
-    let mut upright = *solid;
+    let mut upright = solid.clone();
     upright.half = solid.extent();
+    upright.outline = rectangle(upright.half.x, upright.half.y);
     upright.world_from_body.rotation = UnitQuaternion::identity();
     upright
 }
 
-/// Whether two level boxes overlap as seen from above.
+/// Whether two level bodies overlap as seen from above.
 fn footprints_meet(a: &Solid, b: &Solid) -> bool {
     let grounded = |solid: &Solid| {
-        let mut down = *solid;
+        let mut down = solid.clone();
         down.world_from_body.translation.z = 0.0;
         down
     };
@@ -119,17 +141,29 @@ mod tests {
     #[test]
     fn a_card_alone_rests_level_where_it_fell() {
         let scene = falling(&[([0.05, -0.02], 0.3)]);
-        let poses = alone(&scene, &SettleOptions::default()).unwrap();
+        let pose = alone(&scene, &SettleOptions::default(), 0).unwrap();
         let half = SettleOptions::default().half_body(&scene.objects[0]).z;
-        assert!((poses[0].translation.vector - Vector3::new(0.05, -0.02, half)).norm() < 1e-15);
+        assert!((pose.translation.vector - Vector3::new(0.05, -0.02, half)).norm() < 1e-15);
     }
 
     #[test]
-    fn cards_in_one_column_do_not_fall_alone() {
-        assert!(alone(&falling(&[([0.0, 0.0], 0.1), ([0.1, 0.0], 0.3)]), &SettleOptions::default()).is_none());
-        assert!(alone(&falling(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3)]), &SettleOptions::default()).is_some());
+    fn cards_that_may_touch_stand_in_one_column() {
+        let columns = |starts: &[([f64; 2], f64)]| columns(&falling(starts), &SettleOptions::default());
+        assert_eq!(columns(&[([0.0, 0.0], 0.1), ([0.1, 0.0], 0.3)]), [[0, 1]]);
+        assert_eq!(columns(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3)]), [[0], [1]]);
+        assert_eq!(columns(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3), ([0.0, 0.0], 0.5)]), [[0, 1, 2]]);
+        assert!(columns(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_card_that_may_touch_a_wall_or_a_card_at_rest_is_not_alone() {
+        let (mut scene, options) = (falling(&[([0.29, 0.0], 0.1), ([-0.1, 0.0], 0.1)]), SettleOptions::default());
         // Its middle is over the surface, but it would reach through a wall.
-        assert!(alone(&falling(&[([0.29, 0.0], 0.1)]), &SettleOptions::default()).is_none());
+        assert!(alone(&scene, &options, 0).is_none() && alone(&scene, &options, 1).is_some());
+        let tilted = SettleOptions { gravity: [1.0, 0.0, -9.0], ..options };
+        assert!(alone(&scene, &tilted, 1).is_none());
+        scene.objects[0].placement = Placement::At(Pose::translation(-0.2, 0.0, 0.01));
+        assert!(alone(&scene, &options, 1).is_none());
     }
 
     #[test]

@@ -2,25 +2,32 @@
 //!
 //! [`settle`] turns every [`Placement::Drop`] into a [`Placement::At`] and leaves the rest of the scene alone; a scene in
 //! which nothing falls comes back as it is and no physics world is built. Objects fall as thin boxes
-//! ([`SettleOptions::half_body`]), between walls that stand on the edges of the surface and have no top. A card lies in
-//! the *middle* plane of its box. Objects that already are at rest are obstacles that do not move.
+//! ([`SettleOptions::half_body`]) or as convex prisms ([`Object::outline`]), between walls that stand on the edges of the
+//! surface and have no top. A card lies in the *middle* plane of its body. Objects that already are at rest are obstacles that
+//! do not move; a card that can touch nothing needs no physics.
 //!
-//! The result is judged by an overlap test of its own, which shares nothing with the physics engine, and a
-//! bad end is tried again from a higher start. Same scene, same bits: on every machine, at any thread count.
+//! The result is judged by an overlap test of its own, which shares nothing with the physics engine, and by its energy,
+//! and a bad end is tried again from other heights. Same scene, same bits: on every machine, at any thread count.
 
-#[cfg(test)]
+mod columns;
 mod extremes;
 mod level;
 mod overlap;
+mod preview;
+mod trace;
 mod world;
 
 pub use crate::scene::{SettleMode, SettleOptions};
+pub(crate) use extremes::heap;
+pub use extremes::{Extreme, ExtremeEnd, Promise, extremes};
+pub use preview::preview;
+pub use trace::{Sample, csv as trace_csv};
 
 use crate::error::{Error, Result};
 use crate::geom::Pose;
-use crate::scene::{Object, Placement, Scene};
+use crate::scene::{Draws, Object, Placement, Scene};
 use overlap::Solid;
-use world::End;
+use world::{Drop, Fall};
 
 /// What came of a fall.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,10 +38,13 @@ pub struct Settled {
     pub verdict: Verdict,
     /// How the tries before the last one ended; none of them is [`Verdict::Rested`].
     pub rejected: Vec<Verdict>,
-    /// Length of the last fall, seconds of a world in which the typical card is 200 mm long.
+    /// Length of the last fall, seconds.
     pub seconds: f64,
     /// Deepest overlap of a dropped body with another body, the floor or a wall at the end, metres.
     pub overlap: f64,
+    /// Most energy that appeared between two steps of the last fall, as a share of what the drop gave away; a drop by less
+    /// than a quarter of a card counts as one by that.
+    pub energy_rise: f64,
 }
 
 /// How a fall ended.
@@ -48,6 +58,8 @@ pub enum Verdict {
     Escaped(Vec<usize>),
     /// Bodies overlap by this depth, metres.
     Penetrating(f64),
+    /// Energy appeared between two steps, this share of what the drop gave away: the steps were too long to believe it.
+    Exploded(f64),
 }
 
 impl Settled {
@@ -60,6 +72,7 @@ impl Settled {
             Verdict::TimedOut => format!("something still moves after {:.1} s", self.seconds),
             Verdict::Escaped(ids) => format!("objects {ids:?} left the surface"),
             Verdict::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
+            Verdict::Exploded(share) => format!("energy rose by {:.1} % of the drop's in a step", share * 100.0),
         };
         Err(Error::Unsettled { what: format!("{what}, after {} tries", self.rejected.len() + 1) })
     }
@@ -71,24 +84,36 @@ impl Settled {
 /// # Errors
 /// A scene ([`Scene::check`]) or an option that cannot be right; an object that starts outside the walls.
 pub fn settle(scene: Scene, options: &SettleOptions) -> Result<Settled> {
+    Ok(settle_traced(scene, options, 0)?.0)
+}
+
+/// Lets the dropped objects of a scene come to rest, and tells how the last fall went: a sample of every object in each
+/// `every` steps, ordered by time, then by id; none for `every` 0 and for what needs no simulation.
+///
+/// # Errors
+/// As [`settle`].
+pub fn settle_traced(scene: Scene, options: &SettleOptions, every: usize) -> Result<(Settled, Vec<Sample>)> {
     scene.check()?;
     options.check()?;
     check_starts(&scene)?;
-    if !scene.objects.iter().any(|object| matches!(object.placement, Placement::Drop { .. })) {
-        return Ok(Settled { scene, verdict: Verdict::Rested, rejected: vec![], seconds: 0.0, overlap: 0.0 });
-    }
     let mut rejected = Vec::new();
+    if !scene.objects.iter().any(|object| matches!(object.placement, Placement::Drop { .. })) {
+        let (verdict, seconds, overlap, energy_rise) = (Verdict::Rested, 0.0, 0.0, 0.0);
+        return Ok((Settled { scene, verdict, rejected, seconds, overlap, energy_rise }, Vec::new()));
+    }
     loop {
-        let end = match without_physics(&scene, options) {
-            Some(poses) => End { poses, asleep: true, seconds: 0.0 },
-            None => world::fall(&scene, options, raise(rejected.len())),
+        let heights = start_heights(&scene, rejected.len());
+        let drop = Drop { scene: &scene, options, heights: &heights, sample_every: every };
+        let Fall { poses, rests, seconds, energy_rise, samples, .. } = match options.mode {
+            SettleMode::Fall => columns::fall(&drop),
+            SettleMode::Flat => Fall { poses: level::flat(&scene, options), rests: true, ..Fall::default() },
         };
-        let (verdict, overlap) = judge(&scene, options, &end);
-        if verdict == Verdict::Rested {
-            return Ok(Settled { scene: at_rest(scene, &end.poses), verdict, rejected, seconds: end.seconds, overlap });
-        }
-        if end.seconds == 0.0 || rejected.len() + 1 >= options.attempts as usize {
-            return Ok(Settled { scene, verdict, rejected, seconds: end.seconds, overlap });
+        let end = with_poses(scene.clone(), &poses);
+        let (verdict, overlap) = judge(&scene, &end, options, rests, energy_rise);
+        let last = verdict == Verdict::Rested || seconds == 0.0 || rejected.len() + 1 >= options.attempts as usize;
+        if last {
+            let scene = if verdict == Verdict::Rested { end } else { scene };
+            return Ok((Settled { scene, verdict, rejected, seconds, overlap, energy_rise }, samples));
         }
         log::debug!("settle: try {} ended badly: {verdict:?}", rejected.len() + 1);
         rejected.push(verdict);
@@ -107,78 +132,97 @@ fn check_starts(scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-fn without_physics(scene: &Scene, options: &SettleOptions) -> Option<Vec<Pose>> {
-    match options.mode {
-        SettleMode::Fall => level::alone(scene, options),
-        SettleMode::Flat => Some(level::flat(scene, options)),
+/// Seed of the heights that are tried after those of the scene.
+const RETRY_SEED: u64 = 0x5e771e;
+/// Most that one card of a stack is raised in another try, as a share of the typical card's length.
+const MOST_RAISE: f64 = 0.1;
+
+/// Heights that a try starts from: first those of the scene; then each object, from the lowest up, is raised by some more
+/// than the one below it, so that what starts apart in height stays apart.
+fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
+    let height = |object: &Object| match object.placement {
+        Placement::Drop { height, .. } => height,
+        Placement::At(pose) => pose.translation.z,
+    };
+    let mut heights: Vec<f64> = scene.objects.iter().map(height).collect();
+    if attempt == 0 {
+        return heights;
     }
+    let (draws, most) = (Draws::new(RETRY_SEED, attempt as u64), MOST_RAISE * world::typical_length(scene));
+    let mut order: Vec<usize> = (0..heights.len()).collect();
+    order.sort_by(|&a, &b| heights[a].total_cmp(&heights[b]));
+    let mut raise = 0.0;
+    for i in order {
+        raise += most * draws.unit(&format!("objects[{i}].raise"));
+        heights[i] += raise;
+    }
+    heights
 }
 
-/// Factor on all heights of the start. Free heights only grow by it, so a start without overlap stays one.
-fn raise(attempt: usize) -> f64 {
-    1.0 + 0.05 * attempt as f64
-}
-
-fn at_rest(mut scene: Scene, poses: &[Pose]) -> Scene {
-    for (object, pose) in scene.objects.iter_mut().zip(poses) {
-        if let Placement::Drop { .. } = object.placement {
-            object.placement = Placement::At(*pose);
-        }
-    }
+/// The scene with these poses for the objects that fall, in their order.
+fn with_poses(mut scene: Scene, poses: &[Pose]) -> Scene {
+    let falling = scene.objects.iter_mut().filter(|object| matches!(object.placement, Placement::Drop { .. }));
+    falling.zip(poses).for_each(|(object, pose)| object.placement = Placement::At(*pose));
     scene
 }
 
 /// The verdict on a fall, and the deepest overlap at its end.
-fn judge(scene: &Scene, options: &SettleOptions, end: &End) -> (Verdict, f64) {
-    let bodies = solids(scene, options, &end.poses);
-    let escaped = overlap::outside(&bodies, scene.surface.size);
+fn judge(start: &Scene, end: &Scene, options: &SettleOptions, rests: bool, energy_rise: f64) -> (Verdict, f64) {
+    let bodies = solids_at_rest(start, end, options);
+    let escaped = overlap::outside(&bodies, end.surface.size);
     if !escaped.is_empty() {
         return (Verdict::Escaped(escaped), f64::INFINITY);
     }
-    let depth = overlap::deepest(&bodies, scene.surface.size);
-    if !end.asleep {
-        (Verdict::TimedOut, depth)
-    } else if depth > options.max_overlap * world::typical_length(scene) {
-        (Verdict::Penetrating(depth), depth)
+    let depth = overlap::deepest(&bodies, end.surface.size);
+    let verdict = if !rests {
+        Verdict::TimedOut
+    } else if depth > options.max_overlap * world::typical_length(start) {
+        Verdict::Penetrating(depth)
+    } else if energy_rise > options.max_energy_rise {
+        Verdict::Exploded(energy_rise)
     } else {
-        (Verdict::Rested, depth)
-    }
+        Verdict::Rested
+    };
+    (verdict, depth)
 }
 
-/// The boxes that stand for the objects at these poses.
+/// The bodies at the end of a fall; those fell that fall at its start.
+fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
+    let pose = |object: &Object| match object.placement {
+        Placement::At(pose) => pose,
+        Placement::Drop { above: [x, y], height, rotation } => Pose::from_parts([x, y, height].into(), rotation),
+    };
+    solids(start, options, &end.objects.iter().map(pose).collect::<Vec<_>>())
+}
+
+/// The bodies that stand for the objects at these poses, one for each object.
 fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> Vec<Solid> {
-    let solid = |(object, pose): (&Object, &Pose)| Solid {
-        world_from_body: *pose,
-        half: options.half_body(object),
-        falls: matches!(object.placement, Placement::Drop { .. }),
+    let solid = |(object, pose): (&Object, &Pose)| {
+        let half = options.half_body(object);
+        Solid {
+            world_from_body: *pose,
+            half,
+            outline: if object.outline.is_empty() { rectangle(half.x, half.y) } else { object.outline.clone() },
+            falls: matches!(object.placement, Placement::Drop { .. }),
+        }
     };
     scene.objects.iter().zip(poses).map(solid).collect()
+}
+
+/// Corners of a rectangle of these half lengths, counter-clockwise.
+fn rectangle(x: f64, y: f64) -> Vec<[f64; 2]> {
+    vec![[-x, -y], [x, -y], [x, y], [-x, y]]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geom::{UnitQuaternion, Vector3};
-    use crate::scene::{Background, CameraSource, Choice, Range, Recipe};
+
+    use std::f64::consts::FRAC_PI_6;
 
     pub(super) fn dropped(k: u64, count: usize) -> Scene {
-        let tray = Background {
-            name: "tray".into(),
-            size: [0.6, 0.4],
-            camera: CameraSource::Rectangle {
-                corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
-                photo: [60, 40],
-                focal_px: None,
-            },
-        };
-        let choice = |i: usize| Choice {
-            asset: format!("b{i}"),
-            photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
-            thickness: 0.002 + 0.001 * (i % 10) as f64,
-            mass: 0.02 + 0.002 * (i % 10) as f64,
-        };
-        let recipe = Recipe { objects: Range::fixed(count as f64), ..Recipe::default() };
-        recipe.scene(0, k, &[tray], &(0..20).map(choice).collect::<Vec<_>>()).unwrap()
+        heap(k, count).unwrap()
     }
 
     /// Cards of 200 x 80 x 5 mm, slightly tilted, over a surface of 0.6 x 0.4 m.
@@ -225,7 +269,8 @@ mod tests {
     #[test]
     fn a_card_that_falls_alone_ends_where_physics_says() {
         let (scene, options) = (falling(&[([0.05, -0.02], 0.1)]), SettleOptions::default());
-        let (closed, fall) = (pose(&settled(scene.clone()), 0), world::fall(&scene, &options, 1.0).poses[0]);
+        let drop = Drop { scene: &scene, options: &options, heights: &[0.1], sample_every: 0 };
+        let (closed, fall) = (pose(&settled(scene.clone()), 0), drop.fall(&[0]).poses[0]);
         assert!((closed.translation.vector - fall.translation.vector).norm() < 0.005);
         assert!(closed.rotation.angle_to(&fall.rotation) < 0.03);
     }
@@ -281,6 +326,81 @@ mod tests {
         assert_eq!(settled.rejected, vec![Verdict::TimedOut; 3]);
         let told = settled.into_scene().unwrap_err().to_string();
         assert_eq!(told, "settle: something still moves after 0.1 s, after 4 tries");
+    }
+
+    /// Closed form: on a slope of a a plate stays if tan a < mu, and else slides.
+    #[test]
+    fn a_plate_on_a_slope_slides_if_it_is_steeper_than_friction_holds() {
+        let slid = |friction: f64| {
+            let mut scene = falling(&[([-0.15, 0.0], 0.006)]);
+            scene.surface.friction = friction;
+            scene.objects[0].placement =
+                Placement::Drop { above: [-0.15, 0.0], height: 0.004, rotation: UnitQuaternion::identity() };
+            let g = [9.81 * libm::sin(FRAC_PI_6), 0.0, -9.81 * libm::cos(FRAC_PI_6)];
+            let rest = settle(scene, &SettleOptions { gravity: g, ..Default::default() }).unwrap();
+            assert_eq!(rest.verdict, Verdict::Rested);
+            pose(&rest, 0).translation.x + 0.15
+        };
+        let steep = libm::tan(FRAC_PI_6);
+        assert!(
+            slid(1.05 * steep) < 0.001 && slid(0.95 * steep) > 0.3,
+            "{} {}",
+            slid(1.05 * steep),
+            slid(0.95 * steep)
+        );
+    }
+
+    /// What holds for the dimensions holds for the bits, where the factor on time is a power of two.
+    #[test]
+    fn the_strength_of_gravity_sets_the_time_and_nothing_else() {
+        let with = |factor: f64| {
+            let gravity = [0.0, 0.0, -9.81 * factor];
+            settle(dropped(3, 8), &SettleOptions { gravity, ..Default::default() }).unwrap()
+        };
+        let usual = with(1.0);
+        for factor in [0.1, 16.0, 100.0] {
+            let other = with(factor);
+            assert_eq!(other.scene, usual.scene);
+            assert!((other.seconds * factor.sqrt() / usual.seconds - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn prisms_lie_closer_than_their_boxes_and_rest() {
+        for k in 0..4 {
+            let mut scene = dropped(k, 10);
+            scene.objects.iter_mut().for_each(|object| object.outline = extremes::octagon(object.size));
+            let rest = settled(scene);
+            assert!(rest.energy_rise <= SettleOptions::default().max_energy_rise);
+        }
+    }
+
+    #[test]
+    fn another_try_raises_each_card_more_than_the_one_below_it() {
+        let scene = dropped(2, 9);
+        let (first, second) = (start_heights(&scene, 0), start_heights(&scene, 1));
+        assert_ne!(start_heights(&scene, 2), second);
+        for i in 1..9 {
+            assert!(second[i] - second[i - 1] >= first[i] - first[i - 1]);
+        }
+    }
+
+    #[test]
+    fn a_trace_ends_where_the_cards_rest_and_its_energy_falls() {
+        let (rest, samples) = settle_traced(dropped(1, 6), &SettleOptions::default(), 8).unwrap();
+        assert_eq!(rest.verdict, Verdict::Rested);
+        let energy = |part: &[Sample]| part.iter().map(|s| s.kinetic + s.potential).sum::<f64>();
+        let steps: Vec<&[Sample]> = samples.chunks(6).collect();
+        assert!(steps.iter().all(|step| (1..=6).eq(step.iter().map(|s| s.object))));
+        let drop = energy(steps[0]) - energy(steps[steps.len() - 1]);
+        assert!(steps.windows(2).all(|pair| energy(pair[1]) - energy(pair[0]) < 0.01 * drop));
+        let last = steps[steps.len() - 1];
+        // The last sample may be seven steps before the end.
+        assert!(
+            last.iter()
+                .all(|s| (s.pose.translation.vector - pose(&rest, s.object - 1).translation.vector).norm() < 1e-4)
+        );
+        assert_eq!(trace_csv(&samples).lines().count(), samples.len() + 1);
     }
 
     #[test]

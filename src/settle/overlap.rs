@@ -1,15 +1,17 @@
-//! Do boxes overlap, and how deep? In `f64`, independent of the physics engine, to judge its result.
+//! Do bodies overlap, and how deep? In `f64`, independent of the physics engine, to judge its result.
 
 use crate::geom::{Pose, Vector3};
 use crate::scene::half_extent;
 
-/// A box in the world.
-#[derive(Clone, Copy, Debug)]
+/// A body in the world: a convex prism, whose height is along its own `z`.
+#[derive(Clone, Debug)]
 pub(super) struct Solid {
-    /// Its pose; the box is centred in its own frame.
+    /// Its pose; the box around its card is centred in its own frame.
     pub(super) world_from_body: Pose,
-    /// Half lengths, metres.
+    /// Half lengths of that box, metres.
     pub(super) half: Vector3<f64>,
+    /// Corners of its base, counter-clockwise; those of the box for a box.
+    pub(super) outline: Vec<[f64; 2]>,
     /// Whether it was dropped; the others stand where their author put them.
     pub(super) falls: bool,
 }
@@ -24,25 +26,45 @@ impl Solid {
         [0, 1, 2].map(|i| r.matrix().column(i).into())
     }
 
-    /// Half lengths of the upright box around it.
+    /// Half lengths of the upright box around the box of its card.
     pub(super) fn extent(&self) -> Vector3<f64> {
         half_extent(&self.world_from_body.rotation, &self.half)
     }
 
-    /// Half length of its shadow on a unit direction.
-    fn reach(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> f64 {
-        (0..3).map(|i| self.half[i] * direction.dot(&axes[i]).abs()).sum()
+    /// Its shadow on a direction: from where to where.
+    fn shadow(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> [f64; 2] {
+        let [x, y, z] = axes.map(|axis| axis.dot(direction));
+        let at = self.center().dot(direction);
+        let along = self.outline.iter().map(|corner| corner[0] * x + corner[1] * y);
+        let [low, high] = along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        [at + low - self.half.z * z.abs(), at + high + self.half.z * z.abs()]
+    }
+
+    /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in the world.
+    fn edges(&self, axes: &[Vector3<f64>; 3]) -> Vec<Vector3<f64>> {
+        let next = self.outline.iter().cycle().skip(1);
+        let sides = self.outline.iter().zip(next).map(|(a, b)| axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1]));
+        let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len());
+        for side in sides.map(|side| side.normalize()) {
+            if edges.iter().all(|edge| edge.cross(&side).norm() > PARALLEL) {
+                edges.push(side);
+            }
+        }
+        edges
     }
 }
 
-/// Ids (index + 1) of dropped boxes whose centre is not over the surface, below it, or not finite.
+/// Sine of the angle between edges that count as parallel: their normal would be noise, and other directions decide.
+const PARALLEL: f64 = 1e-6;
+
+/// Ids (index + 1) of dropped bodies whose centre is not over the surface, below it, or not finite.
 pub(super) fn outside(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
     let inside = |c: Vector3<f64>| c.x.abs() <= surface[0] / 2.0 && c.y.abs() <= surface[1] / 2.0 && c.z >= 0.0;
     let ids = solids.iter().enumerate().filter(|(_, s)| s.falls && !inside(s.center()));
     ids.map(|(i, _)| i + 1).collect()
 }
 
-/// Deepest overlap of a dropped box with any other, with the floor `z = 0` or with the walls over the surface's edges,
+/// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over the surface's edges,
 /// metres; 0 when nothing overlaps.
 pub(super) fn deepest(solids: &[Solid], surface: [f64; 2]) -> f64 {
     let falling = solids.iter().filter(|s| s.falls);
@@ -52,24 +74,29 @@ pub(super) fn deepest(solids: &[Solid], surface: [f64; 2]) -> f64 {
     pairs.map(|(i, j)| depth(&solids[i], &solids[j])).fold(edges, f64::max)
 }
 
-/// How far a box reaches through the floor or a wall, whichever is most; 0 inside.
+/// How far a body reaches through the floor or a wall, whichever is most; 0 inside.
 fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
-    let below = solid.extent().z - solid.center().z;
-    past_walls(solid, surface).into_iter().fold(below.max(0.0), f64::max)
+    let axes = solid.axes();
+    let [bottom, _] = solid.shadow(&axes, &Vector3::z());
+    let past = [(Vector3::x(), surface[0]), (Vector3::y(), surface[1])].map(|(direction, length)| {
+        let [low, high] = solid.shadow(&axes, &direction);
+        high.max(-low) - length / 2.0
+    });
+    past.into_iter().fold((-bottom).max(0.0), f64::max)
 }
 
-/// How far a box reaches beyond the walls along x and along y; negative inside.
+/// How far the box of a card reaches beyond the walls along x and along y; negative inside.
 pub(super) fn past_walls(solid: &Solid, surface: [f64; 2]) -> [f64; 2] {
     let (center, extent) = (solid.center(), solid.extent());
     [0, 1].map(|axis| center[axis].abs() + extent[axis] - surface[axis] / 2.0)
 }
 
-/// Shortest way to move one box out of another, metres; 0 when they are apart.
+/// Shortest way to move one body out of another, metres; 0 when they are apart.
 ///
 /// # Method
-/// Separating axes: two boxes are apart if and only if their shadows are, on one of 15 directions: the faces' normals
-/// and the cross products of their edges ([Gottschalk, Lin and Manocha 1996]). The least overlap of
-/// shadows is the depth.
+/// Separating axes: two convex bodies are apart if and only if their shadows are, on one of these directions: the faces'
+/// normals and the cross products of their edges ([Gottschalk, Lin and Manocha 1996]; 15 for two boxes). The least
+/// overlap of shadows is the depth.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
 pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
@@ -78,12 +105,23 @@ pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
         return 0.0;
     }
     let (of_a, of_b) = (a.axes(), b.axes());
-    let edges = (0..9).map(|k| of_a[k / 3].cross(&of_b[k % 3]));
-    // Nearly parallel edges: their direction is noise, and the faces' normals decide.
-    let edges = edges.filter_map(|d| d.try_normalize(1e-6));
-    let directions = of_a.iter().chain(&of_b).copied().chain(edges);
-    let shared = |d: Vector3<f64>| a.reach(&of_a, &d) + b.reach(&of_b, &d) - apart.dot(&d).abs();
-    directions.map(shared).fold(f64::INFINITY, f64::min).max(0.0)
+    let (mut edges_a, mut edges_b) = (a.edges(&of_a), b.edges(&of_b));
+    let sides_a = edges_a.iter().map(|edge| edge.cross(&of_a[2]));
+    let sides_b = edges_b.iter().map(|edge| edge.cross(&of_b[2]));
+    let faces: Vec<Vector3<f64>> = [of_a[2], of_b[2]].into_iter().chain(sides_a).chain(sides_b).collect();
+    edges_a.push(of_a[2]);
+    edges_b.push(of_b[2]);
+    let pairs = edges_a.iter().flat_map(|e| edges_b.iter().map(move |f| e.cross(f)));
+    let directions = faces.iter().copied().chain(pairs.filter_map(|d| d.try_normalize(PARALLEL)));
+    let mut least = f64::INFINITY;
+    for direction in directions {
+        let ([low_a, high_a], [low_b, high_b]) = (a.shadow(&of_a, &direction), b.shadow(&of_b, &direction));
+        least = least.min(high_a - low_b).min(high_b - low_a);
+        if least <= 0.0 {
+            return 0.0;
+        }
+    }
+    least
 }
 
 #[cfg(test)]
@@ -95,7 +133,9 @@ mod tests {
     fn solid(x: f64, y: f64, z: f64, angles: [f64; 3], half: [f64; 3]) -> Solid {
         let rotation = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
         let world_from_body = Pose::from_parts(Vector3::new(x, y, z).into(), rotation);
-        Solid { world_from_body, half: half.into(), falls: true }
+        let [x, y, _] = half;
+        let outline = vec![[-x, -y], [x, -y], [x, y], [-x, y]];
+        Solid { world_from_body, half: half.into(), outline, falls: true }
     }
 
     #[test]
@@ -160,9 +200,28 @@ mod tests {
         let up = a.axes()[2];
         let moved = |k: f64| Solid {
             world_from_body: Pose::translation(up.x * k, up.y * k, up.z * k) * b.world_from_body,
-            ..b
+            ..b.clone()
         };
         assert!(depth(&a, &moved(0.1)) == 0.0 && depth(&a, &moved(-d / 2.0)) >= d / 2.0);
+    }
+
+    /// The closed form: how far a corner of a triangle reaches into a box depends on its slope.
+    #[test]
+    fn a_prism_is_as_wide_as_its_outline_and_not_as_its_card() {
+        let triangle = |x: f64| Solid {
+            outline: vec![[-0.1, -0.04], [0.1, -0.04], [-0.1, 0.04]],
+            ..solid(x, 0.0, 0.0, [0.0; 3], [0.1, 0.04, 0.003])
+        };
+        let card = solid(0.0, 0.0, 0.0, [0.0; 3], [0.1, 0.04, 0.003]);
+        let post = |x: f64, y: f64| solid(x, y, 0.0, [0.0; 3], [0.01, 0.01, 0.003]);
+        assert!(depth(&card, &post(0.1, 0.04)) > 0.0);
+        assert_eq!(depth(&triangle(0.0), &post(0.1, 0.04)), 0.0);
+        assert_eq!(depth(&triangle(0.0), &post(0.02, 0.02)), 0.0);
+        // The slanted side is x / 0.2 + y / 0.08 = 0; the post's corner (x - 0.01, y - 0.01) lies behind it.
+        let behind = |x: f64, y: f64| -((x - 0.01) / 0.2 + (y - 0.01) / 0.08) / (1.0_f64 / 0.2).hypot(1.0 / 0.08);
+        assert!((depth(&triangle(0.0), &post(0.01, 0.009)) - behind(0.01, 0.009)).abs() < 1e-12);
+        // Through the left wall by 0.05, with its vertical side.
+        assert!((deepest(&[triangle(-0.15)], [0.4, 0.3]) - 0.05).abs() < 1e-12);
     }
 
     #[test]

@@ -15,7 +15,13 @@ fn scene(cards: u32, k: u64) -> Scene {
             focal_px: None,
         },
     };
-    let bottle = Choice { asset: "b".into(), photo_sizes: vec![[0.2, 0.08]], thickness: 0.006, mass: 0.03 };
+    let bottle = Choice {
+        asset: "b".into(),
+        photo_sizes: vec![[0.2, 0.08]],
+        photo_outlines: vec![],
+        thickness: 0.006,
+        mass: 0.03,
+    };
     let recipe = Recipe { objects: Range::fixed(cards.into()), ..Recipe::default() };
     recipe.scene(0, k, &[tray], &[bottle]).expect("the bottle fits the tray")
 }

@@ -5,7 +5,17 @@
 mod bad;
 #[cfg(feature = "oiio")]
 mod both_paths;
+mod build;
+mod damaged;
+mod faults;
+mod fuzz;
+#[cfg(feature = "oiio")]
+mod kinds;
 mod make;
 mod meaning;
+mod sweep;
+mod valid;
 #[cfg(feature = "oiio")]
 mod worker;
+#[cfg(feature = "oiio")]
+mod worker_life;

@@ -82,7 +82,7 @@ fn mattes_and_depths_are_plain_numbers() {
         assert_eq!(io::read::<Depth>(folder.file(name)).unwrap()[(1, 1)], Depth(1.25));
     }
     let e = io::write(folder.file("z.png"), &depth).unwrap_err().to_string();
-    assert!(e.ends_with("z.png: a depth needs float samples: .exr or .tif"), "{e}");
+    assert!(e.ends_with("z.png: a depth or a film needs float samples: .exr or .tif"), "{e}");
     assert!(!folder.file("z.png").exists());
 }
 

@@ -5,7 +5,7 @@ use petcomp::io::{self, WriteOptions};
 use petcomp::{Image, LinearRgb, Srgb8, color};
 
 /// A TIFF of two palette colours.
-fn palette_tiff() -> Vec<u8> {
+pub(crate) fn palette_tiff() -> Vec<u8> {
     let tags = [
         (256, 3, 1, 2),
         (257, 3, 1, 1),

@@ -1,14 +1,15 @@
 //! `petcomp asset`: cut-outs with real size and class, kept in a folder.
 
 use crate::common::Common;
-use petcomp::asset::{self, AddPhoto, Library, Manifest, Scale};
+use petcomp::asset::{self, AddPhoto, Library, Manifest, Scale, ScreenSource};
+use petcomp::io;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
     /// Cut out all photos of a list
     Build {
-        /// List (TOML): [[photos]] with file, asset, class and px_per_metre or length
+        /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and px_per_metre or length
         list: PathBuf,
         /// Asset folder
         #[arg(short, long, value_name = "FOLDER")]
@@ -21,10 +22,18 @@ pub(crate) enum Command {
         /// Asset folder
         folder: PathBuf,
     },
-    /// Check that an asset folder is whole
+    /// Check that an asset folder is whole, and list the cut-outs that a person should look at
     Check {
         /// Asset folder
         folder: PathBuf,
+    },
+    /// Show every cut-out over a checkerboard, black, white and green
+    Sheet {
+        /// Asset folder
+        folder: PathBuf,
+        /// Picture to write
+        #[arg(short, long, value_name = "PICTURE")]
+        output: PathBuf,
     },
 }
 
@@ -36,18 +45,24 @@ pub(crate) struct Add {
     /// Asset folder
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
-    /// Name of the asset
+    /// Name of the asset; by default that of the first photo
     #[arg(long)]
-    name: String,
+    name: Option<String>,
     /// Name of its class
     #[arg(long)]
     class: String,
+    /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty screen
+    #[arg(long, value_name = "SCREEN", default_value = "auto")]
+    screen: ScreenSource,
     /// Scale of the photos, pixels per metre
-    #[arg(long, value_name = "PX_PER_M", required_unless_present = "length")]
+    #[arg(long, value_name = "PX_PER_M", required_unless_present_any = ["length", "size"])]
     scale: Option<f64>,
     /// Or: length of the object's longest side, metres
     #[arg(long, value_name = "METRES", conflicts_with = "scale")]
     length: Option<f64>,
+    /// Or: width and height of the object, metres
+    #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2, conflicts_with_all = ["scale", "length"])]
+    size: Option<Vec<f64>>,
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -55,12 +70,25 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Build { list, output } => build(list, output, common),
         Command::Add(args) => add(args, common),
         Command::List { folder } => list(folder),
-        Command::Check { folder } => {
-            let library = Library::open(folder)?;
-            common.say(format_args!("{}: {} assets, all whole", folder.display(), library.assets.len()));
-            Ok(())
-        }
+        Command::Check { folder } => check(folder, common),
+        Command::Sheet { folder, output } => Ok(io::write(output, &asset::contact_sheet(&Library::open(folder)?))?),
     }
+}
+
+/// Name of the contact sheet in an asset folder.
+const SHEET: &str = "contact_sheet.png";
+
+fn check(folder: &Path, common: &Common) -> anyhow::Result<()> {
+    let library = Library::open(folder)?;
+    let photos: Vec<_> = library.assets.iter().flat_map(|asset| &asset.photos).collect();
+    let doubted: Vec<_> = photos.iter().filter(|photo| !photo.record.doubts.is_empty()).collect();
+    for photo in &doubted {
+        common.say(format_args!("look at {}: {}", photo.record.file, photo.record.doubts.join("; ")));
+    }
+    let counts =
+        format!("{} assets, {} cut-outs, all whole, {} to look at", library.assets.len(), photos.len(), doubted.len());
+    common.say(format_args!("{}: {counts}", folder.display()));
+    Ok(())
 }
 
 /// Cuts out all photos of a list, showing progress.
@@ -68,29 +96,43 @@ pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Resu
     let progress = common.progress("cut-outs");
     let built = asset::build(list, folder, &|done, total| progress.at(done as u64, total as u64))?;
     drop(progress);
+    built.refused.iter().for_each(|refusal| log::warn!("{refusal}"));
+    built.doubtful.iter().for_each(|doubt| common.say(format_args!("look at {doubt}")));
     common.say(format_args!("{}: {} photos, {} assets", folder.display(), built.photos, built.assets));
+    sheet(folder, common)
+}
+
+fn sheet(folder: &Path, common: &Common) -> anyhow::Result<()> {
+    let path = folder.join(SHEET);
+    io::write(&path, &asset::contact_sheet(&Library::open(folder)?))?;
+    common.say(format_args!("look at {}", path.display()));
     Ok(())
 }
 
 fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
-    let scale = match (args.scale, args.length) {
-        (Some(px_per_metre), _) => Scale::PxPerMetre(px_per_metre),
-        (None, length) => Scale::Length(length.unwrap_or_default()),
+    let scale = match (args.scale, args.length, args.size.as_deref()) {
+        (Some(px_per_metre), ..) => Scale::PxPerMetre(px_per_metre),
+        (None, _, Some(&[w, h])) => Scale::Size([w.max(h), w.min(h)]),
+        (None, length, _) => Scale::Length(length.unwrap_or_default()),
     };
-    let add = AddPhoto::new(&args.name, &args.class, scale);
+    let first = args.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default();
+    let name = args.name.clone().unwrap_or_else(|| first.to_string_lossy().into_owned());
+    let add = AddPhoto { screen: args.screen.clone(), ..AddPhoto::new(name, &args.class, scale) };
     for photo in &args.photos {
         let record = asset::add_photo(&args.output, photo, &add)?;
-        let [length, width] = record.object_m;
-        common.say(format_args!("{}: {:.0} x {:.0} mm", record.file, length * 1e3, width * 1e3));
+        let ([length, width], error) = (record.object_m.map(|m| m * 1e3), record.error_m * 1e3);
+        common.say(format_args!("{}: {length:.1} x {width:.1} mm (+- {error:.1})", record.file));
+        record.doubts.iter().for_each(|doubt| common.say(format_args!("look at {}: {doubt}", record.file)));
     }
-    Ok(())
+    sheet(&args.output, common)
 }
 
 fn list(folder: &Path) -> anyhow::Result<()> {
     for asset in Manifest::read(folder)?.assets {
         for photo in &asset.photos {
             let [length, width] = photo.object_m.map(|m| m * 1e3);
-            println!("{:12} {:10} {length:4.0} x {width:3.0} mm  {}", asset.name, asset.class, photo.file);
+            let (name, class, sure) = (&asset.name, &asset.class, photo.confidence);
+            println!("{name:12} {class:10} {length:4.0} x {width:3.0} mm  {sure:.2}  {}", photo.file);
         }
     }
     Ok(())

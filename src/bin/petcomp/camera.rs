@@ -1,6 +1,6 @@
 //! `petcomp camera`: four labelled corners -> camera.
 
-use crate::common::Common;
+use crate::common::{Batch, Common};
 use petcomp::camera::{self, CameraFile, ColmapModel, Label, Solution, SolveOptions};
 use petcomp::filter::Pyramid;
 use petcomp::{Error, Image, LinearRgb, PremulRgba, io};
@@ -100,11 +100,16 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
 
 fn solve(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
     anyhow::ensure!(args.output.is_none() || args.labels.len() == 1, "-o: {} labels, expected one", args.labels.len());
-    for path in &args.labels {
+    let one = |path| {
         let label = read_label(path, args.size)?;
-        write(args, path, &label, &solved(path, &label)?, common)?;
+        write(args, path, &label, &solved(path, &label)?, common)
+    };
+    if let [path] = &args.labels[..] {
+        return one(path);
     }
-    Ok(())
+    let mut batch = Batch::default();
+    args.labels.iter().for_each(|path| batch.count(one(path)));
+    batch.finish()
 }
 
 fn joint(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
-use petcomp::io::Override;
+use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -18,14 +18,59 @@ pub(crate) struct Common {
     /// Say nothing but results and errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
+    /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an object a line on the
+    /// standard error
+    #[arg(long, value_name = "HOW", default_value = "bar", global = true)]
+    progress: Shown,
     /// Say more; twice for everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
+    /// Let pictures ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60, ...
+    #[arg(long = "limit", value_name = "NAME=N", global = true)]
+    limits: Vec<Raise>,
+    /// What reads pictures that petcomp's own decoders do not know
+    #[arg(long, value_enum, default_value_t, global = true)]
+    oiio: OpenImageIo,
+}
+
+/// Where OpenImageIO runs.
+#[derive(Clone, Copy, Default, clap::ValueEnum)]
+enum OpenImageIo {
+    /// In a confined process of its own
+    #[default]
+    Worker,
+    /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
+    InProcess,
+    /// Not at all
+    Off,
+}
+
+impl OpenImageIo {
+    fn fallback(self) -> anyhow::Result<Fallback> {
+        match self {
+            Self::Worker => Ok(Fallback::Worker),
+            Self::Off => Ok(Fallback::Nothing),
+            #[cfg(feature = "in-process-oiio")]
+            Self::InProcess => Ok(Fallback::InProcess(petcomp::io::oiio::in_process())),
+            #[cfg(not(feature = "in-process-oiio"))]
+            Self::InProcess => anyhow::bail!(
+                "--oiio in-process: this petcomp does not link OpenImageIO; build it with `--features in-process-oiio`"
+            ),
+        }
+    }
+}
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Shown {
+    Bar,
+    Json,
 }
 
 impl Common {
-    /// Sets up threads and messages; called once.
-    pub(crate) fn apply(&self) {
+    /// Sets up threads, messages and what is read; called once.
+    pub(crate) fn apply(&self) -> anyhow::Result<()> {
+        end_with_the_reader();
         let level = match (self.quiet, self.verbose) {
             (true, _) => log::LevelFilter::Error,
             (_, 0) => log::LevelFilter::Warn,
@@ -40,6 +85,9 @@ impl Common {
         logger.init();
         // Fails only if a pool exists already, and then that pool serves.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
+        let limits = self.limits.iter().try_fold(Limits::default(), Limits::with)?;
+        let options = ReadOptions { limits, fallback: self.oiio.fallback()?, ..Default::default() };
+        Ok(options.make_default()?)
     }
 
     /// Prints a result line, unless told to be quiet.
@@ -49,9 +97,9 @@ impl Common {
         }
     }
 
-    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet.
+    /// A progress display: a bar on a terminal, plain lines elsewhere, nothing when quiet; or JSON, asked for or not.
     pub(crate) fn progress(&self, what: &'static str) -> Progress {
-        Progress::new(what, self.quiet)
+        Progress::new(what, self.quiet, self.progress)
     }
 }
 
@@ -67,41 +115,86 @@ pub(crate) struct RecipeArgs {
 }
 
 impl RecipeArgs {
+    /// Reads the recipe.
+    pub(crate) fn setup(&self) -> anyhow::Result<Setup> {
+        Ok(Setup::read(&self.recipe, &self.overrides)?)
+    }
+
     /// Opens the folders that the recipe names.
     pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
-        Ok(Studio::open(Setup::read(&self.recipe, &self.overrides)?)?)
+        Ok(Studio::open(self.setup()?)?)
     }
 }
 
 /// How far a long job is.
 pub(crate) struct Progress {
     bar: ProgressBar,
-    lines: Option<std::sync::Mutex<Instant>>,
+    lines: Option<std::sync::Mutex<Lines>>,
     what: &'static str,
+}
+
+/// Progress that is told in lines.
+struct Lines {
+    json: bool,
+    every: Duration,
+    /// When the job began, and how many steps were done then.
+    began: Option<(Instant, u64)>,
+    last: Instant,
 }
 
 impl Progress {
     const LINE_EVERY: Duration = Duration::from_secs(10);
+    const JSON_EVERY: Duration = Duration::from_secs(1);
 
-    fn new(what: &'static str, quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
-        let target = if terminal && !quiet { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    fn new(what: &'static str, quiet: bool, shown: Shown) -> Self {
+        let (terminal, json) = (std::io::stderr().is_terminal(), shown == Shown::Json);
+        let drawn = terminal && !quiet && !json;
+        let target = if drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {per_sec}  {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(what);
-        let lines = (!terminal && !quiet).then(|| std::sync::Mutex::new(Instant::now()));
-        Self { bar, lines, what }
+        let every = if json { Self::JSON_EVERY } else { Self::LINE_EVERY };
+        let lines = Lines { json, every, began: None, last: Instant::now() };
+        let told = json || (!terminal && !quiet);
+        Self { bar, lines: told.then(|| std::sync::Mutex::new(lines)), what }
     }
 
-    /// So many steps of so many are done.
+    /// So many steps of so many are done; the first call tells what was done before.
     pub(crate) fn at(&self, done: u64, total: u64) {
-        self.bar.set_length(total);
+        if self.bar.length() != Some(total) {
+            self.bar.set_length(total);
+            self.bar.set_position(done);
+            self.bar.reset_eta();
+        }
         self.bar.set_position(done);
-        let Some(Ok(mut last)) = self.lines.as_ref().map(|l| l.lock()) else { return };
-        if last.elapsed() >= Self::LINE_EVERY {
-            *last = Instant::now();
-            eprintln!("{}: {done} of {total}", self.what);
+        if let Some(Ok(mut lines)) = self.lines.as_ref().map(|lines| lines.lock()) {
+            lines.at(self.what, done, total);
+        }
+    }
+}
+
+impl Lines {
+    fn at(&mut self, what: &str, done: u64, total: u64) {
+        let first = self.began.is_none();
+        let (began, before) = *self.began.get_or_insert((Instant::now(), done));
+        if !(self.json && (first || done == total)) && self.last.elapsed() < self.every {
+            return;
+        }
+        self.last = Instant::now();
+        let rate = done.saturating_sub(before) as f64 / began.elapsed().as_secs_f64().max(1e-9);
+        let left = total.saturating_sub(done) as f64 / rate;
+        // JSON has no infinity: what is not known yet is null.
+        if self.json {
+            let (rate, left) = (rate.is_finite().then_some(rate), left.is_finite().then_some(left));
+            eprintln!(
+                "{}",
+                serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left })
+            );
+        } else if rate > 0.0 {
+            eprintln!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left");
+        } else {
+            eprintln!("{what}: {done} of {total}");
         }
     }
 }
@@ -110,6 +203,18 @@ impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
+}
+
+/// `petcomp ... | head` ends when head does: printing to nobody is no failure of ours, and no panic.
+fn end_with_the_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let said = info.payload().downcast_ref::<String>().map_or("", String::as_str);
+        if said.starts_with("failed printing to std") && said.contains("Broken pipe") {
+            std::process::exit(READER_GONE.into());
+        }
+        usual(info);
+    }));
 }
 
 /// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures; the second one ends
@@ -131,15 +236,65 @@ pub(crate) fn interruption() -> &'static AtomicBool {
     &STOP
 }
 
+/// Files of which some could not be used, while the run went on.
+#[derive(Default)]
+pub(crate) struct Batch {
+    files: usize,
+    failed: usize,
+}
+
+impl Batch {
+    /// Counts a file; one that could not be used is named at once.
+    pub(crate) fn count(&mut self, outcome: anyhow::Result<()>) {
+        self.files += 1;
+        if let Err(error) = outcome {
+            self.failed += 1;
+            eprintln!("failed: {}", format!("{error:#}").replace('\n', " "));
+        }
+    }
+
+    /// # Errors
+    /// [`Incomplete`] when any file failed.
+    pub(crate) fn finish(self) -> anyhow::Result<()> {
+        match self.failed {
+            0 => Ok(()),
+            _ => Err(Incomplete(self).into()),
+        }
+    }
+}
+
+/// The rest was done.
+pub(crate) struct Incomplete(Batch);
+
+impl std::fmt::Display for Incomplete {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} of {} files could not be used; the rest is done", self.0.failed, self.0.files)
+    }
+}
+
+impl std::fmt::Debug for Incomplete {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Display::fmt(self, f)
+    }
+}
+
+impl std::error::Error for Incomplete {}
+
+const INCOMPLETE: u8 = 2;
 const DATA: u8 = 3;
 const FILE: u8 = 4;
 const INTERRUPTED: u8 = 130;
+/// As of a program that SIGPIPE ended.
+const READER_GONE: u8 = 141;
 
-/// Prints one line of causes and gives the exit status: 3 for data that cannot be right, 4 for files that cannot be used,
-/// 130 after an interruption. (2 is a wrong command line; clap says that.)
+/// Prints one line of causes and gives the exit status: 2 where some of many files could not be used, 3 for data that cannot be right, 4 for files that cannot be used,
+/// 130 after an interruption. (2 is a wrong command line too; clap says that.)
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     let line = format!("{error:#}").replace('\n', " ");
     eprintln!("error: {line}");
+    if error.is::<Incomplete>() {
+        return ExitCode::from(INCOMPLETE);
+    }
     ExitCode::from(match error.downcast_ref::<petcomp::Error>() {
         Some(petcomp::Error::File { .. }) => FILE,
         Some(petcomp::Error::Interrupted { .. }) => INTERRUPTED,

@@ -4,7 +4,7 @@ use crate::common::Common;
 use crate::{asset, dataset};
 use petcomp::dataset::{Setup, Studio, contact_sheet_of};
 use petcomp::{Error, io};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -32,7 +32,8 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let recipe = write_recipe(args)?;
     asset::build(&list, &args.output.join("assets"), common)?;
     let folder = args.output.join("dataset");
-    let report = dataset::generate(Studio::open(Setup::read(&recipe, &[])?)?, args.count, args.seed, &folder, common)?;
+    let studio = Studio::open(Setup::read(&recipe, &[])?)?;
+    let report = dataset::make(&studio, &studio.plan(args.count, args.seed, &folder)?, common)?;
     let sheet = args.output.join("contact_sheet.png");
     io::write(&sheet, &contact_sheet_of(&folder, args.count as usize, &Default::default())?)?;
     dataset::tell(&report, common);
@@ -45,16 +46,9 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
 /// A recipe file that says nothing but where its folders are.
 fn write_recipe(args: &Args) -> anyhow::Result<PathBuf> {
     let backgrounds = std::path::absolute(args.samples.join("backgrounds"))?;
-    let backgrounds = relative(&backgrounds, &std::path::absolute(&args.output)?);
+    let backgrounds = io::relative(&backgrounds, &std::path::absolute(&args.output)?);
     let text = format!("assets = \"assets\"\nbackgrounds = {:?}\n", backgrounds.to_string_lossy());
     let path = args.output.join("recipe.toml");
     io::write_text(&path, &text)?;
     Ok(path)
-}
-
-/// The way from one folder to another, both absolute.
-fn relative(to: &Path, from: &Path) -> PathBuf {
-    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
-    let up = from.components().skip(shared).map(|_| std::path::Component::ParentDir);
-    up.chain(to.components().skip(shared)).collect()
 }

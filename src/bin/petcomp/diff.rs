@@ -2,7 +2,7 @@
 
 use crate::common::Common;
 use petcomp::color::linear_to_srgb;
-use petcomp::diff::{Thresholds, Verdict, absolute_difference, compare};
+use petcomp::diff::{Likeness, Thresholds, Verdict, absolute_difference, compare};
 use petcomp::io::Format;
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
 use std::path::{Path, PathBuf};
@@ -99,7 +99,17 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
     }
     common.say(format_args!("Comparing \"{}\" and \"{}\"", args.a.display(), args.b.display()));
     common.say(format_args!("{report}"));
+    if let Some(likeness) = likeness(&args.a, &args.b) {
+        common.say(format_args!("Scene-linear {likeness}"));
+    }
     Ok(ExitCode::from(report.verdict.exit_code()))
+}
+
+/// What the two are to the eye, over black: the second is what the first should be.
+fn likeness(a: &Path, b: &Path) -> Option<Likeness> {
+    let [picture, reference] =
+        [a, b].map(|path| io::read::<PremulRgba>(path).map(|image| image.map(PremulRgba::color)));
+    Likeness::of(&picture.ok()?, &reference.ok()?)
 }
 
 /// The values as the file stores them, which is what `idiff` compares: codes of integer formats as shares of full scale,

@@ -1,7 +1,7 @@
 //! `petcomp matte`: photo -> matte and cut-out.
 
 use crate::common::Common;
-use crate::{matte_key, matte_nodes};
+use crate::{matte_film, matte_key, matte_nodes};
 use petcomp::matte::{CutOutOptions, Remark, SegmentOptions, cut_out, segment};
 use petcomp::{LinearRgb, io};
 use std::path::{Path, PathBuf};
@@ -32,6 +32,10 @@ pub(crate) enum Command {
     },
     /// Key a picture against a screen colour or plate, as Blender's Keying node does
     Key(Box<matte_key::Args>),
+    /// Solve one photo on a coloured screen for what it reflects and what it lets through
+    Film(matte_film::Film),
+    /// The same, exactly, from two or more photos of one object on different screens
+    Triangulate(matte_film::Triangulate),
     #[command(flatten)]
     Node(matte_nodes::Command),
 }
@@ -39,6 +43,8 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Key(args) => matte_key::run(args)?,
+        Command::Film(args) => args.run(common)?,
+        Command::Triangulate(args) => args.run(common)?,
         Command::Node(command) => matte_nodes::run(command)?,
         Command::Segment { photo, output, options } => {
             let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
@@ -56,9 +62,9 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Cut { photo, output, options } => {
             let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
             let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
-            io::write(output, &cut.image)?;
+            io::write(output, &cut.to_rgba())?;
             warn(photo, &cut.remarks);
-            let (w, h) = cut.image.size();
+            let (w, h) = cut.film.size();
             common.say(
                 format_args!("{}: {w} x {h}, matte by {:?}", output.display(), cut.method).to_string().to_lowercase(),
             );
@@ -67,6 +73,6 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn warn(photo: &Path, remarks: &[Remark]) {
+pub(crate) fn warn(photo: &Path, remarks: &[Remark]) {
     remarks.iter().for_each(|remark| log::warn!("{}: {remark}", photo.display()));
 }

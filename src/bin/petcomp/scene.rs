@@ -1,6 +1,7 @@
 //! `petcomp scene`: recipe -> scene.
 
 use crate::common::{Common, RecipeArgs};
+use petcomp::scene::cycles;
 use petcomp::{Scene, io};
 use std::path::PathBuf;
 
@@ -13,6 +14,28 @@ pub(crate) enum Command {
         /// Scene, TOML or JSON
         scene: PathBuf,
     },
+    /// Write a scene for another renderer: JSON, plate and textures that Blender renders with one more command
+    Export(Export),
+}
+
+#[derive(clap::Args)]
+pub(crate) struct Export {
+    /// Scene, TOML or JSON; what is unknown in it is found out first
+    scene: PathBuf,
+    #[command(flatten)]
+    recipe: RecipeArgs,
+    /// The other renderer
+    #[arg(long, value_name = "RENDERER")]
+    to: Renderer,
+    /// Folder to write
+    #[arg(value_name = "FOLDER")]
+    folder: PathBuf,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Renderer {
+    /// Blender's path tracer, by the script that makes our golden references
+    Cycles,
 }
 
 #[derive(clap::Args)]
@@ -42,6 +65,22 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             scene.check().map_err(|e| e.in_file(path))?;
             common.say(format_args!("{}: possible", path.display()));
         }
+        Command::Export(args) => export(args, common)?,
     }
+    Ok(())
+}
+
+fn export(args: &Export, common: &Common) -> anyhow::Result<()> {
+    let scene: Scene = io::read_document(&args.scene)?;
+    let Renderer::Cycles = args.to;
+    let (scene, shot) = args.recipe.studio()?.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
+    cycles::export(&shot, scene.surface.size, &args.folder)?;
+    let folder = args.folder.display();
+    common.say(format_args!(
+        "{folder}: {} cards; render it with\n  blender -b --factory-startup --python-use-system-env -P {folder}/{} -- \
+         {folder}/scene.json --out {folder}/cycles --preview",
+        shot.cards.len(),
+        cycles::SCRIPT
+    ));
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `petcomp settle`: dropped objects come to rest.
 
 use crate::common::Common;
-use petcomp::settle::{SettleOptions, settle};
+use petcomp::settle::{SettleOptions, preview, settle_traced, trace_csv};
 use petcomp::{Scene, io};
 use std::path::PathBuf;
 
@@ -15,6 +15,12 @@ pub(crate) struct Args {
     /// Settle options to use instead of the defaults, as TOML
     #[arg(long, value_name = "FILE")]
     options: Option<PathBuf>,
+    /// Where every object was during the fall, as CSV: a line for each 60th of a second and object
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
+    /// Picture of what lies where, from above and from the side
+    #[arg(long, value_name = "FILE")]
+    preview: Option<PathBuf>,
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
@@ -23,9 +29,19 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         Some(path) => io::read_toml(path)?,
         None => SettleOptions::default(),
     };
-    let settled = settle(scene, &options).map_err(|e| e.in_file(&args.scene))?;
+    // 60 a second at the default step.
+    let every = if args.trace.is_some() { 8 } else { 0 };
+    let (settled, samples) = settle_traced(scene, &options, every).map_err(|e| e.in_file(&args.scene))?;
+    // Written for a bad end too: it shows what went wrong.
+    if let Some(path) = &args.trace {
+        io::write_text(path, &trace_csv(&samples))?;
+    }
     let (seconds, rejected) = (settled.seconds, settled.rejected.len());
-    io::write_document(&args.output, &settled.into_scene()?)?;
+    let rest = settled.into_scene()?;
+    io::write_document(&args.output, &rest)?;
+    if let Some(path) = &args.preview {
+        io::write(path, &preview(&rest, &options))?;
+    }
     common.say(format_args!("{}: at rest after {seconds:.2} s, {rejected} tries thrown away", args.output.display()));
     Ok(())
 }

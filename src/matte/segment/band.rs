@@ -16,26 +16,42 @@ pub enum Tone {
     Grey([f32; 3]),
 }
 
-/// The first and the last band of a photo, at the photo's size and in units of noise.
+/// The bands of a photo, in units of noise.
 pub(super) struct Bands {
-    /// What is finer than about 2 pixels.
+    /// What is finer than about 2 pixels, of the photo's size.
     pub(super) first: Image<Coverage>,
-    /// What is about `2^levels` pixels wide.
-    pub(super) last: Image<Coverage>,
+    /// The other bands, each of its own size, from the second one.
+    coarser: Vec<Image<Coverage>>,
+    /// Sizes of the pyramid's levels, the photo's own first.
+    sizes: Vec<(usize, usize)>,
 }
 
 impl Bands {
-    /// Splits a photo.
-    pub(super) fn of(photo: &Image<LinearRgb>, tone: Tone, levels: usize) -> Self {
+    /// Splits a photo into so many bands.
+    pub(super) fn of(photo: &Image<LinearRgb>, tone: Tone, count: usize) -> Self {
         let pictures = match tone {
             Tone::Channels => {
                 vec![root(photo, [1.0, 0.0, 0.0]), root(photo, [0.0, 1.0, 0.0]), root(photo, [0.0, 0.0, 1.0])]
             }
             Tone::Grey(weights) => vec![root(photo, weights)],
         };
-        let bands: Vec<_> = pictures.into_iter().map(|picture| channel_bands(picture, levels)).collect();
-        let (first, last): (Vec<_>, Vec<_>) = bands.into_iter().unzip();
-        Self { first: length(first), last: length(last) }
+        let mut channels: Vec<_> = pictures.into_iter().map(|picture| magnitudes(picture, count).into_iter()).collect();
+        let mut bands = (0..count).map(|_| joined(channels.iter_mut().filter_map(Iterator::next).collect()));
+        let first = bands.next().unwrap_or_default();
+        let coarser: Vec<_> = bands.map(|band| largest_around(&band, 1)).collect();
+        let mut sizes = vec![first.size()];
+        sizes.extend(coarser.iter().map(Image::size));
+        Self { first, coarser, sizes }
+    }
+
+    /// What is about `2^level` pixels wide, brought to the photo's size; `level` is 2 or more.
+    ///
+    /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the very edge that it
+    /// tells of.
+    pub(super) fn last(&self, level: usize) -> Image<Coverage> {
+        let band = self.coarser[level - 2].clone();
+        let finer = self.sizes[..level - 1].iter().rev();
+        finer.fold(band, |picture, &(w, h)| filter::expand(&picture, w, h))
     }
 }
 
@@ -53,46 +69,44 @@ pub(super) fn root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<Coverag
     })
 }
 
-/// Magnitudes of the first and last band of one picture, in units of noise.
-fn channel_bands(picture: Image<Coverage>, levels: usize) -> (Image<Coverage>, Image<Coverage>) {
-    let mut sizes = Vec::new();
+/// Magnitudes of the bands of one picture, each of its own size.
+fn magnitudes(picture: Image<Coverage>, count: usize) -> Vec<Image<Coverage>> {
     let mut smooth = picture;
-    let (mut first, mut last) = (Image::default(), Image::default());
-    for level in 1..=levels {
+    let band = |_| {
         let coarse = filter::reduce(&smooth);
         let expanded = filter::expand(&coarse, smooth.width(), smooth.height());
-        let band = || smooth.zip_map(&expanded, |a, b| Coverage((a.0 - b.0).abs()));
-        if level == 1 {
-            first = in_noise_units(band());
-        }
-        if level == levels {
-            last = spread(&in_noise_units(band()));
-        }
-        sizes.push(smooth.size());
+        let band = smooth.zip_map(&expanded, |a, b| Coverage((a.0 - b.0).abs()));
         smooth = coarse;
-    }
-    let finer = sizes.iter().rev().skip(1);
-    (first, finer.fold(last, |picture, &(w, h)| filter::expand(&picture, w, h)))
+        band
+    };
+    (0..count).map(band).collect()
 }
 
-/// The largest of the 3 x 3 values around each pixel: a band passes through 0 on the very edge that it tells of.
-fn spread(band: &Image<Coverage>) -> Image<Coverage> {
-    Image::from_fn(band.width(), band.height(), |x, y| largest_around(band, x, y, 1))
-}
-
-/// The largest value at most `reach` columns and rows away.
-pub(super) fn largest_around(band: &Image<Coverage>, x: usize, y: usize, reach: usize) -> Coverage {
-    let columns = x.saturating_sub(reach)..(x + reach + 1).min(band.width());
-    let rows = y.saturating_sub(reach)..(y + reach + 1).min(band.height());
-    let values = rows.flat_map(|v| &band.row(v)[columns.clone()]);
-    Coverage(values.fold(0.0, |largest, c| c.0.max(largest)))
-}
-
-/// Root of the sum of squares.
-fn length(bands: Vec<Image<Coverage>>) -> Image<Coverage> {
-    let squares = bands.into_iter().map(|band| band.map(|c| Coverage(c.0 * c.0)));
-    let sum = squares.reduce(|a, b| a.zip_map(&b, |a, b| Coverage(a.0 + b.0)));
+/// The bands of some channels as one, in units of noise: root of the sum of squares.
+///
+/// No channel counts as less noisy than half their median: square roots have the same shot noise in all of them, and one
+/// that seems to have none is clipped.
+fn joined(bands: Vec<Image<Coverage>>) -> Image<Coverage> {
+    let noises: Vec<f32> = bands.iter().map(noise).collect();
+    let mut sorted = noises.clone();
+    sorted.sort_by(f32::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(ROUNDING);
+    let units = bands.iter().zip(&noises).map(|(band, noise)| {
+        let unit = 1.0 / noise.max(0.5 * median);
+        band.map(|c| Coverage((c.0 * unit) * (c.0 * unit)))
+    });
+    let sum = units.reduce(|a, b| a.zip_map(&b, |a, b| Coverage(a.0 + b.0)));
     sum.unwrap_or_default().map(|c| Coverage(c.0.sqrt()))
+}
+
+/// The largest value at most `reach` columns and rows away, for every pixel.
+pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Coverage> {
+    let (w, h) = band.size();
+    let largest = |values: &mut dyn Iterator<Item = Coverage>| Coverage(values.fold(0.0, |most, c| c.0.max(most)));
+    let along = Image::from_fn(w, h, |x, y| {
+        largest(&mut band.row(y)[x.saturating_sub(reach)..(x + reach + 1).min(w)].iter().copied())
+    });
+    Image::from_fn(w, h, |x, y| largest(&mut (y.saturating_sub(reach)..(y + reach + 1).min(h)).map(|v| along[(x, v)])))
 }
 
 /// Width of the frame along the border that shows the background, as a share of the longer side.
@@ -103,11 +117,6 @@ const QUIET: f64 = 0.25;
 const QUIET_OF_NORMAL: f32 = 0.318_64;
 /// Least noise: the rounding of an 8-bit picture, one step over the square root of 12.
 const ROUNDING: f32 = 1.0 / 255.0 / 3.464;
-
-fn in_noise_units(magnitudes: Image<Coverage>) -> Image<Coverage> {
-    let noise = noise(&magnitudes);
-    magnitudes.map(|c| Coverage(c.0 / noise))
-}
 
 /// Standard deviation of a band on the background, robust against an object that reaches into the frame.
 ///
@@ -161,7 +170,7 @@ mod tests {
     #[test]
     fn a_constant_has_no_bands() {
         let bands = Bands::of(&Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)), Tone::Channels, 4);
-        assert!(bands.first.pixels().iter().chain(bands.last.pixels()).all(|c| c.0 < 0.01));
+        assert!(bands.first.pixels().iter().chain(bands.last(4).pixels()).all(|c| c.0 < 0.01));
     }
 
     #[test]

@@ -82,7 +82,8 @@ mod tests {
     #[test]
     fn every_match_is_within_the_reach_of_equation_1() {
         let description = description(96);
-        let object = |x: f64, y: f64, w: f64| Labelled { class: 0, bbox: BBox { x0: x, y0: y, x1: x + w, y1: y + 20.0 } };
+        let object =
+            |x: f64, y: f64, w: f64| Labelled { class: 0, bbox: BBox { x0: x, y0: y, x1: x + w, y1: y + 20.0 } };
         let objects = [vec![object(3.0, 7.0, 14.0)], vec![], vec![object(40.0, 50.0, 31.0), object(70.0, 1.0, 9.0)]];
         let all: Vec<Match> = (0..3).flat_map(|level| matches(&objects, &description, level)).collect();
         assert!(all.len() > 6, "{all:?}");

@@ -131,8 +131,8 @@ impl<'a> Tile<'a> {
     fn objects<'b>(&'b self, view: &'b View, side: f64) -> impl Iterator<Item = Labelled> + 'b {
         self.sample.objects.iter().filter_map(move |object| {
             let b = object.bbox;
-            let [p, q] = [[b.x0, b.y0], [b.x1, b.y1]]
-                .map(|[x, y]| view.view_from_canvas([x + self.at[0], y + self.at[1]]));
+            let [p, q] =
+                [[b.x0, b.y0], [b.x1, b.y1]].map(|[x, y]| view.view_from_canvas([x + self.at[0], y + self.at[1]]));
             let whole = BBox { x0: p[0].min(q[0]), y0: p[1], x1: p[0].max(q[0]), y1: q[1] };
             let [x0, y0, x1, y1] = [whole.x0, whole.y0, whole.x1, whole.y1].map(|v| v.clamp(0.0, side));
             let seen = BBox { x0, y0, x1, y1 };

@@ -10,6 +10,7 @@ use burn::module::Module;
 use burn::record::{BinBytesRecorder, FullPrecisionSettings, Record, Recorder};
 use burn::tensor::backend::{AutodiffBackend, Backend};
 use serde::{Deserialize, Serialize};
+use std::io::Write as _;
 use std::path::Path;
 
 /// Writes a network with its description.
@@ -55,7 +56,8 @@ pub(super) fn load_training<B: AutodiffBackend>(
     path: &Path,
     device: &B::Device,
 ) -> Result<(Progress, Network<B>, Optimizer<B>)> {
-    let (told, record, weights, others): (String, <Network<B> as Module<B>>::Record, _, _) = read::<B, _>(path, device)?;
+    let (told, record, weights, others): (String, <Network<B> as Module<B>>::Record, _, _) =
+        read::<B, _>(path, device)?;
     let progress: Progress = parse(path, &told)?;
     let network = Network::new(&progress.description, 0, device).load_record(record);
     let mut optimizer = Optimizer::new(progress.options.schedule, &network);
@@ -66,7 +68,7 @@ pub(super) fn load_training<B: AutodiffBackend>(
 fn write<B: Backend, R: Record<B>>(path: &Path, record: R) -> Result<()> {
     let recorder = BinBytesRecorder::<FullPrecisionSettings>::default();
     let bytes = Recorder::<B>::record(&recorder, record, ()).map_err(|e| Error::file(path, e))?;
-    io::write_bytes(path, &bytes)
+    io::write_through(path, |out| out.write_all(&bytes))
 }
 
 fn read<B: Backend, R: Record<B>>(path: &Path, device: &B::Device) -> Result<R> {

@@ -65,8 +65,7 @@ mod tests {
     fn reference(a: [f32; 4], b: [f32; 4]) -> f64 {
         let (a, b) = (a.map(f64::from), b.map(f64::from));
         let edge = |b: [f64; 4], i: usize, sign: f64| b[i] + sign * b[2 + i] / 2.0;
-        let shared =
-            |i| (edge(a, i, 1.0).min(edge(b, i, 1.0)) - edge(a, i, -1.0).max(edge(b, i, -1.0))).max(0.0);
+        let shared = |i| (edge(a, i, 1.0).min(edge(b, i, 1.0)) - edge(a, i, -1.0).max(edge(b, i, -1.0))).max(0.0);
         let around = |i| edge(a, i, 1.0).max(edge(b, i, 1.0)) - edge(a, i, -1.0).min(edge(b, i, -1.0));
         let inter = shared(0) * shared(1);
         let iou = inter / (a[2] * a[3] + b[2] * b[3] - inter);

@@ -50,14 +50,8 @@ impl History {
         let mut text = "epoch,box,objectness,class,rate,map50,map\n".to_owned();
         for (i, e) in self.epochs.iter().enumerate() {
             let [bbox, object, class] = e.losses;
-            let _ = writeln!(
-                text,
-                "{},{bbox:.6},{object:.6},{class:.6},{:.6},{:.6},{:.6}",
-                i + 1,
-                e.rate,
-                e.map50,
-                e.map
-            );
+            let _ =
+                writeln!(text, "{},{bbox:.6},{object:.6},{class:.6},{:.6},{:.6},{:.6}", i + 1, e.rate, e.map50, e.map);
         }
         text
     }

@@ -150,7 +150,11 @@ mod tests {
         let d = description(SIDE);
         let all = loss(output(&[vec![]], 0.0), &[vec![]], &d);
         let expected = std::f64::consts::LN_2 * BALANCE.iter().sum::<f64>() * (SIDE as f64 / GAIN_SIDE).powi(2);
-        assert!((all.parts[1] - expected).abs() < 1e-6 && all.parts[0] == 0.0 && all.parts[2] == 0.0, "{:?}", all.parts);
+        assert!(
+            (all.parts[1] - expected).abs() < 1e-6 && all.parts[0] == 0.0 && all.parts[2] == 0.0,
+            "{:?}",
+            all.parts
+        );
     }
 
     #[test]

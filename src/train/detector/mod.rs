@@ -22,6 +22,7 @@ mod network;
 mod optimizer;
 mod plan;
 mod predict;
+mod read;
 mod sample;
 mod schedule;
 mod suppress;

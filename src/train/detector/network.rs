@@ -126,12 +126,7 @@ impl<B: Backend> Network<B> {
 }
 
 /// A head that at first expects few objects, so that training does not begin with unlearning thousands.
-fn head<B: Backend>(
-    description: &Description,
-    width: usize,
-    stride: usize,
-    builder: &mut Builder<'_, B>,
-) -> Conv2d<B> {
+fn head<B: Backend>(description: &Description, width: usize, stride: usize, builder: &mut Builder<'_, B>) -> Conv2d<B> {
     let numbers = description.numbers();
     let mut head = builder.plain([width, ANCHORS_PER_LEVEL * numbers], 1, 1, true);
     let objects = EXPECTED_OBJECTS / (FULL_SIDE / stride as f64).powi(2);

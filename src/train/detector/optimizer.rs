@@ -31,7 +31,12 @@ impl<B: AutodiffBackend> Optimizer<B> {
     }
 
     /// An update; `gradients` are those of `network`.
-    pub(super) fn step(&mut self, [rate, momentum]: [f64; 2], mut network: Network<B>, mut gradients: B::Gradients) -> Network<B> {
+    pub(super) fn step(
+        &mut self,
+        [rate, momentum]: [f64; 2],
+        mut network: Network<B>,
+        mut gradients: B::Gradients,
+    ) -> Network<B> {
         for i in 0..self.groups.len() {
             let own = GradientsParams::from_params(&mut gradients, &network, &self.members[i]);
             // burn fixes the momentum when an optimizer is made, so one is made anew around the same memory.

@@ -28,7 +28,12 @@ pub(super) struct Step {
 ///
 /// # Errors
 /// [`Error::Value`] for no images, and for a combination with a source that is empty.
-pub(super) fn plan(mode: Mode, [real, synthetic]: [usize; 2], epoch: usize, options: &BatchOptions) -> Result<Vec<Step>> {
+pub(super) fn plan(
+    mode: Mode,
+    [real, synthetic]: [usize; 2],
+    epoch: usize,
+    options: &BatchOptions,
+) -> Result<Vec<Step>> {
     let all = real + synthetic;
     if all == 0 {
         return Err(Error::value("images", "none to learn from, expected at least one"));

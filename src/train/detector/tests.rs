@@ -92,5 +92,8 @@ fn impossible_options_are_refused() {
     assert_eq!(refused(&FitOptions { side: 100, ..small(1, 32) }), "img: 100, expected a multiple of 32");
     assert!(refused(&FitOptions { width: f64::NAN, ..small(1, 32) }).starts_with("width: NaN"));
     let combined = Mode::Combined(crate::train::Balance::default());
-    assert_eq!(refused(&FitOptions { mode: combined, ..small(1, 32) }), "real: no images, expected at least one of each source");
+    assert_eq!(
+        refused(&FitOptions { mode: combined, ..small(1, 32) }),
+        "real: no images, expected at least one of each source"
+    );
 }

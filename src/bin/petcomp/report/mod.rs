@@ -2,6 +2,9 @@
 
 mod camera;
 mod experiments;
+mod matte;
+mod render;
+mod settle;
 
 use crate::common::Common;
 
@@ -9,13 +12,25 @@ use crate::common::Common;
 pub(crate) enum Command {
     /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
     Camera(camera::Args),
+    /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
+    Settle(settle::Args),
+    /// How extreme scenes settle: stability.csv and stability.md
+    Stability(settle::StabilityArgs),
     /// Our trainings beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
+    /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
+    Matte(matte::Args),
+    /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
+    Render(render::Args),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Camera(args) => camera::run(args, common),
+        Command::Settle(args) => settle::run(args, common),
+        Command::Stability(args) => settle::run_stability(args, common),
         Command::Experiments(args) => experiments::run(args, common),
+        Command::Matte(args) => matte::run(args, common),
+        Command::Render(args) => render::run(args, common),
     }
 }

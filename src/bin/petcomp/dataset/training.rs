@@ -1,11 +1,11 @@
-//! The part of `petcomp dataset` that trainings need: batches, anchors, the kit for PyTorch.
+//! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
 use crate::common::Common;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::read_yolo_truth;
 use petcomp::io;
-use petcomp::train::kit::{self, KitOptions};
-use petcomp::train::{Balance, BatchOptions, Source, anchors, batches};
+use petcomp::train::kit::KitOptions;
+use petcomp::train::{self, Balance, BatchOptions, Source};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -78,13 +78,13 @@ pub(crate) struct Anchors {
     seed: u64,
 }
 
-pub(crate) fn write_batches(args: &Batches, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn batches(args: &Batches, common: &Common) -> anyhow::Result<()> {
     let (real, synthetic) = (YoloSet::open(&args.sets.real)?, YoloSet::open(&args.sets.synthetic)?);
     let weights = args.sets.balance().weights(real.train.len() as u64, synthetic.train.len() as u64)?;
     let options = BatchOptions { size: args.sets.batch, seed: args.seed };
     let mut text = String::new();
     for epoch in 0..args.epochs {
-        for batch in batches(real.train.len(), synthetic.train.len(), epoch, &options) {
+        for batch in train::batches(real.train.len(), synthetic.train.len(), epoch, &options) {
             let (list, weight) = match batch.source {
                 Source::Real => (&real.train, weights.real),
                 Source::Synthetic => (&synthetic.train, weights.synthetic),
@@ -106,7 +106,7 @@ pub(crate) fn write_batches(args: &Batches, common: &Common) -> anyhow::Result<(
     Ok(())
 }
 
-pub(crate) fn write_kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
     let options = KitOptions {
         balance: args.sets.balance(),
         seeds: args.seeds,
@@ -114,12 +114,12 @@ pub(crate) fn write_kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
         batch: args.sets.batch as u64,
         ..KitOptions::new(&args.sets.real, &args.sets.synthetic)
     };
-    kit::write(&args.output, &options)?;
+    train::kit::write(&args.output, &options)?;
     common.say(format_args!("{}: run commands.sh there", args.output.display()));
     Ok(())
 }
 
-pub(crate) fn print_anchors(args: &Anchors, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn anchors(args: &Anchors, common: &Common) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
     let labels = set.train.first().and_then(|image| YoloSet::label_of(image).parent().map(Path::to_path_buf));
     let truth = read_yolo_truth(&labels.unwrap_or_default(), None)?;
@@ -127,7 +127,7 @@ pub(crate) fn print_anchors(args: &Anchors, common: &Common) -> anyhow::Result<(
         let scale = f64::from(args.side) / f64::from(size[0].max(size[1]));
         sheet.truth.iter().map(move |t| [t.bbox.width() * scale, t.bbox.height() * scale])
     });
-    let found = anchors(&scaled.collect::<Vec<_>>(), args.count, args.seed);
+    let found = train::anchors(&scaled.collect::<Vec<_>>(), args.count, args.seed);
     for [w, h] in &found.sizes {
         common.say(format_args!("{w:.1},{h:.1}"));
     }

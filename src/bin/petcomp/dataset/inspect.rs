@@ -1,0 +1,62 @@
+//! `petcomp dataset check`, `report` and `sheet`: what is in a dataset.
+
+use crate::common::Common;
+use petcomp::dataset::{self, Checked, contact_sheet_of};
+use petcomp::{io, report};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Check {
+    /// Folder of the dataset
+    folder: PathBuf,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct Report {
+    /// Folder of the dataset
+    folder: PathBuf,
+    /// Page to write; by default report.html in the folder
+    #[arg(short, long, value_name = "HTML")]
+    output: Option<PathBuf>,
+    /// Number of sample pictures
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 32)]
+    most: usize,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct Sheet {
+    /// Folder of the dataset
+    folder: PathBuf,
+    /// Picture to write
+    #[arg(short, long, value_name = "PNG")]
+    output: PathBuf,
+    /// Number of pictures
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 24)]
+    most: usize,
+}
+
+pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
+    let folder = args.folder.display();
+    let checked = dataset::check(&args.folder)?;
+    let Checked { faults, images, .. } = &checked;
+    common.say(checked.balance().markdown());
+    checked.remarks().iter().for_each(|remark| common.say(format_args!("note: {remark}")));
+    faults.iter().for_each(|fault| println!("{fault}"));
+    anyhow::ensure!(faults.is_empty(), "{folder}: {} faults", faults.len());
+    let rows: usize = checked.rows.iter().sum();
+    common.say(format_args!("{folder}: {images} images, {rows} labels, no fault"));
+    Ok(())
+}
+
+pub(crate) fn report(args: &Report, common: &Common) -> anyhow::Result<()> {
+    let output = args.output.clone().unwrap_or_else(|| args.folder.join("report.html"));
+    io::write_text(&output, &report::dataset::page(&args.folder, args.most)?.document())?;
+    common.say(output.display());
+    Ok(())
+}
+
+pub(crate) fn sheet(args: &Sheet, common: &Common) -> anyhow::Result<()> {
+    io::write(&args.output, &contact_sheet_of(&args.folder, args.most, &Default::default())?)?;
+    common.say(args.output.display());
+    Ok(())
+}

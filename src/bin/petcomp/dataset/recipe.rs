@@ -1,0 +1,64 @@
+//! `petcomp dataset init` and `explain`: recipes to write and to understand.
+
+use crate::common::{Common, RecipeArgs};
+use petcomp::dataset::Setup;
+use petcomp::scene::Drawn;
+use petcomp::{Error, Scene, io};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Init {
+    /// File to write
+    #[arg(value_name = "RECIPE", default_value = "recipe.toml")]
+    recipe: PathBuf,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct Explain {
+    #[command(flatten)]
+    recipe: RecipeArgs,
+    /// Number of the image
+    #[arg(long, value_name = "K")]
+    index: u64,
+    /// Seed of the dataset
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+pub(crate) fn init(args: &Init, common: &Common) -> anyhow::Result<()> {
+    if args.recipe.exists() {
+        return Err(Error::file(&args.recipe, "is there already, expected a new file").into());
+    }
+    io::write_text(&args.recipe, Setup::template())?;
+    common.say(args.recipe.display());
+    Ok(())
+}
+
+/// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
+pub(crate) fn explain(args: &Explain, common: &Common) -> anyhow::Result<()> {
+    let sample = args.recipe.studio()?.sample(args.seed, args.index)?;
+    for reason in &sample.rejected {
+        common.say(format_args!("# a scene was thrown away: {reason}"));
+    }
+    if !sample.rejected.is_empty() {
+        common.say(format_args!("# what follows was drawn with seed {}", sample.scene_seed));
+    }
+    let width = |text: &dyn Fn(&Drawn) -> String| sample.draws.iter().map(|d| text(d).len()).max().unwrap_or(0);
+    let (paths, froms) = (width(&|d| d.path.clone()), width(&|d| d.from.to_string()));
+    for draw in &sample.draws {
+        let from = draw.from.to_string();
+        let line = format!("{:paths$}  {from:froms$}  {}  {}", draw.path, draw.value, chosen(draw, &sample.drawn));
+        println!("{}", line.trim_end());
+    }
+    Ok(())
+}
+
+/// The name of what a choice chose.
+fn chosen<'a>(draw: &Drawn, scene: &'a Scene) -> &'a str {
+    let object = draw.path.strip_prefix("selection[").and_then(|rest| rest.strip_suffix("].asset"));
+    match object.and_then(|i| i.parse::<usize>().ok()) {
+        Some(i) => scene.objects.get(i).map_or("", |object| &object.asset),
+        None if draw.path == "background" => &scene.plate,
+        None => "",
+    }
+}

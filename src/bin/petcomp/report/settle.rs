@@ -1,0 +1,47 @@
+//! `petcomp report settle` and `petcomp report stability`.
+
+use crate::common::Common;
+use petcomp::io;
+use petcomp::report::settle::{self, SettleReportOptions};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+    /// Heaps for each setting of the solver
+    #[arg(long, value_name = "N", default_value_t = SettleReportOptions::default().heaps)]
+    heaps: u64,
+    /// Instead, settle heaps for a comparison with another program: writes their scenes, ends and times as JSON
+    #[arg(long, value_name = "FILE")]
+    peers: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct StabilityArgs {
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    if let Some(path) = &args.peers {
+        return Ok(io::write_document(path, &settle::peer_cases()?)?);
+    }
+    let progress = common.progress("measuring");
+    let rows =
+        settle::write(&args.output, &SettleReportOptions { heaps: args.heaps }, |done, of| progress.at(done, of))?;
+    drop(progress);
+    common.say(format_args!("{}: settle.csv ({} lines), settle.md and a plot", args.output.display(), rows.len()));
+    Ok(())
+}
+
+pub(crate) fn run_stability(args: &StabilityArgs, common: &Common) -> anyhow::Result<()> {
+    let progress = common.progress("settling");
+    let ends = settle::write_stability(&args.output, |done, of| progress.at(done, of))?;
+    drop(progress);
+    let kept = ends.iter().filter(|end| end.is_as_promised()).count();
+    common.say(format_args!("{}: {kept} of {} as promised", args.output.join("stability.md").display(), ends.len()));
+    Ok(())
+}

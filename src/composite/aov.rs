@@ -1,0 +1,260 @@
+//! Arbitrary output variables: everything that deep samples know besides the finished frame, as parts of an EXR file.
+//!
+//! Each is a fold of its own over the samples, done only when asked for.
+
+use super::cryptomatte::cryptomatte;
+use crate::error::Error;
+use crate::geom::{Point2, Point3};
+use crate::image::Image;
+use crate::io::exr_parts::{Part, Plane};
+use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+use crate::render::{DeepImage, DeepSample};
+use crate::scene::{Card, Shot};
+use std::str::FromStr;
+
+/// A part of the picture that can be asked for by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aov {
+    /// `beauty`: the finished frame, `R G B A`, scene-linear, premultiplied.
+    Beauty,
+    /// `coverage`: share of the pixel that objects hide of the plate, `Y`.
+    Coverage,
+    /// `shadow`: factor on the plate, `R G B`.
+    Shadow,
+    /// `id`: the [`front`] object, whole numbers, `id`; 0 where there is none.
+    Id,
+    /// `depth`: its distance along the optical axis, metres, `Z`; infinite where there is none.
+    Depth,
+    /// `position`: its point of the world, metres, `X Y Z`; NaN where there is none.
+    Position,
+    /// `uv`: its texture coordinates, right and down, `U V`; NaN where there is none.
+    Uv,
+    /// `cryptomatte`: coverage of every object, see [`cryptomatte`].
+    Cryptomatte,
+    /// `layers`: a part `layer.ID` for each card: its own light and what it hides, held out by what lies in front,
+    /// `R G B A`; with film in the picture also `TR TG TB`, 1 minus what it hides per channel. Their sum is the picture.
+    Layers,
+}
+
+impl Aov {
+    /// All of them with their names.
+    pub const ALL: [(&'static str, Self); 9] = [
+        ("beauty", Self::Beauty),
+        ("coverage", Self::Coverage),
+        ("shadow", Self::Shadow),
+        ("id", Self::Id),
+        ("depth", Self::Depth),
+        ("position", Self::Position),
+        ("uv", Self::Uv),
+        ("cryptomatte", Self::Cryptomatte),
+        ("layers", Self::Layers),
+    ];
+}
+
+impl FromStr for Aov {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        let known = Self::ALL.iter().find(|(n, _)| *n == name);
+        known.map(|&(_, aov)| aov).ok_or_else(|| {
+            let names = Self::ALL.map(|(n, _)| n).join(", ");
+            Error::value("aov", format!("\"{name}\", expected some of {names}"))
+        })
+    }
+}
+
+/// Coverage above which an object owns a pixel: that of the reference renderer.
+pub const FRONT_ALPHA: f32 = 0.05;
+
+/// The foremost object that covers more than [`FRONT_ALPHA`] of a pixel.
+pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
+    samples.iter().find(|s| s.alpha > FRONT_ALPHA)
+}
+
+/// The parts asked for, in that order, of one size.
+///
+/// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position and texture
+/// coordinates are those at the pixel's centre, as depth is.
+pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRgba>) -> Vec<Part> {
+    let fronts = Fronts { deep, shot };
+    let one = |aov: &Aov| match aov {
+        Aov::Beauty => vec![floats("beauty", ["R", "G", "B", "A"], frame.pixels().iter().map(|&p| channels(p)))],
+        Aov::Coverage => vec![floats("coverage", ["Y"], pixels(deep).map(|(x, y)| [deep.flat(x, y).to_rgba().a]))],
+        Aov::Shadow => vec![floats("shadow", ["R", "G", "B"], deep.shadow().pixels().iter().map(|&c| c.into()))],
+        Aov::Id => {
+            vec![Part { name: "id".into(), channels: vec![("id".into(), fronts.ids())], metadata: Vec::new() }]
+        }
+        Aov::Depth => vec![floats("depth", ["Z"], fronts.depths())],
+        Aov::Position => vec![floats("position", ["X", "Y", "Z"], fronts.positions())],
+        Aov::Uv => vec![floats("uv", ["U", "V"], fronts.texture_coordinates())],
+        Aov::Cryptomatte => vec![cryptomatte(deep, |id| format!("object.{}", id.0))],
+        Aov::Layers => shot.cards.iter().map(|card| layer(deep, card.id)).collect(),
+    };
+    aovs.iter().flat_map(one).collect()
+}
+
+/// Every pixel's column and row, in reading order.
+pub(super) fn pixels(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let (width, height) = (deep.width(), deep.height());
+    (0..width * height).map(move |i| (i % width, i / width))
+}
+
+fn channels(p: PremulRgba) -> [f32; 4] {
+    [p.r, p.g, p.b, p.a]
+}
+
+/// A part of float channels from the pixels in reading order.
+pub(super) fn floats<const N: usize>(
+    name: impl Into<String>,
+    names: [&str; N],
+    values: impl Iterator<Item = [f32; N]>,
+) -> Part {
+    let mut planes = [const { Vec::new() }; N];
+    for value in values {
+        planes.iter_mut().zip(value).for_each(|(plane, v)| plane.push(v));
+    }
+    let channels = names.iter().zip(planes).map(|(name, plane)| (name.to_string(), Plane::Float(plane))).collect();
+    Part { name: name.into(), channels, metadata: Vec::new() }
+}
+
+/// The foremost object of every pixel.
+struct Fronts<'a> {
+    deep: &'a DeepImage,
+    shot: &'a Shot,
+}
+
+impl Fronts<'_> {
+    fn samples(&self) -> impl Iterator<Item = ((usize, usize), Option<&DeepSample>)> {
+        pixels(self.deep).map(|(x, y)| ((x, y), front(self.deep.at(x, y))))
+    }
+
+    fn ids(&self) -> Plane {
+        Plane::Whole(self.samples().map(|(_, s)| s.map_or(0, |s| s.object.0)).collect())
+    }
+
+    fn depths(&self) -> impl Iterator<Item = [f32; 1]> {
+        self.samples().map(|(_, s)| [s.map_or(f32::INFINITY, |s| s.depth.0)])
+    }
+
+    fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
+        self.samples().map(|(at, s)| s.map_or([f32::NAN; 3], |s| self.point(at, s).coords.map(|v| v as f32).into()))
+    }
+
+    fn texture_coordinates(&self) -> impl Iterator<Item = [f32; 2]> {
+        let uv = |at, s: &DeepSample| {
+            let card: &Card = self.shot.cards.iter().find(|card| card.id == s.object)?;
+            let p = card.quad.world_from_card.inverse_transform_point(&self.point(at, s));
+            Some([(p.x / card.quad.size[0] + 0.5) as f32, (0.5 - p.y / card.quad.size[1]) as f32])
+        };
+        self.samples().map(move |(at, s)| s.and_then(|s| uv(at, s)).unwrap_or([f32::NAN; 2]))
+    }
+
+    /// The point of the world that a sample shows at its pixel's centre.
+    fn point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
+        self.shot.camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5)).at(f64::from(sample.depth.0))
+    }
+}
+
+/// What one object adds to the picture.
+fn layer(deep: &DeepImage, id: ObjectId) -> Part {
+    let name = format!("layer.{}", id.0);
+    let own = |(x, y): (usize, usize)| {
+        let (samples, tints) = (deep.at(x, y), deep.tints(x, y));
+        let mine = |(_, s): &(usize, &DeepSample)| s.object == id;
+        samples.iter().enumerate().filter(mine).fold(
+            (PremulRgba::TRANSPARENT, LinearRgb::BLACK),
+            |(sum, hidden), (i, s)| {
+                let tint = tints.get(i).copied().unwrap_or(LinearRgb::grey(s.visible));
+                (sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible)), hidden + tint)
+            },
+        )
+    };
+    let films = pixels(deep).any(|(x, y)| !deep.tints(x, y).is_empty());
+    let values = pixels(deep).map(own);
+    if !films {
+        return floats(name, ["R", "G", "B", "A"], values.map(|(p, _)| channels(p)));
+    }
+    floats(
+        name,
+        ["R", "G", "B", "A", "TR", "TG", "TB"],
+        values.map(|(p, h)| [p.r, p.g, p.b, p.a, 1.0 - h.r, 1.0 - h.g, 1.0 - h.b]),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::composite;
+    use crate::geom::{Pose, Quad, UnitQuaternion, Vector2, Vector3};
+    use crate::render::{RenderOptions, cast};
+    use crate::scene::Grade;
+
+    fn shot() -> Shot {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let camera = Camera {
+            image: [32, 24],
+            focal_px: Vector2::new(40.0, 40.0),
+            principal_px: Point2::new(16.0, 12.0),
+            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        };
+        let card = |id, z: f64, alpha: f32| Card {
+            id: ObjectId(id),
+            class: 0,
+            quad: Quad { world_from_card: Pose::translation(0.02 * z, 0.0, z), size: [0.4, 0.3] },
+            texture: Image::filled(8, 8, PremulRgba::new(0.3 * alpha, 0.2 * alpha, 0.1 * alpha, alpha)).into(),
+            back: None,
+            outline_uv: std::sync::Arc::new([]),
+            grade: Grade::default(),
+        };
+        Shot::new(camera).with_card(card(3, 0.1, 0.5)).with_card(card(7, 0.2, 0.25)).with_ambient(LinearRgb::WHITE)
+    }
+
+    fn plane<'a>(part: &'a Part, name: &str) -> &'a [f32] {
+        match &part.channels.iter().find(|(n, _)| n == name).unwrap().1 {
+            Plane::Float(samples) => samples,
+            Plane::Whole(_) => panic!("whole numbers"),
+        }
+    }
+
+    fn made(names: &[&str]) -> (Image<PremulRgba>, Vec<Part>) {
+        let shot = shot();
+        let deep = cast(&shot, &RenderOptions::default());
+        let frame = composite::frame(&deep, None);
+        let aovs: Vec<Aov> = names.iter().map(|n| n.parse().unwrap()).collect();
+        let parts = parts(&aovs, &deep, &shot, &frame);
+        (frame, parts)
+    }
+
+    #[test]
+    fn layers_add_up_to_the_picture() {
+        let (frame, layers) = made(&["layers"]);
+        assert_eq!(layers.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["layer.3", "layer.7"]);
+        for (i, p) in frame.pixels().iter().enumerate() {
+            for (name, value) in [("R", p.r), ("A", p.a)] {
+                let sum: f32 = layers.iter().map(|layer| plane(layer, name)[i]).sum();
+                assert!((sum - value).abs() < 1e-6, "{name}: {sum} against {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn geometry_is_that_of_the_card_in_front() {
+        let (_, parts) = made(&["id", "depth", "position", "uv", "coverage"]);
+        let middle = 12 * 32 + 16;
+        assert!(matches!(&parts[0].channels[0].1, Plane::Whole(ids) if ids[middle] == 7 && ids[0] == 0));
+        assert!((plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5 && plane(&parts[1], "Z")[0].is_infinite());
+        // The pixel's centre is half a pixel right of and below the principal point: 0.01 m at depth 0.8.
+        let at = ["X", "Y", "Z"].map(|c| plane(&parts[2], c)[middle]);
+        assert!((at[0] - 0.01).abs() < 1e-5 && (at[1] + 0.01).abs() < 1e-5 && (at[2] - 0.2).abs() < 1e-5, "{at:?}");
+        let [u, v] = ["U", "V"].map(|c| plane(&parts[3], c)[middle]);
+        assert!((u - (0.5 + 0.006 / 0.4)).abs() < 1e-4 && (v - (0.5 + 0.01 / 0.3)).abs() < 1e-4, "{u} {v}");
+        assert!((plane(&parts[4], "Y")[middle] - (1.0 - 0.5 * 0.75)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn an_unknown_name_is_told_with_the_known_ones() {
+        let told = "normals".parse::<Aov>().unwrap_err().to_string();
+        assert!(told.contains("\"normals\"") && told.contains("cryptomatte"), "{told}");
+    }
+}

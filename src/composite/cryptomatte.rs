@@ -1,0 +1,143 @@
+//! Cryptomatte: soft mattes of all objects in a few channels.
+
+use super::aov::{floats, pixels};
+use crate::io::exr_parts::Part;
+use crate::pixel::ObjectId;
+use crate::render::DeepImage;
+use std::collections::BTreeMap;
+
+/// Objects kept per pixel, those that are seen most; two in each group of four channels.
+const RANKS: usize = 6;
+
+/// What the part and its channels are called.
+const NAME: &str = "CryptoObject";
+
+/// Identifier and visible coverage of up to six objects of each pixel, the most visible first, with the manifest that
+/// tells their names: a part that programs that know Cryptomatte read as it is.
+///
+/// An object's coverage is the share of the pixel that it hides of what is behind it, seen through what lies in front.
+///
+/// # Method
+/// [Cryptomatte specification] 1.2: channels `CryptoObject00.R` (identifier), `.G` (coverage), `.B`, `.A` and so on;
+/// identifiers are MurmurHash3 (32 bits, seed 0) of the name, their exponent kept away from those of infinity, NaN and
+/// denormal numbers.
+///
+/// [Cryptomatte specification]: https://github.com/Psyop/Cryptomatte
+pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
+    let mut part = floats(NAME, CHANNELS, pixels(deep).map(|(x, y)| ranks(deep, x, y, &name)));
+    let objects: BTreeMap<ObjectId, String> =
+        pixels(deep).flat_map(|(x, y)| deep.at(x, y)).map(|s| (s.object, name(s.object))).collect();
+    part.metadata = metadata(objects.values());
+    part
+}
+
+const CHANNELS: [&str; 2 * RANKS] = [
+    "CryptoObject00.R",
+    "CryptoObject00.G",
+    "CryptoObject00.B",
+    "CryptoObject00.A",
+    "CryptoObject01.R",
+    "CryptoObject01.G",
+    "CryptoObject01.B",
+    "CryptoObject01.A",
+    "CryptoObject02.R",
+    "CryptoObject02.G",
+    "CryptoObject02.B",
+    "CryptoObject02.A",
+];
+
+/// Identifier and coverage, in turn; zeros where there are fewer objects.
+fn ranks(deep: &DeepImage, x: usize, y: usize, name: impl Fn(ObjectId) -> String) -> [f32; 2 * RANKS] {
+    let mut seen: BTreeMap<ObjectId, f32> = BTreeMap::new();
+    for s in deep.at(x, y).iter().filter(|s| s.visible > 0.0) {
+        *seen.entry(s.object).or_default() += s.visible;
+    }
+    let mut seen: Vec<_> = seen.into_iter().collect();
+    // A stable sort: equally visible objects stay in the order of their ids.
+    seen.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut out = [0.0; 2 * RANKS];
+    for (pair, (id, coverage)) in out.chunks_exact_mut(2).zip(seen) {
+        pair.copy_from_slice(&[f32::from_bits(identifier(&name(id))), coverage]);
+    }
+    out
+}
+
+/// What the specification asks to be told: under the first seven digits of the part's own hash.
+fn metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, String)> {
+    let manifest: BTreeMap<&str, String> = names.map(|n| (n.as_str(), format!("{:08x}", identifier(n)))).collect();
+    let key = &format!("{:08x}", murmur3(NAME.as_bytes()))[..7];
+    let entry = |field: &str, value: String| (format!("cryptomatte/{key}/{field}"), value);
+    vec![
+        entry("conversion", "uint32_to_float32".into()),
+        entry("hash", "MurmurHash3_32".into()),
+        entry("manifest", serde_json::json!(manifest).to_string()),
+        entry("name", NAME.into()),
+    ]
+}
+
+/// The hash of a name as bits of an ordinary float: an exponent of all zeros or ones has its lowest bit flipped.
+fn identifier(name: &str) -> u32 {
+    let hash = murmur3(name.as_bytes());
+    let exponent = hash >> 23 & 0xff;
+    if exponent == 0 || exponent == 0xff { hash ^ 1 << 23 } else { hash }
+}
+
+/// MurmurHash3 x86 32 with seed 0 (Austin Appleby, public domain).
+fn murmur3(bytes: &[u8]) -> u32 {
+    const C: [u32; 2] = [0xcc9e_2d51, 0x1b87_3593];
+    let scrambled = |word: u32| word.wrapping_mul(C[0]).rotate_left(15).wrapping_mul(C[1]);
+    let words = bytes.chunks_exact(4);
+    let tail = words.remainder().iter().rev().fold(0, |word, &b| word << 8 | u32::from(b));
+    let little = |w: &[u8]| w.iter().rev().fold(0, |word, &b| word << 8 | u32::from(b));
+    let mixed =
+        words.fold(0_u32, |h, w| (h ^ scrambled(little(w))).rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64));
+    let mut h = mixed ^ scrambled(tail) ^ bytes.len() as u32;
+    h = (h ^ h >> 16).wrapping_mul(0x85eb_ca6b);
+    h = (h ^ h >> 13).wrapping_mul(0xc2b2_ae35);
+    h ^ h >> 16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::io::exr_parts::Plane;
+    use crate::pixel::{Depth, LinearRgb};
+    use crate::render::DeepSample;
+
+    /// Published test vectors of MurmurHash3_x86_32 with seed 0.
+    #[test]
+    fn the_hash_is_murmur3() {
+        let vectors = [("", 0), ("a", 0x3c25_69b2), ("test", 0xba6b_d213), ("Hello, world!", 0xc036_3e43)];
+        for (text, hash) in vectors {
+            assert_eq!(murmur3(text.as_bytes()), hash, "{text}");
+        }
+    }
+
+    #[test]
+    fn identifiers_are_ordinary_numbers() {
+        assert!((0..20_000).all(|i| f32::from_bits(identifier(&format!("object.{i}"))).is_normal()));
+    }
+
+    #[test]
+    fn the_most_visible_objects_come_first_and_one_object_counts_once() {
+        let sample = |id, visible| DeepSample {
+            object: ObjectId(id),
+            depth: Depth(1.0),
+            light: LinearRgb::BLACK,
+            alpha: visible,
+            visible,
+        };
+        let lists = [vec![sample(1, 0.25), sample(2, 0.5), sample(1, 0.125)], vec![]];
+        let deep = DeepImage::from_pixels(Image::filled(2, 1, LinearRgb::WHITE), lists);
+        let part = cryptomatte(&deep, |id| format!("bottle {}", id.0));
+        let at = |c: usize| match &part.channels[c].1 {
+            Plane::Float(v) => (v[0], v[1]),
+            Plane::Whole(_) => panic!("whole numbers"),
+        };
+        assert_eq!(at(0), (f32::from_bits(identifier("bottle 2")), 0.0));
+        assert_eq!((at(1), at(3), at(5)), ((0.5, 0.0), (0.375, 0.0), (0.0, 0.0)));
+        let manifest = &part.metadata.iter().find(|(key, _)| key.ends_with("/manifest")).unwrap().1;
+        assert!(manifest.contains(&format!("\"bottle 1\":\"{:08x}\"", identifier("bottle 1"))), "{manifest}");
+    }
+}

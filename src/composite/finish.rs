@@ -1,0 +1,176 @@
+//! The frame as a camera would have given it: noise where there was none, white balance, exposure, sharpening.
+
+use crate::filter::gaussian_blur;
+use crate::image::Image;
+use crate::pixel::{LinearRgb, Mix, PremulRgba};
+use crate::render::DeepImage;
+use crate::scene::{Finish, Noise};
+use std::f64::consts::TAU;
+
+/// Radius of what sharpening takes for blur, pixels.
+const SHARPENING_SIGMA: f32 = 1.0;
+
+/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`Finish::default`] gives the same bits.
+///
+/// Cards get the noise that a photograph of them would have, and no pixel more than that: what is seen of the plate
+/// already has its own, so that a pixel without card or shadow keeps its bits. Exposure, white balance and sharpening
+/// are the whole frame's.
+///
+/// # Method
+/// Noise is Gaussian, its variance `shot * value + read^2` less what the plate's own share brings along. It depends on
+/// the seed, the pixel and the channel only. Noise still to be matched ([`Noise::MatchPlate`]) is none.
+pub fn finish(
+    frame: Image<PremulRgba>,
+    deep: &DeepImage,
+    plate: Option<&Image<LinearRgb>>,
+    finish: &Finish,
+) -> Image<PremulRgba> {
+    let frame = match finish.noise {
+        Noise::Known { shot, read } => Sensor { shot, read, seed: finish.noise_seed }.expose(&frame, deep, plate),
+        Noise::None | Noise::MatchPlate => frame,
+    };
+    let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32);
+    let frame = if gain == LinearRgb::WHITE { frame } else { frame.map(|p| with_color(p, p.color() * gain)) };
+    if finish.sharpening == 0.0 {
+        return frame;
+    }
+    let soft = gaussian_blur(&frame, SHARPENING_SIGMA);
+    let amount = finish.sharpening as f32;
+    frame.zip_map(&soft, |p, s| {
+        let sharp = p.color().scale(1.0 + amount).add_scaled(-amount, s.color());
+        with_color(p, sharp.map(|v| v.max(0.0)))
+    })
+}
+
+fn with_color(p: PremulRgba, LinearRgb { r, g, b }: LinearRgb) -> PremulRgba {
+    PremulRgba { r, g, b, ..p }
+}
+
+struct Sensor {
+    shot: f64,
+    read: f64,
+    seed: u64,
+}
+
+impl Sensor {
+    fn expose(
+        &self,
+        frame: &Image<PremulRgba>,
+        deep: &DeepImage,
+        plate: Option<&Image<LinearRgb>>,
+    ) -> Image<PremulRgba> {
+        Image::from_fn(frame.width(), frame.height(), |x, y| {
+            let p = frame[(x, y)];
+            let (value, kept, behind): ([f32; 3], [f32; 3], [f32; 3]) = match plate {
+                Some(plate) => {
+                    let passes = deep.flat(x, y).transmittance() * deep.shadow()[(x, y)];
+                    (p.color().into(), passes.into(), plate[(x, y)].into())
+                }
+                None => (p.color().into(), [1.0 - p.a; 3], [0.0; 3]),
+            };
+            let index = 3 * (y * frame.width() + x) as u64;
+            let noisy = |c: usize| {
+                let (share, all) = (f64::from(kept[c]), self.variance(value[c]));
+                let missing = all - share * share * self.variance(behind[c]);
+                if missing <= 0.0 {
+                    return value[c];
+                }
+                (f64::from(value[c]) + missing.sqrt() * normal(self.seed, index + c as u64)) as f32
+            };
+            with_color(p, LinearRgb::new(noisy(0), noisy(1), noisy(2)))
+        })
+    }
+
+    fn variance(&self, value: f32) -> f64 {
+        self.shot * f64::from(value).max(0.0) + self.read * self.read
+    }
+}
+
+/// A number from the normal distribution, by Box and Muller from two uniform ones.
+fn normal(seed: u64, index: u64) -> f64 {
+    let uniform = |k: u64| (mixed(mixed(seed).wrapping_add(2 * index + k)) >> 11) as f64 / (1_u64 << 53) as f64;
+    (-2.0 * libm::log(1.0 - uniform(0))).sqrt() * libm::cos(TAU * uniform(1))
+}
+
+/// SplitMix64 (Steele, Lea and Flood, 2014): neighbouring numbers become unrelated ones.
+fn mixed(n: u64) -> u64 {
+    let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    n ^ n >> 31
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::composite::frame;
+    use crate::pixel::{Depth, ObjectId};
+    use crate::render::DeepSample;
+
+    /// The left half bare plate, the right half an opaque card of 0.5.
+    fn deep(size: usize) -> DeepImage {
+        let card = DeepSample {
+            object: ObjectId(1),
+            depth: Depth(1.0),
+            light: LinearRgb::grey(0.5),
+            alpha: 1.0,
+            visible: 1.0,
+        };
+        let list = |i: usize| if i % size < size / 2 { vec![] } else { vec![card] };
+        DeepImage::from_pixels(Image::filled(size, size, LinearRgb::WHITE), (0..size * size).map(list))
+    }
+
+    fn finished(change: Finish) -> (Image<PremulRgba>, Image<PremulRgba>) {
+        let deep = deep(64);
+        let plate = Image::from_fn(64, 64, |x, y| LinearRgb::grey(0.1 + 0.01 * ((x + y) % 7) as f32));
+        let before = frame(&deep, Some(&plate));
+        (before.clone(), finish(before, &deep, Some(&plate), &change))
+    }
+
+    #[test]
+    fn nothing_asked_leaves_every_bit() {
+        let (before, after) = finished(Finish::default());
+        assert_eq!(before, after);
+    }
+
+    #[test]
+    fn noise_falls_on_cards_alone_with_the_variance_told() {
+        let noise = Noise::Known { shot: 0.002, read: 0.01 };
+        let (before, after) = finished(Finish { noise, noise_seed: 5, ..Finish::default() });
+        let differences = |columns: std::ops::Range<usize>| -> Vec<f64> {
+            let pixels = (0..64).flat_map(|y| columns.clone().map(move |x| (x, y)));
+            pixels.flat_map(|at| [after[at].r - before[at].r, after[at].b - before[at].b]).map(f64::from).collect()
+        };
+        assert!(differences(0..32).iter().all(|d| *d == 0.0));
+        let noise = differences(32..64);
+        let variance = noise.iter().map(|d| d * d).sum::<f64>() / noise.len() as f64;
+        // 4096 values: the variance's own standard deviation is 2.2 %.
+        assert!((variance / (0.002 * 0.5 + 0.0001) - 1.0).abs() < 0.1, "{variance}");
+        let mean = noise.iter().sum::<f64>() / noise.len() as f64;
+        assert!(mean.abs() < 4.0 * (variance / noise.len() as f64).sqrt(), "{mean}");
+    }
+
+    #[test]
+    fn another_seed_is_another_noise() {
+        let of = |noise_seed| {
+            finished(Finish { noise: Noise::Known { shot: 0.0, read: 0.01 }, noise_seed, ..Finish::default() }).1
+        };
+        assert_eq!(of(1), of(1));
+        assert_ne!(of(1), of(2));
+    }
+
+    #[test]
+    fn a_stop_doubles_and_balance_scales_each_channel() {
+        let white_balance = LinearRgb::new(0.5, 1.0, 2.0);
+        let (before, after) = finished(Finish { exposure_ev: 1.0, white_balance, ..Finish::default() });
+        let (p, q) = (before[(3, 9)], after[(3, 9)]);
+        assert_eq!([q.r, q.g, q.b, q.a], [p.r, 2.0 * p.g, 4.0 * p.b, 1.0]);
+    }
+
+    #[test]
+    fn sharpening_leaves_flat_parts_and_lifts_edges() {
+        let (before, after) = finished(Finish { sharpening: 1.0, ..Finish::default() });
+        assert!((after[(50, 30)].g - before[(50, 30)].g).abs() < 1e-6);
+        assert!(after[(32, 30)].g > before[(32, 30)].g + 0.05);
+    }
+}

@@ -1,0 +1,185 @@
+//! Labels as COCO writes them: one JSON document for each part of the dataset.
+
+use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
+use crate::error::{Error, Result};
+use crate::io;
+use crate::label::{Mask, trace};
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Numbers that one image has for its annotations. Ids are made from the number of the image and of the object, so they
+/// never change, whichever images are there.
+const IDS_PER_IMAGE: u64 = 1 << 16;
+
+/// Folder of the parts that are joined.
+const KIND: &str = "coco";
+
+/// Writes `annotations/instances_{train,val}.json`, joined from `coco/{train,val}/NNNNNN.json`.
+///
+/// The id of an image is its number; categories are numbered from 1, since trainers take 0 for background, and so are
+/// annotations, since COCO's evaluation takes 0 for none. Objects that are to be ignored are `iscrowd`, with run lengths
+/// whatever `masks` says. Annotations also have `visible_fraction` and `topmost`, which other programs pass over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Coco {
+    /// How masks are written. Default: `rle`.
+    pub masks: CocoMask,
+    /// Whether boxes and masks are those of the whole object or of what is seen. Default: `amodal`.
+    pub boxes: Extent,
+    /// Format of the pictures that it names; in a recipe, that of `pictures`.
+    #[serde(skip)]
+    pub pictures: PictureFormat,
+}
+
+/// How masks are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CocoMask {
+    /// Compressed run lengths: exact.
+    #[default]
+    Rle,
+    /// Polygons along the edges of pixels, one for each part, holes joined by slits.
+    Polygon,
+}
+
+/// One image's share of the document.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Share {
+    image: CocoImage,
+    annotations: Vec<Annotation>,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct CocoImage {
+    id: u64,
+    file_name: String,
+    width: u32,
+    height: u32,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Annotation {
+    id: u64,
+    image_id: u64,
+    category_id: u32,
+    bbox: [f64; 4],
+    area: u64,
+    iscrowd: u8,
+    visible_fraction: f64,
+    topmost: bool,
+    segmentation: Segmentation,
+}
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Segmentation {
+    Runs(Mask),
+    Polygons(Vec<Vec<f64>>),
+}
+
+impl Writer for Coco {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "coco": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        Part::ALL.iter().try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let path = entry.path(KIND, "json");
+        io::write_json(folder.join(&path), &self.share(entry)?)?;
+        Ok(vec![path])
+    }
+
+    fn finish(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Result<()> {
+        io::create_folder(folder.join("annotations"))?;
+        Part::ALL.iter().try_for_each(|&part| {
+            let path = folder.join("annotations").join(format!("instances_{}.json", part.name()));
+            let shares = samples.iter().filter(|sample| sample.part == part);
+            io::write_through(&path, |out| join(out, folder, classes, shares))
+        })
+    }
+}
+
+impl Coco {
+    fn share(&self, entry: &Entry<'_>) -> Result<Share> {
+        let [width, height] = entry.sample.labels.image;
+        let file_name = format!("{:06}.{}", entry.k, self.pictures.extension());
+        let image = CocoImage { id: entry.k, file_name, width, height };
+        let annotations = entry.labelled.iter().filter_map(|label| self.annotation(entry.k, label).transpose());
+        Ok(Share { image, annotations: annotations.collect::<Result<_>>()? })
+    }
+
+    /// None for an object without a box.
+    fn annotation(&self, k: u64, label: &Labelled<'_>) -> Result<Option<Annotation>> {
+        let object = label.object;
+        let (b, mask) = self.boxes.of(object);
+        if b.is_empty() {
+            return Ok(None);
+        }
+        Ok(Some(Annotation {
+            id: annotation_id(k, object.id.0)?,
+            image_id: k,
+            category_id: label.class + 1,
+            bbox: [b.x0, b.y0, b.width(), b.height()],
+            area: mask.area(),
+            iscrowd: u8::from(label.ignored),
+            visible_fraction: object.visible_fraction,
+            topmost: object.is_topmost(),
+            segmentation: self.segmentation(mask, label.ignored),
+        }))
+    }
+
+    fn segmentation(&self, mask: &Mask, ignored: bool) -> Segmentation {
+        let polygons = match self.masks {
+            CocoMask::Polygon if !ignored => trace::polygons(mask),
+            _ => Vec::new(),
+        };
+        // Readers do not take a list without polygons.
+        if polygons.is_empty() {
+            return Segmentation::Runs(mask.clone());
+        }
+        Segmentation::Polygons(polygons.iter().map(|ring| ring.iter().flat_map(|p| [p.x, p.y]).collect()).collect())
+    }
+}
+
+fn annotation_id(k: u64, object: u32) -> Result<u64> {
+    let id = Some(u64::from(object)).filter(|&id| (1..IDS_PER_IMAGE).contains(&id));
+    let id = id.and_then(|id| k.checked_mul(IDS_PER_IMAGE)?.checked_add(id));
+    id.ok_or_else(|| {
+        Error::value("labels.objects", format!("object {object}, expected 1 to {} for COCO", IDS_PER_IMAGE - 1))
+    })
+}
+
+/// Writes the document of a part, one image or annotation a line; holds one image's share at a time.
+fn join<'a>(
+    out: &mut dyn Write,
+    folder: &Path,
+    classes: &[String],
+    samples: impl Iterator<Item = &'a Written>,
+) -> std::io::Result<()> {
+    writeln!(out, "{{\"info\":{{\"description\":\"petcomp {}\"}},", env!("CARGO_PKG_VERSION"))?;
+    let category = |(i, name)| serde_json::json!({ "id": i + 1, "name": name, "supercategory": "object" });
+    let categories: Vec<_> = classes.iter().enumerate().map(category).collect();
+    writeln!(out, "\"categories\":{},", serde_json::Value::from(categories))?;
+    let mut images = Vec::new();
+    write!(out, "\"annotations\":[")?;
+    let mut comma = "\n";
+    for sample in samples {
+        let share: Share = io::read_json(folder.join(sample.file(KIND)?)).map_err(std::io::Error::other)?;
+        images.push(share.image);
+        for annotation in &share.annotations {
+            write!(out, "{comma}{}", serde_json::to_string(annotation)?)?;
+            comma = ",\n";
+        }
+    }
+    write!(out, "],\n\"images\":[")?;
+    comma = "\n";
+    for image in &images {
+        write!(out, "{comma}{}", serde_json::to_string(image)?)?;
+        comma = ",\n";
+    }
+    writeln!(out, "]}}")
+}

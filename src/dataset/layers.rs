@@ -1,0 +1,129 @@
+//! One EXR file for each image with everything a compositor asks for.
+
+use crate::dataset::{Entry, Part, Writer};
+use crate::error::Result;
+use crate::io;
+use crate::io::exr::write_channels;
+use crate::label::LabelOptions;
+use crate::pixel::{LinearRgb, ObjectId};
+use crate::render::{Cryptomatte, DeepImage, DeepSample};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Writes `layers/{train,val}/NNNNNN.exr`: the scene-linear picture and what it was put together from, as 32-bit floats.
+///
+/// | channels | meaning |
+/// | --- | --- |
+/// | `R G B A` | the picture |
+/// | `Z` | depth of the nearest object that is seen, metres along the optical axis; infinite where there is none |
+/// | `shadow.R G B` | factor on the background |
+/// | `CryptoObject00.R` ... | Cryptomatte: which objects, and how much of each is seen |
+/// | `object003.R G B A` | light of one object that reaches the eye, and its seen share (`cards`) |
+/// | `object003.Z`, `amodal003.A` | its depth, and its coverage as if alone (`cards`) |
+///
+/// Objects are called `object003_CLASS` in the Cryptomatte's list. Without film,
+/// `RGB = sum of object RGB + background * shadow * (1 - sum of object A)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Layers {
+    /// Also the layers of each object. Default: no.
+    pub cards: bool,
+}
+
+/// Its folder.
+const KIND: &str = "layers";
+
+/// A channel's name and samples.
+type Plane = (String, Vec<f32>);
+
+impl Writer for Layers {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "layers": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        Part::ALL.iter().try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
+        let names: Vec<_> = sample.labels.objects.iter().map(|o| (o.id, name(o.id, o.class, entry.classes))).collect();
+        let ids = Cryptomatte::new(&sample.deep, "CryptoObject", &names);
+        let mut planes = picture(entry);
+        planes.extend(ids.channels);
+        if self.cards {
+            planes.extend(sample.labels.objects.iter().flat_map(|object| card(&sample.deep, object.id)));
+        }
+        let borrowed: Vec<_> = planes.iter().map(|(name, plane)| (name.as_str(), plane.as_slice())).collect();
+        let mut notes = ids.metadata;
+        notes.push(("petcomp:recipe".into(), entry.recipe_hash.into()));
+        notes.push(("petcomp:seed".into(), entry.seed.to_string()));
+        notes.push(("petcomp:sample".into(), entry.k.to_string()));
+        write_channels(folder.join(&path), sample.frame.size(), &borrowed, &notes)?;
+        Ok(vec![path])
+    }
+}
+
+fn name(id: ObjectId, class: u32, classes: &[String]) -> String {
+    let class = classes.get(class as usize).cloned().unwrap_or_else(|| class.to_string());
+    format!("object{:03}_{class}", id.0)
+}
+
+/// The picture, its depth and its shadows.
+fn picture(entry: &Entry<'_>) -> Vec<Plane> {
+    let (frame, deep) = (&entry.sample.frame, &entry.sample.deep);
+    let of = |f: &dyn Fn(usize) -> f32| (0..frame.pixels().len()).map(f).collect::<Vec<f32>>();
+    let at = |i: usize| frame.pixels()[i];
+    let mut planes: Vec<Plane> = vec![
+        ("R".into(), of(&|i| at(i).r)),
+        ("G".into(), of(&|i| at(i).g)),
+        ("B".into(), of(&|i| at(i).b)),
+        ("A".into(), of(&|i| at(i).a)),
+        ("Z".into(), each(deep, nearest)),
+    ];
+    let shadow: [fn(LinearRgb) -> f32; 3] = [|s| s.r, |s| s.g, |s| s.b];
+    for (channel, value) in ["R", "G", "B"].into_iter().zip(shadow) {
+        let plane = deep.shadow().pixels().iter().map(|&s| value(s)).collect();
+        planes.push((format!("shadow.{channel}"), plane));
+    }
+    planes
+}
+
+/// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
+fn nearest(samples: &[DeepSample]) -> f32 {
+    let least = LabelOptions::default().alpha_threshold;
+    samples.iter().find(|sample| sample.visible > least).map_or(f32::INFINITY, |sample| sample.depth.0)
+}
+
+/// One channel of an object.
+struct Channel {
+    layer: &'static str,
+    name: &'static str,
+    value: fn(&DeepSample) -> f32,
+    /// Where the object is not.
+    none: f32,
+}
+
+/// The channels of an object.
+const CARD: [Channel; 6] = [
+    Channel { layer: "object", name: "R", value: |s| s.light.r, none: 0.0 },
+    Channel { layer: "object", name: "G", value: |s| s.light.g, none: 0.0 },
+    Channel { layer: "object", name: "B", value: |s| s.light.b, none: 0.0 },
+    Channel { layer: "object", name: "A", value: |s| s.visible, none: 0.0 },
+    Channel { layer: "object", name: "Z", value: |s| s.depth.0, none: f32::INFINITY },
+    Channel { layer: "amodal", name: "A", value: |s| s.alpha, none: 0.0 },
+];
+
+fn card(deep: &DeepImage, id: ObjectId) -> Vec<Plane> {
+    let plane = |Channel { layer, name, value, none }: &Channel| {
+        let own = |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(*none, value);
+        (format!("{layer}{:03}.{name}", id.0), each(deep, own))
+    };
+    CARD.iter().map(plane).collect()
+}
+
+/// One value for each pixel.
+fn each(deep: &DeepImage, value: impl Fn(&[DeepSample]) -> f32) -> Vec<f32> {
+    let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
+    pixels.map(|(x, y)| value(deep.at(x, y))).collect()
+}

@@ -1,0 +1,107 @@
+//! The images of a dataset, part by part, and a choice of them: lists that trainers read, without copies.
+
+use crate::dataset::yolo_yaml::DataYaml;
+use crate::dataset::{Part, Record};
+use crate::error::{Error, Result};
+use crate::io;
+use std::path::{Path, PathBuf};
+
+/// Images for training and for validation, in order; none is a copy.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Listing {
+    /// Absolute paths of the images for training.
+    pub train: Vec<PathBuf>,
+    /// Absolute paths of those for validation.
+    pub val: Vec<PathBuf>,
+    /// Names of the classes, in order.
+    pub classes: Vec<String>,
+}
+
+impl Listing {
+    /// Reads the `data.yaml` of a folder, whose parts are folders of images (in order of name) or lists (`.txt`).
+    ///
+    /// # Errors
+    /// No `data.yaml`; a folder or list that cannot be read.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
+        let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
+        let images = |part| yaml.folder(part).map_or(Ok(Vec::new()), |part| images(&folder, part));
+        Ok(Self { train: images(Part::Train)?, val: images(Part::Val)?, classes: yaml.names().to_vec() })
+    }
+
+    /// All images in order of name: the series as it was taken.
+    pub fn series(&self) -> Vec<PathBuf> {
+        let mut all: Vec<PathBuf> = self.train.iter().chain(&self.val).cloned().collect();
+        all.sort_by(|a, b| a.file_name().cmp(&b.file_name()).then_with(|| a.cmp(b)));
+        all
+    }
+
+    /// The first part of the images for training and the first part of those for validation, as the paper takes 25 % of
+    /// its photos "from the beginning".
+    ///
+    /// # Errors
+    /// A share that is not in `0..=1`.
+    pub fn head(&self, share: f64) -> Result<Self> {
+        if !(0.0..=1.0).contains(&share) {
+            return Err(Error::value("head", format!("{share}, expected a share, 0 to 1")));
+        }
+        let head = |images: &[PathBuf]| images[..(images.len() as f64 * share).round() as usize].to_vec();
+        Ok(Self { train: head(&self.train), val: head(&self.val), classes: self.classes.clone() })
+    }
+
+    /// Writes `train.txt`, `val.txt` and `data.yaml`, paths relative to the folder.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        io::create_folder(folder)?;
+        let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
+        for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
+            // Trainers take `./` for the folder of the list.
+            let line = |path: &PathBuf| format!("./{}\n", io::relative(path, &folder).display());
+            io::write_text(folder.join(format!("{}.txt", part.name())), &images.iter().map(line).collect::<String>())?;
+        }
+        io::write_text(folder.join("data.yaml"), &DataYaml::write_with(&self.classes, |part| format!("{part}.txt")))
+    }
+}
+
+/// The images of a part.
+fn images(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
+    let path = folder.join(part);
+    if part.ends_with(".txt") {
+        let from = path.parent().unwrap_or(folder).to_path_buf();
+        let text = io::read_text(&path)?;
+        return Ok(text.lines().filter(|line| !line.is_empty()).map(|line| plain(&from.join(line))).collect());
+    }
+    let entries = std::fs::read_dir(&path).map_err(|e| Error::file(&path, e))?;
+    let mut images: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|path| is_image(path)).collect();
+    images.sort();
+    Ok(images)
+}
+
+/// The same path without `.` and `..`.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for step in path.components() {
+        match step {
+            std::path::Component::CurDir => {}
+            std::path::Component::ParentDir => drop(plain.pop()),
+            step => plain.push(step),
+        }
+    }
+    plain
+}
+
+pub(crate) fn is_image(path: &Path) -> bool {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    extension.is_some_and(|e| ["png", "jpg", "jpeg", "tif", "tiff"].contains(&e.as_str()))
+}
+
+/// What is known of an image: its sidecar.
+///
+/// # Errors
+/// When there is none beside it.
+pub(crate) fn record_of(image: &Path) -> Result<Record> {
+    let swapped: PathBuf = image.iter().map(|step| if step == "images" { "scenes".as_ref() } else { step }).collect();
+    io::read_json(swapped.with_extension("json"))
+}

@@ -1,0 +1,158 @@
+//! Joins the shards of a dataset: the folder that a single run would have made.
+
+use crate::dataset::folder::{self, IDENTITY};
+use crate::dataset::journal::{Finished, Line, lines_of};
+use crate::dataset::run::{Progress, run};
+use crate::dataset::times::Times;
+use crate::dataset::{LabelSetup, Numbers, Pictures, Plan, Report, Shard, Sidecar, Writer};
+use crate::error::{Error, Result};
+use crate::io;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Copies the samples of shards into one folder, checks each file against its checksum, and joins the files of many
+/// samples.
+///
+/// The folder is then, byte for byte, what one run without shards makes. Nothing is taken from the shards. A merge that
+/// was interrupted goes on when it is called again.
+///
+/// # Errors
+/// Folders that are no shards, or not all of one dataset: another recipe, seed or program (the message names the field),
+/// a shard that is missing or given twice, a sample that is missing; a file that is not as it was written. As
+/// [`generate`](crate::dataset::generate) for the folder that is written.
+pub fn merge(
+    shards: &[PathBuf],
+    folder: &Path,
+    progress: &(dyn Fn(Progress) + Sync),
+    stop: &AtomicBool,
+) -> Result<Report> {
+    let identity = common(shards)?;
+    let count = identity.count;
+    let mut lines = BTreeMap::new();
+    for shard in shards {
+        lines.extend(lines_of(shard)?.into_iter().map(|line| (line.k, (shard, line))));
+    }
+    if let Some(k) = (0..count).find(|k| !lines.contains_key(k)) {
+        let shard = &shards[identity.place[(k % identity.of) as usize]];
+        return Err(Error::file(shard, format!("sample {k} is missing: finish this shard first")));
+    }
+    let plan = plan(identity.document, count, folder)?;
+    let copy = |k| {
+        let (shard, line): &(&PathBuf, Line) = &lines[&k];
+        line.files.iter().try_for_each(|file| copy(shard, folder, file))?;
+        Ok((line.clone(), Times::default()))
+    };
+    run(&plan, copy, progress, stop)
+}
+
+/// What all shards say of themselves.
+struct Common {
+    /// What the dataset was made from, without the shard.
+    document: Map<String, Value>,
+    of: u64,
+    count: u64,
+    /// Where in the list each shard is, in order of index.
+    place: Vec<usize>,
+}
+
+fn common(shards: &[PathBuf]) -> Result<Common> {
+    let mut first: Option<(Value, u64, u64)> = None;
+    let mut place = BTreeMap::new();
+    for (i, path) in shards.iter().enumerate() {
+        let (document, Share { shard, count }) = open(path)?;
+        if let Some((before, of, of_count)) = &first {
+            let said = json!({ "of": of, "count": of_count, "dataset": before });
+            let says = json!({ "of": shard.of, "count": count, "dataset": document });
+            folder::same(&said, &says, "").map_err(|(at, what)| {
+                Error::value(at.trim_start_matches("dataset."), what).in_file(path.join(IDENTITY))
+            })?;
+        } else {
+            first = Some((document, shard.of, count));
+        }
+        if let Some(twin) = place.insert(shard.index, i) {
+            return Err(Error::file(path, format!("is shard {shard}, as {} is", shards[twin].display())));
+        }
+    }
+    let (document, of, count) = first.ok_or_else(|| Error::value("shards", "none, expected their folders"))?;
+    if let Some(index) = (1..=of).find(|index| !place.contains_key(index)) {
+        return Err(Error::value("shards", format!("shard {index}/{of} is missing")));
+    }
+    let document = document.as_object().cloned().unwrap_or_default();
+    Ok(Common { document, of, count, place: place.into_values().collect() })
+}
+
+/// What the folder of a shard says of its share.
+#[derive(serde::Deserialize)]
+struct Share {
+    #[serde(flatten)]
+    shard: Shard,
+    count: u64,
+}
+
+/// What a shard's folder was made from, and which share it is.
+fn open(path: &Path) -> Result<(Value, Share)> {
+    let document = folder::identity(path)?;
+    let mut document = document.ok_or_else(|| Error::file(path, format!("no {IDENTITY}, expected a shard")))?;
+    let share = document.as_object_mut().and_then(|map| map.remove("shard"));
+    let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
+    let share = serde_json::from_value(share).map_err(|e| Error::value("shard", e).in_file(path.join(IDENTITY)))?;
+    Ok((document, share))
+}
+
+/// The plan that a dataset was made with, but for where its samples come from.
+fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
+    let said: Vec<Map<String, Value>> = field(&mut document, "writers")?;
+    let pictures = match said.iter().find(|settings| settings.contains_key("pictures")) {
+        Some(settings) => field(&mut settings.clone(), "pictures")?,
+        None => Pictures::default(),
+    };
+    let writers = said.into_iter().flatten().map(|(name, settings)| writer(&name, settings, &pictures));
+    Ok(Plan {
+        folder: folder.into(),
+        count,
+        numbers: Numbers::All,
+        seed: field(&mut document, "seed")?,
+        recipe: field(&mut document, "recipe")?,
+        classes: field(&mut document, "classes")?,
+        split: field(&mut document, "split")?,
+        obstructed: field(&mut document, "obstructed")?,
+        writers: writers.collect::<Result<_>>()?,
+    })
+}
+
+fn field<T: serde::de::DeserializeOwned>(document: &mut Map<String, Value>, name: &str) -> Result<T> {
+    serde_json::from_value(document.remove(name).unwrap_or_default()).map_err(|e| Error::value(name, e))
+}
+
+/// The writer of a name and settings, as [`Writer::settings`] told them.
+fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Writer>> {
+    let wrong = |e: serde_json::Error| Error::value(format!("writers.{name}"), e);
+    match name {
+        "pictures" => Ok(Box::new(*pictures)),
+        "sidecar" => Ok(Box::new(Sidecar)),
+        format => {
+            let mut setup = json!({ "formats": [format] });
+            if settings.as_object().is_some_and(|map| !map.is_empty()) {
+                setup[format] = settings;
+            }
+            let setup: LabelSetup = serde_json::from_value(setup).map_err(wrong)?;
+            let unknown = || Error::value(format!("writers.{name}"), "no such layout");
+            setup.writers(pictures).into_iter().next().ok_or_else(unknown)
+        }
+    }
+}
+
+/// Copies a file and looks whether it arrived as it was written.
+fn copy(shard: &Path, folder: &Path, file: &Finished) -> Result<()> {
+    let path = Path::new(&file.path);
+    let place = folder.join(path);
+    io::create_folder(place.parent().unwrap_or(folder))?;
+    io::copy(shard.join(path), &place)?;
+    let arrived = Finished::of(folder, path)?;
+    if arrived != *file {
+        return Err(Error::file(shard.join(path), "has other bytes than when it was written"));
+    }
+    Ok(())
+}

@@ -1,0 +1,213 @@
+//! Which samples of a dataset a run makes: all, one machine's share, or one.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// Which samples of a dataset a run makes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Numbers {
+    /// All that are missing.
+    #[default]
+    All,
+    /// Those of a shard that are missing.
+    Shard(Shard),
+    /// This one, whether it is there or not.
+    One(u64),
+}
+
+impl Numbers {
+    /// Sample `k` is one of them.
+    pub fn contains(self, k: u64) -> bool {
+        match self {
+            Self::All => true,
+            Self::Shard(shard) => shard.contains(k),
+            Self::One(one) => k == one,
+        }
+    }
+}
+
+/// A share of the samples, every `of`-th: each machine makes its own and none has to know of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shard {
+    /// Which one, from 1.
+    pub index: u64,
+    /// Of how many.
+    pub of: u64,
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl Shard {
+    /// The shard, if there can be such a one.
+    ///
+    /// # Errors
+    /// An index that is not in `1..=of`.
+    pub fn new(index: u64, of: u64) -> Result<Self> {
+        let shard = Self { index, of };
+        match index {
+            0 => Err(Error::value("shard", format!("{shard}, expected 1/{of} to {of}/{of}"))),
+            _ if index > of => Err(Error::value("shard", format!("{shard}, expected at most {of}/{of}"))),
+            _ => Ok(shard),
+        }
+    }
+
+    /// Sample `k` belongs to it.
+    pub fn contains(self, k: u64) -> bool {
+        k % self.of == self.index - 1
+    }
+
+    /// Name of its folder: names in order are shards in order.
+    pub fn folder(self) -> String {
+        let digits = self.of.to_string().len();
+        format!("shard-{:0digits$}-of-{}", self.index, self.of)
+    }
+}
+
+/// What `--shard` says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShardChoice {
+    /// `3/8`.
+    Given(Shard),
+    /// `auto` or `auto/8`: what the cluster's environment says, see [`ShardChoice::within`].
+    Auto {
+        /// Number of shards, where the environment does not tell.
+        of: Option<u64>,
+    },
+}
+
+impl FromStr for ShardChoice {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let wrong = || Error::value("shard", format!("\"{text}\", expected I/N, auto or auto/N"));
+        let number = |digits: &str| digits.parse::<u64>().map_err(|_| wrong());
+        match text.split_once('/') {
+            None if text == "auto" => Ok(Self::Auto { of: None }),
+            None => Err(wrong()),
+            Some(("auto", of)) => Ok(Self::Auto { of: Some(number(of)?) }),
+            Some((index, of)) => Shard::new(number(index)?, number(of)?).map(Self::Given),
+        }
+    }
+}
+
+impl ShardChoice {
+    /// The shard that is meant, `variable` telling the environment's variables.
+    ///
+    /// `auto` understands the tasks of a Slurm array (`SLURM_ARRAY_TASK_ID` with `_MIN`, `_MAX`, `_STEP` and `_COUNT`) and
+    /// the pods of an indexed Kubernetes job (`JOB_COMPLETION_INDEX`, from 0; `auto/N` says of how many, since Kubernetes
+    /// does not).
+    ///
+    /// # Errors
+    /// An environment of neither; an array with gaps; numbers that cannot be right.
+    pub fn within(self, variable: impl Fn(&str) -> Option<String>) -> Result<Shard> {
+        let of = match self {
+            Self::Given(shard) => return Ok(shard),
+            Self::Auto { of } => of,
+        };
+        let number = |name: &str| -> Result<Option<u64>> {
+            let read = |text: String| {
+                text.trim().parse().map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+            };
+            variable(name).map(read).transpose()
+        };
+        if let Some(id) = number("SLURM_ARRAY_TASK_ID")? {
+            return slurm(id, of, number);
+        }
+        match (number("JOB_COMPLETION_INDEX")?, of) {
+            (Some(index), Some(of)) => Shard::new(index + 1, of),
+            (Some(_), None) => Err(Error::value("shard", "Kubernetes does not tell the number of shards: say auto/N")),
+            (None, _) => {
+                let what = "auto, but neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
+                Err(Error::value("shard", what))
+            }
+        }
+    }
+}
+
+/// The share of a task of a Slurm array.
+fn slurm(id: u64, of: Option<u64>, number: impl Fn(&str) -> Result<Option<u64>>) -> Result<Shard> {
+    let first = number("SLURM_ARRAY_TASK_MIN")?.unwrap_or(0);
+    let step = number("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
+    let count = number("SLURM_ARRAY_TASK_COUNT")?;
+    let last = number("SLURM_ARRAY_TASK_MAX")?;
+    if let (Some(count), Some(last)) = (count, last)
+        && (count == 0 || last.checked_sub(first) != (count - 1).checked_mul(step))
+    {
+        let what = format!("{count} tasks from {first} to {last}: tasks are missing, expected all of 1-N");
+        return Err(Error::value("SLURM_ARRAY_TASK_COUNT", what));
+    }
+    let Some(of) = of.or(count) else {
+        return Err(Error::value("shard", "SLURM_ARRAY_TASK_COUNT is not set: say auto/N"));
+    };
+    match id.checked_sub(first) {
+        Some(past) => Shard::new(past / step + 1, of),
+        None => Err(Error::value("SLURM_ARRAY_TASK_ID", format!("{id}, expected at least {first}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn within(text: &str, variables: &[(&str, &str)]) -> std::result::Result<String, String> {
+        let find = |name: &str| variables.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string());
+        let shard = text.parse::<ShardChoice>().and_then(|choice| choice.within(find));
+        shard.map(|s| s.to_string()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn every_sample_belongs_to_one_shard() {
+        for of in 1..7 {
+            let shards: Vec<Shard> = (1..=of).map(|index| Shard::new(index, of).unwrap()).collect();
+            assert!((0..50).all(|k| shards.iter().filter(|s| s.contains(k)).count() == 1));
+        }
+    }
+
+    #[test]
+    fn a_shard_is_given_by_hand() {
+        assert_eq!(within("3/8", &[]).unwrap(), "3/8");
+        assert_eq!(within("0/8", &[]).unwrap_err(), "shard: 0/8, expected 1/8 to 8/8");
+        assert_eq!(within("9/8", &[]).unwrap_err(), "shard: 9/8, expected at most 8/8");
+        for wrong in ["3", "3/", "a/b", "auto/x", ""] {
+            assert!(within(wrong, &[]).unwrap_err().contains("expected I/N, auto or auto/N"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_slurm_array_tells_the_shard() {
+        let array = |id, min, max, step, count| {
+            let v = [("ID", id), ("MIN", min), ("MAX", max), ("STEP", step), ("COUNT", count)];
+            let named: Vec<(String, &str)> = v.iter().map(|(n, v)| (format!("SLURM_ARRAY_TASK_{n}"), *v)).collect();
+            let named: Vec<(&str, &str)> = named.iter().map(|(n, v)| (n.as_str(), *v)).collect();
+            within("auto", &named)
+        };
+        assert_eq!(array("3", "1", "4", "1", "4").unwrap(), "3/4");
+        assert_eq!(array("0", "0", "6", "2", "4").unwrap(), "1/4");
+        assert_eq!(array("6", "0", "6", "2", "4").unwrap(), "4/4");
+        assert!(array("7", "0", "7", "1", "3").unwrap_err().contains("tasks are missing"));
+        assert!(array("x", "0", "7", "1", "8").unwrap_err().contains("\"x\", expected a number"));
+    }
+
+    #[test]
+    fn an_indexed_job_tells_its_index_but_not_of_how_many() {
+        let pod = [("JOB_COMPLETION_INDEX", "0")];
+        assert_eq!(within("auto/8", &pod).unwrap(), "1/8");
+        assert!(within("auto", &pod).unwrap_err().contains("say auto/N"));
+        assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).is_err());
+        assert!(within("auto", &[]).unwrap_err().contains("neither"));
+    }
+
+    #[test]
+    fn folders_of_shards_are_in_order() {
+        let names: Vec<String> = (1..=12).map(|i| Shard { index: i, of: 12 }.folder()).collect();
+        assert!(names.is_sorted());
+        assert_eq!(names[0], "shard-01-of-12");
+    }
+}

@@ -1,0 +1,200 @@
+//! Sharing images out for training and validation, and what leaks from one to the other.
+
+use crate::dataset::listing::{Listing, record_of};
+use crate::dataset::near::{Near, near_pairs};
+use crate::error::{Error, Result};
+use crate::scene::Draws;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// How images are shared out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sharing {
+    /// The first ones for training, the last for validation, as the paper does with series of photos; so many between
+    /// them for neither.
+    Consecutive {
+        /// Images that are left out.
+        guard: usize,
+    },
+    /// Groups stay together.
+    Grouped(Group),
+    /// Each for itself.
+    Random,
+}
+
+/// What images may have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Group {
+    /// The photo of the place.
+    Background,
+    /// The choice of objects and their photos.
+    Selection,
+}
+
+impl Group {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Background, Self::Selection];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Background => "background",
+            Self::Selection => "selection",
+        }
+    }
+}
+
+impl FromStr for Group {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let known = Self::ALL.into_iter().find(|group| group.name() == text);
+        known.ok_or_else(|| Error::value("group", format!("\"{text}\", expected background or selection")))
+    }
+}
+
+/// What training and validation have in common.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Leaks {
+    /// For each [`Group`] that is known of the images: groups of the images for validation, and how many of them also
+    /// occur in training.
+    pub groups: Vec<(&'static str, [usize; 2])>,
+    /// Images for validation that look like one for training.
+    pub near: Vec<Near>,
+}
+
+impl Listing {
+    /// Shares the images out anew, in order of name: `ratio` of them for training.
+    ///
+    /// # Errors
+    /// A ratio outside 0..1; groups of images without sidecars.
+    pub fn shared(&self, how: Sharing, ratio: f64, seed: u64) -> Result<Self> {
+        if !(ratio > 0.0 && ratio < 1.0) {
+            return Err(Error::value("ratio", format!("{ratio}, expected a share between 0 and 1")));
+        }
+        let all = self.series();
+        let train = (all.len() as f64 * ratio).round() as usize;
+        let parts = match how {
+            Sharing::Consecutive { guard } => [all[..train].to_vec(), all[(train + guard).min(all.len())..].to_vec()],
+            Sharing::Random => {
+                let own = |i: usize| i.to_string();
+                grouped(&all, &(0..all.len()).map(own).collect::<Vec<_>>(), train, seed)
+            }
+            Sharing::Grouped(group) => grouped(&all, &groups(&all, group)?, train, seed),
+        };
+        let [train, val] = parts;
+        Ok(Self { train, val, classes: self.classes.clone() })
+    }
+
+    /// What leaks from training to validation; images are near when they differ by less than `near_codes` (root mean
+    /// square of 8-bit grey values of a small copy).
+    ///
+    /// # Errors
+    /// An image that cannot be read.
+    pub fn leaks(&self, near_codes: f64) -> Result<Leaks> {
+        let shared = |group: Group| {
+            let of = |images: &[PathBuf]| groups(images, group).map(BTreeSet::from_iter);
+            let (train, val): (BTreeSet<String>, BTreeSet<String>) = (of(&self.train).ok()?, of(&self.val).ok()?);
+            Some((group.name(), [val.len(), val.intersection(&train).count()]))
+        };
+        let groups = Group::ALL.into_iter().filter_map(shared).collect();
+        Ok(Leaks { groups, near: near_pairs(&self.train, &self.val, near_codes)? })
+    }
+}
+
+/// The group of each image.
+fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
+    let of = |image: &PathBuf| -> Result<String> {
+        let scene = record_of(image)?.drawn;
+        Ok(match group {
+            Group::Background => scene.plate,
+            Group::Selection => {
+                let mut things: Vec<_> = scene.objects.iter().map(|o| format!("{}/{}", o.asset, o.photo)).collect();
+                things.sort();
+                things.join(" ")
+            }
+        })
+    };
+    images.par_iter().map(of).collect()
+}
+
+/// Groups in an order of chance go to validation until it has its share; the rest is for training.
+fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [Vec<PathBuf>; 2] {
+    let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
+    groups.iter().for_each(|group| *sizes.entry(group).or_default() += 1);
+    let mut order: Vec<(&str, usize)> = sizes.into_iter().collect();
+    order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
+    let wanted = images.len() - train;
+    let mut val = BTreeSet::new();
+    let mut taken = 0;
+    for (group, size) in order {
+        // A group is taken when the share comes closer by it.
+        if taken < wanted && (taken + size).abs_diff(wanted) <= wanted - taken {
+            taken += size;
+            val.insert(group);
+        }
+    }
+    let of = |want: bool| {
+        let pairs = images.iter().zip(groups);
+        pairs.filter(|(_, group)| val.contains(group.as_str()) == want).map(|(image, _)| image.clone()).collect()
+    };
+    [of(false), of(true)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn listing(n: usize) -> Listing {
+        Listing { train: (0..n).map(|i| format!("/d/images/{i:04}.png").into()).collect(), ..Listing::default() }
+    }
+
+    #[test]
+    fn the_paper_s_series_is_cut_once() {
+        let cut = listing(2031).shared(Sharing::Consecutive { guard: 0 }, 0.8, 0).unwrap();
+        // 80 % of 2031 is 1624.8; the paper says 1624 or, rounded, 1625.
+        assert_eq!((cut.train.len(), cut.val.len()), (1625, 406));
+        assert!(cut.train.last() < cut.val.first());
+        let guarded = listing(100).shared(Sharing::Consecutive { guard: 5 }, 0.8, 0).unwrap();
+        assert_eq!((guarded.train.len(), guarded.val.len()), (80, 15));
+    }
+
+    #[test]
+    fn a_random_split_depends_on_the_seed_alone() {
+        let split = |seed| listing(200).shared(Sharing::Random, 0.75, seed).unwrap();
+        assert_eq!((split(1).train.len(), split(1).val.len()), (150, 50));
+        assert_eq!(split(1), split(1));
+        assert_ne!(split(1).val, split(2).val);
+    }
+
+    #[test]
+    fn groups_stay_together() {
+        let images = listing(90).train;
+        let names: Vec<String> = (0..90).map(|i| format!("g{}", i % 9)).collect();
+        let [train, val] = grouped(&images, &names, 72, 3);
+        assert_eq!((train.len(), val.len()), (70, 20));
+        let of = |image: &PathBuf| names[images.iter().position(|i| i == image).unwrap()].clone();
+        let (a, b): (BTreeSet<String>, BTreeSet<String>) =
+            (train.iter().map(of).collect(), val.iter().map(of).collect());
+        assert!(a.is_disjoint(&b));
+    }
+
+    #[test]
+    fn the_head_is_taken_of_both_parts() {
+        let split = listing(100).shared(Sharing::Consecutive { guard: 0 }, 0.8, 0).unwrap().head(0.25).unwrap();
+        assert_eq!((split.train.len(), split.val.len()), (20, 5));
+        assert!(listing(3).head(1.5).is_err() && listing(3).shared(Sharing::Random, 1.0, 0).is_err());
+    }
+
+    #[test]
+    fn a_listing_reads_back_from_any_folder() {
+        let dir = tempfile::tempdir().unwrap();
+        let root = std::path::absolute(dir.path()).unwrap();
+        let image = |part: &str| root.join(format!("images/{part}/0.png"));
+        let listing = Listing { train: vec![image("train")], val: vec![image("val")], classes: vec!["a: b".into()] };
+        listing.write(&root.join("splits/one")).unwrap();
+        assert_eq!(Listing::read(&root.join("splits/one")).unwrap(), listing);
+    }
+}

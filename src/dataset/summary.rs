@@ -1,0 +1,172 @@
+//! Everything a dataset on disk tells of itself, gathered for a report.
+
+use crate::dataset::folder::{self, IDENTITY};
+use crate::dataset::journal::{Line, lines_of};
+use crate::dataset::times::{RunTimes, runs_of};
+use crate::dataset::{Part, Record};
+use crate::error::{Error, Result};
+use crate::io;
+use crate::scene::Recipe;
+use rayon::prelude::*;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What a dataset's files tell.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// What it was made from: `dataset.json`.
+    pub identity: Value,
+    /// Names of the classes, in order.
+    pub classes: Vec<String>,
+    /// Images of both parts.
+    pub images: [usize; 2],
+    /// Drawn numbers by the key of their distribution in the recipe: `scale`, `start.x`, `lights[0].height`.
+    pub drawn: BTreeMap<String, Vec<f64>>,
+    /// How often each was chosen: photos of the place, assets, photos of an asset.
+    pub chosen: BTreeMap<&'static str, BTreeMap<String, u64>>,
+    /// Seen share of each object, 0 to 1.
+    pub visible: Vec<f64>,
+    /// Width and height of the box of each labelled object, pixels.
+    pub boxes: Vec<[f64; 2]>,
+    /// Objects and labels of each class, of both parts.
+    pub balance: Vec<[[u64; 2]; 2]>,
+    /// Scenes thrown away: number of the sample, and why.
+    pub rejected: Vec<(u64, String)>,
+    /// The runs that wrote it.
+    pub(crate) runs: Vec<RunTimes>,
+    /// Some of the samples, evenly spread.
+    pub shown: Vec<Shown>,
+}
+
+/// A sample to look at.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Its picture.
+    pub picture: PathBuf,
+    /// What is known of it.
+    pub record: Record,
+}
+
+/// What one sample adds.
+struct Told {
+    k: u64,
+    part: Part,
+    record: Record,
+}
+
+impl Summary {
+    /// Reads a dataset's folder; at most `most` samples are kept to be shown.
+    ///
+    /// # Errors
+    /// A folder that is no dataset, or was written without its sidecars.
+    pub fn read(folder: &Path, most: usize) -> Result<Self> {
+        let identity = folder::identity(folder)?;
+        let identity = identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
+        let lines = lines_of(folder)?;
+        let classes: Vec<String> = serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
+        let mut summary = Self {
+            images: Part::ALL.map(|part| lines.iter().filter(|line| line.part == part).count()),
+            balance: vec![[[0; 2]; 2]; classes.len()],
+            identity,
+            classes,
+            drawn: BTreeMap::new(),
+            chosen: BTreeMap::new(),
+            visible: Vec::new(),
+            boxes: Vec::new(),
+            rejected: Vec::new(),
+            runs: runs_of(folder),
+            shown: Vec::new(),
+        };
+        let shown = most.min(lines.len());
+        let places: Vec<usize> = (0..shown).map(|i| i * lines.len() / shown).collect();
+        // In steps, so that no more records are in memory than threads can read at a time.
+        for (step, part) in lines.chunks(STEP).enumerate() {
+            let told: Result<Vec<_>> = part.par_iter().map(|line| told(folder, line)).collect();
+            for (i, (told, line)) in told?.into_iter().zip(part).enumerate() {
+                summary.add(&told, line);
+                if places.binary_search(&(step * STEP + i)).is_ok() {
+                    summary.shown.push(Shown { picture: file(folder, line, "images/")?, record: told.record });
+                }
+            }
+        }
+        Ok(summary)
+    }
+
+    /// The distribution of a drawn number: least and greatest value, and whether it is a whole number.
+    pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
+        let recipe: Recipe = serde_json::from_value(self.identity["recipe"]["scene"].clone()).ok()?;
+        let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
+        let pointer = format!("/{}", key.replace('.', "/").replace('[', "/").replace(']', ""));
+        let value = recipe.pointer(&pointer)?;
+        let number = |value: &Value| value.as_f64();
+        let range = match value {
+            Value::Array(ends) if ends.len() == 2 => [number(&ends[0])?, number(&ends[1])?],
+            fixed => [number(fixed)?; 2],
+        };
+        Some((range, key == "objects"))
+    }
+
+    fn add(&mut self, told: &Told, line: &Line) {
+        let Told { k, part, record } = told;
+        for (path, &value) in &record.draws {
+            if let Some(key) = key(path) {
+                self.drawn.entry(key).or_default().push(value);
+            }
+        }
+        let mut count = |what, name: String| *self.chosen.entry(what).or_default().entry(name).or_default() += 1;
+        count("background", record.drawn.plate.clone());
+        for object in &record.drawn.objects {
+            count("asset", object.asset.clone());
+            count("photo of the asset", object.photo.to_string());
+        }
+        for object in &record.labels.objects {
+            self.visible.push(object.visible_fraction);
+            if record.labelled.contains(&object.id) {
+                self.boxes.push([object.amodal_box.width(), object.amodal_box.height()]);
+            }
+        }
+        for (class, counts) in self.balance.iter_mut().zip(&line.classes) {
+            let of = &mut class[usize::from(*part == Part::Val)];
+            *of = [of[0] + counts[0], of[1] + counts[1]];
+        }
+        self.rejected.extend(record.rejected.iter().map(|why| (*k, why.clone())));
+    }
+}
+
+/// Records that are read at a time.
+const STEP: usize = 256;
+
+fn told(folder: &Path, line: &Line) -> Result<Told> {
+    Ok(Told { k: line.k, part: line.part, record: io::read_json(file(folder, line, "scenes/")?)? })
+}
+
+/// The file of a sample in one of the dataset's folders.
+fn file(folder: &Path, line: &Line, kind: &str) -> Result<PathBuf> {
+    let file = line.files.iter().find(|file| file.path.starts_with(kind));
+    file.map(|file| folder.join(&file.path))
+        .ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
+}
+
+/// The key in the recipe of a draw's distribution; none for a choice from a list and for a turn that was drawn again.
+fn key(path: &str) -> Option<String> {
+    let choice =
+        path == "background" || path.ends_with(".asset") || path.ends_with(".photo") || path.ends_with(".file");
+    if choice || path.contains('#') {
+        return None;
+    }
+    let own = path.strip_prefix("objects[").and_then(|rest| rest.split_once("].")).map(|(_, own)| own);
+    Some(own.or(path.strip_prefix("selection.")).unwrap_or(path).to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_of_a_draw_is_that_of_its_distribution() {
+        let keys = ["objects[12].start.x", "lights[0].color[1]", "selection.objects", "selection[3].asset"].map(key);
+        assert_eq!(keys, [Some("start.x".into()), Some("lights[0].color[1]".into()), Some("objects".into()), None]);
+        assert_eq!(key("objects[1].start.yaw_deg#3"), None);
+    }
+}

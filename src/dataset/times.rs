@@ -1,0 +1,84 @@
+//! Where the time of a run goes.
+
+use serde::{Deserialize, Serialize};
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Name of the file that tells how long each run took: of the machine and the day, and no part of the dataset.
+pub(crate) const RUNS: &str = ".runs.jsonl";
+
+/// Time that samples took, by stage: the sum over samples, not over the clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Times {
+    /// Drawing, falling and coming to rest, exposure.
+    pub settle: Duration,
+    /// Casting rays and composing the picture.
+    pub render: Duration,
+    /// Labels.
+    pub label: Duration,
+    /// Encoding and writing files.
+    pub write: Duration,
+}
+
+/// A line of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RunTimes {
+    /// Samples made.
+    pub(crate) made: u64,
+    /// Threads that made them.
+    pub(crate) threads: usize,
+    /// Seconds by the clock.
+    pub(crate) wall_s: f64,
+    /// Seconds of all threads, by stage.
+    pub(crate) settle_s: f64,
+    pub(crate) render_s: f64,
+    pub(crate) label_s: f64,
+    pub(crate) write_s: f64,
+}
+
+impl std::ops::AddAssign for Times {
+    fn add_assign(&mut self, other: Self) {
+        self.settle += other.settle;
+        self.render += other.render;
+        self.label += other.label;
+        self.write += other.write;
+    }
+}
+
+impl Times {
+    /// Adds a line to the folder's list of runs. It is a note, so a disk without room for it is no error.
+    pub(crate) fn append(&self, folder: &Path, made: u64, wall: Duration) {
+        if made == 0 {
+            return;
+        }
+        let line = RunTimes {
+            made,
+            threads: rayon::current_num_threads(),
+            wall_s: wall.as_secs_f64(),
+            settle_s: self.settle.as_secs_f64(),
+            render_s: self.render.as_secs_f64(),
+            label_s: self.label.as_secs_f64(),
+            write_s: self.write.as_secs_f64(),
+        };
+        let text = serde_json::to_string(&line).map(|text| text + "\n").unwrap_or_default();
+        let file = OpenOptions::new().append(true).create(true).open(folder.join(RUNS));
+        if let Err(e) = file.and_then(|mut file| file.write_all(text.as_bytes())) {
+            log::warn!("{}: {e}", folder.join(RUNS).display());
+        }
+    }
+}
+
+/// The runs that wrote a folder.
+pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
+    let text = std::fs::read_to_string(folder.join(RUNS)).unwrap_or_default();
+    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// What a closure gives, and how long it took.
+pub(crate) fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let began = Instant::now();
+    let done = work();
+    (done, began.elapsed())
+}

@@ -1,0 +1,124 @@
+//! Labels as Pascal VOC writes them: one XML file for each image, and lists of images.
+
+use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
+use crate::error::Result;
+use crate::io;
+use crate::label::BBox;
+use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Writes `voc/{train,val}/NNNNNN.xml` and the lists `voc/{train,val}.txt`.
+///
+/// Pixels are counted from 1 and the last is inside, as in the Pascal VOC challenges. `truncated` is an object that
+/// touches the picture's edge, `occluded` one that something lies over, `difficult` one that is to be ignored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Voc {
+    /// Whether boxes are those of the whole object or of what is seen. Default: `amodal`.
+    pub boxes: Extent,
+    /// Format of the pictures that it names; in a recipe, that of `pictures`.
+    #[serde(skip)]
+    pub pictures: PictureFormat,
+}
+
+/// Its folder.
+const KIND: &str = "voc";
+
+impl Writer for Voc {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "voc": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        Part::ALL.iter().try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+    }
+
+    fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        let path = entry.path(KIND, "xml");
+        io::write_text(folder.join(&path), &self.document(entry))?;
+        Ok(vec![path])
+    }
+
+    fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
+        Part::ALL.iter().try_for_each(|&part| {
+            let numbers =
+                samples.iter().filter(|sample| sample.part == part).map(|sample| format!("{:06}\n", sample.k));
+            io::write_text(folder.join(KIND).join(format!("{}.txt", part.name())), &numbers.collect::<String>())
+        })
+    }
+}
+
+impl Voc {
+    fn document(&self, entry: &Entry<'_>) -> String {
+        let [w, h] = entry.sample.labels.image;
+        let (part, k, extension) = (entry.part.name(), entry.k, self.pictures.extension());
+        let mut xml =
+            format!("<annotation>\n  <folder>images/{part}</folder>\n  <filename>{k:06}.{extension}</filename>\n");
+        xml += "  <source>\n    <database>petcomp</database>\n  </source>\n";
+        xml +=
+            &format!("  <size>\n    <width>{w}</width>\n    <height>{h}</height>\n    <depth>3</depth>\n  </size>\n");
+        xml += "  <segmented>0</segmented>\n";
+        let objects = entry.labelled.iter().map(|label| self.object(entry, label));
+        xml.extend(objects);
+        xml + "</annotation>\n"
+    }
+
+    /// Nothing for an object without a box.
+    fn object(&self, entry: &Entry<'_>, label: &Labelled<'_>) -> String {
+        let (b, _) = self.boxes.of(label.object);
+        if b.is_empty() {
+            return String::new();
+        }
+        let name =
+            entry.classes.get(label.class as usize).map_or_else(|| label.class.to_string(), |name| escaped(name));
+        let [w, h] = entry.sample.labels.image.map(f64::from);
+        let is_cut = b.x0 <= 0.0 || b.y0 <= 0.0 || b.x1 >= w || b.y1 >= h;
+        let claims = [("truncated", is_cut), ("difficult", label.ignored), ("occluded", !label.object.is_topmost())];
+        let mut xml = format!("  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n");
+        for (claim, is_so) in claims {
+            xml += &format!("    <{claim}>{}</{claim}>\n", u8::from(is_so));
+        }
+        xml += "    <bndbox>\n";
+        for (side, at) in pixels(&b) {
+            xml += &format!("      <{side}>{at}</{side}>\n");
+        }
+        xml + "    </bndbox>\n  </object>\n"
+    }
+}
+
+/// The first and last pixels that a box touches, counted from 1.
+fn pixels(b: &BBox) -> [(&'static str, u64); 4] {
+    let first = |v: f64| libm::floor(v) as u64 + 1;
+    let last = |v: f64| libm::ceil(v) as u64;
+    [("xmin", first(b.x0)), ("ymin", first(b.y0)), ("xmax", last(b.x1)), ("ymax", last(b.y1))]
+}
+
+/// Text that XML does not take for its own; what XML cannot hold at all becomes a space.
+fn escaped(text: &str) -> String {
+    let mut xml = String::new();
+    for letter in text.chars() {
+        match letter {
+            '&' | '<' | '>' => write!(xml, "&#{};", u32::from(letter)).expect("a string takes all that is written"),
+            c if c.is_control() => xml.push(' '),
+            c => xml.push(c),
+        }
+    }
+    xml
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_of_whole_pixels_holds_its_first_and_last() {
+        let b = BBox { x0: 0.0, y0: 2.0, x1: 3.0, y1: 4.0 };
+        assert_eq!(pixels(&b).map(|(_, at)| at), [1, 3, 3, 4]);
+    }
+
+    #[test]
+    fn names_cannot_break_the_document() {
+        assert_eq!(escaped("a<b> & \u{1}"), "a&#60;b&#62; &#38;  ");
+    }
+}

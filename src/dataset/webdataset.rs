@@ -1,0 +1,110 @@
+//! Samples in tar archives that are read from front to back: WebDataset.
+
+use crate::dataset::{Entry, Part, Writer, Written};
+use crate::error::{Error, Result};
+use crate::io;
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Writes `webdataset/{train,val}-NNNNNN.tar`, each with the files of so many samples in order of number.
+///
+/// Files of a sample are called by its number: `000012.png`, `000012.json`; where two writers have one of the same
+/// kind, the later one's is called `000012.FOLDER.json` after its folder. There is no empty archive. Times and owners are
+/// zero, so the same samples give the same bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WebDataset {
+    /// Samples in an archive, at least 1. Default: 500.
+    pub samples: usize,
+}
+
+impl Default for WebDataset {
+    fn default() -> Self {
+        Self { samples: 500 }
+    }
+}
+
+/// Its folder.
+const KIND: &str = "webdataset";
+
+/// Everyone may read, the owner may write.
+const MODE: u32 = 0o644;
+
+impl Writer for WebDataset {
+    fn settings(&self) -> serde_json::Value {
+        serde_json::json!({ "webdataset": self })
+    }
+
+    fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
+        if self.samples == 0 {
+            return Err(Error::value("labels.webdataset.samples", "0, expected at least 1"));
+        }
+        io::create_folder(folder.join(KIND))
+    }
+
+    fn write(&self, _folder: &Path, _entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
+        Ok(Vec::new())
+    }
+
+    fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
+        for part in Part::ALL {
+            let of_part: Vec<_> = samples.iter().filter(|sample| sample.part == part).collect();
+            let archives: Vec<_> = of_part.chunks(self.samples.max(1)).collect();
+            for (i, samples) in archives.iter().enumerate() {
+                io::write_through(&archive(folder, part, i), |out| pack(out, folder, samples))?;
+            }
+            // A dataset that had more samples before.
+            let left_over = (archives.len()..).map(|i| archive(folder, part, i)).take_while(|path| path.exists());
+            left_over
+                .into_iter()
+                .try_for_each(|path| std::fs::remove_file(&path).map_err(|e| Error::file(&path, e)))?;
+        }
+        Ok(())
+    }
+}
+
+fn archive(folder: &Path, part: Part, i: usize) -> PathBuf {
+    folder.join(KIND).join(format!("{}-{i:06}.tar", part.name()))
+}
+
+fn pack(out: &mut dyn Write, folder: &Path, samples: &[&Written]) -> std::io::Result<()> {
+    let mut tar = tar::Builder::new(out);
+    for sample in samples {
+        for (name, file) in named(sample) {
+            let bytes = std::fs::read(folder.join(file)).map_err(|e| std::io::Error::other(Error::file(file, e)))?;
+            let mut header = tar::Header::new_ustar();
+            header.set_size(bytes.len() as u64);
+            header.set_mode(MODE);
+            header.set_mtime(0);
+            tar.append_data(&mut header, name, bytes.as_slice())?;
+        }
+    }
+    tar.finish()
+}
+
+/// The files of a sample and their names in an archive.
+fn named(sample: &Written) -> Vec<(String, &Path)> {
+    let mut named: Vec<(String, &Path)> = Vec::new();
+    for file in &sample.files {
+        let extension = file.extension().unwrap_or_default().to_string_lossy();
+        let short = format!("{:06}.{extension}", sample.k);
+        let kind = file.iter().next().unwrap_or_default().to_string_lossy();
+        let is_taken = named.iter().any(|(name, _)| *name == short);
+        named.push((if is_taken { format!("{:06}.{kind}.{extension}", sample.k) } else { short }, file));
+    }
+    named
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_one_kind_get_names_of_their_own() {
+        let files = ["images/val/000007.png", "scenes/val/000007.json", "coco/val/000007.json"].map(PathBuf::from);
+        let sample = Written { k: 7, part: Part::Val, files: files.to_vec() };
+        let names: Vec<_> = named(&sample).into_iter().map(|(name, _)| name).collect();
+        assert_eq!(names, ["000007.png", "000007.json", "000007.coco.json"]);
+    }
+}

@@ -1,0 +1,224 @@
+//! Colour profiles (ICC) that files carry: what they say their display codes are.
+//!
+//! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of one grey curve are
+//! applied; others are named in a warning and the codes taken for sRGB.
+//!
+//! # Method
+//! ICC.1:2022: curves to linear light (10.6, 10.18), the matrix of the colorant columns to XYZ under D50 (F.3), Bradford to D65
+//! (E.3), and from there to Rec. 709. Evaluated here, not by the crate that takes the profile apart, so that the bits are the
+//! same on every machine.
+
+use super::format::{Format, Source};
+use super::limits::Limits;
+use super::{jpeg, png, tiff};
+use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_xyz, srgb_to_linear};
+use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve};
+use nalgebra::Matrix3;
+
+/// CIE x, y of the connection space's white (ICC.1:2022, 7.2.16: X 0.9642, Y 1, Z 0.8249).
+const D50: [f64; 2] = [0.345_70, 0.358_54];
+/// The largest code of 16 bits, the finest that files have.
+const FULL: f32 = 65_535.0;
+/// Curves and matrices that differ by less are sRGB's, written with fewer digits or measured from a table.
+const SAME: f32 = 2e-3;
+
+/// How display codes become light, where a file says so itself.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Profile {
+    /// Linear light of each 16-bit code, for red, green and blue.
+    curves: [Vec<f32>; 3],
+    to_rec709: ColorMatrix,
+}
+
+impl Profile {
+    /// The profile in a file, if it is not sRGB anyway.
+    ///
+    /// # Errors
+    /// What a profile says that cannot be applied.
+    pub(super) fn of_file(source: &Source, limits: &Limits) -> Result<Option<Self>, String> {
+        match embedded(source, limits) {
+            Some(bytes) => Self::parsed(&bytes),
+            None => Ok(None),
+        }
+    }
+
+    fn parsed(bytes: &[u8]) -> Result<Option<Self>, String> {
+        let icc = ColorProfile::new_from_slice(bytes).map_err(|_| "a damaged colour profile")?;
+        let profile = match icc.color_space {
+            DataColorSpace::Rgb => Self::of_primaries(&icc),
+            DataColorSpace::Gray => icc.gray_trc.as_ref().and_then(table).map(|curve| Self {
+                curves: std::array::from_fn(|_| curve.clone()),
+                to_rec709: Matrix3::identity().into(),
+            }),
+            other => return Err(format!("a colour profile for {other:?}")),
+        };
+        let profile = profile.ok_or("a colour profile without primaries and curves")?;
+        Ok((!profile.is_srgb()).then_some(profile))
+    }
+
+    fn of_primaries(icc: &ColorProfile) -> Option<Self> {
+        let columns = [icc.red_colorant, icc.green_colorant, icc.blue_colorant].map(|c| [c.x, c.y, c.z]);
+        let xyz_d50_from_rgb = Matrix3::from_columns(&columns.map(Into::into));
+        let matrix = rgb_from_xyz(&RgbSpace::REC709) * bradford(RgbSpace::REC709.white, D50) * xyz_d50_from_rgb;
+        let curve = |trc: &Option<ToneReprCurve>| trc.as_ref().and_then(table);
+        let curves = [curve(&icc.red_trc)?, curve(&icc.green_trc)?, curve(&icc.blue_trc)?];
+        matrix.iter().all(|v| v.is_finite()).then(|| Self { curves, to_rec709: matrix.into() })
+    }
+
+    fn is_srgb(&self) -> bool {
+        let near = |v: f32, w: f32| (v - w).abs() < SAME;
+        let unit = ColorMatrix::from(Matrix3::identity());
+        let plain = self.to_rec709.rows.iter().flatten().zip(unit.rows.iter().flatten()).all(|(&v, &w)| near(v, w));
+        plain
+            && self
+                .curves
+                .iter()
+                .flatten()
+                .enumerate()
+                .all(|(i, &v)| near(v, srgb_to_linear((i % CODES) as f32 / FULL)))
+    }
+
+    /// Linear Rec. 709 of display values from 0 to 1.
+    #[inline]
+    pub(super) fn light(&self, display: [f32; 3]) -> [f32; 3] {
+        let light = |c: usize| self.curves[c][(display[c].clamp(0.0, 1.0) * FULL + 0.5) as usize];
+        self.to_rec709.apply([light(0), light(1), light(2)])
+    }
+}
+
+/// 16-bit codes.
+const CODES: usize = 1 << 16;
+
+/// Light of every 16-bit code; none for a curve that is not one.
+fn table(curve: &ToneReprCurve) -> Option<Vec<f32>> {
+    let light: Vec<f32> =
+        (0..CODES).map(|code| evaluate(curve, f64::from(code as u16) / f64::from(FULL)) as f32).collect();
+    light.iter().all(|v| v.is_finite()).then_some(light)
+}
+
+/// ICC.1:2022, 10.6 (tables, or a gamma of 8.8 bits) and 10.18 (functions of one to seven parameters).
+fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
+    match curve {
+        ToneReprCurve::Lut(table) => match table[..] {
+            [] => x,
+            [gamma] => libm::pow(x, f64::from(gamma) / 256.0),
+            _ => interpolated(table, x),
+        },
+        ToneReprCurve::Parametric(p) => match p.iter().map(|&v| f64::from(v)).collect::<Vec<_>>()[..] {
+            [g] => libm::pow(x, g),
+            [g, a, b] => {
+                if x >= -b / a {
+                    libm::pow(a * x + b, g)
+                } else {
+                    0.0
+                }
+            }
+            [g, a, b, c] => {
+                if x >= -b / a {
+                    libm::pow(a * x + b, g) + c
+                } else {
+                    c
+                }
+            }
+            [g, a, b, c, d] => {
+                if x >= d {
+                    libm::pow(a * x + b, g)
+                } else {
+                    c * x
+                }
+            }
+            [g, a, b, c, d, e, f] => {
+                if x >= d {
+                    libm::pow(a * x + b, g) + e
+                } else {
+                    c * x + f
+                }
+            }
+            _ => f64::NAN,
+        },
+    }
+}
+
+fn interpolated(table: &[u16], x: f64) -> f64 {
+    let at = x * (table.len() - 1) as f64;
+    let i = (at as usize).min(table.len() - 2);
+    let (low, high) = (f64::from(table[i]), f64::from(table[i + 1]));
+    (low + (high - low) * (at - i as f64)) / f64::from(FULL)
+}
+
+/// The profile as the file holds it; formats of linear light have none.
+fn embedded(source: &Source, limits: &Limits) -> Option<Vec<u8>> {
+    match source.format {
+        Format::Png => png::profile(&source.bytes, limits),
+        Format::Jpeg => jpeg::profile(&source.bytes),
+        Format::Tiff => tiff::profile(&source.bytes, limits),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::rgb_from_rgb;
+
+    fn parsed(icc: &ColorProfile) -> Option<Profile> {
+        Profile::parsed(&icc.encode().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn srgb_is_what_was_assumed_anyway() {
+        assert_eq!(parsed(&ColorProfile::new_srgb()), None);
+    }
+
+    /// SMPTE EG 432-1: P3 primaries, D65; Adobe RGB (1998): 4.3.1 and gamma 563/256.
+    #[test]
+    fn other_primaries_become_rec_709() {
+        let p3 = RgbSpace { primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]], white: [0.3127, 0.3290] };
+        let adobe = RgbSpace { primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]], white: [0.3127, 0.3290] };
+        fn gamma(v: f64) -> f64 {
+            libm::pow(v, 563.0 / 256.0)
+        }
+        fn srgb(v: f64) -> f64 {
+            f64::from(srgb_to_linear(v as f32))
+        }
+        let cases = [
+            (ColorProfile::new_display_p3(), p3, srgb as fn(f64) -> f64),
+            (ColorProfile::new_adobe_rgb(), adobe, gamma as fn(f64) -> f64),
+        ];
+        for (icc, space, curve) in cases {
+            let profile = parsed(&icc).unwrap();
+            for display in [[0.2, 0.5, 0.9], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [0.8, 0.1, 0.3]] {
+                let light = nalgebra::Vector3::from(display.map(curve));
+                let expected = rgb_from_rgb(&RgbSpace::REC709, &space) * light;
+                let got = profile.light(display.map(|v| v as f32));
+                // Colorants are stored in steps of 1/65536, and some programs round their curves to 1/256.
+                for (v, w) in got.iter().zip(expected.iter()) {
+                    assert!((f64::from(*v) - w).abs() < 1e-3, "{display:?}: {got:?}, expected {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn curves_are_those_of_the_standard() {
+        let at = |curve: ToneReprCurve, x| evaluate(&curve, x);
+        assert_eq!(at(ToneReprCurve::Lut(vec![]), 0.3), 0.3);
+        assert_eq!(at(ToneReprCurve::Lut(vec![512]), 0.5), 0.25);
+        assert_eq!(at(ToneReprCurve::Lut(vec![0, 0, 65_535]), 0.75), 0.5);
+        assert_eq!(at(ToneReprCurve::Lut(vec![0, 65_535]), 1.0), 1.0);
+        assert_eq!(at(ToneReprCurve::Parametric(vec![2.0]), 0.5), 0.25);
+        assert_eq!(at(ToneReprCurve::Parametric(vec![2.0, 1.0, -0.5]), 0.25), 0.0);
+        assert_eq!(at(ToneReprCurve::Parametric(vec![2.0, 1.0, 0.0, 0.5, 0.25]), 0.125), 0.0625);
+        assert!(table(&ToneReprCurve::Parametric(vec![1.0, 2.0])).is_none());
+    }
+
+    #[test]
+    fn damaged_profiles_are_refused_and_named() {
+        let whole = ColorProfile::new_display_p3().encode().unwrap();
+        for length in (0..whole.len()).step_by(7) {
+            // A cut may spare everything that counts.
+            let _ = Profile::parsed(&whole[..length]);
+        }
+        assert_eq!(Profile::parsed(b"profile").unwrap_err(), "a damaged colour profile");
+    }
+}

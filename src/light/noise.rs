@@ -1,0 +1,119 @@
+//! How noisy a photograph is.
+
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use crate::scene::{Noise, Scene};
+
+/// Groups of pixels of like brightness.
+const GROUPS: usize = 12;
+/// Fewer pixels tell nothing of a group.
+const FEWEST: usize = 200;
+/// Texture only makes residuals larger, so the small ones tell the noise: a quarter of a normal distribution's magnitudes
+/// lies below 0.3186 standard deviations.
+const QUARTILE: f64 = 0.318_639;
+/// Standard deviation of the residual of noise of standard deviation 1: the root of the mask's summed squares.
+const MASK_GAIN: f64 = 6.0;
+/// Values from here on may be clipped.
+const NEARLY_WHITE: f32 = 0.95;
+
+/// Turns [`Noise::MatchPlate`] of a scene's finish into the noise of its plate; any other scene comes back as it is.
+pub fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    if scene.finish.noise == Noise::MatchPlate {
+        scene.finish.noise = plate_noise(plate);
+    }
+    scene
+}
+
+/// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small to tell.
+///
+/// # Method
+/// The residual of the difference of two Laplacians, which passes over slopes and straight edges (J. Immerkær, "Fast Noise
+/// Variance Estimation", 1996); its lower quartile in groups of like brightness; a line through their variances.
+pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
+    let (width, height) = plate.size();
+    if width < 3 || height < 3 {
+        return Noise::None;
+    }
+    let mut seen: Vec<(f32, f32)> = (1..height - 1)
+        .flat_map(|y| (1..width - 1).map(move |x| (x, y)))
+        .filter_map(|(x, y)| residual(plate, x, y))
+        .collect();
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = seen.len() / GROUPS;
+    if size < FEWEST {
+        return Noise::None;
+    }
+    fit(&seen.chunks_exact(size).map(of_group).collect::<Vec<_>>())
+}
+
+/// Mean and magnitude of the residual around a pixel; none near white or where something is not finite.
+fn residual(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32)> {
+    const MASK: [f32; 9] = [1.0, -2.0, 1.0, -2.0, 4.0, -2.0, 1.0, -2.0, 1.0];
+    let at = |i: usize| plate[(x + i % 3 - 1, y + i / 3 - 1)].g;
+    let (mut mean, mut sum) = (0.0, 0.0);
+    for (i, weight) in MASK.iter().enumerate() {
+        mean += at(i) / 9.0;
+        sum += weight * at(i);
+    }
+    (mean.is_finite() && sum.is_finite() && mean < NEARLY_WHITE).then_some((mean, sum.abs()))
+}
+
+/// Mean brightness and variance of a group.
+fn of_group(group: &[(f32, f32)]) -> [f64; 2] {
+    let mean = group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64;
+    let mut residuals: Vec<f32> = group.iter().map(|p| p.1).collect();
+    let quarter = *residuals.select_nth_unstable_by(group.len() / 4, f32::total_cmp).1;
+    let sigma = f64::from(quarter) / (QUARTILE * MASK_GAIN);
+    [mean, sigma * sigma]
+}
+
+/// The line of least squares through variances over means, neither part of it negative.
+fn fit(groups: &[[f64; 2]]) -> Noise {
+    let n = groups.len() as f64;
+    let sum = |f: &dyn Fn(&[f64; 2]) -> f64| groups.iter().map(f).sum::<f64>();
+    let (x, y, xx, xy) = (sum(&|g| g[0]), sum(&|g| g[1]), sum(&|g| g[0] * g[0]), sum(&|g| g[0] * g[1]));
+    let spread = n * xx - x * x;
+    let slope = if spread > 0.0 { (n * xy - x * y) / spread } else { 0.0 };
+    let rest = (y - slope * x) / n;
+    let (shot, dark) = match (slope > 0.0, rest > 0.0) {
+        (true, true) => (slope, rest),
+        (true, false) => (xy / xx.max(f64::MIN_POSITIVE), 0.0),
+        (false, _) => (0.0, y / n),
+    };
+    Noise::Known { shot, read: dark.sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Draws;
+
+    /// A slope with noise of `shot * value + read^2`; sums of twelve uniform numbers are as good as normal.
+    fn noisy(shot: f64, read: f64) -> Image<LinearRgb> {
+        Image::from_fn(160, 120, |x, y| {
+            let value = 0.05 + 0.7 * x as f64 / 160.0 + 0.05 * (y as f64 / 9.0).sin();
+            let draws = Draws::new(1, (y * 160 + x) as u64);
+            let normal: f64 = (0..12).map(|i| draws.unit(&i.to_string())).sum::<f64>() - 6.0;
+            LinearRgb::grey((value + normal * (shot * value + read * read).sqrt()) as f32)
+        })
+    }
+
+    #[test]
+    fn the_noise_that_was_put_in_is_found() {
+        let Noise::Known { shot, read } = plate_noise(&noisy(0.002, 0.01)) else { panic!("nothing found") };
+        let at = |v: f64| (shot * v + read * read) / (0.002 * v + 0.0001);
+        assert!([0.1, 0.4, 0.7].iter().all(|&v| (at(v) - 1.0).abs() < 0.15), "{shot} {read}");
+    }
+
+    #[test]
+    fn a_smooth_picture_has_none_to_speak_of() {
+        let Noise::Known { shot, read } = plate_noise(&noisy(0.0, 0.0)) else { panic!("nothing found") };
+        assert!(shot < 1e-6 && read < 1e-3, "{shot} {read}");
+    }
+
+    #[test]
+    fn too_little_to_see_is_no_noise() {
+        assert_eq!(plate_noise(&Image::new(2, 2)), Noise::None);
+        assert_eq!(plate_noise(&Image::filled(200, 200, LinearRgb::grey(f32::NAN))), Noise::None);
+    }
+}

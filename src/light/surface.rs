@@ -1,0 +1,108 @@
+//! What the plate tells of the light on the labelled surface.
+
+use crate::geom::{Plane, Point2};
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use crate::scene::{CameraSource, Cast, Scene};
+
+/// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
+/// camera is not known yet, or does not see it.
+pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
+    let CameraSource::Known(camera) = scene.camera else { return None };
+    let [w, h] = scene.surface.size.map(|side| 0.5 * side);
+    let on_surface = |x: usize, y: usize| {
+        let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let hit = Plane::surface().intersect(&ray).map(|t| ray.at(t));
+        hit.is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
+    };
+    let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
+    let seen: Vec<LinearRgb> =
+        places.filter(|&(x, y)| on_surface(x, y)).map(|at| plate[at]).filter(|c| c.is_finite()).collect();
+    if seen.is_empty() {
+        return None;
+    }
+    let median = |channel: fn(&LinearRgb) -> f32| {
+        let mut values: Vec<f32> = seen.iter().map(channel).collect();
+        let middle = values.len() / 2;
+        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    };
+    Some(LinearRgb::new(median(|c| c.r), median(|c| c.g), median(|c| c.b)))
+}
+
+/// Turns [`Cast::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
+///
+/// The surface is taken to be grey: its colour is then that of the light on it. A share below 1 believes half, say, of
+/// that, since trays and tables may have a colour of their own. Luminance stays.
+pub fn match_cast(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    let Cast::MatchSurface { share } = scene.cast else { return scene };
+    let color = surface_color(&scene, plate).unwrap_or(LinearRgb::WHITE);
+    let luminance = color.luminance();
+    let lit = color.r > 0.0 && color.g > 0.0 && color.b > 0.0;
+    let channel = |v: f32| if lit { libm::pow(f64::from(v / luminance), share) as f32 } else { 1.0 };
+    let tint = color.map(channel);
+    Scene { cast: Cast::Known(tint.scale(1.0 / tint.luminance())), ..scene }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::geom::{Pose, UnitQuaternion, Vector2, Vector3};
+    use crate::scene::{Exposure, Surface};
+
+    /// A camera one metre above a surface that fills the middle half of its picture.
+    pub(in crate::light) fn scene(cast: Cast) -> Scene {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        let camera = Camera {
+            image: [40, 30],
+            focal_px: Vector2::new(40.0, 40.0),
+            principal_px: Point2::new(20.0, 15.0),
+            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        };
+        Scene {
+            image: [40, 30],
+            plate: "tray".into(),
+            camera: CameraSource::Known(camera),
+            surface: Surface::new([0.5, 0.375]),
+            objects: Vec::new(),
+            lights: Vec::new(),
+            ambient: LinearRgb::WHITE,
+            environment: None,
+            exposure: Exposure::Ev(0.0),
+            cast,
+            finish: Default::default(),
+        }
+    }
+
+    /// A reddish surface with a bright spot on a blue table.
+    fn plate() -> Image<LinearRgb> {
+        Image::from_fn(40, 30, |x, y| match (x, y) {
+            (18..22, 14..16) => LinearRgb::grey(5.0),
+            (10..30, 7..23) => LinearRgb::new(0.4, 0.2, 0.1),
+            _ => LinearRgb::new(0.0, 0.1, 0.9),
+        })
+    }
+
+    #[test]
+    fn the_surface_is_told_from_the_table_and_from_highlights() {
+        assert_eq!(surface_color(&scene(Cast::default()), &plate()), Some(LinearRgb::new(0.4, 0.2, 0.1)));
+    }
+
+    #[test]
+    fn the_cast_is_the_surface_s_colour_at_luminance_one() {
+        let Cast::Known(tint) = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &plate()).cast else {
+            panic!("still unknown")
+        };
+        assert!((tint.luminance() - 1.0).abs() < 1e-6 && (tint.r / tint.g - 2.0).abs() < 1e-5);
+        let none = match_cast(scene(Cast::MatchSurface { share: 0.0 }), &plate()).cast;
+        assert_eq!(none, Cast::Known(LinearRgb::WHITE));
+        let known = scene(Cast::Known(LinearRgb::new(2.0, 1.0, 0.5)));
+        assert_eq!(match_cast(known.clone(), &plate()), known);
+    }
+
+    #[test]
+    fn a_black_plate_has_no_cast() {
+        let black = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &Image::filled(40, 30, LinearRgb::BLACK));
+        assert_eq!(black.cast, Cast::Known(LinearRgb::WHITE));
+    }
+}

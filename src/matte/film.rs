@@ -1,0 +1,199 @@
+//! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
+
+mod bright;
+mod planes;
+mod solve;
+mod tint;
+mod view;
+
+pub use planes::film_planes;
+pub(super) use view::view;
+
+use super::plate::ScreenPlate;
+use super::remark::Remark;
+use super::screen::{is_keyable, strongest_channel};
+use crate::error::{Error, Result};
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::{Coverage, Film, LinearRgb};
+use serde::{Deserialize, Serialize};
+use solve::Solver;
+use std::borrow::Cow;
+
+/// How film is solved for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FilmOptions {
+    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath it; nothing = from the
+    /// photo. Default: nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flat: Option<LinearRgb>,
+    /// Scene-linear value from which on a channel counts as clipped. Default: 0.98.
+    pub clipped: f32,
+    /// How far the thickness of plastic scatters around that of two walls, as a share: what counts where the photo does
+    /// not tell. Default: 0.35.
+    pub thickness_spread: f32,
+    /// How well the reflected light of the screen's channel is told from the others, as a share. Default: 0.15.
+    pub reflection_error: f32,
+}
+
+impl Default for FilmOptions {
+    fn default() -> Self {
+        Self { flat: None, clipped: 0.98, thickness_spread: 0.35, reflection_error: 0.15 }
+    }
+}
+
+/// What one photo tells of a film. `F + V * background` composites it over a background with light of its own,
+/// `F + T * background` over one that the object itself shades.
+#[derive(Clone, Debug)]
+pub struct FilmMatte {
+    /// Reflected light F and opacity `1 - V` by the view transmittance V, which is *estimated* from T. Of the photo's size,
+    /// empty outside the object.
+    pub film: Image<Film>,
+    /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
+    pub transmittance: Image<LinearRgb>,
+    /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
+    pub uncertainty: Image<Coverage>,
+    /// T of the plastic where it lies flat: its tint, and what relates V to T.
+    pub flat: LinearRgb,
+    /// What a person should know.
+    pub remarks: Vec<Remark>,
+}
+
+impl FilmMatte {
+    /// Reflected light F and opacity `1 - T`: the film as it lay on the screen, its shadow included.
+    pub fn shaded(&self) -> Image<Film> {
+        self.film.zip_map(&self.transmittance, |film, t| Film::new(film.color, t))
+    }
+}
+
+/// Solves `photo = F + T * plate` for the reflected light F and the transmittance T of one object.
+///
+/// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
+/// garbage matte). A screen without a colour tells nothing of T: then the object is taken for opaque, and a [`Remark`]
+/// says so.
+///
+/// # Method
+/// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the plastic is clear or has
+/// one of the dyes of PET ([Beer and Lambert]), found from the pixels that reflect least; a pixel is that plastic times
+/// one factor. *Reflection*: a neutral glint plus light scattered in the plastic, of half its tint, so that the screen's
+/// channel of F follows from the two others (colour difference is the special case of clear plastic). The factor is then
+/// one equation; where dark or strongly tinted plastic makes it ill-conditioned it is drawn to that of flat plastic, or
+/// to opaque where more is reflected than plastic can, by their variances, and the uncertainty says how much was measured.
+/// `F = photo - T * plate` leaves nothing of the screen's light: there is no spill to take away.
+///
+/// What is brighter in the screen's hue than the screen itself through plastic is opaque (a label, a cap); clipped pixels
+/// have the factor of their surroundings.
+///
+/// # Errors
+/// [`Error::Photo`] where `inside` is empty or a pixel of the photo is not a finite number; [`Error::Value`] for an option that cannot be right.
+/// # Panics
+/// When the sizes differ.
+///
+/// [Beer and Lambert]: https://en.wikipedia.org/wiki/Beer-Lambert_law
+pub fn film(
+    photo: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Image<Coverage>,
+    opts: &FilmOptions,
+) -> Result<FilmMatte> {
+    opts.check()?;
+    assert_eq!(photo.size(), plate.image.size(), "photo and plate differ in size");
+    assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
+    if !inside.pixels().iter().any(|c| c.0 > 0.0) {
+        return Err(Error::Photo { what: "the mask of the object is empty".into() });
+    }
+    if let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) {
+        let (x, y) = (i % photo.width(), i / photo.width());
+        return Err(Error::Photo { what: format!("pixel ({x}, {y}) is not a finite number") });
+    }
+    let screen = plate.color();
+    if !is_keyable(screen) {
+        return Ok(opaque(photo, inside, screen));
+    }
+    let key = strongest_channel(screen);
+    let calm = calmed(photo, plate.residual);
+    let flat = opts.flat.map_or_else(|| tint::fit(&calm, plate, inside, key).flat, Into::into);
+    let solver = Solver::new(key, flat, plate.residual, opts);
+    let mut factors = calm.zip_map(&plate.image, |pixel, screen| solver.solve(pixel.into(), screen.into()));
+    let painted = bright::make_opaque(&mut factors, &calm, &plate.image, inside);
+    let clipped = bright::fill_clipped(&mut factors, photo, inside, opts.clipped);
+    let remarks = painted.into_iter().chain(clipped).collect();
+    Ok(composed(photo, plate, inside, &factors, flat.into(), remarks))
+}
+
+impl FilmOptions {
+    fn check(&self) -> Result<()> {
+        if let Some(flat) = self.flat
+            && !<[f32; 3]>::from(flat).iter().all(|t| (0.001..=1.0).contains(t))
+        {
+            return Err(Error::value("flat", format!("({}, {}, {}), expected 0.001 to 1", flat.r, flat.g, flat.b)));
+        }
+        let positive = [
+            ("clipped", self.clipped),
+            ("thickness_spread", self.thickness_spread),
+            ("reflection_error", self.reflection_error),
+        ];
+        match positive.into_iter().find(|(_, v)| v.is_nan() || *v <= 0.0) {
+            Some((at, v)) => Err(Error::value(at, format!("{v}, expected more than 0"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Noise from which on the transmittance is told from a blurred photo: a twentieth of what a screen at 0.4 shows through
+/// two clear walls.
+const NOISY: f32 = 0.01;
+/// Blur of a noisy photo, standard deviation in pixels: leaves a quarter of the noise, and folds.
+const CALM_PX: f32 = 1.0;
+
+/// The photo that the transmittance is told from.
+fn calmed(photo: &Image<LinearRgb>, noise: LinearRgb) -> Cow<'_, Image<LinearRgb>> {
+    if noise.r.max(noise.g).max(noise.b) < NOISY {
+        return Cow::Borrowed(photo);
+    }
+    Cow::Owned(filter::gaussian_blur(photo, CALM_PX))
+}
+
+/// F, T and V from the factors by which the pixels are flat plastic.
+fn composed(
+    photo: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Image<Coverage>,
+    factors: &Image<solve::Factor>,
+    flat: LinearRgb,
+    remarks: Vec<Remark>,
+) -> FilmMatte {
+    let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
+    let transmittance = plastic.zip_map(inside, covered);
+    let reflected = photo.zip_map(&plate.image, |p, k| (p, k)).zip_map(&transmittance, |(p, k), t| without(p, t * k));
+    let seen = plastic.zip_map(inside, |t, c| covered(view(t, flat), c));
+    let reflected = reflected.zip_map(inside, |f, c| f.scale(c.0));
+    let most = flat.r.max(flat.g).max(flat.b);
+    let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
+    FilmMatte { film: reflected.zip_map(&seen, Film::new), transmittance, uncertainty, flat, remarks }
+}
+
+/// A transmittance that holds for the covered share of a pixel only.
+pub(super) fn covered(t: LinearRgb, Coverage(c): Coverage) -> LinearRgb {
+    t.map(|t| 1.0 - c * (1.0 - t))
+}
+
+/// Light that is left when some is taken away; not less than none.
+pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
+    LinearRgb::new((light.r - taken.r).max(0.0), (light.g - taken.g).max(0.0), (light.b - taken.b).max(0.0))
+}
+
+/// The object as its outline has it, nothing see-through, and known not to be known.
+fn opaque(photo: &Image<LinearRgb>, inside: &Image<Coverage>, screen: LinearRgb) -> FilmMatte {
+    FilmMatte {
+        film: photo.zip_map(inside, |p, m| p.opaque().masked(m).into()),
+        transmittance: inside.map(|c| LinearRgb::grey(1.0 - c.0)),
+        uncertainty: inside.clone(),
+        flat: LinearRgb::grey(tint::CLEAR),
+        remarks: vec![Remark::GreyScreen(screen)],
+    }
+}
+
+#[cfg(test)]
+mod tests;

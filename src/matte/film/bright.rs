@@ -1,0 +1,95 @@
+//! Pixels too bright for plastic: paint of the screen's hue, and clipped glints.
+
+use super::solve::Factor;
+use super::tint::WHOLE;
+use crate::filter;
+use crate::image::Image;
+use crate::matte::remark::Remark;
+use crate::pixel::{Coverage, LinearRgb};
+
+/// Flat plastic passes 1; so many times that is the screen's hue from elsewhere.
+const PAINTED: f32 = 1.65;
+/// Rim of the object where a pixel may be that bright, as a share of the longer side: bare screen shines in.
+const RIM: f64 = 0.01;
+/// Blur of the paint's mask, standard deviation in pixels, and the shares of it between which a pixel turns opaque.
+const BLUR_PX: f32 = 2.0;
+const TURNS: [f32; 2] = [0.4, 0.7];
+/// Share of the object below which nothing is said.
+const WORTH_SAYING: f32 = 0.002;
+
+/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest channel, it may be.
+const SCREEN: f32 = 0.06;
+
+/// Makes what is painted in the screen's hue opaque; bare screen that a wide mask lets in is not.
+pub(super) fn make_opaque(
+    factors: &mut Image<Factor>,
+    photo: &Image<LinearRgb>,
+    plate: &Image<LinearRgb>,
+    inside: &Image<Coverage>,
+) -> Option<Remark> {
+    let bare = photo.zip_map(plate, |p, k| is_screen(p.into(), k.into()));
+    let bright = factors.zip_map(&bare, |f, bare| f.raw > PAINTED && !bare);
+    if !bright.pixels().iter().any(|b| *b) {
+        return None;
+    }
+    let rim_px = (RIM * factors.width().max(factors.height()) as f64).max(2.0);
+    let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px);
+    let painted = bright.zip_map(&interior, |b, i| Coverage(f32::from(u8::from(b && i))));
+    let painted = filter::gaussian_blur(&painted, BLUR_PX);
+    let paint = painted.map(|p| ((p.0 - TURNS[0]) / (TURNS[1] - TURNS[0])).clamp(0.0, 1.0));
+    for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
+        factor.value *= 1.0 - paint;
+        factor.sigma = factor.sigma.max(*paint);
+    }
+    let share = share(paint.pixels().iter().map(|p| *p > 0.5), inside);
+    (share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
+}
+
+/// A pixel is the screen in some shade.
+fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
+    let strongest = screen.into_iter().fold(0.0, f32::max);
+    (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= SCREEN * strongest)
+}
+
+/// Reach of the surroundings that a clipped pixel is filled from, standard deviation in pixels.
+const FILL_PX: f32 = 3.0;
+/// Weight of surroundings, as a share of the window, that is enough.
+const ENOUGH: f32 = 0.05;
+
+/// Gives clipped pixels the factor of their surroundings, where these are not clipped.
+pub(super) fn fill_clipped(
+    factors: &mut Image<Factor>,
+    photo: &Image<LinearRgb>,
+    inside: &Image<Coverage>,
+    clipped_at: f32,
+) -> Option<Remark> {
+    let clipped = photo.zip_map(inside, |p, c| c.0 > 0.0 && p.r.max(p.g).max(p.b) >= clipped_at);
+    if !clipped.pixels().iter().any(|c| *c) {
+        return None;
+    }
+    let told = clipped.zip_map(inside, |clipped, c| if clipped { 0.0 } else { c.0 });
+    // Weight and weighted factor ride in one picture: one blur for both.
+    let weighted = told.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
+    let around = filter::gaussian_blur(&weighted, FILL_PX);
+    let pixels = factors.pixels_mut().iter_mut().zip(clipped.pixels()).zip(around.pixels());
+    for ((factor, _), around) in pixels.filter(|((_, clipped), around)| **clipped && around.r > ENOUGH) {
+        factor.value = around.g / around.r;
+        factor.sigma = factor.sigma.max(FILLED_SIGMA);
+    }
+    let share = share(clipped.pixels().iter().copied(), inside);
+    (share > CLIPPED_WORTH_SAYING).then_some(Remark::Clipped(share))
+}
+
+/// Standard deviation of a factor that is only its surroundings': that of plastic around its median.
+const FILLED_SIGMA: f32 = 0.35;
+/// Share of the object that may be clipped without a word: glints.
+const CLIPPED_WORTH_SAYING: f32 = 0.03;
+
+/// The share of the object that a set of pixels has.
+fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
+    let object: f64 = inside.pixels().iter().map(|c| f64::from(c.0)).sum();
+    let chosen: f64 = set.zip(inside.pixels()).filter(|(set, _)| *set).map(|(_, c)| f64::from(c.0)).sum();
+    if object > 0.0 { (chosen / object) as f32 } else { 0.0 }
+}

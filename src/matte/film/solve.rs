@@ -1,0 +1,120 @@
+//! One pixel of film: by which factor it is the plastic of its photo.
+
+use super::FilmOptions;
+use super::tint::{CLEAR, body};
+use crate::pixel::LinearRgb;
+
+/// How see-through a pixel is beside flat plastic.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Factor {
+    /// Transmittance over that of flat plastic, the same in all channels.
+    pub(super) value: f32,
+    /// Standard deviation of it.
+    pub(super) sigma: f32,
+    /// What the photo alone says, before anything bounds it.
+    pub(super) raw: f32,
+}
+
+/// What is the same for all pixels of a photo.
+pub(super) struct Solver {
+    key: usize,
+    others: [usize; 2],
+    flat: [f32; 3],
+    /// Shares of the others' reflection that make up the key channel's.
+    shares: [f32; 2],
+    noise: f32,
+    reflection_error: f32,
+    spread: f32,
+}
+
+/// Tints must differ by so much of the largest to tell glint from scattered light.
+const TELLING: f32 = 0.25;
+/// Coded pictures are no finer than this.
+const FINEST: f32 = 0.004;
+/// Clear plastic reflects neutrally: this much of the error of the key channel's reflection is due to the tint.
+const DUE_TO_TINT: f32 = 0.8;
+/// Scene-linear value from which on to which reflected light passes from that of plastic to that of paint. An exposure that
+/// has the screen at 0.3 to 0.45 has white paper at 0.5.
+const PAINT: [f32; 2] = [0.15, 0.3];
+
+impl Solver {
+    pub(super) fn new(key: usize, flat: [f32; 3], noise: LinearRgb, opts: &FilmOptions) -> Self {
+        let others = [(key + 1) % 3, (key + 2) % 3];
+        let tinted = 1.0 - (flat[key] / CLEAR).clamp(0.0, 1.0) * DUE_TO_TINT;
+        Self {
+            key,
+            others,
+            flat,
+            shares: shares(key, others, body(flat)),
+            noise: noise.r.max(noise.g).max(noise.b).max(FINEST),
+            reflection_error: opts.reflection_error * tinted,
+            spread: opts.thickness_spread,
+        }
+    }
+
+    pub(super) fn solve(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
+        let mixed = |of: [f32; 3]| self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]];
+        let through: [f32; 3] = std::array::from_fn(|c| self.flat[c] * screen[c]);
+        let reflected = mixed(pixel).max(0.0);
+        let gain = (through[self.key] - mixed(through)).max(f32::MIN_POSITIVE);
+        let raw = (pixel[self.key] - mixed(pixel)) / gain;
+        let reflection = self.reflection_error * reflected;
+        let variance = (reflection * reflection + self.noise * self.noise) / (gain * gain);
+        let prior = self.spread * self.spread;
+        let drawn = (raw * prior + self.expected(pixel, reflected) * variance) / (prior + variance);
+        // Nothing reflects less than no light: no channel shows more screen than light.
+        let bound = (0..3).map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE)).fold(f32::MAX, f32::min);
+        let most = 1.0 / self.flat.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        Factor { value: drawn.min(bound).clamp(0.0, most), sigma: (prior * variance / (prior + variance)).sqrt(), raw }
+    }
+
+    /// The factor of a pixel of which nothing but its brightness is known: plastic, or paint.
+    fn expected(&self, pixel: [f32; 3], reflected: f32) -> f32 {
+        let brightest = pixel[self.others[0]].max(pixel[self.others[1]]).max(reflected);
+        ((PAINT[1] - brightest) / (PAINT[1] - PAINT[0])).clamp(0.0, 1.0)
+    }
+}
+
+/// The shares of two channels' light that make up the third's, for light of which a part is neutral and the rest has the
+/// colour `body`; half and half where the two do not differ.
+fn shares(key: usize, [a, b]: [usize; 2], body: [f32; 3]) -> [f32; 2] {
+    let soft = TELLING * body.iter().copied().fold(0.0, f32::max);
+    let differ = body[a] - body[b];
+    let share = (differ * (body[key] - body[b]) + 0.5 * soft * soft) / (differ * differ + soft * soft);
+    let share = share.clamp(0.0, 1.0);
+    [share, 1.0 - share]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREEN: [f32; 3] = [0.045, 0.42, 0.085];
+
+    fn clear() -> Solver {
+        Solver::new(1, [CLEAR; 3], LinearRgb::grey(0.001), &FilmOptions::default())
+    }
+
+    #[test]
+    fn neutral_glint_on_clear_plastic_is_told_from_the_screen() {
+        for (u, glint) in [(1.0, 0.0), (0.8, 0.1), (0.3, 0.05), (1.2, 0.12)] {
+            let pixel = GREEN.map(|k| u * CLEAR * k + glint);
+            let found = clear().solve(pixel, GREEN);
+            assert!((found.value - u).abs() < 0.02, "{found:?} for {u} and {glint}");
+        }
+    }
+
+    #[test]
+    fn no_channel_shows_more_screen_than_light() {
+        let found = clear().solve([0.0, 0.2, 0.04], GREEN);
+        assert_eq!(found.value, 0.0);
+    }
+
+    #[test]
+    fn what_the_photo_does_not_tell_is_uncertain() {
+        let dark = Solver::new(2, [0.01, 0.2, 0.02], LinearRgb::grey(0.002), &FilmOptions::default());
+        let screen = [0.03, 0.09, 0.5];
+        let (sure, unsure) = (clear().solve([0.05, 0.25, 0.07], GREEN), dark.solve([0.1, 0.12, 0.11], screen));
+        assert!(sure.sigma < 0.05 && unsure.sigma > 0.2, "{sure:?} {unsure:?}");
+    }
+}

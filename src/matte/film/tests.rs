@@ -1,0 +1,220 @@
+use super::*;
+use crate::matte::plate::PlateOptions;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SIZE: (usize, usize) = (180, 120);
+const GREEN: LinearRgb = LinearRgb::new(0.045, 0.42, 0.085);
+const BLUE: LinearRgb = LinearRgb::new(0.03, 0.095, 0.52);
+const CLEAR: LinearRgb = LinearRgb::grey(0.55);
+
+fn inside() -> Image<Coverage> {
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (u, v) = ((x as f32 - 90.0) / 65.0, (y as f32 - 60.0) / 38.0);
+        Coverage(f32::from(u8::from(u * u + v * v < 1.0)))
+    })
+}
+
+/// A label across the middle.
+fn is_label(x: usize) -> bool {
+    (80..110).contains(&x)
+}
+
+struct World {
+    flat: LinearRgb,
+    label: LinearRgb,
+    glint: f32,
+    screen: LinearRgb,
+    /// Darkest over brightest is 1 minus this.
+    uneven: f32,
+    noise: f32,
+}
+
+impl Default for World {
+    fn default() -> Self {
+        Self { flat: CLEAR, label: LinearRgb::grey(0.5), glint: 0.15, screen: GREEN, uneven: 0.15, noise: 0.003 }
+    }
+}
+
+impl World {
+    fn plate(&self, x: usize, y: usize) -> LinearRgb {
+        let across = (x as f32 / SIZE.0 as f32 + 0.5 * y as f32 / SIZE.1 as f32) / 1.5;
+        self.screen.scale(1.0 - self.uneven * across)
+    }
+
+    /// F and T.
+    fn truth(&self, x: usize, y: usize) -> (LinearRgb, LinearRgb) {
+        if inside()[(x, y)].0 == 0.0 {
+            return (LinearRgb::BLACK, LinearRgb::WHITE);
+        }
+        if is_label(x) {
+            return (self.label, LinearRgb::BLACK);
+        }
+        let (u, v) = (x as f32, y as f32);
+        let fold = 0.85 + 0.2 * libm::sinf(0.21 * u + 0.013 * v * v);
+        let glint = self.glint * libm::powf(libm::sinf(0.17 * u - 0.29 * v), 8.0);
+        (LinearRgb::grey(0.015 + glint), self.flat.scale(fold))
+    }
+
+    fn photo(&self) -> Image<LinearRgb> {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut grain = || self.noise * ((0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0);
+        let mut photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+            let (f, t) = self.truth(x, y);
+            f + t * self.plate(x, y)
+        });
+        photo.pixels_mut().iter_mut().for_each(|p| *p = p.map(|v| (v + grain()).clamp(0.0, 1.0)));
+        photo
+    }
+
+    fn solved(&self) -> FilmMatte {
+        let photo = self.photo();
+        let free = inside().map(|c| c.0 == 0.0);
+        let plate = ScreenPlate::fit(&photo, &free, &PlateOptions::default()).unwrap();
+        film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap()
+    }
+
+    /// Mean absolute error inside, over a grey background in the object's shadow, of what a function chooses.
+    fn error(&self, found: &FilmMatte, of: impl Fn(usize) -> bool) -> f32 {
+        let shaded = found.shaded();
+        let behind = LinearRgb::new(0.5, 0.35, 0.3);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for y in 0..SIZE.1 {
+            for x in (0..SIZE.0).filter(|&x| inside()[(x, y)].0 > 0.5 && of(x)) {
+                let (f, t) = self.truth(x, y);
+                let (told, real): ([f32; 3], [f32; 3]) =
+                    (shaded[(x, y)].over_color(behind).into(), (f + t * behind).into());
+                sum += told.iter().zip(real).map(|(a, b)| (a - b).abs()).sum::<f32>();
+                count += 3.0;
+            }
+        }
+        sum / count
+    }
+}
+
+#[test]
+fn clear_plastic_and_a_white_label_are_recomposited() {
+    for screen in [GREEN, BLUE] {
+        let world = World { screen, ..World::default() };
+        let found = world.solved();
+        let (film, label) = (world.error(&found, |x| !is_label(x)), world.error(&found, is_label));
+        assert!(film < 0.012 && label < 0.012, "{film} {label}");
+        assert!((found.flat.r - CLEAR.r).abs() < 0.02 && found.remarks.is_empty(), "{:?}", found.remarks);
+    }
+}
+
+#[test]
+fn tinted_plastic_keeps_its_tint() {
+    for (flat, screen) in [([0.17, 0.38, 0.54], GREEN), ([0.05, 0.3, 0.09], BLUE), ([0.17, 0.05, 0.015], GREEN)] {
+        let world = World { flat: flat.into(), screen, ..World::default() };
+        let found = world.solved();
+        let error = world.error(&found, |x| !is_label(x));
+        assert!(error < 0.03, "{error} for {flat:?}");
+    }
+}
+
+#[test]
+fn nothing_of_the_screen_is_left_in_the_reflected_light() {
+    let found = World { noise: 0.0, ..World::default() }.solved();
+    let casts = (0..SIZE.0).filter(|&x| inside()[(x, 60)].0 > 0.5 && !is_label(x)).map(|x| {
+        let f = found.film[(x, 60)].color;
+        f.g - 0.5 * (f.r + f.b)
+    });
+    let worst = casts.fold(0.0, f32::max);
+    assert!(worst < 0.005, "green cast of {worst}");
+}
+
+#[test]
+fn outside_there_is_nothing_even_where_the_screen_is_uneven() {
+    for uneven in [0.15, 0.6] {
+        let found = World { uneven, ..World::default() }.solved();
+        let outside = found
+            .film
+            .pixels()
+            .iter()
+            .zip(inside().pixels())
+            .filter(|(_, c)| c.0 == 0.0)
+            .map(|(f, _)| *f)
+            .collect::<Vec<_>>();
+        assert!(outside.iter().all(|f| *f == Film::default()));
+    }
+}
+
+#[test]
+fn bare_screen_within_a_mask_that_is_too_wide_is_nearly_nothing() {
+    let world = World::default();
+    let photo = world.photo();
+    let plate = ScreenPlate::fit(&photo, &inside().map(|c| c.0 == 0.0), &PlateOptions::default()).unwrap();
+    let found = film(&photo, &plate, &Image::filled(SIZE.0, SIZE.1, Coverage(1.0)), &FilmOptions::default()).unwrap();
+    let outside = inside()
+        .pixels()
+        .iter()
+        .zip(found.film.pixels())
+        .filter(|(c, _)| c.0 == 0.0)
+        .map(|(_, f)| f.to_rgba().a)
+        .collect::<Vec<_>>();
+    let mean = outside.iter().sum::<f32>() / outside.len() as f32;
+    // The plate goes on from a thin rim of the picture, and what it misses there is taken for haze.
+    assert!(mean < 0.1, "{mean}");
+}
+
+#[test]
+fn a_screen_uneven_by_60_percent_costs_little() {
+    let error = |uneven| {
+        let world = World { uneven, ..World::default() };
+        world.error(&world.solved(), |_| true)
+    };
+    let (even, uneven) = (error(0.0), error(0.6));
+    assert!(uneven < 2.0 * even + 0.005, "{even} {uneven}");
+}
+
+#[test]
+fn noise_of_3_percent_is_survived_and_told() {
+    let world = World { noise: 0.03, ..World::default() };
+    let found = world.solved();
+    let error = world.error(&found, |_| true);
+    assert!(error < 0.045, "{error}");
+    let mean = |found: &FilmMatte| found.uncertainty.pixels().iter().map(|u| u.0).sum::<f32>();
+    assert!(mean(&found) > 2.0 * mean(&World::default().solved()));
+}
+
+#[test]
+fn clipped_glints_do_not_turn_plastic_opaque() {
+    let world = World { glint: 3.0, ..World::default() };
+    let photo = world.photo();
+    let found = world.solved();
+    let clipped = (0..photo.pixels().len()).filter(|&i| photo.pixels()[i].g >= 1.0 && !is_label(i % SIZE.0));
+    let opaque = clipped.clone().filter(|&i| found.transmittance.pixels()[i].g < 0.2).count();
+    assert!(opaque * 5 < clipped.count(), "{opaque}");
+}
+
+#[test]
+fn a_label_of_the_screens_hue_is_opaque_and_said() {
+    let world = World { label: LinearRgb::new(0.15, 0.6, 0.2), ..World::default() };
+    let found = world.solved();
+    assert!(world.error(&found, is_label) < 0.08);
+    assert!(found.remarks.iter().any(|r| matches!(r, Remark::ScreenHue(share) if *share > 0.1)), "{:?}", found.remarks);
+}
+
+#[test]
+fn on_a_grey_screen_the_object_is_opaque_and_said() {
+    let found = World { screen: LinearRgb::grey(0.3), ..World::default() }.solved();
+    assert!(matches!(found.remarks[..], [Remark::GreyScreen(_)]));
+    assert_eq!(found.film[(50, 60)].opacity, LinearRgb::WHITE);
+    assert_eq!(found.uncertainty[(50, 60)], Coverage(1.0));
+}
+
+#[test]
+fn awkward_input_is_named_not_a_panic() {
+    let (photo, plate) = (Image::filled(20, 20, GREEN), ScreenPlate::even(GREEN, (20, 20)));
+    let empty = film(&photo, &plate, &Image::new(20, 20), &FilmOptions::default()).unwrap_err();
+    assert!(empty.to_string().contains("the mask of the object is empty"));
+    let wrong = FilmOptions { thickness_spread: 0.0, ..FilmOptions::default() };
+    let said = film(&photo, &plate, &Image::filled(20, 20, Coverage(1.0)), &wrong).unwrap_err().to_string();
+    assert_eq!(said, "thickness_spread: 0, expected more than 0");
+    let strange = Image::filled(20, 20, LinearRgb::new(f32::NAN, 0.5, 0.5));
+    let refused = film(&strange, &plate, &Image::filled(20, 20, Coverage(1.0)), &FilmOptions::default()).unwrap_err();
+    assert!(refused.to_string().contains("pixel (0, 0) is not a finite number"));
+}
+
+mod world;

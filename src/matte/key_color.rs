@@ -1,0 +1,152 @@
+//! Key colour: one colour for the screen, and whether the object has it, too.
+
+use super::remark::Remark;
+use super::screen::{screen_color, screen_pixels, strongest_channel};
+use crate::error::Result;
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::{Coverage, LinearRgb};
+use serde::{Deserialize, Serialize};
+
+/// How the pixels of a screen become one colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum KeyAverage {
+    /// The mean, as the paper has it: what lies on the screen counts.
+    Mean,
+    /// The mean of what is near the median: dirt, shadows and markers do not count.
+    #[default]
+    Robust,
+}
+
+/// The colour of a screen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeyColor {
+    /// Scene-linear.
+    pub color: LinearRgb,
+    /// Standard deviation of the pixels around it, per channel, by their median distance: noise and uneven light.
+    pub spread: LinearRgb,
+    /// What a person should know: the object has the screen's hue.
+    pub remarks: Vec<Remark>,
+}
+
+/// The colour of the screen, from the pixels outside `mask` and a margin around it.
+///
+/// `photo` is scene-linear.
+///
+/// # Method
+/// Channel by channel the median, then the mean weighted by [Tukey]'s biweight around it.
+///
+/// # Errors
+/// [`Error::Photo`](crate::Error::Photo) when the mask leaves no background.
+/// # Panics
+/// When the sizes differ.
+///
+/// [Tukey]: https://doi.org/10.1080/03610927708827533
+pub fn key_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>, average: KeyAverage) -> Result<KeyColor> {
+    let mean = screen_color(photo, mask)?;
+    let far = screen_pixels(mask);
+    let far = if far.pixels().iter().any(|p| *p) { far } else { mask.map(|c| c.0 <= 0.0) };
+    let [r, g, b] = [0, 1, 2].map(|c| robust(photo, &far, c));
+    let color = match average {
+        KeyAverage::Mean => mean,
+        KeyAverage::Robust => LinearRgb::new(r.0, g.0, b.0),
+    };
+    let remarks = screen_hue(photo, mask, color).into_iter().collect();
+    Ok(KeyColor { color, spread: LinearRgb::new(r.1, g.1, b.1), remarks })
+}
+
+/// Pixels that are asked: the median of a noise of 0.01 is known to 1e-4.
+const ASKED: usize = 20_000;
+/// Distance from the median beyond which nothing counts, in standard deviations (95 % efficient for a Gaussian).
+const TUKEY: f32 = 4.685;
+/// Standard deviation of a Gaussian over the median of its absolute values.
+const SIGMA_OF_MEDIAN: f32 = 1.4826;
+/// Values nearer than a code of an 8-bit picture are the same.
+const FINEST: f32 = 1e-3;
+
+/// Centre and standard deviation of a channel.
+fn robust(photo: &Image<LinearRgb>, set: &Image<bool>, channel: usize) -> (f32, f32) {
+    let all: Vec<usize> = (0..photo.pixels().len()).filter(|&i| set.pixels()[i]).collect();
+    let step = (all.len() / ASKED).max(1);
+    let value = |i: usize| <[f32; 3]>::from(photo.pixels()[i])[channel];
+    let values: Vec<f32> = all.into_iter().step_by(step).map(value).filter(|v| v.is_finite()).collect();
+    let center = median(values.clone());
+    let sigma = SIGMA_OF_MEDIAN * median(values.iter().map(|v| (v - center).abs()).collect());
+    let reach = TUKEY * sigma.max(FINEST);
+    let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
+    for v in values {
+        let weight = f64::from((1.0 - ((v - center) / reach).powi(2)).max(0.0).powi(2));
+        sum += weight * f64::from(v);
+        weights += weight;
+    }
+    (if weights > 0.0 { (sum / weights) as f32 } else { center }, sigma)
+}
+
+fn median(mut values: Vec<f32>) -> f32 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+}
+
+/// The screen's own excess of its strongest channel, uneven light included, is below so many times its mean; see-through
+/// plastic shows less than that.
+const BEYOND_SCREEN: f32 = 1.25;
+/// Rim of the mask that is not asked, as a share of the longer side: bare screen.
+const RIM: f64 = 0.01;
+/// Share of the object below which nothing is said.
+const WORTH_SAYING: f32 = 0.002;
+
+/// The remark on an object that has the screen's hue, brighter than the screen.
+fn screen_hue(photo: &Image<LinearRgb>, mask: &Image<Coverage>, screen: LinearRgb) -> Option<Remark> {
+    let key = strongest_channel(screen);
+    let excess = |p: LinearRgb| {
+        let c: [f32; 3] = p.into();
+        c[key] - c[(key + 1) % 3].max(c[(key + 2) % 3])
+    };
+    let rim_px = RIM * photo.width().max(photo.height()) as f64;
+    let interior = filter::erode(&mask.map(|c| c.0 > 0.5), rim_px);
+    let object = interior.pixels().iter().filter(|p| **p).count();
+    let limit = BEYOND_SCREEN * excess(screen);
+    let pairs = photo.pixels().iter().zip(interior.pixels());
+    let hued = pairs.filter(|(p, inside)| **inside && excess(**p) > limit).count();
+    let share = hued as f32 / object.max(1) as f32;
+    (excess(screen) > 0.0 && share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GREEN: LinearRgb = LinearRgb::new(0.05, 0.4, 0.1);
+
+    fn slab(paint: LinearRgb) -> (Image<LinearRgb>, Image<Coverage>) {
+        let inside = |x: usize, y: usize| (40..120).contains(&x) && (30..70).contains(&y);
+        let mask = Image::from_fn(160, 100, |x, y| Coverage(f32::from(u8::from(inside(x, y)))));
+        (mask.map(|c| if c.0 > 0.0 { paint } else { GREEN }), mask)
+    }
+
+    #[test]
+    fn dirt_on_the_screen_moves_the_mean_and_not_the_robust_colour() {
+        let (mut photo, mask) = slab(LinearRgb::WHITE);
+        (0..160).for_each(|x| (0..12).for_each(|y| photo[(x, y)] = LinearRgb::WHITE));
+        let far = |how| (key_color(&photo, &mask, how).unwrap().color.g - GREEN.g).abs();
+        assert!(far(KeyAverage::Robust) < 1e-4 && far(KeyAverage::Mean) > 0.05);
+    }
+
+    #[test]
+    fn an_object_of_the_screens_hue_is_said() {
+        let said = |paint| {
+            let (photo, mask) = slab(paint);
+            key_color(&photo, &mask, KeyAverage::Robust).unwrap().remarks
+        };
+        assert!(matches!(said(LinearRgb::new(0.1, 0.7, 0.15))[..], [Remark::ScreenHue(share)] if share > 0.9));
+        assert!(said(LinearRgb::new(0.6, 0.6, 0.6)).is_empty());
+        assert!(said(GREEN.scale(0.6)).is_empty(), "as see-through film would look");
+    }
+
+    #[test]
+    fn a_mask_without_background_is_refused() {
+        let full = Image::filled(40, 40, Coverage(1.0));
+        assert!(key_color(&Image::filled(40, 40, GREEN), &full, KeyAverage::Robust).is_err());
+    }
+}

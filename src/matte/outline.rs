@@ -1,0 +1,174 @@
+//! Outline: what an object covers, as closed lines that may have holes.
+
+use crate::geom::Point2;
+use crate::image::Image;
+use crate::pixel::Coverage;
+use contour::ContourBuilder;
+use geo::orient::Direction;
+use geo::{Area, ConvexHull, MultiPoint, Orient, Point};
+use rayon::prelude::*;
+
+/// The border of what an object covers, in pixel-corner coordinates.
+///
+/// Rings do not cross. Those around the object go clockwise as seen, those around holes the other way; none repeats its
+/// first point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outline {
+    /// The rings, each directly followed by its holes.
+    pub rings: Vec<Vec<Point2<f64>>>,
+}
+
+/// Value at which a coverage becomes inside.
+const HALF: f64 = 0.5;
+/// Rings around less than this are rounding, square pixels.
+const LEAST_AREA_PX: f64 = 1.0;
+
+impl Outline {
+    /// The lines along which a coverage is one half.
+    ///
+    /// # Method
+    /// Marching squares with linear interpolation between pixel centres (crate `contour`).
+    pub fn around(coverage: &Image<Coverage>) -> Self {
+        let values: Vec<f64> = coverage.pixels().iter().map(|c| f64::from(c.0)).collect();
+        let (w, h) = coverage.size();
+        // Fails only for values that are not as many as the sides say.
+        let contours = ContourBuilder::new(w, h, true).contours(&values, &[HALF]).unwrap_or_default();
+        let polygons = contours.iter().flat_map(|contour| &contour.geometry().0);
+        let worth = polygons.filter(|p| p.unsigned_area() >= LEAST_AREA_PX).map(|p| p.orient(Direction::Default));
+        let rings = worth.flat_map(|polygon| {
+            let (outer, holes) = polygon.into_inner();
+            std::iter::once(outer).chain(holes).map(|ring| {
+                let open = &ring.0[..ring.0.len().saturating_sub(1)];
+                open.iter().map(|c| Point2::new(c.x, c.y)).collect()
+            })
+        });
+        Self { rings: rings.collect() }
+    }
+
+    /// The convex hull, clockwise as seen.
+    pub fn hull(&self) -> Vec<Point2<f64>> {
+        let points = self.rings.iter().flatten().map(|p| Point::new(p.x, p.y));
+        let (ring, _) = points.collect::<MultiPoint>().convex_hull().into_inner();
+        ring.0.iter().skip(1).map(|c| Point2::new(c.x, c.y)).collect()
+    }
+
+    /// Area inside, square pixels; holes do not count.
+    pub fn area(&self) -> f64 {
+        self.rings.iter().map(|ring| signed_area(ring)).sum()
+    }
+
+    /// Every point moved by a function.
+    pub fn map(&self, f: impl Fn(Point2<f64>) -> Point2<f64>) -> Self {
+        Self { rings: self.rings.iter().map(|ring| ring.iter().map(|p| f(*p)).collect()).collect() }
+    }
+
+    /// The share of every pixel that lies inside.
+    pub fn coverage(&self, width: usize, height: usize) -> Image<Coverage> {
+        let rows = self.sides_by_row(height);
+        let mut image = Image::new(width, height);
+        image.par_rows_mut().zip(&rows).enumerate().for_each(|(y, (row, sides))| {
+            for line in 0..LINES {
+                let at = y as f64 + (line as f64 + HALF) / LINES as f64;
+                let mut xs: Vec<f64> = sides.iter().filter_map(|side| crossing(side, at)).collect();
+                xs.sort_by(f64::total_cmp);
+                xs.chunks_exact(2).for_each(|span| add_span(row, span[0], span[1]));
+            }
+        });
+        image
+    }
+
+    /// The sides of the rings that pass through each row of pixels.
+    fn sides_by_row(&self, height: usize) -> Vec<Vec<Side>> {
+        let mut rows = vec![Vec::new(); height];
+        for ring in &self.rings {
+            for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+                let (top, bottom) = (a.y.min(b.y).max(0.0) as usize, a.y.max(b.y).max(0.0) as usize);
+                for row in rows.iter_mut().take(bottom.saturating_add(1)).skip(top) {
+                    row.push([*a, *b]);
+                }
+            }
+        }
+        rows
+    }
+}
+
+type Side = [Point2<f64>; 2];
+
+/// Scan lines per row of pixels; each contributes exact spans, so only slanted sides are approximated.
+const LINES: usize = 8;
+
+/// Where a side crosses the horizontal line at `y`.
+fn crossing([a, b]: &Side, y: f64) -> Option<f64> {
+    ((a.y <= y) != (b.y <= y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
+}
+
+fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
+    let first = (x0.max(0.0) as usize).min(row.len());
+    let end = (x1.max(0.0).ceil() as usize).min(row.len());
+    for (x, pixel) in row[..end].iter_mut().enumerate().skip(first) {
+        let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
+        pixel.0 += overlap.clamp(0.0, 1.0) as f32 / LINES as f32;
+    }
+}
+
+/// Area of a ring, positive where it goes clockwise as seen (shoelace formula).
+fn signed_area(ring: &[Point2<f64>]) -> f64 {
+    let next = ring.iter().cycle().skip(1);
+    HALF * ring.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ring of radius 12 to 20 around (32, 30), antialiased.
+    fn ring() -> Image<Coverage> {
+        Image::from_fn(64, 60, |x, y| {
+            let r = (x as f64 + 0.5 - 32.0).hypot(y as f64 + 0.5 - 30.0);
+            Coverage(((20.5 - r).clamp(0.0, 1.0) * (r - 11.5).clamp(0.0, 1.0)) as f32)
+        })
+    }
+
+    #[test]
+    fn a_ring_has_an_outline_and_a_hole() {
+        let outline = Outline::around(&ring());
+        assert_eq!(outline.rings.len(), 2);
+        let area = std::f64::consts::PI * (400.0 - 144.0);
+        assert!((outline.area() / area - 1.0).abs() < 0.01, "{} against {area}", outline.area());
+        assert!(signed_area(&outline.rings[0]) > 0.0 && signed_area(&outline.rings[1]) < 0.0);
+    }
+
+    #[test]
+    fn coverage_and_outline_are_each_others_inverse() {
+        let there = ring();
+        let back = Outline::around(&there).coverage(64, 60);
+        let off = there.pixels().iter().zip(back.pixels()).map(|(a, b)| (a.0 - b.0).abs()).fold(0.0, f32::max);
+        assert!(off < 0.25, "{off}: the outline is straight inside a pixel");
+        let mean = there.zip_map(&back, |a, b| Coverage((a.0 - b.0).abs()));
+        assert!(mean.pixels().iter().map(|c| c.0).sum::<f32>() / mean.pixels().len() as f32 <= 0.005);
+    }
+
+    #[test]
+    fn the_hull_has_no_hollow() {
+        let ell = Image::from_fn(40, 40, |x, y| {
+            Coverage(f32::from(u8::from((5..35).contains(&x) && (5..35).contains(&y) && (x < 15 || y > 25))))
+        });
+        let hull = Outline { rings: vec![Outline::around(&ell).hull()] };
+        let [full, corner] = [900.0, 0.5 * 20.0 * 21.0];
+        assert!((hull.area() - (full - corner)).abs() < 40.0, "{}", hull.area());
+    }
+
+    #[test]
+    fn what_reaches_the_border_ends_there() {
+        let half = Image::from_fn(20, 10, |x, _| Coverage(f32::from(u8::from(x < 8))));
+        let outline = Outline::around(&half);
+        assert!((outline.area() - 80.0).abs() < 1.0, "{}", outline.area());
+    }
+
+    #[test]
+    fn nothing_has_no_outline() {
+        let none = Outline::around(&Image::new(5, 4));
+        assert!(none.rings.is_empty() && none.hull().is_empty() && none.area() == 0.0);
+        assert!(none.coverage(3, 2).pixels().iter().all(|c| c.0 == 0.0));
+    }
+}

@@ -1,0 +1,221 @@
+//! Screen plate: the screen as it would be seen without the object, pixel by pixel.
+
+mod cells;
+mod polynomial;
+
+use super::register::{self, Registered};
+use super::screen::{screen_pixels, strongest_channel};
+use crate::error::{Error, Result};
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::{Coverage, LinearRgb};
+use polynomial::Polynomial;
+use serde::{Deserialize, Serialize};
+
+/// How a screen plate is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlateOptions {
+    /// Highest degree of the polynomial, 0 to 6. Default: 4.
+    pub max_degree: usize,
+    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6: around
+    /// the object only, a higher degree fits shadows and swings beneath it.
+    pub least_gain: f64,
+    /// An empty-screen photo may be shifted by so many pixels. Default: 8.
+    pub max_shift_px: f64,
+    /// An empty-screen photo may differ from the photo by this share of the screen's brightness once it is aligned and
+    /// its exposure matched, 0 to 1. Default: 0.05.
+    pub max_mismatch: f32,
+}
+
+impl Default for PlateOptions {
+    fn default() -> Self {
+        Self { max_degree: 4, least_gain: 0.6, max_shift_px: 8.0, max_mismatch: 0.05 }
+    }
+}
+
+/// The screen alone, of the photo's size.
+#[derive(Clone, Debug)]
+pub struct ScreenPlate {
+    /// The empty screen as the camera sees it, its uneven light included; scene-linear.
+    pub image: Image<LinearRgb>,
+    /// How uneven the screen is: 1 minus darkest over brightest, of its strongest channel.
+    pub unevenness: f32,
+    /// Standard deviation of the photo around the plate where the screen is free: noise, and what the plate misses.
+    pub residual: LinearRgb,
+    /// Degree of the fitted polynomial; nothing where the plate is a photo.
+    pub degree: Option<usize>,
+    /// How far a photographed plate was moved to lie on the photo, pixels right and down; 0 for a fitted one.
+    pub shift_px: [f64; 2],
+}
+
+impl ScreenPlate {
+    /// Fits a smooth screen to the pixels of a photo that show it.
+    ///
+    /// `photo` is scene-linear; `background` says which pixels are surely screen. They may lie around the object only: the
+    /// polynomial goes on under it.
+    ///
+    /// # Method
+    /// The logarithm of each channel is a polynomial of the position, fitted to the means of small cells by iteratively
+    /// reweighted least squares with [Tukey]'s biweight, narrower on the dark side, so that shadows and dirt do not count. Light falls off by
+    /// factors and never goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
+    /// `least_gain` in the residual of cells that were left out of the fit.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] where there is not enough background, or no light on it; [`Error::Value`] for an option that cannot
+    /// be right.
+    /// # Panics
+    /// When the sizes differ.
+    ///
+    /// [Tukey]: https://doi.org/10.1080/03610927708827533
+    pub fn fit(photo: &Image<LinearRgb>, background: &Image<bool>, opts: &PlateOptions) -> Result<Self> {
+        opts.check()?;
+        let cells = cells::means(photo, background);
+        let fitted = Polynomial::fit(&cells, photo.size(), opts)?;
+        let image = fitted.image(photo.size());
+        Ok(Self::of(image, photo, background, Some(fitted.degree), [0.0; 2]))
+    }
+
+    /// Takes a photo of the empty screen for the plate.
+    ///
+    /// It is moved onto the photo (the screen's texture and dirt tell how far, if it has any), its exposure and white balance
+    /// are matched channel by channel, and its noise is blurred.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] where the sizes differ, the empty screen lies farther off than `max_shift_px`, or differs from what the
+    /// photo shows of the screen by more than `max_mismatch`; [`Error::Value`] for an option that cannot be right.
+    /// # Panics
+    /// When the sizes of photo and background differ.
+    pub fn from_photo(
+        empty: &Image<LinearRgb>,
+        photo: &Image<LinearRgb>,
+        background: &Image<bool>,
+        opts: &PlateOptions,
+    ) -> Result<Self> {
+        opts.check()?;
+        if empty.size() != photo.size() {
+            let ((w, h), (pw, ph)) = (empty.size(), photo.size());
+            return Err(refused(format!("the empty screen is {w} x {h} pixels, the photo {pw} x {ph}")));
+        }
+        let Registered { shift_px, .. } = register::shift(photo, empty, background, [1.0; 3]);
+        if shift_px.iter().any(|s| s.abs() > opts.max_shift_px) {
+            return Err(refused(format!(
+                "the empty screen lies ({:.1}, {:.1}) pixels off the photo, expected at most {}; did the camera move?",
+                shift_px[0], shift_px[1], opts.max_shift_px
+            )));
+        }
+        let moved = register::moved(empty, shift_px);
+        let smooth = filter::gaussian_blur(&moved, PHOTO_BLUR_PX);
+        let gain = cells::gain(&cells::means(photo, background), &cells::means(&smooth, background))
+            .ok_or_else(|| refused("the object leaves no background to check the empty screen on"))?;
+        let plate = Self::of(smooth.map(|p| p * gain), photo, background, None, shift_px);
+        plate.check_mismatch(photo, background, opts)?;
+        Ok(plate)
+    }
+
+    /// [`ScreenPlate::fit`] to what an object's mask and a margin around it leave free.
+    ///
+    /// # Errors
+    /// Those of [`ScreenPlate::fit`].
+    /// # Panics
+    /// When the sizes differ.
+    pub fn fit_outside(photo: &Image<LinearRgb>, mask: &Image<Coverage>, opts: &PlateOptions) -> Result<Self> {
+        Self::fit(photo, &screen_pixels(mask), opts)
+    }
+
+    /// [`ScreenPlate::from_photo`], checked on what an object's mask and a margin around it leave free.
+    ///
+    /// # Errors
+    /// Those of [`ScreenPlate::from_photo`].
+    /// # Panics
+    /// When the sizes of photo and mask differ.
+    pub fn from_photo_outside(
+        empty: &Image<LinearRgb>,
+        photo: &Image<LinearRgb>,
+        mask: &Image<Coverage>,
+        opts: &PlateOptions,
+    ) -> Result<Self> {
+        Self::from_photo(empty, photo, &screen_pixels(mask), opts)
+    }
+
+    /// One colour everywhere: what the paper takes for the screen.
+    pub fn even(color: LinearRgb, size: (usize, usize)) -> Self {
+        let image = Image::filled(size.0, size.1, color);
+        Self { image, unevenness: 0.0, residual: LinearRgb::BLACK, degree: Some(0), shift_px: [0.0; 2] }
+    }
+
+    /// Mean colour of the plate, scene-linear.
+    pub fn color(&self) -> LinearRgb {
+        let mut sum = [0.0_f64; 3];
+        for p in self.image.pixels() {
+            let channels: [f32; 3] = (*p).into();
+            sum.iter_mut().zip(channels).for_each(|(s, c)| *s += f64::from(c));
+        }
+        let n = self.image.pixels().len().max(1) as f64;
+        sum.map(|s| (s / n) as f32).into()
+    }
+
+    fn of(
+        image: Image<LinearRgb>,
+        photo: &Image<LinearRgb>,
+        background: &Image<bool>,
+        degree: Option<usize>,
+        shift_px: [f64; 2],
+    ) -> Self {
+        let residual = cells::deviation(photo, &image, background);
+        let mut plate = Self { image, unevenness: 0.0, residual, degree, shift_px };
+        plate.unevenness = unevenness(&plate);
+        plate
+    }
+
+    fn check_mismatch(&self, photo: &Image<LinearRgb>, background: &Image<bool>, opts: &PlateOptions) -> Result<()> {
+        let mismatch = cells::mismatch(&cells::means(photo, background), &cells::means(&self.image, background));
+        if mismatch <= opts.max_mismatch {
+            return Ok(());
+        }
+        Err(refused(format!(
+            "the empty screen differs from the photo's by {:.0} %, expected at most {:.0} %; did the light change?",
+            100.0 * mismatch,
+            100.0 * opts.max_mismatch
+        )))
+    }
+}
+
+/// Blur of a photographed plate against its noise, standard deviation in pixels: a tenth of the noise is left, and screens
+/// have no finer structure that matters.
+const PHOTO_BLUR_PX: f32 = 3.0;
+/// The highest degree that is offered: 28 coefficients a channel.
+const HIGHEST_DEGREE: usize = 6;
+
+impl PlateOptions {
+    fn check(&self) -> Result<()> {
+        if self.max_degree > HIGHEST_DEGREE {
+            return Err(Error::value("max_degree", format!("{}, expected 0 to {HIGHEST_DEGREE}", self.max_degree)));
+        }
+        if !(0.0..=1.0).contains(&self.least_gain) {
+            return Err(Error::value("least_gain", format!("{}, expected 0 to 1", self.least_gain)));
+        }
+        if self.max_shift_px.is_nan() || self.max_shift_px < 0.0 {
+            return Err(Error::value("max_shift_px", format!("{}, expected at least 0", self.max_shift_px)));
+        }
+        if !(0.0..=1.0).contains(&self.max_mismatch) {
+            return Err(Error::value("max_mismatch", format!("{}, expected 0 to 1", self.max_mismatch)));
+        }
+        Ok(())
+    }
+}
+
+/// 1 minus darkest over brightest of the strongest channel.
+fn unevenness(plate: &ScreenPlate) -> f32 {
+    let strongest = strongest_channel(plate.color());
+    let values = plate.image.pixels().iter().map(|p| <[f32; 3]>::from(*p)[strongest]);
+    let (low, high) = values.fold((f32::MAX, 0.0_f32), |(low, high), v| (low.min(v), high.max(v)));
+    if high > 0.0 { 1.0 - (low / high).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+fn refused(what: impl Into<String>) -> Error {
+    Error::Photo { what: what.into() }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,165 @@
+//! Polynomials of the position, one a channel, for the logarithm of the screen.
+
+use super::cells::{Cell, SIGMA_OF_MEDIAN, median};
+use super::{PlateOptions, refused};
+use crate::error::Result;
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+/// A polynomial in x and y of a total degree for each channel of the screen's logarithm.
+#[derive(Clone, Debug)]
+pub(super) struct Polynomial {
+    pub(super) degree: usize,
+    coefficients: [DVector<f64>; 3],
+}
+
+/// A channel that is darker than this share of the brightest is held there: the logarithm of nothing is not fitted.
+const DARKEST: f64 = 1e-4;
+/// Rounds of reweighting.
+const ROUNDS: usize = 8;
+/// Residual in standard deviations beyond which a cell does not count at all (Tukey's biweight, 95 % efficient).
+const TUKEY: f64 = 4.685;
+/// The same for what is darker than the fit, in standard deviations of what is brighter: objects darken the screen around
+/// them far and wide and never brighten it, so that the brighter cells tell the noise, and the darker the shadow.
+const SHADOWED: f64 = 1.5;
+/// Relative noise of a cell below which nothing is an outlier: the coding of an 8-bit picture.
+const FINEST: f64 = 2e-3;
+/// Cells a coefficient, at least.
+const CELLS_A_COEFFICIENT: usize = 4;
+/// Every so many-th cell is left out of the fit that chooses the degree.
+const LEFT_OUT: usize = 3;
+
+/// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
+struct Sample {
+    basis: Vec<f64>,
+    log: [f64; 3],
+}
+
+impl Polynomial {
+    pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
+        let samples = samples(cells, size, opts.max_degree)?;
+        let most = |degree: usize| samples.len() >= CELLS_A_COEFFICIENT * terms(degree);
+        let degrees: Vec<usize> = (0..=opts.max_degree).filter(|&d| d == 0 || most(d)).collect();
+        let (left, asked): (Vec<_>, Vec<_>) = samples.iter().enumerate().partition(|(i, _)| i % LEFT_OUT == 0);
+        let strip = |part: Vec<(usize, _)>| part.into_iter().map(|(_, s)| s).collect::<Vec<&Sample>>();
+        let (left, asked) = (strip(left), strip(asked));
+        let errors: Vec<f64> = degrees.iter().map(|&degree| left_out_error(&asked, &left, degree)).collect();
+        let all: Vec<&Sample> = samples.iter().collect();
+        let best = errors.iter().copied().fold(f64::MAX, f64::min).max(FINEST);
+        let enough = errors.iter().position(|e| *e <= best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE));
+        let degree = degrees[enough.unwrap_or(degrees.len() - 1)];
+        Ok(Self { degree, coefficients: [0, 1, 2].map(|c| robust(&all, degree, c)) })
+    }
+
+    /// The screen in every pixel.
+    pub(super) fn image(&self, size: (usize, usize)) -> Image<LinearRgb> {
+        let (w, h) = size;
+        let mut out = Image::new(w, h);
+        out.par_rows_mut().enumerate().for_each(|(y, row): (usize, &mut [LinearRgb])| {
+            let along = [0, 1, 2].map(|c| self.along(c, place([0.0, y as f64 + 0.5], size)[1]));
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let u = place([x as f64 + 0.5, 0.0], size)[0] as f32;
+                let value = |c: usize| libm::expf(along[c].iter().rev().fold(0.0_f32, |sum, k| sum * u + k));
+                *pixel = LinearRgb::new(value(0), value(1), value(2));
+            }
+        });
+        out
+    }
+
+    /// Coefficients of the polynomial in x that is left of a channel in one row.
+    fn along(&self, channel: usize, v: f64) -> Vec<f32> {
+        let mut along = vec![0.0_f64; self.degree + 1];
+        for (&[i, j], k) in exponents(self.degree).iter().zip(self.coefficients[channel].iter()) {
+            along[i] += k * v.powi(j as i32);
+        }
+        along.into_iter().map(|k| k as f32).collect()
+    }
+}
+
+fn terms(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) / 2
+}
+
+/// The powers of x and y up to a total degree.
+fn exponents(degree: usize) -> Vec<[usize; 2]> {
+    (0..=degree).flat_map(|total| (0..=total).map(move |j| [total - j, j])).collect()
+}
+
+/// A position in units of half the longer side, from the centre.
+fn place([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
+    let half = 0.5 * w.max(h) as f64;
+    [(x - 0.5 * w as f64) / half, (y - 0.5 * h as f64) / half]
+}
+
+fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<Sample>> {
+    let brightest = cells.iter().flat_map(|cell| cell.color).fold(0.0, f64::max);
+    if cells.is_empty() {
+        return Err(refused("the object leaves no background to fit the screen to"));
+    }
+    if brightest <= 0.0 {
+        return Err(refused("the background is black; a screen plate needs light on the screen"));
+    }
+    let exponents = exponents(max_degree);
+    let sample = |cell: &Cell| {
+        let [u, v] = place(cell.at_px, size);
+        Sample {
+            basis: exponents.iter().map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32)).collect(),
+            log: cell.color.map(|c| libm::log(c.max(DARKEST * brightest))),
+        }
+    };
+    Ok(cells.iter().map(sample).collect())
+}
+
+/// Median absolute error of the cells that a fit to the others leaves, of the brightest channel: the others have its shape
+/// and more noise.
+fn left_out_error(asked: &[&Sample], left: &[&Sample], degree: usize) -> f64 {
+    if asked.len() < terms(degree) {
+        return f64::MAX;
+    }
+    let brightness = |c: usize| asked.iter().map(|s| s.log[c]).sum::<f64>();
+    let brightest = (1..3).fold(0, |best, c| if brightness(c) > brightness(best) { c } else { best });
+    let k = robust(asked, degree, brightest);
+    median(left.iter().map(|s| (s.log[brightest] - value(&k, s)).abs())).unwrap_or(f64::MAX)
+}
+
+/// The polynomial where a sample is; the basis may go on to higher degrees.
+fn value(k: &DVector<f64>, sample: &Sample) -> f64 {
+    k.iter().zip(&sample.basis).map(|(k, b)| k * b).sum()
+}
+
+/// Iteratively reweighted least squares for one channel.
+fn robust(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
+    let mut weights = vec![1.0; samples.len()];
+    let mut k = DVector::zeros(terms(degree));
+    for _ in 0..ROUNDS {
+        k = solved(samples, channel, &weights, terms(degree));
+        let residuals: Vec<f64> = samples.iter().map(|s| s.log[channel] - value(&k, s)).collect();
+        let spread = |set: &dyn Fn(f64) -> bool| {
+            let chosen = residuals.iter().filter(|r| set(**r)).map(|r| r.abs());
+            (SIGMA_OF_MEDIAN * median(chosen).unwrap_or(0.0)).max(FINEST)
+        };
+        let (above, below) = (TUKEY * spread(&|_| true), SHADOWED * spread(&|r| r > 0.0));
+        let reach = |r: f64| if r > 0.0 { above } else { below };
+        weights = residuals.iter().map(|r| (1.0 - (r / reach(*r)).powi(2)).max(0.0).powi(2)).collect();
+    }
+    k
+}
+
+/// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
+fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
+    let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE, DVector::zeros(n));
+    for (sample, weight) in samples.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        for i in 0..n {
+            let scaled = weight * sample.basis[i];
+            right[i] += scaled * sample.log[channel];
+            // The lower half is all that Cholesky reads.
+            (0..=i).for_each(|j| normal[(i, j)] += scaled * sample.basis[j]);
+        }
+    }
+    normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
+}
+
+/// Far below what a single cell adds.
+const RIDGE: f64 = 1e-6;

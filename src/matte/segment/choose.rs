@@ -1,0 +1,138 @@
+//! The depth of the search, chosen by how well searches agree.
+
+use super::pass::{Pass, Search};
+use super::{Confidence, SMALLEST, SegmentOptions};
+use crate::error::Result;
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::{Coverage, LinearRgb};
+use rayon::prelude::*;
+
+/// The search that is believed.
+pub(super) struct Chosen {
+    /// What it found.
+    pub(super) pass: Pass,
+    /// Its first band.
+    pub(super) first: Image<Coverage>,
+    /// Where that is above its cut.
+    pub(super) first_binary: Image<bool>,
+    /// The band that served as the last one.
+    pub(super) levels: usize,
+    /// How far it can be believed.
+    pub(super) confidence: Confidence,
+}
+
+/// A picture size and the depths to search it at, the usual one first.
+///
+/// Half the size sees half the noise, and a third of it at a quarter; the bands then are as wide as those of one depth more.
+const SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
+/// The last band has at least so many pixels along the longer side: below that, it does not tell an object from the rest.
+const LEAST_CELLS: usize = 30;
+/// A finer picture is preferred to one that scores better by less than this factor.
+const PREFERENCE: f64 = 0.8;
+/// Longer side of the pictures in which outlines are compared, pixels.
+const COMPARED: usize = 256;
+
+/// Searches the picture at several sizes and depths.
+///
+/// # Method
+/// An outline is right where it lies on edges and where it does not depend on how it was looked for. Each search scores
+/// the share of its outline that lies on edges times its mean overlap (intersection over union) with what the other
+/// searches found; a search that finds nothing overlaps with nothing. The best score wins, the finer picture when in
+/// doubt.
+/// # Errors
+/// That of the usual search when more than half of the searches fail.
+pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Chosen> {
+    let mut searched = searches(picture, opts);
+    let failed = searched.iter().filter(|s| s.pass.is_err()).count();
+    if 2 * failed > searched.len() {
+        let first = searched.iter().position(|s| s.pass.is_err()).unwrap_or(0);
+        return searched.swap_remove(first).chosen(Confidence::default());
+    }
+    let outlines: Vec<Option<Image<bool>>> = searched.iter().map(|s| s.compared(picture.size())).collect();
+    let beliefs: Vec<Confidence> = searched
+        .iter()
+        .enumerate()
+        .map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i) })
+        .collect();
+    let wanted = |i: usize| opts.levels.is_none_or(|levels| searched[i].reduction == 1 && searched[i].levels == levels);
+    let most = (0..searched.len()).filter(|&i| wanted(i)).map(|i| beliefs[i].value()).fold(0.0, f64::max);
+    let pick = (0..searched.len()).find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most).unwrap_or(0);
+    searched.swap_remove(pick).chosen(beliefs[pick])
+}
+
+/// One search and its setting.
+struct Searched {
+    reduction: usize,
+    levels: usize,
+    first: (Image<Coverage>, Image<bool>),
+    pass: Result<Pass>,
+}
+
+fn searches(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Searched> {
+    let (w, h) = picture.size();
+    let large_enough = |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST;
+    let sizes: Vec<_> = SIZES.into_iter().filter(|(reduction, _)| large_enough(*reduction)).collect();
+    let at_size = |&(reduction, depths): &(usize, &[usize])| {
+        let longer = w.max(h) / reduction;
+        let mut depths: Vec<usize> = depths.iter().copied().filter(|&d| d == 2 || longer >> d >= LEAST_CELLS).collect();
+        depths.extend(opts.levels.filter(|levels| reduction == 1 && !depths.contains(levels)));
+        let smaller = (reduction > 1).then(|| filter::resize(picture, w / reduction, h / reduction));
+        let search = Search::of(smaller.as_ref().unwrap_or(picture), opts, depths.iter().copied().max().unwrap_or(2));
+        let at = |&levels: &usize| {
+            let (first, binary) = search.first();
+            Searched { reduction, levels, first: (first.clone(), binary.clone()), pass: search.at(levels, opts) }
+        };
+        depths.par_iter().map(at).collect::<Vec<_>>()
+    };
+    sizes.par_iter().map(at_size).collect::<Vec<_>>().into_iter().flatten().collect()
+}
+
+impl Searched {
+    fn chosen(self, confidence: Confidence) -> Result<Chosen> {
+        let (first, first_binary) = self.first;
+        Ok(Chosen { pass: self.pass?, first, first_binary, levels: self.levels, confidence })
+    }
+
+    /// The inside in a picture small enough to be compared quickly.
+    fn compared(&self, (w, h): (usize, usize)) -> Option<Image<bool>> {
+        let pass = self.pass.as_ref().ok()?;
+        let longer = w.max(h);
+        let side = |len: usize| (len * COMPARED.min(longer)).div_ceil(longer);
+        let inside = pass.inside.map(|p| Coverage(f32::from(u8::from(p))));
+        Some(filter::resize(&inside, side(w), side(h)).map(|c| c.0 > 0.5))
+    }
+
+    /// Share of the outline that lies on edges; what lies on the picture's border does not count.
+    fn support(&self) -> f64 {
+        let Ok(pass) = &self.pass else { return 0.0 };
+        let near = filter::dilate(&pass.object, EDGE_REACH_PX);
+        let core = filter::erode(&pass.inside, 1.0);
+        let (w, h) = core.size();
+        let (mut length, mut on_edges) = (0u64, 0u64);
+        for (y, (inside, core)) in pass.inside.rows().zip(core.rows()).enumerate() {
+            for x in (0..w).filter(|&x| inside[x] && !core[x] && x > 0 && y > 0 && x + 1 < w && y + 1 < h) {
+                length += 1;
+                on_edges += u64::from(near[(x, y)]);
+            }
+        }
+        on_edges as f64 / length.max(1) as f64
+    }
+}
+
+/// How far from an edge pixel an outline still lies on it, pixels: the smear of the first band.
+const EDGE_REACH_PX: f64 = 2.0;
+
+/// Mean overlap of one outline with the others.
+fn agreement(outlines: &[Option<Image<bool>>], i: usize) -> f64 {
+    let others = (0..outlines.len()).filter(|&j| j != i);
+    let overlap = |j: usize| outlines[i].as_ref().zip(outlines[j].as_ref()).map_or(0.0, |(a, b)| overlap(a, b));
+    others.clone().map(overlap).sum::<f64>() / others.count().max(1) as f64
+}
+
+/// Intersection over union.
+fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
+    let count =
+        |holds: fn(bool, bool) -> bool| a.pixels().iter().zip(b.pixels()).filter(|(a, b)| holds(**a, **b)).count();
+    count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
+}

@@ -1,0 +1,180 @@
+//! One search of a picture: two of its bands become edges, a cluster of edges, and what they enclose.
+
+use super::band::{self, Bands};
+use super::cluster::{self, Groups};
+use super::hull;
+use super::{SegmentOptions, longer_side, refused};
+use crate::error::Result;
+use crate::filter;
+use crate::geom::Point2;
+use crate::image::Image;
+use crate::matte::remark::Remark;
+use crate::pixel::{Coverage, LinearRgb};
+
+/// A picture ready to be searched at any depth.
+pub(super) struct Search {
+    bands: Bands,
+    /// Where the first band is above its cut.
+    first_binary: Image<bool>,
+    /// Where the first band is no mere smear of a stronger edge.
+    ridges: Image<bool>,
+}
+
+/// What a search at one depth found, in pixels of the picture that was searched.
+pub(super) struct Pass {
+    /// The band that served as the last one.
+    pub(super) last: Image<Coverage>,
+    /// Where that is above its cut.
+    pub(super) last_binary: Image<bool>,
+    /// The edges, specks left out.
+    pub(super) edges: Image<bool>,
+    /// Those of the object.
+    pub(super) object: Image<bool>,
+    /// Convex hull of the object.
+    pub(super) hull: Vec<Point2<f64>>,
+    /// What its edges enclose.
+    pub(super) inside: Image<bool>,
+    /// Left, top, right and bottom border are reached.
+    pub(super) touches: [bool; 4],
+    /// What was left out.
+    pub(super) remarks: Vec<Remark>,
+}
+
+/// How far the first band smears an edge, pixels: the reach of its kernel.
+const SMEAR: usize = 2;
+/// Edges nearer than this belong together in the smallest picture, too, pixels: the width of a smeared edge.
+const LEAST_JOIN_PX: f64 = 6.0;
+
+impl Search {
+    /// Splits a picture into bands, `deepest` of them.
+    pub(super) fn of(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
+        let bands = Bands::of(picture, opts.tone, deepest);
+        let first = &bands.first;
+        let cut = opts.first_threshold.of(first).max(opts.least_contrast);
+        let first_binary = first.map(|c| c.0 > cut);
+        let strongest = band::largest_around(first, SMEAR);
+        let ridges = first.zip_map(&strongest, |c, most| c.0 >= opts.ridge * most.0);
+        Self { bands, first_binary, ridges }
+    }
+
+    /// The first band and where it is above its cut.
+    pub(super) fn first(&self) -> (&Image<Coverage>, &Image<bool>) {
+        (&self.bands.first, &self.first_binary)
+    }
+
+    /// Finds the object with band `levels` as the last one.
+    pub(super) fn at(&self, levels: usize, opts: &SegmentOptions) -> Result<Pass> {
+        let last = self.bands.last(levels);
+        let cut = opts.last_threshold.of(&last);
+        let last_binary = last.map(|c| c.0 > cut);
+        let both = self.first_binary.zip_map(&last_binary, |a, b| a && b);
+        let edges = cluster::without_specks(&both.zip_map(&self.ridges, |a, b| a && b), opts.speck);
+        let join_px = (opts.join * longer_side(&edges) as f64).max(LEAST_JOIN_PX);
+        let (object, remarks) = main_cluster(&edges, join_px)?;
+        let hull = hull::convex_hull(&object);
+        let touches = touches(&object);
+        check_object(&hull, touches, edges.size())?;
+        let inside = enclosed(&object, join_px);
+        Ok(Pass { last, last_binary, edges, object, hull, inside, touches, remarks })
+    }
+}
+
+/// Two clusters are two objects when the smaller one has at least this share of the larger one's edge pixels.
+const RIVAL: f64 = 0.3;
+/// A smaller cluster is worth a warning from this share on.
+const REMNANT: f64 = 0.05;
+
+/// The edges of the one object.
+///
+/// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
+/// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
+fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<Remark>)> {
+    let groups = Groups::of(&filter::dilate(edges, join_px / 2.0));
+    let sizes = groups.sizes(edges);
+    let Some(main) = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i))) else {
+        return Err(refused(
+            "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
+        ));
+    };
+    let member = |i: usize| groups.only(move |group| group == i).zip_map(edges, |near, edge| near && edge);
+    let object = member(main);
+    let hull = hull::coverage(&hull::convex_hull(&object), edges.width(), edges.height()).map(|c| c.0 > 0.0);
+    let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
+    let mut remarks = Vec::new();
+    for i in (0..sizes.len()).filter(|&i| i != main && 2 * inside[i] < sizes[i]) {
+        let share = sizes[i] as f64 / sizes[main] as f64;
+        if share >= RIVAL {
+            return Err(refused(format!(
+                "two objects, {} and {}; photograph them one by one (or, if it is one, raise segment.join)",
+                place(&object),
+                place(&member(i))
+            )));
+        }
+        if share >= REMNANT {
+            remarks.push(Remark::LeftOut { what: place(&member(i)), object: place(&object) });
+        }
+    }
+    let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
+    Ok((groups.only(belongs).zip_map(edges, |near, edge| near && edge), remarks))
+}
+
+/// Where a set of pixels is, in words, as shares of the picture.
+fn place(set: &Image<bool>) -> String {
+    let hull = hull::convex_hull(set);
+    let n = hull.len().max(1) as f64;
+    let percent = |sum: f64, len: usize| (100.0 * sum / n / len as f64).round();
+    let x = percent(hull.iter().map(|p| p.x).sum(), set.width());
+    let y = percent(hull.iter().map(|p| p.y).sum(), set.height());
+    format!("at {x} % of the width and {y} % of the height")
+}
+
+/// The area may grow by this factor when twice the gap is bridged; by more, and it had leaked.
+const LEAK: f64 = 1.1;
+
+/// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
+/// area jump, for then the outline had a gap through which the inside leaked out.
+fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
+    let hull = hull::coverage(&hull::convex_hull(edges), edges.width(), edges.height()).map(|c| c.0 > 0.5);
+    let area = |set: &Image<bool>| set.pixels().iter().filter(|p| **p).count() as f64;
+    let mut narrow = closed(edges, &hull, join_px / 2.0);
+    for times in [1.0, 2.0, 4.0] {
+        let wide = closed(edges, &hull, times * join_px);
+        if area(&wide) <= LEAK * area(&narrow) {
+            return wide;
+        }
+        narrow = wide;
+    }
+    hull
+}
+
+fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool> {
+    let whole = filter::erode(&cluster::filled(&filter::dilate(edges, radius_px)), radius_px);
+    whole.zip_map(hull, |inside, hull| inside && hull)
+}
+
+fn touches(set: &Image<bool>) -> [bool; 4] {
+    let (w, h) = set.size();
+    let column = |x: usize| set.rows().any(|row| row[x]);
+    let row = |y: usize| set.row(y).iter().any(|p| *p);
+    [column(0), row(0), column(w - 1), row(h - 1)]
+}
+
+/// Least length of an object as a share of the photo's longer side; anything smaller is dirt.
+const LEAST_LENGTH: f64 = 0.05;
+
+fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)) -> Result<()> {
+    let extent = |along: fn(&Point2<f64>) -> f64| {
+        let (low, high) = hull.iter().map(along).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+        (high - low).max(0.0)
+    };
+    let (width, height) = (extent(|p| p.x), extent(|p| p.y));
+    if hull.is_empty() || width.max(height) < LEAST_LENGTH * w.max(h) as f64 {
+        return Err(refused(format!(
+            "the largest thing found is {width:.0} x {height:.0} of {w} x {h} pixels; is there an object, and is it in focus?"
+        )));
+    }
+    if touches == [true; 4] {
+        return Err(refused("the object reaches all four borders; photograph it with background all around it"));
+    }
+    Ok(())
+}

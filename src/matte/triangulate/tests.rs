@@ -1,0 +1,116 @@
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const SIZE: (usize, usize) = (160, 100);
+const GREEN: LinearRgb = LinearRgb::new(0.045, 0.42, 0.085);
+const BLUE: LinearRgb = LinearRgb::new(0.03, 0.095, 0.52);
+const RED: LinearRgb = LinearRgb::new(0.5, 0.04, 0.05);
+
+fn inside() -> Image<Coverage> {
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (u, v) = ((x as f32 - 80.0) / 60.0, (y as f32 - 50.0) / 35.0);
+        Coverage(f32::from(u8::from(u * u + v * v < 1.0)))
+    })
+}
+
+/// Blue film with folds and glints.
+fn truth(x: f64, y: f64) -> (LinearRgb, LinearRgb) {
+    let (u, v) = ((x - 80.0) / 60.0, (y - 50.0) / 35.0);
+    if u * u + v * v >= 1.0 {
+        return (LinearRgb::BLACK, LinearRgb::WHITE);
+    }
+    let fold = (0.75 + 0.2 * libm::sin(0.23 * x + 0.011 * y * y)) as f32;
+    let glint = (0.12 * libm::pow(libm::sin(0.17 * x - 0.29 * y), 8.0)) as f32;
+    (LinearRgb::new(0.03, 0.05, 0.07).map(|f| f + glint), LinearRgb::new(0.25, 0.45, 0.6).scale(fold))
+}
+
+fn photo(screen: LinearRgb, [dx, dy]: [f64; 2], noise: f32, seed: u64) -> Image<LinearRgb> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut grain = || noise * ((0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0);
+    let mut image = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (f, t) = truth(x as f64 - dx, y as f64 - dy);
+        f + t * screen
+    });
+    image.pixels_mut().iter_mut().for_each(|p| *p = p.map(|v| v + grain()));
+    image
+}
+
+fn solved(screens: &[LinearRgb], shift: [f64; 2], noise: f32) -> Result<Triangulated> {
+    let photos: Vec<_> = screens
+        .iter()
+        .enumerate()
+        .map(|(i, &k)| photo(k, if i == 0 { [0.0; 2] } else { shift }, noise, i as u64))
+        .collect();
+    let plates: Vec<_> = screens.iter().map(|&k| ScreenPlate::even(k, SIZE)).collect();
+    let shots: Vec<_> = photos.iter().zip(&plates).collect();
+    triangulate(&shots, &inside(), &TriangulateOptions::default())
+}
+
+/// Mean absolute errors of T in the three channels and of F, inside.
+fn errors(found: &Triangulated) -> ([f32; 3], f32) {
+    let (mut t_error, mut f_error, mut count) = ([0.0; 3], 0.0, 0.0);
+    for y in 0..SIZE.1 {
+        for x in (0..SIZE.0).filter(|&x| inside()[(x, y)].0 > 0.5) {
+            let (f, t) = truth(x as f64, y as f64);
+            let (ft, tt): ([f32; 3], [f32; 3]) = (found.transmittance[(x, y)].into(), t.into());
+            (0..3).for_each(|c| t_error[c] += (ft[c] - tt[c]).abs());
+            f_error += (found.film[(x, y)].color.g - f.g).abs();
+            count += 1.0;
+        }
+    }
+    (t_error.map(|e| e / count), f_error / count)
+}
+
+#[test]
+fn two_screens_without_noise_are_exact_where_they_differ() {
+    let found = solved(&[GREEN, BLUE], [0.0; 2], 0.0).unwrap();
+    assert_eq!(found.determined, [false, true, true]);
+    let ([r, g, b], f) = errors(&found);
+    assert!(g < 1e-4 && b < 1e-4 && f < 1e-4, "{g} {b} {f}");
+    assert!(r < 0.03, "red is told from the others: {r}");
+    assert_eq!(found.remarks, [Remark::Undetermined("red")]);
+}
+
+#[test]
+fn three_screens_determine_every_channel() {
+    let found = solved(&[GREEN, BLUE, RED], [0.0; 2], 0.003).unwrap();
+    assert_eq!(found.determined, [true; 3]);
+    let (t, f) = errors(&found);
+    assert!(t.iter().all(|e| *e < 0.015) && f < 0.01, "{t:?} {f}");
+    assert!(found.residual < 0.005, "{}", found.residual);
+}
+
+#[test]
+fn an_object_that_moved_is_moved_back() {
+    let shift = [1.6, -0.7];
+    let found = solved(&[GREEN, BLUE], shift, 0.002).unwrap();
+    let [x, y] = found.shift_px[1];
+    assert!((x - shift[0]).abs() < 0.15 && (y - shift[1]).abs() < 0.15, "{x} {y}");
+    assert!(matches!(found.remarks[0], Remark::Moved { photo: 2, .. }));
+    let still = errors(&solved(&[GREEN, BLUE], [0.0; 2], 0.002).unwrap());
+    assert!(errors(&found).0[1] < still.0[1] + 0.05);
+}
+
+#[test]
+fn an_object_that_moved_far_is_refused() {
+    let (a, b) = (photo(GREEN, [0.0; 2], 0.002, 1), photo(BLUE, [1.6, -0.7], 0.002, 2));
+    let (ka, kb) = (ScreenPlate::even(GREEN, SIZE), ScreenPlate::even(BLUE, SIZE));
+    let strict = TriangulateOptions { max_shift_px: 1.0, ..TriangulateOptions::default() };
+    let far = triangulate(&[(&a, &ka), (&b, &kb)], &inside(), &strict).unwrap_err().to_string();
+    assert!(far.contains("did it move?"), "{far}");
+}
+
+#[test]
+fn screens_that_are_alike_and_single_photos_are_refused() {
+    let alike = solved(&[GREEN, GREEN], [0.0; 2], 0.002).unwrap_err().to_string();
+    assert!(alike.contains("too alike"), "{alike}");
+    let single = solved(&[GREEN], [0.0; 2], 0.0).unwrap_err().to_string();
+    assert_eq!(single, "photos: 1, expected at least 2");
+}
+
+#[test]
+fn outside_the_object_there_is_nothing() {
+    let found = solved(&[GREEN, BLUE], [0.0; 2], 0.01).unwrap();
+    assert_eq!((found.film[(2, 3)], found.transmittance[(2, 3)]), (Film::default(), LinearRgb::WHITE));
+}

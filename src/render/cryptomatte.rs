@@ -1,0 +1,137 @@
+//! Cryptomatte: which objects are in a pixel, and how much of each is seen, in channels of floats.
+//!
+//! # Method
+//! Friedman and Jones, "Cryptomatte Specification" 1.2.0 (2019): an object's id is the MurmurHash3 of its name, made a
+//! float that is neither a NaN nor subnormal; a pixel's objects are ranked by coverage, two ranks to a set of four
+//! channels; text attributes name the layer, the hash and the objects. Readers need the floats exactly: no half, and no
+//! compression with loss.
+
+use crate::pixel::ObjectId;
+use crate::render::DeepImage;
+
+/// Sets of four channels, two ranks each: the six ranks that most programs write.
+const SETS: usize = 3;
+
+/// Channels of a set: id and coverage of the one rank, then of the next.
+const SET: [&str; 4] = ["R", "G", "B", "A"];
+
+/// Characters of the layer's key in its attributes.
+const KEY: usize = 7;
+
+/// The channels and attributes of one layer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cryptomatte {
+    /// Names and samples, row by row: `CryptoObject00.R`, ...
+    pub channels: Vec<(String, Vec<f32>)>,
+    /// Names and texts of attributes: `cryptomatte/3ae39a5/name`, ...
+    pub metadata: Vec<(String, String)>,
+}
+
+impl Cryptomatte {
+    /// The layer of the objects in a picture; `names` says how each is called, and who is not in it is left out.
+    ///
+    /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with least are left out.
+    pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
+        let ids: Vec<(ObjectId, f32)> = names.iter().map(|(object, name)| (*object, id_of(name))).collect();
+        let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); SETS * SET.len()];
+        for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
+            let id = |object| ids.iter().find(|(known, _)| *known == object).map(|&(_, id)| id);
+            let seen =
+                deep.at(x, y).iter().filter(|s| s.visible > 0.0).filter_map(|s| Some((id(s.object)?, s.visible)));
+            let mut ranks: Vec<(f32, f32)> = seen.collect();
+            // By id where coverage is the same, so that nothing depends on depth.
+            ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
+            ranks.resize(planes.len() / 2, (0.0, 0.0));
+            for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
+                pair[0].push(id);
+                pair[1].push(coverage);
+            }
+        }
+        let name = |i: usize| format!("{layer}{:02}.{}", i / SET.len(), SET[i % SET.len()]);
+        let channels = planes.into_iter().enumerate().map(|(i, plane)| (name(i), plane)).collect();
+        Self { channels, metadata: metadata(layer, names) }
+    }
+}
+
+fn metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
+    let key = &format!("{:08x}", murmur3(layer.as_bytes()))[..KEY];
+    let hex = |name: &str| format!("{:08x}", id_of(name).to_bits());
+    let manifest: serde_json::Map<_, _> = names.iter().map(|(_, name)| (name.clone(), hex(name).into())).collect();
+    let texts = [
+        ("name", layer.to_owned()),
+        ("hash", "MurmurHash3_32".to_owned()),
+        ("conversion", "uint32_to_float32".to_owned()),
+        ("manifest", serde_json::Value::Object(manifest).to_string()),
+    ];
+    texts.into_iter().map(|(what, text)| (format!("cryptomatte/{key}/{what}"), text)).collect()
+}
+
+/// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals, infinity and NaN.
+fn id_of(name: &str) -> f32 {
+    const MANTISSA: u32 = (1 << 23) - 1;
+    const SIGN: u32 = 1 << 31;
+    let hash = murmur3(name.as_bytes());
+    let exponent = (hash >> 23 & 0xff).clamp(1, 254);
+    f32::from_bits(hash & (SIGN | MANTISSA) | exponent << 23)
+}
+
+/// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
+fn murmur3(bytes: &[u8]) -> u32 {
+    let mix = |word: u32| word.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593);
+    let mut hash = 0_u32;
+    let words = bytes.chunks_exact(4);
+    let rest = words.remainder().iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
+    for word in words {
+        hash ^= mix(u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
+        hash = hash.rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64);
+    }
+    hash ^= mix(rest) ^ bytes.len() as u32;
+    hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
+    hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
+    hash ^ hash >> 16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Image;
+    use crate::pixel::LinearRgb;
+    use crate::render::DeepSample;
+
+    /// Values of the Python package mmh3 5.
+    const HASHES: [(&str, u32); 7] = [
+        ("", 0),
+        ("a", 0x3c25_69b2),
+        ("ab", 0x9bbf_d75f),
+        ("abc", 0xb3dd_93fa),
+        ("CryptoObject", 0x3ae3_9a58),
+        ("object001_cap_label", 0xe291_0778),
+        ("grün", 0x2af5_80c6),
+    ];
+
+    #[test]
+    fn hashes_are_those_of_murmur3() {
+        for (text, hash) in HASHES {
+            assert_eq!(murmur3(text.as_bytes()), hash, "{text}");
+        }
+    }
+
+    #[test]
+    fn ids_are_ordinary_numbers() {
+        for i in 0..100_000 {
+            assert!(id_of(&format!("object{i}")).is_normal());
+        }
+    }
+
+    #[test]
+    fn objects_are_ranked_by_what_is_seen_of_them() {
+        let sample = |id, visible| DeepSample { object: ObjectId(id), visible, alpha: 1.0, ..DeepSample::default() };
+        let pixel = vec![sample(1, 0.25), sample(2, 0.5), sample(3, 0.0), sample(9, 0.1)];
+        let deep = DeepImage::from_pixels(Image::filled(1, 1, LinearRgb::WHITE), [pixel]);
+        let names = [1, 2, 3].map(|id| (ObjectId(id), format!("object{id}")));
+        let found = Cryptomatte::new(&deep, "CryptoObject", &names);
+        let values: Vec<_> = found.channels.iter().map(|(_, plane)| plane[0]).collect();
+        assert_eq!(values[..5], [id_of("object2"), 0.5, id_of("object1"), 0.25, 0.0]);
+        assert_eq!((found.channels.len(), found.channels[7].0.as_str()), (12, "CryptoObject01.A"));
+    }
+}

@@ -1,0 +1,248 @@
+//! What reaches a card or the surface: all its light in the open, less what blockers take away.
+//!
+//! Keeping what is *lost* instead of what arrives makes work sparse, since most beams meet no blocker at most nodes, and
+//! makes light exact where nothing is in its way.
+
+use crate::geom::Vector3;
+use crate::pixel::LinearRgb;
+use crate::render::RenderOptions;
+use crate::render::four::Four;
+use crate::render::half_plane::{grown, sides, span, whole};
+use crate::render::lattice::Lattice;
+use crate::render::shadow::{Beam, Casters, rows_and_columns};
+use crate::render::source::{Lamp, Lamps};
+use crate::render::view::{HORIZON, Seen};
+use crate::scene::Shot;
+use std::ops::Range;
+
+/// One receiver under some of its lamps, on a lattice.
+#[derive(Debug)]
+pub(super) struct Receiver {
+    seen: Seen,
+    /// Nodes outside of these conditions are not asked for.
+    outline: Vec<Vector3<f64>>,
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+    lamps: Vec<(LinearRgb, Vec<Beam>)>,
+    /// Channels that blockers differ in: 1, or 3 where there is film.
+    channels: usize,
+    /// Irradiance that comes from other lamps than these, before anything is lost.
+    pub(super) rest: LinearRgb,
+}
+
+/// A receiver under area lights, whose shadows are sharp, and under the sky, whose shadows are soft enough for half the
+/// nodes.
+#[derive(Debug)]
+pub(super) struct Lit {
+    pub(super) fine: Receiver,
+    pub(super) coarse: Receiver,
+    /// The share of open irradiance is asked for, not irradiance itself.
+    pub(super) relative: bool,
+}
+
+/// What receivers are made from.
+pub(super) struct Studio<'a> {
+    pub(super) fine: Lattice,
+    pub(super) coarse: Lattice,
+    pub(super) casters: Casters<'a>,
+    pub(super) shot: &'a Shot,
+    pub(super) options: RenderOptions,
+}
+
+impl Studio<'_> {
+    /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.
+    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<Lit> {
+        let fine = self.card_on(&self.fine, own, reach, |lamps| &lamps.faces)?;
+        let coarse = self.card_on(&self.coarse, own, reach, |lamps| &lamps.sky)?;
+        Some(Lit { fine, coarse, relative: false })
+    }
+
+    fn card_on(
+        &self,
+        lattice: &Lattice,
+        own: usize,
+        reach: [f64; 2],
+        some: impl Fn(&Lamps) -> &[Lamp],
+    ) -> Option<Receiver> {
+        let sheet = &self.casters.cards[own].sheet;
+        let seen = Seen::of(sheet, &lattice.view)?;
+        let (rows, columns) = rows_and_columns(sheet, reach, &lattice.view);
+        if rows.len() < 2 || columns.len() < 2 {
+            return None;
+        }
+        // Two nodes, for the finer lattice's one that lies between them.
+        let outline = sides(&seen.u, &seen.v, &seen.w, reach).iter().map(|s| grown(s, 2.0)).collect();
+        let cell = seen.cell_metres(&lattice.view, &sheet.center);
+        Some(self.receiver(lattice, seen, Some(own), cell, some).within(outline, rows, columns))
+    }
+
+    /// The surface; asked for where a shadow may fall on it. None where there is no shadow, or none to be seen.
+    pub(super) fn surface(&self) -> Option<Lit> {
+        let fine = self.surface_on(&self.fine, |lamps| &lamps.faces)?;
+        let coarse = self.surface_on(&self.coarse, |lamps| &lamps.sky)?;
+        let doubled = |r: &Range<usize>| if r.is_empty() { 0..0 } else { (2 * r.start).saturating_sub(2)..2 * r.end };
+        let view = &self.fine.view;
+        let rows = cut(union(fine.rows.clone(), doubled(&coarse.rows)), view.height);
+        let columns = cut(union(fine.columns.clone(), doubled(&coarse.columns)), view.width);
+        let seen = rows.len() > 1 && columns.len() > 1;
+        seen.then(|| Lit { fine: Receiver { rows, columns, ..fine }, coarse, relative: true })
+    }
+
+    fn surface_on(&self, lattice: &Lattice, some: impl Fn(&Lamps) -> &[Lamp]) -> Option<Receiver> {
+        let seen = Seen::of(&self.casters.surface, &lattice.view).filter(|s| s.normal.z > 0.0)?;
+        let cell = seen.cell_metres(&lattice.view, &Vector3::zeros());
+        let receiver = self.receiver(lattice, seen, None, cell, some);
+        let blockers = receiver.lamps.iter().flat_map(|(_, beams)| beams).flat_map(|b| &b.blockers);
+        let areas = blockers.map(|b| (b.rows.clone(), b.columns.clone()));
+        let (rows, columns) = areas.reduce(|a, b| (union(a.0, b.0), union(a.1, b.1))).unwrap_or((0..0, 0..0));
+        Some(receiver.within(vec![seen.w], rows, columns))
+    }
+
+    fn receiver(
+        &self,
+        lattice: &Lattice,
+        seen: Seen,
+        own: Option<usize>,
+        cell: f64,
+        some: impl Fn(&Lamps) -> &[Lamp],
+    ) -> Receiver {
+        let all = Lamps::of(self.shot, &self.options, &seen.normal);
+        let beams = |lamp: &Lamp| (lamp.radiance, self.casters.beams(&seen, &lattice.view, lamp, own, cell));
+        Receiver {
+            lamps: some(&all).iter().map(beams).collect(),
+            channels: if self.casters.tinted { 3 } else { 1 },
+            rest: all.open_sky(),
+            seen,
+            outline: Vec::new(),
+            columns: 0..0,
+            rows: 0..0,
+        }
+    }
+}
+
+fn union(a: Range<usize>, b: Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b,
+        (_, true) => a,
+        _ => a.start.min(b.start)..a.end.max(b.end),
+    }
+}
+
+fn cut(range: Range<usize>, end: usize) -> Range<usize> {
+    range.start.min(end)..range.end.min(end)
+}
+
+/// Scratch of one task, a value per node of a row.
+#[derive(Default)]
+pub(super) struct Buffers {
+    /// World position.
+    position: [Vec<f32>; 3],
+    /// Irradiance by unit radiance of one beam, and of all beams of a lamp.
+    strength: Vec<f32>,
+    lamp: Vec<f32>,
+    /// Share of a beam that passes the blockers, and what a lamp loses to them, per channel.
+    through: [Vec<f32>; 3],
+    lost: [Vec<f32>; 3],
+    /// Nodes that each blocker of a beam touches.
+    touched: Vec<(usize, Range<usize>)>,
+    /// Irradiance in the open.
+    pub(super) open: Vec<Four>,
+    /// Irradiance that blockers take away.
+    pub(super) hidden: Vec<Four>,
+    /// A row of hidden irradiance of the coarser lattice.
+    pub(super) coarse: Vec<Four>,
+}
+
+impl Receiver {
+    fn within(self, outline: Vec<Vector3<f64>>, rows: Range<usize>, columns: Range<usize>) -> Self {
+        Self { outline, rows, columns, ..self }
+    }
+
+    /// The nodes of a row that are asked for.
+    pub(super) fn asked(&self, j: usize) -> Range<usize> {
+        let (low, high) = span(&self.outline, j as f64);
+        whole(low, high, &self.columns)
+    }
+
+    /// Open and hidden irradiance at the asked nodes of a row: `rest` and this receiver's own lamps.
+    pub(super) fn gather(&self, j: usize, asked: &Range<usize>, buffers: &mut Buffers) {
+        let n = asked.len();
+        let LinearRgb { r, g, b } = self.rest;
+        refill(&mut buffers.open, n, Four([r, g, b, 0.0]));
+        refill(&mut buffers.hidden, n, Four::ZERO);
+        if !self.lamps.is_empty() {
+            self.positions(j, asked, &mut buffers.position);
+        }
+        for (radiance, beams) in &self.lamps {
+            refill(&mut buffers.lamp, n, 0.0);
+            buffers.lost.iter_mut().take(self.channels).for_each(|lost| refill(lost, n, 0.0));
+            let touched = beams.iter().map(|beam| self.beam(beam, j, asked, buffers)).reduce(union);
+            add_lamp(&mut buffers.open, &buffers.lamp, (*radiance).into());
+            if let Some(touched) = touched.filter(|t| !t.is_empty()) {
+                let lost = |c: usize| &buffers.lost[c.min(self.channels - 1)][touched.clone()];
+                add_lost(&mut buffers.hidden[touched.clone()], [lost(0), lost(1), lost(2)], *radiance);
+            }
+        }
+    }
+
+    /// Adds up a beam; tells the nodes (counted from the first that is asked for) where something is in its way.
+    fn beam(&self, beam: &Beam, j: usize, asked: &Range<usize>, buffers: &mut Buffers) -> Range<usize> {
+        let Buffers { position, strength, lamp, through, lost, touched, .. } = buffers;
+        strength.resize(asked.len(), 0.0);
+        beam.strength().fill([&position[0], &position[1], &position[2]], strength);
+        lamp.iter_mut().zip(&*strength).for_each(|(sum, e)| *sum += e);
+        touched.clear();
+        let nodes = beam.blockers.iter().map(|b| b.nodes(j, asked)).enumerate();
+        touched.extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
+        let Some(all) = touched.iter().map(|(_, nodes)| nodes.clone()).reduce(union) else { return 0..0 };
+        let here = all.start - asked.start..all.end - asked.start;
+        for channel in 0..self.channels {
+            let through = &mut through[channel];
+            refill(through, all.len(), 1.0);
+            for (k, nodes) in touched.iter() {
+                let through = &mut through[nodes.start - all.start..nodes.end - all.start];
+                beam.blockers[*k].darken(channel, j, nodes, through);
+            }
+            lose(&mut lost[channel][here.clone()], &strength[here.clone()], through);
+        }
+        here
+    }
+
+    /// World positions of a row's nodes.
+    fn positions(&self, j: usize, asked: &Range<usize>, out: &mut [Vec<f32>; 3]) {
+        let seen = &self.seen;
+        let first = Vector3::new(asked.start as f64, j as f64, 1.0);
+        let (p, w) = (seen.point * first, seen.w.dot(&first));
+        let (step, w_step) = (seen.point.column(0), seen.w.x);
+        let nearest = seen.height / HORIZON;
+        for (axis, out) in out.iter_mut().enumerate() {
+            out.resize(asked.len(), 0.0);
+            for (i, out) in out.iter_mut().enumerate() {
+                let k = i as f64;
+                *out = ((p[axis] + k * step[axis]) / (w + k * w_step).max(nearest)) as f32;
+            }
+        }
+    }
+}
+
+fn refill<T: Copy>(buffer: &mut Vec<T>, n: usize, value: T) {
+    buffer.clear();
+    buffer.resize(n, value);
+}
+
+fn lose(lost: &mut [f32], strength: &[f32], through: &[f32]) {
+    for ((lost, e), t) in lost.iter_mut().zip(strength).zip(through) {
+        *lost += e * (1.0 - t);
+    }
+}
+
+fn add_lamp(open: &mut [Four], lamp: &[f32], radiance: Four) {
+    open.iter_mut().zip(lamp).for_each(|(o, &e)| *o = o.add_scaled(e, radiance));
+}
+
+fn add_lost(hidden: &mut [Four], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
+    for (((h, &r), &g), &b) in hidden.iter_mut().zip(r).zip(g).zip(b) {
+        let [x, y, z, _] = h.0;
+        *h = Four([x + r * radiance.r, y + g * radiance.g, z + b * radiance.b, 0.0]);
+    }
+}

@@ -1,0 +1,164 @@
+//! What passes through the layers of a block so far, for each sub-sample, and a row of one more layer.
+
+use crate::render::four::Four;
+use crate::render::lattice::Place;
+use crate::render::layers::{Block, Layer};
+use crate::render::texture::{Baked, Cells, LANES, Linear, mean};
+use std::ops::Range;
+
+/// Transmittance of each sub-sample of a block: a plane for each of the places inside a pixel.
+#[derive(Debug)]
+pub(super) struct Through {
+    width: usize,
+    /// Pixels of a plane.
+    area: usize,
+    /// One number for all channels; empty where there is film.
+    grey: Vec<f32>,
+    /// A number for each channel; empty where there is none.
+    tinted: Vec<Four>,
+}
+
+/// A row of one layer, a value for each pixel.
+#[derive(Debug, Default)]
+pub(super) struct LayerRow {
+    /// Pixels that the layer touches.
+    pub(super) touched: Range<usize>,
+    /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of its alpha.
+    pub(super) light: Vec<Four>,
+    /// The same of its opacity, where there is film.
+    pub(super) hidden: Vec<Four>,
+    /// Sum of its alpha, whatever is in front.
+    pub(super) alpha: Vec<f32>,
+    /// Light on it at the sub-samples under work, where that is not the pixel's.
+    irradiance: Vec<Four>,
+}
+
+impl LayerRow {
+    /// Empties a row of `n` pixels.
+    pub(super) fn start(&mut self, n: usize, tinted: bool) {
+        self.touched = 0..0;
+        self.irradiance.clear();
+        for fours in [&mut self.light, &mut self.hidden] {
+            fours.clear();
+        }
+        self.light.resize(n, Four::ZERO);
+        self.hidden.resize(if tinted { n } else { 0 }, Four::ZERO);
+        self.alpha.clear();
+        self.alpha.resize(n, 0.0);
+    }
+
+    /// Looks up the light on a layer at one sub-sample of each pixel.
+    pub(super) fn light_between(
+        &mut self,
+        layer: &Layer,
+        pixels: Range<usize>,
+        column: impl Fn(usize) -> Place,
+        row: Place,
+    ) {
+        self.irradiance.clear();
+        self.irradiance.extend(pixels.map(|i| layer.light.at(column(i), row)));
+    }
+}
+
+impl Through {
+    /// Nothing in the way of `r` x `r` sub-samples a pixel.
+    pub(super) fn all(block: &Block, r: usize, tinted: bool) -> Self {
+        let (width, area) = (block.x.len(), block.len());
+        let count = area * r * r;
+        let (grey, tints) = if tinted { (0, count) } else { (count, 0) };
+        Self { width, area, grey: vec![1.0; grey], tinted: vec![Four::ONE; tints] }
+    }
+
+    /// The sub-samples of a pixel, row by row.
+    #[inline(always)]
+    pub(super) fn of(&self, x: usize, y: usize) -> impl Iterator<Item = Four> {
+        let i = y * self.width + x;
+        let grey = self.grey.iter().skip(i).step_by(self.area.max(1)).map(|&t| Four([t; 4]));
+        grey.chain(self.tinted.iter().skip(i).step_by(self.area.max(1)).copied())
+    }
+
+    /// Passes a layer at some pixels of a row, one sub-sample each: adds to the row what is seen of the layer, and takes
+    /// away what it hides of all that comes later.
+    pub(super) fn pass(
+        &mut self,
+        layer: &Layer,
+        line: &Linear,
+        plane: usize,
+        y: usize,
+        pixels: Range<usize>,
+        row: &mut LayerRow,
+    ) {
+        let start = plane * self.area + y * self.width;
+        let places = start + pixels.start..start + pixels.end;
+        let (light, alpha) = (&mut row.light[pixels.clone()], &mut row.alpha[pixels.clone()]);
+        if self.tinted.is_empty() {
+            pass_grey(&layer.texture, line, &row.irradiance, &mut self.grey[places], light, alpha);
+        } else {
+            let sums = (light, alpha, &mut row.hidden[pixels]);
+            pass_tinted(&layer.texture, line, &row.irradiance, &mut self.tinted[places], sums);
+        }
+    }
+}
+
+#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+fn pass_grey(
+    texture: &Baked,
+    line: &Linear,
+    irradiance: &[Four],
+    through: &mut [f32],
+    light: &mut [Four],
+    alpha: &mut [f32],
+) {
+    let size = texture.size();
+    let sums = through.chunks_mut(LANES).zip(light.chunks_mut(LANES)).zip(alpha.chunks_mut(LANES));
+    for (run, ((through, light), alpha)) in sums.enumerate() {
+        let cells = Cells::of(line, (run * LANES) as f32, size);
+        let irradiance = irradiance.get(run * LANES..).unwrap_or_default();
+        for (lane, ((through, light), alpha)) in through.iter_mut().zip(light).zip(alpha).enumerate() {
+            let texel = bilinear(&texture.texels, size.0, &cells, lane);
+            let a = texel.alpha().max(0.0).min(1.0);
+            let lit = if let Some(&e) = irradiance.get(lane) { texel.times(e) } else { texel };
+            *light = light.add_scaled(*through, lit);
+            *alpha += a;
+            *through *= 1.0 - a;
+        }
+    }
+}
+
+fn pass_tinted(
+    texture: &Baked,
+    line: &Linear,
+    irradiance: &[Four],
+    through: &mut [Four],
+    (light, alpha, hidden): (&mut [Four], &mut [f32], &mut [Four]),
+) {
+    let size = texture.size();
+    let sums = through.iter_mut().zip(light).zip(alpha.iter_mut().zip(hidden)).enumerate();
+    let mut cells = Cells::of(line, 0.0, size);
+    for (i, ((through, light), (alpha, hidden))) in sums {
+        let lane = i % LANES;
+        if lane == 0 {
+            cells = Cells::of(line, i as f32, size);
+        }
+        let texel = bilinear(&texture.texels, size.0, &cells, lane);
+        let opacity = match texture.opacity.as_slice() {
+            [] => Four([texel.alpha(); 4]),
+            film => bilinear(film, size.0, &cells, lane),
+        };
+        let opacity = Four(opacity.0.map(|o| o.max(0.0).min(1.0)));
+        let lit = if let Some(&e) = irradiance.get(i) { texel.times(e) } else { texel };
+        // The fourth number tells whether anything is seen at all.
+        *light =
+            Four(std::array::from_fn(|c| light.0[c] + through.0[c] * if c < 3 { lit.0[c] } else { texel.alpha() }));
+        *alpha += mean(opacity.rgb());
+        *hidden = Four(std::array::from_fn(|c| hidden.0[c] + through.0[c] * opacity.0[c]));
+        *through = Four(std::array::from_fn(|c| through.0[c] * (1.0 - opacity.0[c])));
+    }
+}
+
+#[inline(always)]
+fn bilinear(texels: &[Four], stride: usize, cells: &Cells, lane: usize) -> Four {
+    let at = cells.at[lane] as usize;
+    let (top, bottom) = (&texels[at..][..2], &texels[at + stride..][..2]);
+    Four::bilinear([top[0], top[1]], [bottom[0], bottom[1]], cells.fx[lane], cells.fy[lane])
+}

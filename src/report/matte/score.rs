@@ -1,0 +1,125 @@
+//! Errors of a cut-out against what is known.
+
+use super::method::Cut;
+use super::truth::Known;
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::{Coverage, Film, LinearRgb};
+
+/// Errors of one cut-out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Score {
+    /// Sum of absolute differences of alpha, thousands of pixels.
+    pub sad: f64,
+    /// Mean squared difference of alpha.
+    pub mse: f64,
+    /// Sum of squared differences of the gradient's length of alpha, thousands.
+    pub gradient: f64,
+    /// Mean absolute error over new backgrounds that are lit by themselves (F + V B), linear light.
+    pub mae_lit: f64,
+    /// The same as a peak signal-to-noise ratio, decibels for a peak of 1.
+    pub psnr_lit: f64,
+    /// Mean absolute error over new backgrounds in the object's own shadow (F + T B), linear light.
+    pub mae_shaded: f64,
+    /// The same as a peak signal-to-noise ratio.
+    pub psnr_shaded: f64,
+    /// Mean alpha where there is no object.
+    pub residue: f64,
+    /// Intersection over union of the outline.
+    pub iou: f64,
+    /// Largest error of a side of the hull's box, pixels.
+    pub box_px: f64,
+}
+
+impl Score {
+    pub(super) fn of(found: &Cut, known: &Known, backgrounds: &[Image<LinearRgb>]) -> Self {
+        let alpha = found.film.map(|f| Coverage(f.to_rgba().a));
+        let truth = known.view.map(|v| Coverage(1.0 - (v.r + v.g + v.b) / 3.0));
+        let off = |a: Coverage, b: Coverage| f64::from(a.0) - f64::from(b.0);
+        let n = alpha.pixels().len().max(1) as f64;
+        let differences = || alpha.pixels().iter().zip(truth.pixels()).map(|(a, b)| off(*a, *b));
+        let slopes = gradient(&alpha).into_iter().zip(gradient(&truth)).map(|(a, b)| (a - b) * (a - b));
+        let lit = |f: Film, _, b| f.over_color(b);
+        let shaded = |f: Film, t: LinearRgb, b: LinearRgb| f.color + t * b;
+        let [mae_lit, psnr_lit] = recomposite(found, known, &known.view, backgrounds, lit);
+        let [mae_shaded, psnr_shaded] = recomposite(found, known, &known.transmittance, backgrounds, shaded);
+        Self {
+            sad: differences().map(f64::abs).sum::<f64>() / THOUSAND,
+            mse: differences().map(|d| d * d).sum::<f64>() / n,
+            gradient: slopes.sum::<f64>() / THOUSAND,
+            mae_lit,
+            psnr_lit,
+            mae_shaded,
+            psnr_shaded,
+            residue: residue(&alpha, &known.mask),
+            iou: overlap(&found.outline, &known.mask),
+            box_px: box_error(found, known.box_px),
+        }
+    }
+}
+
+const THOUSAND: f64 = 1000.0;
+/// Width of the derivative whose length is the gradient, pixels ([Rhemann et al. 2009]).
+///
+/// [Rhemann et al. 2009]: https://doi.org/10.1109/CVPR.2009.5206503
+const GRADIENT_SIGMA_PX: f32 = 1.4;
+
+/// Length of the gradient of the blurred picture, by central differences.
+fn gradient(alpha: &Image<Coverage>) -> Vec<f64> {
+    let smooth = filter::gaussian_blur(alpha, GRADIENT_SIGMA_PX);
+    let at = |x: usize, y: usize, dx: isize, dy: isize| f64::from(smooth.nearest(x as isize + dx, y as isize + dy).0);
+    let half = |a: f64, b: f64| 0.5 * (a - b);
+    let (w, h) = alpha.size();
+    let along = |i: usize| {
+        let (x, y) = (i % w, i / w);
+        libm::hypot(half(at(x, y, 1, 0), at(x, y, -1, 0)), half(at(x, y, 0, 1), at(x, y, 0, -1)))
+    };
+    (0..w * h).map(along).collect()
+}
+
+/// Mean absolute error and peak signal-to-noise ratio over all backgrounds.
+fn recomposite(
+    found: &Cut,
+    known: &Known,
+    passes: &Image<LinearRgb>,
+    backgrounds: &[Image<LinearRgb>],
+    over: impl Fn(Film, LinearRgb, LinearRgb) -> LinearRgb,
+) -> [f64; 2] {
+    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0u64);
+    for background in backgrounds {
+        for i in 0..background.pixels().len() {
+            let b = background.pixels()[i];
+            let ours: [f32; 3] = over(found.film.pixels()[i], found.transmittance.pixels()[i], b).into();
+            let truth: [f32; 3] = (known.foreground.pixels()[i] + passes.pixels()[i] * b).into();
+            for (a, b) in ours.into_iter().zip(truth) {
+                let d = f64::from(a) - f64::from(b);
+                (sum, squares, count) = (sum + d.abs(), squares + d * d, count + 1);
+            }
+        }
+    }
+    let n = count.max(1) as f64;
+    [sum / n, -10.0 * libm::log10((squares / n).max(f64::MIN_POSITIVE))]
+}
+
+/// Mean alpha where the object covers nothing.
+fn residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
+    let outside = alpha.pixels().iter().zip(mask.pixels()).filter(|(_, m)| m.0 == 0.0);
+    let (sum, count) = outside.fold((0.0, 0u64), |(sum, n), (a, _)| (sum + f64::from(a.0), n + 1));
+    sum / count.max(1) as f64
+}
+
+/// Intersection over union of what is covered by at least a half.
+pub(super) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
+    let pairs = a.pixels().iter().zip(b.pixels()).map(|(a, b)| (a.0 >= 0.5, b.0 >= 0.5));
+    let (both, any) =
+        pairs.fold((0u64, 0u64), |(both, any), (a, b)| (both + u64::from(a && b), any + u64::from(a || b)));
+    both as f64 / any.max(1) as f64
+}
+
+fn box_error(found: &Cut, truth: [f64; 4]) -> f64 {
+    let hull = &found.found.hull;
+    let low = |along: fn(&crate::geom::Point2<f64>) -> f64| hull.iter().map(along).fold(f64::INFINITY, f64::min);
+    let high = |along: fn(&crate::geom::Point2<f64>) -> f64| hull.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
+    let sides = [low(|p| p.x), low(|p| p.y), high(|p| p.x), high(|p| p.y)];
+    sides.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}

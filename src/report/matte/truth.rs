@@ -1,0 +1,121 @@
+//! Photos with known mattes, as the sample world has them.
+
+use crate::error::{Error, Result};
+use crate::image::Image;
+use crate::io;
+use crate::pixel::{Coverage, LinearRgb};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A photo and all that its renderer knows of it; all pictures are scene-linear and of one size.
+pub(super) struct Known {
+    pub(super) name: String,
+    pub(super) photo: Image<LinearRgb>,
+    /// Premultiplied foreground F.
+    pub(super) foreground: Image<LinearRgb>,
+    /// Transmittance T as a screen under the object shows it, 1 outside the object.
+    pub(super) transmittance: Image<LinearRgb>,
+    /// View transmittance V, 1 outside the object.
+    pub(super) view: Image<LinearRgb>,
+    /// The empty screen K.
+    pub(super) screen: Image<LinearRgb>,
+    pub(super) mask: Image<Coverage>,
+    /// Left, top, right and bottom of the outline, pixels.
+    pub(super) box_px: [f64; 4],
+    pub(super) noise: Noise,
+}
+
+#[derive(Deserialize)]
+struct Document {
+    photos: Vec<Record>,
+}
+
+#[derive(Deserialize)]
+struct Record {
+    name: String,
+    bbox_px: [f64; 4],
+    files: Files,
+    sensor: Noise,
+}
+
+#[derive(Deserialize)]
+struct Files {
+    photo_png: PathBuf,
+    foreground: PathBuf,
+    transmittance: PathBuf,
+    transmittance_view: PathBuf,
+    mask: PathBuf,
+    screen_plate: PathBuf,
+}
+
+/// Sensor noise: the variance of a value is `shot^2 * value + read^2`.
+#[derive(Clone, Copy, Debug, Deserialize)]
+pub(super) struct Noise {
+    pub(super) shot: f64,
+    pub(super) read: f64,
+}
+
+/// The records of a folder, by file name, still to be read.
+pub(super) struct Truths {
+    folder: PathBuf,
+    records: Vec<Record>,
+}
+
+impl Truths {
+    /// Finds the records (`*.json`) of a folder.
+    pub(super) fn of(folder: &Path) -> Result<Self> {
+        let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+        let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::file(folder, e)));
+        let mut paths: Vec<PathBuf> = paths.collect::<Result<_>>()?;
+        paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
+        paths.sort();
+        let documents: Vec<Document> = paths.iter().map(io::read_json).collect::<Result<_>>()?;
+        let records: Vec<Record> = documents.into_iter().flat_map(|d| d.photos).collect();
+        if records.is_empty() {
+            return Err(Error::file(folder, "no photos with truth (*.json), expected those of the sample world"));
+        }
+        Ok(Self { folder: folder.into(), records })
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.records.len()
+    }
+
+    /// Reads photo `i`.
+    pub(super) fn read(&self, i: usize) -> Result<Known> {
+        let record = &self.records[i];
+        let color = |name: &Path| io::read::<LinearRgb>(self.folder.join(name));
+        let mask: Image<Coverage> = io::read(self.folder.join(&record.files.mask))?;
+        // Linear in 8 bits, which is how coverage is stored and colour is not.
+        let view = color(&record.files.transmittance_view)?.map(|p| p.map(crate::color::linear_to_srgb));
+        let inside = |t: LinearRgb, c: Coverage| t.map(|t| 1.0 + c.0.min(1.0) * (t - 1.0));
+        Ok(Known {
+            name: record.name.clone(),
+            photo: color(&record.files.photo_png)?,
+            foreground: color(&record.files.foreground)?,
+            transmittance: color(&record.files.transmittance)?.zip_map(&mask, inside),
+            view,
+            screen: color(&record.files.screen_plate)?,
+            mask,
+            box_px: record.bbox_px,
+            noise: record.sensor,
+        })
+    }
+}
+
+impl Known {
+    /// The object on another screen: `F + T K` with sensor noise, in 8 bits.
+    pub(super) fn on(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
+        let mut draw = super::normal(seed);
+        let mut seen = self.foreground.clone();
+        for ((pixel, t), k) in seen.pixels_mut().iter_mut().zip(self.transmittance.pixels()).zip(screen.pixels()) {
+            *pixel = (*pixel + *t * *k).map(|v| {
+                let deviation =
+                    (self.noise.shot * self.noise.shot * f64::from(v) + self.noise.read * self.noise.read).sqrt();
+                let code = 255.0 * crate::color::linear_to_srgb((v + (deviation * draw()) as f32).clamp(0.0, 1.0));
+                crate::color::srgb_to_linear(code.round() / 255.0)
+            });
+        }
+        seen
+    }
+}

@@ -1,0 +1,132 @@
+//! What stands in a scene file of the reference renderer; lengths in metres, matrices by rows.
+
+use crate::pixel::LinearRgb;
+use serde::{Deserialize, Serialize};
+
+/// The whole file. Keys that only Blender needs (physics, material) are passed over.
+#[derive(Serialize, Deserialize)]
+pub(super) struct File {
+    pub(super) render: Render,
+    pub(super) camera: Camera,
+    pub(super) tray: Tray,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) plate: Option<Picture>,
+    pub(super) quads: Vec<Quad>,
+    #[serde(default)]
+    pub(super) lights: Vec<Light>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) environment: Option<Environment>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) ground: Option<Ground>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Render {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    #[serde(default)]
+    pub(super) samples: u32,
+    #[serde(default)]
+    pub(super) max_bounces: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[expect(non_snake_case, reason = "the keys of the file")]
+pub(super) struct Camera {
+    pub(super) K: [[f64; 3]; 3],
+    pub(super) R: [[f64; 3]; 3],
+    pub(super) t: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) resolution: Option<[u32; 2]>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Tray {
+    pub(super) size: [f64; 2],
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Ground {
+    pub(super) extent: [f64; 2],
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Picture {
+    pub(super) path: String,
+}
+
+/// A card; `texture` is premultiplied, or what a film adds where there is `film`: its opacity per channel.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Quad {
+    pub(super) id: u32,
+    pub(super) size: [f64; 2],
+    pub(super) pose: [[f64; 4]; 4],
+    #[serde(flatten)]
+    pub(super) front: Side,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) back: Option<Side>,
+    #[serde(default)]
+    pub(super) hue_shift: f32,
+    #[serde(default = "one")]
+    pub(super) saturation: f32,
+    #[serde(default = "one")]
+    pub(super) value: f32,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Side {
+    pub(super) texture: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) film: Option<String>,
+}
+
+#[derive(Serialize, Deserialize)]
+pub(super) struct Light {
+    #[serde(default)]
+    pub(super) shape: Shape,
+    pub(super) size: Size,
+    pub(super) power: f64,
+    #[serde(default = "white")]
+    pub(super) color: LinearRgb,
+    pub(super) position: [f64; 3],
+    #[serde(default)]
+    pub(super) target: [f64; 3],
+}
+
+#[derive(Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Shape {
+    #[default]
+    Rectangle,
+    Square,
+    Disk,
+    Ellipse,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(untagged)]
+pub(super) enum Size {
+    One(f64),
+    Two([f64; 2]),
+}
+
+/// A constant colour, or a picture; degrees.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Environment {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) color: Option<LinearRgb>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) path: Option<String>,
+    #[serde(default = "one")]
+    pub(super) strength: f32,
+    #[serde(default)]
+    pub(super) rotation_z: f64,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn white() -> LinearRgb {
+    LinearRgb::WHITE
+}

@@ -1,0 +1,211 @@
+//! A shot from a file of the reference renderer.
+
+use super::file::{Environment, File, Light, Quad, Shape, Side, Size};
+use crate::Camera;
+use crate::asset::{Panorama, Texture};
+use crate::error::{Error, Result};
+use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
+use crate::image::Image;
+use crate::io;
+use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
+use crate::scene::resolve::CATCHER;
+use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
+use std::path::Path;
+use std::sync::Arc;
+
+/// The shot that a scene file of the reference renderer tells, at the file's own size or another.
+///
+/// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is averaged over the pixels
+/// of the picture, as the script does.
+///
+/// # Errors
+/// A file that cannot be read or misses a key; a picture that it names and that cannot be read.
+pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
+    let path = path.as_ref();
+    let file: File = io::read_json(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let camera = camera(&file).resized(size.unwrap_or([file.render.width, file.render.height]));
+    let mut shot = Shot::new(camera);
+    if let Some(plate) = &file.plate {
+        let photo: Image<PremulRgba> = io::read(folder.join(&plate.path))?;
+        shot = shot.with_plate(Arc::new(averaged(&photo.map(PremulRgba::color), camera.image)));
+    }
+    shot.catcher = file.ground.map_or(file.tray.size.map(|side| CATCHER * side), |ground| ground.extent);
+    shot.lights = file.lights.iter().map(light).collect();
+    shot.cards = file.quads.iter().map(|q| card(folder, q)).collect::<Result<_>>()?;
+    if let Some(around) = &file.environment {
+        shot.ambient = around.color.unwrap_or_default().scale(around.strength);
+        shot.environment = map(folder, around)?;
+    }
+    Ok(shot)
+}
+
+fn camera(file: &File) -> Camera {
+    let c = &file.camera;
+    Camera {
+        image: c.resolution.unwrap_or([file.render.width, file.render.height]),
+        focal_px: Vector2::new(c.K[0][0], c.K[1][1]),
+        principal_px: Point2::new(c.K[0][2], c.K[1][2]),
+        camera_from_world: Pose::from_parts(Vector3::from(c.t).into(), rotation(c.R)),
+    }
+}
+
+fn rotation(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
+    let matrix = nalgebra::Matrix3::from_fn(|i, j| rows[i][j]);
+    UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix))
+}
+
+fn light(l: &Light) -> AreaLight {
+    AreaLight {
+        shape: match l.shape {
+            Shape::Rectangle | Shape::Square => LightShape::Rectangle,
+            Shape::Disk | Shape::Ellipse => LightShape::Ellipse,
+        },
+        position: l.position,
+        target: l.target,
+        size: match l.size {
+            Size::One(side) => [side; 2],
+            Size::Two(sides) => sides,
+        },
+        power: l.power,
+        color: l.color,
+    }
+}
+
+fn card(folder: &Path, q: &Quad) -> Result<Card> {
+    let axes = std::array::from_fn(|i| std::array::from_fn(|j| q.pose[i][j]));
+    let at = Vector3::new(q.pose[0][3], q.pose[1][3], q.pose[2][3]);
+    Ok(Card {
+        id: ObjectId(q.id),
+        class: 0,
+        quad: crate::geom::Quad { world_from_card: Pose::from_parts(at.into(), rotation(axes)), size: q.size },
+        texture: texture(folder, &q.front)?,
+        back: q.back.as_ref().map(|back| texture(folder, back)).transpose()?,
+        outline_uv: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from).into(),
+        grade: Grade { hue_deg: q.hue_shift, saturation: q.saturation, value: q.value },
+    })
+}
+
+fn texture(folder: &Path, side: &Side) -> Result<Texture> {
+    let color: Image<PremulRgba> = io::read(folder.join(&side.texture))?;
+    let Some(film) = &side.film else { return Ok(color.into()) };
+    let opacity: Image<PremulRgba> = io::read(folder.join(film))?;
+    if opacity.size() != color.size() {
+        let what = format!("{:?} pixels, but its colour has {:?}", opacity.size(), color.size());
+        return Err(Error::file(folder.join(film), what));
+    }
+    Ok(color.zip_map(&opacity, |c, o| Film { color: c.color(), opacity: o.color() }).into())
+}
+
+fn map(folder: &Path, around: &Environment) -> Result<Option<EnvironmentMap>> {
+    let Some(path) = &around.path else { return Ok(None) };
+    let photo: Image<PremulRgba> = io::read(folder.join(path))?;
+    let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(folder.join(path)))?;
+    let rotation = around.rotation_z.to_radians();
+    Ok(Some(EnvironmentMap { panorama: Arc::new(panorama), rotation, strength: around.strength }))
+}
+
+/// Each pixel the mean over the part of the photo that it covers, whether that is more than one of its pixels or less.
+fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<LinearRgb> {
+    let (width, height) = (width as usize, height as usize);
+    if photo.size() == (width, height) {
+        return photo.clone();
+    }
+    let columns: Vec<_> = (0..width).map(|x| covered(x, width, photo.width())).collect();
+    let rows: Vec<_> = (0..height).map(|y| covered(y, height, photo.height())).collect();
+    Image::from_fn(width, height, |x, y| {
+        rows[y].iter().fold(LinearRgb::BLACK, |sum, &(j, v)| {
+            columns[x].iter().fold(sum, |sum, &(i, u)| sum.add_scaled(u * v, photo[(i, j)]))
+        })
+    })
+}
+
+/// The samples that the `k`-th of `n` equal parts of a line of `len` covers, and their shares of it.
+fn covered(k: usize, n: usize, len: usize) -> Vec<(usize, f32)> {
+    let scale = len as f64 / n as f64;
+    let (start, end) = (k as f64 * scale, (k + 1) as f64 * scale);
+    let share = |i: usize| (end.min((i + 1) as f64) - start.max(i as f64)) / scale;
+    (start as usize..len).map(|i| (i, share(i) as f32)).take_while(|&(_, share)| share > 0.0).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{SCRIPT, export};
+    use super::*;
+    use crate::geom::Quad;
+
+    fn shot() -> Shot {
+        let camera = Camera {
+            image: [8, 6],
+            focal_px: Vector2::new(11.0, 10.5),
+            principal_px: Point2::new(4.25, 3.0),
+            camera_from_world: Pose::from_parts(
+                Vector3::new(0.1, 0.2, 1.0).into(),
+                UnitQuaternion::from_euler_angles(3.0, 0.2, 0.1),
+            ),
+        };
+        let film = Film::new(LinearRgb::new(0.1, 0.2, 0.0), LinearRgb::new(0.5, 0.25, 1.0));
+        let card = Card {
+            id: ObjectId(4),
+            class: 0,
+            quad: Quad { world_from_card: Pose::translation(0.1, 0.0, 0.05), size: [0.2, 0.1] },
+            texture: Image::filled(3, 2, PremulRgba::new(0.25, 0.125, 0.0, 0.5)).into(),
+            back: Some(Image::filled(2, 2, film).into()),
+            outline_uv: Arc::new([]),
+            grade: Grade { hue_deg: 10.0, saturation: 0.75, value: 1.5 },
+        };
+        let light = AreaLight {
+            shape: LightShape::Ellipse,
+            position: [0.3, 0.1, 1.0],
+            target: [0.0, 0.1, 0.0],
+            size: [0.1, 0.2],
+            power: 5.0,
+            color: LinearRgb::new(1.0, 0.5, 0.25),
+        };
+        let mut shot = Shot::new(camera).with_card(card).with_light(light).with_ambient(LinearRgb::grey(0.5));
+        shot.plate = Some(Arc::new(Image::from_fn(8, 6, |x, y| LinearRgb::new(x as f32, y as f32, 0.5))));
+        shot.catcher = [1.0, 0.75];
+        shot.exposure = 2.0;
+        shot
+    }
+
+    #[test]
+    fn what_is_written_comes_back_with_the_exposure_in_the_lights() {
+        let folder = tempfile::tempdir().unwrap();
+        let shot = shot();
+        export(&shot, [0.4, 0.3], folder.path()).unwrap();
+        assert!(folder.path().join(SCRIPT).exists());
+        let back = import(folder.path().join("scene.json"), None).unwrap();
+        assert!((back.camera.camera_from_world.inverse() * shot.camera.camera_from_world).rotation.angle() < 1e-12);
+        assert_eq!((back.camera.image, back.catcher, back.exposure), (shot.camera.image, shot.catcher, 1.0));
+        assert_eq!((back.plate, back.ambient), (shot.plate, LinearRgb::WHITE));
+        assert_eq!(back.lights, [AreaLight { power: 10.0, ..shot.lights[0] }]);
+        let (a, b) = (&back.cards[0], &shot.cards[0]);
+        assert_eq!((a.id, a.quad.size, a.grade), (b.id, b.quad.size, b.grade));
+        assert_eq!(a.texture.texel(2, 1), b.texture.texel(2, 1));
+        assert_eq!(a.back.as_ref().unwrap().texel(1, 1), b.back.as_ref().unwrap().texel(1, 1));
+    }
+
+    #[test]
+    fn ambient_and_a_picture_become_one_environment() {
+        let folder = tempfile::tempdir().unwrap();
+        let panorama = Panorama::new(Image::filled(4, 2, LinearRgb::new(1.0, 2.0, 3.0))).unwrap();
+        let map = EnvironmentMap { panorama: Arc::new(panorama), rotation: 1.0, strength: 0.5 };
+        export(&Shot { environment: Some(map), ..shot() }, [0.4, 0.3], folder.path()).unwrap();
+        let back = import(folder.path().join("scene.json"), None).unwrap();
+        let map = back.environment.unwrap();
+        assert_eq!(back.ambient, LinearRgb::BLACK);
+        assert!((map.rotation - 1.0).abs() < 1e-12);
+        // (picture x 0.5 + ambient 0.5) x exposure 2
+        assert_eq!(map.radiance(&Vector3::x()), LinearRgb::new(2.0, 3.0, 4.0));
+    }
+
+    #[test]
+    fn averaging_keeps_the_mean_and_the_places() {
+        let photo = Image::from_fn(4, 1, |x, _| LinearRgb::grey(x as f32));
+        let values = |w| averaged(&photo, [w, 1]).pixels().iter().map(|c| c.r).collect::<Vec<_>>();
+        assert_eq!(values(2), [0.5, 2.5]);
+        assert_eq!(values(8), [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert!(values(3).iter().zip([0.25, 1.5, 2.75]).all(|(v, w)| (v - w).abs() < 1e-6));
+    }
+}

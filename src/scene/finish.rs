@@ -1,0 +1,171 @@
+//! What happens to a finished frame before it is written: the other half of a camera.
+
+use crate::color::planckian;
+use crate::error::{Error, Result};
+use crate::pixel::LinearRgb;
+use crate::scene::{Draws, Range};
+use serde::{Deserialize, Serialize};
+
+/// Exposure, white balance, noise and sharpening of the whole frame, plate included; the default leaves every bit alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Finish {
+    /// Brighter or darker by so many stops. Default: 0.
+    pub exposure_ev: f64,
+    /// Factor on each channel. Default: 1, 1, 1.
+    pub white_balance: LinearRgb,
+    /// Noise that rendered cards get, as the plate has it. Default: none.
+    pub noise: Noise,
+    /// Where in the noise: another number is another frame of it. Default: 0.
+    pub noise_seed: u64,
+    /// Amount of sharpening (unsharp mask of one pixel). Default: 0.
+    pub sharpening: f64,
+}
+
+impl Default for Finish {
+    fn default() -> Self {
+        Self {
+            exposure_ev: 0.0,
+            white_balance: LinearRgb::WHITE,
+            noise: Noise::default(),
+            noise_seed: 0,
+            sharpening: 0.0,
+        }
+    }
+}
+
+/// Noise of a sensor: variance `shot * value + read^2` of each scene-linear channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Noise {
+    /// None.
+    #[default]
+    None,
+    /// As much as is told.
+    Known {
+        /// Variance per value: photon noise.
+        shot: f64,
+        /// Standard deviation in the dark.
+        read: f64,
+    },
+    /// Found by the `light` stage: as much as the plate has.
+    MatchPlate,
+}
+
+impl Finish {
+    /// Nothing is to be done.
+    pub fn is_nothing(&self) -> bool {
+        let Self { exposure_ev, white_balance, noise, noise_seed: _, sharpening } = *self;
+        exposure_ev == 0.0 && white_balance == LinearRgb::WHITE && noise == Noise::None && sharpening == 0.0
+    }
+
+    /// Fails on the first value that cannot be right.
+    pub(super) fn check(&self, at: &str) -> Result<()> {
+        let expect = |claim: bool, field: &str, value: &dyn std::fmt::Debug, wanted: &str| {
+            let told = || Error::value(format!("{at}.{field}"), format!("{value:?}, expected {wanted}"));
+            claim.then_some(()).ok_or_else(told)
+        };
+        expect(self.exposure_ev.is_finite(), "exposure_ev", &self.exposure_ev, "a finite number")?;
+        let gains: [f32; 3] = self.white_balance.into();
+        let positive = gains.iter().all(|g| g.is_finite() && *g > 0.0);
+        expect(positive, "white_balance", &gains, "three numbers above 0")?;
+        let sharpening = self.sharpening;
+        expect(sharpening.is_finite() && sharpening >= 0.0, "sharpening", &sharpening, "a number of at least 0")?;
+        let Noise::Known { shot, read } = self.noise else { return Ok(()) };
+        let fine = [shot, read].iter().all(|v| v.is_finite() && *v >= 0.0);
+        expect(fine, "noise.known", &[shot, read], "numbers of at least 0")
+    }
+}
+
+/// What the finish of a scene is drawn from; every default leaves the frame alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FinishRanges {
+    /// Stops. Default: 0.
+    pub exposure_ev: Range,
+    /// Temperature of the light that the camera takes for white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
+    pub white_k: Range,
+    /// Noise of rendered cards. Default: `"none"`.
+    pub noise: Noise,
+    /// Amount of sharpening. Default: 0.
+    pub sharpening: Range,
+}
+
+/// Temperature of the white of Rec. 709, kelvin: nothing is changed there.
+pub(super) const NEUTRAL_K: f64 = 6504.0;
+/// Temperatures that [`planckian`] knows.
+pub(super) const KELVIN: [f64; 2] = [1667.0, 25_000.0];
+
+impl Default for FinishRanges {
+    fn default() -> Self {
+        Self {
+            exposure_ev: Range::fixed(0.0),
+            white_k: Range::fixed(NEUTRAL_K),
+            noise: Noise::None,
+            sharpening: Range::fixed(0.0),
+        }
+    }
+}
+
+impl FinishRanges {
+    pub(super) fn draw(&self, draws: &Draws) -> Finish {
+        Finish {
+            exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
+            white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
+            noise: self.noise,
+            noise_seed: if self.noise == Noise::None { 0 } else { draws.bits("finish.noise") >> 11 },
+            sharpening: self.sharpening.draw(draws, "finish.sharpening"),
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        self.exposure_ev.check("finish.exposure_ev", -32.0, 32.0)?;
+        self.white_k.check("finish.white_k", KELVIN[0], KELVIN[1])?;
+        self.sharpening.check("finish.sharpening", 0.0, f64::INFINITY)?;
+        Finish { noise: self.noise, ..Finish::default() }.check("finish")
+    }
+}
+
+/// Gains that turn light of a temperature into what light of 6504 K looks like, green left alone.
+pub fn white_balance(white_k: f64) -> LinearRgb {
+    if white_k == NEUTRAL_K {
+        return LinearRgb::WHITE;
+    }
+    let (wanted, seen) = (planckian(NEUTRAL_K), planckian(white_k));
+    let gain = |w: f32, s: f32| (w / wanted.g) / (s / seen.g).max(f32::MIN_POSITIVE);
+    LinearRgb::new(gain(wanted.r, seen.r), 1.0, gain(wanted.b, seen.b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_do_nothing_and_draw_nothing() {
+        let finish = FinishRanges::default().draw(&Draws::new(3, 4));
+        assert_eq!(finish, Finish::default());
+        assert!(finish.is_nothing());
+    }
+
+    #[test]
+    fn a_warm_white_makes_the_frame_bluer() {
+        let gains = white_balance(3000.0);
+        assert!(gains.r < 0.8 && gains.g == 1.0 && gains.b > 2.0, "{gains:?}");
+        let balanced = planckian(3000.0) * gains;
+        let neutral = planckian(NEUTRAL_K);
+        assert!((balanced.r / balanced.b - neutral.r / neutral.b).abs() < 1e-5);
+    }
+
+    #[test]
+    fn what_cannot_be_right_is_told() {
+        let told = |f: Finish| f.check("finish").unwrap_err().to_string();
+        let good = Finish::default();
+        assert!(good.check("finish").is_ok());
+        assert!(told(Finish { exposure_ev: f64::NAN, ..good }).starts_with("finish.exposure_ev: NaN"));
+        assert!(told(Finish { white_balance: LinearRgb::BLACK, ..good }).starts_with("finish.white_balance"));
+        let noise = Noise::Known { shot: -1.0, read: 0.0 };
+        assert!(told(Finish { noise, ..good }).starts_with("finish.noise.known: [-1.0, 0.0]"));
+        let read: Finish = toml::from_str("noise = 'match_plate'").unwrap();
+        assert_eq!(read.noise, Noise::MatchPlate);
+    }
+}

@@ -1,0 +1,82 @@
+//! The corners of the convex prism that falls in place of a cut-out: few, so that contacts are cheap and calm.
+
+use crate::geom::Point2;
+
+/// Most corners of a prism: those of an octagon lose little of a bottle's hull.
+pub(super) const MOST_CORNERS: usize = 8;
+
+/// Corners of a convex outline in texture coordinates (right and down, 0 to 1) as those of a prism on a card of this
+/// size, counter-clockwise with y up, metres; empty where the outline has no area.
+///
+/// # Method
+/// The corner whose loss takes the least area goes first, until [`MOST_CORNERS`] are left (Visvalingam and Whyatt 1993);
+/// what is left lies inside the outline, so a prism never touches what its outline does not.
+pub(super) fn prism(outline_uv: &[Point2<f64>], [w, h]: [f64; 2]) -> Vec<[f64; 2]> {
+    let on_card = |p: &Point2<f64>| [(p.x.clamp(0.0, 1.0) - 0.5) * w, (0.5 - p.y.clamp(0.0, 1.0)) * h];
+    let mut ring: Vec<[f64; 2]> = outline_uv.iter().map(on_card).collect();
+    if doubled_area(&ring) < 0.0 {
+        ring.reverse();
+    }
+    while let Some((least, area)) = least_corner(&ring) {
+        if ring.len() <= MOST_CORNERS && area > LEAST_CORNER * w * h {
+            break;
+        }
+        ring.remove(least);
+    }
+    if ring.len() < 3 { Vec::new() } else { ring }
+}
+
+/// Twice the area of a corner's triangle below which it is straight, as a share of the card's area.
+const LEAST_CORNER: f64 = 1e-6;
+
+/// The corner whose triangle with its neighbours is least, and twice the area of that.
+fn least_corner(ring: &[[f64; 2]]) -> Option<(usize, f64)> {
+    (0..ring.len()).map(|i| (i, turn(ring, i))).min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns left.
+pub(super) fn turn(ring: &[[f64; 2]], i: usize) -> f64 {
+    let [a, b, c] = [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()]);
+    (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+}
+
+fn doubled_area(ring: &[[f64; 2]]) -> f64 {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn circle(n: usize, clockwise: bool) -> Vec<Point2<f64>> {
+        let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64 * if clockwise { 1.0 } else { -1.0 };
+        (0..n).map(|i| Point2::new(0.5 + 0.5 * libm::cos(angle(i)), 0.5 + 0.5 * libm::sin(angle(i)))).collect()
+    }
+
+    #[test]
+    fn a_prism_turns_left_at_each_of_its_few_corners() {
+        for outline in [circle(40, true), circle(40, false), circle(5, true)] {
+            let ring = prism(&outline, [0.2, 0.08]);
+            assert_eq!(ring.len(), outline.len().min(MOST_CORNERS));
+            assert!((0..ring.len()).all(|i| turn(&ring, i) > 0.0), "{ring:?}");
+        }
+    }
+
+    #[test]
+    fn an_octagon_in_an_ellipse_keeps_nine_tenths_of_its_area() {
+        let area = doubled_area(&prism(&circle(40, true), [0.2, 0.08])) / 2.0;
+        let whole = std::f64::consts::PI * 0.1 * 0.04;
+        // A regular octagon has 2 sqrt 2 / pi of its circle.
+        assert!((0.85..=0.901).contains(&(area / whole)), "{}", area / whole);
+    }
+
+    #[test]
+    fn straight_and_doubled_corners_go_and_no_area_is_no_prism() {
+        let p = |x: f64, y: f64| Point2::new(x, y);
+        let square = [p(0.0, 0.0), p(0.5, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(1.0, 1.0), p(0.0, 1.0)];
+        assert_eq!(prism(&square, [2.0, 2.0]).len(), 4);
+        assert!(prism(&[], [1.0, 1.0]).is_empty());
+        assert!(prism(&[p(0.0, 0.0), p(0.5, 0.5), p(1.0, 1.0)], [1.0, 1.0]).is_empty());
+    }
+}

@@ -1,0 +1,113 @@
+//! Falls of what cannot touch, apart from each other.
+//!
+//! Cards in columns of their own fall in worlds of their own; a card that has a column to itself needs none. That is
+//! checked afterwards: where the rooms that two columns passed through overlap, they fall again, together.
+
+use super::level;
+use super::world::{Drop, Fall};
+use crate::scene::{Scene, SettleOptions};
+
+/// Objects that fall together, and how that ended.
+struct Column {
+    members: Vec<usize>,
+    fall: Fall,
+}
+
+/// Lets everything fall; the poses are in the order of the objects that fall.
+pub(super) fn fall(drop: &Drop) -> Fall {
+    let columns = level::columns(drop.scene, drop.options);
+    let mut columns: Vec<Column> = columns.into_iter().map(|members| Column::of(drop, members)).collect();
+    while let Some((i, j)) = first_that_meet(&columns) {
+        let mut members = columns.swap_remove(j).members;
+        members.append(&mut columns[i].members);
+        members.sort_unstable();
+        columns[i] = Column::of(drop, members);
+    }
+    together(columns)
+}
+
+impl Column {
+    fn of(drop: &Drop, members: Vec<usize>) -> Self {
+        let closed = match members[..] {
+            [i] => alone(drop.scene, drop.options, i),
+            _ => None,
+        };
+        Self { fall: closed.unwrap_or_else(|| drop.fall(&members)), members }
+    }
+}
+
+fn alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> {
+    let pose = level::alone(scene, options, i)?;
+    let reach = options.half_body(&scene.objects[i]).norm();
+    let [x, y] = [pose.translation.x, pose.translation.y];
+    let swept = [x, y].map(|at| [at - reach, at + reach]);
+    Some(Fall { poses: vec![pose], rests: true, swept, ..Fall::default() })
+}
+
+/// The first two columns whose rooms overlap, in order. What is not a number overlaps all.
+fn first_that_meet(columns: &[Column]) -> Option<(usize, usize)> {
+    let apart = |a: &Fall, b: &Fall| (0..2).any(|i| a.swept[i][1] < b.swept[i][0] || b.swept[i][1] < a.swept[i][0]);
+    let mut pairs = (0..columns.len()).flat_map(|i| (i + 1..columns.len()).map(move |j| (i, j)));
+    pairs.find(|&(i, j)| !apart(&columns[i].fall, &columns[j].fall))
+}
+
+fn together(columns: Vec<Column>) -> Fall {
+    let mut all = Fall { rests: true, ..Fall::default() };
+    let mut poses = Vec::new();
+    for Column { members, fall } in columns {
+        poses.extend(members.into_iter().zip(fall.poses));
+        all.rests &= fall.rests;
+        all.seconds = all.seconds.max(fall.seconds);
+        all.energy_rise = all.energy_rise.max(fall.energy_rise);
+        all.samples.extend(fall.samples);
+    }
+    poses.sort_by_key(|(i, _)| *i);
+    all.poses = poses.into_iter().map(|(_, pose)| pose).collect();
+    all.samples.sort_by(|a, b| a.seconds.total_cmp(&b.seconds).then(a.object.cmp(&b.object)));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Placement;
+    use crate::settle::tests::{dropped, falling};
+
+    fn drop<'a>(scene: &'a Scene, options: &'a SettleOptions, heights: &'a [f64]) -> Drop<'a> {
+        Drop { scene, options, heights, sample_every: 0 }
+    }
+
+    fn heights(scene: &Scene) -> Vec<f64> {
+        let height = |placement: &Placement| match placement {
+            Placement::Drop { height, .. } => *height,
+            Placement::At(_) => 0.0,
+        };
+        scene.objects.iter().map(|object| height(&object.placement)).collect()
+    }
+
+    #[test]
+    fn columns_apart_end_as_if_each_were_the_only_one() {
+        let mut scene = falling(&[([-0.6, 0.0], 0.05), ([-0.62, 0.0], 0.1), ([0.6, 0.1], 0.05), ([0.6, 0.12], 0.2)]);
+        scene.surface.size = [2.0, 1.0];
+        let (options, heights) = (SettleOptions::default(), heights(&scene));
+        let drop = drop(&scene, &options, &heights);
+        let both = fall(&drop);
+        assert_eq!(both.poses, [drop.fall(&[0, 1]).poses, drop.fall(&[2, 3]).poses].concat());
+    }
+
+    #[test]
+    fn columns_that_spread_into_each_other_fall_together() {
+        // Two towers on edge, side by side, that topple.
+        let mut scene = dropped(0, 8);
+        for (i, object) in scene.objects.iter_mut().enumerate() {
+            let side = if i % 2 == 0 { -0.12 } else { 0.12 };
+            let rotation = crate::geom::UnitQuaternion::from_euler_angles(0.0, 1.4, 0.0);
+            object.placement = Placement::Drop { above: [side, 0.0], height: 0.15 + 0.12 * i as f64, rotation };
+            (object.size, object.thickness) = ([0.2, 0.08], 0.01);
+        }
+        let (options, heights) = (SettleOptions::default(), heights(&scene));
+        assert_eq!(level::columns(&scene, &options).len(), 2);
+        let drop = drop(&scene, &options, &heights);
+        assert_eq!(fall(&drop).poses, drop.fall(&(0..8).collect::<Vec<_>>()).poses);
+    }
+}

@@ -1,0 +1,277 @@
+//! Labels in every format, from pictures that the renderer made, read back by the programs that they are for.
+//!
+//! The programs are Python packages: `$PETCOMP_PYTHON` (or `python3`) is asked for them, and where it has none, the test
+//! says so and passes. `make formats` fetches pycocotools and runs all of this.
+
+use petcomp::asset::Texture;
+use petcomp::camera::Camera;
+use petcomp::dataset::{LabelSetup, Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, generate};
+use petcomp::filter::Pyramid;
+use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::io::exr::read_channels;
+use petcomp::label::{LabelOptions, label};
+use petcomp::scene::{CameraSource, Card, Cast, Exposure, Finish, Grade, Surface};
+use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+const IMAGE: [u32; 2] = [96, 72];
+
+/// A camera one metre above the surface that looks straight down.
+fn camera() -> Camera {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    Camera {
+        image: IMAGE,
+        focal_px: Vector2::new(100.0, 100.0),
+        principal_px: Point2::new(48.0, 36.0),
+        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+    }
+}
+
+/// A ring, so that masks have a hole, a little see-through.
+fn ring(size: usize, light: LinearRgb) -> Image<PremulRgba> {
+    let middle = 0.5 * size as f32;
+    Image::from_fn(size, size, |x, y| {
+        let radius = (x as f32 + 0.5 - middle).hypot(y as f32 + 0.5 - middle) / middle;
+        let a = if (0.3..0.9).contains(&radius) { 0.8 } else { 0.0 };
+        PremulRgba::new(a * light.r, a * light.g, a * light.b, a)
+    })
+}
+
+fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
+    let rotation = UnitQuaternion::from_euler_angles(0.1, -0.1, turn);
+    let light = LinearRgb::new(0.2 + 0.1 * id as f32, 0.5, 0.9 - 0.1 * id as f32);
+    let corners = (0..12).map(|i| f64::from(i) * std::f64::consts::TAU / 12.0);
+    Card {
+        id: ObjectId(id),
+        class: id % 2,
+        quad: Quad { world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation), size },
+        texture: Texture::Rgba(Arc::new(Pyramid::new(ring(64, light)))),
+        outline_uv: corners.map(|a| Point2::new(0.5 + 0.45 * a.cos(), 0.5 + 0.45 * a.sin())).collect(),
+        grade: Grade::default(),
+        back: None,
+    }
+}
+
+/// Picture k: none, one, two or three rings; the second lies over the first, the third is cut by the picture's edge.
+fn shot(k: u64) -> Shot {
+    let shift = 0.01 * (k / 4) as f64;
+    let cards = [
+        card(1, [-0.1 + shift, 0.0, 0.01], 0.3, [0.3, 0.2]),
+        card(2, [0.05 + shift, 0.03, 0.06], 1.0, [0.25, 0.25]),
+        card(3, [0.4, -0.2 + shift, 0.03], -0.5, [0.3, 0.2]),
+    ];
+    let empty = Shot::new(camera()).with_ambient(LinearRgb::grey(1.0));
+    let plate = Arc::new(Image::filled(96, 72, LinearRgb::new(0.3, 0.2, 0.1 + 0.01 * k as f32)));
+    cards.into_iter().take((k % 4) as usize).fold(empty.with_plate(plate), Shot::with_card)
+}
+
+fn sample(k: u64) -> Result<Sample> {
+    let shot = shot(k);
+    let deep = render::cast(&shot, &Default::default());
+    let frame = composite::frame(&deep, shot.plate.as_deref());
+    let labels = label(&deep, &shot, &LabelOptions::default());
+    let scene = Scene {
+        image: IMAGE,
+        plate: "grey".into(),
+        camera: CameraSource::Known(shot.camera),
+        surface: Surface::new([0.8, 0.6]),
+        objects: Vec::new(),
+        lights: Vec::new(),
+        ambient: LinearRgb::grey(1.0),
+        environment: None,
+        exposure: Exposure::default(),
+        cast: Cast::default(),
+        finish: Finish::default(),
+    };
+    Ok(Sample {
+        frame,
+        deep,
+        labels,
+        drawn: scene.clone(),
+        scene,
+        scene_seed: 3,
+        rejected: vec![],
+        draws: vec![],
+        times: Times::default(),
+    })
+}
+
+fn classes() -> Vec<String> {
+    ["cap & label", "none"].map(String::from).to_vec()
+}
+
+/// Makes 12 samples with the formats and settings of a table `[labels]`.
+fn made(labels: &str) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let setup: LabelSetup = toml::from_str(labels).unwrap();
+    let pictures = Pictures::default();
+    let mut plan = Plan {
+        folder: dir.path().into(),
+        count: 12,
+        numbers: Numbers::All,
+        seed: 3,
+        recipe: serde_json::json!({}),
+        classes: setup.obstructed.classes(&classes()).unwrap(),
+        split: Split::default(),
+        obstructed: setup.obstructed,
+        writers: vec![Box::new(pictures), Box::new(Sidecar)],
+    };
+    plan.writers.extend(setup.writers(&pictures));
+    generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();
+    dir
+}
+
+/// Runs a check of `tests/formats.py`; says so where Python or the package is missing.
+fn python(check: &str, package: &str, folder: &Path) {
+    let python = std::env::var_os("PETCOMP_PYTHON").unwrap_or_else(|| "python3".into());
+    let has = Command::new(&python).args(["-c", &format!("import {package}")]).output();
+    if !has.is_ok_and(|out| out.status.success()) {
+        eprintln!("skipped: {} has no {package}; `make formats` fetches it", python.display());
+        return;
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats.py");
+    let out = Command::new(&python).arg(script).arg(check).arg(folder).output().unwrap();
+    let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(out.status.success(), "{}{}", said(&out.stdout), said(&out.stderr));
+    eprintln!("{}", said(&out.stdout));
+}
+
+/// Pixels of the masks of each sample's objects, by the number and the object's: what a reader must find again.
+fn tell_pixels(folder: &Path) {
+    let pixels = |k: u64| {
+        let objects = sample(k).unwrap().labels.objects;
+        objects.into_iter().map(move |o| (format!("{k}/{}", o.id.0), o.amodal_mask.pixels().collect::<Vec<_>>()))
+    };
+    let all: BTreeMap<_, _> = (0..12).flat_map(pixels).collect();
+    io::write_json(folder.join("pixels.json"), &all).unwrap();
+}
+
+#[test]
+fn pycocotools_reads_run_lengths_and_polygons() {
+    for masks in ["rle", "polygon"] {
+        let dir = made(&format!("obstructed = \"ignore\"\nformats = [\"coco\"]\ncoco = {{ masks = \"{masks}\" }}"));
+        tell_pixels(dir.path());
+        python("coco", "pycocotools", dir.path());
+    }
+}
+
+#[test]
+fn ultralytics_takes_boxes_and_segments() {
+    for (task, obstructed) in [("detect", "drop"), ("segment", "class")] {
+        let dir = made(&format!("obstructed = \"{obstructed}\"\nyolo = {{ task = \"{task}\" }}"));
+        python(task, "ultralytics.data.utils", dir.path());
+    }
+}
+
+#[test]
+fn yolov5_takes_boxes() {
+    let dir = made("obstructed = \"keep\"");
+    python("yolov5", "yolov5.utils.dataloaders", dir.path());
+}
+
+#[test]
+fn a_voc_document_tells_class_box_and_flags() {
+    let dir = made("obstructed = \"ignore\"\nformats = [\"voc\"]");
+    let text = std::fs::read_to_string(dir.path().join("voc/train/000003.xml")).unwrap();
+    let objects = sample(3).unwrap().labels.objects;
+    assert_eq!(text.matches("<object>").count(), objects.len());
+    let below = &text[text.find("<object>").unwrap()..text.find("</object>").unwrap()];
+    let b = objects[0].amodal_box;
+    assert!(
+        below.contains(&format!("<xmin>{}</xmin>", b.x0 + 1.0)) && below.contains(&format!("<ymax>{}</ymax>", b.y1))
+    );
+    for expected in
+        ["<name>none</name>", "<difficult>1</difficult>", "<occluded>1</occluded>", "<truncated>0</truncated>"]
+    {
+        assert!(below.contains(expected), "no {expected} in {below}");
+    }
+    assert!(text.contains("<name>cap &#38; label</name>") && text.contains("<truncated>1</truncated>"));
+    assert_eq!(std::fs::read_to_string(dir.path().join("voc/val.txt")).unwrap(), "000000\n000005\n000010\n");
+}
+
+#[test]
+fn an_archive_holds_the_files_of_its_samples_in_order() {
+    let dir = made("formats = [\"webdataset\", \"coco\", \"yolo\"]\nwebdataset = { samples = 4 }");
+    let names = |archive: &str| {
+        let file = std::fs::File::open(dir.path().join("webdataset").join(archive)).unwrap();
+        let mut tar = tar::Archive::new(file);
+        let paths = tar.entries().unwrap().map(|entry| entry.unwrap().path().unwrap().into_owned());
+        paths.collect::<Vec<PathBuf>>()
+    };
+    let expected = [5, 10].map(|k| ["png", "json", "txt", "coco.json"].map(|e| PathBuf::from(format!("{k:06}.{e}"))));
+    assert_eq!(names("val-000000.tar")[4..], expected.concat());
+    assert_eq!([0, 1, 2].map(|i| names(&format!("train-{i:06}.tar")).len()), [16, 16, 4]);
+    assert!(!dir.path().join("webdataset/train-000003.tar").exists());
+}
+
+#[test]
+fn webdataset_reads_archives() {
+    let dir = made("formats = [\"webdataset\", \"coco\", \"yolo\"]\nwebdataset = { samples = 4 }");
+    python("webdataset", "webdataset", dir.path());
+}
+
+#[test]
+fn layers_add_up_to_the_picture_and_ids_to_what_is_seen() {
+    let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
+    let ((w, h), channels) = read_channels(dir.path().join("layers/train/000003.exr")).unwrap();
+    let plane = |name: &str| &channels.iter().find(|c| c.name == name).unwrap_or_else(|| panic!("no {name}")).samples;
+    assert_eq!([w as u32, h as u32], IMAGE);
+    let plate = 0.3;
+    for i in 0..w * h {
+        let sum = |channel: &str| (1..4).map(|id| plane(&format!("object{id:03}.{channel}"))[i]).sum::<f32>();
+        let behind = plate * plane("shadow.R")[i] * (1.0 - sum("A"));
+        assert!((plane("R")[i] - sum("R") - behind).abs() < 1e-5);
+        let coverage: f32 = ["00.G", "00.A", "01.G"].map(|c| plane(&format!("CryptoObject{c}"))[i]).iter().sum();
+        assert!((coverage - sum("A")).abs() < 1e-6);
+        let is_seen = plane("Z")[i].is_finite();
+        assert!(is_seen == (1..4).any(|id| plane(&format!("object{id:03}.A"))[i] > 0.1));
+        assert!(!is_seen || (0.85..1.05).contains(&plane("Z")[i]));
+    }
+}
+
+#[test]
+fn a_mask_is_what_the_layer_of_its_object_shows() {
+    let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
+    let (_, channels) = read_channels(dir.path().join("layers/train/000007.exr")).unwrap();
+    for object in sample(7).unwrap().labels.objects {
+        let plane = |layer: &str| channels.iter().find(|p| p.name == format!("{layer}{:03}.A", object.id.0)).unwrap();
+        for (layer, mask) in [("amodal", &object.amodal_mask), ("object", &object.visible_mask)] {
+            let alpha = |x: u32, y: u32| plane(layer).samples[(y * IMAGE[0] + x) as usize];
+            assert_eq!(*mask, petcomp::label::Mask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1));
+        }
+        assert!(object.visible_mask.pixels().count() <= object.amodal_mask.pixels().count());
+        assert!(object.depth.near <= object.depth.mean && object.depth.mean <= object.depth.far);
+    }
+}
+
+#[test]
+fn a_box_is_that_of_the_object_rendered_alone() {
+    for k in [3, 7, 11] {
+        let shot = shot(k);
+        let together = sample(k).unwrap().labels;
+        for card in &shot.cards {
+            let alone = Shot { cards: vec![card.clone()], ..shot.clone() };
+            let alone = label(&render::cast(&alone, &Default::default()), &alone, &LabelOptions::default());
+            let object = together.objects.iter().find(|o| o.id == card.id).unwrap();
+            let (a, b) = (object.amodal_box, alone.objects[0].visible_box);
+            let off = [a.x0 - b.x0, a.y0 - b.y0, a.x1 - b.x1, a.y1 - b.y1].map(f64::abs);
+            // What hides it may change the rounding of a pixel at the threshold.
+            assert!(off.iter().all(|&side| side <= 1.0), "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn an_obstructed_class_is_the_last_and_has_the_obstructed() {
+    let dir = made("obstructed = \"class\"");
+    let yaml = std::fs::read_to_string(dir.path().join("data.yaml")).unwrap();
+    assert!(yaml.contains("nc: 3") && yaml.ends_with("  2: \"obstructed\"\n"), "{yaml}");
+    let rows = std::fs::read_to_string(dir.path().join("labels/train/000003.txt")).unwrap();
+    let first: Vec<_> = rows.lines().map(|row| &row[..1]).collect();
+    assert_eq!(first, ["2", "0", "1"]);
+    assert_eq!(Obstructed::default(), Obstructed::Drop);
+}

@@ -1,0 +1,125 @@
+//! Files byte by byte: what no writer would write.
+
+use std::io::Write;
+
+/// The checksum of PNG chunks (ISO 3309), bit by bit.
+pub(crate) fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0_u32, |crc, &b| {
+        (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
+    })
+}
+
+/// A PNG of these chunks.
+pub(crate) fn png(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
+    let mut out = b"\x89PNG\r\n\x1a\n".to_vec();
+    for (kind, data) in chunks {
+        out.extend((data.len() as u32).to_be_bytes());
+        let start = out.len();
+        out.extend(*kind);
+        out.extend(data);
+        let crc = crc32(&out[start..]);
+        out.extend(crc.to_be_bytes());
+    }
+    out
+}
+
+/// `IHDR`: size, bits, colour kind, interlacing.
+pub(crate) fn ihdr(width: u32, height: u32, bits: u8, color: u8, interlace: u8) -> (&'static [u8; 4], Vec<u8>) {
+    let mut data = [width.to_be_bytes(), height.to_be_bytes()].concat();
+    data.extend([bits, color, 0, 0, interlace]);
+    (b"IHDR", data)
+}
+
+/// Zlib data out of stored (uncompressed) blocks.
+pub(crate) fn stored(data: &[u8]) -> Vec<u8> {
+    let mut out = vec![0x78, 0x01];
+    let blocks = data.chunks(60_000).count().max(1);
+    for (i, block) in data.chunks(60_000).enumerate() {
+        out.push(u8::from(i + 1 == blocks));
+        out.extend((block.len() as u16).to_le_bytes());
+        out.extend((!(block.len() as u16)).to_le_bytes());
+        out.extend(block);
+    }
+    let (a, b) = data.iter().fold((1_u32, 0_u32), |(a, b), &x| {
+        let a = (a + u32::from(x)) % 65_521;
+        (a, (b + a) % 65_521)
+    });
+    out.extend((b << 16 | a).to_be_bytes());
+    out
+}
+
+/// A megabyte of zeros a thousand times over, compressed: gzip inside the system's own tool would do the same.
+pub(crate) fn zeros(megabytes: usize) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    let block = vec![0; 1 << 20];
+    (0..megabytes).for_each(|_| encoder.write_all(&block).unwrap());
+    encoder.finish().unwrap()
+}
+
+/// A file with the bytes at a place replaced.
+pub(crate) fn with(file: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
+    let mut out = file.to_vec();
+    out[at..at + bytes.len()].copy_from_slice(bytes);
+    out
+}
+
+/// Where a text begins.
+pub(crate) fn find(file: &[u8], text: &[u8]) -> usize {
+    file.windows(text.len()).position(|w| w == text).unwrap_or_else(|| panic!("{:?}", String::from_utf8_lossy(text)))
+}
+
+/// Where the places of an EXR's blocks are: behind the zero that ends its attributes.
+pub(crate) fn end_of_attributes(file: &[u8]) -> usize {
+    let text = |at: usize| at + file[at..].iter().position(|&b| b == 0).unwrap() + 1;
+    let mut at = 8;
+    while file[at] != 0 {
+        let size = text(text(at));
+        at = size + 4 + u32::from_le_bytes(*file[size..].first_chunk().unwrap()) as usize;
+    }
+    at + 1
+}
+
+/// An EXR file with bytes of an attribute's value replaced, from `at` on.
+pub(crate) fn attribute(file: &[u8], name_and_kind: &str, at: usize, bytes: &[u8]) -> Vec<u8> {
+    let value = find(file, name_and_kind.as_bytes()) + name_and_kind.len() + 4;
+    with(file, value + at, bytes)
+}
+
+/// A JPEG segment.
+pub(crate) fn segment(marker: u8, data: &[u8]) -> Vec<u8> {
+    let mut out = vec![0xff, marker];
+    out.extend((data.len() as u16 + 2).to_be_bytes());
+    out.extend(data);
+    out
+}
+
+/// A file with bytes put in.
+pub(crate) fn inserted(file: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
+    [&file[..at], bytes, &file[at..]].concat()
+}
+
+/// A TIFF tag: number, kind, count, value.
+pub(crate) type Tag = (u16, u16, u32, u32);
+
+/// Tags of a grey 8-bit picture of one strip, some of them replaced or added.
+pub(crate) fn tags(width: u32, height: u32, others: &[Tag]) -> Vec<Tag> {
+    let mut all: Vec<Tag> = vec![
+        (256, 4, 1, width),
+        (257, 4, 1, height),
+        (258, 3, 1, 8),
+        (259, 3, 1, 1),
+        (262, 3, 1, 1),
+        (273, 4, 1, 0),
+        (277, 3, 1, 1),
+        (278, 4, 1, height),
+        (279, 4, 1, width.saturating_mul(height).min(1 << 20)),
+    ];
+    for other in others {
+        all.retain(|tag| tag.0 != other.0);
+        all.push(*other);
+    }
+    all.sort_unstable();
+    let strip = super::make::behind(all.len());
+    all.iter_mut().filter(|tag| tag.0 == 273 && tag.3 == 0).for_each(|tag| tag.3 = strip);
+    all
+}

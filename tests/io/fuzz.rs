@@ -1,0 +1,98 @@
+//! The doors of `fuzz/` without a fuzzer: seeds with bytes changed, cut, doubled and swapped, on the stable compiler.
+
+use crate::sweep::Random;
+use crate::valid;
+use petcomp::fuzzing;
+use std::time::{Duration, Instant};
+
+const LABEL: &str = r#"{"format": "plane-label", "version": 1, "image": {"file": "a.jpg", "width": 640, "height": 480},
+    "surface": {"id": "tray", "width_m": 0.6, "height_m": 0.4, "corners_px": [[100, 100], [500, 110], [510, 400], [90, 390]]},
+    "camera": {"focal_px": 800.0}, "points": [], "_remark": null}"#;
+const RECIPE: &str = "assets = \"a\"\n[scene]\nobjects = [4, 12]\nscale = [0.9, 1.1]\n[split]\nval = 0.2\n[yolo]\n";
+const JOURNAL: &str = r#"{"k":0,"part":"train","classes":[[3,2]],"knotted":0,"retries":0,"files":[{"path":"images/train/000000.jpg","bytes":1,"crc32":2}]}
+"#;
+const ANSWER: &str = "{\"picture\":{\"width\":2,\"height\":2,\"names\":[\"R\",\"G\",\"B\"],\"sample\":\"u8\",\"display_encoded\":true}}\nabcdefghijkl";
+
+type Door = (&'static str, fn(&[u8]), Vec<Vec<u8>>);
+
+fn doors() -> Vec<Door> {
+    let text = |text: &str| vec![text.as_bytes().to_vec()];
+    let pictures = valid::all().into_iter().map(|(_, bytes)| bytes[..bytes.len().min(2_000)].to_vec()).collect();
+    vec![
+        ("label", fuzzing::label, text(LABEL)),
+        ("recipe", fuzzing::recipe, text(RECIPE)),
+        ("journal", fuzzing::journal, text(JOURNAL)),
+        #[cfg(feature = "oiio")]
+        ("worker", fuzzing::worker, text(ANSWER)),
+        ("header", fuzzing::header, pictures),
+    ]
+}
+
+/// Words that mean something to one of the readers.
+const WORDS: [&[u8]; 12] = [
+    b"-",
+    b"1e308",
+    b"99999999999999999999",
+    b"null",
+    b"[",
+    b"{\"a\":",
+    b"\"",
+    b"\n",
+    b"inf",
+    b"\xff\xff\xff\xff",
+    b"\0",
+    b"/../",
+];
+
+fn varied(random: &mut Random, seed: &[u8]) -> Vec<u8> {
+    let mut bytes = random.damage(seed);
+    for _ in 0..random.below(3) {
+        let at = random.below(bytes.len() + 1);
+        match random.below(4) {
+            0 => bytes.truncate(at),
+            1 => {
+                bytes.splice(at..at, WORDS[random.below(WORDS.len())].iter().copied());
+            }
+            2 => {
+                let end = (at + 1 + random.below(40)).min(bytes.len());
+                let part = bytes[at..end].to_vec();
+                bytes.splice(at..at, part);
+            }
+            _ => {
+                let end = (at + random.below(20)).min(bytes.len());
+                bytes.drain(at..end);
+            }
+        }
+    }
+    if bytes.is_empty() { vec![0] } else { bytes }
+}
+
+/// Knocks at every door for so long; a panic is the failure.
+fn knock(time: Duration) {
+    for (name, door, seeds) in doors() {
+        let (mut random, start, mut count) = (Random(3), Instant::now(), 0_u64);
+        seeds.iter().for_each(|seed| door(seed));
+        let mut slowest = Duration::ZERO;
+        while start.elapsed() < time {
+            let bytes = varied(&mut random, &seeds[count as usize % seeds.len()]);
+            let begun = Instant::now();
+            door(&bytes);
+            slowest = slowest.max(begun.elapsed());
+            count += 1;
+        }
+        println!("{name}: {count} inputs in {} s, slowest {slowest:?}", time.as_secs());
+        assert!(slowest < Duration::from_secs(2), "{name}: {slowest:?}");
+    }
+}
+
+#[test]
+fn no_door_panics_for_a_moment() {
+    knock(Duration::from_millis(500));
+}
+
+/// `make fuzz` where there is no cargo-fuzz.
+#[test]
+#[ignore = "takes five minutes"]
+fn no_door_panics_for_a_minute() {
+    knock(Duration::from_secs(60));
+}
