@@ -18,7 +18,6 @@ mod render;
 mod report;
 mod scene;
 mod settle;
-
 #[cfg(feature = "train")]
 mod train;
 

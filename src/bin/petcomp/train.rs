@@ -68,7 +68,12 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let metrics = eval::write(&args.output, &[Run { name, sheets: fitted.sheets }], &options)?;
     common.say(eval::scores_table(&metrics, &options).markdown());
     if let Some(best) = fitted.history.best() {
-        common.say(format_args!("best epoch {} of {}: {}", best + 1, args.epochs, args.output.join("best.ckpt").display()));
+        common.say(format_args!(
+            "best epoch {} of {}: {}",
+            best + 1,
+            args.epochs,
+            args.output.join("best.ckpt").display()
+        ));
     }
     Ok(())
 }

@@ -26,7 +26,9 @@ pub(super) fn ciou<B: Backend>(a: Tensor<B, 2>, b: Tensor<B, 2>) -> Tensor<B, 2>
     let angle = |w: Tensor<B, 2>, h: Tensor<B, 2>| (w / (h + EPSILON)).atan();
     let quarter_turns = (angle(bw, bh) - angle(aw, ah)) * (2.0 / std::f64::consts::PI);
     let aspect = square(quarter_turns);
-    let trade_off = (aspect.clone() / (aspect.clone() - iou.clone() + (1.0 + EPSILON))).detach();
+    // Rounding may take the overlap of equal boxes beyond 1.
+    let apart = (-iou.clone() + 1.0).clamp_min(0.0);
+    let trade_off = (aspect.clone() / (aspect.clone() + apart + EPSILON)).detach();
     iou - distance - aspect * trade_off
 }
 

@@ -39,7 +39,7 @@ pub struct Description {
     pub width: f64,
     /// Multiple of the full number of blocks; 0.33 is YOLOv5s.
     pub depth: f64,
-    /// Side of the square that images are fitted into, pixels; a multiple of 32.
+    /// Side of the square that images are fitted into, pixels; a multiple of 32, at least 64.
     pub side: usize,
     /// Widths and heights of the anchors of each head, pixels, by area.
     pub anchors: [[[f64; 2]; ANCHORS_PER_LEVEL]; LEVELS],
@@ -50,8 +50,11 @@ impl Description {
     /// [`Error::Value`] for a network that cannot be built.
     pub fn check(&self) -> Result<()> {
         let coarsest = STRIDES[LEVELS - 1];
-        if self.side == 0 || !self.side.is_multiple_of(coarsest) {
-            return Err(Error::value("img", format!("{}, expected a multiple of {coarsest}", self.side)));
+        // burn's pooling on the processor cannot do with a single cell.
+        let least = 2 * coarsest;
+        if self.side < least || !self.side.is_multiple_of(coarsest) {
+            let what = format!("{}, expected a multiple of {coarsest}, at least {least}", self.side);
+            return Err(Error::value("img", what));
         }
         for (at, value) in [("width", self.width), ("depth", self.depth)] {
             if !(value > 0.0 && value <= 2.0) {

@@ -64,10 +64,10 @@ fn sixteen_images_are_learnt_by_heart() {
 
 #[test]
 fn a_training_that_was_interrupted_ends_as_one_that_was_not() {
-    let (set, whole, broken) = (set(5, 32), tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (set, whole, broken) = (set(5, 64), tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mode = Mode::Combined(crate::train::Balance::default());
     let set = TrainingSet { real: set.synthetic[..2].to_vec(), ..set };
-    let options = FitOptions { batch: 2, augment: Augment::default(), mode, ..small(3, 32) };
+    let options = FitOptions { batch: 2, augment: Augment::default(), mode, ..small(3, 64) };
     let expected = run(&set, &options, whole.path(), false);
     let mut calls = 0;
     let stopped = fit::<Cpu>(&set, &options, broken.path(), true, &Default::default(), |_, _| {
@@ -86,14 +86,14 @@ fn a_training_that_was_interrupted_ends_as_one_that_was_not() {
 fn impossible_options_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |options: &FitOptions| {
-        let set = set(1, 32);
+        let set = set(1, 64);
         fit::<Cpu>(&set, options, folder.path(), false, &Default::default(), |_, _| true).unwrap_err().to_string()
     };
-    assert_eq!(refused(&FitOptions { side: 100, ..small(1, 32) }), "img: 100, expected a multiple of 32");
-    assert!(refused(&FitOptions { width: f64::NAN, ..small(1, 32) }).starts_with("width: NaN"));
+    assert_eq!(refused(&FitOptions { side: 100, ..small(1, 64) }), "img: 100, expected a multiple of 32, at least 64");
+    assert!(refused(&FitOptions { width: f64::NAN, ..small(1, 64) }).starts_with("width: NaN"));
     let combined = Mode::Combined(crate::train::Balance::default());
     assert_eq!(
-        refused(&FitOptions { mode: combined, ..small(1, 32) }),
+        refused(&FitOptions { mode: combined, ..small(1, 64) }),
         "real: no images, expected at least one of each source"
     );
 }
