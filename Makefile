@@ -1,5 +1,6 @@
 # make demo   a labelled sample dataset from the photographs in this repository
 # make test   every test
+# make train-test   the trainer of the feature `train`, with burn
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 
@@ -51,7 +52,7 @@ fuzz: packages
 	  $(CARGO) test --release --locked --test io -- --ignored --nocapture fuzz::; \
 	fi
 
-# The trainer (burn takes minutes to compile): learns sixteen images by heart.
+# The trainer, which burn takes minutes to compile for: it learns sixteen images by heart.
 train-test: packages
 	$(CARGO) test --release --locked --no-default-features --features train --lib -- train::detector
 

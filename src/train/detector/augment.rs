@@ -116,7 +116,7 @@ impl<'a> Tile<'a> {
     /// Place 0 to 3: left above the corner, right above, left below, right below.
     fn at_corner(sample: &'a Sample, place: usize, corner: [f64; 2]) -> Self {
         let size = [sample.picture.width() as f64, sample.picture.height() as f64];
-        let before = [place % 2 == 0, place < 2];
+        let before = [place.is_multiple_of(2), place < 2];
         Self { sample, at: [0, 1].map(|i| if before[i] { corner[i] - size[i] } else { corner[i] }) }
     }
 

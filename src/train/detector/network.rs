@@ -50,7 +50,7 @@ impl Description {
     /// [`Error::Value`] for a network that cannot be built.
     pub fn check(&self) -> Result<()> {
         let coarsest = STRIDES[LEVELS - 1];
-        // burn's pooling on the processor cannot do with a single cell.
+        // A single cell of a single image leaves nothing to normalise over.
         let least = 2 * coarsest;
         if self.side < least || !self.side.is_multiple_of(coarsest) {
             let what = format!("{}, expected a multiple of {coarsest}, at least {least}", self.side);
