@@ -62,7 +62,7 @@ impl History {
         };
         let across = Axis { title: "epoch".into(), range: [0.0, self.epochs.len().max(1) as f64], logarithmic: false };
         let losses: Vec<_> = (0..3).map(|part| curve(&|e| e.losses[part])).collect();
-        let names = ["box loss, mAP@0.5", "objectness loss, mAP@0.5:0.95", "class loss"];
+        let names = ["box, mAP@0.5", "object, mAP@0.5:0.95", "class"];
         let loss = Chart {
             title: "loss per image".into(),
             names: names.map(String::from).into(),
