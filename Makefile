@@ -1,5 +1,7 @@
 # make demo   a labelled sample dataset from the photographs in this repository
 # make test   every test
+# make train-test   the trainer of the feature `train`, with burn
+# make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 #
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
@@ -13,6 +15,7 @@ PYTHON    := $(CURDIR)/target/python/bin/python
 # Each set of features that stands alone; the first, empty one builds without a C++ compiler.
 FEATURES  := "" markers oiio settle
 
+.PHONY: demo test train-test lint bench golden formats python packages blender
 # Seconds for each door of fuzz/.
 FUZZ      := 60
 
@@ -50,6 +53,10 @@ fuzz: packages
 	  echo "no cargo-fuzz with a nightly compiler here: seeds and chance instead"; \
 	  $(CARGO) test --release --locked --test io -- --ignored --nocapture fuzz::; \
 	fi
+
+# The trainer, which burn takes minutes to compile for: it learns sixteen images by heart.
+train-test: packages
+	$(CARGO) test --release --locked --no-default-features --features train --lib -- train::detector
 
 lint: packages
 	$(CARGO) fmt --check

@@ -84,7 +84,7 @@ fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> 
     (count > 0.0).then(|| sum.map(|s| s / count))
 }
 
-fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
+pub(super) fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
     (0..2).all(|i| (b[i] / anchor[i]).max(anchor[i] / b[i]) < THRESHOLD)
 }
 
