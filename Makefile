@@ -15,11 +15,10 @@ PYTHON    := $(CURDIR)/target/python/bin/python
 # Each set of features that stands alone; the first, empty one builds without a C++ compiler.
 FEATURES  := "" markers oiio settle
 
-.PHONY: demo test train-test lint bench golden formats python packages blender
 # Seconds for each door of fuzz/.
 FUZZ      := 60
 
-.PHONY: demo test lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: demo test train-test lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins

@@ -84,7 +84,7 @@ impl AddPhoto {
 /// two processes at once: the later manifest wins.
 ///
 /// # Errors
-/// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of [`cut_out`], naming the photo;
+/// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of [`cut_out`](crate::matte::cut_out), naming the photo;
 /// those of writing.
 pub fn add_photo(folder: impl AsRef<Path>, photo: impl AsRef<Path>, add: &AddPhoto) -> Result<PhotoRecord> {
     let folder = folder.as_ref();

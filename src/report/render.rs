@@ -82,7 +82,7 @@ pub fn write(folder: impl AsRef<Path>, options: &RenderReportOptions) -> Result<
 /// Every preset, and every picture of the other program that is there.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
     let shot = cycles::import(&options.scene, Some(options.size))?;
     let small = cycles::import(&options.scene, Some(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1))))?;

@@ -19,7 +19,7 @@ pub enum Source {
     /// Where lights are, how bright and of which colour: each stays at the middle of its ranges. How large they are,
     /// which is how soft shadows are, goes on varying.
     Light,
-    /// New choices of objects for every scene: there are only [`REPEATED`], as in the paper.
+    /// New choices of objects for every scene: there are only 50, as in the paper.
     Selection,
 }
 
