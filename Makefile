@@ -1,9 +1,8 @@
 # make demo   a labelled sample dataset from the photographs in this repository
 # make test   every test
-# make train-test   the trainer of the feature `train`, with burn
-# make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 #
+# make train-test   the trainer behind the feature `train`
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 
 CARGO     := cargo
