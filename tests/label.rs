@@ -201,8 +201,10 @@ proptest! {
     fn the_higher_of_two_flat_cards_that_share_pixels_lies_over_the_other(cards in [flat_card(1), flat_card(2)]) {
         let scene = shot(cards);
         let deep = cast(&scene);
-        let shared = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)))
-            .any(|(x, y)| deep.at(x, y).iter().any(|s| s.alpha > s.visible));
+        let pixels = (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y)));
+        let hidden: f32 = pixels.flat_map(|(x, y)| deep.at(x, y)).map(|s| s.alpha - s.visible).sum();
+        // Outlines that share less than a hundredth of a pixel only touch, and a ray or two may hit what they share.
+        let shared = hidden > 4.0 / (RAYS * RAYS) as f32;
         let found = label(&deep, &scene, &LabelOptions::default());
         let covered = |id: u32| found.objects.iter().find(|o| o.id == ObjectId(id)).map(|o| o.covered_by.clone());
         if let (Some(low), Some(high)) = (covered(1), covered(2)) {

@@ -7,8 +7,9 @@ const FRAME: [f64; 2] = [300.0, 260.0];
 const LEFT: f64 = 62.0;
 const TOP: f64 = 40.0;
 const BELOW: f64 = 48.0;
-/// Width of the column of names at the right.
-const NAMES: f64 = 200.0;
+/// Width of the column of names at the right, beside its letters, and of one letter.
+const NAMES: f64 = 56.0;
+const LETTER: f64 = 7.0;
 /// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
 const COLORS: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
 
@@ -76,7 +77,9 @@ impl Chart {
     /// Charts side by side with one list of names, the first chart's, as an SVG document.
     pub fn row(charts: &[Self]) -> String {
         let names = charts.first().map_or(&[][..], |c| &c.names);
-        let width = charts.len() as f64 * (LEFT + FRAME[0]) + NAMES;
+        let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+        let column = NAMES + LETTER * longest as f64;
+        let width = charts.len() as f64 * (LEFT + FRAME[0]) + column;
         let height = TOP + FRAME[1] + BELOW;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
@@ -86,7 +89,7 @@ impl Chart {
             let left = LEFT + i as f64 * (LEFT + FRAME[0]);
             chart.draw(&mut svg, left);
         }
-        let left = width - NAMES + 16.0;
+        let left = width - column + 16.0;
         for (i, name) in names.iter().enumerate() {
             let y = TOP + 14.0 + 20.0 * i as f64;
             let color = COLORS[i % COLORS.len()];

@@ -105,7 +105,7 @@ impl Drop<'_> {
         p.static_contact_softness.natural_frequency = rate / 2.0;
         p.static_contact_softness.damping_ratio = 2.0;
         // What pushes bodies apart must not become speed. Of 150 heaps 19 gained more than 1 % of their energy in a step at
-        // 10 and one unbiased pass, and none at these; at 2 some sink too deep.
+        // 10 and one unbiased pass, and none at these; at 2 they overlap ten times as far, by 0.3 mm.
         p.normalized_max_corrective_velocity = 4.0;
         p.num_internal_stabilization_iterations = 2;
         p.normalized_max_linear_velocity = 80.0;
