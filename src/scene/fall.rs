@@ -29,7 +29,7 @@ pub struct SettleOptions {
     pub max_energy_rise: f64,
     /// Longest fall, seconds of a world in which the typical card is 200 mm long. Default: 30.
     pub time_limit: f64,
-    /// Tries before giving up; each starts from heights of its own. Default: 4.
+    /// Tries before giving up; each starts from heights of its own. Default: 8.
     pub attempts: u32,
     /// Time step in the same seconds, at most 1/240: with longer ones half of the heaps end wrong. Default: 1/480.
     pub step: f64,
@@ -59,7 +59,7 @@ impl Default for SettleOptions {
             max_overlap: 0.0025,
             max_energy_rise: 0.01,
             time_limit: 30.0,
-            attempts: 4,
+            attempts: 8,
             step: 1.0 / 480.0,
             iterations: 4,
             ccd: 1,
