@@ -320,7 +320,8 @@ mod tests {
 
     #[test]
     fn a_fall_that_is_cut_short_is_told_and_leaves_the_scene_falling() {
-        let (scene, options) = (dropped(0, 5), SettleOptions { time_limit: 0.1, ..Default::default() });
+        let options = SettleOptions { time_limit: 0.1, attempts: 4, ..Default::default() };
+        let scene = dropped(0, 5);
         let settled = settle(scene.clone(), &options).unwrap();
         assert_eq!((&settled.verdict, &settled.scene), (&Verdict::TimedOut, &scene));
         assert_eq!(settled.rejected, vec![Verdict::TimedOut; 3]);
