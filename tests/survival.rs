@@ -169,6 +169,12 @@ fn twenty_runs_on_one_folder_make_one_dataset() {
     assert!(desk.run(&["dataset", "check", "out"]).status.success());
 }
 
+/// By the shell's own `kill`: the program of that name is not on every machine.
+fn send(signal: &str, child: &std::process::Child) {
+    let line = format!("kill -s {signal} {}", child.id());
+    assert!(Command::new("sh").args(["-c", &line]).status().unwrap().success(), "{line}");
+}
+
 #[test]
 fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     let desk = Desk::new();
@@ -180,11 +186,11 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
         };
         let child = run("100000");
         wait_for_a_sample(&desk.0.path().join(signal));
-        assert!(Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap().success());
+        send(signal, &child);
         assert_eq!(ends(child).code(), Some(130), "{signal}");
         let killed = run("100000");
         std::thread::sleep(Duration::from_millis(700));
-        assert!(Command::new("kill").args(["-s", "KILL", &killed.id().to_string()]).status().unwrap().success());
+        send("KILL", &killed);
         assert_eq!(ends(killed).signal(), Some(9));
         assert_eq!(ends(run("3")).code(), Some(0), "after {signal} and KILL");
     }

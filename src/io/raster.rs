@@ -68,9 +68,16 @@ impl std::fmt::Display for Refusal {
     }
 }
 
-/// A text of any form on one line.
+/// Letters of a decoder's message that are told; a damaged file may make it list thousands of numbers.
+const TOLD: usize = 300;
+
+/// The beginning of a text of any form on one line.
 pub(super) fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(TOLD) {
+        Some((end, _)) => format!("{}..", &line[..end]),
+        None => line,
+    }
 }
 
 /// Which channels a kind of pixel is made from.
