@@ -364,6 +364,12 @@ mod tests {
     }
 
     #[test]
+    fn long_messages_are_cut() {
+        assert_eq!(one_line(" a\n b "), "a b");
+        assert_eq!(one_line(&"ö ".repeat(9999)).chars().count(), TOLD + 2);
+    }
+
+    #[test]
     fn alpha_multiplies_linear_light() {
         let half_white = raster(Samples::U8(vec![255, 255, 255, 128]), "R G B A", true, false);
         let p = PremulRgba::from_raster(&Opaque(&half_white, None)).unwrap()[(0, 0)];

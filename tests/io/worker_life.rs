@@ -78,7 +78,7 @@ fn killed_workers_spoil_no_picture() {
             while !done.load(Ordering::Relaxed) {
                 if let Some(pid) = workers().last() {
                     // It may be gone already.
-                    let _ = std::process::Command::new("kill").args(["-9", &pid.to_string()]).output();
+                    let _ = std::process::Command::new("sh").args(["-c", &format!("kill -9 {pid}")]).output();
                     *killed.lock().unwrap() += 1;
                 }
                 std::thread::sleep(Duration::from_millis(40));
