@@ -3,7 +3,7 @@
 use super::aov::{floats, pixels};
 use crate::io::exr_parts::Part;
 use crate::pixel::ObjectId;
-use crate::render::DeepImage;
+use crate::render::{DeepImage, id_of, murmur3};
 use std::collections::BTreeMap;
 
 /// Objects kept per pixel, those that are seen most; two in each group of four channels.
@@ -75,26 +75,9 @@ fn metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, String)
     ]
 }
 
-/// The hash of a name as bits of an ordinary float: an exponent of all zeros or ones has its lowest bit flipped.
+/// The id of a name as bits.
 fn identifier(name: &str) -> u32 {
-    let hash = murmur3(name.as_bytes());
-    let exponent = hash >> 23 & 0xff;
-    if exponent == 0 || exponent == 0xff { hash ^ 1 << 23 } else { hash }
-}
-
-/// MurmurHash3 x86 32 with seed 0 (Austin Appleby, public domain).
-fn murmur3(bytes: &[u8]) -> u32 {
-    const C: [u32; 2] = [0xcc9e_2d51, 0x1b87_3593];
-    let scrambled = |word: u32| word.wrapping_mul(C[0]).rotate_left(15).wrapping_mul(C[1]);
-    let words = bytes.chunks_exact(4);
-    let tail = words.remainder().iter().rev().fold(0, |word, &b| word << 8 | u32::from(b));
-    let little = |w: &[u8]| w.iter().rev().fold(0, |word, &b| word << 8 | u32::from(b));
-    let mixed =
-        words.fold(0_u32, |h, w| (h ^ scrambled(little(w))).rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64));
-    let mut h = mixed ^ scrambled(tail) ^ bytes.len() as u32;
-    h = (h ^ h >> 16).wrapping_mul(0x85eb_ca6b);
-    h = (h ^ h >> 13).wrapping_mul(0xc2b2_ae35);
-    h ^ h >> 16
+    id_of(name).to_bits()
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! Would trainers take this dataset? Every fault, with its place.
 
-use crate::dataset::Part;
 use crate::dataset::journal::{Finished, JOURNAL, Line};
 use crate::dataset::listing::is_image;
 use crate::dataset::near::{NEAR_CODES, Thumbnail, nearest};
 use crate::dataset::yolo::LEAST_SIDE_PX;
 use crate::dataset::yolo_yaml::DataYaml;
+use crate::dataset::{Part, YoloSet};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::pixel::PremulRgba;
@@ -196,9 +196,9 @@ impl Findings<'_> {
 
     /// Label files that belong to no image.
     fn orphans(&mut self, images: &[PathBuf], yaml: &DataYaml) {
-        let wanted: BTreeSet<_> = images.iter().map(|image| label_of(image)).collect();
+        let wanted: BTreeSet<_> = images.iter().map(|image| YoloSet::label_of(image)).collect();
         for part in Part::ALL.iter().filter_map(|&part| yaml.folder(part)) {
-            let labels = label_of(&Path::new(part).join("x"));
+            let labels = YoloSet::label_of(&Path::new(part).join("x"));
             let labels = labels.parent().unwrap_or(Path::new("")).to_string_lossy().into_owned();
             let texts =
                 list(self.folder, &labels).into_iter().filter(|path| path.extension().is_some_and(|e| e == "txt"));
@@ -274,14 +274,6 @@ fn list(folder: &Path, below: &str) -> Vec<PathBuf> {
     files
 }
 
-/// The label file of an image, where trainers look for it: the last folder `images` becomes `labels`.
-fn label_of(image: &Path) -> PathBuf {
-    let parts: Vec<_> = image.iter().collect();
-    let last = parts.iter().rposition(|part| *part == "images");
-    let renamed = parts.iter().enumerate().map(|(i, part)| if Some(i) == last { "labels".as_ref() } else { *part });
-    renamed.collect::<PathBuf>().with_extension("txt")
-}
-
 /// What one image and its labels are like.
 #[derive(Default)]
 struct Look {
@@ -307,7 +299,7 @@ fn look(folder: &Path, image: &Path, class_count: Option<usize>) -> Look {
         Ok(picture) => look.small = Some(Thumbnail::of(&picture.map(|p| p.color()))),
     }
     look.bytes = Finished::of(folder, image).ok().map(|file| (file.bytes, file.crc32));
-    let label = label_of(image);
+    let label = YoloSet::label_of(image);
     match std::fs::read_to_string(folder.join(&label)) {
         Err(_) => {
             look.faults.push(fault(label, None, format!("missing or not text, but there is {}", image.display())))

@@ -67,7 +67,7 @@ fn metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> 
 }
 
 /// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals, infinity and NaN.
-fn id_of(name: &str) -> f32 {
+pub(crate) fn id_of(name: &str) -> f32 {
     const MANTISSA: u32 = (1 << 23) - 1;
     const SIGN: u32 = 1 << 31;
     let hash = murmur3(name.as_bytes());
@@ -76,7 +76,7 @@ fn id_of(name: &str) -> f32 {
 }
 
 /// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
-fn murmur3(bytes: &[u8]) -> u32 {
+pub(crate) fn murmur3(bytes: &[u8]) -> u32 {
     let mix = |word: u32| word.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593);
     let mut hash = 0_u32;
     let words = bytes.chunks_exact(4);

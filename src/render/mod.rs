@@ -35,6 +35,7 @@ mod view;
 pub use cast::cast;
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
+pub(crate) use cryptomatte::{id_of, murmur3};
 pub use deep::{DeepImage, DeepSample};
 pub use interreflection::interreflect;
 pub use options::{Quality, RenderOptions};
