@@ -13,6 +13,7 @@ mod page;
 pub mod render;
 #[cfg(feature = "settle")]
 pub mod settle;
+pub mod stability;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};
