@@ -4,7 +4,17 @@
 //! its cause; it is never what came out before. A case that panics, or that fails where it should not, is a row that
 //! failed, and the others go on.
 
+mod bottle;
+mod camera;
 mod case;
+mod composite;
+mod dataset;
+mod eval;
+mod io;
+mod keyer;
+mod label;
+mod light;
+mod matte;
 mod memory;
 mod render;
 mod render_light;
@@ -16,7 +26,7 @@ pub use case::{Case, Outcome};
 
 use super::Table;
 use crate::error::{Error, Result};
-use crate::io;
+use crate::io::{create_folder, write_text};
 use std::path::Path;
 
 /// Makes the cases of a stage.
@@ -24,9 +34,17 @@ type Cases = fn() -> Result<Vec<Case>>;
 
 /// The stages that have cases, in the order of the data.
 const STAGES: &[(&str, Cases)] = &[
+    ("matte", matte::cases),
+    ("camera", camera::cases),
     #[cfg(feature = "settle")]
     ("settle", settle::cases),
+    ("light", light::cases),
     ("render", render::cases),
+    ("composite", composite::cases),
+    ("label", label::cases),
+    ("dataset", dataset::cases),
+    ("io", io::cases),
+    ("eval", eval::cases),
 ];
 
 /// How a case ended.
@@ -116,10 +134,10 @@ pub fn summary(rows: &[Row]) -> Table {
 /// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
 pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     let rows = run(&cases(stage)?, progress);
-    io::create_folder(folder)?;
-    io::write_text(folder.join("stability.csv"), &table(&rows).csv())?;
+    create_folder(folder)?;
+    write_text(folder.join("stability.csv"), &table(&rows).csv())?;
     let text = format!("{}\n{}", summary(&rows).markdown(), table(&rows).markdown());
-    io::write_text(folder.join("stability.md"), &text)?;
+    write_text(folder.join("stability.md"), &text)?;
     Ok(rows)
 }
 

@@ -5,7 +5,7 @@ use crate::camera::Camera;
 use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
+use crate::scene::{AreaLight, CameraSource, Card, Exposure, Grade, LightShape, Scene, Shot, Surface};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -72,6 +72,23 @@ pub(super) fn lamp(position: [f64; 3], side: f64, power: f64) -> AreaLight {
 /// A shot from above, 5 x 5 pixels of a centimetre.
 pub(super) fn small() -> Shot {
     Shot::new(above([5, 5], 100.0))
+}
+
+/// A scene of nothing on a surface that fills the picture.
+pub(super) fn scene(camera: Camera) -> Scene {
+    Scene {
+        image: camera.image,
+        plate: "plate".into(),
+        camera: CameraSource::Known(camera),
+        surface: Surface::new([2.0, 2.0]),
+        objects: Vec::new(),
+        lights: Vec::new(),
+        ambient: LinearRgb::BLACK,
+        environment: None,
+        exposure: Exposure::Ev(0.0),
+        cast: Default::default(),
+        finish: Default::default(),
+    }
 }
 
 /// The part of a card's square that a camera sees, pixels: the area of its projected corners.
