@@ -29,7 +29,8 @@ pub fn finish(
         Noise::Known { shot, read } => Sensor { shot, read, seed: finish.noise_seed }.expose(&frame, deep, plate),
         Noise::None | Noise::MatchPlate => frame,
     };
-    let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32);
+    // An infinite gain would make NaN of black.
+    let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32).map(|g| g.min(f32::MAX));
     let frame = if gain == LinearRgb::WHITE { frame } else { frame.map(|p| with_color(p, p.color() * gain)) };
     if finish.sharpening == 0.0 {
         return frame;

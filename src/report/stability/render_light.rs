@@ -57,7 +57,9 @@ fn small_light(side: f64) -> Case {
         name,
         "10 W, 0.97 m away, over a white level card",
         format!("the limit of small lights, P cos / (pi r)^2 = {expected:.6}: to 0.1 %"),
-        move || Ok(Outcome::near(seen(small().with_light(light), &RenderOptions::default()) / expected, 1.0, 1e-3, "of it")),
+        move || {
+            Ok(Outcome::near(seen(small().with_light(light), &RenderOptions::default()) / expected, 1.0, 1e-3, "of it"))
+        },
     )
 }
 
