@@ -212,7 +212,7 @@ fn lost_picture() -> Case {
         "8 are good, 2 are made again; then no fault",
         || {
             let made = of_cards()?;
-            let picture = |k: u64| made.path().join(format!("images/train/{k:06}.jpg"));
+            let picture = |k: u64| made.path().join(format!("images/train/{k:06}.png"));
             std::fs::remove_file(picture(1)).map_err(|e| Error::file(picture(1), e))?;
             let half = std::fs::read(picture(2)).map_err(|e| Error::file(picture(2), e))?;
             std::fs::write(picture(2), &half[..half.len() / 2]).map_err(|e| Error::file(picture(2), e))?;
@@ -318,7 +318,7 @@ fn seeds() -> Case {
 fn recipes() -> Vec<Case> {
     vec![
         refused("recipe without a background", "background", &[], |_| ()),
-        refused("recipe without stock", "assets", &[tray()], |_| ()),
+        refused("recipe without stock", "no asset", &[tray()], |_| ()),
         refused("pictures of 0 x 48", "image", &[tray()], |recipe| recipe.image = [0, 48]),
         refused("10^9 objects", "objects", &[tray()], |recipe| recipe.objects = Range::fixed(1e9)),
         refused("range turned round", "objects", &[tray()], |recipe| recipe.objects = Range::new(5.0, 2.0)),
