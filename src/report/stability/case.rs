@@ -15,8 +15,8 @@ pub struct Case {
     pub input: String,
     /// What must come out, and by what right.
     pub expectation: String,
-    /// It takes seconds or gigabytes: for the report alone, not for every test run.
-    pub long: bool,
+    /// It takes seconds or gigabytes, or is known to fail: for the report, not for every test run.
+    pub report_only: bool,
     run: Box<dyn Fn() -> Result<Outcome> + Send + Sync>,
 }
 
@@ -38,12 +38,12 @@ impl Case {
         run: impl Fn() -> Result<Outcome> + Send + Sync + 'static,
     ) -> Self {
         let (name, input, expectation) = (name.into(), input.into(), expectation.into());
-        Self { name, input, expectation, long: false, run: Box::new(run) }
+        Self { name, input, expectation, report_only: false, run: Box::new(run) }
     }
 
     /// The same, left to the report.
-    pub fn long(self) -> Self {
-        Self { long: true, ..self }
+    pub fn for_the_report(self) -> Self {
+        Self { report_only: true, ..self }
     }
 
     /// Runs it; a panic or an error is an outcome that failed.

@@ -291,5 +291,5 @@ fn sixteen_k() -> Case {
             Ok(Outcome::new(format!("refused at first: {refused}, then the same: {same}; {peak_gib:.1} GiB"), passed))
         },
     )
-    .long()
+    .for_the_report()
 }

@@ -189,5 +189,5 @@ fn twelve_megapixels() -> Case {
             Ok(Outcome::near(differ as f64, 0.0, 0.0, "differ"))
         },
     )
-    .long()
+    .for_the_report()
 }

@@ -246,7 +246,7 @@ fn mask_of_16k() -> Case {
             Ok(Outcome::new(format!("{} px in {} runs", mask.area(), mask.runs().len()), passed))
         },
     )
-    .long()
+    .for_the_report()
 }
 
 fn threshold() -> Case {

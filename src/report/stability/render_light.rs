@@ -6,7 +6,7 @@ use crate::asset::{Panorama, uv_to_direction};
 use crate::camera::Camera;
 use crate::geom::{Point3, UnitQuaternion, Vector3};
 use crate::image::Image;
-use crate::light::{frame, gauss_legendre, polygon_irradiance, radiance};
+use crate::light::{frame, polygon_irradiance, radiance};
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{Quality, RenderOptions, cast};
 use crate::scene::{AreaLight, EnvironmentMap, Shot};
@@ -63,26 +63,18 @@ fn small_light(side: f64) -> Case {
     )
 }
 
-/// Gauss's rule of n nodes takes the mean of max(0, y) for this much more than it is: its error at a horizon.
-fn kink(nodes: usize) -> f64 {
-    gauss_legendre(nodes).iter().map(|(y, weight)| y.max(0.0) * weight).sum::<f64>() / 0.5 - 1.0
-}
-
+/// At the default quality, of 3 x 3 nodes, one row of which counts, the light comes out 18 % too dark.
 fn cut_by_the_horizon(quality: Quality) -> Case {
     let light = lamp([1.0, 0.0, 0.0], 1.0, 10.0);
     let white = f64::from(radiance(&light).g) / PI;
     let expected = polygon_irradiance(&frame(&light).corners(light.size), Point3::origin(), Vector3::z()) * white;
-    let bound = kink(quality.options().light_samples).abs() + 0.01;
-    Case::new(
+    let case = Case::new(
         format!("light half below the horizon, quality {quality:?}").to_lowercase(),
         "an upright light of 1 x 1 m, 1 m away, half of it under the plane of a white level card",
-        format!(
-            "Lambert's formula for the upper half, {expected:.6}: to what Gauss's {0} x {0} nodes are off at an edge, {1:.0} %",
-            quality.options().light_samples,
-            100.0 * bound
-        ),
-        move || Ok(Outcome::near(seen(small().with_light(light), &quality.options()) / expected, 1.0, bound, "of it")),
-    )
+        format!("Lambert's formula for the upper half, {expected:.6}: to 5 %, 0.07 stops"),
+        move || Ok(Outcome::near(seen(small().with_light(light), &quality.options()) / expected, 1.0, 0.05, "of it")),
+    );
+    if quality == Quality::Fast { case.for_the_report() } else { case }
 }
 
 /// A camera that sees the surface around `x`, `y` from straight above and very near to it.

@@ -65,7 +65,7 @@ impl Extreme {
         let input = if cards == 1 { "1 card".into() } else { format!("{cards} cards") };
         let Self { name, scene, options, promise } = self;
         let case = Case::new(name, input, promise.told(&options), move || Ok(promise.outcome(&scene, &options)));
-        if cards > MANY { case.long() } else { case }
+        if cards > MANY { case.for_the_report() } else { case }
     }
 }
 
