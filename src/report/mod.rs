@@ -11,9 +11,11 @@ mod histogram;
 pub mod matte;
 mod page;
 pub mod render;
+pub mod scale;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod table;
+pub mod work;
 
 pub use chart::{Axis, Chart, Curve};
 pub use histogram::Histogram;
