@@ -10,7 +10,6 @@
 //! sum. Sums of whole numbers do not depend on their order, and what may be made twice by threads that race for it is
 //! counted where it is kept, so the numbers are the same at any thread count. Nothing that is counted decides a byte.
 
-use serde::Serialize;
 use std::cell::RefCell;
 use std::ops::Index;
 use std::sync::Arc;
@@ -19,86 +18,81 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Bytes from which on an allocation is a large one.
 pub const LARGE: usize = 1 << 20;
 
-/// A kind of work.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Kind {
-    /// Physics worlds built.
-    PhysicsWorlds,
-    /// Time steps of all of them.
-    PhysicsSteps,
-    /// Values of unshadowed light: a place on a receiver, a sample of an area light.
-    LightSamples,
-    /// From a place on a receiver to a sample of an area light or of the sky, with a card or the surface in between.
-    ShadowRays,
-    /// How much a card lets through to a place on a receiver, read from its texture: 1 for a cut-out, 3 for film.
-    Transmittances,
-    /// The same of a card that is opaque all over, whose texture is read along its edges only.
-    OpaqueEdges,
-    /// Pieces of an environment map weighed for a receiver.
-    MapPieces,
-    /// Texture readings of the picture: a sub-sample of a pixel, a card.
-    TextureSamples,
-    /// Those of them that carry a transmittance for each channel.
-    FilmSamples,
-    /// Light looked up for a pixel (or sub-sample) of a card.
-    ShadedSamples,
-    /// Pixels of the surface whose shadow is looked up.
-    ShadowedPixels,
-    /// Textures made ready for a picture or a shadow: a level of detail, in a card's own colours.
-    Bakes,
-    /// Levels of detail made.
-    Levels,
-    /// Blurs, changes of size and other filters over a whole picture.
-    Filters,
-    /// Pixels that noise was drawn for.
-    NoisyPixels,
-    /// Deep samples looked at for labels.
-    LabelSamples,
-    /// Masks drawn for labels, two an object.
-    Masks,
-    /// Pictures encoded.
-    Encodes,
-    /// Bytes of files written, whatever is in them.
-    BytesWritten,
-    /// Files read, and their bytes.
-    FilesRead,
-    /// See [`FilesRead`](Self::FilesRead).
-    BytesRead,
-    /// Allocations of [`LARGE`] bytes or more; where a program's allocator tells ([`allocated`]).
-    LargeAllocations,
+/// Kinds of work with their names; what they mean is said once, for the documentation and for tables.
+macro_rules! kinds {
+    ($(#[doc = $meaning:literal] $kind:ident, $name:literal;)*) => {
+        /// A kind of work.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum Kind {
+            $(#[doc = $meaning] $kind,)*
+        }
+
+        impl Kind {
+            /// All of them.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$kind),*];
+
+            /// What it is called in tables.
+            pub const fn name(self) -> &'static str {
+                [$($name),*][self as usize]
+            }
+
+            /// What is counted.
+            pub fn meaning(self) -> &'static str {
+                [$($meaning),*][self as usize].trim()
+            }
+        }
+    };
 }
 
-impl Kind {
-    /// All of them with their names.
-    pub const ALL: [(Self, &'static str); 22] = [
-        (Self::PhysicsWorlds, "physics worlds"),
-        (Self::PhysicsSteps, "physics steps"),
-        (Self::LightSamples, "light samples"),
-        (Self::ShadowRays, "shadow rays"),
-        (Self::Transmittances, "transmittances"),
-        (Self::OpaqueEdges, "opaque edges"),
-        (Self::MapPieces, "map pieces"),
-        (Self::TextureSamples, "texture samples"),
-        (Self::FilmSamples, "film samples"),
-        (Self::ShadedSamples, "shaded samples"),
-        (Self::ShadowedPixels, "shadowed pixels"),
-        (Self::Bakes, "bakes"),
-        (Self::Levels, "levels of detail"),
-        (Self::Filters, "filters"),
-        (Self::NoisyPixels, "noisy pixels"),
-        (Self::LabelSamples, "label samples"),
-        (Self::Masks, "masks"),
-        (Self::Encodes, "encodes"),
-        (Self::BytesWritten, "bytes written"),
-        (Self::FilesRead, "files read"),
-        (Self::BytesRead, "bytes read"),
-        (Self::LargeAllocations, "allocations of 1 MiB"),
-    ];
+kinds! {
+    /// Physics worlds built
+    PhysicsWorlds, "physics worlds";
+    /// Time steps of all physics worlds
+    PhysicsSteps, "physics steps";
+    /// Places on receivers times samples of area lights: light before anything is in its way
+    LightSamples, "light samples";
+    /// Places on receivers times samples of lights and sky that a card, or the surface, may be in the way of
+    ShadowRays, "shadow rays";
+    /// Readings of how much light a see-through card lets pass: one for each card in the way of a shadow ray, 3 with film
+    Transmittances, "transmittances";
+    /// The same for cards that are opaque all over, whose textures are read along their edges alone
+    OpaqueEdges, "opaque edges";
+    /// Pieces of an environment map, weighed for each receiver
+    MapPieces, "map pieces";
+    /// Texture readings of the picture: cards times sub-samples of pixels
+    TextureSamples, "texture samples";
+    /// Texture readings of pictures that carry a transmittance for each channel
+    FilmSamples, "film samples";
+    /// Pixels (or sub-samples) of cards that light is looked up for
+    ShadedSamples, "shaded samples";
+    /// Pixels of the surface that a shadow is looked up for
+    ShadowedPixels, "shadowed pixels";
+    /// Textures made ready for a picture or a shadow: a level of detail in the card's own colours
+    Bakes, "bakes";
+    /// Levels of detail made
+    Levels, "levels of detail";
+    /// Blurs, changes of size, gains and other filters over a whole picture
+    Filters, "filters";
+    /// Pixels of frames that get noise
+    NoisyPixels, "noisy pixels";
+    /// Deep samples looked at for labels
+    LabelSamples, "label samples";
+    /// Masks drawn for labels, two an object
+    Masks, "masks";
+    /// Pictures encoded
+    Encodes, "encodes";
+    /// Bytes of files written
+    BytesWritten, "bytes written";
+    /// Files read
+    FilesRead, "files read";
+    /// Bytes of files read
+    BytesRead, "bytes read";
+    /// Allocations of 1 MiB or more; where a program's allocator tells
+    LargeAllocations, "large allocations";
 }
 
 /// How much of each kind was done.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work([u64; Kind::ALL.len()]);
 
 impl Index<Kind> for Work {
@@ -228,6 +222,7 @@ mod tests {
 
     #[test]
     fn kinds_lie_where_their_list_says() {
-        assert!(Kind::ALL.iter().enumerate().all(|(i, (kind, _))| *kind as usize == i));
+        assert!(Kind::ALL.iter().enumerate().all(|(i, kind)| *kind as usize == i));
+        assert_eq!((Kind::Masks.name(), Kind::Masks.meaning()), ("masks", "Masks drawn for labels, two an object"));
     }
 }

@@ -72,14 +72,7 @@ impl Studio<'_> {
         Some(Lit { fine, coarse, relative: false })
     }
 
-    fn card_on(
-        &self,
-        lattice: &Lattice,
-        own: usize,
-        reach: [f64; 2],
-        all: &Lamps,
-        some: &[Lamp],
-    ) -> Option<Receiver> {
+    fn card_on(&self, lattice: &Lattice, own: usize, reach: [f64; 2], all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
         let sheet = &self.casters.cards[own].sheet;
         let seen = Seen::of(sheet, &lattice.view)?;
         let (rows, columns) = rows_and_columns(sheet, reach, &lattice.view);

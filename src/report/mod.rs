@@ -11,10 +11,12 @@ mod histogram;
 pub mod matte;
 mod page;
 pub mod render;
+#[cfg(feature = "settle")]
 pub mod scale;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod table;
+#[cfg(feature = "settle")]
 pub mod work;
 
 pub use chart::{Axis, Chart, Curve};
