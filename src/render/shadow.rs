@@ -378,3 +378,84 @@ fn fill_face(at: [f32; 3], normal: [f32; 3], scale: f32, [x, y, z]: [&[f32]; 3],
         *e = scale * face / (r2 * r2).max(f32::MIN_POSITIVE);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2};
+    use crate::image::Image;
+    use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+    use crate::render::RenderOptions;
+    use crate::render::source::Lamps;
+    use crate::render::view::sheets;
+    use crate::scene::{AreaLight, LightShape, Shot};
+
+    fn camera() -> Camera {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 2.6);
+        Camera {
+            image: [200, 150],
+            focal_px: Vector2::new(240.0, 240.0),
+            principal_px: Point2::new(100.0, 75.0),
+            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        }
+    }
+
+    fn light() -> AreaLight {
+        AreaLight {
+            shape: LightShape::Rectangle,
+            position: [0.4, 0.3, 0.8],
+            target: [0.0; 3],
+            size: [0.3; 2],
+            power: 9.0,
+            color: LinearRgb::WHITE,
+        }
+    }
+
+    /// A card of odd size, turned in every way.
+    fn shot(tilt: f64) -> Shot {
+        let turn = UnitQuaternion::from_euler_angles(tilt, 0.2, 0.7);
+        let card = Card {
+            id: ObjectId(1),
+            class: 0,
+            quad: Quad {
+                world_from_card: Pose::from_parts(Vector3::new(0.02, 0.0, 0.12).into(), turn),
+                size: [0.3, 0.2],
+            },
+            texture: Image::filled(301, 203, PremulRgba::new(0.5, 0.5, 0.5, 1.0)).into(),
+            back: None,
+            outline_uv: Arc::new([]),
+            grade: Grade::default(),
+        };
+        Shot::new(camera()).with_light(light()).with_ambient(LinearRgb::WHITE).with_card(card)
+    }
+
+    #[test]
+    fn the_inside_of_an_opaque_card_is_as_dark_as_if_it_were_read() {
+        for tilt in [0.0, 0.3, 1.2] {
+            let shot = shot(tilt);
+            let view = View::of(&shot.camera);
+            let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
+            let seen = Seen::of(&casters.surface, &view).unwrap();
+            let Lamps { faces, sky } = Lamps::of(&shot, &RenderOptions::default(), &seen.normal);
+            let (mut edges, mut all) = (0, 0);
+            // Fine and coarse levels of the texture.
+            for (lamp, cell) in faces.iter().chain(&sky).flat_map(|lamp| [(lamp, 1e-4), (lamp, 5e-3)]) {
+                let blockers = casters.beams(&seen, &view, lamp, None, cell).into_iter().flat_map(|beam| beam.blockers);
+                for mut blocker in blockers {
+                    for j in blocker.rows.clone() {
+                        let nodes = blocker.nodes(j, &(0..view.width));
+                        let inside = blocker.inside;
+                        let [mut quick, mut read] = [vec![1.0; nodes.len()], vec![1.0; nodes.len()]];
+                        edges += blocker.darken(0, j, &nodes, &mut quick).edges;
+                        blocker.inside = None;
+                        all += blocker.darken(0, j, &nodes, &mut read).see_through;
+                        blocker.inside = inside;
+                        assert_eq!(quick, read, "tilt {tilt}, row {j}");
+                    }
+                }
+            }
+            assert!(all > 10_000 && edges < all / 3, "{edges} of {all} read");
+        }
+    }
+}
