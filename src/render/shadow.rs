@@ -2,7 +2,7 @@
 
 use crate::asset::Texture;
 use crate::geom::Vector3;
-use crate::render::half_plane::{sides, span, whole};
+use crate::render::half_plane::{meet, sides, span, whole};
 use crate::render::source::{self, Lamp, Source};
 use crate::render::texture::Shade;
 use crate::render::view::{Seen, Sheet, View, texture_rows};
@@ -92,14 +92,17 @@ impl std::ops::AddAssign for Readings {
     }
 }
 
-/// Rows and columns of the lattice (or pixels of a picture) that a sheet is seen in, one more on each side.
-pub(super) fn rows_and_columns(sheet: &Sheet, reach: [f64; 2], view: &View) -> (Range<usize>, Range<usize>) {
+/// Rows and columns of the lattice, or pixels of a picture.
+pub(super) type Area = (Range<usize>, Range<usize>);
+
+/// Rows and columns that a sheet is seen in, one more on each side.
+pub(super) fn rows_and_columns(sheet: &Sheet, reach: [f64; 2], view: &View) -> Area {
     bounds(&sheet.grown(reach).corners(), view)
 }
 
 /// Bounds of projected points; the whole view where one of them is not in front.
-fn bounds(points: &[Vector3<f64>; 4], view: &View) -> (Range<usize>, Range<usize>) {
-    let Some(px) = points.iter().map(|p| view.project(p)).collect::<Option<Vec<_>>>() else {
+fn bounds(points: &[Vector3<f64>; 4], view: &View) -> Area {
+    let Some(px) = view.project(points) else {
         return (0..view.height, 0..view.width);
     };
     let range = |axis: usize, count: usize| {
@@ -133,15 +136,22 @@ impl<'a> Casters<'a> {
 
     /// The beams of a lamp that reach a receiver from above, with what may be in their way.
     ///
-    /// `own` is the receiver's place among the cards; none for the surface. `cell` is the distance of nodes on the
-    /// receiver, metres.
-    pub(super) fn beams(&self, seen: &Seen, view: &View, lamp: &Lamp, own: Option<usize>, cell: f64) -> Vec<Beam> {
+    /// `own` is the receiver's place among the cards; none for the surface. `area` is where it is asked for, `cell` the
+    /// distance of nodes on it, metres.
+    pub(super) fn beams(
+        &self,
+        (seen, area): (&Seen, &Area),
+        view: &View,
+        lamp: &Lamp,
+        own: Option<usize>,
+        cell: f64,
+    ) -> Vec<Beam> {
         let plane = seen.normal.dot(&view.eye) - seen.height;
         let above = |k: usize| self.cards[k].sheet.corners().iter().any(|c| seen.normal.dot(c) - plane > TOUCHING);
         let above: Vec<_> = (0..self.cards.len()).filter(|&k| Some(k) != own && above(k)).collect();
         let beam = |source: &Source| {
             let height = source.at.xyz().dot(&seen.normal) - source.at.w * plane;
-            let shadow = Shadow { seen, view, plane, height, source, cell };
+            let shadow = Shadow { seen, area, view, plane, height, source, cell };
             let from_below = own.is_some() && source.at.w == 0.0 && source.at.z < 0.0;
             let surface = from_below.then(|| shadow.of_surface(&self.surface));
             let cards = above.iter().filter_map(|&k| shadow.of_card(&self.cards[k]));
@@ -192,6 +202,8 @@ impl<'a> Shades<'a> {
 /// One receiver and one source.
 struct Shadow<'a> {
     seen: &'a Seen,
+    /// Where the receiver is asked for.
+    area: &'a Area,
     view: &'a View,
     /// Offset of the receiver's plane along its normal.
     plane: f64,
@@ -210,6 +222,17 @@ impl Shadow<'_> {
         if toward.abs() <= TOUCHING {
             return None;
         }
+        // A receiver sees the side that is turned away from the source.
+        let (shades, turned) = match &caster.back {
+            Some(back) if toward > 0.0 => (back, true),
+            _ => (&caster.front, false),
+        };
+        let shade = shades.at(sheet.size, self.cell, self.blur(sheet));
+        let (rows, columns) = self.bounds(&sheet.grown(shade.grid.reach));
+        let missed = !meet(&rows, &self.area.0) || !meet(&columns, &self.area.1);
+        if missed || rows.len() < 2 || columns.len() < 2 {
+            return None;
+        }
         let normal = sheet.normal * toward.signum();
         // With p = (i, j, 1) the receiver's point is point p / depth; all of the following are rows times depth.
         let (point, depth) = (&self.seen.point, &self.seen.w);
@@ -217,16 +240,7 @@ impl Shadow<'_> {
         let w = depth * normal.dot(&at) - point.transpose() * normal * q;
         let hit = point * toward.abs() + at * below.transpose();
         let [u, v] = texture_rows(sheet, &hit, &w);
-        // A receiver sees the side that is turned away from the source.
-        let (shades, u) = match &caster.back {
-            Some(back) if toward > 0.0 => (back, w - u),
-            _ => (&caster.front, u),
-        };
-        let shade = shades.at(sheet.size, self.cell, self.blur(sheet));
-        let (rows, columns) = self.bounds(&sheet.grown(shade.grid.reach));
-        if rows.len() < 2 || columns.len() < 2 {
-            return None;
-        }
+        let u = if turned { w - u } else { u };
         let mut sides = sides(&u, &v, &w, shade.grid.reach).to_vec();
         // Below the card, seen from the source; w is positive there.
         sides[4] = below;
@@ -275,7 +289,7 @@ impl Shadow<'_> {
     }
 
     /// Part of the lattice that a shadow lies in: bounds of the four corners thrown onto the receiver.
-    fn bounds(&self, sheet: &Sheet) -> (Range<usize>, Range<usize>) {
+    fn bounds(&self, sheet: &Sheet) -> Area {
         let everything = (0..self.view.height, 0..self.view.width);
         let mut thrown = sheet.corners();
         for corner in &mut thrown {
@@ -438,10 +452,12 @@ mod tests {
             let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
             let seen = Seen::of(&casters.surface, &view).unwrap();
             let Lamps { faces, sky } = Lamps::of(&shot, &RenderOptions::default(), &seen.normal);
+            let area = (0..view.height, 0..view.width);
             let (mut edges, mut all) = (0, 0);
             // Fine and coarse levels of the texture.
             for (lamp, cell) in faces.iter().chain(&sky).flat_map(|lamp| [(lamp, 1e-4), (lamp, 5e-3)]) {
-                let blockers = casters.beams(&seen, &view, lamp, None, cell).into_iter().flat_map(|beam| beam.blockers);
+                let blockers =
+                    casters.beams((&seen, &area), &view, lamp, None, cell).into_iter().flat_map(|beam| beam.blockers);
                 for mut blocker in blockers {
                     for j in blocker.rows.clone() {
                         let nodes = blocker.nodes(j, &(0..view.width));
