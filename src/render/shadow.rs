@@ -474,4 +474,19 @@ mod tests {
             assert!(all > 10_000 && edges < all / 3, "{edges} of {all} read");
         }
     }
+
+    #[test]
+    fn shadows_that_miss_the_receiver_are_left_out() {
+        let shot = shot(0.0);
+        let view = View::of(&shot.camera);
+        let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
+        let seen = Seen::of(&casters.surface, &view).unwrap();
+        let lamps = Lamps::of(&shot, &RenderOptions::default(), &seen.normal).faces;
+        let blockers = |area: Area| {
+            let beams = casters.beams((&seen, &area), &view, &lamps[0], None, 1e-3);
+            beams.iter().map(|beam| beam.blockers.len()).sum::<usize>()
+        };
+        assert_eq!(blockers((0..2, 0..2)), 0);
+        assert!(blockers((0..view.height, 0..view.width)) > 0);
+    }
 }

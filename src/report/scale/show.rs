@@ -74,7 +74,7 @@ fn prices(model: &Model) -> Table {
         table.push([(*term).to_owned(), format!("{:.4} ms", 1e3 * price), "CPU time".into()])
     });
     let memory = model.memory.terms.iter().zip(&model.memory.prices);
-    memory.for_each(|(term, price)| table.push([(*term).to_owned(), format!("{:.1} MB", price * MB), "memory".into()]));
+    memory.for_each(|(term, price)| table.push([(*term).to_owned(), format!("{:.3} MB", price * MB), "memory".into()]));
     for (what, fit) in [("CPU time", &model.time), ("memory", &model.memory)] {
         let spread = format!("within {:.0} %", 100.0 * fit.spread());
         table.push(["nine in ten points that the fit has not seen".into(), spread, what.to_owned()]);

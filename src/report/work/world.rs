@@ -175,7 +175,7 @@ fn record(asset: &str) -> AssetRecord {
 /// Stripes of one alpha.
 fn cut_out(alpha: f32) -> Image<PremulRgba> {
     Image::from_fn(TEXELS[0], TEXELS[1], |x, y| {
-        let stripe = if (x / 8 + y / 8) % 2 == 0 { 0.75 } else { 0.25 };
+        let stripe = if (x / 8 + y / 8).is_multiple_of(2) { 0.75 } else { 0.25 };
         PremulRgba::new(alpha * stripe, alpha * 0.5, alpha * (1.0 - stripe), alpha)
     })
 }
