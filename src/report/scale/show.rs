@@ -13,7 +13,7 @@ const MB: f64 = 1e-6;
 /// Tables with their titles: all points and residuals first, then the model, threads, falls, and a million pictures.
 ///
 /// # Errors
-/// As [`Model::of`] and [`forecast`].
+/// As [`Model::of`] and [`forecast()`].
 pub fn tables(measured: &Measured) -> Result<Vec<(String, Table)>> {
     let model = Model::of(measured)?;
     let titled = |title: &str, table| (title.to_owned(), table);
