@@ -12,9 +12,13 @@ pub mod matte;
 mod page;
 pub mod render;
 #[cfg(feature = "settle")]
+pub mod scale;
+#[cfg(feature = "settle")]
 pub mod settle;
 pub mod stability;
 mod table;
+#[cfg(feature = "settle")]
+pub mod work;
 
 pub use chart::{Axis, Chart, Curve};
 pub use histogram::Histogram;

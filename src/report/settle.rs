@@ -115,7 +115,7 @@ fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<Row> {
 }
 
 /// Median and greatest; zero of nothing.
-fn median_and_worst(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(super) fn median_and_worst(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     [values.len() / 2, values.len().wrapping_sub(1)].map(|i| values.get(i).copied().unwrap_or(0.0))

@@ -35,7 +35,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
     let mut setup = args.recipe.setup()?;
     setup.render = args.quality.map_or(setup.render, Quality::options);
-    let studio = petcomp::dataset::Studio::open(setup)?;
+    let studio = petcomp::dataset::Studio::open_for(setup, &scene)?;
     let (scene, shot) = studio.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
     let (deep, frame) = studio.shoot(&scene, &shot);
     match args.aov.as_slice() {
