@@ -5,11 +5,12 @@
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/matte.py [-o FOLDER] [--truth FOLDER]
 
 The photo is drawn with all that is known of it (bottle.py), or comes from a folder with truth; times and errors are means
-over the photos. Every method gets the same 8-bit photo, made linear, and the mean colour of the screen; two get more:
+over the photos. Every method gets the same 8-bit photo, made linear, and the mean colour of the screen; some get more:
 
     petcomp film, mask given    the true coverage of the object
     PyMatting                   a trimap of the truth: opaque, no object, and the rest unknown
-    ffmpeg                      the similarity and blend of 25 that do best against the truth
+    ffmpeg                      the similarity and blend of 25 that do best against the truth, beside its defaults
+    the Keying node             the clip levels of 25 that do so (petcomp's keyer, the same to the bit, looks for them)
 
 In process: petcomp by library.rs; Blender renders image -> Keying -> Composite less image -> Composite; ffmpeg repeats the
 frame before its filters, less a run that does not. ffmpeg's display values are made linear before they are put over
@@ -32,8 +33,10 @@ from side_by_side import CORES, INSIDE, ROOT, WHOLE, Comparison, arguments, here
 ERROR = "mean |F + V B - truth| over new backgrounds B, linear light"
 BLENDER = ["-b", "-t", len(CORES), "--factory-startup", "--python-use-system-env", "-noaudio", "-P",
            "golden/matte/keying_reference.py", "--"]
-REPEATS = 10
+REPEATS, FRAMES = 10, 50
 SIMILARITIES, BLENDS = (0.02, 0.05, 0.1, 0.15, 0.2), (0.0, 0.05, 0.1, 0.2, 0.4)
+UNCLIPPED = 0.0, 1.0
+BLACKS, WHITES = (0.0, 0.1, 0.2, 0.3, 0.5), (0.6, 0.7, 0.8, 0.9, 1.0)
 
 
 class Files:
@@ -86,36 +89,52 @@ def petcomps(comparison, files, args):
         comparison.add("petcomp", ours, setting, told(pinned(program, REPEATS, *task(*files.photos[0]))),
                        lambda: files.mean(lambda i, photo: library_seconds(program, REPEATS, *task(i, photo))), **judged)
 
-    cover = lambda i, photo: files.at(i, "cover.png")
+    cover = lambda i, _: files.at(i, "cover.png")
     for i, photo in files.photos:
-        made = lambda name: ["-o", files.at(i, name)]
-        seconds_of(pinned(args.petcomp, "matte", "film", files.at(i, "photo.exr"), *made("film.exr")))
-        seconds_of(pinned(args.petcomp, "matte", "film", files.at(i, "photo.exr"), "--mask", cover(i, photo), *made("within.exr")))
-        seconds_of(pinned(args.petcomp, "matte", "key", files.at(i, "photo.exr"), "--screen", screen(photo), *made("key.exr")))
+        film = pinned(args.petcomp, "-q", "matte", "film", files.at(i, "photo.exr"), "-o")
+        seconds_of([*film, str(files.at(i, "film.exr"))])
+        seconds_of([*film, str(files.at(i, "within.exr")), "--mask", str(cover(i, photo))])
     add("film, default", "cut", **files.film("film.exr"))
     add("film, mask given", "film", cover, **files.film("within.exr"))
-    add("key", "key", lambda i, photo: screen(photo), **files.premultiplied("key.exr"))
+    keyed(files, args, *UNCLIPPED, name="key.exr")
+    add("key", "key", lambda _, photo: screen(photo), **files.premultiplied("key.exr"))
 
 
-def keying_node(comparison, files, args):
-    listing, command = files.folder / "keying.json", pinned(args.blender, *BLENDER)
+def keyed(files, args, black, white, name):
+    """petcomp's keyer on all photos; its error."""
+    for i, photo in files.photos:
+        seconds_of(pinned(args.petcomp, "-q", "matte", "key", files.at(i, "photo.exr"), "--screen", screen(photo), "--set",
+                          f"key.clip_black={black}", "--set", f"key.clip_white={white}", "-o", files.at(i, name)))
+    return files.premultiplied(name)["error"]()
+
+
+def keying_nodes(comparison, files, args):
+    levels = min(itertools.product(BLACKS, WHITES), key=lambda pair: keyed(files, args, *pair, name="clipped.exr"))
+    add_keying_node(comparison, files, args, "defaults", UNCLIPPED, "keying")
+    add_keying_node(comparison, files, args, "clip black {}, white {} (best of 25)".format(*levels), levels, "keying_clipped")
+
+
+def add_keying_node(comparison, files, args, setting, levels, name):
+    listing = files.folder / f"{name}.json"
+    command = pinned(args.blender, *BLENDER, listing)
     jobs = []
     for i, photo in files.photos:
         common = dict(input=str(files.at(i, "photo.exr")), prefix=str(files.at(i, "")), repeats=REPEATS)
         jobs.append(dict(common, node="empty", params={}, outputs={}))
-        jobs.append(dict(common, node="keying", params=dict(key_color=list(photo.screen)), outputs={"Image": "keying"}))
+        params = dict(key_color=list(photo.screen), clip_black=levels[0], clip_white=levels[1])
+        jobs.append(dict(common, node="keying", params=params, outputs={"Image": name}))
     listing.write_text(json.dumps(jobs))
 
     def run():
-        said = spent([*command, str(listing)])[1]
+        said = spent(command)[1]
         seconds = list(map(float, re.findall(r"render seconds: ([\d.]+)", said)))
         if len(seconds) != REPEATS * len(jobs):
             raise RuntimeError(said[-300:])
         middle = [statistics.median(seconds[k:k + REPEATS]) for k in range(0, len(seconds), REPEATS)]
-        return sum(middle[1::2]) - sum(middle[::2])
+        return (sum(middle[1::2]) - sum(middle[::2])) / len(files.photos)
 
-    comparison.add("Blender Keying", version([args.blender, "--version"]), "defaults", told([*command, str(listing)]),
-                   lambda: run() / len(files.photos), beside="key", **files.premultiplied("keying.exr"))
+    comparison.add("Blender Keying", version([args.blender, "--version"]), setting, told(command), run, beside="key",
+                   **files.premultiplied(f"{name}.exr"))
 
 
 def chromakey(args, files, i, photo, similarity, blend, *, frames=0, out=None):
@@ -136,23 +155,26 @@ def best_chromakey(args, files):
     return min(itertools.product(SIMILARITIES, BLENDS), key=error)
 
 
-def chromakeys(comparison, files, args, whole):
-    tells = version([args.ffmpeg, "-version"])
-    settings = {"similarity 0.01, blend 0 (its defaults)": (0.01, 0.0)}
+def chromakeys(comparison, files, args, whole, beside):
     best = best_chromakey(args, files)
-    settings["similarity {}, blend {} (best of 25)".format(*best)] = best
-    for name, pair in settings.items():
-        out = "chromakey_%s_%s.png" % pair
-        def one(i, photo, pair=pair, out=out):
-            return seconds_of(chromakey(args, files, i, photo, *pair, out=files.at(i, out)))
-        def inside(i, photo, pair=pair, out=out):
-            one(i, photo)
-            many = [seconds_of(chromakey(args, files, i, photo, *pair, frames=n)) for n in (5 * REPEATS, 0)]
-            return (many[0] - many[1]) / (5 * REPEATS)
-        run = one if whole else inside
-        command = chromakey(args, files, *files.photos[0], *pair, **(dict(out=files.at(0, out)) if whole else dict(frames=5 * REPEATS)))
-        comparison.add("ffmpeg chromakey + despill", tells, name, told(command), lambda run=run: files.mean(run),
-                       beside="key", **files.straight(out))
+    add_chromakey(comparison, files, args, "similarity 0.01, blend 0 (its defaults)", (0.01, 0.0), whole, beside)
+    add_chromakey(comparison, files, args, "similarity {}, blend {} (best of 25)".format(*best), best, whole, beside)
+
+
+def add_chromakey(comparison, files, args, setting, pair, whole, beside):
+    name, frames = "chromakey_%s_%s.png" % pair, 0 if whole else FRAMES
+
+    def alone(i, photo):
+        return seconds_of(chromakey(args, files, i, photo, *pair, out=files.at(i, name)))
+
+    def repeated(i, photo):
+        alone(i, photo)
+        many, one = (seconds_of(chromakey(args, files, i, photo, *pair, frames=n)) for n in (frames, 0))
+        return (many - one) / frames
+
+    command = chromakey(args, files, *files.photos[0], *pair, frames=frames, out=whole and files.at(0, name))
+    comparison.add("ffmpeg chromakey + despill", version([args.ffmpeg, "-version"]), setting, told(command),
+                   lambda: files.mean(alone if whole else repeated), beside=beside, **files.straight(name))
 
 
 def pymattings(comparison, files):
@@ -195,9 +217,7 @@ def commands(files, args):
     add("key to PNG", lambda i, photo: ["key", files.at(i, "photo.png"), "--screen", screen(photo), "-o", files.at(i, "key.png")],
         files.straight("key.png"))
     with comparison.absent_if_it_fails("ffmpeg chromakey + despill"):
-        chromakeys(comparison, files, args, whole=True)
-    for peer in comparison.peers[2:]:
-        peer.beside = "key to PNG"
+        chromakeys(comparison, files, args, whole=True, beside="key to PNG")
     comparison.finish()
 
 
@@ -210,17 +230,18 @@ def main():
     parser = arguments(__doc__)
     parser.add_argument("--truth", type=pathlib.Path, metavar="FOLDER", help="photos with truth instead of the drawn one")
     parser.add_argument("--most", type=int, default=4, help="photos of that folder to take (default: %(default)s)")
+    parser.add_argument("--size", type=int, nargs=2, default=[640, 480], metavar=("W", "H"), help="of the drawn photo")
     parser.add_argument("--blender", default="blender", metavar="PROGRAM")
     parser.add_argument("--ffmpeg", default="ffmpeg", metavar="PROGRAM")
     args = parser.parse_args()
-    photos = bottle.known(args.truth, args.most) if args.truth else [bottle.drawn()]
+    photos = bottle.known(args.truth, args.most) if args.truth else [bottle.drawn(*args.size)]
     files = Files(args.output / "matte", photos)
     comparison = Comparison("matte", args, INSIDE, described(files), ERROR, "the photo's own F and V")
     petcomps(comparison, files, args)
     with comparison.absent_if_it_fails("Blender Keying"):
-        keying_node(comparison, files, args)
+        keying_nodes(comparison, files, args)
     with comparison.absent_if_it_fails("ffmpeg chromakey + despill"):
-        chromakeys(comparison, files, args, whole=False)
+        chromakeys(comparison, files, args, whole=False, beside="key")
     with comparison.absent_if_it_fails("PyMatting"):
         pymattings(comparison, files)
     comparison.finish()
