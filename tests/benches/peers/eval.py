@@ -67,7 +67,6 @@ def yolov5_stats(truth, found):
     from yolov5.utils.metrics import ap_per_class
     from yolov5.val import process_batch
     boxes = lambda rows: torch.tensor([[x, y, x + w, y + h] for x, y, w, h in (row["bbox"] for row in rows)]).reshape(-1, 4)
-    per_image = lambda rows: {}
     def by_image(rows):
         images = {}
         for row in rows:

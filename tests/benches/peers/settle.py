@@ -4,7 +4,7 @@
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/settle.py [-o FOLDER]
 
-Three heaps each of 5, 20 and 60 cards, which `petcomp report settle --peers` draws and settles. Bullet gets the same boxes,
+Three heaps each of 20 and of 5 cards (and of 60, `--counts 20 5 60`, which takes minutes a round), which `petcomp report settle --peers` draws and settles. Bullet gets the same boxes,
 masses, friction, walls and starts, in three settings: its own defaults; petcomp's step and the scale that is recommended
 for small bodies (lengths times ten, gravity too); and that with a larger solver effort. It stops as petcomp does: all
 bodies slower than 1 cm/s and 0.5 rad/s for 0.5 s, or after 30 s. Seconds are those of one heap in memory: petcomp's
@@ -18,7 +18,6 @@ import numpy as np
 from side_by_side import INSIDE, Comparison, arguments, here, library, library_seconds, pinned, seconds_of, told, version
 
 TIMES = 3
-COUNTS = 20, 5, 60
 SLOW, SLOW_TURN, STILL, LIMIT = 0.01, 0.5, 0.5, 30.0
 WALL = 0.5
 SETTINGS = {
@@ -119,8 +118,8 @@ def judged(cases, ends):
 
 def petcomps(comparison, args, heaps):
     program = library()
-    for count in COUNTS:
-        cases, scenes = heaps[count], []
+    for count, cases in heaps.items():
+        scenes = []
         for k, case in enumerate(cases):
             scenes.append(args.output / "settle" / f"{count}_{k}.json")
             scenes[-1].write_text(json.dumps(case["scene"]))
@@ -131,15 +130,16 @@ def petcomps(comparison, args, heaps):
 
 
 def bullets(comparison, heaps):
+    import importlib.metadata
     import pybullet as p
     p.connect(p.DIRECT)
-    for count in COUNTS:
+    for count, cases in heaps.items():
         for name, setting in SETTINGS.items():
-            ends, cases = [], heaps[count]
+            ends = []
             def run(ends=ends, cases=cases, setting=setting):
                 seconds, ends[:] = here(lambda: [fall(p, case, **setting) for case in cases])
                 return seconds / len(cases)
-            add(comparison, "Bullet", str(p.getAPIVersion()), f"{name}, {count} cards", f"pybullet.stepSimulation() with {setting}",
+            add(comparison, "Bullet", importlib.metadata.version("pybullet"), f"{name}, {count} cards", f"pybullet.stepSimulation() with {setting}",
                 run, cases, ends, f"default, {count} cards")
 
 
@@ -149,12 +149,14 @@ def add(comparison, program, tells, setting, command, run, cases, ends, beside):
 
 
 def main():
-    args = arguments(__doc__).parse_args()
+    parser = arguments(__doc__)
+    parser.add_argument("--counts", type=int, nargs="+", default=[20, 5], help="cards a heap: 5, 20 or 60")
+    args = parser.parse_args()
     (args.output / "settle").mkdir(parents=True, exist_ok=True)
     drawn = args.output / "settle" / "heaps.json"
     seconds_of(pinned(args.petcomp, "-q", "-j", 1, "report", "settle", "--peers", drawn))
     cases = json.loads(drawn.read_text())
-    heaps = {count: [case for case in cases if len(case["boxes"]) == count] for count in COUNTS}
+    heaps = {count: [case for case in cases if len(case["boxes"]) == count] for count in args.counts}
     comparison = Comparison("settle", args, INSIDE, "heaps of cards that fall into a tray", "deepest overlap, mm",
                             "bodies that do not sink into each other")
     petcomps(comparison, args, heaps)
