@@ -101,7 +101,7 @@ def comparisons(args, folder, described):
 
 def main():
     parser = arguments(__doc__)
-    parser.add_argument("--size", type=int, nargs=2, default=[1920, 1440], metavar=("W", "H"))
+    parser.add_argument("--size", type=int, nargs=2, default=[1280, 960], metavar=("W", "H"))
     parser.add_argument("--oiiotool", default="oiiotool", metavar="PROGRAM")
     parser.add_argument("--idiff", default="idiff", metavar="PROGRAM")
     args = parser.parse_args()

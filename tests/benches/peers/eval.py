@@ -64,6 +64,7 @@ def petcomp_stats(out, definition="coco"):
 def yolov5_stats(truth, found):
     """What the validation of YOLOv5 does after its detector: match boxes image by image, then its average precision."""
     import torch
+    np.trapz = np.trapezoid  # the name that YOLOv5 7.0 knows it by
     from yolov5.utils.metrics import ap_per_class
     from yolov5.val import process_batch
     boxes = lambda rows: torch.tensor([[x, y, x + w, y + h] for x, y, w, h in (row["bbox"] for row in rows)]).reshape(-1, 4)
@@ -84,7 +85,7 @@ def yolov5_stats(truth, found):
             detections = torch.cat([boxes(rows), scores[:, None], classes(rows)[:, None]], 1)
             right = process_batch(detections, torch.cat([classes(labels)[:, None], boxes(labels)], 1), thresholds)
         stats.append((right, scores, classes(rows), classes(labels)))
-    ap = ap_per_class(*(torch.cat(column).numpy() for column in zip(*stats)))[5]
+    ap = ap_per_class(*(torch.cat(column).numpy() for column in zip(*stats)), names=dict.fromkeys(range(CLASSES)))[5]
     return [float(ap.mean()), float(ap[:, 0].mean()), float(ap[:, 5].mean())]
 
 

@@ -231,6 +231,7 @@ def main():
     parser.add_argument("--truth", type=pathlib.Path, metavar="FOLDER", help="photos with truth instead of the drawn one")
     parser.add_argument("--most", type=int, default=4, help="photos of that folder to take (default: %(default)s)")
     parser.add_argument("--size", type=int, nargs=2, default=[640, 480], metavar=("W", "H"), help="of the drawn photo")
+    parser.add_argument("--no-pymatting", action="store_true", help="for large photos: it takes minutes for some megapixels")
     parser.add_argument("--blender", default="blender", metavar="PROGRAM")
     parser.add_argument("--ffmpeg", default="ffmpeg", metavar="PROGRAM")
     args = parser.parse_args()
@@ -242,8 +243,11 @@ def main():
         keying_nodes(comparison, files, args)
     with comparison.absent_if_it_fails("ffmpeg chromakey + despill"):
         chromakeys(comparison, files, args, whole=False, beside="key")
-    with comparison.absent_if_it_fails("PyMatting"):
-        pymattings(comparison, files)
+    if args.no_pymatting:
+        comparison.leave_out("PyMatting", "left out by --no-pymatting")
+    else:
+        with comparison.absent_if_it_fails("PyMatting"):
+            pymattings(comparison, files)
     comparison.finish()
     commands(files, args)
 

@@ -10,6 +10,7 @@ point is set beside petcomp's default, or beside another setting of petcomp that
 
 import argparse
 import contextlib
+import functools
 import json
 import os
 import pathlib
@@ -67,13 +68,13 @@ class Comparison:
         """Around what needs another program: if it is not here, or fails, it is named as absent and the rest goes on."""
         try:
             yield
-        except (ImportError, OSError, RuntimeError, ValueError, subprocess.CalledProcessError) as error:
-            self.leave_out(program, error)
+        except Exception as error:  # whatever another program's failure looks like
+            said = (getattr(error, "stdout", None) or "").strip().splitlines()[-1:]
+            self.leave_out(program, " ".join([f"{type(error).__name__}: {error}", *said]))
 
-    def leave_out(self, program, error):
-        said = (getattr(error, "stdout", None) or "").strip().splitlines()[-1:]
-        self.absent.append({"program": program, "why": " ".join([str(error) or type(error).__name__, *said])})
-        print(f"absent: {program}: {self.absent[-1]['why']}", file=sys.stderr)
+    def leave_out(self, program, why):
+        self.absent.append({"program": program, "why": why})
+        print(f"absent: {program}: {why}", file=sys.stderr)
 
     def finish(self):
         """Runs everybody by turns, judges, writes the JSON and prints the table."""
@@ -104,18 +105,18 @@ class Comparison:
                  f"{self.told['reference']}. Median of {self.args.runs}, {len(CORES)} core(s), processor seconds.", "",
                  "| program | setting | error | seconds | times petcomp's seconds | beside |", "|" + " --- |" * 6]
         for p in self.points:
-            beside = ours.get(p["beside"], usual)
+            beside = p["program"] != "petcomp" and ours.get(p["beside"], usual)
             ratio = f"{p['seconds'] / beside['seconds']:.3g} | {beside['setting']}" if beside else "|"
             lines.append(f"| {p['program']} {p['version']} | {p['setting']} | {p['error']:.4g} | {p['seconds']:.4g} | {ratio} |")
         lines += [f"| {a['program']} | absent: {a['why']} | | | | |" for a in self.absent]
         return "\n".join(lines) + "\n"
 
 
-def arguments(doc, **defaults):
+def arguments(doc):
     """The options that all scripts share."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("target/peers"), metavar="FOLDER")
-    parser.add_argument("-n", "--runs", type=int, default=defaults.get("runs", 5), help="rounds (default: %(default)s)")
+    parser.add_argument("-n", "--runs", type=int, default=5, help="rounds (default: %(default)s)")
     parser.add_argument("--petcomp", default="target/release/petcomp", metavar="PROGRAM")
     os.chdir(ROOT)
     return parser
@@ -156,10 +157,11 @@ def version(command, pattern=r"(\d+\.\d+[^\s,]*)"):
     return re.search(pattern, spent(command)[1]).group(1)
 
 
+@functools.cache
 def library():
     """petcomp's library in a program of its own, tests/benches/peers/library.rs, built if it is not."""
-    said = subprocess.run(["cargo", "build", "--release", "--locked", "--bench", "peers", "--message-format=json"],
-                          stdout=subprocess.PIPE, text=True, check=True).stdout
+    build = ["cargo", "build", "--quiet", "--release", "--locked", "--bench", "peers", "--message-format=json"]
+    said = subprocess.run(build, stdout=subprocess.PIPE, text=True, check=True).stdout
     built = [json.loads(line) for line in said.splitlines()]
     path, = [m["executable"] for m in built if m.get("executable") and m["target"]["name"] == "peers"]
     return os.path.relpath(path, ROOT)
