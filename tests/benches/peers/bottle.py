@@ -8,6 +8,7 @@ it lets through of a new background that is lit by itself. A film is a pair like
 (its premultiplied colour, 1 - alpha).
 """
 
+import functools
 import pathlib
 from dataclasses import dataclass
 
@@ -75,16 +76,18 @@ def known(folder, most):
                     linear.read_codes(part("_view.png")), cover, linear.read_exr(path)[cover == 0].mean(axis=0))
 
 
+@functools.cache
 def backgrounds(shape):
     """Pictures that nobody has seen: patches of random colours and sizes."""
-    rng = np.random.default_rng(7)
+    rng, pictures = np.random.default_rng(7), []
     for _ in range(BACKGROUNDS):
         picture = np.full(shape, 0.2)
         for _ in range(PATCHES):
             y, x = (rng.integers(0, side) for side in shape[:2])
             down, across = rng.integers(1, PATCH_PX, 2)
             picture[y:y + down, x:x + across] = rng.random(3)
-        yield picture
+        pictures.append(picture)
+    return pictures
 
 
 def errors(photo, light, passes):

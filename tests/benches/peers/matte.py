@@ -44,7 +44,7 @@ class Files:
 
     def __init__(self, folder, photos):
         folder.mkdir(parents=True, exist_ok=True)
-        self.folder, self.photos = folder, list(enumerate(photos))
+        self.folder, self.photos, self.best_chromakey = folder, list(enumerate(photos)), None
         for i, photo in self.photos:
             linear.write_exr(self.at(i, "photo.exr"), photo.seen)
             linear.write_codes(self.at(i, "photo.png"), np.round(255 * linear.to_srgb(photo.seen)).astype(np.uint8))
@@ -140,7 +140,8 @@ def add_keying_node(comparison, files, args, setting, levels, name):
 def chromakey(args, files, i, photo, similarity, blend, *, frames=0, out=None):
     codes = "0x" + "".join(f"{round(255 * c):02x}" for c in linear.to_srgb(photo.screen))
     loop = f"loop=loop={frames}:size=1," if frames else ""
-    filters = f"{loop}format=yuva444p,chromakey={codes}:{similarity}:{blend},format=rgba,despill=green"
+    hue = "green" if photo.screen[1] > photo.screen[2] else "blue"
+    filters = f"{loop}format=yuva444p,chromakey={codes}:{similarity}:{blend},format=rgba,despill={hue}"
     sink = [out] if out else ["-f", "null", "-"]
     return pinned(args.ffmpeg, "-v", "error", "-y", "-threads", len(CORES), "-filter_threads", len(CORES), "-i",
                   files.at(i, "photo.png"), "-vf", filters, "-pix_fmt", "rgba", *sink)
@@ -156,7 +157,7 @@ def best_chromakey(args, files):
 
 
 def chromakeys(comparison, files, args, whole, beside):
-    best = best_chromakey(args, files)
+    best = files.best_chromakey = files.best_chromakey or best_chromakey(args, files)
     add_chromakey(comparison, files, args, "similarity 0.01, blend 0 (its defaults)", (0.01, 0.0), whole, beside)
     add_chromakey(comparison, files, args, "similarity {}, blend {} (best of 25)".format(*best), best, whole, beside)
 
