@@ -78,7 +78,7 @@ class Files:
 
 
 def screen(photo):
-    return ",".join(f"{c:.5f}" for c in photo.screen)
+    return ",".join(f"{c:.9g}" for c in photo.screen)
 
 
 def petcomps(comparison, files, args):
@@ -157,12 +157,15 @@ def best_chromakey(args, files):
 
 
 def chromakeys(comparison, files, args, whole, beside):
+    tells = version([args.ffmpeg, "-version"])
     best = files.best_chromakey = files.best_chromakey or best_chromakey(args, files)
-    add_chromakey(comparison, files, args, "similarity 0.01, blend 0 (its defaults)", (0.01, 0.0), whole, beside)
-    add_chromakey(comparison, files, args, "similarity {}, blend {} (best of 25)".format(*best), best, whole, beside)
+    settings = {"similarity 0.01, blend 0 (its defaults)": (0.01, 0.0),
+                "similarity {}, blend {} (best of 25)".format(*best): best}
+    for setting, pair in settings.items():
+        add_chromakey(comparison, files, args, tells, setting, pair, whole, beside)
 
 
-def add_chromakey(comparison, files, args, setting, pair, whole, beside):
+def add_chromakey(comparison, files, args, tells, setting, pair, whole, beside):
     name, frames = "chromakey_%s_%s.png" % pair, 0 if whole else FRAMES
 
     def alone(i, photo):
@@ -174,7 +177,7 @@ def add_chromakey(comparison, files, args, setting, pair, whole, beside):
         return (many - one) / frames
 
     command = chromakey(args, files, *files.photos[0], *pair, frames=frames, out=whole and files.at(0, name))
-    comparison.add("ffmpeg chromakey + despill", version([args.ffmpeg, "-version"]), setting, told(command),
+    comparison.add("ffmpeg chromakey + despill", tells, setting, told(command),
                    lambda: files.mean(alone if whole else repeated), beside=beside, **files.straight(name))
 
 

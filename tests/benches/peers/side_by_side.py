@@ -33,7 +33,8 @@ PINNED = ["taskset", "-c", ",".join(map(str, CORES))]
 
 @dataclass
 class Peer:
-    """A program at one setting. `run` does the work once and returns seconds; `error` judges what the last run left."""
+    """A program at one setting. `run` does the work once and returns seconds; `error` judges what the last run left, and
+    `more` what else is worth knowing of it."""
 
     program: str
     version: str
@@ -48,7 +49,7 @@ class Peer:
     def point(self):
         return {"program": self.program, "version": self.version, "setting": self.setting, "command": self.command,
                 "error": float(self.error()), "seconds": statistics.median(self.seconds), "runs": len(self.seconds),
-                "least": min(self.seconds), "most": max(self.seconds), "beside": self.beside, **self.more()}
+                "least": min(self.seconds), "most": max(self.seconds), "beside": self.beside, "also": self.more()}
 
 
 class Comparison:
@@ -103,12 +104,14 @@ class Comparison:
         usual = next((p for name, p in ours.items() if "default" in name), next(iter(ours.values()), None))
         lines = [f"## {self.stage}: {self.told['input']}", "", f"Error: {self.told['error']}. Reference: "
                  f"{self.told['reference']}. Median of {self.args.runs}, {len(CORES)} core(s), processor seconds.", "",
-                 "| program | setting | error | seconds | times petcomp's seconds | beside |", "|" + " --- |" * 6]
+                 "| program | setting | error | seconds | times petcomp's seconds | beside | also |", "|" + " --- |" * 7]
         for p in self.points:
             beside = p["program"] != "petcomp" and ours.get(p["beside"], usual)
             ratio = f"{p['seconds'] / beside['seconds']:.3g} | {beside['setting']}" if beside else "|"
-            lines.append(f"| {p['program']} {p['version']} | {p['setting']} | {p['error']:.4g} | {p['seconds']:.4g} | {ratio} |")
-        lines += [f"| {a['program']} | absent: {a['why']} | | | | |" for a in self.absent]
+            also = ", ".join(f"{name} {value:.7g}" for name, value in p["also"].items() if value is not None)
+            lines.append(f"| {p['program']} {p['version']} | {p['setting']} | {p['error']:.4g} | {p['seconds']:.4g} | {ratio} "
+                         f"| {also} |")
+        lines += [f"| {a['program']} | absent: {a['why']} | | | | | |" for a in self.absent]
         return "\n".join(lines) + "\n"
 
 
