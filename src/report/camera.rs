@@ -3,6 +3,10 @@
 //! Views are drawn by [`simulate`](crate::camera::simulate) from fixed seeds; every method sees the same ones. `joint` sees
 //! each of them with seven more photos of the same camera, at the same tilt.
 
+mod diagram;
+
+pub use diagram::diagrams;
+
 use super::{Axis, Chart, Curve};
 use crate::camera::simulate::{Scenario, View, distorted};
 use crate::camera::{self, Effort, Priors, Solution, SolveOptions};

@@ -1,15 +1,25 @@
 //! Charts of curves on logarithmic or linear axes, side by side, as SVG.
 
+use super::number::power;
 use std::fmt::Write;
 
-/// Size of a chart's frame, and the room around it for words, in SVG units.
+/// Size of the frame of a chart in a row, and of one alone, in SVG units.
 const FRAME: [f64; 2] = [300.0, 260.0];
+const ALONE: [f64; 2] = [620.0, 360.0];
+/// The room around a frame for words.
 const LEFT: f64 = 62.0;
 const TOP: f64 = 40.0;
 const BELOW: f64 = 48.0;
 /// Width of the column of names at the right, beside its letters, and of one letter.
 const NAMES: f64 = 56.0;
 const LETTER: f64 = 7.0;
+/// Size of the words beside points, and the room that a letter of them takes.
+const LABEL: f64 = 10.0;
+const LABEL_LETTER: f64 = 5.6;
+/// How far a word stands from its point.
+const BESIDE: f64 = 7.0;
+/// Logarithmic axes of no more decades than this also have lines at 2 and 5.
+const FEW_DECADES: i32 = 2;
 /// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
 const COLORS: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
 
@@ -67,7 +77,9 @@ impl Axis {
     fn marks(&self) -> Vec<f64> {
         if self.logarithmic {
             let [low, high] = self.range.map(|v| libm::round(libm::log10(v)) as i32);
-            return (low..=high).map(|e| libm::exp10(f64::from(e))).collect();
+            let steps: &[f64] = if high - low > FEW_DECADES { &[1.0] } else { &[1.0, 2.0, 5.0] };
+            let all = (low..=high).flat_map(|e| steps.iter().map(move |step| step * libm::exp10(f64::from(e))));
+            return all.filter(|v| *v <= self.range[1] * (1.0 + f64::EPSILON)).collect();
         }
         (0..=4).map(|i| self.range[0] + (self.range[1] - self.range[0]) * f64::from(i) / 4.0).collect()
     }
@@ -76,18 +88,27 @@ impl Axis {
 impl Chart {
     /// Charts side by side with one list of names, the first chart's, as an SVG document.
     pub fn row(charts: &[Self]) -> String {
+        Self::drawing(charts, FRAME, &[])
+    }
+
+    /// A chart by itself, larger than in a row, as an SVG document; with words beside points, as far as there is room.
+    pub fn alone(&self, labels: &[([f64; 2], String)]) -> String {
+        Self::drawing(std::slice::from_ref(self), ALONE, labels)
+    }
+
+    fn drawing(charts: &[Self], frame: [f64; 2], labels: &[([f64; 2], String)]) -> String {
         let names = charts.first().map_or(&[][..], |c| &c.names);
         let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let column = NAMES + LETTER * longest as f64;
-        let width = charts.len() as f64 * (LEFT + FRAME[0]) + column;
-        let height = TOP + FRAME[1] + BELOW;
+        let width = charts.len() as f64 * (LEFT + frame[0]) + column;
+        let height = TOP + frame[1] + BELOW;
         let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
-             font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+             height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
         );
         for (i, chart) in charts.iter().enumerate() {
-            let left = LEFT + i as f64 * (LEFT + FRAME[0]);
-            chart.draw(&mut svg, left);
+            let left = LEFT + i as f64 * (LEFT + frame[0]);
+            chart.draw(&mut svg, left, frame, labels);
         }
         let left = width - column + 16.0;
         for (i, name) in names.iter().enumerate() {
@@ -99,8 +120,7 @@ impl Chart {
         svg + "</svg>\n"
     }
 
-    fn draw(&self, svg: &mut String, left: f64) {
-        let [w, h] = FRAME;
+    fn draw(&self, svg: &mut String, left: f64, [w, h]: [f64; 2], labels: &[([f64; 2], String)]) {
         let x = |value| self.across.part(value).map(|part| left + w * part);
         let y = |value| self.up.part(value).map(|part| TOP + h * (1.0 - part));
         for mark in self.across.marks() {
@@ -133,16 +153,46 @@ impl Chart {
         for [x, y] in self.defaults.iter().filter_map(|p| Some([x(p[0])?, y(p[1])?])) {
             let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\" fill=\"none\" stroke=\"#c00\"/>");
         }
+        let labels = labels.iter().filter_map(|(p, text)| Some(([x(p[0])?, y(p[1])?], text.as_str())));
+        let points = self.curves.iter().flatten().filter_map(|p| Some([x(p[0])?, y(p[1])?]));
+        *svg += &beside(labels.collect(), points.collect(), [left + w, TOP]);
     }
 }
 
+/// Words beside points, where they cover neither each other nor another point, and stay left of and below a corner.
+fn beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [right, top]: [f64; 2]) -> String {
+    let mut taken: Vec<[f64; 4]> = points.iter().map(|[x, y]| [x - 3.0, y - 3.0, x + 3.0, y + 3.0]).collect();
+    let mut svg = String::new();
+    for ([x, y], text) in labels {
+        let width = LABEL_LETTER * text.chars().count() as f64;
+        let places = [[BESIDE, -3.0], [BESIDE, LABEL], [-BESIDE - width, -3.0], [-BESIDE - width, LABEL]];
+        let free = places.into_iter().map(|[dx, dy]| [x + dx, y + dy]).find(|[x, y]| {
+            let own = [*x, y - 0.8 * LABEL, x + width, *y];
+            let apart = |b: &[f64; 4]| own[2] < b[0] || b[2] < own[0] || own[3] < b[1] || b[3] < own[1];
+            own[2] <= right && own[1] >= top && taken.iter().all(apart)
+        });
+        let Some([x, y]) = free else { continue };
+        taken.push([x, y - 0.8 * LABEL, x + width, y]);
+        let text = plain(text);
+        let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LABEL}\" fill=\"#444\">{text}</text>");
+    }
+    svg
+}
+
+fn plain(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;")
+}
+
 fn words(x: f64, y: f64, anchor: &str, text: &str) -> String {
-    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    let text = plain(text);
     format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>\n")
 }
 
-/// A number as short as it can be told, up to a thousandth.
+/// A number as short as it can be told; beyond a thousandth and a hundred thousand with a power of ten.
 fn short(value: f64) -> String {
+    if value != 0.0 && !(9e-4..9e4).contains(&value.abs()) {
+        return power(value);
+    }
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -172,6 +222,23 @@ mod tests {
         let svg = Chart::row(&[chart]);
         assert_eq!(svg.matches("<circle").count(), 2);
         assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("&lt;x> &amp; y"), "{svg}");
+    }
+
+    #[test]
+    fn small_numbers_are_not_called_nothing() {
+        assert_eq!(
+            [0.0, 1e-6, 2e-4, 0.001, 0.5, 20.0, 1e4, 1e6].map(short),
+            ["0", "1e-6", "2e-4", "0.001", "0.5", "20", "10000", "1e6"]
+        );
+    }
+
+    #[test]
+    fn words_beside_points_do_not_cover_each_other() {
+        let text = beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [200.0, 0.0]);
+        assert_eq!(text.matches("<text").count(), 2);
+        let crowd = vec![([50.0, 50.0], "a long word"); 9];
+        assert!(beside(crowd, vec![], [200.0, 0.0]).matches("<text").count() < 9);
+        assert!(!beside(vec![([199.0, 50.0], "wide")], vec![], [200.0, 0.0]).contains("x=\"206"));
     }
 
     #[test]

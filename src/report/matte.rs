@@ -5,10 +5,13 @@
 //! by `F + T K`, with the noise of the same sensor: on the photo's screen, and on one with green and blue swapped. (The
 //! photo itself departs from the model by what blurs and refracts the screen, which a second shot would do alike.)
 
+mod diagram;
+mod made;
 mod method;
 mod score;
 mod truth;
 
+pub use diagram::diagrams;
 pub use method::Method;
 pub use score::Score;
 
@@ -72,12 +75,17 @@ const PATCH_PX: usize = 24;
 /// A folder without truth, or files of it that cannot be read.
 pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     let truths = Truths::of(folder)?;
+    measure_known(truths.len(), |i| truths.read(i), progress)
+}
+
+/// Measures every method on so many photos.
+fn measure_known(count: usize, read: impl Fn(usize) -> Result<Known>, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     // One thread, so that run times can be compared.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let mut rows = Vec::new();
-    for i in 0..truths.len() {
-        progress(i as u64, truths.len() as u64);
-        let known = truths.read(i)?;
+    for i in 0..count {
+        progress(i as u64, count as u64);
+        let known = read(i)?;
         let on = |screen: &Image<LinearRgb>, shot: u64| known.on(screen, SHOTS * i as u64 + shot);
         let shots = [on(&known.screen, 0), on(&known.screen.map(swapped), 1)];
         let backgrounds: Vec<_> = (0..BACKGROUNDS).map(|k| background(known.photo.size(), k)).collect();

@@ -2,20 +2,36 @@
 //!
 //! Errors are the same at every run; times are this machine's.
 
+#[cfg(feature = "settle")]
+pub mod all;
 pub mod camera;
 mod chart;
+mod clock;
+pub mod color;
 pub mod dataset;
+mod diagram;
+pub mod encode;
 pub mod eval;
 pub mod experiments;
 mod histogram;
+pub mod keying;
+pub mod label;
+pub mod light;
+mod machine;
 pub mod matte;
+mod number;
 mod page;
+pub mod peers;
+mod pile;
 pub mod render;
+mod section;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};
+pub use diagram::{Diagram, Point, front};
 pub use histogram::Histogram;
 pub use page::{Page, base64, escaped};
+pub use section::{Document, Section};
 pub use table::Table;

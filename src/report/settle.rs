@@ -9,6 +9,10 @@
 //! the worst pair overlapped by 0.23 mm, half of what is accepted, and a fifth of the heaps gained energy; at 1/480 s
 //! nothing overlapped by more than 0.03 mm. Shorter steps buy what no picture shows.
 
+mod diagram;
+
+pub use diagram::diagrams;
+
 use super::{Axis, Chart, Table};
 use crate::geom::UnitQuaternion;
 use crate::scene::{Object, Placement, Scene, SettleOptions};
