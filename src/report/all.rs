@@ -86,13 +86,15 @@ pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Docu
         diagrams.extend(stage(options, &amount)?);
     }
     progress(steps - 1, steps);
-    let sections = vec![
+    let mut sections = vec![
         about(options),
         curves(&diagrams),
         qualities(),
         beside_others(&peers::read(&options.peers)?, &options.peers),
-        stability()?,
     ];
+    if !options.quick {
+        sections.push(stability()?);
+    }
     progress(steps, steps);
     Ok(Document { title: "petcomp: what it does, how well, and at what cost".into(), sections })
 }
@@ -108,7 +110,11 @@ pub fn write(folder: &Path, options: &AllOptions, progress: impl Fn(u64, u64)) -
 }
 
 fn about(options: &AllOptions) -> Section {
-    let quick = if options.quick { " It was made in a hurry (`--quick`): times are of single runs." } else { "" };
+    let quick = if options.quick {
+        " It was made in a hurry (`--quick`): times are of few runs, and extreme cases are left out."
+    } else {
+        ""
+    };
     Section::new("What this is")
         .text(format!(
             "One run of `petcomp report all` on the machine below. Times are CPU seconds of one thread, medians; errors are \

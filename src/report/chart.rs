@@ -155,12 +155,12 @@ impl Chart {
         }
         let labels = labels.iter().filter_map(|(p, text)| Some(([x(p[0])?, y(p[1])?], text.as_str())));
         let points = self.curves.iter().flatten().filter_map(|p| Some([x(p[0])?, y(p[1])?]));
-        *svg += &beside(labels.collect(), points.collect(), [left + w, TOP]);
+        *svg += &beside(labels.collect(), points.collect(), [left, left + w, TOP]);
     }
 }
 
-/// Words beside points, where they cover neither each other nor another point, and stay left of and below a corner.
-fn beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [right, top]: [f64; 2]) -> String {
+/// Words beside points, where they cover neither each other nor another point, and stay between two sides and below a top.
+fn beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right, top]: [f64; 3]) -> String {
     let mut taken: Vec<[f64; 4]> = points.iter().map(|[x, y]| [x - 3.0, y - 3.0, x + 3.0, y + 3.0]).collect();
     let mut svg = String::new();
     for ([x, y], text) in labels {
@@ -169,7 +169,7 @@ fn beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [right, top]: [f
         let free = places.into_iter().map(|[dx, dy]| [x + dx, y + dy]).find(|[x, y]| {
             let own = [*x, y - 0.8 * LABEL, x + width, *y];
             let apart = |b: &[f64; 4]| own[2] < b[0] || b[2] < own[0] || own[3] < b[1] || b[3] < own[1];
-            own[2] <= right && own[1] >= top && taken.iter().all(apart)
+            own[0] >= left && own[2] <= right && own[1] >= top && taken.iter().all(apart)
         });
         let Some([x, y]) = free else { continue };
         taken.push([x, y - 0.8 * LABEL, x + width, y]);
@@ -234,11 +234,15 @@ mod tests {
 
     #[test]
     fn words_beside_points_do_not_cover_each_other() {
-        let text = beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [200.0, 0.0]);
+        let text = beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [0.0, 200.0, 0.0]);
         assert_eq!(text.matches("<text").count(), 2);
         let crowd = vec![([50.0, 50.0], "a long word"); 9];
-        assert!(beside(crowd, vec![], [200.0, 0.0]).matches("<text").count() < 9);
-        assert!(!beside(vec![([199.0, 50.0], "wide")], vec![], [200.0, 0.0]).contains("x=\"206"));
+        assert!(beside(crowd, vec![], [0.0, 200.0, 0.0]).matches("<text").count() < 9);
+        assert!(!beside(vec![([199.0, 50.0], "wide")], vec![], [0.0, 200.0, 0.0]).contains("x=\"206"));
+        assert_eq!(
+            beside(vec![([10.0, 50.0], "a word as wide as the chart itself is")], vec![], [0.0, 200.0, 0.0]),
+            ""
+        );
     }
 
     #[test]

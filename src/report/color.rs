@@ -43,31 +43,29 @@ fn decoded(value: f64) -> f64 {
     if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Seconds and error of a form that turns values into values.
-fn point(
-    name: &str,
-    setting: &str,
+/// Seconds and error of a form that turns values into codes; what those stand for is not timed.
+fn point<T: Send>(
+    [name, setting]: [&str; 2],
     values: &[f32],
     right: fn(f64) -> f64,
-    form: impl Fn(&[f32]) -> Vec<f32> + Sync,
+    form: impl Fn(&[f32]) -> Vec<T> + Sync,
+    meant: impl Fn(&T) -> f64,
 ) -> Result<Point> {
     let (made, seconds) = timed(RUNS, || Ok(form(values)))?;
-    let squares = made.iter().zip(values).map(|(m, v)| (f64::from(*m) - right(f64::from(*v))).powi(2));
+    let squares = made.iter().zip(values).map(|(m, v)| (meant(m) - right(f64::from(*v))).powi(2));
     Ok(Point::new(name, setting, seconds, (squares.sum::<f64>() / values.len() as f64).sqrt()))
 }
 
 fn encoding() -> Result<Diagram> {
     let lights = lights();
-    let codes8 = |values: &[f32]| -> Vec<Srgb8> {
-        values.chunks_exact(3).map(|v| encode_srgb8(LinearRgb::new(v[0], v[1], v[2]))).collect()
+    let table8 = |values: &[f32]| -> Vec<u8> {
+        let triples = values.chunks_exact(3).map(|v| encode_srgb8(LinearRgb::new(v[0], v[1], v[2])));
+        triples.flat_map(|c| [c.r, c.g, c.b]).collect()
     };
-    let table8 = |values: &[f32]| {
-        codes8(values).iter().flat_map(|c| [c.r, c.g, c.b]).map(|c| (f64::from(c) / MOST8) as f32).collect()
-    };
-    let table16 = |values: &[f32]| values.iter().map(|v| (f64::from(encode_srgb16(*v)) / MOST16) as f32).collect();
+    let table16 = |values: &[f32]| values.iter().map(|v| encode_srgb16(*v)).collect();
     let each = |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
     let gamma = |v: f32| Curve::Gamma(PLAIN_GAMMA).encode(v);
-    let wrong = wrong_codes(&codes8(&lights), &lights);
+    let wrong = wrong_codes(&table8(&lights), &lights);
     Ok(Diagram {
         file: "color_encode".into(),
         title: "color: light to display values".into(),
@@ -76,10 +74,10 @@ fn encoding() -> Result<Diagram> {
         cost: "CPU seconds per megapixel".into(),
         reference: "closed form of IEC 61966-2-1 in double precision".into(),
         points: vec![
-            point("table", "8 bits", &lights, encoded, table8)?.used_where(|_| true),
-            point("table", "16 bits", &lights, encoded, table16)?,
-            point("formula", "32-bit float", &lights, encoded, each(linear_to_srgb))?,
-            point("plain power", "gamma 2.2", &lights, encoded, each(gamma))?,
+            point(["table", "8 bits"], &lights, encoded, table8, |c| f64::from(*c) / MOST8)?.used_where(|_| true),
+            point(["table", "16 bits"], &lights, encoded, table16, |c| f64::from(*c) / MOST16)?,
+            point(["formula", "32-bit float"], &lights, encoded, each(linear_to_srgb), |v| f64::from(*v))?,
+            point(["plain power", "gamma 2.2"], &lights, encoded, each(gamma), |v| f64::from(*v))?,
         ],
         limit: Some((1.01 * ROUNDING / MOST8, "what rounding to 8 bits costs, and 1 % for the few values".into())),
         why: format!(
@@ -90,23 +88,24 @@ fn encoding() -> Result<Diagram> {
 }
 
 /// Codes that are not the nearest to what the closed form gives.
-fn wrong_codes(codes: &[Srgb8], lights: &[f32]) -> usize {
-    let all = codes.iter().flat_map(|c| [c.r, c.g, c.b]).zip(lights);
+fn wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
+    let all = codes.iter().zip(lights);
     // Half a code, and a hair for the closed form's own rounding.
-    all.filter(|(c, v)| (f64::from(*c) - MOST8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9).count()
+    all.filter(|(c, v)| (f64::from(**c) - MOST8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9).count()
 }
 
 fn decoding() -> Result<Diagram> {
     let codes: Vec<u8> = (0..VALUES).map(|i| (i.wrapping_mul(2_654_435_761) >> 8) as u8).collect();
     let values: Vec<f32> = codes.iter().map(|c| (f64::from(*c) / MOST8) as f32).collect();
     // The table takes codes, not values: both stand for the same.
-    let table8 = |_: &[f32]| {
+    let table8 = |_: &[f32]| -> Vec<f32> {
         let triples = codes.chunks_exact(3).map(|c| decode_srgb8(Srgb8 { r: c[0], g: c[1], b: c[2] }));
         triples.flat_map(<[f32; 3]>::from).collect()
     };
     let table16 = |_: &[f32]| codes.iter().map(|c| decode_srgb16(u16::from(*c) * 257)).collect();
     let each = |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
     let gamma = |v: f32| Curve::Gamma(PLAIN_GAMMA).decode(v);
+    let light = |v: &f32| f64::from(*v);
     Ok(Diagram {
         file: "color_decode".into(),
         title: "color: display values to light".into(),
@@ -115,10 +114,10 @@ fn decoding() -> Result<Diagram> {
         cost: "CPU seconds per megapixel".into(),
         reference: "closed form of IEC 61966-2-1 in double precision".into(),
         points: vec![
-            point("table", "8 bits", &values, decoded, table8)?.used_where(|_| true),
-            point("table", "16 bits", &values, decoded, table16)?,
-            point("formula", "32-bit float", &values, decoded, each(srgb_to_linear))?,
-            point("plain power", "gamma 2.2", &values, decoded, each(gamma))?,
+            point(["table", "8 bits"], &values, decoded, table8, light)?.used_where(|_| true),
+            point(["table", "16 bits"], &values, decoded, table16, light)?,
+            point(["formula", "32-bit float"], &values, decoded, each(srgb_to_linear), light)?,
+            point(["plain power", "gamma 2.2"], &values, decoded, each(gamma), light)?,
         ],
         limit: Some((f64::from(f32::EPSILON), "rounding of a float".into())),
         why: String::new(),
@@ -149,15 +148,15 @@ mod tests {
     fn no_code_of_the_table_is_wrong_and_a_wrong_one_is_counted() {
         let lights = [0.0, 0.2, 1.0];
         let right = encode_srgb8(LinearRgb::from(lights));
-        assert_eq!(wrong_codes(&[right], &lights), 0);
-        assert_eq!(wrong_codes(&[Srgb8 { g: right.g + 1, ..right }], &lights), 1);
+        assert_eq!(wrong_codes(&[right.r, right.g, right.b], &lights), 0);
+        assert_eq!(wrong_codes(&[right.r, right.g + 1, right.b], &lights), 1);
     }
 
     #[test]
     fn a_table_of_eight_bits_is_off_by_its_rounding() {
         let values: Vec<f32> = (0..3 * 4096).map(|i| i as f32 / (3 * 4096) as f32).collect();
-        let round = |values: &[f32]| values.iter().map(|v| (linear_to_srgb(*v) * 255.0).round() / 255.0).collect();
-        let found = point("", "", &values, encoded, round).unwrap();
+        let round = |values: &[f32]| values.iter().map(|v| (linear_to_srgb(*v) * 255.0).round()).collect();
+        let found = point(["", ""], &values, encoded, round, |code: &f32| f64::from(*code) / MOST8).unwrap();
         assert!((found.error / (ROUNDING / MOST8) - 1.0).abs() < 0.05, "{}", found.error);
     }
 }

@@ -73,11 +73,18 @@ impl Point {
         self.qualities.contains(&Quality::default())
     }
 
-    /// Setting, and the qualities that use it.
+    /// Setting and curve; the curve alone where it is all that is set.
+    fn name(&self) -> String {
+        if self.setting.is_empty() { self.curve.clone() } else { format!("{} ({})", self.setting, self.curve) }
+    }
+
+    /// What stands beside it: what is set, and the qualities that use it.
     fn label(&self) -> String {
+        let set = if self.setting.is_empty() { &self.curve } else { &self.setting };
         match self.qualities.as_slice() {
-            [] => self.setting.clone(),
-            used => format!("{} ({})", self.setting, used.iter().map(|q| q.name()).collect::<Vec<_>>().join(", ")),
+            [] => set.clone(),
+            used if used.len() == Quality::ALL.len() => format!("{set} (every quality)"),
+            used => format!("{set} ({})", used.iter().map(|q| q.name()).collect::<Vec<_>>().join(", ")),
         }
     }
 }
@@ -104,14 +111,13 @@ impl Diagram {
     /// In words: where the default is, why, whether it is on the efficient front, and how far from it.
     pub fn verdict(&self) -> String {
         let Some(default) = self.default_point() else { return self.why.clone() };
-        let mut said = format!("Default: {} ({}).", default.setting, default.curve);
+        let mut said = format!("Default: {}.", default.name());
         said += &self.beside_limit(default);
         said += &match self.cheaper_than_default() {
             None => " It is on the efficient front.".to_owned(),
             Some(p) => format!(
-                " It is not on the efficient front: {} ({}) is at least as exact (error {} beside {}) at {} of its cost.",
-                p.setting,
-                p.curve,
+                " It is not on the efficient front: {} is at least as exact (error {} beside {}) at {} of its cost.",
+                p.name(),
                 three(p.error),
                 three(default.error),
                 three(p.cost / default.cost)
@@ -132,21 +138,16 @@ impl Diagram {
             return format!(" The cheapest setting under {told} ({why}).");
         }
         let share = three(best.cost / point.cost);
-        format!(
-            " The cheapest setting under {told} ({why}) is {} ({}), at {share} of its cost.",
-            best.setting, best.curve
-        )
+        format!(" The cheapest setting under {told} ({why}) is {}, at {share} of its cost.", best.name())
     }
 
     /// What the diagram shows, against what, and its verdict.
     pub fn caption(&self) -> String {
+        let ring = if self.default_point().is_some() { " Ring: the default." } else { "" };
         let exact = self.points.iter().any(|p| p.error == 0.0);
         let floor = if exact { " Points on the lower edge have no error." } else { "" };
         let verdict = self.verdict();
-        format!(
-            "{}. Input: {}. Reference: {}. Ring: the default.{floor} {verdict}",
-            self.title, self.input, self.reference
-        )
+        format!("{}. Input: {}. Reference: {}.{ring}{floor} {verdict}", self.title, self.input, self.reference)
     }
 
     /// The diagram as an SVG document.
@@ -198,18 +199,29 @@ impl Diagram {
 
     /// A line for each of some diagrams: the default, its error and cost, and what beats it.
     pub fn summary(diagrams: &[Self]) -> Table {
-        let mut table = Table::new(["diagram", "default", "error", "cost", "held against", "cheaper and as exact"]);
+        let mut table = Table::new([
+            "stage and what is asked",
+            "held against",
+            "default",
+            "error is",
+            "error",
+            "cost is",
+            "cost",
+            "cheaper and as exact",
+        ]);
         for diagram in diagrams {
             let Some(default) = diagram.default_point() else { continue };
             let beaten = diagram.cheaper_than_default().map_or("none: on the front".to_owned(), |p| {
-                format!("{} ({}), {} of the cost", p.setting, p.curve, three(p.cost / default.cost))
+                format!("{}, {} of the cost", p.name(), three(p.cost / default.cost))
             });
             table.push([
                 diagram.title.clone(),
-                format!("{} ({})", default.setting, default.curve),
-                format!("{} {}", three(default.error), diagram.error),
-                format!("{} {}", three(default.cost), diagram.cost),
                 diagram.reference.clone(),
+                default.name(),
+                diagram.error.clone(),
+                three(default.error),
+                diagram.cost.clone(),
+                three(default.cost),
                 beaten,
             ]);
         }

@@ -44,7 +44,10 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
             let (labels, seconds) = timed(RUNS, || Ok(label(&deep, &shot, &options)))?;
             let mask = mask(&labels);
             let error = 1.0 - ellipse.iou(&mask);
-            let name = format!("{} x {}, alpha {alpha_threshold}", size[0], size[1]);
+            let name = match size == USUAL {
+                true => format!("alpha {alpha_threshold}"),
+                false => format!("{} px wide", size[0]),
+            };
             let is_default = size == USUAL && alpha_threshold == usual_threshold();
             times.push(Point::new("mask", &name, seconds, error).used_where(|_| is_default));
             let (rings, more) = timed(RUNS, || Ok(trace::polygons(&mask)))?;
@@ -78,7 +81,14 @@ fn diagram(file: &str, title: &str, cost: &str, points: Vec<Point>) -> Diagram {
     Diagram {
         file: file.into(),
         title: title.into(),
-        input: format!("an ellipse of {:.0} x {:.0} mm from straight above", 2e3 * HALF[0], 2e3 * HALF[1]),
+        input: format!(
+            "an ellipse of {:.0} x {:.0} mm from straight above; {} x {} px and alpha {} where nothing else is said",
+            2e3 * HALF[0],
+            2e3 * HALF[1],
+            USUAL[0],
+            USUAL[1],
+            usual_threshold()
+        ),
         error: "1 - IoU".into(),
         cost: cost.into(),
         reference: "the ellipse (closed form)".into(),

@@ -114,7 +114,7 @@ impl Document {
 impl Part {
     fn put_on(&self, page: &mut Page) {
         match self {
-            Self::Text(text) => page.text(text),
+            Self::Text(text) => page.html(&format!("<p>{}</p>\n", with_code(text))),
             Self::Table { table, .. } => page.table(table),
             Self::Figure { svg, caption, data, .. } => {
                 let points = format!("<details><summary>Its points</summary>{}</details>\n", data.html());
@@ -130,6 +130,15 @@ impl Part {
             Self::Figure { file, caption, .. } => format!("\n* `{file}.csv`: {caption}\n"),
         }
     }
+}
+
+/// Text for HTML, with what stands between backticks as code.
+fn with_code(text: &str) -> String {
+    let part = |(i, part): (usize, &str)| match i % 2 {
+        0 => escaped(part),
+        _ => format!("<code>{}</code>", escaped(part)),
+    };
+    text.split('`').enumerate().map(part).collect()
 }
 
 #[cfg(test)]
@@ -160,6 +169,11 @@ mod tests {
         let html = io::read_text(folder.path().join("report.html")).unwrap();
         assert!(html.contains("One &amp; two") && html.contains("<svg") && html.contains("<td>2</td>"));
         assert!(!html.contains("src=") && !html.contains("href=\"http"), "needs no other file");
+    }
+
+    #[test]
+    fn code_is_code_and_text_is_text() {
+        assert_eq!(with_code("a < `b < c` d"), "a &lt; <code>b &lt; c</code> d");
     }
 
     #[test]

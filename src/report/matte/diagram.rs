@@ -2,6 +2,7 @@
 
 use super::{Method, Score, Summary, made, measure, measure_known, summaries};
 use crate::error::Result;
+use crate::report::number::three;
 use crate::report::{Diagram, Point};
 use std::path::Path;
 
@@ -36,27 +37,33 @@ fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
         ("matte_lit", "matte: on new backgrounds", "mean absolute error, scene-linear", |s| s.mae_lit),
         ("matte_shaded", "matte: in the object's own shadow", "mean absolute error, scene-linear", |s| s.mae_shaded),
     ];
-    let diagram = |(file, title, error, of): (&str, &str, &str, Error)| {
-        Diagram {
+    let diagram = |(file, title, error, of): (&str, &str, &str, Error)| Diagram {
         file: file.into(),
         title: title.into(),
         input: input.into(),
         error: error.into(),
-        cost: "seconds per photo, one thread, finding the object included".into(),
+        cost: "seconds per photo".into(),
         reference: source.into(),
         points: summaries.iter().map(|s| point(s, of(&s.score))).collect(),
         limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
-        why: "Two screens need a second photo of each object; of the methods that need one, the default has the least error."
-            .into(),
-    }
+        why: why(summaries, of),
     };
     errors.map(diagram).into()
 }
 
+/// What the default is worth beside the paper's method.
+fn why(summaries: &[Summary], error: fn(&Score) -> f64) -> String {
+    let of = |method| summaries.iter().find(|s| s.method == method).map_or(0.0, |s: &Summary| error(&s.score));
+    let share = three(of(Method::Physical) / of(Method::Paper));
+    format!(
+        "Times are of one thread, finding the object included. Two screens need a second photo of each object. The default has \
+         {share} of the error of the paper's keyer."
+    )
+}
+
 fn point(summary: &Summary, error: f64) -> Point {
-    let curve = if summary.method == Method::TwoScreen { "two photos" } else { "one photo" };
     let is_default = summary.method == Method::Physical;
-    Point::new(curve, summary.method.name(), summary.time_ms * MILLI, error).used_where(|_| is_default)
+    Point::new(summary.method.name(), "", summary.time_ms * MILLI, error).used_where(|_| is_default)
 }
 
 #[cfg(test)]
@@ -67,6 +74,6 @@ mod tests {
     fn every_method_is_a_point_and_the_physical_one_has_the_ring() {
         let found = of(&summaries(&[]), "", "");
         assert!(found.iter().all(|d| d.points.len() == Method::ALL.len()));
-        assert!(found.iter().all(|d| d.default_point().is_some_and(|p| p.setting == "physical")));
+        assert!(found.iter().all(|d| d.default_point().is_some_and(|p| p.curve == "physical")));
     }
 }

@@ -1,8 +1,9 @@
 //! Photos of see-through objects made in code, with all that a renderer would know of them: for a repository without any.
 //!
 //! A bottle is two walls of film around a closed outline, with wrinkles, a bright streak and an opaque label, on a screen that
-//! is darker towards its corners. Light passes a wall `exp(-absorption * thickness)`; the screen under the object lost as much
-//! once more on the light's way down.
+//! is darker towards its corners. Two flat walls of clear PET pass three quarters of the light (four surfaces, each of which
+//! reflects some 7 %), and dye takes its share; the screen is seen through the object and lit through it. In folds and rims the
+//! sight meets more plastic, while the light, which comes from all around, does not.
 
 use super::truth::{Known, Noise};
 use crate::image::Image;
@@ -10,8 +11,10 @@ use crate::pixel::{Coverage, LinearRgb};
 
 /// How many there are.
 pub(super) const COUNT: usize = TINTS.len();
-/// Absorption of two walls that lie flat, for each photo.
-const TINTS: [[f64; 3]; 4] = [[0.05, 0.05, 0.05], [0.45, 0.16, 0.07], [0.1, 0.1, 0.35], [0.3, 0.3, 0.3]];
+/// Absorbance of the dye of two walls that lie flat: clear, blue, green, brown.
+const TINTS: [[f64; 3]; 4] = [[0.0; 3], [0.4, 0.13, 0.01], [0.35, 0.09, 0.27], [0.08, 0.18, 0.25]];
+/// Absorbance of two clear walls, by what four surfaces reflect.
+const CLEAR: f64 = 0.29;
 const SIZE: (usize, usize) = (600, 320);
 const SCREEN: LinearRgb = LinearRgb::new(0.06, 0.42, 0.12);
 /// Light that film throws back.
@@ -29,6 +32,8 @@ struct Place {
     cover: f64,
     foreground: [f64; 3],
     view: [f64; 3],
+    /// What reaches the screen.
+    lit: [f64; 3],
 }
 
 /// Photo `i`.
@@ -37,7 +42,7 @@ pub(super) fn made(i: usize) -> Known {
     let places = Image::from_fn(w, h, |x, y| place(i, (x as f64 + 0.5, y as f64 + 0.5)));
     let color = |c: [f64; 3]| LinearRgb::from(c.map(|v| v as f32));
     let foreground = places.map(|p| color(p.foreground));
-    let transmittance = places.map(|p| color(p.view.map(|v| v * v)));
+    let transmittance = places.map(|p| color([0, 1, 2].map(|c| p.view[c] * p.lit[c])));
     let view = places.map(|p| color(p.view));
     let mask = places.map(|p| Coverage(p.cover as f32));
     let screen = Image::from_fn(w, h, |x, y| {
@@ -87,7 +92,8 @@ fn place(i: usize, (x, y): (f64, f64)) -> Place {
     let wrinkle = 1.0 + 0.5 * libm::sin(0.11 * x + 0.03 * i as f64) * libm::sin(0.07 * y + 0.05 * x);
     let label = if (0.45..0.65).contains(&along) && depth > 12.0 { 1.0 } else { 0.0 };
     let streak = 0.5 * libm::exp(-((depth - 30.0) / 5.0).powi(2)) * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4);
-    let film = TINTS[i % COUNT].map(|a| libm::exp(-a * rim * wrinkle));
+    let flat = TINTS[i % COUNT].map(|dye| libm::exp(-CLEAR - dye));
+    let film = flat.map(|v| libm::pow(v, rim * wrinkle));
     let own = |c: usize| {
         let paint = [0.6, 0.12, 0.1][c] * (0.7 + 0.3 * libm::sin(0.3 * y));
         label * paint + (1.0 - label) * (SHEEN * rim * wrinkle + streak)
@@ -96,6 +102,7 @@ fn place(i: usize, (x, y): (f64, f64)) -> Place {
         cover,
         foreground: [0, 1, 2].map(|c| inside * own(c)),
         view: film.map(|v| 1.0 - inside * (1.0 - (1.0 - label) * v)),
+        lit: flat.map(|v| 1.0 - inside * (1.0 - v)),
     }
 }
 

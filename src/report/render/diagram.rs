@@ -12,6 +12,9 @@ use crate::report::{Diagram, Point};
 use crate::scene::{Shot, cycles};
 use std::path::{Path, PathBuf};
 
+/// The curve that the qualities lie on.
+const PRESETS: &str = "presets";
+const MEGA: f64 = 1e6;
 const PIXELS: [usize; 4] = [1, 3, 4, 6];
 const LIGHTS: [usize; 4] = [1, 2, 4, 6];
 const SKIES: [usize; 4] = [8, 16, 64, 128];
@@ -30,6 +33,13 @@ struct Scene {
     wanted: Image<LinearRgb>,
 }
 
+/// What a scene costs, and how wrong it is.
+struct Cost {
+    mean_square: f64,
+    seconds: f64,
+    pixels: f64,
+}
+
 /// The golden scenes at many settings, `runs` times each, and filtered samples beside plain ones; none without scenes.
 ///
 /// # Errors
@@ -39,31 +49,52 @@ pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
     if scenes.is_empty() {
         return Ok(Vec::new());
     }
-    let mut points = Vec::new();
-    for (curve, setting, options) in settings() {
-        let used = |q: Quality| curve == "presets" && q.render() == options;
-        points.push(point(curve, setting, &scenes, runs, |shot| cast(shot, &options))?.used_where(used));
-    }
-    let count = scenes.len();
-    let whole =
-        diagram("render_samples", "render: samples", format!("{count} golden scenes of up to 30 cards"), points);
+    let mut found = samples(&scenes, runs)?;
     let plain: Vec<Scene> = scenes.into_iter().filter(|scene| scene.name == PLAIN).collect();
-    if plain.is_empty() {
-        return Ok(vec![whole]);
+    if !plain.is_empty() {
+        found.push(filter(&plain, runs)?);
     }
+    Ok(found)
+}
+
+/// Every setting, on the piles and on all scenes.
+fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
+    let (mut all, mut piles) = (Vec::new(), Vec::new());
+    for (curve, setting, options) in settings() {
+        let costs = measured(scenes, runs, |shot| cast(shot, &options))?;
+        let of = |is_in: fn(&Scene) -> bool| {
+            let some = scenes.iter().zip(&costs).filter(|(scene, _)| is_in(scene)).map(|(_, cost)| cost);
+            point(curve, &setting, some).used_where(|q| curve == PRESETS && q.render() == options)
+        };
+        piles.push(of(Scene::is_pile));
+        all.push(of(|_| true));
+    }
+    let count = scenes.iter().filter(|scene| scene.is_pile()).count();
+    let bottles = format!("{count} golden piles of 5 to 30 bottles");
+    let everything = format!("{} golden scenes", scenes.len());
+    Ok(vec![
+        diagram("render_piles", "render: samples, piles of bottles", bottles, piles),
+        Diagram { why: EDGES.into(), ..diagram("render_all", "render: samples, all scenes", everything, all) },
+    ])
+}
+
+/// Filtered samples and plain ones.
+fn filter(scenes: &[Scene], runs: usize) -> Result<Diagram> {
     let mut points = Vec::new();
     for subsamples in SIDES {
         let options = RenderOptions { subsamples, ..RenderOptions::default() };
+        let is_default = options == RenderOptions::default();
         let setting = format!("{subsamples} x {subsamples}");
-        let found = point("filtered", setting.clone(), &plain, runs, |shot| cast(shot, &options))?;
-        points.push(found.used_where(|q| q == Quality::Normal && q.render() == options));
-        points.push(point("plain samples", setting, &plain, 1, |shot| reference(shot, &options))?);
+        let filtered = point("filtered", &setting, &measured(scenes, runs, |shot| cast(shot, &options))?);
+        points.push(filtered.used_where(|q| is_default && q == Quality::default()));
+        points.push(point("plain samples", &setting, &measured(scenes, 1, |shot| reference(shot, &options))?));
     }
-    Ok(vec![
-        whole,
-        diagram("render_filter", "render: filtered and plain samples", format!("golden scene {PLAIN}"), points),
-    ])
+    Ok(diagram("render_filter", "render: filtered and plain samples", format!("golden scene {PLAIN}"), points))
 }
+
+/// What is to be known of the scenes.
+const EDGES: &str = "Cards of the scenes that are no piles are bare rectangles, whose edges want more samples of a pixel than \
+    cut-outs do, which end in their own soft alpha.";
 
 fn diagram(file: &str, title: &str, input: String, points: Vec<Point>) -> Diagram {
     Diagram {
@@ -82,7 +113,7 @@ fn diagram(file: &str, title: &str, input: String, points: Vec<Point>) -> Diagra
 /// The presets, and each number of the default changed by itself.
 fn settings() -> Vec<(&'static str, String, RenderOptions)> {
     let usual = RenderOptions::default();
-    let presets = Preset::ALL.into_iter().map(|(name, preset)| ("presets", name.to_owned(), preset.options()));
+    let presets = Preset::ALL.into_iter().map(|(name, preset)| (PRESETS, name.to_owned(), preset.options()));
     let square = |n: usize| format!("{n} x {n}");
     let pixels = PIXELS.map(|n| ("samples of a pixel", square(n), RenderOptions { subsamples: n, ..usual }));
     let lights = LIGHTS.map(|n| ("samples of a light", square(n), RenderOptions { light_samples: n, ..usual }));
@@ -104,24 +135,28 @@ fn scenes(golden: &Path) -> Result<Vec<Scene>> {
     folders.iter().map(scene).collect()
 }
 
-/// Root mean squared error over all scenes, each counting alike, and the CPU seconds of all of them per megapixel.
-fn point(
-    curve: &str,
-    setting: String,
-    scenes: &[Scene],
-    runs: usize,
-    render: impl Fn(&Shot) -> DeepImage + Sync,
-) -> Result<Point> {
-    let (mut squares, mut seconds, mut pixels) = (0.0, 0.0, 0.0);
-    for scene in scenes {
+fn measured(scenes: &[Scene], runs: usize, render: impl Fn(&Shot) -> DeepImage + Sync) -> Result<Vec<Cost>> {
+    let cost = |scene: &Scene| {
         let frame = || Ok(composite::frame(&render(&scene.shot), scene.shot.plate.as_deref()));
-        let (frame, time) = timed(runs, frame)?;
-        squares += mean_square(&frame, scene)?;
-        seconds += time;
-        pixels += frame.pixels().len() as f64;
+        let (frame, seconds) = timed(runs, frame)?;
+        Ok(Cost { mean_square: mean_square(&frame, scene)?, seconds, pixels: frame.pixels().len() as f64 })
+    };
+    scenes.iter().map(cost).collect()
+}
+
+/// Root mean squared error over scenes, each counting alike, and the CPU seconds of all of them per megapixel.
+fn point<'a>(curve: &str, setting: &str, costs: impl IntoIterator<Item = &'a Cost>) -> Point {
+    let costs: Vec<&Cost> = costs.into_iter().collect();
+    let sum = |of: fn(&Cost) -> f64| costs.iter().map(|cost| of(cost)).sum::<f64>();
+    let error = (sum(|c| c.mean_square) / costs.len() as f64).sqrt();
+    Point::new(curve, setting, sum(|c| c.seconds) / sum(|c| c.pixels) * MEGA, error)
+}
+
+impl Scene {
+    /// Cut-outs of bottles in a heap: what datasets are made of.
+    fn is_pile(&self) -> bool {
+        self.name.starts_with("pile_of_")
     }
-    let error = (squares / scenes.len() as f64).sqrt();
-    Ok(Point::new(curve, setting, seconds / pixels * 1e6, error))
 }
 
 fn mean_square(frame: &Image<PremulRgba>, scene: &Scene) -> Result<f64> {
@@ -153,16 +188,16 @@ mod tests {
             .count()
         };
         let all = settings();
-        assert!(all.iter().filter(|(curve, ..)| *curve != "presets").all(|(.., o)| changed(o) == 1));
-        assert_eq!(all.iter().filter(|(curve, _, o)| *curve == "presets" && *o == usual).count(), 1);
+        assert!(all.iter().filter(|(curve, ..)| *curve != PRESETS).all(|(.., o)| changed(o) == 1));
+        assert_eq!(all.iter().filter(|(curve, _, o)| *curve == PRESETS && *o == usual).count(), 1);
     }
 
     #[test]
     fn a_preset_that_does_more_is_nearer_to_cycles() {
         let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/render");
         let scenes: Vec<_> = scenes(&golden).unwrap().into_iter().filter(|s| s.name == "pile_of_5").collect();
-        let error =
-            |preset: Preset| point("", String::new(), &scenes, 1, |shot| cast(shot, &preset.options())).unwrap().error;
+        let measured = |preset: Preset| measured(&scenes, 1, |shot| cast(shot, &preset.options())).unwrap();
+        let error = |preset| point("", "", &measured(preset)).error;
         let [draft, fast, high] = [Preset::Draft, Preset::Fast, Preset::High].map(error);
         assert!(draft > fast && fast > high && high > 0.0, "{draft} {fast} {high}");
     }
