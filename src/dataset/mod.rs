@@ -51,6 +51,7 @@ pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use formats::{Extent, Format, LabelSetup};
 pub use generate::{Plan, generate};
 pub(crate) use journal::read as journal_lines;
+pub(crate) use journal::JOURNAL;
 pub use journal::{ClassCount, Report, mend};
 pub use layers::Layers;
 pub use listing::Listing;

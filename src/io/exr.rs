@@ -72,7 +72,6 @@ pub fn write_half_channels(
     metadata: &[(String, String)],
 ) -> Result<()> {
     let path = path.as_ref();
-    let halves = |samples: &[f32]| FlatSamples::F16(samples.iter().map(|&v| half::f16::from_f32(v)).collect());
     let planes = channels.iter().map(|&(name, samples)| (name, halves(samples))).collect();
     let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
@@ -301,10 +300,16 @@ fn to_f32(plane: &FlatSamples) -> Vec<f32> {
     }
 }
 
-/// Floats as halves, rounded to nearest.
+/// Floats as halves, rounded to nearest; what is finite stays so, 65504 at most: programs blur and scale what they read,
+/// and one infinite pixel would take its neighbours along.
 pub(super) fn halves(samples: &[f32]) -> FlatSamples {
     let mut out = vec![f16::ZERO; samples.len()];
     half::slice::HalfFloatSliceExt::convert_from_f32_slice(out.as_mut_slice(), samples);
+    for (half, v) in out.iter_mut().zip(samples) {
+        if half.is_infinite() && v.is_finite() {
+            *half = f16::MAX.copysign(*half);
+        }
+    }
     FlatSamples::F16(out)
 }
 

@@ -1,7 +1,7 @@
 //! Where an area light is sampled: few points, placed so that smooth integrals come out right.
 
 use crate::geom::{Point3, Vector3};
-use crate::light::area::{LightFrame, area, frame};
+use crate::light::area::{LightFrame, area, frame, sides};
 use crate::scene::{AreaLight, LightShape};
 use std::f64::consts::{PI, TAU};
 
@@ -39,7 +39,7 @@ pub fn nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
 
 fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
     let (frame, area) = (frame(light), area(light));
-    let [half_x, half_y] = light.size.map(|s| 0.5 * s);
+    let [half_x, half_y] = sides(light).map(|s| 0.5 * s);
     let row = |&(y, wy): &(f64, f64)| {
         rule.iter().map(move |&(x, wx)| Node { point: frame.point(x * half_x, y * half_y), area: area * wx * wy / 4.0 })
     };
@@ -48,7 +48,7 @@ fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
 
 fn ellipse_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
     let (frame, area) = (frame(light), area(light));
-    let [half_x, half_y] = light.size.map(|s| 0.5 * s);
+    let [half_x, half_y] = sides(light).map(|s| 0.5 * s);
     let steps = 2 * rule.len();
     let ring = |(k, &(x, w)): (usize, &(f64, f64))| {
         let radius = (0.5 + 0.5 * x).sqrt();

@@ -27,6 +27,7 @@ pub mod render;
 mod section;
 #[cfg(feature = "settle")]
 pub mod settle;
+pub mod stability;
 mod table;
 
 pub use chart::{Axis, Chart, Curve};

@@ -16,7 +16,7 @@ pub use diagram::diagrams;
 use super::{Axis, Chart, Table};
 use crate::geom::UnitQuaternion;
 use crate::scene::{Object, Placement, Scene, SettleOptions};
-use crate::settle::{Extreme, ExtremeEnd, Settled, Verdict, extremes, heap, settle};
+use crate::settle::{Settled, Verdict, heap, settle};
 use crate::{Error, Result, io};
 use serde::Serialize;
 use std::path::Path;
@@ -227,56 +227,6 @@ pub fn charts(rows: &[Row]) -> Vec<Chart> {
     errors.map(chart).into()
 }
 
-/// Settles every extreme scene; `progress` hears of each and of how many there are.
-///
-/// # Errors
-/// None that a caller can cause: the scenes are made by [`extremes`].
-pub fn stability(progress: impl Fn(u64, u64)) -> Result<Vec<ExtremeEnd>> {
-    let all = extremes()?;
-    let of = |(i, extreme): (usize, &Extreme)| {
-        progress(i as u64, all.len() as u64);
-        extreme.run()
-    };
-    Ok(all.iter().enumerate().map(of).collect())
-}
-
-/// The ends of extreme scenes as a table.
-pub fn stability_table(ends: &[ExtremeEnd]) -> Table {
-    let mut table = Table::new([
-        "case",
-        "cards",
-        "promise",
-        "kept",
-        "verdict",
-        "tries",
-        "escapes",
-        "overlap, % of a card",
-        "energy rise %",
-        "to rest s",
-        "time ms",
-    ]);
-    for end in ends {
-        let escapes = if let Some(Verdict::Escaped(ids)) = &end.verdict { ids.len() } else { 0 };
-        let kept = if end.is_as_promised() { "yes" } else { "no" };
-        let name = end.verdict.as_ref().map_or("refused".into(), |verdict| format!("{verdict:?}"));
-        let verdict = name.split('(').next().unwrap_or_default();
-        table.push([
-            end.name.clone(),
-            end.cards.to_string(),
-            format!("{:?}", end.promise),
-            kept.into(),
-            verdict.into(),
-            end.tries.to_string(),
-            escapes.to_string(),
-            format!("{:.4}", end.overlap * 100.0),
-            format!("{:.4}", end.energy_rise * 100.0),
-            format!("{:.2}", end.seconds),
-            format!("{:.1}", end.wall_ms),
-        ]);
-    }
-    table
-}
-
 /// A heap for another program to settle, and what became of it here.
 #[derive(Clone, Debug, Serialize)]
 pub struct PeerCase {
@@ -333,18 +283,6 @@ pub fn write(folder: &Path, options: &SettleReportOptions, progress: impl Fn(u64
     io::write_text(folder.join("settle.md"), &table(&rows).markdown())?;
     io::write_text(folder.join("settle.svg"), &Chart::row(&charts(&rows)))?;
     Ok(rows)
-}
-
-/// Writes the ends of extreme scenes (`stability.csv`, `.md`) into a folder.
-///
-/// # Errors
-/// Files that cannot be written.
-pub fn write_stability(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<ExtremeEnd>> {
-    let ends = stability(progress)?;
-    io::create_folder(folder)?;
-    io::write_text(folder.join("stability.csv"), &stability_table(&ends).csv())?;
-    io::write_text(folder.join("stability.md"), &stability_table(&ends).markdown())?;
-    Ok(ends)
 }
 
 #[cfg(test)]

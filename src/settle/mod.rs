@@ -10,7 +10,7 @@
 //! and a bad end is tried again from other heights. Same scene, same bits: on every machine, at any thread count.
 
 mod columns;
-mod extremes;
+mod heap;
 mod level;
 mod overlap;
 mod preview;
@@ -18,10 +18,10 @@ mod trace;
 mod world;
 
 pub use crate::scene::{SettleMode, SettleOptions};
-pub(crate) use extremes::heap;
-pub use extremes::{Extreme, ExtremeEnd, Promise, extremes};
+pub(crate) use heap::{heap, octagon};
 pub use preview::preview;
 pub use trace::{Sample, csv as trace_csv};
+pub(crate) use world::typical_length;
 
 use crate::error::{Error, Result};
 use crate::geom::Pose;
@@ -370,7 +370,7 @@ mod tests {
     fn prisms_lie_closer_than_their_boxes_and_rest() {
         for k in 0..4 {
             let mut scene = dropped(k, 10);
-            scene.objects.iter_mut().for_each(|object| object.outline = extremes::octagon(object.size));
+            scene.objects.iter_mut().for_each(|object| object.outline = octagon(object.size));
             let rest = settled(scene);
             assert!(rest.energy_rise <= SettleOptions::default().max_energy_rise);
         }

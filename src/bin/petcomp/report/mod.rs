@@ -6,6 +6,7 @@ mod experiments;
 mod matte;
 mod render;
 mod settle;
+mod stability;
 
 use crate::common::Common;
 
@@ -17,8 +18,8 @@ pub(crate) enum Command {
     Camera(camera::Args),
     /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
     Settle(settle::Args),
-    /// How extreme scenes settle: stability.csv and stability.md
-    Stability(settle::StabilityArgs),
+    /// Every stage on stiff and extreme input: stability.csv and stability.md
+    Stability(stability::Args),
     /// Our trainings beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
@@ -32,7 +33,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::All(args) => all::run(args, common),
         Command::Camera(args) => camera::run(args, common),
         Command::Settle(args) => settle::run(args, common),
-        Command::Stability(args) => settle::run_stability(args, common),
+        Command::Stability(args) => stability::run(args, common),
         Command::Experiments(args) => experiments::run(args, common),
         Command::Matte(args) => matte::run(args, common),
         Command::Render(args) => render::run(args, common),

@@ -1,4 +1,4 @@
-//! `petcomp report settle` and `petcomp report stability`.
+//! `petcomp report settle`: the settle stage on heaps and closed forms.
 
 use crate::common::Common;
 use petcomp::io;
@@ -18,13 +18,6 @@ pub(crate) struct Args {
     peers: Option<PathBuf>,
 }
 
-#[derive(clap::Args)]
-pub(crate) struct StabilityArgs {
-    /// Folder to write
-    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
-    output: PathBuf,
-}
-
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(path) = &args.peers {
         return Ok(io::write_document(path, &settle::peer_cases()?)?);
@@ -34,14 +27,5 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         settle::write(&args.output, &SettleReportOptions { heaps: args.heaps }, |done, of| progress.at(done, of))?;
     drop(progress);
     common.say(format_args!("{}: settle.csv ({} lines), settle.md and a plot", args.output.display(), rows.len()));
-    Ok(())
-}
-
-pub(crate) fn run_stability(args: &StabilityArgs, common: &Common) -> anyhow::Result<()> {
-    let progress = common.progress("settling");
-    let ends = settle::write_stability(&args.output, |done, of| progress.at(done, of))?;
-    drop(progress);
-    let kept = ends.iter().filter(|end| end.is_as_promised()).count();
-    common.say(format_args!("{}: {kept} of {} as promised", args.output.join("stability.md").display(), ends.len()));
     Ok(())
 }

@@ -1,0 +1,261 @@
+//! Photos that are hard to cut out: each must come out right, or say that it may not have.
+
+use super::bottle::{BLUE, GREEN, Likeness, Take};
+use super::{Case, Outcome, keyer};
+use crate::error::Result;
+use crate::image::Image;
+use crate::matte::{
+    FilmOptions, MatteMethod, PlateOptions, Remark, ScreenPlate, TriangulateOptions, Triangulated, film, triangulate,
+};
+use crate::pixel::{Coverage, LinearRgb};
+use crate::report::matte::{GOOD_BOX_PX, GOOD_IOU};
+
+pub(super) fn cases() -> Result<Vec<Case>> {
+    let mut cases = keyer::cases();
+    cases.extend(cut_outs());
+    cases.extend(refusals());
+    cases.extend(films());
+    cases.extend(two_screens());
+    Ok(cases)
+}
+
+/// What is promised of a photo.
+#[derive(Clone, Copy)]
+enum Promise {
+    /// The outline is right and nothing is said against it.
+    Right,
+    /// The outline is right, or doubted, or the photo is refused.
+    RightOrTold,
+    /// This is among the doubts.
+    Doubted(&'static str),
+}
+
+impl Promise {
+    fn told(self) -> String {
+        let right = format!("outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px)");
+        match self {
+            Self::Right => format!("{right} without a doubt"),
+            Self::RightOrTold => format!("{right}, or doubted, or refused; never silently wrong"),
+            Self::Doubted(what) => format!("doubted, by \"{what}\""),
+        }
+    }
+
+    fn is_kept(self, found: &Likeness) -> bool {
+        match self {
+            Self::Right => found.is_right && found.doubts.is_empty(),
+            Self::RightOrTold => found.is_right || !found.doubts.is_empty(),
+            Self::Doubted(what) => found.doubts.iter().any(|doubt| doubt.contains(what)),
+        }
+    }
+}
+
+fn cut_out_of(name: &str, promise: Promise, take: Take) -> Case {
+    let input = format!("a bottle on a screen, {} x {} pixels", take.size.0, take.size.1);
+    Case::new(name, input, promise.told(), move || match (take.cut(), promise) {
+        (Ok((_, found)), _) => {
+            let doubts = if found.doubts.is_empty() { "no doubt".into() } else { found.doubts.join("; ") };
+            let told = format!("IoU {:.4}, box off by {:.2} px, {doubts}", found.iou, found.box_px);
+            Ok(Outcome::new(told, promise.is_kept(&found)))
+        }
+        (Err(error), Promise::RightOrTold) => Ok(Outcome::new(format!("refused: {error}"), true)),
+        (Err(error), _) => Err(error),
+    })
+}
+
+fn cut_outs() -> Vec<Case> {
+    use Promise::{Doubted, Right, RightOrTold};
+    let usual = Take::default;
+    let grey = LinearRgb::new(0.5, 0.52, 0.5);
+    vec![
+        cut_out_of("plain photo, green screen", Right, usual()),
+        cut_out_of("plain photo, blue screen", Right, Take { screen: BLUE, ..usual() }),
+        cut_out_of("grey screen", Right, Take { screen: grey, ..usual() }),
+        opaque_on_grey(Take { screen: grey, ..usual() }),
+        cut_out_of("cap of the screen's hue", RightOrTold, Take { cap: LinearRgb::new(0.02, 0.25, 0.05), ..usual() }),
+        cut_out_of("clipped highlights", Right, Take { exposure: 1.8, ..usual() }),
+        cut_out_of("clipped all over", RightOrTold, Take { exposure: 3.0, ..usual() }),
+        cut_out_of("black photo", RightOrTold, Take { exposure: 0.0, ..usual() }),
+        cut_out_of("noise of 3 %, green screen", RightOrTold, Take { noise: 0.03, ..usual() }),
+        cut_out_of("noise of 3 %, blue screen", RightOrTold, Take { noise: 0.03, screen: BLUE, ..usual() }),
+        cut_out_of("screen uneven by 60 %", Right, Take { uneven: 0.6, ..usual() }),
+        cut_out_of("object over the border", Doubted("left border"), Take { at: vec![[0.2, 0.5]], ..usual() }),
+        cut_out_of("64 x 64 pixels, green screen", RightOrTold, Take { size: (64, 64), ..usual() }),
+        cut_out_of("64 x 64 pixels, blue screen", RightOrTold, Take { size: (64, 64), screen: BLUE, ..usual() }),
+        cut_out_of("12 megapixels", Right, Take { size: (4000, 3000), ..usual() }).long(),
+    ]
+}
+
+fn opaque_on_grey(take: Take) -> Case {
+    Case::new("grey screen tells nothing of film", "the same photo", "an opaque object: the method is the outline", move || {
+        let method = take.cut()?.0.method;
+        Ok(Outcome::new(format!("{method:?}"), method == MatteMethod::Outline))
+    })
+}
+
+fn refusals() -> Vec<Case> {
+    let two = Take { at: vec![[0.25, 0.5], [0.75, 0.5]], length: 0.4, ..Take::default() };
+    let empty = |uneven: f32| Take { at: vec![], uneven, ..Take::default() };
+    vec![
+        refused("two objects", "two objects", move || two.taken().0),
+        refused("empty screen", "is there an object", move || empty(0.0).taken().0),
+        refused("empty screen, uneven by 60 %", "is there an object", move || empty(0.6).taken().0),
+        refused("photo of one pixel", "1 x 1 pixels", || Image::filled(1, 1, GREEN)),
+        refused("photo without pixels", "0 x 0 pixels", || Image::new(0, 0)),
+        refused("photo with NaN", "not a finite number", || spoiled(f32::NAN)),
+        refused("photo with infinity", "not a finite number", || spoiled(f32::INFINITY)),
+    ]
+}
+
+fn refused(name: &str, cause: &'static str, photo: impl Fn() -> Image<LinearRgb> + Send + Sync + 'static) -> Case {
+    Case::new(name, "to be cut out", format!("refused, by \"{cause}\""), move || {
+        Ok(Outcome::refused(crate::matte::cut_out(&photo(), &Default::default()), cause))
+    })
+}
+
+/// A plain photo with one bad pixel.
+fn spoiled(value: f32) -> Image<LinearRgb> {
+    let mut photo = Take::default().taken().0;
+    photo[(300, 160)].r = value;
+    photo
+}
+
+const SIZE: (usize, usize) = (160, 100);
+
+/// An ellipse in the middle.
+fn inside() -> Image<Coverage> {
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (u, v) = ((x as f32 - 80.0) / 60.0, (y as f32 - 50.0) / 35.0);
+        Coverage(f32::from(u8::from(u * u + v * v < 1.0)))
+    })
+}
+
+/// Light of a glint and transmittance of folded film at a pixel, inside.
+fn folded(x: usize, y: usize) -> (f32, f32) {
+    let (x, y) = (x as f64, y as f64);
+    let glint = libm::pow(libm::sin(0.17 * x - 0.29 * y), 8.0);
+    ((0.02 + 0.1 * glint) as f32, (0.6 + 0.2 * libm::sin(0.23 * x + 0.011 * y * y)) as f32)
+}
+
+/// Neutral film on a screen of one colour, times an exposure, clipped at 1.
+fn on(screen: LinearRgb, exposure: f32) -> Image<LinearRgb> {
+    let mask = inside();
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (light, passes) = if mask[(x, y)].0 > 0.0 { folded(x, y) } else { (0.0, 1.0) };
+        screen.map(|k| ((light + passes * k) * exposure).min(1.0))
+    })
+}
+
+fn films() -> Vec<Case> {
+    let film_of = |name: &str, expectation: &str, photo: fn() -> Image<LinearRgb>, screen: LinearRgb| {
+        Case::new(name, "neutral film on an even screen", expectation, move || {
+            let plate = ScreenPlate::even(screen, SIZE);
+            let found = film(&photo(), &plate, &inside(), &FilmOptions::default())?;
+            let sound = found.film.pixels().iter().all(|p| p.is_sound());
+            let told = found.remarks.iter().map(Remark::to_string).collect::<Vec<_>>().join("; ");
+            let mean = found.uncertainty.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>() / inside_area();
+            let told = if told.is_empty() { "nothing said".into() } else { told };
+            Ok(Outcome::new(format!("sound: {sound}, mean uncertainty {mean:.3}, {told}"), sound))
+        })
+    };
+    let sound = "opacity in 0..1, light finite, in every pixel";
+    vec![
+        film_of("film on a black screen", sound, || on(LinearRgb::BLACK, 1.0), LinearRgb::BLACK),
+        film_of("film in a photo clipped all over", sound, || Image::filled(SIZE.0, SIZE.1, LinearRgb::WHITE), GREEN),
+        film_of("film in a black photo", sound, || Image::new(SIZE.0, SIZE.1), GREEN),
+        film_of("film in a photo of 1e-30", sound, || on(GREEN.scale(1e-30), 1.0), GREEN.scale(1e-30)),
+        film_of("film of the screen's own colour", sound, || Image::filled(SIZE.0, SIZE.1, GREEN), GREEN),
+        film_error("film, nothing extreme", 1.0),
+        empty_mask(),
+        no_background(),
+    ]
+}
+
+fn inside_area() -> f64 {
+    inside().pixels().iter().map(|c| f64::from(c.0)).sum()
+}
+
+/// The well-conditioned neighbour of the cases above.
+fn film_error(name: &str, exposure: f32) -> Case {
+    Case::new(name, "neutral film on an even green screen", "mean error of the transmittance at most 0.02", move || {
+        let plate = ScreenPlate::even(GREEN, SIZE);
+        let found = film(&on(GREEN, exposure), &plate, &inside(), &FilmOptions::default())?;
+        Ok(Outcome::at_most(transmittance_error(&found.transmittance), 0.02, ""))
+    })
+}
+
+/// Mean error of the green transmittance inside.
+fn transmittance_error(found: &Image<LinearRgb>) -> f64 {
+    let mask = inside();
+    let pixels = (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))).filter(|&at| mask[at].0 > 0.0);
+    pixels.map(|(x, y)| f64::from((found[(x, y)].g - folded(x, y).1).abs())).sum::<f64>() / inside_area()
+}
+
+fn empty_mask() -> Case {
+    Case::new("film without an object", "a mask of zeros", "refused, by \"mask of the object is empty\"", || {
+        let (plate, nothing) = (ScreenPlate::even(GREEN, SIZE), Image::new(SIZE.0, SIZE.1));
+        let found = film(&on(GREEN, 1.0), &plate, &nothing, &FilmOptions::default());
+        Ok(Outcome::refused(found, "mask of the object is empty"))
+    })
+}
+
+fn no_background() -> Case {
+    Case::new("screen without background", "no pixel of it to fit to", "refused: there is not enough", || {
+        let nowhere = Image::filled(SIZE.0, SIZE.1, false);
+        Ok(Outcome::refused(ScreenPlate::fit(&on(GREEN, 1.0), &nowhere, &PlateOptions::default()), "background"))
+    })
+}
+
+fn triangulated(screens: [LinearRgb; 2], exposure: f32) -> Result<Triangulated> {
+    let photos = screens.map(|screen| on(screen, exposure));
+    let plates = screens.map(|screen| ScreenPlate::even(screen.scale(exposure), SIZE));
+    let shots = [(&photos[0], &plates[0]), (&photos[1], &plates[1])];
+    triangulate(&shots, &inside(), &TriangulateOptions::default())
+}
+
+fn two_screens() -> Vec<Case> {
+    let exact = |name: &str, screens: [LinearRgb; 2]| {
+        let promise = "photo = F + T screen has one solution in green: T to 1e-4 on average";
+        Case::new(name, "neutral film on two even screens, no noise", promise, move || {
+            Ok(Outcome::at_most(transmittance_error(&triangulated(screens, 1.0)?.transmittance), 1e-4, ""))
+        })
+    };
+    let alike = |name: &str, screens: [LinearRgb; 2]| {
+        Case::new(name, "neutral film on both", "refused, by \"too alike\"", move || {
+            Ok(Outcome::refused(triangulated(screens, 1.0), "too alike"))
+        })
+    };
+    vec![
+        exact("two screens, green and blue", [GREEN, BLUE]),
+        exact("two screens, one of them black", [GREEN, LinearRgb::BLACK]),
+        alike("two screens that are the same", [GREEN, GREEN]),
+        alike("two screens, both black", [LinearRgb::BLACK; 2]),
+        saturated(),
+        one_screen(),
+    ]
+}
+
+fn saturated() -> Case {
+    Case::new(
+        "two photos clipped all over",
+        "film on green and blue, 100 times too bright, clipped at 1",
+        "refused, or told: every pixel sound, and the residual or the uncertainty above 0.1",
+        || {
+            let found = match triangulated([GREEN, BLUE], 100.0) {
+                Ok(found) => found,
+                Err(error) => return Ok(Outcome::new(format!("refused: {error}"), true)),
+            };
+            let sound = found.film.pixels().iter().all(|p| p.is_sound());
+            let unsure = found.uncertainty.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>() / inside_area();
+            let told = format!("sound: {sound}, residual {:.3}, uncertainty {unsure:.3}", found.residual);
+            Ok(Outcome::new(told, sound && (found.residual > 0.1 || unsure > 0.1)))
+        },
+    )
+}
+
+fn one_screen() -> Case {
+    Case::new("triangulation from one photo", "film on green", "refused, by \"expected at least 2\"", || {
+        let (photo, plate) = (on(GREEN, 1.0), ScreenPlate::even(GREEN, SIZE));
+        let found = triangulate(&[(&photo, &plate)], &inside(), &TriangulateOptions::default());
+        Ok(Outcome::refused(found, "expected at least 2"))
+    })
+}

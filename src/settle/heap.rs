@@ -1,0 +1,33 @@
+//! Heaps to measure the stage on.
+
+use crate::error::Result;
+use crate::scene::{Background, CameraSource, Choice, Range, Recipe, Scene, Start};
+
+/// Cards of 200 x 70 and 190 x 80 mm, 2 to 11 mm thick, over a surface of 0.6 x 0.4 m: scene `k`.
+pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
+    let tray = Background {
+        name: "tray".into(),
+        size: [0.6, 0.4],
+        camera: CameraSource::Rectangle {
+            corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
+            photo: [60, 40],
+            focal_px: None,
+        },
+    };
+    let choice = |i: usize| Choice {
+        asset: format!("b{i}"),
+        photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
+        photo_outlines: vec![],
+        thickness: 0.002 + 0.001 * (i % 10) as f64,
+        mass: 0.02 + 0.002 * (i % 10) as f64,
+    };
+    let recipe = Recipe { objects: Range::fixed(cards as f64), start: Start::default(), ..Recipe::default() };
+    recipe.scene(0, k, &[tray], &(0..20).map(choice).collect::<Vec<_>>())
+}
+
+/// An octagon that touches the middle half of each side of its card.
+pub(crate) fn octagon([w, h]: [f64; 2]) -> Vec<[f64; 2]> {
+    let (x, y) = (w / 2.0, h / 2.0);
+    let half = [[x, -y / 2.0], [x, y / 2.0], [x / 2.0, y], [-x / 2.0, y]];
+    half.into_iter().chain(half.map(|[a, b]| [-a, -b])).collect()
+}
