@@ -26,6 +26,7 @@ pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;
 pub mod train;
+pub mod work;
 
 pub use camera::Camera;
 pub use error::{Error, Result};

@@ -5,7 +5,8 @@ use petcomp::report::stability::{Case, cases};
 
 fn main() {
     let args = Arguments::from_args();
-    let trials = cases("").unwrap_or_else(|error| panic!("{error}")).into_iter().map(|(stage, case)| trial(stage, case));
+    let trials =
+        cases("").unwrap_or_else(|error| panic!("{error}")).into_iter().map(|(stage, case)| trial(stage, case));
     libtest_mimic::run(&args, trials.collect()).exit();
 }
 

@@ -57,8 +57,17 @@ impl Library {
     /// picture has; [`Error::Field`] (`size_m`) for
     /// one of another size than the manifest says. Of several the first in the manifest's order.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
+        Self::open_some(folder, |_| true)
+    }
+
+    /// The same with no other assets than those whose names are wanted; what the manifest says of others is checked still.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_some(folder: impl AsRef<Path>, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let folder = folder.as_ref();
-        let manifest = Manifest::read(folder)?;
+        let mut manifest = Manifest::read(folder)?;
+        manifest.assets.retain(|asset| wanted(&asset.name));
         let photos: Vec<(usize, usize)> = manifest.assets.iter().enumerate().flat_map(places).collect();
         let load = |&(i, j): &(usize, usize)| {
             let at = format!("assets[{i}].photos[{j}]");

@@ -5,6 +5,7 @@ use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix, PremulRgba};
 use crate::render::DeepImage;
 use crate::scene::{Finish, Noise};
+use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
 /// Radius of what sharpening takes for blur, pixels.
@@ -26,11 +27,13 @@ pub fn finish(
     finish: &Finish,
 ) -> Image<PremulRgba> {
     let frame = match finish.noise {
-        Noise::Known { shot, read } => Sensor { shot, read, seed: finish.noise_seed }.expose(&frame, deep, plate),
-        Noise::None | Noise::MatchPlate => frame,
+        Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => {
+            Sensor { shot, read, seed: finish.noise_seed }.expose(&frame, deep, plate)
+        }
+        Noise::Known { .. } | Noise::None | Noise::MatchPlate => frame,
     };
     let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32);
-    let frame = if gain == LinearRgb::WHITE { frame } else { frame.map(|p| with_color(p, p.color() * gain)) };
+    let frame = if gain == LinearRgb::WHITE { frame } else { balanced(&frame, gain) };
     if finish.sharpening == 0.0 {
         return frame;
     }
@@ -40,6 +43,11 @@ pub fn finish(
         let sharp = p.color().scale(1.0 + amount).add_scaled(-amount, s.color());
         with_color(p, sharp.map(|v| v.max(0.0)))
     })
+}
+
+fn balanced(frame: &Image<PremulRgba>, gain: LinearRgb) -> Image<PremulRgba> {
+    work::add(Kind::Filters, 1);
+    frame.map(|p| with_color(p, p.color() * gain))
 }
 
 fn with_color(p: PremulRgba, LinearRgb { r, g, b }: LinearRgb) -> PremulRgba {
@@ -59,6 +67,7 @@ impl Sensor {
         deep: &DeepImage,
         plate: Option<&Image<LinearRgb>>,
     ) -> Image<PremulRgba> {
+        work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
             let (value, kept, behind): ([f32; 3], [f32; 3], [f32; 3]) = match plate {

@@ -6,6 +6,7 @@ use crate::dataset::times::Times;
 use crate::dataset::{Numbers, Plan, Report};
 use crate::error::{Error, Result};
 use crate::io;
+use crate::work;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -70,8 +71,8 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
     fn work(&self, missing: &[u64]) -> Result<()> {
         let threads = rayon::current_num_threads();
         let workers = threads.min(missing.len());
-        let pool = |_| rayon::ThreadPoolBuilder::new().num_threads(threads / workers.max(1)).build();
-        let pools: std::result::Result<Vec<_>, _> = (0..workers).map(pool).collect();
+        let pool = |_| work::pool(threads / workers.max(1));
+        let pools: std::io::Result<Vec<_>> = (0..workers).map(pool).collect();
         let pools = pools.map_err(|e| Error::value("threads", e))?;
         let next = AtomicUsize::new(0);
         let take = || missing.get(next.fetch_add(1, Ordering::Relaxed)).copied().filter(|_| self.goes_on());

@@ -8,7 +8,7 @@ use crate::dataset::times::timed;
 use crate::dataset::{Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
 use crate::error::{Error, Result};
 use crate::image::Image;
-use crate::label;
+use crate::label::{self, Labels};
 use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self, DeepImage};
@@ -36,7 +36,19 @@ impl Studio {
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
     pub fn open(setup: Setup) -> Result<Self> {
-        let library = Library::open(&setup.assets)?;
+        Self::with_assets(setup, |_| true)
+    }
+
+    /// The same for one scene that is there already: only cut-outs of the assets that it names are read, and known.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
+        Self::with_assets(setup, |name| scene.objects.iter().any(|object| object.asset == name))
+    }
+
+    fn with_assets(setup: Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
+        let library = Library::open_some(&setup.assets, wanted)?;
         let places = Place::all(&setup.backgrounds, setup.scene.image)?;
         let backgrounds = places.iter().map(|place| place.background.clone()).collect();
         let stock = stock(&library);
@@ -135,6 +147,17 @@ impl Studio {
         Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, rejected: vec![], draws: vec![], times })
     }
 
+    /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment is read.
+    ///
+    /// The labels are those of [`take`](Self::take).
+    ///
+    /// # Errors
+    /// As [`take`](Self::take).
+    pub fn label(&self, scene: Scene) -> Result<Labels> {
+        let (_, shot) = self.resolve(scene.unlit())?;
+        Ok(label::label(&render::cover(&shot, &self.setup.render), &shot, &self.setup.labels.options()))
+    }
+
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
         let deep = render::cast(shot, &self.setup.render);
@@ -183,7 +206,8 @@ impl Studio {
 
 /// The picture of the surroundings that a scene names.
 fn panorama(scene: &Scene) -> Result<Option<Arc<Panorama>>> {
-    scene.environment.as_ref().map(|map| Panorama::read(&map.file).map(Arc::new)).transpose()
+    let shining = scene.environment.as_ref().filter(|map| map.shines());
+    shining.map(|map| Panorama::read(&map.file).map(Arc::new)).transpose()
 }
 
 /// One checksum for each photo's cut-out.

@@ -3,6 +3,7 @@
 use super::separable::{Taps, filter};
 use crate::image::Image;
 use crate::pixel::Mix;
+use crate::work::{self, Kind};
 
 /// Standard deviations at which the Gaussian window ends; what lies beyond weighs 6e-5 of the whole.
 const GAUSSIAN_REACH: f64 = 4.0;
@@ -31,6 +32,7 @@ pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
 
 /// Both axes weighted by a function of the distance, out to `reach`.
 fn blur<P: Mix>(image: &Image<P>, reach: usize, weight: impl Fn(isize) -> f64) -> Image<P> {
+    work::add(Kind::Filters, 1);
     let taps = |len: usize| -> Vec<Taps> {
         let reach = reach.min(len) as isize;
         (0..len as isize).map(|i| Taps::new(i - reach..i + reach + 1, len, |j| weight(j - i))).collect()

@@ -1,6 +1,7 @@
 //! Masks grown and shrunk by a disc.
 
 use crate::image::Image;
+use crate::work::{self, Kind};
 use rayon::prelude::*;
 
 /// The mask grown by `radius_px`: every pixel whose centre is at most that far from the centre of a set pixel.
@@ -17,6 +18,7 @@ pub fn dilate(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
     if radius_px.is_nan() || radius_px < 1.0 {
         return mask.clone();
     }
+    work::add(Kind::Filters, 1);
     let reach = reach_by_distance(mask, radius_px);
     let distances = vertical_distances(mask);
     let mut out = Image::new(mask.width(), mask.height());

@@ -3,6 +3,7 @@
 use super::separable::{Taps, filter};
 use crate::image::Image;
 use crate::pixel::Mix;
+use crate::work::{self, Kind};
 use std::sync::OnceLock;
 
 /// A picture at half the size, and half of that, down to one pixel; levels are made when they are first asked for.
@@ -40,13 +41,21 @@ impl<P: Mix> Pyramid<P> {
         }
         // Halved before the cell is locked: the work is parallel, and a thread that waits for its parts may be handed
         // a task that asks for this very level.
-        let half = halve(self.level(n));
-        self.halves[n].get_or_init(|| half)
+        let half = halved(self.level(n));
+        self.halves[n].get_or_init(|| {
+            work::add(Kind::Levels, 1);
+            half
+        })
     }
 }
 
 /// A picture of half the size, each pixel the mean of the (up to) four it covers; odd sizes round up.
 pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
+    work::add(Kind::Filters, 1);
+    halved(image)
+}
+
+fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
     let taps = |len: usize| lines(len.div_ceil(2), |i| Taps::new(2 * i..2 * i + 2, len, |_| 1.0));
     filter(image, &taps(image.width()), &taps(image.height()))
 }
@@ -61,6 +70,7 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 ///
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
+    work::add(Kind::Filters, 1);
     let taps = |len: usize| lines(len.div_ceil(2), |i| Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i)));
     filter(image, &taps(image.width()), &taps(image.height()))
 }
@@ -79,6 +89,7 @@ pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
 pub fn expand<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P> {
     let half = (width.div_ceil(2), height.div_ceil(2));
     assert_eq!(image.size(), half, "not half of {width} x {height}");
+    work::add(Kind::Filters, 1);
     let taps = |from, to| lines(to, |i| Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i)));
     filter(image, &taps(half.0, width), &taps(half.1, height))
 }

@@ -1,6 +1,7 @@
 //! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
 
 use super::format::reason;
+use crate::work::{self, Kind};
 use crate::{Error, Result};
 use std::fs::Permissions;
 use std::io::{BufWriter, Write};
@@ -8,6 +9,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// Writes a file in one step: readers see the old one or the new one, never a part.
 pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    work::add(Kind::BytesWritten, bytes.len() as u64);
     write_through(path, |file| file.write_all(bytes))
 }
 

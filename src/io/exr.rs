@@ -9,6 +9,7 @@ use super::limits::{Demand, Limits, at_most};
 use super::raster::{Raster, Refusal, Samples, Wanted};
 use super::{Compression, Format, ReadOptions, Source, Window};
 use crate::color::{ColorMatrix, RgbSpace, rgb_from_rgb};
+use crate::work::{self, Kind};
 use crate::{Error, Result};
 use exr::meta::attribute::Chromaticities;
 use exr::prelude::{
@@ -57,6 +58,7 @@ pub fn write_channels(
 ) -> Result<()> {
     let path = path.as_ref();
     let planes = channels.iter().map(|&(name, samples)| (name, FlatSamples::F32(samples.to_vec()))).collect();
+    work::add(Kind::Encodes, 1);
     let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
 }
@@ -73,6 +75,7 @@ pub fn write_half_channels(
 ) -> Result<()> {
     let path = path.as_ref();
     let planes = channels.iter().map(|&(name, samples)| (name, halves(samples))).collect();
+    work::add(Kind::Encodes, 1);
     let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
 }

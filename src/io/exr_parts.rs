@@ -2,6 +2,7 @@
 
 use super::atomic::write_bytes;
 use super::exr::sort_attributes;
+use crate::work::{self, Kind};
 use crate::{Error, Result};
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
@@ -47,6 +48,7 @@ impl Plane {
 /// written.
 pub fn write_parts(path: impl AsRef<Path>, size: (usize, usize), parts: &[Part]) -> Result<()> {
     let path = path.as_ref();
+    work::add(Kind::Encodes, 1);
     let bytes = encode(size, parts).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
 }

@@ -1,6 +1,7 @@
 //! Which kind of file it is, by its first bytes, and how it is opened.
 
 use super::limits::{Limits, affordable, at_most};
+use crate::work::{self, Kind};
 use crate::{Error, Result};
 use std::fs::{File, Metadata};
 use std::io::{BufRead, BufReader, Read};
@@ -164,6 +165,7 @@ fn all_of(file: impl Read, told: u64, most: u64) -> std::result::Result<Vec<u8>,
     affordable(told)?;
     let mut bytes = Vec::with_capacity(usize::try_from(told).unwrap_or(0));
     file.take(most).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    work::add_all([(Kind::FilesRead, 1), (Kind::BytesRead, bytes.len() as u64)]);
     Ok(bytes)
 }
 

@@ -3,6 +3,7 @@
 use super::atomic::write_bytes;
 use super::{Format, exr, jpeg, png, tiff};
 use crate::color::{decode_srgb8, encode_srgb8, encode_srgb16};
+use crate::work::{self, Kind};
 use crate::{Coverage, Depth, Error, Film, Image, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba};
 use rayon::prelude::*;
 use std::path::Path;
@@ -326,6 +327,7 @@ fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> s
     if image.is_empty() {
         return Err(format!("{} x {} pixels, expected at least 1 x 1", image.width(), image.height()));
     }
+    work::add(Kind::Encodes, 1);
     let format = Format::of_extension(path);
     match (format, stored_as::<P>(format, options.bits)?) {
         (Some(Format::Exr), bits) => encode_exr(image, bits, options),

@@ -4,6 +4,7 @@ use crate::label::mask::Bits;
 use crate::label::{LabelOptions, Mask};
 use crate::pixel::ObjectId;
 use crate::render::{DeepImage, DeepSample};
+use crate::work::{self, Kind};
 use serde::{Deserialize, Serialize};
 
 /// What the deep samples tell of one object.
@@ -79,13 +80,16 @@ impl Tally {
 pub(crate) fn fold(deep: &DeepImage, ids: &[ObjectId], options: &LabelOptions) -> Vec<Seen> {
     let size = [deep.width() as u32, deep.height() as u32];
     let mut tallies: Vec<_> = ids.iter().map(|_| Tally::new(size)).collect();
+    let mut looked_at = 0;
     for y in 0..deep.height() {
         for x in 0..deep.width() {
+            looked_at += deep.at(x, y).len();
             for sample in deep.at(x, y) {
                 let Ok(i) = ids.binary_search(&sample.object) else { continue };
                 tallies[i].add(x, y, sample, options.alpha_threshold);
             }
         }
     }
+    work::add_all([(Kind::LabelSamples, looked_at as u64), (Kind::Masks, 2 * ids.len() as u64)]);
     tallies.into_iter().map(Tally::seen).collect()
 }

@@ -4,6 +4,7 @@ use crate::asset::Piece;
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::scene::{EnvironmentMap, turned};
+use crate::work::{self, Kind};
 
 /// A direction that stands for a piece of the sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +36,7 @@ pub(crate) fn sky_cells(map: &EnvironmentMap, count: usize, normal: &Vector3<f64
 }
 
 fn scaled(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<SkyPiece> {
+    work::add(Kind::MapPieces, pieces.len() as u64);
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
     let seen: Vec<_> = pieces.iter().filter_map(|piece| over(piece, &local)).collect();

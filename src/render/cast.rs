@@ -14,6 +14,7 @@ use crate::render::texture::Baked;
 use crate::render::view::{Seen, Sheet, View, sheets};
 use crate::render::{DeepImage, RenderOptions};
 use crate::scene::{Card, Shot};
+use crate::work::{self, Kind};
 use rayon::prelude::*;
 
 /// Side of the blocks that the picture is put together from, pixels.
@@ -52,12 +53,21 @@ pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let mut lights = maps(&receivers);
 
     let share = lights.pop().flatten();
-    let together = cards.iter().zip(looks).zip(lights);
-    let layers = together.filter_map(|(((card, _), look), light)| Some(look?.layer(card, light?))).collect();
+    let together = cards.iter().zip(looks).zip(receivers.iter().zip(lights));
+    let seen = together.filter_map(|(((card, _), look), (lit, light))| Some((card, lit.as_ref().and(look)?, light)));
+    let layers = seen.map(|(card, look, light)| look.layer(card, light)).collect();
     let ground = Ground { seen: Seen::of(&studio.casters.surface, &view), share };
     let stack =
         Stack { layers, ground, samples: samples(&view, &fine, offsets, &options), exposure: shot.exposure, tinted };
     assemble(&view, &tiles(&view).into_par_iter().map(|tile| stack.paint(tile)).collect::<Vec<_>>())
+}
+
+/// The same in the dark: what objects cover and hide, and how far away they are, without any light.
+///
+/// All that labels are made from, at a part of the price; bit for bit what [`cast`] says of it.
+pub fn cover(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    let dark = Shot { lights: Vec::new(), ambient: LinearRgb::BLACK, environment: None, plate: None, ..shot.clone() };
+    cast(&dark, options)
 }
 
 /// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
@@ -83,13 +93,14 @@ impl Look {
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
+        work::add(Kind::Bakes, 1);
         let (seen, texture) = side(card, sheet, seen, view);
         let texture = Baked::new(texture, &card.grade, level(texture, sheet, &seen, view, offsets));
         let (rows, columns) = rows_and_columns(sheet, texture.grid.reach, view);
         Some(Self { seen, texture, columns, rows })
     }
 
-    fn layer(self, card: &Card, light: Map) -> Layer {
+    fn layer(self, card: &Card, light: Option<Map>) -> Layer {
         let Self { seen, texture, columns, rows } = self;
         let sides = sides(&seen.u, &seen.v, &seen.w, texture.grid.reach);
         Layer { id: card.id, seen, texture, light, sides, columns, rows }

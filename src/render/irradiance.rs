@@ -19,12 +19,13 @@ pub(super) struct Map {
 
 /// The maps of all receivers, computed in parallel in bands of rows; the same bits for any number of threads.
 ///
-/// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number.
+/// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number. None in the dark.
 pub(super) fn maps(receivers: &[Option<Lit>]) -> Vec<Option<Map>> {
-    let mut soft: Vec<_> = receivers.iter().map(|r| r.as_ref().map(|r| Map::of(&r.coarse, Four::ZERO))).collect();
+    let lit = || receivers.iter().map(|r| r.as_ref().filter(|r| !r.is_dark()));
+    let mut soft: Vec<_> = lit().map(|r| r.map(|r| Map::of(&r.coarse, Four::ZERO))).collect();
     fill(receivers, &mut soft, |lit, _| &lit.coarse, |lit, _, j, out, buffers| hidden(&lit.coarse, j, out, buffers));
     let empty = |lit: &Lit| if lit.relative { Four::ONE } else { Four::ZERO };
-    let mut maps: Vec<_> = receivers.iter().map(|r| r.as_ref().map(|r| Map::of(&r.fine, empty(r)))).collect();
+    let mut maps: Vec<_> = lit().map(|r| r.map(|r| Map::of(&r.fine, empty(r)))).collect();
     let with_soft = |lit: &Lit, k: usize, j: usize, out: &mut [Four], buffers: &mut Buffers| {
         if let Some(soft) = &soft[k] {
             whole_row(lit, soft, j, out, buffers);

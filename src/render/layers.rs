@@ -14,6 +14,7 @@ use crate::render::lattice::Place;
 use crate::render::texture::{Baked, Linear, mean};
 use crate::render::through::{LayerRow, Through};
 use crate::render::view::Seen;
+use crate::work::{self, Kind};
 use std::f32::consts::PI;
 use std::ops::Range;
 
@@ -26,8 +27,8 @@ pub(super) struct Layer {
     pub(super) seen: Seen,
     /// Its colours.
     pub(super) texture: Baked,
-    /// Light on it.
-    pub(super) light: Map,
+    /// Light on it; none in the dark.
+    pub(super) light: Option<Map>,
     /// Where it ends, its texture's soft border included.
     pub(super) sides: [Vector3<f64>; 5],
     /// Pixels it may touch.
@@ -175,6 +176,7 @@ impl Stack {
         }
         let through = self.walk(part, &layers, painting);
         if let Some(shadow) = shadow {
+            work::add(Kind::ShadowedPixels, part.len() as u64);
             self.shade_ground(whole, part, &through, shadow);
         }
     }
@@ -193,9 +195,10 @@ impl Stack {
             let layer = &self.layers[k];
             for y in overlap(&block.y, &layer.rows) {
                 self.walk_row(layer, block, y, &mut through, &mut row);
-                self.keep(layer, block, y, &row, out);
+                self.keep(layer, block, y, &mut row, out);
             }
         }
+        work::add_all(row.counts(self.tinted));
         through
     }
 
@@ -212,27 +215,31 @@ impl Stack {
                     continue;
                 }
                 row.touched = join(&row.touched, &pixels);
-                if self.samples.each {
+                if let (true, Some(light)) = (self.samples.each, &layer.light) {
                     let place = |i: usize| self.samples.columns[(block.x.start + i) * r + sx];
-                    row.light_between(layer, pixels.clone(), place, self.samples.rows[y * r + sy]);
+                    row.light_between(light, pixels.clone(), place, self.samples.rows[y * r + sy]);
                 }
                 let at = line.at(0.5 + *offset_x as f32 + pixels.start as f32);
                 let plane = sy * r + sx;
+                row.read += pixels.len();
                 through.pass(layer, &at, plane, y - block.y.start, pixels, row);
             }
         }
     }
 
     /// Keeps what a row's pixels got from a layer.
-    fn keep(&self, layer: &Layer, block: &Block, y: usize, row: &LayerRow, out: &mut Painting) {
+    fn keep(&self, layer: &Layer, block: &Block, y: usize, row: &mut LayerRow, out: &mut Painting) {
         let r = self.samples.offsets.len();
         let weight = 1.0 / (r * r) as f32;
         for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
             let x = block.x.start + i;
-            let light = match self.samples.each {
-                true => row.light[i],
-                false if row.light[i].alpha() > 0.0 => row.light[i].times(self.light_at(layer, x, y)),
-                false => row.light[i],
+            let light = match &layer.light {
+                Some(map) if !self.samples.each && row.light[i].alpha() > 0.0 => {
+                    row.lit += 1;
+                    row.light[i].times(self.light_at(map, x, y))
+                }
+                Some(_) => row.light[i],
+                None => Four([0.0, 0.0, 0.0, row.light[i].alpha()]),
             };
             let hidden = if self.tinted { row.hidden[i].rgb() } else { LinearRgb::grey(row.light[i].alpha()) };
             let (sample, tint) = self.sample(layer, [x, y], light, row.alpha[i] * weight, hidden.scale(weight));
@@ -245,8 +252,8 @@ impl Stack {
 
     /// Irradiance in the middle of a pixel.
     #[inline(always)]
-    fn light_at(&self, layer: &Layer, x: usize, y: usize) -> Four {
-        layer.light.at(self.samples.columns[x], self.samples.rows[y])
+    fn light_at(&self, light: &Map, x: usize, y: usize) -> Four {
+        light.at(self.samples.columns[x], self.samples.rows[y])
     }
 
     fn sample(

@@ -32,7 +32,7 @@ mod texture;
 mod through;
 mod view;
 
-pub use cast::cast;
+pub use cast::{cast, cover};
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{id_of, murmur3};

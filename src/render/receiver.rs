@@ -9,10 +9,11 @@ use crate::render::RenderOptions;
 use crate::render::four::Four;
 use crate::render::half_plane::{grown, sides, span, whole};
 use crate::render::lattice::Lattice;
-use crate::render::shadow::{Beam, Casters, rows_and_columns};
+use crate::render::shadow::{Beam, Casters, Readings, rows_and_columns};
 use crate::render::source::{Lamp, Lamps};
-use crate::render::view::{HORIZON, Seen};
+use crate::render::view::{HORIZON, Seen, Sheet};
 use crate::scene::Shot;
+use crate::work::{self, Kind};
 use std::ops::Range;
 
 /// One receiver under some of its lamps, on a lattice.
@@ -40,6 +41,13 @@ pub(super) struct Lit {
     pub(super) relative: bool,
 }
 
+impl Lit {
+    /// No lamp shines on it.
+    pub(super) fn is_dark(&self) -> bool {
+        self.fine.lamps.is_empty() && self.coarse.lamps.is_empty()
+    }
+}
+
 /// What receivers are made from.
 pub(super) struct Studio<'a> {
     pub(super) fine: Lattice,
@@ -50,20 +58,21 @@ pub(super) struct Studio<'a> {
 }
 
 impl Studio<'_> {
+    /// What lights a sheet on the side of the eye; none where it is seen edge-on. The normal is that of every lattice.
+    fn lamps(&self, sheet: &Sheet) -> Option<Lamps> {
+        let seen = Seen::of(sheet, &self.fine.view)?;
+        Some(Lamps::of(self.shot, &self.options, &seen.normal))
+    }
+
     /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.
     pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<Lit> {
-        let fine = self.card_on(&self.fine, own, reach, |lamps| &lamps.faces)?;
-        let coarse = self.card_on(&self.coarse, own, reach, |lamps| &lamps.sky)?;
+        let lamps = self.lamps(&self.casters.cards[own].sheet)?;
+        let fine = self.card_on(&self.fine, own, reach, &lamps, &lamps.faces)?;
+        let coarse = self.card_on(&self.coarse, own, reach, &lamps, &lamps.sky)?;
         Some(Lit { fine, coarse, relative: false })
     }
 
-    fn card_on(
-        &self,
-        lattice: &Lattice,
-        own: usize,
-        reach: [f64; 2],
-        some: impl Fn(&Lamps) -> &[Lamp],
-    ) -> Option<Receiver> {
+    fn card_on(&self, lattice: &Lattice, own: usize, reach: [f64; 2], all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
         let sheet = &self.casters.cards[own].sheet;
         let seen = Seen::of(sheet, &lattice.view)?;
         let (rows, columns) = rows_and_columns(sheet, reach, &lattice.view);
@@ -73,13 +82,14 @@ impl Studio<'_> {
         // Two nodes, for the finer lattice's one that lies between them.
         let outline = sides(&seen.u, &seen.v, &seen.w, reach).iter().map(|s| grown(s, 2.0)).collect();
         let cell = seen.cell_metres(&lattice.view, &sheet.center);
-        Some(self.receiver(lattice, seen, Some(own), cell, some).within(outline, rows, columns))
+        Some(self.receiver(lattice, seen, Some(own), cell, (all, some)).within(outline, rows, columns))
     }
 
     /// The surface; asked for where a shadow may fall on it. None where there is no shadow, or none to be seen.
     pub(super) fn surface(&self) -> Option<Lit> {
-        let fine = self.surface_on(&self.fine, |lamps| &lamps.faces)?;
-        let coarse = self.surface_on(&self.coarse, |lamps| &lamps.sky)?;
+        let lamps = self.lamps(&self.casters.surface)?;
+        let fine = self.surface_on(&self.fine, &lamps, &lamps.faces)?;
+        let coarse = self.surface_on(&self.coarse, &lamps, &lamps.sky)?;
         let doubled = |r: &Range<usize>| if r.is_empty() { 0..0 } else { (2 * r.start).saturating_sub(2)..2 * r.end };
         let view = &self.fine.view;
         let rows = cut(union(fine.rows.clone(), doubled(&coarse.rows)), view.height);
@@ -88,10 +98,10 @@ impl Studio<'_> {
         seen.then_some(Lit { fine: Receiver { rows, columns, ..fine }, coarse, relative: true })
     }
 
-    fn surface_on(&self, lattice: &Lattice, some: impl Fn(&Lamps) -> &[Lamp]) -> Option<Receiver> {
+    fn surface_on(&self, lattice: &Lattice, all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
         let seen = Seen::of(&self.casters.surface, &lattice.view).filter(|s| s.normal.z > 0.0)?;
         let cell = seen.cell_metres(&lattice.view, &Vector3::zeros());
-        let receiver = self.receiver(lattice, seen, None, cell, some);
+        let receiver = self.receiver(lattice, seen, None, cell, (all, some));
         let blockers = receiver.lamps.iter().flat_map(|(_, beams)| beams).flat_map(|b| &b.blockers);
         let areas = blockers.map(|b| (b.rows.clone(), b.columns.clone()));
         let (rows, columns) = areas.reduce(|a, b| (union(a.0, b.0), union(a.1, b.1))).unwrap_or((0..0, 0..0));
@@ -104,12 +114,11 @@ impl Studio<'_> {
         seen: Seen,
         own: Option<usize>,
         cell: f64,
-        some: impl Fn(&Lamps) -> &[Lamp],
+        (all, some): (&Lamps, &[Lamp]),
     ) -> Receiver {
-        let all = Lamps::of(self.shot, &self.options, &seen.normal);
         let beams = |lamp: &Lamp| (lamp.radiance, self.casters.beams(&seen, &lattice.view, lamp, own, cell));
         Receiver {
-            lamps: some(&all).iter().map(beams).collect(),
+            lamps: some.iter().map(beams).collect(),
             channels: if self.casters.tinted { 3 } else { 1 },
             rest: all.open_sky(),
             seen,
@@ -151,6 +160,26 @@ pub(super) struct Buffers {
     pub(super) hidden: Vec<Four>,
     /// A row of hidden irradiance of the coarser lattice.
     pub(super) coarse: Vec<Four>,
+    rays: Rays,
+}
+
+/// What one row took.
+#[derive(Default)]
+struct Rays {
+    light: usize,
+    shadow: usize,
+    through: Readings,
+}
+
+impl Rays {
+    fn counts(self) -> [(Kind, u64); 4] {
+        [
+            (Kind::LightSamples, self.light as u64),
+            (Kind::ShadowRays, self.shadow as u64),
+            (Kind::Transmittances, self.through.see_through as u64),
+            (Kind::OpaqueEdges, self.through.edges as u64),
+        ]
+    }
 }
 
 impl Receiver {
@@ -170,11 +199,12 @@ impl Receiver {
         let LinearRgb { r, g, b } = self.rest;
         refill(&mut buffers.open, n, Four([r, g, b, 0.0]));
         refill(&mut buffers.hidden, n, Four::ZERO);
-        if !self.lamps.is_empty() {
+        if self.lamps.iter().flat_map(|(_, beams)| beams).any(Beam::is_face) {
             self.positions(j, asked, &mut buffers.position);
         }
         for (radiance, beams) in &self.lamps {
-            refill(&mut buffers.lamp, n, 0.0);
+            let is_face = beams.iter().any(Beam::is_face);
+            refill(&mut buffers.lamp, if is_face { n } else { 0 }, 0.0);
             buffers.lost.iter_mut().take(self.channels).for_each(|lost| refill(lost, n, 0.0));
             let touched = beams.iter().map(|beam| self.beam(beam, j, asked, buffers)).reduce(union);
             add_lamp(&mut buffers.open, &buffers.lamp, (*radiance).into());
@@ -183,25 +213,34 @@ impl Receiver {
                 add_lost(&mut buffers.hidden[touched.clone()], [lost(0), lost(1), lost(2)], *radiance);
             }
         }
+        work::add_all(std::mem::take(&mut buffers.rays).counts());
     }
 
     /// Adds up a beam; tells the nodes (counted from the first that is asked for) where something is in its way.
     fn beam(&self, beam: &Beam, j: usize, asked: &Range<usize>, buffers: &mut Buffers) -> Range<usize> {
-        let Buffers { position, strength, lamp, through, lost, touched, .. } = buffers;
+        let Buffers { position, strength, lamp, through, lost, touched, rays, .. } = buffers;
         strength.resize(asked.len(), 0.0);
-        beam.strength().fill([&position[0], &position[1], &position[2]], strength);
-        lamp.iter_mut().zip(&*strength).for_each(|(sum, e)| *sum += e);
+        // What the sky gives in the open is in `rest`.
+        if beam.is_face() {
+            beam.strength().fill([&position[0], &position[1], &position[2]], strength);
+            lamp.iter_mut().zip(&*strength).for_each(|(sum, e)| *sum += e);
+            rays.light += asked.len();
+        }
         touched.clear();
         let nodes = beam.blockers.iter().map(|b| b.nodes(j, asked)).enumerate();
         touched.extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
         let Some(all) = touched.iter().map(|(_, nodes)| nodes.clone()).reduce(union) else { return 0..0 };
         let here = all.start - asked.start..all.end - asked.start;
+        if !beam.is_face() {
+            beam.strength().fill([&[]; 3], &mut strength[here.clone()]);
+        }
+        rays.shadow += all.len();
         for channel in 0..self.channels {
             let through = &mut through[channel];
             refill(through, all.len(), 1.0);
             for (k, nodes) in touched.iter() {
                 let through = &mut through[nodes.start - all.start..nodes.end - all.start];
-                beam.blockers[*k].darken(channel, j, nodes, through);
+                rays.through += beam.blockers[*k].darken(channel, j, nodes, through);
             }
             lose(&mut lost[channel][here.clone()], &strength[here.clone()], through);
         }

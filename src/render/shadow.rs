@@ -3,10 +3,11 @@
 use crate::asset::Texture;
 use crate::geom::Vector3;
 use crate::render::half_plane::{sides, span, whole};
-use crate::render::source::{Kind, Lamp, Source};
+use crate::render::source::{self, Lamp, Source};
 use crate::render::texture::Shade;
 use crate::render::view::{Seen, Sheet, View, texture_rows};
 use crate::scene::{Card, Grade};
+use crate::work::{self, Kind};
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -71,6 +72,24 @@ pub(super) struct Blocker {
     v: Vector3<f64>,
     w: Vector3<f64>,
     shade: Option<Arc<Shade>>,
+    /// Where nothing gets through an opaque texture, whatever is read of it; none for one that is see-through.
+    inside: Option<[Vector3<f64>; 5]>,
+}
+
+/// Texels read, bilinearly, to know what gets through.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Readings {
+    /// Of see-through cards.
+    pub(super) see_through: usize,
+    /// Of opaque ones, along their edges.
+    pub(super) edges: usize,
+}
+
+impl std::ops::AddAssign for Readings {
+    fn add_assign(&mut self, other: Self) {
+        self.see_through += other.see_through;
+        self.edges += other.edges;
+    }
 }
 
 /// Rows and columns of the lattice (or pixels of a picture) that a sheet is seen in, one more on each side.
@@ -162,7 +181,11 @@ impl<'a> Shades<'a> {
         }
         // Made outside of the lock: a pyramid may halve in parallel, and whoever waits may come back here.
         let shade = Arc::new(Shade::new(self.texture, &self.grade, level));
-        self.levels[level].get_or_init(|| shade).clone()
+        let keep = || {
+            work::add(Kind::Bakes, 1);
+            shade
+        };
+        self.levels[level].get_or_init(keep).clone()
     }
 }
 
@@ -208,8 +231,9 @@ impl Shadow<'_> {
         // Below the card, seen from the source; w is positive there.
         sides[4] = below;
         sides.push(*depth);
+        let inside = shade.inset().map(|inset| self::sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = shade.grid.rows(&u, &v, &w);
-        Some(Blocker { rows, columns, sides, u, v, w, shade: Some(shade) })
+        Some(Blocker { rows, columns, sides, u, v, w, shade: Some(shade), inside })
     }
 
     /// How far the piece of light that a source stands for smears a card's shadow, metres on the card, as the side of a
@@ -246,6 +270,7 @@ impl Shadow<'_> {
             v: zero,
             w: zero,
             shade: None,
+            inside: None,
         }
     }
 
@@ -276,12 +301,25 @@ impl Blocker {
         whole(low, high, within)
     }
 
-    /// Multiplies what gets through to these nodes of a row, in one channel.
-    pub(super) fn darken(&self, channel: usize, j: usize, nodes: &Range<usize>, through: &mut [f32]) {
-        let Some(shade) = &self.shade else { return through.fill(0.0) };
+    /// Multiplies what gets through to these nodes of a row, in one channel; tells what had to be read for it.
+    pub(super) fn darken(&self, channel: usize, j: usize, nodes: &Range<usize>, through: &mut [f32]) -> Readings {
+        let Some(shade) = &self.shade else {
+            through.fill(0.0);
+            return Readings::default();
+        };
         let first = Vector3::new(nodes.start as f64, j as f64, 1.0);
         let line = [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32));
-        shade.darken(channel, &line, through);
+        let Some(inside) = &self.inside else {
+            shade.darken(channel, &line, 0, through);
+            return Readings { see_through: nodes.len(), edges: 0 };
+        };
+        let (low, high) = span(inside, j as f64);
+        let dark = whole(low, high, nodes);
+        let dark = dark.start - nodes.start..dark.end - nodes.start;
+        through[dark.clone()].fill(0.0);
+        shade.darken(channel, &line, 0, &mut through[..dark.start]);
+        shade.darken(channel, &line, dark.end, &mut through[dark.end..]);
+        Readings { see_through: 0, edges: nodes.len() - dark.len() }
     }
 }
 
@@ -302,12 +340,17 @@ pub(super) enum Strength {
 }
 
 impl Beam {
+    /// It comes from an area light, not from the sky.
+    pub(super) fn is_face(&self) -> bool {
+        matches!(self.source.kind, source::Kind::Face { .. })
+    }
+
     /// For the receiver it was made for.
     pub(super) fn strength(&self) -> Strength {
         match self.source.kind {
-            Kind::Sky { share } => Strength::Even(share as f32),
+            source::Kind::Sky { share } => Strength::Even(share as f32),
             // All points of a plane see a light from the same height.
-            Kind::Face { normal, area } => Strength::Face {
+            source::Kind::Face { normal, area } => Strength::Face {
                 at: self.source.at.xyz().map(|c| c as f32).into(),
                 normal: normal.map(|c| c as f32).into(),
                 scale: (area * self.height) as f32,

@@ -59,8 +59,8 @@ impl Lamps {
     pub(super) fn of(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Self {
         let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
         let ambient = ambient(shot.ambient, options.ambient_samples, normal);
-        let map =
-            shot.environment.iter().flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
+        let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
+        let map = shining.flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
         Self::from_parts(faces, ambient, map)
     }
 

@@ -258,7 +258,12 @@ pub(super) struct Shade {
     height: usize,
     /// One plane of alpha, or one for each channel of film.
     planes: Vec<Vec<f32>>,
+    /// Every texel stops all light.
+    opaque: bool,
 }
+
+/// Positions in single precision are off by less than this, texels.
+const SURELY: f64 = 1.0 / 8.0;
 
 impl Shade {
     /// Opacity of a texture halved `level` times, in a card's own colours.
@@ -284,19 +289,26 @@ impl Shade {
             }
             plane
         };
-        Self { grid, width, height, planes: channels.iter().map(plane).collect() }
+        let planes = channels.iter().map(plane).collect();
+        let opaque = image.pixels().iter().all(|&p| channels.iter().all(|channel| channel(p) == 1.0));
+        Self { grid, width, height, planes, opaque }
     }
 
-    /// Multiplies what gets through, along a line over bordered texels, in one channel.
-    pub(super) fn darken(&self, channel: usize, line: &Linear, through: &mut [f32]) {
+    /// How far inside of its sides an opaque texture is surely read as opaque, as shares of it; none for one that is not.
+    pub(super) fn inset(&self) -> Option<[f64; 2]> {
+        self.opaque.then(|| self.grid.texels.map(|n| (0.5 + SURELY) / n))
+    }
+
+    /// Multiplies what gets through, along a line over bordered texels from its sample `first` on, in one channel.
+    pub(super) fn darken(&self, channel: usize, line: &Linear, first: usize, through: &mut [f32]) {
         let plane = &self.planes[channel.min(self.planes.len() - 1)];
-        darken(plane, (self.width, self.height), line, through);
+        darken(plane, (self.width, self.height), line, first as f32, through);
     }
 }
 
 #[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn darken(opacity: &[f32], size: (usize, usize), line: &Linear, through: &mut [f32]) {
-    let mut first = 0.0;
+fn darken(opacity: &[f32], size: (usize, usize), line: &Linear, first: f32, through: &mut [f32]) {
+    let mut first = first;
     for run in through.chunks_mut(LANES) {
         let cells = Cells::of(line, first, size);
         let mut corners = [[0.0; LANES]; 4];

@@ -3,9 +3,11 @@
 #![expect(clippy::manual_clamp, reason = "takes a number that is none to 0")]
 
 use crate::render::four::Four;
+use crate::render::irradiance::Map;
 use crate::render::lattice::Place;
 use crate::render::layers::{Block, Layer};
 use crate::render::texture::{Baked, Cells, LANES, Linear, mean};
+use crate::work::Kind;
 use std::ops::Range;
 
 /// Transmittance of each sub-sample of a block: a plane for each of the places inside a pixel.
@@ -33,9 +35,23 @@ pub(super) struct LayerRow {
     pub(super) alpha: Vec<f32>,
     /// Light on it at the sub-samples under work, where that is not the pixel's.
     irradiance: Vec<Four>,
+    /// Texture readings, and light looked up, for all rows so far.
+    pub(super) read: usize,
+    /// See `read`.
+    pub(super) lit: usize,
 }
 
 impl LayerRow {
+    /// What all rows took.
+    pub(super) fn counts(&self, tinted: bool) -> [(Kind, u64); 3] {
+        let film = if tinted { self.read } else { 0 };
+        [
+            (Kind::TextureSamples, self.read as u64),
+            (Kind::FilmSamples, film as u64),
+            (Kind::ShadedSamples, self.lit as u64),
+        ]
+    }
+
     /// Empties a row of `n` pixels.
     pub(super) fn start(&mut self, n: usize, tinted: bool) {
         self.touched = 0..0;
@@ -52,13 +68,14 @@ impl LayerRow {
     /// Looks up the light on a layer at one sub-sample of each pixel.
     pub(super) fn light_between(
         &mut self,
-        layer: &Layer,
+        light: &Map,
         pixels: Range<usize>,
         column: impl Fn(usize) -> Place,
         row: Place,
     ) {
         self.irradiance.clear();
-        self.irradiance.extend(pixels.map(|i| layer.light.at(column(i), row)));
+        self.lit += pixels.len();
+        self.irradiance.extend(pixels.map(|i| light.at(column(i), row)));
     }
 }
 

@@ -5,7 +5,9 @@
 //! do; photos with known mattes and other programs' measurements are added where they are.
 
 use super::section::{Document, Section};
-use super::{Diagram, camera, color, encode, keying, label, light, machine, matte, peers, render, settle};
+use super::{
+    Diagram, camera, color, encode, keying, label, light, machine, matte, peers, render, scale, settle, stability, work,
+};
 use crate::error::Result;
 use crate::quality::Quality;
 use std::path::{Path, PathBuf};
@@ -72,28 +74,30 @@ const STAGES: [Measure; 9] = [
     |_, _| encode::diagrams(),
 ];
 
+/// What follows the diagrams, and takes its time.
+const REST: [fn() -> Result<Section>; 3] = [stability_of_stages, paid_for, memory_and_scale];
+
 /// Measures everything; `progress` hears of each step and of how many there are.
 ///
-/// Timings are CPU seconds of one thread. About three minutes on one core, half a minute when it is to be quick.
+/// Times are CPU seconds of one thread. Takes about MINUTES on four cores, a quarter of a minute when it is to be quick, which
+/// leaves out extreme cases, counted work and scale.
 ///
 /// # Errors
-/// An input that cannot be read; a thread or scratch folder that cannot be had.
+/// An input that cannot be read; a thread or scratch folder that cannot be had; memory and scale need Linux's `/proc`.
 pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
-    let (amount, steps) = (options.amount(), STAGES.len() as u64 + 1);
+    let amount = options.amount();
+    let rest = if options.quick { &[][..] } else { &REST };
+    let steps = (STAGES.len() + rest.len()) as u64;
     let mut diagrams = Vec::new();
     for (done, stage) in (0..).zip(STAGES) {
         progress(done, steps);
         diagrams.extend(stage(options, &amount)?);
     }
-    progress(steps - 1, steps);
-    let mut sections = vec![
-        about(options),
-        curves(&diagrams),
-        qualities(),
-        beside_others(&peers::read(&options.peers)?, &options.peers),
-    ];
-    if !options.quick {
-        sections.push(stability()?);
+    let others = peers::read(&options.peers)?;
+    let mut sections = vec![about(options), curves(&diagrams), qualities(), beside_others(&others, &options.peers)];
+    for (done, section) in (STAGES.len() as u64..).zip(rest) {
+        progress(done, steps);
+        sections.push(section()?);
     }
     progress(steps, steps);
     Ok(Document { title: "petcomp: what it does, how well, and at what cost".into(), sections })
@@ -111,7 +115,7 @@ pub fn write(folder: &Path, options: &AllOptions, progress: impl Fn(u64, u64)) -
 
 fn about(options: &AllOptions) -> Section {
     let quick = if options.quick {
-        " It was made in a hurry (`--quick`): times are of few runs, and extreme cases are left out."
+        " It was made in a hurry (`--quick`): times are of few runs; extreme cases, counted work and scale are left out."
     } else {
         ""
     };
@@ -162,10 +166,41 @@ fn beside_others(comparisons: &[peers::Comparison], folder: &Path) -> Section {
         .table("peers_commands", peers::commands(comparisons))
 }
 
-fn stability() -> Result<Section> {
-    let ends = settle::stability(|_, _| ())?;
-    let kept = ends.iter().filter(|end| end.is_as_promised()).count();
+fn stability_of_stages() -> Result<Section> {
+    let rows = stability::measure(|_, _| ())?;
+    let passed = rows.iter().filter(|row| row.outcome.passed).count();
     Ok(Section::new("Stability")
-        .text(format!("{kept} of {} stiff and extreme cases end as promised.", ends.len()))
-        .table("stability", settle::stability_table(&ends)))
+        .text(format!("{passed} of {} stiff and extreme cases come out as they must.", rows.len()))
+        .table("stability_summary", stability::summary(&rows))
+        .table("stability", stability::table(&rows)))
+}
+
+fn paid_for() -> Result<Section> {
+    let rows = work::measure(|_, _| ())?;
+    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    Ok(Section::new("A scene pays for what it uses")
+        .text(format!(
+            "Work, counted and not timed: the same at every run and on every machine. A marked zero is promised; {kept} of {} \
+             scenes keep their promises.",
+            rows.len()
+        ))
+        .table("work", work::table(&rows)))
+}
+
+fn memory_and_scale() -> Result<Section> {
+    let measured = scale::measure(&scale::ScaleOptions::default(), |_, _| ())?;
+    let tables = scale::tables(&measured)?;
+    let data = tables.first().map(|(_, table)| table.clone()).unwrap_or_default();
+    let section = Section::new("Memory and scale");
+    let section = (1..)
+        .zip(scale::charts(&measured)?)
+        .fold(section, |section, (i, (svg, caption))| section.figure(format!("scale_{i}"), svg, caption, data.clone()));
+    Ok(tables.into_iter().fold(section, |section, (title, table)| {
+        section.text(format!("{title}:")).table(format!("scale_{}", file_name(&title)), table)
+    }))
+}
+
+/// A title as a file may be called.
+fn file_name(title: &str) -> String {
+    title.to_lowercase().replace(' ', "_")
 }

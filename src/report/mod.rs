@@ -24,11 +24,15 @@ mod page;
 pub mod peers;
 mod pile;
 pub mod render;
+#[cfg(feature = "settle")]
+pub mod scale;
 mod section;
 #[cfg(feature = "settle")]
 pub mod settle;
 pub mod stability;
 mod table;
+#[cfg(feature = "settle")]
+pub mod work;
 
 pub use chart::{Axis, Chart, Curve};
 pub use diagram::{Diagram, Point, front};

@@ -27,6 +27,11 @@ fn one() -> f64 {
 }
 
 impl Environment {
+    /// It gives light, so its picture is needed.
+    pub fn shines(&self) -> bool {
+        self.strength > 0.0
+    }
+
     /// Fails on the first value that cannot be right.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         let expect = |claim: bool, field: &str, what: String| {

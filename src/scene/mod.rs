@@ -81,6 +81,22 @@ pub struct Scene {
     pub finish: Finish,
 }
 
+impl Scene {
+    /// The same objects before the same camera in the dark, without a plate: what is left where only labels are asked.
+    pub fn unlit(self) -> Self {
+        Self {
+            plate: String::new(),
+            lights: Vec::new(),
+            ambient: LinearRgb::BLACK,
+            environment: None,
+            exposure: Exposure::Ev(0.0),
+            cast: Cast::default(),
+            finish: Finish::default(),
+            ..self
+        }
+    }
+}
+
 /// A labelled rectangle of known size: the plane `z = 0`, centred on the world's origin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

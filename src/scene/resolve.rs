@@ -78,7 +78,7 @@ impl Scene {
     }
 
     fn environment_map(&self, panorama: Option<Arc<Panorama>>) -> Result<Option<EnvironmentMap>> {
-        let Some(named) = &self.environment else { return Ok(None) };
+        let Some(named) = self.environment.as_ref().filter(|named| named.shines()) else { return Ok(None) };
         let missing =
             || Error::value("environment.file", format!("\"{}\", but its picture is not at hand", named.file));
         let panorama = panorama.ok_or_else(missing)?;

@@ -1,6 +1,7 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
 use crate::common::{Common, RecipeArgs};
+use petcomp::dataset::Studio;
 use petcomp::{Scene, io, label};
 use std::path::PathBuf;
 
@@ -20,13 +21,17 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
-    let studio = args.recipe.studio()?;
-    let sample = studio.take(scene).map_err(|e| e.in_file(&args.scene))?;
-    io::write_json(&args.output, &sample.labels)?;
-    if let Some(path) = &args.overlay {
-        io::write(path, &label::overlay(&sample.frame, &sample.labels, &studio.library().classes))?;
-    }
-    let objects = &sample.labels.objects;
+    let studio = Studio::open_for(args.recipe.setup()?, &scene)?;
+    let labels = match &args.overlay {
+        None => studio.label(scene).map_err(|e| e.in_file(&args.scene))?,
+        Some(path) => {
+            let sample = studio.take(scene).map_err(|e| e.in_file(&args.scene))?;
+            io::write(path, &label::overlay(&sample.frame, &sample.labels, &studio.library().classes))?;
+            sample.labels
+        }
+    };
+    io::write_json(&args.output, &labels)?;
+    let objects = &labels.objects;
     let topmost = objects.iter().filter(|o| o.is_topmost()).count();
     common.say(format_args!("{}: {} objects, {topmost} on top", args.output.display(), objects.len()));
     Ok(())

@@ -1,6 +1,7 @@
 //! The `petcomp` program: reads arguments, calls the library, writes results.
 #![warn(clippy::unwrap_used)]
 
+mod allocator;
 mod asset;
 mod camera;
 mod common;

@@ -36,7 +36,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(quality) = args.quality {
         setup = quality.setup(setup);
     }
-    let studio = petcomp::dataset::Studio::open(setup)?;
+    let studio = petcomp::dataset::Studio::open_for(setup, &scene)?;
     let (scene, shot) = studio.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
     let (deep, frame) = studio.shoot(&scene, &shot);
     match args.aov.as_slice() {

@@ -148,8 +148,7 @@ impl Likeness {
         let box_px = sides.iter().zip(sides_of(mask)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         let iou = count(|a, b| a && b) / count(|a, b| a || b);
         // Pixels of a reduced search are that much larger.
-        let is_right = iou >= GOOD_IOU
-            && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
+        let is_right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
         let doubts = cut.segmentation.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect();
         Self { iou, box_px, is_right, doubts }
     }
@@ -160,6 +159,7 @@ fn sides_of(mask: &Image<bool>) -> [f64; 4] {
     let (w, h) = mask.size();
     let columns = || (0..w).filter(|&x| (0..h).any(|y| mask[(x, y)]));
     let rows = || (0..h).filter(|&y| (0..w).any(|x| mask[(x, y)]));
-    let ends = [columns().next(), rows().next(), columns().next_back().map(|x| x + 1), rows().next_back().map(|y| y + 1)];
+    let ends =
+        [columns().next(), rows().next(), columns().next_back().map(|x| x + 1), rows().next_back().map(|y| y + 1)];
     ends.map(|end| end.unwrap_or(0) as f64)
 }

@@ -95,16 +95,21 @@ fn extreme(name: &str, scenario: Scenario, limit: f64) -> Case {
 }
 
 fn nearly_level() -> Case {
-    Case::new("tilted by 0.01 degrees", format!("exact corners of {VIEWS} views"), "corners met to 1e-6 px, sound numbers", || {
-        let mut worst = 0.0_f64;
-        for k in 0..VIEWS {
-            let view = exact(&Scenario::default().tilted(0.01), k, 0.01);
-            let (free, usual) = (solve(&view.label, &ideal())?, solve(&view.label, &SolveOptions::default())?);
-            let sound = is_sound(&free) && is_sound(&usual);
-            worst = worst.max(if sound { free.rms_px } else { f64::INFINITY });
-        }
-        Ok(Outcome::at_most(worst, 1e-6, "px"))
-    })
+    Case::new(
+        "tilted by 0.01 degrees",
+        format!("exact corners of {VIEWS} views"),
+        "corners met to 1e-6 px, sound numbers",
+        || {
+            let mut worst = 0.0_f64;
+            for k in 0..VIEWS {
+                let view = exact(&Scenario::default().tilted(0.01), k, 0.01);
+                let (free, usual) = (solve(&view.label, &ideal())?, solve(&view.label, &SolveOptions::default())?);
+                let sound = is_sound(&free) && is_sound(&usual);
+                worst = worst.max(if sound { free.rms_px } else { f64::INFINITY });
+            }
+            Ok(Outcome::at_most(worst, 1e-6, "px"))
+        },
+    )
 }
 
 /// A rectangle tilted by 30 degrees as seen from infinitely far.
@@ -126,7 +131,10 @@ fn without_perspective() -> Case {
             let said = free.focal_source == FocalSource::Unbounded
                 && free.warnings.iter().any(|w| matches!(w, Warning::FocalUnbounded { .. }));
             let passed = bound && said && (tilt - 30.0).abs() < 0.1 && is_sound(&free);
-            Ok(Outcome::new(format!("{:.0} px, {tilt:.3} degrees, {:?}", free.camera.focal_px.x, free.focal_source), passed))
+            Ok(Outcome::new(
+                format!("{:.0} px, {tilt:.3} degrees, {:?}", free.camera.focal_px.x, free.focal_source),
+                passed,
+            ))
         },
     )
 }
@@ -161,22 +169,26 @@ fn inverse_perspective() -> Case {
 }
 
 /// Orders of the four corners that begin at the first: it names the width.
-const ORDERS: [[usize; 4]; 6] =
-    [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3], [0, 2, 3, 1], [0, 3, 1, 2], [0, 3, 2, 1]];
+const ORDERS: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3], [0, 2, 3, 1], [0, 3, 1, 2], [0, 3, 2, 1]];
 
 fn order() -> Case {
-    Case::new("corners in any order", "the same four corners, criss-cross and the other way round", "one camera: centres 1e-9 m apart", || {
-        let view = Scenario::realistic().tilted(25.0).view(1, 4);
-        let Some(corners) = view.label.surface.corners_px else { return Ok(Outcome::new("no corners", false)) };
-        let first = solve(&view.label, &SolveOptions::default())?.camera.center();
-        let mut apart = 0.0_f64;
-        for order in ORDERS {
-            let mut label = view.label.clone();
-            label.surface.corners_px = Some(order.map(|i| corners[i]));
-            apart = apart.max((solve(&label, &SolveOptions::default())?.camera.center() - first).norm());
-        }
-        Ok(Outcome::at_most(apart, 1e-9, "m"))
-    })
+    Case::new(
+        "corners in any order",
+        "the same four corners, criss-cross and the other way round",
+        "one camera: centres 1e-9 m apart",
+        || {
+            let view = Scenario::realistic().tilted(25.0).view(1, 4);
+            let Some(corners) = view.label.surface.corners_px else { return Ok(Outcome::new("no corners", false)) };
+            let first = solve(&view.label, &SolveOptions::default())?.camera.center();
+            let mut apart = 0.0_f64;
+            for order in ORDERS {
+                let mut label = view.label.clone();
+                label.surface.corners_px = Some(order.map(|i| corners[i]));
+                apart = apart.max((solve(&label, &SolveOptions::default())?.camera.center() - first).norm());
+            }
+            Ok(Outcome::at_most(apart, 1e-9, "m"))
+        },
+    )
 }
 
 fn impossible() -> Vec<Case> {
@@ -188,7 +200,11 @@ fn impossible() -> Vec<Case> {
         at("three corners on a line", [[100.0, 100.0], [1100.0, 100.0], [2100.0, 100.0], [1100.0, 900.0]], "line"),
         at("all corners in one point", [[500.0, 500.0]; 4], "apart"),
         at("two corners in one point", [[100.0, 100.0], [100.0, 100.0], [900.0, 900.0], [100.0, 900.0]], "apart"),
-        at("a corner inside the others", [[100.0, 100.0], [2000.0, 100.0], [700.0, 600.0], [100.0, 2000.0]], "not convex"),
+        at(
+            "a corner inside the others",
+            [[100.0, 100.0], [2000.0, 100.0], [700.0, 600.0], [100.0, 2000.0]],
+            "not convex",
+        ),
         at("corner of NaN", [[f64::NAN, 0.0], [900.0, 0.0], [900.0, 900.0], [0.0, 900.0]], "not finite"),
         refused("no corners", "corners_px is missing", |label| label.surface.corners_px = None),
         refused("picture without pixels", "0 x 3000", |label| label.image.width = 0),

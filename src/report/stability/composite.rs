@@ -43,12 +43,17 @@ fn layers() -> Case {
 }
 
 fn thousands_of_layers() -> Case {
-    Case::new("10 000 pixels of alpha 1/255 over each other", "white", "alpha 1 and light 1, to 1e-4, never above 1", || {
-        let a = 1.0 / 255.0;
-        let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| PremulRgba::new(a, a, a, a).over(behind));
-        let passed = (0.9999..=1.0).contains(&all.a) && (0.9999..=1.0).contains(&all.g);
-        Ok(Outcome::new(format!("alpha {:.7}, light {:.7}", all.a, all.g), passed))
-    })
+    Case::new(
+        "10 000 pixels of alpha 1/255 over each other",
+        "white",
+        "alpha 1 and light 1, to 1e-4, never above 1",
+        || {
+            let a = 1.0 / 255.0;
+            let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| PremulRgba::new(a, a, a, a).over(behind));
+            let passed = (0.9999..=1.0).contains(&all.a) && (0.9999..=1.0).contains(&all.g);
+            Ok(Outcome::new(format!("alpha {:.7}, light {:.7}", all.a, all.g), passed))
+        },
+    )
 }
 
 /// Noise that looks like no constant.
@@ -154,7 +159,8 @@ fn sharpened() -> Case {
         "an amount of 2",
         "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not reach",
         || {
-            let picture = Image::from_fn(33, 33, |x, y| LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque());
+            let picture =
+                Image::from_fn(33, 33, |x, y| LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque());
             let change = Finish { sharpening: 2.0, ..Finish::default() };
             let out = finish(picture, &row(vec![]), None, &change);
             let [least, most] = [f32::min, f32::max].map(|of| out.pixels().iter().map(|p| p.g).fold(out[(0, 0)].g, of));

@@ -4,9 +4,8 @@ use super::staged::{above, grey, level, scene};
 use super::{Case, Outcome};
 use crate::composite;
 use crate::dataset::{
-    JOURNAL,
-    Format, LabelSetup, Numbers, Obstructed, Part, Pictures, Plan, Sample, Shard, Sidecar, Split, SplitOrder, Times,
-    Writer, check, generate, mend,
+    Format, JOURNAL, LabelSetup, Numbers, Obstructed, Part, Pictures, Plan, Sample, Shard, Sidecar, Split, SplitOrder,
+    Times, Writer, check, generate, mend,
 };
 use crate::error::{Error, Result};
 use crate::io;
@@ -117,13 +116,18 @@ impl Made {
 }
 
 fn empty_pictures() -> Case {
-    Case::new("dataset of empty scenes", "5 pictures without an object, as YOLO, COCO and VOC", "no label, no fault: 0", || {
-        let made = Made::of(5, |_| taken(&Shot::new(above(IMAGE, 100.0))))?;
-        let (faults, checked) = (made.faults()?, check(made.path())?);
-        let rows: usize = checked.rows.iter().sum();
-        let told = format!("{} images, {rows} rows, {} faults {}", checked.images, faults.len(), faults.join("; "));
-        Ok(Outcome::new(told.trim_end(), rows == 0 && faults.is_empty() && checked.images == 5))
-    })
+    Case::new(
+        "dataset of empty scenes",
+        "5 pictures without an object, as YOLO, COCO and VOC",
+        "no label, no fault: 0",
+        || {
+            let made = Made::of(5, |_| taken(&Shot::new(above(IMAGE, 100.0))))?;
+            let (faults, checked) = (made.faults()?, check(made.path())?);
+            let rows: usize = checked.rows.iter().sum();
+            let told = format!("{} images, {rows} rows, {} faults {}", checked.images, faults.len(), faults.join("; "));
+            Ok(Outcome::new(told.trim_end(), rows == 0 && faults.is_empty() && checked.images == 5))
+        },
+    )
 }
 
 fn crowd() -> Case {
@@ -134,7 +138,10 @@ fn crowd() -> Case {
         || {
             let made = Made::of(2, |_| crowded())?;
             let (rows, faults) = (made.label("train/000001.txt")?.lines().count(), made.faults()?);
-            Ok(Outcome::new(format!("{rows} row, {} faults {}", faults.len(), faults.join("; ")), rows == 1 && faults.is_empty()))
+            Ok(Outcome::new(
+                format!("{rows} row, {} faults {}", faults.len(), faults.join("; ")),
+                rows == 1 && faults.is_empty(),
+            ))
         },
     )
 }
@@ -158,10 +165,15 @@ fn crowded() -> Sample {
 
 fn row_of_one_pixel() -> Case {
     const ROW: &str = "0 0.054688 0.052083 0.015625 0.020833\n";
-    Case::new("YOLO row of one pixel", "pixel (3, 2) of 64 x 48", format!("3.5/64 2.5/48 1/64 1/48: {}", ROW.trim_end()), || {
-        let row = Made::of(2, |_| crowded())?.label("train/000001.txt")?;
-        Ok(Outcome::new(row.trim_end(), row == ROW))
-    })
+    Case::new(
+        "YOLO row of one pixel",
+        "pixel (3, 2) of 64 x 48",
+        format!("3.5/64 2.5/48 1/64 1/48: {}", ROW.trim_end()),
+        || {
+            let row = Made::of(2, |_| crowded())?.label("train/000001.txt")?;
+            Ok(Outcome::new(row.trim_end(), row == ROW))
+        },
+    )
 }
 
 fn too_small() -> Case {

@@ -97,7 +97,14 @@ fn one_image() -> Case {
         "yolov5: 2000 boxes in one image",
         "all found, all of one confidence",
         format!("mAP {PERFECT_YOLO}, to 1e-9"),
-        || Ok(Outcome::near(evaluate(&[sheet(2000, 2000, equal)], Definition::Yolov5, &[]).map(), PERFECT_YOLO, 1e-9, "")),
+        || {
+            Ok(Outcome::near(
+                evaluate(&[sheet(2000, 2000, equal)], Definition::Yolov5, &[]).map(),
+                PERFECT_YOLO,
+                1e-9,
+                "",
+            ))
+        },
     )
 }
 
@@ -108,7 +115,8 @@ fn half_right() -> Case {
         "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
         || {
             let mut half = sheet(50, 50, equal);
-            let away = |f: &FoundBox| FoundBox { bbox: BBox { x0: f.bbox.x0 + 1e4, x1: f.bbox.x1 + 1e4, ..f.bbox }, ..*f };
+            let away =
+                |f: &FoundBox| FoundBox { bbox: BBox { x0: f.bbox.x0 + 1e4, x1: f.bbox.x1 + 1e4, ..f.bbox }, ..*f };
             let wrong: Vec<FoundBox> = half.found.iter().map(away).collect();
             half.found.extend(wrong);
             Ok(Outcome::near(evaluate(&[half], Definition::Coco, &[]).map(), 1.0, 1e-9, ""))

@@ -112,12 +112,17 @@ fn codes() -> Case {
 }
 
 fn one_pixel(format: &'static str) -> Case {
-    Case::new(format!("{format}: one-pixel image"), "1 x 1 pixel of green 1/2", "1 x 1 pixel back, to 1 code of 255", move || {
-        let found = through(&format!("a.{format}"), &[0.5], &WriteOptions::default())?;
-        let off = found.iter().map(|v| f64::from(v - 0.5).abs()).fold(0.0, f64::max);
-        // A code is at most 1/255 of the curve, whose slope in linear light at 1/2 is below 1.7; JPEG's YCbCr adds one.
-        Ok(Outcome::new(format!("{} px, {off:.4} off", found.len()), found.len() == 1 && off < 2.0 * 1.7 / 255.0))
-    })
+    Case::new(
+        format!("{format}: one-pixel image"),
+        "1 x 1 pixel of green 1/2",
+        "1 x 1 pixel back, to 1 code of 255",
+        move || {
+            let found = through(&format!("a.{format}"), &[0.5], &WriteOptions::default())?;
+            let off = found.iter().map(|v| f64::from(v - 0.5).abs()).fold(0.0, f64::max);
+            // A code is at most 1/255 of the curve, whose slope in linear light at 1/2 is below 1.7; JPEG's YCbCr adds one.
+            Ok(Outcome::new(format!("{} px, {off:.4} off", found.len()), found.len() == 1 && off < 2.0 * 1.7 / 255.0))
+        },
+    )
 }
 
 fn empty(format: &'static str) -> Case {
@@ -131,7 +136,8 @@ fn empty(format: &'static str) -> Case {
 
 /// The bytes of a picture of 17 x 13 pixels.
 fn bytes(path: &Path) -> Result<Vec<u8>> {
-    let value = |x: usize, y: usize| LinearRgb::new(x as f32 / 17.0, y as f32 / 13.0, ((x * 7 + y * 5) % 11) as f32 / 11.0);
+    let value =
+        |x: usize, y: usize| LinearRgb::new(x as f32 / 17.0, y as f32 / 13.0, ((x * 7 + y * 5) % 11) as f32 / 11.0);
     io::write(path, &Image::from_fn(17, 13, value))?;
     std::fs::read(path).map_err(|e| Error::file(path, e))
 }
@@ -158,7 +164,12 @@ fn truncated(format: &'static str) -> Case {
 }
 
 /// A file whose header asks for more than there may be: refused by the name of the limit, before memory is taken.
-fn lying(name: &str, input: &str, limit: &'static str, make: impl Fn(&Path) -> Result<PathBuf> + Send + Sync + 'static) -> Case {
+fn lying(
+    name: &str,
+    input: &str,
+    limit: &'static str,
+    make: impl Fn(&Path) -> Result<PathBuf> + Send + Sync + 'static,
+) -> Case {
     /// A header, a message and what the decoders keep.
     const FEW_GIB: f64 = 0.064;
     let promise = format!("refused by Limits::{limit}, within 64 MiB");

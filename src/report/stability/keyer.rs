@@ -51,7 +51,8 @@ fn weak(saturation: f32) -> Case {
         "every matte value in 0..1: 0 wrong",
         move || {
             let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
-            let photo = Image::from_fn(7, 5, |x, y| LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32));
+            let photo =
+                Image::from_fn(7, 5, |x, y| LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32));
             Ok(no_shares(Profile::ALL.iter().map(|(_, profile)| key(&photo, screen, &KeyOptions::of(*profile)))))
         },
     )
@@ -99,7 +100,12 @@ fn extreme_pixels() -> Case {
                 for opts in [KeyOptions::of(profile), all_stages(profile)] {
                     let keyed = Keying::new(&photo, Screen::Color(GREEN)).run(&opts)?;
                     wrong += keyed.matte.pixels().iter().filter(|m| m.0.is_nan()).count();
-                    wrong += keyed.cutout.pixels().iter().filter(|p| [p.r, p.g, p.b, p.a].iter().any(|v| v.is_nan())).count();
+                    wrong += keyed
+                        .cutout
+                        .pixels()
+                        .iter()
+                        .filter(|p| [p.r, p.g, p.b, p.a].iter().any(|v| v.is_nan()))
+                        .count();
                 }
             }
             Ok(Outcome::near(wrong as f64, 0.0, 0.0, "NaN"))
@@ -142,7 +148,8 @@ fn wide_windows() -> Case {
                 ..all_stages(profile)
             };
             let sizes = [(1, 1), (5, 1), (1, 5), (3, 2)];
-            let photos = sizes.map(|(w, h)| Image::from_fn(w, h, |x, y| LinearRgb::new(0.3, 0.2 * (x + y) as f32, 0.25)));
+            let photos =
+                sizes.map(|(w, h)| Image::from_fn(w, h, |x, y| LinearRgb::new(0.3, 0.2 * (x + y) as f32, 0.25)));
             let runs = Profile::ALL.iter().flat_map(|(_, profile)| photos.iter().map(move |photo| (*profile, photo)));
             Ok(no_shares(runs.map(|(profile, photo)| key(photo, GREEN, &opts(profile)))))
         },
@@ -150,11 +157,21 @@ fn wide_windows() -> Case {
 }
 
 fn no_pixels() -> Case {
-    Case::new("keyer: no pixel", "0 x 0, 0 x 5 and 5 x 0 pixels, all stages", "a matte and a cut-out of no pixel: 0", || {
-        let keyed = |(w, h)| key(&Image::new(w, h), GREEN, &all_stages(Profile::Blender34));
-        let count = |keyed: Keyed| keyed.matte.pixels().len() + keyed.cutout.pixels().len();
-        Ok(Outcome::near([(0, 0), (0, 5), (5, 0)].map(keyed).map(count).iter().sum::<usize>() as f64, 0.0, 0.0, "px"))
-    })
+    Case::new(
+        "keyer: no pixel",
+        "0 x 0, 0 x 5 and 5 x 0 pixels, all stages",
+        "a matte and a cut-out of no pixel: 0",
+        || {
+            let keyed = |(w, h)| key(&Image::new(w, h), GREEN, &all_stages(Profile::Blender34));
+            let count = |keyed: Keyed| keyed.matte.pixels().len() + keyed.cutout.pixels().len();
+            Ok(Outcome::near(
+                [(0, 0), (0, 5), (5, 0)].map(keyed).map(count).iter().sum::<usize>() as f64,
+                0.0,
+                0.0,
+                "px",
+            ))
+        },
+    )
 }
 
 fn twelve_megapixels() -> Case {

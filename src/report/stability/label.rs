@@ -92,7 +92,14 @@ fn smaller_than_a_pixel() -> Case {
         "object of a hundredth of a pixel",
         "a card of 1 x 1 mm where a pixel is 10 mm",
         "below the threshold of 0.1 in every pixel: no label, 0",
-        || Ok(Outcome::near(labelled(&shot([64, 48], [opaque(1, [0.0; 3], 0.001)])).objects.len() as f64, 0.0, 0.0, "labels")),
+        || {
+            Ok(Outcome::near(
+                labelled(&shot([64, 48], [opaque(1, [0.0; 3], 0.001)])).objects.len() as f64,
+                0.0,
+                0.0,
+                "labels",
+            ))
+        },
     )
 }
 
@@ -106,7 +113,8 @@ fn many_in_a_pixel() -> Case {
             let shot = shot([8, 6], (1..=MANY).map(|id| opaque(id, [0.0; 3], 0.01)));
             let found = label(&one_place([8, 6], samples), &shot, &LabelOptions::default()).objects;
             let seen: f64 = found.iter().map(|o| o.visible_fraction).sum();
-            let boxed = found.iter().filter(|o| o.amodal_box == PLACE && o.visible_box.is_empty() == (o.id.0 > 1)).count();
+            let boxed =
+                found.iter().filter(|o| o.amodal_box == PLACE && o.visible_box.is_empty() == (o.id.0 > 1)).count();
             let passed = found.len() == MANY as usize && boxed == found.len() && seen == 1.0;
             Ok(Outcome::new(format!("{} labels, {boxed} boxed rightly, {seen} seen", found.len()), passed))
         },
@@ -152,11 +160,16 @@ fn cut_by_the_border() -> Case {
 }
 
 fn larger_than_the_picture() -> Case {
-    Case::new("object larger than the picture", "an opaque card 1 km across", "the picture's own box and all its 3072 pixels", || {
-        let found = labelled(&shot([64, 48], [opaque(1, [0.0; 3], 1000.0)])).objects;
-        let whole = BBox { x0: 0.0, y0: 0.0, x1: 64.0, y1: 48.0 };
-        Ok(told(&found, |o| o.amodal_box == whole && o.amodal_mask.area() == 64 * 48 && o.visible_fraction == 1.0))
-    })
+    Case::new(
+        "object larger than the picture",
+        "an opaque card 1 km across",
+        "the picture's own box and all its 3072 pixels",
+        || {
+            let found = labelled(&shot([64, 48], [opaque(1, [0.0; 3], 1000.0)])).objects;
+            let whole = BBox { x0: 0.0, y0: 0.0, x1: 64.0, y1: 48.0 };
+            Ok(told(&found, |o| o.amodal_box == whole && o.amodal_mask.area() == 64 * 48 && o.visible_fraction == 1.0))
+        },
+    )
 }
 
 fn one_pixel_picture() -> Case {
@@ -171,7 +184,8 @@ fn edge_on() -> Case {
     Case::new("objects out of sight", "a card edge-on, one behind the camera, one 3 m away", "no label: 0", || {
         let texture = || Image::<PremulRgba>::filled(8, 8, grey(1.0));
         let edge_on = card(1, [0.0, 0.0, 0.5], tilted(FRAC_PI_2), [0.2; 2], texture());
-        let found = labelled(&shot([64, 48], [edge_on, opaque(2, [0.0, 0.0, 2.0], 0.2), opaque(3, [3.0, 0.0, 0.0], 0.2)]));
+        let found =
+            labelled(&shot([64, 48], [edge_on, opaque(2, [0.0, 0.0, 2.0], 0.2), opaque(3, [3.0, 0.0, 0.0], 0.2)]));
         Ok(Outcome::near(found.objects.len() as f64, 0.0, 0.0, "labels"))
     })
 }

@@ -25,7 +25,11 @@ fn lamps() -> Vec<Case> {
         cases.push(small(&name, AreaLight { shape, ..lamp([0.3, 0.2, 0.9], 0.0, 10.0) }, "of no size"));
         cases.push(small(&name, AreaLight { shape, ..lamp([0.0, 0.0, 1e6], 0.1, 10.0) }, "1000 km away"));
         let graze = libm::sincos(1e-4);
-        cases.push(small(&name, AreaLight { shape, ..lamp([10.0 * graze.1, 0.0, 10.0 * graze.0], 1e-4, 10.0) }, "grazing at 1e-4 rad"));
+        cases.push(small(
+            &name,
+            AreaLight { shape, ..lamp([10.0 * graze.1, 0.0, 10.0 * graze.0], 1e-4, 10.0) },
+            "grazing at 1e-4 rad",
+        ));
         cases.push(wide(&name, AreaLight { shape, ..lamp([0.0, 0.0, 1e-6], 1.0, 10.0) }, "1 um away"));
         cases.push(wide(&name, AreaLight { shape, ..lamp([0.0, 0.0, 1.0], 1e6, 10.0) }, "1000 km across"));
     }
@@ -57,9 +61,12 @@ fn wide(shape: &str, light: AreaLight, what: &str) -> Case {
 }
 
 fn inside() -> Case {
-    Case::new("receiver in the middle of a light", "a light of 1 x 1 m, the point its centre", "finite: 0, since it shines away", || {
-        Ok(Outcome::near(received(&lamp([0.0; 3], 1.0, 10.0)), 0.0, 0.0, "W/m2"))
-    })
+    Case::new(
+        "receiver in the middle of a light",
+        "a light of 1 x 1 m, the point its centre",
+        "finite: 0, since it shines away",
+        || Ok(Outcome::near(received(&lamp([0.0; 3], 1.0, 10.0)), 0.0, 0.0, "W/m2")),
+    )
 }
 
 fn skies() -> Vec<Case> {

@@ -86,10 +86,15 @@ fn cut_outs() -> Vec<Case> {
 }
 
 fn opaque_on_grey(take: Take) -> Case {
-    Case::new("grey screen tells nothing of film", "the same photo", "an opaque object: the method is the outline", move || {
-        let method = take.cut()?.0.method;
-        Ok(Outcome::new(format!("{method:?}"), method == MatteMethod::Outline))
-    })
+    Case::new(
+        "grey screen tells nothing of film",
+        "the same photo",
+        "an opaque object: the method is the outline",
+        move || {
+            let method = take.cut()?.0.method;
+            Ok(Outcome::new(format!("{method:?}"), method == MatteMethod::Outline))
+        },
+    )
 }
 
 fn refusals() -> Vec<Case> {

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::geom::UnitQuaternion;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::{DeepImage, Quality, RenderOptions, cast, interreflect, reference};
+use crate::render::{DeepImage, Preset, RenderOptions, cast, interreflect, reference};
 use crate::scene::{Card, Shot};
 use std::f64::consts::FRAC_PI_2;
 
@@ -125,7 +125,8 @@ fn near_and_grazing() -> Case {
         "an opaque card 20 m wide, the eye 1 cm over it, tilted by 80 degrees, under even light of 1",
         "below the horizon, 1 pixel away from it, alpha 1 and light 1/2, to 1e-4; above it nothing",
         || {
-            let camera = looking_at([0.0, 0.0, 0.01], [0.0, 0.01 * libm::tan(80_f64.to_radians()), 0.0], [65, 48], 60.0);
+            let camera =
+                looking_at([0.0, 0.0, 0.01], [0.0, 0.01 * libm::tan(80_f64.to_radians()), 0.0], [65, 48], 60.0);
             let shot = Shot::new(camera).with_ambient(LinearRgb::WHITE);
             let deep = cast(&shot.with_card(level(1, [0.0; 3], 20.0, grey(1.0))), &RenderOptions::default());
             // Where the card ends 10 m away: a hair under the horizon, 60 tan(10 degrees) above the middle.
@@ -163,9 +164,12 @@ fn steep(degrees: f64) -> Case {
     Case::new(
         format!("card turned by {degrees} degrees"),
         format!("an opaque card of which {area:.1} pixels are seen, at {PLACES} places across a pixel"),
-        format!("coverage sums to the area of the projected corners: to 2 % on average, to a row of samples ({strip:.0} px) each"),
+        format!(
+            "coverage sums to the area of the projected corners: to 2 % on average, to a row of samples ({strip:.0} px) each"
+        ),
         move || {
-            let found: Vec<f64> = (0..PLACES).map(|place| covered(&cast(&shown(place), &RenderOptions::default()))).collect();
+            let found: Vec<f64> =
+                (0..PLACES).map(|place| covered(&cast(&shown(place), &RenderOptions::default()))).collect();
             // Moved sideways, a card shows a little more or less of itself.
             let areas: Vec<f64> = (0..PLACES).map(|k| projected_area(&shown(k).cards[0], &shown(k).camera)).collect();
             let mean = found.iter().sum::<f64>() / areas.iter().sum::<f64>() - 1.0;
@@ -192,7 +196,7 @@ fn one_pixel() -> Case {
                 let shot = Shot::new(above([side; 2], 50.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
                 let sheet = Image::filled(64, 64, grey(0.6));
                 let shot = shot.with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet));
-                let deep = cast(&shot, &Quality::Good.options());
+                let deep = cast(&shot, &Preset::Good.options());
                 let middle = (side / 2) as usize;
                 (deep.flat(middle, middle), deep.shadow()[(middle, middle)])
             };
@@ -244,7 +248,7 @@ fn sixteen_k() -> Case {
             let center = [from_corner(1100.0), -from_corner(1100.0), 0.0];
             let sheet = level(1, center, 0.2, grey(1.0));
             let shot = Shot::new(above([SIXTEEN_K; 2], 10_000.0)).with_ambient(LinearRgb::WHITE).with_card(sheet);
-            let (deep, peak) = memory::peak_gib(|| cast(&shot, &Quality::Draft.options()));
+            let (deep, peak) = memory::peak_gib(|| cast(&shot, &Preset::Draft.options()));
             let (found, last) = (covered(&deep), SIXTEEN_K as usize - 1);
             let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
             let right = (found / SHOWN - 1.0).abs() < 1e-4 && deep.shadow()[(last, last)] == LinearRgb::WHITE;
@@ -288,7 +292,8 @@ fn nothing_to_see() -> Vec<Case> {
 fn awkward() -> Vec<Case> {
     let base = || Shot::new(above([15, 11], 20.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
     let flat = UnitQuaternion::identity;
-    let one = |center: [f64; 3], texture: Image<PremulRgba>| base().with_card(card(1, center, flat(), [0.4; 2], texture));
+    let one =
+        |center: [f64; 3], texture: Image<PremulRgba>| base().with_card(card(1, center, flat(), [0.4; 2], texture));
     let full = || Image::filled(8, 8, grey(0.8));
     let twice = one([0.0, 0.0, 0.1], full()).with_card(level(2, [0.0, 0.0, 0.1], 0.4, grey(0.5)));
     let through = card(1, [0.01, 0.0, 1.0], UnitQuaternion::from_euler_angles(0.0, 1.2, 0.0), [0.5; 2], full());
@@ -309,7 +314,8 @@ fn awkward() -> Vec<Case> {
 
 fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> Case {
     let coverage = if least == most { format!("{least}") } else { format!("{least:.2} to {most}") };
-    let promise = format!("coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer");
+    let promise =
+        format!("coverage {coverage} in the middle (to 1e-5), light finite, shadows in 0..1, in either renderer");
     Case::new(name, "under a light of 10 W", promise, move || {
         let options = RenderOptions::default();
         let ends = [cast(&shot, &options), reference(&shot, &options)];

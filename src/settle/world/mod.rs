@@ -14,6 +14,7 @@ mod units;
 use super::trace::Sample;
 use crate::geom::{Pose, Vector3};
 use crate::scene::{Object, Placement, Scene, SettleOptions};
+use crate::work::{self, Kind};
 use rapier3d::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 use units::{Units, vector};
 
@@ -75,6 +76,7 @@ fn median(scene: &Scene, of: impl Fn(&Object) -> f64) -> f64 {
 impl Drop<'_> {
     /// Lets some objects fall until they rest, among all that lies there already.
     pub(super) fn fall(&self, members: &[usize]) -> Fall {
+        work::add(Kind::PhysicsWorlds, 1);
         let units = Units::of(self.scene, self.options);
         let mut world = self.empty_world();
         self.enclose(&mut world, &units, members);

@@ -10,6 +10,7 @@ use super::units::Units;
 use super::{CARD, Fall, MASS};
 use crate::scene::SettleOptions;
 use crate::settle::trace::Sample;
+use crate::work::{self, Kind};
 use rapier3d::prelude::{PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle};
 
 /// Movement of a card that still counts as rest, metres in the world.
@@ -40,10 +41,12 @@ impl Run<'_> {
         let steps = (self.options.time_limit / self.options.step).ceil() as usize;
         let (mut stillness, mut energy, mut fall) = (Stillness::default(), Energy::of(&self), Fall::default());
         fall.swept = [[f64::INFINITY, -f64::INFINITY]; 2];
+        let mut taken = 0;
         self.sample(&mut fall, 0);
         for step in 1..=steps {
             // Nothing is active before the first step.
             self.world.step();
+            taken = step;
             let now = step as f64 * self.options.step;
             let kinetic = energy.follow(&self);
             self.sweep(&mut fall.swept);
@@ -55,6 +58,7 @@ impl Run<'_> {
                 break;
             }
         }
+        work::add(Kind::PhysicsSteps, taken as u64);
         fall.energy_rise = energy.rise();
         fall.poses = self.moving().map(|body| self.units.to_scene(body.position())).collect();
         fall

@@ -5,8 +5,10 @@ mod camera;
 mod experiments;
 mod matte;
 mod render;
+mod scale;
 mod settle;
 mod stability;
+mod work;
 
 use crate::common::Common;
 
@@ -26,6 +28,10 @@ pub(crate) enum Command {
     Matte(matte::Args),
     /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
     Render(render::Args),
+    /// What scenes pay for, counted: work.csv and work.md
+    Work(work::Args),
+    /// Memory and rate by threads, pixels and cards, and a million pictures: scale.csv, scale.md and charts (SVG)
+    Scale(scale::Args),
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -37,5 +43,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Experiments(args) => experiments::run(args, common),
         Command::Matte(args) => matte::run(args, common),
         Command::Render(args) => render::run(args, common),
+        Command::Work(args) => work::run(args, common),
+        Command::Scale(args) => scale::run(args, common),
     }
 }

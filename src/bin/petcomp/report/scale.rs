@@ -1,0 +1,38 @@
+//! `petcomp report scale`: memory and rate, and what a million pictures take.
+
+use crate::common::Common;
+use petcomp::report::scale::{self, Case, ScaleOptions};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+    /// About how many seconds of work each point is measured for; more is finer
+    #[arg(long, value_name = "N", default_value_t = ScaleOptions::default().seconds)]
+    seconds: f64,
+    /// Most threads; by default one per core
+    #[arg(long, value_name = "N", default_value_t = ScaleOptions::default().threads)]
+    most_threads: usize,
+    /// Instead, measure this point in this process and print it (JSON)
+    #[arg(long, value_name = "JSON", hide = true)]
+    case: Option<String>,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    if let Some(case) = &args.case {
+        let case: Case = serde_json::from_str(case)?;
+        common.say(serde_json::to_string(&scale::run(&case, args.seconds)?)?);
+        return Ok(());
+    }
+    let options = ScaleOptions { seconds: args.seconds, threads: args.most_threads, ..ScaleOptions::default() };
+    let progress = common.progress("measuring");
+    let measured = scale::write(&args.output, &options, |done, of| progress.at(done, of))?;
+    drop(progress);
+    for (title, table) in scale::tables(&measured)? {
+        common.say(format_args!("{title}\n{}", table.markdown()));
+    }
+    common.say(format_args!("{}: scale.csv, scale.md and two charts", args.output.display()));
+    Ok(())
+}

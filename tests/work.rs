@@ -1,0 +1,30 @@
+//! Large allocations, counted by an allocator that tells: the one of the program.
+
+#[path = "../src/bin/petcomp/allocator.rs"]
+mod allocator;
+
+use petcomp::report::work::measure;
+use petcomp::work::{Kind, LARGE, counted};
+
+#[test]
+fn an_allocation_of_a_mebibyte_is_one_and_a_smaller_one_is_none() {
+    let large =
+        |bytes: usize| counted(|| drop(std::hint::black_box(vec![1_u8; bytes]))).unwrap().1[Kind::LargeAllocations];
+    assert_eq!([LARGE - 1, LARGE, 3 * LARGE].map(large), [0, 1, 1]);
+    let (_, work) = counted(|| std::hint::black_box(Vec::<u8>::with_capacity(LARGE)).reserve_exact(2 * LARGE)).unwrap();
+    assert_eq!(work[Kind::LargeAllocations], 2, "growing is another one");
+}
+
+#[test]
+fn every_scene_is_as_promised_with_allocations_counted_too() {
+    let rows = measure(|_, _| {}).unwrap();
+    let broken: Vec<_> = rows.iter().filter(|row| !row.is_as_promised()).collect();
+    assert!(broken.is_empty(), "{broken:#?}");
+    let large = |name: &str| {
+        let row = rows.iter().find(|row| row.scene == name).unwrap();
+        row.counts.iter().find(|(kind, _)| *kind == Kind::LargeAllocations).unwrap().1
+    };
+    // A frame of 320 x 240 pixels has 1.2 MB; labels need none, and nothing more than a plate is what a plate needs.
+    assert!(large("labels") < large("usual") && large("nothing") < large("usual"));
+    assert_eq!(large("dim map"), large("usual"));
+}
