@@ -18,8 +18,12 @@ const LABEL: f64 = 10.0;
 const LABEL_LETTER: f64 = 5.6;
 /// How far a word stands from its point.
 const BESIDE: f64 = 7.0;
-/// Logarithmic axes of no more decades than this also have lines at 2 and 5.
-const FEW_DECADES: i32 = 2;
+/// Logarithmic axes on which values are up to so many times each other also have lines at 2 and 5.
+const FEW_DECADES: f64 = 100.0;
+/// Where logarithmic axes have lines in a decade.
+const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
+/// What powers of ten may be off by.
+const HAIR: f64 = 1e-9;
 /// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
 const COLORS: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
 
@@ -65,6 +69,20 @@ impl Axis {
         Self { title: title.into(), range, logarithmic: true }
     }
 
+    /// A logarithmic axis that begins and ends at 1, 2 or 5 times a power of ten, as near to all positive values as can be; 1
+    /// to 10 where there are none.
+    pub fn around(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
+        let seen: Vec<f64> = values.into_iter().filter(|v| v.is_finite() && *v > 0.0).collect();
+        let wide = Self::over_decades(title, seen.iter().copied());
+        let [first, last] = wide.range.map(|v| libm::round(libm::log10(v)) as i32);
+        let lines = || (first..=last).flat_map(|e| STEPS.map(|step| step * decade(e)));
+        let least = seen.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = seen.iter().copied().fold(0.0, f64::max);
+        let low = lines().filter(|v| *v <= least * (1.0 + HAIR)).fold(wide.range[0], f64::max);
+        let high = lines().filter(|v| *v >= most * (1.0 - HAIR) && *v > low).fold(wide.range[1], f64::min);
+        if seen.is_empty() { wide } else { Self { range: [low, high], ..wide } }
+    }
+
     /// How far along a value is, from 0 to 1; none where it cannot be shown.
     fn part(&self, value: f64) -> Option<f64> {
         let [low, high, value] =
@@ -76,10 +94,10 @@ impl Axis {
     /// Values with a line through the chart.
     fn marks(&self) -> Vec<f64> {
         if self.logarithmic {
-            let [low, high] = self.range.map(|v| libm::round(libm::log10(v)) as i32);
-            let steps: &[f64] = if high - low > FEW_DECADES { &[1.0] } else { &[1.0, 2.0, 5.0] };
-            let all = (low..=high).flat_map(|e| steps.iter().map(move |step| step * libm::exp10(f64::from(e))));
-            return all.filter(|v| *v <= self.range[1] * (1.0 + f64::EPSILON)).collect();
+            let [low, high] = [libm::floor(libm::log10(self.range[0])), libm::ceil(libm::log10(self.range[1]))];
+            let steps = if self.range[1] > FEW_DECADES * self.range[0] { &STEPS[..1] } else { &STEPS };
+            let all = (low as i32..=high as i32).flat_map(|e| steps.iter().map(move |step| step * decade(e)));
+            return all.filter(|v| *v >= self.range[0] * (1.0 - HAIR) && *v <= self.range[1] * (1.0 + HAIR)).collect();
         }
         (0..=4).map(|i| self.range[0] + (self.range[1] - self.range[0]) * f64::from(i) / 4.0).collect()
     }
@@ -183,6 +201,10 @@ fn plain(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;")
 }
 
+fn decade(exponent: i32) -> f64 {
+    libm::exp10(f64::from(exponent))
+}
+
 fn words(x: f64, y: f64, anchor: &str, text: &str) -> String {
     let text = plain(text);
     format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>\n")
@@ -206,6 +228,15 @@ mod tests {
         assert_eq!(Axis::over_decades("", [0.02, 30.0, 0.0, f64::NAN]).range, [0.01, 100.0]);
         assert_eq!(Axis::over_decades("", [1.0]).range, [1.0, 10.0]);
         assert_eq!(Axis::over_decades("", []).range, [1.0, 10.0]);
+    }
+
+    #[test]
+    fn a_close_axis_ends_at_the_nearest_lines_around_all_values() {
+        let range = |values: &[f64]| Axis::around("", values.iter().copied()).range.map(|v| (v * 1e6).round() / 1e6);
+        assert_eq!(range(&[0.003, 0.04]), [0.002, 0.05]);
+        assert_eq!((range(&[0.2, 5.0]), range(&[1.0]), range(&[])), ([0.2, 5.0], [1.0, 2.0], [1.0, 10.0]));
+        assert_eq!(Axis::around("", [0.003, 0.04]).marks().len(), 5);
+        assert_eq!(Axis::around("", [0.003, 4.0]).marks().len(), 3);
     }
 
     #[test]

@@ -164,7 +164,7 @@ impl Diagram {
         let curve = |name: &String| -> Curve { self.points.iter().filter(|p| p.curve == *name).map(at).collect() };
         let chart = Chart {
             title: self.title.clone(),
-            across: Axis::over_decades(&self.cost, self.points.iter().map(|p| p.cost)),
+            across: Axis::around(&self.cost, self.points.iter().map(|p| p.cost)),
             curves: names.iter().map(curve).collect(),
             names,
             defaults: self.points.iter().filter(|p| p.is_default()).map(at).collect(),
@@ -175,12 +175,13 @@ impl Diagram {
         chart.alone(&labels)
     }
 
-    /// The axis of errors; one decade more below where some are 0.
+    /// The axis of errors; longer below where some are 0.
     fn errors(&self) -> Axis {
-        const DECADE: f64 = 10.0;
-        let mut up = Axis::over_decades(&self.error, self.points.iter().map(|p| p.error));
+        /// So far below the least error, as a factor, that no one takes it for one.
+        const BELOW: f64 = 10.0;
+        let mut up = Axis::around(&self.error, self.points.iter().map(|p| p.error));
         if self.points.iter().any(|p| p.error == 0.0) {
-            up.range[0] /= DECADE;
+            up.range[0] /= BELOW;
         }
         up
     }
@@ -290,7 +291,7 @@ mod tests {
     fn exact_points_lie_on_the_lower_edge_and_are_told() {
         let found = diagram(vec![normal(Point::new("a", "exact", 2.0, 0.0)), Point::new("a", "1", 1.0, 0.1)]);
         assert!(found.svg().matches("r=\"2.5\"").count() == 2 && found.caption().contains("no error"));
-        assert_eq!(found.errors().range[0], 0.01);
+        assert!((found.errors().range[0] - 0.01).abs() < 1e-9);
     }
 
     #[test]

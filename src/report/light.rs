@@ -72,7 +72,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
     }
     for quality in [Quality::Draft, Quality::Reference] {
         let options = quality.render();
-        let point = measured(("all of a quality", "every number".into()), &shot, &exact, &options, cast)?;
+        let point = measured(("all of a quality", String::new()), &shot, &exact, &options, cast)?;
         points.push(point.used_where(|q| q == quality));
     }
     Ok(told(kind, points))

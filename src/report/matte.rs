@@ -15,6 +15,7 @@ pub use diagram::diagrams;
 pub use method::Method;
 pub use score::Score;
 
+use super::clock::cpu_seconds;
 use super::{Axis, Chart, Page, Table};
 use crate::error::Result;
 use crate::image::Image;
@@ -23,7 +24,6 @@ use crate::pixel::LinearRgb;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::path::Path;
-use std::time::Instant;
 use truth::{Known, Truths};
 
 /// What a method made of a photo.
@@ -37,7 +37,7 @@ pub struct Row {
     pub score: Option<Score>,
     /// Why a person should look at the cut-out, or why there is none.
     pub doubts: Vec<String>,
-    /// Run time from the photo in memory to the cut-out on one thread, milliseconds.
+    /// CPU time from the photo in memory to the cut-out on one thread, milliseconds.
     pub time_ms: f64,
 }
 
@@ -103,9 +103,9 @@ fn swapped(c: LinearRgb) -> LinearRgb {
 }
 
 fn row(method: Method, known: &Known, shots: &[Image<LinearRgb>; 2], backgrounds: &[Image<LinearRgb>]) -> Row {
-    let start = Instant::now();
+    let start = cpu_seconds();
     let cut = method.run(known, shots);
-    let time_ms = 1e3 * start.elapsed().as_secs_f64();
+    let time_ms = 1e3 * (cpu_seconds() - start);
     let (score, doubts) = match &cut {
         Ok(cut) => {
             let doubts = cut.found.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect();

@@ -21,7 +21,7 @@ fn diagram(tilt_deg: f64, views: u64) -> Diagram {
         title: format!("camera: four corners, {tilt_deg} degrees from straight above"),
         input: format!("{views} simulated views, corners to {NOISE_PX} px, lens and tape measure as uncertain as usual"),
         error: "focal length, median error, %".into(),
-        cost: "microseconds per photo".into(),
+        cost: "CPU microseconds per photo".into(),
         reference: "the cameras that the views were drawn with (closed form)".into(),
         points: Method::ALL.map(|method| point(&cell.row(method, &photos))).into(),
         limit: None,

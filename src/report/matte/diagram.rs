@@ -42,7 +42,7 @@ fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
         title: title.into(),
         input: input.into(),
         error: error.into(),
-        cost: "seconds per photo".into(),
+        cost: "CPU seconds per photo".into(),
         reference: source.into(),
         points: summaries.iter().map(|s| point(s, of(&s.score))).collect(),
         limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
@@ -56,7 +56,7 @@ fn why(summaries: &[Summary], error: fn(&Score) -> f64) -> String {
     let of = |method| summaries.iter().find(|s| s.method == method).map_or(0.0, |s: &Summary| error(&s.score));
     let share = three(of(Method::Physical) / of(Method::Paper));
     format!(
-        "Times are of one thread, finding the object included. Two screens need a second photo of each object. The default has \
+        "Times include finding the object. Two screens need a second photo of each object. The default has \
          {share} of the error of the paper's keyer."
     )
 }

@@ -17,7 +17,7 @@ pub fn diagrams(rows: &[Row]) -> Vec<Diagram> {
     let heaps = rows.first().map_or(0, |row| row.heaps);
     let with = |error: fn(&Row) -> f64| Diagram {
         input: format!("{heaps} heaps of {CARDS} cards for each setting"),
-        cost: "milliseconds per heap, median".into(),
+        cost: "CPU milliseconds per heap, median".into(),
         points: rows.iter().map(|row| point(row, error(row))).collect(),
         why: why(rows),
         ..Diagram::default()
@@ -57,7 +57,7 @@ fn point(row: &Row, error: f64) -> Point {
     let many = if row.iterations == 1 { "" } else { "s" };
     let setting =
         if is_usual { format!("{} iteration{many}", row.iterations) } else { format!("{} CCD stops", row.ccd) };
-    Point::new(curve, setting, row.wall_ms, error).used_where(|q: Quality| {
+    Point::new(curve, setting, row.cpu_ms, error).used_where(|q: Quality| {
         let settings = q.settle(options);
         is_usual && settings.iterations == row.iterations && settings.step * f64::from(row.rate) == 1.0
     })
@@ -93,7 +93,7 @@ mod tests {
             energy_percent: [0.1, 0.2],
             stack_mm: 3.9,
             wrong_slopes: 1,
-            wall_ms: 20.0,
+            cpu_ms: 20.0,
         }
     }
 
