@@ -5,7 +5,6 @@ use super::number::three;
 use super::{Diagram, Point, Table};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::quality::Quality;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -28,6 +27,9 @@ pub struct Comparison {
     /// Threads that each program may use.
     #[serde(default)]
     pub threads: Option<u32>,
+    /// What the seconds are.
+    #[serde(default)]
+    pub clock: String,
     /// What was measured.
     #[serde(default)]
     pub points: Vec<Measured>,
@@ -55,6 +57,9 @@ pub struct Measured {
     /// How many runs that is the median of.
     #[serde(default)]
     pub runs: u32,
+    /// The setting of petcomp that does the same; empty = its default.
+    #[serde(default)]
+    pub beside: String,
 }
 
 /// A program that could not be run, and why.
@@ -86,19 +91,15 @@ impl Comparison {
     pub fn diagram(&self) -> Diagram {
         let point = |m: &Measured| {
             let curve = format!("{} {}", m.program, m.version);
-            let is_default = self.ours().is_some_and(|ours| std::ptr::eq(ours, m));
-            Some(
-                Point::new(curve, m.setting.clone(), m.seconds, m.error?)
-                    .used_where(|q| is_default && q == Quality::Normal),
-            )
+            Some(Point::new(curve, m.setting.clone(), m.seconds, m.error?))
         };
-        let threads = self.threads.map_or(String::new(), |n| format!(", threads: {n}"));
+        let threads = self.threads.map_or(String::new(), |n| format!("; threads: {n}"));
         Diagram {
             file: format!("peers_{}", file_name(&self.stage)),
             title: format!("{}: petcomp and other programs", self.stage),
             input: format!("{}{threads}", self.input),
             error: self.error.clone(),
-            cost: "seconds, median".into(),
+            cost: if self.clock.is_empty() { "seconds, median".into() } else { self.clock.clone() },
             reference: self.reference.clone(),
             points: self.points.iter().filter_map(point).collect(),
             limit: None,
@@ -106,11 +107,11 @@ impl Comparison {
         }
     }
 
-    /// Our default among the points, or else our first setting.
-    fn ours(&self) -> Option<&Measured> {
-        let mut ours = self.points.iter().filter(|m| m.program == OURS);
-        let default = ours.clone().find(|m| m.setting.contains(DEFAULT));
-        default.or_else(|| ours.next())
+    /// Our point that another is set beside: the one that it names, or our default, or else our first.
+    fn ours(&self, other: &Measured) -> Option<&Measured> {
+        let ours = || self.points.iter().filter(|m| m.program == OURS);
+        let named = ours().find(|m| !other.beside.is_empty() && m.setting == other.beside);
+        named.or_else(|| ours().find(|m| m.setting.contains(DEFAULT))).or_else(|| ours().next())
     }
 
     /// Programs that are not in it, in words; nothing where all are.
@@ -142,8 +143,8 @@ pub fn ratios(comparisons: &[Comparison]) -> Table {
         "runs",
     ]);
     for comparison in comparisons {
-        let ours = comparison.ours();
         for m in &comparison.points {
+            let ours = comparison.ours(m);
             let seconds = ours.map(|ours| m.seconds / ours.seconds);
             let error = ours.and_then(|ours| Some(m.error? / ours.error?));
             let number = |v: Option<f64>| v.filter(|v| v.is_finite()).map_or(String::new(), three);
@@ -205,9 +206,16 @@ mod tests {
         assert_eq!((ratios.rows[1][4].as_str(), ratios.rows[3][6].as_str()), ("1.00", ""));
         let diagram = found[0].diagram();
         assert_eq!(diagram.points.len(), 3, "what has no error has no place");
-        assert_eq!(diagram.default_point().map(|p| p.setting.as_str()), Some("default"));
+        assert_eq!(diagram.cost, "seconds, median");
         assert_eq!(found[0].missing(), "Not here: Gone (no package).");
         assert_eq!(commands(&found).rows[2][3], "slow");
+    }
+
+    #[test]
+    fn a_program_may_name_the_setting_that_does_the_same() {
+        let mut found = read(folder().path()).unwrap();
+        found[0].points[2].beside = "fast".into();
+        assert_eq!(ratios(&found).rows[2][4], "8.00");
     }
 
     #[test]
