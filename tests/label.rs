@@ -323,29 +323,6 @@ fn a_card_that_reaches_behind_the_camera_is_clipped_to_the_picture() {
 }
 
 #[test]
-fn what_cannot_be_seen_has_no_label() {
-    let out_of_sight = card(1, [3.0, 0.0, 0.0], [0.0; 3], [0.2; 2], &WHOLE);
-    let behind = card(2, [0.0, 0.0, 2.0], [0.0; 3], [0.2; 2], &WHOLE);
-    let edge_on = card(3, [0.0, 0.0, 0.5], [0.0, std::f64::consts::FRAC_PI_2, 0.0], [0.2; 2], &WHOLE);
-    let scene = shot([out_of_sight, behind, edge_on]);
-    for amodal in [AmodalBox::Mask, AmodalBox::Outline] {
-        assert!(labels(&scene, &LabelOptions { amodal, ..LabelOptions::default() }).objects.is_empty());
-    }
-}
-
-#[test]
-fn an_outline_that_is_none_still_gives_a_mask_box() {
-    let nan = [[f64::NAN, 0.0], [1.0, 0.0], [1.0, 1.0]];
-    for outline in [&[][..], &[[0.5, 0.5]], &[[0.0, 0.0], [1.0, 1.0]], &[[0.2, 0.2], [0.4, 0.4], [0.8, 0.8]], &nan] {
-        let whole = shot([card(1, [0.0; 3], [0.0; 3], [0.2; 2], &WHOLE)]);
-        let scene = shot([card(1, [0.0; 3], [0.0; 3], [0.2; 2], outline)]);
-        let found = label(&cast(&whole), &scene, &LabelOptions::default());
-        assert_eq!(found.objects[0].amodal_box, BBox { x0: 38.0, y0: 26.0, x1: 58.0, y1: 46.0 });
-        assert!(found.objects[0].outline_px.is_empty());
-    }
-}
-
-#[test]
 fn an_outline_that_crosses_itself_keeps_both_loops() {
     let bow_tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
     let found = labels(&shot([card(1, [0.0; 3], [0.0; 3], [0.4; 2], &bow_tie)]), &LabelOptions::default());

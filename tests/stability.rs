@@ -4,7 +4,8 @@ use libtest_mimic::{Arguments, Failed, Trial};
 use petcomp::report::stability::{Case, cases};
 
 fn main() {
-    let args = Arguments::from_args();
+    // One at a time: some are held to what the whole process takes of memory.
+    let args = Arguments { test_threads: Some(1), ..Arguments::from_args() };
     let trials =
         cases("").unwrap_or_else(|error| panic!("{error}")).into_iter().map(|(stage, case)| trial(stage, case));
     libtest_mimic::run(&args, trials.collect()).exit();

@@ -32,7 +32,8 @@ pub fn finish(
         }
         Noise::Known { .. } | Noise::None | Noise::MatchPlate => frame,
     };
-    let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32);
+    // An infinite gain would make NaN of black.
+    let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32).map(|g| g.min(f32::MAX));
     let frame = if gain == LinearRgb::WHITE { frame } else { balanced(&frame, gain) };
     if finish.sharpening == 0.0 {
         return frame;

@@ -4,10 +4,12 @@ use crate::geom::{Point3, Vector3};
 use crate::light::{nodes, polygon_irradiance};
 use crate::pixel::LinearRgb;
 use crate::scene::{AreaLight, LightShape};
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 /// Samples along each side of an ellipse where its irradiance is asked for without shadows.
 const ELLIPSE_SAMPLES: usize = 16;
+/// Corners that an ellipse is given where it is near.
+const ELLIPSE_CORNERS: usize = 256;
 
 /// An area light in the world: its sides run along `x` and `y`, it emits to the side of `normal` only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +49,18 @@ impl LightFrame {
         let [a, b] = size.map(|s| 0.5 * s);
         [self.point(-a, -b), self.point(a, -b), self.point(a, b), self.point(-a, b)]
     }
+
+    /// Corners of a polygon along the ellipse of these diameters, in turn, of the same area.
+    fn rim(&self, size: [f64; 2]) -> Vec<Point3<f64>> {
+        let step = TAU / ELLIPSE_CORNERS as f64;
+        let grown = (step / libm::sin(step)).sqrt();
+        let [a, b] = size.map(|s| 0.5 * s * grown);
+        let corner = |i: usize| {
+            let (sin, cos) = libm::sincos(step * i as f64);
+            self.point(a * cos, b * sin)
+        };
+        (0..ELLIPSE_CORNERS).map(corner).collect()
+    }
 }
 
 /// Shorter sides count as this, metres: a light without size is the limit of small ones, a point, which no picture tells
@@ -75,14 +89,19 @@ pub fn radiance(light: &AreaLight) -> LinearRgb {
 /// Irradiance at `point` on a surface of unit `normal`, where nothing is in the way.
 ///
 /// # Method
-/// Closed form for rectangles ([`polygon_irradiance`]); a product rule of 16 x 32 points for ellipses.
+/// Closed form for rectangles ([`polygon_irradiance`]), and for ellipses nearer than they are wide, as polygons of 256
+/// corners and of their area; a product rule of 16 x 32 points for ellipses farther away.
 pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -> LinearRgb {
     let frame = frame(light);
     if frame.normal.dot(&(point - frame.center)) <= 0.0 {
         return LinearRgb::BLACK;
     }
+    let [a, b] = sides(light);
     let factor = match light.shape {
-        LightShape::Rectangle => polygon_irradiance(&frame.corners(sides(light)), point, normal),
+        LightShape::Rectangle => polygon_irradiance(&frame.corners([a, b]), point, normal),
+        LightShape::Ellipse if (point - frame.center).norm() < a.max(b) => {
+            polygon_irradiance(&frame.rim([a, b]), point, normal)
+        }
         LightShape::Ellipse => nodes(light, ELLIPSE_SAMPLES).iter().map(|n| n.irradiance(&frame, point, normal)).sum(),
     };
     radiance(light).scale(factor as f32)
@@ -151,6 +170,13 @@ pub(crate) mod tests {
     fn nothing_is_lit_behind_a_light() {
         let e = irradiance(&square(), Point3::new(0.6, 0.4, 1.9), -Vector3::z());
         assert_eq!(e, LinearRgb::BLACK);
+    }
+
+    #[test]
+    fn an_ellipse_is_the_same_to_a_receiver_just_nearer_and_just_farther_than_it_is_wide() {
+        let light = AreaLight { shape: LightShape::Ellipse, position: [0.0, 0.0, 1.0], size: [1.0, 0.6], ..square() };
+        let [near, far] = [1e-9, -1e-9].map(|z| irradiance(&light, Point3::new(0.0, 0.0, z), Vector3::z()).g);
+        assert!((near / far - 1.0).abs() < 1e-5, "{near} {far}");
     }
 
     #[test]

@@ -35,13 +35,20 @@ pub(crate) fn sky_cells(map: &EnvironmentMap, count: usize, normal: &Vector3<f64
     scaled(map, &map.panorama.even(rows), normal)
 }
 
+/// Side of a square as large as half the sky, radians: `sqrt(2 pi)`.
+const HALF_OF_THE_SKY: f64 = 2.506_628_274_631;
+
 fn scaled(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<SkyPiece> {
     work::add(Kind::MapPieces, pieces.len() as u64);
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
-    let seen: Vec<_> = pieces.iter().filter_map(|piece| over(piece, &local)).collect();
-    let sum = seen.iter().fold([0.0; 3], |sum, (_, e, _)| std::array::from_fn(|c| sum[c] + e[c]));
+    let mut seen: Vec<_> = pieces.iter().filter_map(|piece| over(piece, &local)).collect();
     let whole = map.panorama.irradiance(&local);
+    if seen.is_empty() && whole.iter().any(|&e| e > 0.0) {
+        // A sun has taken all the cuts, on the other side: what little there is here is one piece.
+        seen.push((local, whole, HALF_OF_THE_SKY));
+    }
+    let sum = seen.iter().fold([0.0; 3], |sum, (_, e, _)| std::array::from_fn(|c| sum[c] + e[c]));
     let strength = f64::from(map.strength);
     let scale: [f64; 3] = std::array::from_fn(|c| if sum[c] > 0.0 { strength * whole[c] / sum[c] } else { 0.0 });
     let piece = |(direction, e, width): (Vector3<f64>, [f64; 3], f64)| SkyPiece {

@@ -1,5 +1,5 @@
-//! Single pixels and rows with the digits that Blender prints, and numbers at their extremes. Whole pictures are held against Blender in
-//! `tests/golden`.
+//! Single pixels and rows with the digits that Blender prints. Whole pictures are held against Blender in `tests/golden`, numbers
+//! at their extremes are rows of `petcomp report stability`.
 
 #![expect(clippy::excessive_precision, reason = "numbers with the nine digits that Blender prints")]
 
@@ -94,19 +94,6 @@ fn row_operations_come_out_as_in_blender() {
     assert_eq!(of(LATE, |o| o.feather_distance = -3), inward);
 }
 
-#[test]
-fn a_weak_key_makes_no_nan() {
-    for saturation in [0.0, 1e-30, 1e-10, 1e-3] {
-        let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
-        let photo = Image::from_fn(7, 5, |x, y| LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32));
-        for (_, profile) in Profile::ALL {
-            assert!(
-                key(&photo, screen, &KeyOptions::of(profile)).matte.pixels().iter().all(|m| (0.0..=1.0).contains(&m.0))
-            );
-        }
-    }
-}
-
 fn all_stages(profile: Profile) -> KeyOptions {
     KeyOptions {
         blur_pre: 3,
@@ -116,62 +103,6 @@ fn all_stages(profile: Profile) -> KeyOptions {
         dilate_distance: -2,
         feather_distance: 4,
         ..KeyOptions::of(profile)
-    }
-}
-
-#[test]
-fn extreme_but_finite_pixels_make_no_nan() {
-    let sizes = [1e-42f32, 1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e20, 1e30];
-    let photo = Image::from_fn(17, 13, |x, y| {
-        let at = |k: usize| sizes[(x * 7 + y * 3 + k * 5) % 8] * if (x + y + k).is_multiple_of(5) { -1.0 } else { 1.0 };
-        PremulRgba::new(at(0), at(1), at(2), [0.0, 0.5, 1.0, 1.5][(x + y) % 4])
-    });
-    for (_, profile) in Profile::ALL {
-        for opts in [KeyOptions::of(profile), all_stages(profile)] {
-            let keyed = Keying::new(&photo, Screen::Color(GREEN)).run(&opts).unwrap();
-            assert!(keyed.matte.pixels().iter().all(|m| !m.0.is_nan()), "{opts:?}");
-            assert!(keyed.cutout.pixels().iter().all(|p| !(p.r + p.a).is_nan() && !p.g.is_nan() && !p.b.is_nan()));
-        }
-    }
-}
-
-#[test]
-fn the_robust_profile_defines_and_counts_what_is_no_number() {
-    let mut photo = Image::filled(9, 9, GREEN.opaque());
-    photo[(4, 4)].b = f32::NAN;
-    photo[(5, 4)].a = f32::INFINITY;
-    let garbage = Image::from_fn(9, 9, |x, _| Coverage(if x == 0 { f32::NAN } else { 0.0 }));
-    let job = Keying::new(&photo, Screen::Color(GREEN)).with_garbage(&garbage);
-    let keyed = job.run(&all_stages(Profile::Robust)).unwrap();
-    assert_eq!((keyed.deviations.unusable_pixels, keyed.deviations.unusable_mattes), (2, 9));
-    assert!(keyed.matte.pixels().iter().all(|m| (0.0..=1.0).contains(&m.0)));
-    assert!(keyed.cutout.pixels().iter().all(|p| p.color().is_finite() && p.a.is_finite()));
-}
-
-#[test]
-fn windows_may_be_larger_than_the_picture() {
-    let opts = |profile| KeyOptions {
-        blur_pre: 300,
-        edge_kernel_radius: 100,
-        blur_post: 300,
-        dilate_distance: 100,
-        feather_distance: -100,
-        ..all_stages(profile)
-    };
-    for (width, height) in [(1, 1), (5, 1), (1, 5), (3, 2)] {
-        let photo = Image::from_fn(width, height, |x, y| LinearRgb::new(0.3, 0.2 * (x + y) as f32, 0.25));
-        for (_, profile) in Profile::ALL {
-            let keyed = key(&photo, GREEN, &opts(profile));
-            assert!(keyed.matte.pixels().iter().all(|m| m.0.is_finite()));
-        }
-    }
-}
-
-#[test]
-fn a_picture_without_pixels_has_a_matte_without_pixels() {
-    for size in [(0, 0), (0, 5), (5, 0)] {
-        let keyed = key(&Image::new(size.0, size.1), GREEN, &all_stages(Profile::Blender34));
-        assert!(keyed.matte.is_empty() && keyed.cutout.is_empty());
     }
 }
 

@@ -163,3 +163,25 @@ fn sides_of(mask: &Image<bool>) -> [f64; 4] {
         [columns().next(), rows().next(), columns().next_back().map(|x| x + 1), rows().next_back().map(|y| y + 1)];
     ends.map(|end| end.unwrap_or(0) as f64)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bottle_is_as_long_as_it_is_said_to_be() {
+        let [left, _, right, _] = sides_of(&Take::default().taken().1);
+        // Turned by 0.1, its ends 0.08 and 0.24 of its length high.
+        let length = 0.8 * 600.0 * libm::cos(TURN);
+        assert!((right - left - length).abs() < 0.1 * length * libm::sin(TURN) * 2.0 + 2.0, "{left} to {right}");
+    }
+
+    #[test]
+    fn a_photo_without_noise_of_an_empty_even_screen_is_its_colour() {
+        let take = Take { at: vec![], noise: 0.0, uneven: 0.0, size: (8, 8), ..Take::default() };
+        let (photo, mask) = take.taken();
+        // Half a code of 8 bits at that brightness.
+        assert!(photo.pixels().iter().all(|p| (p.g - GREEN.g).abs() < 0.003));
+        assert!(mask.pixels().iter().all(|inside| !inside));
+    }
+}

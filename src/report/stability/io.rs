@@ -191,10 +191,10 @@ fn strip(message: &str, path: &Path) -> String {
 }
 
 fn lying_png() -> Case {
-    lying("png: header of 2^31 - 1 pixels a side", "a header and nothing behind it", "side", |folder| {
+    lying("png: header of 32767 x 32767 pixels", "a PNG of 17 x 13 that says so", "pixels", |folder| {
         let path = folder.join("a.png");
         let mut png = bytes(&path)?;
-        png[16..24].copy_from_slice(&[0x7f, 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff]);
+        png[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
         let sum = crc32fast::hash(&png[12..29]);
         png[29..33].copy_from_slice(&sum.to_be_bytes());
         save(path, &png)

@@ -5,7 +5,7 @@ use super::{Case, Outcome};
 use crate::error::Result;
 use crate::geom::Point2;
 use crate::image::Image;
-use crate::label::{BBox, LabelOptions, Labels, Mask, ObjectLabel, label};
+use crate::label::{AmodalBox, BBox, LabelOptions, Labels, Mask, ObjectLabel, label};
 use crate::pixel::{Depth, LinearRgb, ObjectId, PremulRgba};
 use crate::render::{DeepImage, DeepSample, RenderOptions, cast};
 use crate::scene::{Card, Shot};
@@ -184,9 +184,11 @@ fn edge_on() -> Case {
     Case::new("objects out of sight", "a card edge-on, one behind the camera, one 3 m away", "no label: 0", || {
         let texture = || Image::<PremulRgba>::filled(8, 8, grey(1.0));
         let edge_on = card(1, [0.0, 0.0, 0.5], tilted(FRAC_PI_2), [0.2; 2], texture());
-        let found =
-            labelled(&shot([64, 48], [edge_on, opaque(2, [0.0, 0.0, 2.0], 0.2), opaque(3, [3.0, 0.0, 0.0], 0.2)]));
-        Ok(Outcome::near(found.objects.len() as f64, 0.0, 0.0, "labels"))
+        let shot = shot([64, 48], [edge_on, opaque(2, [0.0, 0.0, 2.0], 0.2), opaque(3, [3.0, 0.0, 0.0], 0.2)]);
+        let deep = cast(&shot, &RenderOptions::default());
+        let around = |amodal| label(&deep, &shot, &LabelOptions { amodal, ..LabelOptions::default() }).objects.len();
+        let found = around(AmodalBox::Mask) + around(AmodalBox::Outline);
+        Ok(Outcome::near(found as f64, 0.0, 0.0, "labels"))
     })
 }
 

@@ -152,6 +152,15 @@ mod tests {
     }
 
     #[test]
+    fn every_stage_has_cases_and_their_names_are_their_own() {
+        for stage in stages() {
+            let names: Vec<String> = cases(stage).unwrap().into_iter().map(|(_, case)| case.name).collect();
+            let distinct: std::collections::BTreeSet<&String> = names.iter().collect();
+            assert!(!names.is_empty() && distinct.len() == names.len(), "{stage}: {names:?}");
+        }
+    }
+
+    #[test]
     fn a_case_that_panics_or_fails_is_a_row_that_failed() {
         let cases = [
             ("a", Case::new("panics", "", "", || panic!("index 3 of 2"))),

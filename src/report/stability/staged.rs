@@ -97,3 +97,21 @@ pub(super) fn projected_area(card: &Card, camera: &Camera) -> f64 {
     let next = corners.iter().cycle().skip(1);
     0.5 * corners.iter().zip(next).map(|((a, _), (b, _))| a.x * b.y - b.x * a.y).sum::<f64>().abs()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_card_covers_its_size_over_its_distance() {
+        let area = projected_area(&level(1, [0.0, 0.0, 0.1], 0.2, grey(1.0)), &above([96, 96], 400.0));
+        assert!((area - (0.2 * 400.0 / 0.9) * (0.2 * 400.0 / 0.9)).abs() < 1e-9, "{area}");
+    }
+
+    #[test]
+    fn the_middle_of_a_picture_sees_the_target() {
+        let camera = looking_at([0.3, -0.2, 0.8], [0.1, 0.0, 0.0], [40, 30], 50.0);
+        let seen = camera.project(Point3::new(0.1, 0.0, 0.0)).map(|(px, _)| px);
+        assert!(seen.is_some_and(|px| (px - Point2::new(20.0, 15.0)).norm() < 1e-9), "{seen:?}");
+    }
+}
