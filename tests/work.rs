@@ -1,5 +1,7 @@
 //! Large allocations, counted by an allocator that tells: the one of the program.
 
+#![cfg(feature = "settle")]
+
 #[path = "../src/bin/petcomp/allocator.rs"]
 mod allocator;
 

@@ -29,6 +29,11 @@ pub(super) fn grown(side: &Vector3<f64>, by: f64) -> Vector3<f64> {
     Vector3::new(side.x, side.y, side.z + by * (side.x.abs() + side.y.abs()))
 }
 
+/// Ranges have something in common.
+pub(super) fn meet(a: &std::ops::Range<usize>, b: &std::ops::Range<usize>) -> bool {
+    a.start < b.end && b.start < a.end
+}
+
 /// Whole numbers in `low..=high`, cut to `within`.
 pub(super) fn whole(low: f64, high: f64, within: &std::ops::Range<usize>) -> std::ops::Range<usize> {
     // `as` saturates, so infinite ends are cut like all others.

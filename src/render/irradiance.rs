@@ -1,6 +1,7 @@
 //! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
 
 use crate::render::four::Four;
+use crate::render::half_plane::meet;
 use crate::render::lattice::{Place, coarser};
 use crate::render::receiver::{Buffers, Lit, Receiver};
 use rayon::prelude::*;
@@ -120,7 +121,6 @@ impl Map {
 
     /// Does it share nodes with a part of the lattice?
     pub(super) fn meets(&self, columns: Range<usize>, rows: Range<usize>) -> bool {
-        let meet = |a: &Range<usize>, b: &Range<usize>| a.start < b.end && b.start < a.end;
         meet(&self.columns, &columns) && meet(&self.rows, &rows)
     }
 

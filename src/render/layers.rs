@@ -8,7 +8,7 @@ use crate::geom::Vector3;
 use crate::pixel::{Depth, LinearRgb, ObjectId};
 use crate::render::DeepSample;
 use crate::render::four::Four;
-use crate::render::half_plane::{sides, span, whole};
+use crate::render::half_plane::{meet, sides, span, whole};
 use crate::render::irradiance::Map;
 use crate::render::lattice::Place;
 use crate::render::texture::{Baked, Linear, mean};
@@ -136,7 +136,6 @@ impl Block {
 
 impl Layer {
     fn touches(&self, block: &Block) -> bool {
-        let meet = |a: &Range<usize>, b: &Range<usize>| a.start < b.end && b.start < a.end;
         meet(&self.columns, &block.x) && meet(&self.rows, &block.y)
     }
 

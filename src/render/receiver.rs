@@ -9,7 +9,7 @@ use crate::render::RenderOptions;
 use crate::render::four::Four;
 use crate::render::half_plane::{grown, sides, span, whole};
 use crate::render::lattice::Lattice;
-use crate::render::shadow::{Beam, Casters, Readings, rows_and_columns};
+use crate::render::shadow::{Area, Beam, Casters, Readings, rows_and_columns};
 use crate::render::source::{Lamp, Lamps};
 use crate::render::view::{HORIZON, Seen, Sheet};
 use crate::scene::Shot;
@@ -82,7 +82,9 @@ impl Studio<'_> {
         // Two nodes, for the finer lattice's one that lies between them.
         let outline = sides(&seen.u, &seen.v, &seen.w, reach).iter().map(|s| grown(s, 2.0)).collect();
         let cell = seen.cell_metres(&lattice.view, &sheet.center);
-        Some(self.receiver(lattice, seen, Some(own), cell, (all, some)).within(outline, rows, columns))
+        let area = (rows, columns);
+        let receiver = self.receiver(lattice, (seen, &area), Some(own), cell, (all, some));
+        Some(receiver.within(outline, area.0, area.1))
     }
 
     /// The surface; asked for where a shadow may fall on it. None where there is no shadow, or none to be seen.
@@ -101,7 +103,8 @@ impl Studio<'_> {
     fn surface_on(&self, lattice: &Lattice, all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
         let seen = Seen::of(&self.casters.surface, &lattice.view).filter(|s| s.normal.z > 0.0)?;
         let cell = seen.cell_metres(&lattice.view, &Vector3::zeros());
-        let receiver = self.receiver(lattice, seen, None, cell, (all, some));
+        let everywhere = (0..lattice.view.height, 0..lattice.view.width);
+        let receiver = self.receiver(lattice, (seen, &everywhere), None, cell, (all, some));
         let blockers = receiver.lamps.iter().flat_map(|(_, beams)| beams).flat_map(|b| &b.blockers);
         let areas = blockers.map(|b| (b.rows.clone(), b.columns.clone()));
         let (rows, columns) = areas.reduce(|a, b| (union(a.0, b.0), union(a.1, b.1))).unwrap_or((0..0, 0..0));
@@ -111,12 +114,12 @@ impl Studio<'_> {
     fn receiver(
         &self,
         lattice: &Lattice,
-        seen: Seen,
+        (seen, area): (Seen, &Area),
         own: Option<usize>,
         cell: f64,
         (all, some): (&Lamps, &[Lamp]),
     ) -> Receiver {
-        let beams = |lamp: &Lamp| (lamp.radiance, self.casters.beams(&seen, &lattice.view, lamp, own, cell));
+        let beams = |lamp: &Lamp| (lamp.radiance, self.casters.beams((&seen, area), &lattice.view, lamp, own, cell));
         Receiver {
             lamps: some.iter().map(beams).collect(),
             channels: if self.casters.tinted { 3 } else { 1 },

@@ -82,10 +82,12 @@ impl View {
         }
     }
 
-    /// Picture position `(x, y, 1)` of a world point; none at or behind the eye.
-    pub(super) fn project(&self, world: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let p = self.ray.try_inverse()? * (world - self.eye);
-        (p.z > VANISHING && p.iter().all(|c| c.is_finite())).then(|| p / p.z)
+    /// Picture positions `(x, y, 1)` of world points; none where one of them is at or behind the eye.
+    pub(super) fn project<const N: usize>(&self, world: &[Vector3<f64>; N]) -> Option<[Vector3<f64>; N]> {
+        let picture_from_world = self.ray.try_inverse()?;
+        let seen = world.map(|point| picture_from_world * (point - self.eye));
+        let in_front = seen.iter().all(|p| p.z > VANISHING && p.iter().all(|c| c.is_finite()));
+        in_front.then(|| seen.map(|p| p / p.z))
     }
 }
 
@@ -121,7 +123,7 @@ impl Seen {
     /// the middle of the picture where that is behind the eye.
     pub(super) fn cell_metres(&self, view: &View, target: &Vector3<f64>) -> f64 {
         let middle = Vector3::new(0.5 * view.width as f64, 0.5 * view.height as f64, 1.0);
-        let p = view.project(target).unwrap_or(middle);
+        let p = view.project(&[*target]).map_or(middle, |[p]| p);
         let w = self.w.dot(&p).max(self.height / HORIZON);
         let point = self.point * p / w;
         let along = |k: usize| (self.point.column(k) - point * self.w[k]) / w;

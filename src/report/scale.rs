@@ -4,11 +4,9 @@
 //! # Method
 //! Every point is a dataset of its own, made by [`generate`](crate::dataset::generate) in a process of its own: pictures
 //! are rendered, labelled, encoded and written, one to a thread, as in any run. A first picture tells how many more are
-//! worth the time. Seconds are the processor's ([user and system time][stat]), so that other programs on the machine
+//! worth the time. Seconds are the processor's (`CLOCK_PROCESS_CPUTIME_ID`), so that other programs on the machine
 //! disturb little; the rate is by the clock, and memory the most that was ever resident (`VmHWM`). Scenes are made in
 //! code, at rest; falling is measured by itself, in this process.
-//!
-//! [stat]: https://man7.org/linux/man-pages/man5/proc_pid_stat.5.html
 
 mod fit;
 mod forecast;
@@ -23,7 +21,6 @@ pub use grid::Case;
 pub use run::run;
 pub use show::{charts, tables};
 
-use crate::report::settle::settle_seconds;
 use crate::{Error, Result, io};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -84,7 +81,7 @@ pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Me
         process::in_a_child(&options.program, case, options.seconds)
     };
     let points = cases.iter().enumerate().map(of).collect::<Result<_>>()?;
-    let falls = grid::FALLS.iter().map(|&cards| Ok((cards, settle_seconds(cards)?))).collect::<Result<_>>()?;
+    let falls = grid::FALLS.iter().map(|&cards| Ok((cards, run::fall_seconds(cards)?))).collect::<Result<_>>()?;
     Ok(Measured { points, falls })
 }
 

@@ -89,23 +89,6 @@ pub fn measure(options: &SettleReportOptions, progress: impl Fn(u64, u64)) -> Re
     settings.iter().enumerate().map(of).collect()
 }
 
-/// Median seconds that heaps of so many cards take to settle, on this thread.
-///
-/// # Errors
-/// None that a caller can cause: the scenes are made here.
-pub(super) fn settle_seconds(cards: usize) -> Result<f64> {
-    /// Odd, so that the median is one of them.
-    const HEAPS: u64 = 5;
-    let seconds = |k| {
-        let scene = heap(k, cards)?;
-        let start = Instant::now();
-        settle(scene, &SettleOptions::default())?;
-        Ok(start.elapsed().as_secs_f64())
-    };
-    let seconds = (0..HEAPS).map(seconds).collect::<Result<Vec<_>>>()?;
-    Ok(median_and_worst(seconds.into_iter())[0])
-}
-
 fn settings() -> Vec<SettleOptions> {
     let usual = SettleOptions { attempts: 1, ..SettleOptions::default() };
     let pairs = RATES.iter().flat_map(|rate| ITERATIONS.map(|iterations| (*rate, iterations)));
@@ -137,7 +120,7 @@ fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<Row> {
 }
 
 /// Median and greatest; zero of nothing.
-fn median_and_worst(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(super) fn median_and_worst(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     [values.len() / 2, values.len().wrapping_sub(1)].map(|i| values.get(i).copied().unwrap_or(0.0))

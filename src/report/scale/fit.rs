@@ -26,19 +26,27 @@ pub struct Model {
     pub memory: Fit,
 }
 
-const TIME: [&str; 5] = ["picture", "megapixel", "card", "megapixel of a layer", "pair of cards"];
-const MEMORY: [&str; 3] = ["process", "megapixel in hand", "megapixel of a layer in hand"];
+/// Layers shade each other, so that light costs as many readings as there are pairs of layers, and any card may stand
+/// in another's light.
+const TIME: [&str; 6] =
+    ["picture", "megapixel", "card", "megapixel of a layer", "megapixel of layers, squared", "pair of cards"];
+const MEMORY: [&str; 4] = ["process", "megapixel in hand", "megapixel of a layer in hand", "pair of cards in hand"];
 
 /// What a picture has of each term of its time.
 fn time_terms(point: &Point) -> Vec<f64> {
-    let (pixels, cards) = (point.case.megapixels(), point.case.cards as f64);
-    vec![1.0, pixels, cards, pixels * point.layers, 0.5 * cards * (cards - 1.0)]
+    let (pixels, layers) = (point.case.megapixels(), point.layers);
+    vec![1.0, pixels, point.case.cards as f64, pixels * layers, pixels * layers * layers, pairs(point)]
 }
 
 /// What a process has of each term of its memory.
 fn memory_terms(point: &Point) -> Vec<f64> {
-    let in_hand = point.case.threads as f64 * point.case.megapixels();
-    vec![1.0, in_hand, in_hand * point.layers]
+    let (pictures, pixels) = (point.case.threads as f64, point.case.megapixels());
+    vec![1.0, pictures * pixels, pictures * pixels * point.layers, pictures * pairs(point)]
+}
+
+fn pairs(point: &Point) -> f64 {
+    let cards = point.case.cards as f64;
+    0.5 * cards * (cards - 1.0)
 }
 
 impl Model {

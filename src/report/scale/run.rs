@@ -8,9 +8,11 @@ use crate::dataset::{Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::label::{LabelOptions, label};
 use crate::render::{DeepImage, RenderOptions, cast};
+use crate::report::settle::median_and_worst;
 use crate::scene::{
     AreaLight, CameraSource, Exposure, Grade, LightShape, Look, Object, Placement, Scene, Shot, Surface,
 };
+use crate::settle::{SettleOptions, heap, settle};
 use crate::{Error, Image, LinearRgb, PremulRgba, Result, composite, work};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -40,13 +42,13 @@ const MOST: f64 = 1000.0;
 pub fn run(case: &Case, seconds: f64) -> Result<Point> {
     let world = World::of(case);
     let pool = work::pool(case.threads).map_err(|e| Error::value("threads", e))?;
-    let (began, work_before) = (Instant::now(), cpu_seconds()?);
+    let (began, work_before) = (Instant::now(), cpu_seconds());
     let layers = pool.install(|| world.make(1))?;
-    let first = (cpu_seconds()? - work_before).max(began.elapsed().as_secs_f64()).max(1e-3);
+    let first = (cpu_seconds() - work_before).max(began.elapsed().as_secs_f64()).max(1e-3);
     let pictures = (seconds * case.threads as f64 / first).ceil().clamp(case.threads as f64, MOST) as u64;
-    let (began, work_before) = (Instant::now(), cpu_seconds()?);
+    let (began, work_before) = (Instant::now(), cpu_seconds());
     pool.install(|| world.make(pictures))?;
-    let (wall, cpu) = (began.elapsed().as_secs_f64(), cpu_seconds()? - work_before);
+    let (wall, cpu) = (began.elapsed().as_secs_f64(), cpu_seconds() - work_before);
     Ok(Point {
         case: *case,
         layers,
@@ -55,6 +57,19 @@ pub fn run(case: &Case, seconds: f64) -> Result<Point> {
         rate: pictures as f64 / wall,
         peak_bytes: peak_bytes()?,
     })
+}
+
+/// Median seconds of a processor until a heap of so many cards lies still.
+pub(super) fn fall_seconds(cards: usize) -> Result<f64> {
+    const HEAPS: u64 = 5;
+    let seconds = |k| {
+        let scene = heap(k, cards)?;
+        let before = cpu_seconds();
+        settle(scene, &SettleOptions::default())?;
+        Ok(cpu_seconds() - before)
+    };
+    let seconds = (0..HEAPS).map(seconds).collect::<Result<Vec<_>>>()?;
+    Ok(median_and_worst(seconds.into_iter())[0])
 }
 
 /// What pictures of a kind are made from.
@@ -203,15 +218,15 @@ fn cut_out(k: usize) -> Image<PremulRgba> {
 mod tests {
     use super::*;
 
-    const SMALL: Case = Case { threads: 2, image: [64, 48], cards: 5, scale: 1.0 };
+    const SMALL: Case = Case { threads: 2, image: [320, 240], cards: 5, scale: 1.0 };
 
     #[test]
     fn a_point_tells_time_memory_and_layers() {
         let point = run(&SMALL, 0.0).unwrap();
         assert_eq!((point.case, point.pictures), (SMALL, 2));
         assert!(point.rate > 0.0 && point.peak_bytes > 1e6 && point.cpu_seconds >= 0.0);
-        // Five cards of 7 x 21 cm over 94 x 71 cm, less what bottles leave of their cards.
-        assert!((0.03..0.13).contains(&point.layers), "{}", point.layers);
+        // Five cards of 7 x 21 cm over 94 x 71 cm, of which bottles fill 0.79; soft borders touch a few pixels more.
+        assert!((0.08..0.13).contains(&point.layers), "{}", point.layers);
     }
 
     #[test]
@@ -219,6 +234,6 @@ mod tests {
         let layers = |case| mean_layers(&World::of(&case).sample().deep);
         let usual = layers(SMALL);
         assert!(layers(Case { scale: 2.0, ..SMALL }) > 2.5 * usual);
-        assert!((layers(Case { image: [128, 96], ..SMALL }) / usual - 1.0).abs() < 0.15);
+        assert!((layers(Case { image: [640, 480], ..SMALL }) / usual - 1.0).abs() < 0.15);
     }
 }

@@ -1,10 +1,14 @@
 //! What is promised of work: zeros where a thing is absent, more than zero where it is there, and idle switches.
 
+use super::world::dropped;
 use super::*;
-use crate::dataset::Setup;
+use crate::dataset::{Progress, Setup};
 use crate::pixel::LinearRgb;
 use crate::scene::{AreaLight, Finish, Noise, Scene};
 use crate::work::Kind::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 #[test]
 fn scenes_pay_for_what_they_use_and_for_nothing_else() {
@@ -103,6 +107,39 @@ fn quality_where_it_does_not_apply_changes_nothing() {
     let longer = |setup: &mut Setup| setup.scene.settle.time_limit *= 2.0;
     assert!(with(longer, &scene) == with(|_| {}, &scene));
     assert!(with(finest, &scene).0 != with(|_| {}, &scene).0, "quality matters where it applies");
+}
+
+/// A dataset of three scenes: every file and its bytes, but for notes of how long it took.
+fn dataset(world: &World, threads: usize, progress: &(dyn Fn(Progress) + Sync)) -> BTreeMap<PathBuf, Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    let studio = Studio::open(world.setup()).unwrap();
+    let plan = studio.plan(3, 0, folder.path()).unwrap();
+    let make = |_| studio.take(dropped(world.scene()));
+    let pool = crate::work::pool(threads).unwrap();
+    pool.install(|| generate(&plan, make, progress, &AtomicBool::new(false))).unwrap();
+    files(folder.path())
+        .into_iter()
+        .map(|(path, bytes)| (path.strip_prefix(folder.path()).unwrap().into(), bytes))
+        .collect()
+}
+
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let shown = entries.filter(|path| !path.file_name().unwrap().to_string_lossy().starts_with('.'));
+    let below = |path: PathBuf| {
+        if path.is_dir() { files(&path) } else { BTreeMap::from([(path.clone(), std::fs::read(&path).unwrap())]) }
+    };
+    shown.flat_map(below).collect()
+}
+
+#[test]
+fn jobs_and_progress_leave_every_byte() {
+    let world = World::make().unwrap();
+    let alone = dataset(&world, 1, &|_| {});
+    let told = AtomicU64::new(0);
+    let watched = dataset(&world, 3, &|progress| told.store(progress.done, Ordering::Relaxed));
+    assert_eq!((told.into_inner(), alone.len()), (3, 3 * 3 + 3), "pictures, labels, scenes; and three lists");
+    assert!(alone == watched);
 }
 
 #[test]
