@@ -19,7 +19,13 @@ FEATURES  := "" markers oiio settle
 # Seconds for each door of fuzz/.
 FUZZ      := 60
 
-.PHONY: demo test train-test lint bench golden formats python packages blender soak soak-dataset fuzz
+# What `make peers` compares with: Debian packages, and packages of Python. Those of PyTorch's size are left out; with
+# `make peers PEERS_PYTHON="... yolov5"` YOLOv5 takes part too. CORE is the one processor that all of them run on.
+PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
+PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
+CORE         := 0
+
+.PHONY: peers demo test train-test lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins
@@ -73,6 +79,19 @@ bench: packages
 	$(CARGO) bench --locked $(addprefix --bench ,$(BENCHES)) -- --warm-up-time 1 --measurement-time 2
 	$(CARGO) build --release --locked --bins
 	target/release/petcomp report all -o $(REPORT)
+
+# petcomp and other programs on the same input and core, by turns: target/peers/*.json and a table. What cannot be
+# installed is named there as absent.
+peers: packages
+	@$(foreach package,$(PEERS),{ $(call install,$(package)); } || echo "$(package) cannot be installed";)
+	@[ -x target/peers-python/bin/python ] || python3 -m venv target/peers-python
+	@for package in $(PEERS_PYTHON); do \
+	  target/peers-python/bin/python -m pip install --quiet --retries 1 $$package || echo "$$package cannot be installed"; \
+	done
+	$(CARGO) build --release --locked --bins --bench peers
+	@code=0; for stage in matte camera warp convert render settle eval; do \
+	  taskset -c $(CORE) target/peers-python/bin/python tests/benches/peers/$$stage.py -o target/peers || code=1; \
+	done; exit $$code
 
 # Remakes every reference with the other programs; `git diff --stat golden` then shows whether they moved.
 golden: blender

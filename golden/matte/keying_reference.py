@@ -13,7 +13,7 @@ JOBS.json is a list of objects, all done in one Blender session:
     prefix    outputs are written to PREFIX + name + ".exr" as 32-bit float
     outputs   {"Image": "name", "Matte": "name", "Edges": "name"}: which outputs of the node, and their names
     linked    optional: the output that the Composite node gets; the first one where it is not given
-    repeats   optional: render so many times more and print the seconds of each
+    repeats   optional: render so many times more and print the processor seconds of each
 
 There is no colour conversion anywhere, and the compositor runs on the CPU in full precision.  Tried with Blender 3.4.1
 and with bpy 4.2.0 and 4.5.15, whose options are sockets where 3.4 has properties.
@@ -159,10 +159,10 @@ def collect(folder, name, target):
 
 
 def render():
-    started = time.perf_counter()
+    started = time.process_time()
     if "FINISHED" not in bpy.ops.render.render(write_still=False):
         raise RuntimeError("Blender did not finish the render")
-    return time.perf_counter() - started
+    return time.process_time() - started
 
 
 def do(job):

@@ -1,93 +1,251 @@
 #!/usr/bin/env python3
-"""Time Blender's Keying node and petcomp's keyer on the same 4K picture size, one after the other.
+"""Mattes of film: petcomp, Blender's Keying node, ffmpeg's chromakey + despill and PyMatting on the same photos.
 
-    python3 tests/benches/peers/matte.py --blender blender
+    make peers
+    taskset -c 0 target/peers-python/bin/python tests/benches/peers/matte.py [-o FOLDER] [--truth FOLDER]
 
-Blender: seconds of a render whose tree is image -> Keying -> Composite, least of N, less that of image -> Composite; the
-picture is in memory and nothing is written.  "Matte only" links the node's Matte instead of its Image to the Composite,
-which makes a colour of it.  petcomp: `cargo bench --bench matte`, pictures in memory likewise; the lower
-end of criterion's interval.
+The photo is drawn with all that is known of it (bottle.py), or comes from a folder with truth; times and errors are means
+over the photos. Every method gets the same 8-bit photo, made linear, and the mean colour of the screen; some get more:
+
+    petcomp film, mask given    the true coverage of the object
+    PyMatting                   a trimap of the truth: opaque, no object, and the rest unknown
+    ffmpeg                      the similarity and blend of 25 that do best against the truth, beside its defaults
+    the Keying node             the clip levels of 25 that do so (petcomp's keyer, the same to the bit, looks for them)
+
+In process: petcomp by library.rs; Blender renders image -> Keying -> Composite less image -> Composite; ffmpeg repeats the
+frame before its filters, less a run that does not. ffmpeg's display values are made linear before they are put over
+backgrounds. The drawn photo follows the model that `petcomp matte film` solves for; --truth takes photos of a renderer.
 """
 
-import argparse
-import os
-import random
+import itertools
+import json
+import pathlib
 import re
 import statistics
-import subprocess
-import sys
-import tempfile
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..")
-sys.path.insert(0, os.path.join(ROOT, "golden", "matte"))
-import blenders  # noqa: E402
-import exr_file  # noqa: E402
-import pictures  # noqa: E402
+import numpy as np
 
-WIDTH, HEIGHT, SCREEN = 3840, 2160, (0.1, 0.75, 0.2)
-ALL = dict(blur_pre=6, clip_black=0.1, clip_white=0.9, edge_kernel_radius=3, blur_post=4, dilate_distance=3,
-           feather_distance=8)
+import bottle
+import linear
+from side_by_side import CORES, INSIDE, ROOT, WHOLE, Comparison, arguments, here, library, library_seconds, pinned, \
+    seconds_of, spent, told, version
 
-
-def picture(path, patterns=16):
-    """A striped bar before a noisy screen, made of a few rows again and again."""
-    r = random.Random(1)
-
-    def row(front, k):
-        values = []
-        for x in range(WIDTH):
-            cover = min(1.0, max(0.0, (900 - abs(x - WIDTH / 2)) / 8 + 0.5)) if front else 0.0
-            subject = (0.6, 0.3, 0.2)[k] if x // 40 % 2 else (0.75, 0.72, 0.7)[k]
-            values.append(cover * subject + (1 - cover) * SCREEN[k] + r.uniform(-0.01, 0.01))
-        return pictures.floats(values)
-
-    bands = [[row(front, k) for _ in range(patterns)] for front in (False, True) for k in range(3)]
-    inside = range(HEIGHT // 8, HEIGHT * 7 // 8)
-    channels = {c: b"".join(bands[k + 3 * (y in inside)][y % patterns] for y in range(HEIGHT)) for k, c in enumerate("RGB")}
-    channels["A"] = pictures.floats([1.0]) * (WIDTH * HEIGHT)
-    exr_file.write(path, WIDTH, HEIGHT, channels, exr_file.NO_COMPRESSION)
+ERROR = "mean |F + V B - truth| over new backgrounds B, linear light"
+BLENDER = ["-b", "-t", len(CORES), "--factory-startup", "--python-use-system-env", "-noaudio", "-P",
+           "golden/matte/keying_reference.py", "--"]
+REPEATS, FRAMES = 10, 50
+SIMILARITIES, BLENDS = (0.02, 0.05, 0.1, 0.15, 0.2), (0.0, 0.05, 0.1, 0.2, 0.4)
+UNCLIPPED = 0.0, 1.0
+BLACKS, WHITES = (0.0, 0.1, 0.2, 0.3, 0.5), (0.6, 0.7, 0.8, 0.9, 1.0)
 
 
-def time_blender(version, command, repeats):
-    with tempfile.TemporaryDirectory() as folder:
-        path = os.path.join(folder, "input.exr")
-        picture(path)
-        common = dict(input=path, prefix=folder + os.sep, outputs={}, repeats=repeats)
-        key = dict(key_color=SCREEN)
-        jobs = [dict(common, node="empty", params={}), dict(common, node="keying", params=key),
-                dict(common, node="keying", params=key, linked="Matte"),
-                dict(common, node="keying", params=dict(key, **ALL))]
-        said = blenders.run(version, command, jobs)
-    seconds = [float(s) for s in re.findall(r"render seconds: ([\d.]+)", said)]
-    empty, defaults, matte, everything = (seconds[i * repeats:(i + 1) * repeats] for i in range(4))
-    for name, times in (("empty tree", empty), ("defaults", defaults), ("matte only", matte), ("all stages", everything)):
-        print("Blender %s, %s: least %.1f ms, median %.1f ms" % (version, name, min(times) * 1e3,
-                                                                 statistics.median(times) * 1e3))
-    return {"defaults": min(defaults) - min(empty), "matte only": min(matte) - min(empty), "all stages": min(everything) - min(empty)}
+class Files:
+    """The photos as files, and what the methods made of them."""
+
+    def __init__(self, folder, photos):
+        folder.mkdir(parents=True, exist_ok=True)
+        self.folder, self.photos = folder, list(enumerate(photos))
+        for i, photo in self.photos:
+            linear.write_exr(self.at(i, "photo.exr"), photo.seen)
+            linear.write_codes(self.at(i, "photo.png"), np.round(255 * linear.to_srgb(photo.seen)).astype(np.uint8))
+            linear.write_codes(self.at(i, "cover.png"), np.round(255 * photo.cover).astype(np.uint8))
+
+    def at(self, i, name):
+        return self.folder / f"{i}_{name}"
+
+    def mean(self, action):
+        """Of what an action gives for number and photo."""
+        return statistics.fmean(action(i, photo) for i, photo in self.photos)
+
+    def judged(self, read):
+        """The errors as a Peer wants them, of films that are read once a run is done."""
+        return dict(error=lambda: self.mean(lambda i, photo: bottle.errors(photo, *read(i))["error"]),
+                    more=lambda: {"alpha_error": self.mean(lambda i, photo: bottle.errors(photo, *read(i))["alpha_error"])})
+
+    def film(self, name):
+        """What `petcomp matte film` wrote."""
+        return self.judged(lambda i: (linear.read_exr(self.at(i, name)), linear.read_exr(self.at(i, name), ["VR", "VG", "VB"])))
+
+    def premultiplied(self, name):
+        return self.judged(lambda i: (linear.read_exr(self.at(i, name)), 1 - linear.read_exr(self.at(i, name), "A")))
+
+    def straight(self, name):
+        """Display-encoded with straight alpha."""
+        def read(i):
+            codes = linear.read_codes(self.at(i, name))
+            return linear.from_srgb(codes[..., :3]) * codes[..., 3:], 1 - codes[..., 3:]
+        return self.judged(read)
 
 
-def time_petcomp():
-    said = subprocess.run(["cargo", "bench", "--bench", "matte", "--", "--noplot"], cwd=ROOT, stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL, text=True, check=True).stdout
-    unit = {"ns": 1e-9, "µs": 1e-6, "ms": 1e-3, "s": 1.0}
-    found = re.findall(r"^(matte/\S+ ?[^\n]*?)\s+time:\s+\[(\S+) (\S+)", said, re.M)
-    return {name.strip().split("/", 2)[2]: float(value) * unit[u] for name, value, u in found}
+def screen(photo):
+    return ",".join(f"{c:.5f}" for c in photo.screen)
+
+
+def petcomps(comparison, files, args):
+    ours, program = version([args.petcomp, "--version"]), library()
+
+    def add(setting, work, *words, times=REPEATS, **judged):
+        task = lambda i, photo: [program, times, work, files.at(i, "photo.exr"), *(word(i, photo) for word in words)]
+        comparison.add("petcomp", ours, setting, told(pinned(*task(*files.photos[0]))),
+                       lambda: files.mean(lambda i, photo: library_seconds(*task(i, photo))), **judged)
+
+    cover = lambda i, _: files.at(i, "cover.png")
+    for i, photo in files.photos:
+        film = pinned(args.petcomp, "-q", "matte", "film", files.at(i, "photo.exr"), "-o")
+        seconds_of([*film, str(files.at(i, "film.exr"))])
+        seconds_of([*film, str(files.at(i, "within.exr")), "--mask", str(cover(i, photo))])
+    add("film, default", "cut", **files.film("film.exr"))
+    add("film, mask given", "film", cover, **files.film("within.exr"))
+    keyed(files, args, *UNCLIPPED, name="key.exr")
+    add("key", "key", lambda _, photo: screen(photo), times=20 * REPEATS, **files.premultiplied("key.exr"))
+
+
+def keyed(files, args, black, white, name):
+    """petcomp's keyer on all photos; its error."""
+    for i, photo in files.photos:
+        seconds_of(pinned(args.petcomp, "-q", "matte", "key", files.at(i, "photo.exr"), "--screen", screen(photo), "--set",
+                          f"key.clip_black={black}", "--set", f"key.clip_white={white}", "-o", files.at(i, name)))
+    return files.premultiplied(name)["error"]()
+
+
+def keying_nodes(comparison, files, args):
+    levels = min(itertools.product(BLACKS, WHITES), key=lambda pair: keyed(files, args, *pair, name="clipped.exr"))
+    add_keying_node(comparison, files, args, "defaults", UNCLIPPED, "keying")
+    add_keying_node(comparison, files, args, "clip black {}, white {} (best of 25)".format(*levels), levels, "keying_clipped")
+
+
+def add_keying_node(comparison, files, args, setting, levels, name):
+    listing = files.folder / f"{name}.json"
+    command = pinned(args.blender, *BLENDER, listing)
+    jobs = []
+    for i, photo in files.photos:
+        common = dict(input=str(files.at(i, "photo.exr")), prefix=str(files.at(i, "")), repeats=REPEATS)
+        jobs.append(dict(common, node="empty", params={}, outputs={}))
+        params = dict(key_color=list(photo.screen), clip_black=levels[0], clip_white=levels[1])
+        jobs.append(dict(common, node="keying", params=params, outputs={"Image": name}))
+    listing.write_text(json.dumps(jobs))
+
+    def run():
+        said = spent(command)[1]
+        seconds = list(map(float, re.findall(r"render seconds: ([\d.]+)", said)))
+        if len(seconds) != REPEATS * len(jobs):
+            raise RuntimeError(said[-300:])
+        middle = [statistics.median(seconds[k:k + REPEATS]) for k in range(0, len(seconds), REPEATS)]
+        return (sum(middle[1::2]) - sum(middle[::2])) / len(files.photos)
+
+    comparison.add("Blender Keying", version([args.blender, "--version"]), setting, told(command), run, beside="key",
+                   **files.premultiplied(f"{name}.exr"))
+
+
+def chromakey(args, files, i, photo, similarity, blend, *, frames=0, out=None):
+    codes = "0x" + "".join(f"{round(255 * c):02x}" for c in linear.to_srgb(photo.screen))
+    loop = f"loop=loop={frames}:size=1," if frames else ""
+    filters = f"{loop}format=yuva444p,chromakey={codes}:{similarity}:{blend},format=rgba,despill=green"
+    sink = [out] if out else ["-f", "null", "-"]
+    return pinned(args.ffmpeg, "-v", "error", "-y", "-threads", len(CORES), "-filter_threads", len(CORES), "-i",
+                  files.at(i, "photo.png"), "-vf", filters, "-pix_fmt", "rgba", *sink)
+
+
+def best_chromakey(args, files):
+    """Similarity and blend that suit these photos best: a person would look for them too."""
+    def error(pair):
+        for i, photo in files.photos:
+            seconds_of(chromakey(args, files, i, photo, *pair, out=files.at(i, "chromakey.png")))
+        return files.straight("chromakey.png")["error"]()
+    return min(itertools.product(SIMILARITIES, BLENDS), key=error)
+
+
+def chromakeys(comparison, files, args, whole, beside):
+    best = best_chromakey(args, files)
+    add_chromakey(comparison, files, args, "similarity 0.01, blend 0 (its defaults)", (0.01, 0.0), whole, beside)
+    add_chromakey(comparison, files, args, "similarity {}, blend {} (best of 25)".format(*best), best, whole, beside)
+
+
+def add_chromakey(comparison, files, args, setting, pair, whole, beside):
+    name, frames = "chromakey_%s_%s.png" % pair, 0 if whole else FRAMES
+
+    def alone(i, photo):
+        return seconds_of(chromakey(args, files, i, photo, *pair, out=files.at(i, name)))
+
+    def repeated(i, photo):
+        alone(i, photo)
+        many, one = (seconds_of(chromakey(args, files, i, photo, *pair, frames=n)) for n in (frames, 0))
+        return (many - one) / frames
+
+    command = chromakey(args, files, *files.photos[0], *pair, frames=frames, out=whole and files.at(0, name))
+    comparison.add("ffmpeg chromakey + despill", version([args.ffmpeg, "-version"]), setting, told(command),
+                   lambda: files.mean(alone if whole else repeated), beside=beside, **files.straight(name))
+
+
+def pymattings(comparison, files):
+    import pymatting
+    films = {}
+
+    def trimap(photo):
+        opaque, nothing = photo.passes.max(axis=-1) <= 0.01, photo.cover == 0
+        return np.where(opaque, 1.0, np.where(nothing, 0.0, 0.5))
+
+    def run(alpha_of, name):
+        def one(i, photo):
+            def solve():
+                alpha = alpha_of(photo.seen, trimap(photo))
+                return alpha, pymatting.estimate_foreground_ml(photo.seen, alpha)
+            seconds, (alpha, front) = here(solve)
+            films[name, i] = (alpha[..., None] * front, 1 - alpha[..., None])
+            return seconds
+        return lambda: files.mean(one)
+
+    for name, alpha_of in (("closed form", pymatting.estimate_alpha_cf), ("KNN", pymatting.estimate_alpha_knn)):
+        small = np.s_[::8, ::8]  # what is compiled when first met is compiled before the clock runs
+        photo = files.photos[0][1]
+        alpha = alpha_of(np.ascontiguousarray(photo.seen[small]), np.ascontiguousarray(trimap(photo)[small]))
+        pymatting.estimate_foreground_ml(np.ascontiguousarray(photo.seen[small]), alpha)
+        command = f"{alpha_of.__name__}(photo, trimap); estimate_foreground_ml(photo, alpha)"
+        comparison.add("PyMatting", pymatting.__version__, f"{name}, trimap of the truth", command, run(alpha_of, name),
+                       **files.judged(lambda i, name=name: films[name, i]), beside="film, mask given")
+
+
+def commands(files, args):
+    """What a person types: from a PNG to a file with alpha."""
+    comparison = Comparison("matte commands", args, WHOLE, described(files), ERROR, "the photo's own F and V")
+    ours = version([args.petcomp, "--version"])
+    def add(setting, words, judged):
+        command = lambda i, photo: pinned(args.petcomp, "-q", "-j", len(CORES), "matte", *words(i, photo))
+        comparison.add("petcomp", ours, setting, told(command(*files.photos[0])),
+                       lambda: files.mean(lambda i, photo: seconds_of(command(i, photo))), **judged)
+    add("film to EXR, default", lambda i, _: ["film", files.at(i, "photo.png"), "-o", files.at(i, "film.exr")], files.film("film.exr"))
+    add("key to PNG", lambda i, photo: ["key", files.at(i, "photo.png"), "--screen", screen(photo), "-o", files.at(i, "key.png")],
+        files.straight("key.png"))
+    with comparison.absent_if_it_fails("ffmpeg chromakey + despill"):
+        chromakeys(comparison, files, args, whole=True, beside="key to PNG")
+    comparison.finish()
+
+
+def described(files):
+    photo = files.photos[0][1]
+    return f"{len(files.photos)} photo(s) of film on a screen, {photo.name}" + (" and others" if len(files.photos) > 1 else "")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("-n", type=int, default=10, dest="repeats", help="renders of each tree (default: 10)")
-    blenders.add_arguments(parser)
+    parser = arguments(__doc__)
+    parser.add_argument("--truth", type=pathlib.Path, metavar="FOLDER", help="photos with truth instead of the drawn one")
+    parser.add_argument("--most", type=int, default=4, help="photos of that folder to take (default: %(default)s)")
+    parser.add_argument("--size", type=int, nargs=2, default=[640, 480], metavar=("W", "H"), help="of the drawn photo")
+    parser.add_argument("--blender", default="blender", metavar="PROGRAM")
+    parser.add_argument("--ffmpeg", default="ffmpeg", metavar="PROGRAM")
     args = parser.parse_args()
-    ours = time_petcomp()
-    for name, seconds in ours.items():
-        print("petcomp %s: %.2f ms, %.2f of a copy" % (name, seconds * 1e3, seconds / ours["copy"]))
-    for version, command in blenders.chosen(args).items():
-        net = time_blender(version, command, args.repeats)
-        profile = blenders.PROFILES[version]
-        for name, of in (("defaults", "key/defaults"), ("matte only", "key/matte only"), ("all stages", "key/all stages, %s" % profile)):
-            print("Blender %s, %s: %.1f ms net; petcomp %.2f ms: %.1f times as fast" % (
-                version, name, net[name] * 1e3, ours[of] * 1e3, net[name] / ours[of]))
+    photos = bottle.known(args.truth, args.most) if args.truth else [bottle.drawn(*args.size)]
+    files = Files(args.output / "matte", photos)
+    comparison = Comparison("matte", args, INSIDE, described(files), ERROR, "the photo's own F and V")
+    petcomps(comparison, files, args)
+    with comparison.absent_if_it_fails("Blender Keying"):
+        keying_nodes(comparison, files, args)
+    with comparison.absent_if_it_fails("ffmpeg chromakey + despill"):
+        chromakeys(comparison, files, args, whole=False, beside="key")
+    with comparison.absent_if_it_fails("PyMatting"):
+        pymattings(comparison, files)
+    comparison.finish()
+    commands(files, args)
 
 
 if __name__ == "__main__":

@@ -1,70 +1,131 @@
 #!/usr/bin/env python3
-"""Renders a scene with Blender's Cycles at many sample counts: the other curve of `petcomp report render`.
+"""A scene rendered by petcomp at its presets and by Blender's Cycles at many sample counts.
 
-    python3 tests/benches/peers/render.py golden/render/pile_of_20/scene.json -o cycles --size 320 240
+    make peers
+    taskset -c 0 target/peers-python/bin/python tests/benches/peers/render.py [SCENE] [-o FOLDER] [--size W H]
+    target/release/petcomp report render SCENE --size W H --cycles FOLDER/render    (the same points as a chart of its own)
 
 The scene is a file of golden/render/scene_reference.py: one of golden/render, or one that
-`petcomp scene export SCENE --to cycles DIR` wrote.  OUT gets one scene-linear picture per sample count
-(spp_00016.exr) and times.json: CPU seconds of the render itself (all threads; without starting Blender, loading
-files or saving).  The largest count is what the others are held against.  Pictures that are there are kept.
+`petcomp scene export SCENE --to cycles DIR` wrote. Seconds are those of the rendering alone, without start, files and
+textures' pyramids, as each program tells its own processor time. Error: `petcomp report render` measures both programs'
+against the picture of the largest count, which has its own seed and is kept for the next run. FOLDER/render gets Cycles'
+pictures (spp_00016.exr) and times.json.
 """
 
-import argparse
+import csv
 import json
-import os
+import pathlib
 import shutil
-import subprocess
+import statistics
 import tempfile
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-SCRIPT = os.path.join(HERE, "..", "..", "..", "golden", "render", "scene_reference.py")
-COUNTS = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 4096]
+from side_by_side import CORES, INSIDE, Comparison, arguments, pinned, spent, told, version
+
+SCRIPT = "golden/render/scene_reference.py"
+DEFAULT_PRESET = "fast"
+PRESETS = ("draft", "fast", "good", "high", "reference")
 
 
-def render(blender, scene, count, size, threads, out):
-    """Renders once; returns CPU seconds and the program's version."""
-    with tempfile.TemporaryDirectory() as work:
-        command = [blender, "-b", "--factory-startup", "--python-use-system-env", "-noaudio", "-P", SCRIPT, "--", scene,
-                   "--out", work, "--samples", str(count), "--threads", str(threads), "--seed", str(count)]
-        if size:
-            command += ["--size", *map(str, size)]
-        run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        if run.returncode:
-            raise SystemExit(run.stdout)
-        shutil.copy(os.path.join(work, "beauty.exr"), out)
-        with open(os.path.join(work, "report.json")) as handle:
-            report = json.load(handle)
-    seconds = report["cpu_seconds"]
-    return seconds["render_beauty"] + seconds.get("render_passing", 0.0), report["blender"]
+class Cycles:
+    """Cycles' pictures of a scene in a folder."""
+
+    def __init__(self, args):
+        self.args, self.folder = args, args.output / "render"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.program, self.seconds = version([args.blender, "--version"]), {}
+
+    def command(self, samples, work):
+        return pinned(self.args.blender, "-b", "--factory-startup", "--python-use-system-env", "-noaudio", "-P", SCRIPT, "--",
+                      self.args.scene, "--out", work, "--samples", samples, "--threads", len(CORES), "--seed", samples,
+                      "--size", *self.args.size)
+
+    def render(self, samples):
+        """Processor seconds of one rendering; its picture is kept."""
+        with tempfile.TemporaryDirectory() as work:
+            said = spent(self.command(samples, work))[1]
+            report = pathlib.Path(work, "report.json")
+            if not report.exists():
+                raise RuntimeError(said[-300:])
+            seconds = json.loads(report.read_text())["cpu_seconds"]
+            shutil.copy(pathlib.Path(work, "beauty.exr"), self.folder / self.name(samples))
+        took = seconds["render_beauty"] + seconds.get("render_passing", 0.0)
+        self.seconds.setdefault(samples, []).append(took)
+        self.tell()
+        return took
+
+    def name(self, samples):
+        return "spp_%05d.exr" % samples
+
+    def tell(self):
+        pictures = [{"samples": samples, "file": self.name(samples), "cpu_seconds": round(statistics.median(seconds), 4)}
+                    for samples, seconds in sorted(self.seconds.items())]
+        (self.folder / "times.json").write_text(json.dumps({"program": self.program, "pictures": pictures}, indent=1) + "\n")
+
+    def reference(self, samples):
+        """The picture that all are held against: of an earlier run with the same settings, or rendered now."""
+        kept, asked = self.folder / "reference.json", [str(self.args.scene), self.args.size, samples, self.program]
+        told_before = json.loads(kept.read_text()) if kept.exists() else {}
+        if told_before.get("asked") == asked and (self.folder / self.name(samples)).exists():
+            self.seconds[samples] = [told_before["seconds"]]
+        else:
+            kept.write_text(json.dumps({"asked": asked, "seconds": self.render(samples)}))
+        self.tell()
+
+
+class Report:
+    """What `petcomp report render` tells, once a round."""
+
+    def __init__(self, args, cycles):
+        self.rounds, self.folder = [], args.output / "render" / "report"
+        self.command = pinned(args.petcomp, "-q", "-j", len(CORES), "report", "render", args.scene, "-o", self.folder, "--size",
+                              *args.size, "--cycles", cycles, "--golden", self.folder / "no_golden", "--repeats", 1)
+
+    def rows(self, number):
+        """By program's first word and setting."""
+        while len(self.rounds) <= number:
+            spent(self.command)
+            with open(self.folder / "render.csv", newline="") as source:
+                self.rounds.append({(row["program"].split()[0], row["setting"]): row for row in csv.DictReader(source)})
+        return self.rounds[number]
+
+    def seconds(self, preset):
+        """A function that gives the next round's seconds each time."""
+        numbers = iter(range(1 << 30))
+        return lambda: float(self.rows(next(numbers))["petcomp", preset]["CPU s"])
+
+    def error(self, *key):
+        """Of the last round: Cycles' pictures of it were there before."""
+        return float(self.rounds[-1][key]["RMSE to Cycles"])
+
+
+def compare(comparison, args, cycles):
+    """Cycles first: petcomp's report of a round is to find the pictures of that round."""
+    report, ours = Report(args, cycles.folder), version([args.petcomp, "--version"])
+    for samples in args.counts:
+        comparison.add("Cycles", cycles.program, f"{samples} spp", told(cycles.command(samples, "OUT")),
+                       lambda samples=samples: cycles.render(samples),
+                       lambda samples=samples: report.error("Cycles", f"{samples} spp"))
+    for preset in PRESETS:
+        setting = preset + (", default" if preset == DEFAULT_PRESET else "")
+        comparison.add("petcomp", ours, setting, told(report.command), report.seconds(preset),
+                       lambda preset=preset: report.error("petcomp", preset))
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene")
-    parser.add_argument("-o", "--out", required=True)
-    parser.add_argument("--size", type=int, nargs=2, metavar=("W", "H"))
-    parser.add_argument("--counts", type=int, nargs="+", default=COUNTS)
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--blender", default="blender")
+    parser = arguments(__doc__)
+    parser.add_argument("scene", nargs="?", type=pathlib.Path, default=pathlib.Path("golden/render/pile_of_20/scene.json"))
+    parser.add_argument("--size", type=int, nargs=2, default=[160, 120], metavar=("W", "H"))
+    parser.add_argument("--counts", type=int, nargs="+", default=[1, 4, 16, 64, 256], help="samples per pixel")
+    parser.add_argument("--reference", type=int, default=2048, help="samples per pixel of the reference (default: %(default)s)")
+    parser.add_argument("--blender", default="blender", metavar="PROGRAM")
     args = parser.parse_args()
-    os.makedirs(args.out, exist_ok=True)
-    table = os.path.join(args.out, "times.json")
-    told = {"program": "", "pictures": []}
-    if os.path.exists(table):
-        with open(table) as handle:
-            told = json.load(handle)
-    for count in args.counts:
-        picture = "spp_%05d.exr" % count
-        if any(entry["file"] == picture for entry in told["pictures"]):
-            continue
-        seconds, told["program"] = render(args.blender, args.scene, count, args.size, args.threads,
-                                          os.path.join(args.out, picture))
-        told["pictures"].append({"samples": count, "file": picture, "cpu_seconds": round(seconds, 4)})
-        told["pictures"].sort(key=lambda entry: entry["samples"])
-        with open(table, "w") as handle:
-            json.dump(told, handle, indent=1)
-            handle.write("\n")
-        print("%5d spp: %.2f CPU s" % (count, seconds), flush=True)
+    comparison = Comparison("render", args, INSIDE, "{}, {} x {}".format(args.scene, *args.size), "root mean square, linear light",
+                            f"Cycles at {args.reference} samples per pixel")
+    with comparison.absent_if_it_fails("Cycles"):
+        cycles = Cycles(args)
+        cycles.reference(args.reference)
+        compare(comparison, args, cycles)
+    comparison.finish()
 
 
 if __name__ == "__main__":

@@ -1,30 +1,29 @@
 #!/usr/bin/env python3
 """Settles the same heaps in Bullet and in petcomp, side by side.
 
-    petcomp report settle --peers heaps.json
-    python3 -m venv venv && venv/bin/pip install pybullet numpy
-    taskset -c 0 venv/bin/python tests/benches/peers/settle.py heaps.json
+    make peers
+    taskset -c 0 target/peers-python/bin/python tests/benches/peers/settle.py [-o FOLDER]
 
-Both run on one thread. Bullet gets the same boxes, masses, friction, walls and starts, in three settings: its own
-defaults; petcomp's step and the scale that is recommended for small bodies (lengths times ten, gravity too); and that
-with a larger solver effort. It stops as petcomp does: all bodies slower than 1 cm/s and 0.5 rad/s for 0.5 s, or after
-30 s. Overlap is measured for both by the separating-axis test below, in double precision.
+Three heaps each of 20 and of 5 cards (and of 60, `--counts 20 5 60`, which takes minutes a round), which `petcomp report settle --peers` draws and settles. Bullet gets the same boxes,
+masses, friction, walls and starts, in three settings: its own defaults; petcomp's step and the scale that is recommended
+for small bodies (lengths times ten, gravity too); and that with a larger solver effort. It stops as petcomp does: all
+bodies slower than 1 cm/s and 0.5 rad/s for 0.5 s, or after 30 s. Seconds are those of one heap in memory: petcomp's
+(library.rs) with the judgement of its end, Bullet's with the calls from Python, two a body and step. Overlap, the deepest
+of three heaps, is measured for both by the separating-axis test below, in double precision.
 """
 import json
-import statistics
-import sys
-import time
 
 import numpy as np
-import pybullet as p
 
-RUNS = 5
+from side_by_side import INSIDE, Comparison, arguments, here, library, library_seconds, pinned, seconds_of, told, version
+
+TIMES = 3
 SLOW, SLOW_TURN, STILL, LIMIT = 0.01, 0.5, 0.5, 30.0
 WALL = 0.5
 SETTINGS = {
-    "bullet 1/240 s": dict(step=1 / 240, iterations=50, scale=1.0),
-    "bullet 1/480 s, x10": dict(step=1 / 480, iterations=50, scale=10.0),
-    "bullet 1/960 s, x10, 200": dict(step=1 / 960, iterations=200, scale=10.0),
+    "1/240 s, its default": dict(step=1 / 240, iterations=50, scale=1.0),
+    "1/480 s, x10": dict(step=1 / 480, iterations=50, scale=10.0),
+    "1/960 s, x10, 200": dict(step=1 / 960, iterations=200, scale=10.0),
 }
 
 
@@ -38,7 +37,7 @@ def rest(obj):
     return at["translation"], at["rotation"]
 
 
-def world(case, step, iterations, scale):
+def world(p, case, step, iterations, scale):
     scene = case["scene"]
     p.resetSimulation()
     p.setGravity(0, 0, -9.81 * scale)
@@ -62,23 +61,19 @@ def world(case, step, iterations, scale):
     return bodies
 
 
-def fall(case, step, iterations, scale):
-    """Poses at the end in metres, seconds simulated (none where it did not rest), seconds it took, those of the steps alone."""
-    before = time.perf_counter()
-    bodies = world(case, step, iterations, scale)
-    still, steps, rested, stepping = 0.0, 0, False, 0.0
+def fall(p, case, step, iterations, scale):
+    """Poses at the end in metres, and whether it came to rest."""
+    bodies = world(p, case, step, iterations, scale)
+    still, steps, rested = 0.0, 0, False
     while steps * step < LIMIT and not rested:
-        a = time.perf_counter()
         p.stepSimulation()
-        stepping += time.perf_counter() - a
         steps += 1
         speeds = [p.getBaseVelocity(body) for body in bodies]
         slow = all(np.dot(v, v) < (SLOW * scale) ** 2 and np.dot(w, w) < SLOW_TURN**2 for v, w in speeds)
         still = still + step if slow else 0.0
         rested = still >= STILL
     poses = [p.getBasePositionAndOrientation(body) for body in bodies]
-    poses = [([v / scale for v in position], rotation) for position, rotation in poses]
-    return poses, steps * step if rested else None, time.perf_counter() - before, stepping
+    return [([v / scale for v in position], rotation) for position, rotation in poses], rested
 
 
 def axes(rotation):
@@ -115,20 +110,59 @@ def judge(poses, case):
     return deepest, outside
 
 
-def main():
-    cases = json.load(open(sys.argv[1]))
+def judged(cases, ends):
+    """The worst of some heaps."""
+    overlaps, outside = zip(*(judge(poses, case) for case, (poses, _) in zip(cases, ends)))
+    return {"error": 1e3 * max(overlaps), "outside": sum(outside), "at_rest": sum(rested for _, rested in ends)}
+
+
+def petcomps(comparison, args, heaps):
+    program = library()
+    for count, cases in heaps.items():
+        scenes = []
+        for k, case in enumerate(cases):
+            scenes.append(args.output / "settle" / f"{count}_{k}.json")
+            scenes[-1].write_text(json.dumps(case["scene"]))
+        ends = [([rest(obj) for obj in case["settled"]["objects"]], True) for case in cases]
+        setting = f"default, {count} cards"
+        add(comparison, "petcomp", version([args.petcomp, "--version"]), setting, told(pinned(program, TIMES, "settle", *scenes)),
+            lambda scenes=scenes: library_seconds(program, TIMES, "settle", *scenes) / len(scenes), cases, ends, setting)
+
+
+def bullets(comparison, heaps):
+    import importlib.metadata
+    import pybullet as p
     p.connect(p.DIRECT)
-    print("| heap | program | rests after s | overlap mm | outside | time ms (median of 5) | steps alone ms |\n|" + " --- |" * 7)
-    for case in cases:
-        overlap, outside = judge([rest(obj) for obj in case["settled"]["objects"]], case)
-        ms = statistics.median(case["wall_ms"])
-        print(f"| {case['name']} | petcomp | yes | {overlap * 1e3:.3f} | {outside} | {ms:.1f} | |")
+    for count, cases in heaps.items():
         for name, setting in SETTINGS.items():
-            runs = [fall(case, **setting) for _ in range(RUNS)]
-            overlap, outside = judge(runs[0][0], case)
-            ms, steps = (statistics.median(run[k] for run in runs) * 1e3 for k in (2, 3))
-            seconds = "no" if runs[0][1] is None else f"{runs[0][1]:.2f}"
-            print(f"| {case['name']} | {name} | {seconds} | {overlap * 1e3:.3f} | {outside} | {ms:.1f} | {steps:.1f} |", flush=True)
+            ends = []
+            def run(ends=ends, cases=cases, setting=setting):
+                seconds, ends[:] = here(lambda: [fall(p, case, **setting) for case in cases])
+                return seconds / len(cases)
+            add(comparison, "Bullet", importlib.metadata.version("pybullet"), f"{name}, {count} cards", f"pybullet.stepSimulation() with {setting}",
+                run, cases, ends, f"default, {count} cards")
+
+
+def add(comparison, program, tells, setting, command, run, cases, ends, beside):
+    comparison.add(program, tells, setting, command, run, lambda: judged(cases, ends)["error"], beside,
+                   lambda: {key: judged(cases, ends)[key] for key in ("outside", "at_rest")})
+
+
+def main():
+    parser = arguments(__doc__)
+    parser.add_argument("--counts", type=int, nargs="+", default=[20, 5], help="cards a heap: 5, 20 or 60")
+    args = parser.parse_args()
+    (args.output / "settle").mkdir(parents=True, exist_ok=True)
+    drawn = args.output / "settle" / "heaps.json"
+    seconds_of(pinned(args.petcomp, "-q", "-j", 1, "report", "settle", "--peers", drawn))
+    cases = json.loads(drawn.read_text())
+    heaps = {count: [case for case in cases if len(case["boxes"]) == count] for count in args.counts}
+    comparison = Comparison("settle", args, INSIDE, "heaps of cards that fall into a tray", "deepest overlap, mm",
+                            "bodies that do not sink into each other")
+    petcomps(comparison, args, heaps)
+    with comparison.absent_if_it_fails("Bullet"):
+        bullets(comparison, heaps)
+    comparison.finish()
 
 
 if __name__ == "__main__":

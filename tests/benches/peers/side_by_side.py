@@ -1,0 +1,171 @@
+"""Runs petcomp and other programs on the same input and cores, round by round, and writes what came of it.
+
+A script makes a Comparison, adds a Peer for every program and setting, and ends with `finish`. In every round each peer
+runs once, so that whatever else the machine does hits all of them. Seconds are those of the processor, user and system
+together, of all threads and children: on the one core that `taskset` gives they are what a quiet machine's clock shows.
+
+A comparison counts either WHOLE processes, with their start and their files, or only the work INSIDE them, never both. A
+point is set beside petcomp's default, or beside another setting of petcomp that does the same thing.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import pathlib
+import re
+import resource
+import shlex
+import statistics
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from typing import Callable
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+WHOLE = "whole processes, with their start and their files"
+INSIDE = "the work alone, pictures and data in memory"
+CORES = sorted(os.sched_getaffinity(0))
+PINNED = ["taskset", "-c", ",".join(map(str, CORES))]
+
+
+@dataclass
+class Peer:
+    """A program at one setting. `run` does the work once and returns seconds; `error` judges what the last run left."""
+
+    program: str
+    version: str
+    setting: str
+    command: str
+    run: Callable[[], float]
+    error: Callable[[], float]
+    beside: str = ""
+    more: Callable[[], dict] = dict
+    seconds: list = field(default_factory=list)
+
+    def point(self):
+        return {"program": self.program, "version": self.version, "setting": self.setting, "command": self.command,
+                "error": float(self.error()), "seconds": statistics.median(self.seconds), "runs": len(self.seconds),
+                "least": min(self.seconds), "most": max(self.seconds), "beside": self.beside, **self.more()}
+
+
+class Comparison:
+    """What is compared, and the peers that take part or are absent."""
+
+    def __init__(self, stage, args, counted, input, error, reference):
+        self.stage, self.args = stage, args
+        self.told = {"stage": stage, "input": f"{input}; {counted}", "error": error, "reference": reference,
+                     "threads": len(CORES), "clock": "processor seconds, median"}
+        self.peers, self.absent, self.points = [], [], []
+
+    def add(self, *args, **named):
+        self.peers.append(Peer(*args, **named))
+
+    @contextlib.contextmanager
+    def absent_if_it_fails(self, program):
+        """Around what needs another program: if it is not here, or fails, it is named as absent and the rest goes on."""
+        try:
+            yield
+        except (ImportError, OSError, RuntimeError, ValueError, subprocess.CalledProcessError) as error:
+            self.leave_out(program, error)
+
+    def leave_out(self, program, error):
+        said = (getattr(error, "stdout", None) or "").strip().splitlines()[-1:]
+        self.absent.append({"program": program, "why": " ".join([str(error) or type(error).__name__, *said])})
+        print(f"absent: {program}: {self.absent[-1]['why']}", file=sys.stderr)
+
+    def finish(self):
+        """Runs everybody by turns, judges, writes the JSON and prints the table."""
+        for _ in range(self.args.runs):
+            for peer in list(self.peers):
+                self.attempt(peer, lambda: peer.seconds.append(peer.run()))
+        for peer in list(self.peers):
+            self.attempt(peer, lambda: self.points.append(peer.point()))
+        self.args.output.mkdir(parents=True, exist_ok=True)
+        path = self.args.output / f"{self.stage.replace(' ', '_')}.json"
+        path.write_text(json.dumps({**self.told, "points": self.points, "absent": self.absent}, indent=1) + "\n")
+        print(self.table())
+
+    def attempt(self, peer, action):
+        """A peer that fails is absent; if it is petcomp that fails, so does the comparison."""
+        if peer.program == "petcomp":
+            return action()
+        before = len(self.absent)
+        with self.absent_if_it_fails(f"{peer.program}, {peer.setting}"):
+            action()
+        if len(self.absent) > before:
+            self.peers.remove(peer)
+
+    def table(self):
+        ours = {p["setting"]: p for p in self.points if p["program"] == "petcomp"}
+        usual = next((p for name, p in ours.items() if "default" in name), next(iter(ours.values()), None))
+        lines = [f"## {self.stage}: {self.told['input']}", "", f"Error: {self.told['error']}. Reference: "
+                 f"{self.told['reference']}. Median of {self.args.runs}, {len(CORES)} core(s), processor seconds.", "",
+                 "| program | setting | error | seconds | times petcomp's seconds | beside |", "|" + " --- |" * 6]
+        for p in self.points:
+            beside = ours.get(p["beside"], usual)
+            ratio = f"{p['seconds'] / beside['seconds']:.3g} | {beside['setting']}" if beside else "|"
+            lines.append(f"| {p['program']} {p['version']} | {p['setting']} | {p['error']:.4g} | {p['seconds']:.4g} | {ratio} |")
+        lines += [f"| {a['program']} | absent: {a['why']} | | | | |" for a in self.absent]
+        return "\n".join(lines) + "\n"
+
+
+def arguments(doc, **defaults):
+    """The options that all scripts share."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("target/peers"), metavar="FOLDER")
+    parser.add_argument("-n", "--runs", type=int, default=defaults.get("runs", 5), help="rounds (default: %(default)s)")
+    parser.add_argument("--petcomp", default="target/release/petcomp", metavar="PROGRAM")
+    os.chdir(ROOT)
+    return parser
+
+
+def pinned(*command):
+    """A command as it is run and told: on the cores of this process."""
+    return PINNED + [str(word) for word in command]
+
+
+def told(command):
+    return shlex.join(command)
+
+
+def spent(command, env=None, accept=(0,)):
+    """Runs a command; returns the processor seconds of it and its children, and what it said."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=env)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode not in accept:
+        raise subprocess.CalledProcessError(done.returncode, told(command), done.stdout)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime, done.stdout
+
+
+def seconds_of(command, accept=(0,)):
+    return spent(command, accept=accept)[0]
+
+
+def here(action):
+    """Processor seconds of an action of this process, and what it gave."""
+    start = time.process_time()
+    given = action()
+    return time.process_time() - start, given
+
+
+def version(command, pattern=r"(\d+\.\d+[^\s,]*)"):
+    """The first thing that looks like a version in what a program says of itself."""
+    return re.search(pattern, spent(command)[1]).group(1)
+
+
+def library():
+    """petcomp's library in a program of its own, tests/benches/peers/library.rs, built if it is not."""
+    said = subprocess.run(["cargo", "build", "--release", "--locked", "--bench", "peers", "--message-format=json"],
+                          stdout=subprocess.PIPE, text=True, check=True).stdout
+    built = [json.loads(line) for line in said.splitlines()]
+    path, = [m["executable"] for m in built if m.get("executable") and m["target"]["name"] == "peers"]
+    return os.path.relpath(path, ROOT)
+
+
+def library_seconds(program, times, *task):
+    """Processor seconds of one piece of work: those of a process that does it so many times less those of one that only
+    reads, by the number of times."""
+    return (seconds_of(pinned(program, times, *task)) - seconds_of(pinned(program, 0, *task))) / times
