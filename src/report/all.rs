@@ -79,7 +79,7 @@ const REST: [fn() -> Result<Section>; 3] = [stability_of_stages, paid_for, memor
 
 /// Measures everything; `progress` hears of each step and of how many there are.
 ///
-/// Times are CPU seconds of one thread. Takes about MINUTES on four cores, a quarter of a minute when it is to be quick, which
+/// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a minute when it is to be quick, which
 /// leaves out extreme cases, counted work and scale.
 ///
 /// # Errors
@@ -191,10 +191,10 @@ fn memory_and_scale() -> Result<Section> {
     let measured = scale::measure(&scale::ScaleOptions::default(), |_, _| ())?;
     let tables = scale::tables(&measured)?;
     let data = tables.first().map(|(_, table)| table.clone()).unwrap_or_default();
-    let section = Section::new("Memory and scale");
-    let section = (1..)
-        .zip(scale::charts(&measured)?)
-        .fold(section, |section, (i, (svg, caption))| section.figure(format!("scale_{i}"), svg, caption, data.clone()));
+    let section =
+        scale::charts(&measured)?.into_iter().fold(Section::new("Memory and scale"), |section, (svg, caption)| {
+            section.figure("scale_points", svg, caption, data.clone())
+        });
     Ok(tables.into_iter().fold(section, |section, (title, table)| {
         section.text(format!("{title}:")).table(format!("scale_{}", file_name(&title)), table)
     }))

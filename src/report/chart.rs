@@ -44,6 +44,15 @@ pub struct Chart {
     pub defaults: Vec<[f64; 2]>,
 }
 
+/// What a large chart has beyond a small one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Beside {
+    /// Words beside points; those without room are left out.
+    pub(super) labels: Vec<([f64; 2], String)>,
+    /// Points of one curve have nothing between them, and no line.
+    pub(super) apart: bool,
+}
+
 /// The points of a curve, from left to right; points that are not finite, or not positive on a logarithmic axis, are left out.
 pub type Curve = Vec<[f64; 2]>;
 
@@ -106,15 +115,15 @@ impl Axis {
 impl Chart {
     /// Charts side by side with one list of names, the first chart's, as an SVG document.
     pub fn row(charts: &[Self]) -> String {
-        Self::drawing(charts, FRAME, &[])
+        Self::drawing(charts, FRAME, &Beside::default())
     }
 
-    /// A chart by itself, larger than in a row, as an SVG document; with words beside points, as far as there is room.
-    pub fn alone(&self, labels: &[([f64; 2], String)]) -> String {
-        Self::drawing(std::slice::from_ref(self), ALONE, labels)
+    /// A chart by itself, larger than in a row, as an SVG document.
+    pub(super) fn alone(&self, beside: &Beside) -> String {
+        Self::drawing(std::slice::from_ref(self), ALONE, beside)
     }
 
-    fn drawing(charts: &[Self], frame: [f64; 2], labels: &[([f64; 2], String)]) -> String {
+    fn drawing(charts: &[Self], frame: [f64; 2], beside: &Beside) -> String {
         let names = charts.first().map_or(&[][..], |c| &c.names);
         let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let column = NAMES + LETTER * longest as f64;
@@ -126,7 +135,7 @@ impl Chart {
         );
         for (i, chart) in charts.iter().enumerate() {
             let left = LEFT + i as f64 * (LEFT + frame[0]);
-            chart.draw(&mut svg, left, frame, labels);
+            chart.draw(&mut svg, left, frame, beside);
         }
         let left = width - column + 16.0;
         for (i, name) in names.iter().enumerate() {
@@ -138,7 +147,7 @@ impl Chart {
         svg + "</svg>\n"
     }
 
-    fn draw(&self, svg: &mut String, left: f64, [w, h]: [f64; 2], labels: &[([f64; 2], String)]) {
+    fn draw(&self, svg: &mut String, left: f64, [w, h]: [f64; 2], beside: &Beside) {
         let x = |value| self.across.part(value).map(|part| left + w * part);
         let y = |value| self.up.part(value).map(|part| TOP + h * (1.0 - part));
         for mark in self.across.marks() {
@@ -159,11 +168,12 @@ impl Chart {
         for (i, curve) in self.curves.iter().enumerate() {
             let seen: Vec<_> = curve.iter().filter_map(|p| Some([x(p[0])?, y(p[1])?])).collect();
             let color = COLORS[i % COLORS.len()];
-            let path = seen.iter().map(|[x, y]| format!("{x:.1},{y:.1} ")).collect::<String>();
-            *svg += &format!(
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>\n",
-                path.trim_end()
-            );
+            if !beside.apart {
+                let path = seen.iter().map(|[x, y]| format!("{x:.1},{y:.1} ")).collect::<String>();
+                let points = path.trim_end();
+                *svg +=
+                    &format!("<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>\n");
+            }
             for [x, y] in seen {
                 let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{color}\"/>");
             }
@@ -171,14 +181,14 @@ impl Chart {
         for [x, y] in self.defaults.iter().filter_map(|p| Some([x(p[0])?, y(p[1])?])) {
             let _ = writeln!(svg, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\" fill=\"none\" stroke=\"#c00\"/>");
         }
-        let labels = labels.iter().filter_map(|(p, text)| Some(([x(p[0])?, y(p[1])?], text.as_str())));
+        let labels = beside.labels.iter().filter_map(|(p, text)| Some(([x(p[0])?, y(p[1])?], text.as_str())));
         let points = self.curves.iter().flatten().filter_map(|p| Some([x(p[0])?, y(p[1])?]));
-        *svg += &beside(labels.collect(), points.collect(), [left, left + w, TOP]);
+        *svg += &set_beside(labels.collect(), points.collect(), [left, left + w, TOP]);
     }
 }
 
 /// Words beside points, where they cover neither each other nor another point, and stay between two sides and below a top.
-fn beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right, top]: [f64; 3]) -> String {
+fn set_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right, top]: [f64; 3]) -> String {
     let mut taken: Vec<[f64; 4]> = points.iter().map(|[x, y]| [x - 3.0, y - 3.0, x + 3.0, y + 3.0]).collect();
     let mut svg = String::new();
     for ([x, y], text) in labels {
@@ -265,13 +275,13 @@ mod tests {
 
     #[test]
     fn words_beside_points_do_not_cover_each_other() {
-        let text = beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [0.0, 200.0, 0.0]);
+        let text = set_beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [0.0, 200.0, 0.0]);
         assert_eq!(text.matches("<text").count(), 2);
         let crowd = vec![([50.0, 50.0], "a long word"); 9];
-        assert!(beside(crowd, vec![], [0.0, 200.0, 0.0]).matches("<text").count() < 9);
-        assert!(!beside(vec![([199.0, 50.0], "wide")], vec![], [0.0, 200.0, 0.0]).contains("x=\"206"));
+        assert!(set_beside(crowd, vec![], [0.0, 200.0, 0.0]).matches("<text").count() < 9);
+        assert!(!set_beside(vec![([199.0, 50.0], "wide")], vec![], [0.0, 200.0, 0.0]).contains("x=\"206"));
         assert_eq!(
-            beside(vec![([10.0, 50.0], "a word as wide as the chart itself is")], vec![], [0.0, 200.0, 0.0]),
+            set_beside(vec![([10.0, 50.0], "a word as wide as the chart itself is")], vec![], [0.0, 200.0, 0.0]),
             ""
         );
     }

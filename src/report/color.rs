@@ -84,6 +84,7 @@ fn encoding() -> Result<Diagram> {
             "Pictures have 8 bits, and {wrong} of {} codes differ from the nearest one: the table is the formula, rounded.",
             lights.len()
         ),
+        ..Diagram::default()
     })
 }
 
@@ -120,7 +121,7 @@ fn decoding() -> Result<Diagram> {
             point(["plain power", "gamma 2.2"], &values, decoded, each(gamma), light)?,
         ],
         limit: Some((f64::from(f32::EPSILON), "rounding of a float".into())),
-        why: String::new(),
+        ..Diagram::default()
     })
 }
 

@@ -1,5 +1,6 @@
 //! Work-precision diagrams: the error of a stage against what it costs, a point for each setting.
 
+use super::chart::Beside;
 use super::number::three;
 use super::{Axis, Chart, Curve, Table};
 use crate::quality::Quality;
@@ -28,6 +29,8 @@ pub struct Diagram {
     pub limit: Option<(f64, String)>,
     /// Why the default is what it is, beyond what the points say.
     pub why: String,
+    /// Points of one curve do not follow from each other, so that no line joins them.
+    pub apart: bool,
 }
 
 /// A setting.
@@ -172,7 +175,7 @@ impl Diagram {
         };
         let labelled = |used: bool| self.points.iter().filter(move |p| p.qualities.is_empty() != used);
         let labels: Vec<_> = labelled(true).chain(labelled(false)).map(|p| (at(p), p.label())).collect();
-        chart.alone(&labels)
+        chart.alone(&Beside { labels, apart: self.apart })
     }
 
     /// The axis of errors; longer below where some are 0.

@@ -52,8 +52,8 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
         cost: "CPU seconds".into(),
         reference: "mean over the window in double precision (closed form)".into(),
         points,
-        limit: None,
         why,
+        ..Diagram::default()
     }])
 }
 

@@ -93,11 +93,11 @@ fn diagram(file: &str, title: &str, cost: &str, points: Vec<Point>) -> Diagram {
         cost: cost.into(),
         reference: "the ellipse (closed form)".into(),
         points,
-        limit: None,
         why: "Masks are read from the deep samples, like the picture, so they agree with what is seen of see-through objects; the \
               outline is what the geometry says. A pixel counts from a coverage of 0.1, where film is still told from noise: \
               masks are a fraction of a pixel too wide for that, and boxes hold all of the object."
             .into(),
+        ..Diagram::default()
     }
 }
 

@@ -98,6 +98,7 @@ fn told(kind: Kind, points: Vec<Point>) -> Diagram {
         limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
         why: "Piles cast many shadows on each other, so that a single one is held to a fraction of what is seen."
             .into(),
+        ..Diagram::default()
     }
 }
 

@@ -102,8 +102,8 @@ impl Comparison {
             cost: if self.clock.is_empty() { "seconds, median".into() } else { self.clock.clone() },
             reference: self.reference.clone(),
             points: self.points.iter().filter_map(point).collect(),
-            limit: None,
-            why: String::new(),
+            apart: true,
+            ..Diagram::default()
         }
     }
 

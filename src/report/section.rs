@@ -118,7 +118,8 @@ impl Part {
             Self::Table { table, .. } => page.table(table),
             Self::Figure { svg, caption, data, .. } => {
                 let points = format!("<details><summary>Its points</summary>{}</details>\n", data.html());
-                page.chart(svg, caption).html(&points)
+                let caption = with_code(caption);
+                page.html(&format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>\n{points}"))
             }
         };
     }

@@ -24,10 +24,10 @@ fn diagram(tilt_deg: f64, views: u64) -> Diagram {
         cost: "CPU microseconds per photo".into(),
         reference: "the cameras that the views were drawn with (closed form)".into(),
         points: Method::ALL.map(|method| point(&cell.row(method, &photos))).into(),
-        limit: None,
         why: "The whole refinement is the default at every quality: it alone tells its own uncertainty and tries every start, \
               and it takes less than a hundredth of the time that rendering a picture does."
             .into(),
+        ..Diagram::default()
     }
 }
 

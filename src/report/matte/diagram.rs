@@ -47,6 +47,7 @@ fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
         points: summaries.iter().map(|s| point(s, of(&s.score))).collect(),
         limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
         why: why(summaries, of),
+        ..Diagram::default()
     };
     errors.map(diagram).into()
 }

@@ -106,7 +106,7 @@ fn diagram(file: &str, title: &str, input: String, points: Vec<Point>) -> Diagra
         reference: "Blender 3.4.1 Cycles, 2048 samples or more a pixel (golden/render)".into(),
         points,
         limit: Some((UNSEEN, "half of an 8-bit code at middle grey".into())),
-        why: String::new(),
+        ..Diagram::default()
     }
 }
 

@@ -209,7 +209,7 @@ fn cut_out(k: usize) -> Image<PremulRgba> {
         let across = (x as f32 - 95.5).abs() / 96.0;
         let half_width = if y < 115 { 0.35 } else { 0.9 };
         let alpha = (20.0 * (half_width - across)).clamp(0.0, 1.0) * if (230..346).contains(&y) { 0.95 } else { 0.5 };
-        let stripe = if (y / 6 + k) % 2 == 0 { 0.75 } else { 0.35 };
+        let stripe = if (y / 6 + k).is_multiple_of(2) { 0.75 } else { 0.35 };
         PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
     })
 }

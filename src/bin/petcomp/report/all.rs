@@ -34,6 +34,8 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         quick: args.quick,
         date: args.date.clone(),
     };
+    // Extreme cases are to be warned of; what comes of them is in the tables.
+    log::set_max_level(log::LevelFilter::Error);
     let progress = common.progress("measuring");
     all::write(&args.output, &options, |done, of| progress.at(done, of))?;
     drop(progress);
