@@ -17,6 +17,7 @@ mod histogram;
 pub mod keying;
 pub mod label;
 pub mod light;
+#[cfg(feature = "settle")]
 mod machine;
 pub mod matte;
 mod number;
