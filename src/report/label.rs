@@ -209,7 +209,9 @@ mod tests {
         assert!((area(ring) / ellipse.area() - libm::sin(turn) / turn).abs() < 1e-7);
         let half = LabelOptions { alpha_threshold: 0.5, ..LabelOptions::default() };
         let mask = mask(&label(&ellipse.deep(), &shot, &half));
-        assert!(ellipse.iou(&mask) > 0.96, "{}", ellipse.iou(&mask));
+        // A pixel on the border is wrong by at most a half, and by a quarter in the mean.
+        let border: f64 = ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| (b - a).norm()).sum();
+        assert!(1.0 - ellipse.iou(&mask) < 0.5 * border / ellipse.area(), "{}", ellipse.iou(&mask));
     }
 
     #[test]
