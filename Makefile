@@ -10,7 +10,9 @@ SUDO      := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 BUILD     := g++ pkg-config libopenimageio-dev
 BLENDER   := blender python3-numpy python3-venv
 OUT       := demo
+REPORT    := target/report
 PYTHON    := $(CURDIR)/target/python/bin/python
+BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
 # Each set of features that stands alone; the first, empty one builds without a C++ compiler.
 FEATURES  := "" markers oiio settle
 
@@ -71,8 +73,12 @@ lint: packages
 formats: packages python
 	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked --test formats -- --nocapture
 
+# About ten minutes on two cores: what each stage takes (criterion, inputs made in code), then error against run time of
+# every approximate stage on one page.
 bench: packages
-	$(CARGO) bench --locked
+	$(CARGO) bench --locked $(addprefix --bench ,$(BENCHES)) -- --warm-up-time 1 --measurement-time 2
+	$(CARGO) build --release --locked --bins
+	target/release/petcomp report all -o $(REPORT)
 
 # petcomp and other programs on the same input and core, by turns: target/peers/*.json and a table. What cannot be
 # installed is named there as absent.

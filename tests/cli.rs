@@ -265,6 +265,39 @@ fn one_camera_solve_says_what_it_found() {
 }
 
 #[test]
+fn one_word_says_how_finely_every_stage_works() {
+    let desk = Desk::new();
+    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    let made = |quality: &[&str], folder: &str| {
+        let call = ["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-o", folder];
+        desk.ok(&[&call[..], quality].concat());
+        let at = |part: &str| desk.path(folder).join(format!("images/{part}/000000.png"));
+        std::fs::read(at("train")).or_else(|_| std::fs::read(at("val"))).expect("a picture")
+    };
+    let usual = made(&[], "usual");
+    assert!(usual == made(&["--quality", "normal"], "normal"), "normal is what there is without a word");
+    assert!(usual != made(&["--quality", "draft"], "draft"));
+    let told = desk.refused(&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-o", "x", "--quality", "fast"]);
+    assert!(told.contains("draft, normal, reference"), "{told}");
+}
+
+#[test]
+fn everything_measured_is_one_page_with_its_data() {
+    let desk = Desk::new();
+    let golden = format!("{}/golden/render", env!("CARGO_MANIFEST_DIR"));
+    desk.ok(&["report", "all", "--quick", "-q", "-o", "all", "--golden", &golden, "--date", "a Saturday"]);
+    let read = |name: &str| std::fs::read_to_string(desk.path("all").join(name)).expect(name);
+    let (html, markdown) = (read("report.html"), read("report.md"));
+    assert!(html.contains("a Saturday") && html.contains("<svg") && !html.contains("NaN"));
+    assert!(!html.contains("src=") && !html.contains("<link"), "the page needs no other file");
+    for stage in ["color", "matte", "camera", "settle", "shadow", "render", "label", "encode"] {
+        assert!(html.contains(&format!("{stage}: ")) && markdown.contains(&format!("| {stage}: ")), "{stage}");
+    }
+    assert!(markdown.contains("| normal (the default) |") && read("quality.csv").contains("1/480"));
+    assert!(read("render_piles.csv").lines().any(|line| line.contains("fast") && line.contains("normal")));
+}
+
+#[test]
 fn a_report_is_a_table_and_plots() {
     let desk = Desk::new();
     desk.ok(&["report", "camera", "-o", "found", "--views", "2"]);

@@ -88,7 +88,7 @@ pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 pub use serve::serve as serve_worker;
 #[cfg(feature = "oiio")]
 pub use worker::worker_version;
-pub use write::{Bits, Compression, ToFile, WriteOptions, jpeg_bytes, write, write_with};
+pub use write::{Bits, Compression, PngEffort, ToFile, WriteOptions, jpeg_bytes, write, write_with};
 
 use crate::{Error, Image, Result};
 use exif::CameraNotes;

@@ -3,7 +3,7 @@
 use super::header::{Header, Notes, note};
 use super::limits::{Demand, Limits};
 use super::raster::{Raster, Refusal, Samples, usual_names};
-use super::write::{Coded, Codes};
+use super::write::{Coded, Codes, PngEffort};
 use crate::io::Format;
 use png::{BitDepth, ColorType, Transformations};
 use std::io::{BufRead, Cursor, Seek};
@@ -78,20 +78,25 @@ fn is_linear(info: &png::Info<'_>) -> bool {
 }
 
 /// A whole file; the fast compression takes a few milliseconds for 640 x 480.
-pub(super) fn encode(picture: &Coded<'_>, metadata: &[(String, String)]) -> Result<Vec<u8>, String> {
+pub(super) fn encode(picture: &Coded<'_>, effort: PngEffort, metadata: &[(String, String)]) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
-    write(&mut bytes, picture, metadata).map_err(|e| e.to_string())?;
+    write(&mut bytes, picture, effort, metadata).map_err(|e| e.to_string())?;
     Ok(bytes)
 }
 
-fn write(out: &mut Vec<u8>, picture: &Coded<'_>, metadata: &[(String, String)]) -> Result<(), png::EncodingError> {
+fn write(
+    out: &mut Vec<u8>,
+    picture: &Coded<'_>,
+    effort: PngEffort,
+    metadata: &[(String, String)],
+) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, picture.width as u32, picture.height as u32);
     encoder.set_color(match picture.names.len() {
         1 => ColorType::Grayscale,
         3 => ColorType::Rgb,
         _ => ColorType::Rgba,
     });
-    encoder.set_compression(png::Compression::Fast);
+    encoder.set_compression(effort.of_png());
     if picture.names.len() > 1 {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     }

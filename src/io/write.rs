@@ -43,6 +43,31 @@ impl Compression {
     }
 }
 
+/// How hard a PNG is compressed; all of them lossless.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PngEffort {
+    /// Hardly: the quickest.
+    Least,
+    /// Well for its time.
+    #[default]
+    Fast,
+    /// As most programs do.
+    Usual,
+    /// As small as it gets.
+    Most,
+}
+
+impl PngEffort {
+    pub(super) fn of_png(self) -> ::png::Compression {
+        match self {
+            Self::Least => ::png::Compression::Fastest,
+            Self::Fast => ::png::Compression::Fast,
+            Self::Usual => ::png::Compression::Balanced,
+            Self::Most => ::png::Compression::High,
+        }
+    }
+}
+
 /// How a picture is written.
 #[derive(Clone, Debug)]
 pub struct WriteOptions {
@@ -50,6 +75,8 @@ pub struct WriteOptions {
     pub bits: Option<Bits>,
     /// Compression of an EXR. Default: [`Compression::Zip`].
     pub compression: Compression,
+    /// Compression of a PNG. Default: [`PngEffort::Fast`].
+    pub png: PngEffort,
     /// Quality of a JPEG, 1 to 100. Default: 95.
     pub jpeg_quality: u8,
     /// Texts to store with the picture, by name. Default: none.
@@ -58,7 +85,13 @@ pub struct WriteOptions {
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { bits: None, compression: Compression::default(), jpeg_quality: 95, metadata: Vec::new() }
+        Self {
+            bits: None,
+            compression: Compression::default(),
+            png: PngEffort::default(),
+            jpeg_quality: 95,
+            metadata: Vec::new(),
+        }
     }
 }
 
@@ -303,7 +336,7 @@ fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> s
         }
         (Some(Format::Tiff), bits) => tiff::encode_codes(&coded(image, bits), &options.metadata),
         (Some(Format::Jpeg), _) => encode_jpeg(image, options),
-        (_, bits) => png::encode(&coded(image, bits), &options.metadata),
+        (_, bits) => png::encode(&coded(image, bits), options.png, &options.metadata),
     }
 }
 

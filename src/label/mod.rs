@@ -19,6 +19,7 @@ pub use overlay::overlay;
 pub use topmost::knotted;
 pub use visibility::DepthRange;
 
+use crate::camera::Camera;
 use crate::geom::Point2;
 use crate::pixel::ObjectId;
 use crate::render::DeepImage;
@@ -101,6 +102,11 @@ pub enum AmodalBox {
     Mask,
     /// The projected outline, which may be wider than what can be seen of a transparent object.
     Outline,
+}
+
+/// The outline of a card as the camera sees it, clipped to the picture: one ring per part, pixels.
+pub(crate) fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
+    outline::rings(&outline::region(card, camera))
 }
 
 /// A card as the camera sees it.

@@ -7,7 +7,7 @@ use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, Quality, RenderOptions, cast, check, interreflect, reference};
+use crate::render::{DeepImage, Preset, RenderOptions, cast, check, interreflect, reference};
 use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -145,7 +145,7 @@ fn a_lit_card_is_as_bright_as_the_closed_form_says() {
         PremulRgba::new(0.4, 0.3, 0.2, 1.0),
     ));
     for way in [cast, reference] {
-        let c = way(&shot, &Quality::Fast.options()).at(2, 2)[0].light;
+        let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
         let e = 2.975061 / std::f32::consts::PI;
         assert!((c.r - 0.4 * e).abs() < 2e-4 && (c.b - 0.2 * e).abs() < 2e-4, "{c:?}");
     }
@@ -160,7 +160,7 @@ fn ambient_alone_lights_a_card_by_its_albedo() {
         grey(1.0),
     ));
     for way in [cast, reference] {
-        let c = way(&shot, &Quality::Fast.options()).at(2, 2)[0].light;
+        let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
         assert!((c.r - 0.25).abs() < 1e-5 && (c.b - 1.0).abs() < 1e-5, "{c:?}");
     }
 }
@@ -178,7 +178,7 @@ fn magnified() -> (Shot, Image<PremulRgba>) {
 #[test]
 fn textures_follow_the_convention() {
     let (shot, texture) = magnified();
-    let one = RenderOptions { subsamples: 1, ..Quality::High.options() };
+    let one = RenderOptions { subsamples: 1, ..Preset::High.options() };
     for way in [cast, reference] {
         // The card spans 0.5 to 40.5: texel centres lie on pixel centres 5, 15, 25, 35.
         let deep = way(&shot, &one);
@@ -217,7 +217,7 @@ fn an_edge_is_as_soft_as_the_window() {
         let alpha = |deep: DeepImage| deep.at(4, 4).first().map_or(0.0, |s| s.alpha);
         let fine = alpha(reference(&shot, &RenderOptions { subsamples: 64, ..sharp() }));
         assert!((fine - coverage).abs() < 0.01, "{t}: {fine} against {coverage}");
-        let coarse = alpha(cast(&shot, &Quality::High.options()));
+        let coarse = alpha(cast(&shot, &Preset::High.options()));
         assert!((coarse - coverage).abs() < 0.17, "{t}: {coarse} against {coverage}");
     }
 }
@@ -231,7 +231,7 @@ fn without_cards_the_plate_is_the_picture_bit_for_bit() {
     let plate = plate(33, 21);
     let shot = Shot::new(above(33, 21, 30.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.2));
     for way in [cast, reference] {
-        let out = composite::frame(&way(&shot, &Quality::Draft.options()), Some(&plate));
+        let out = composite::frame(&way(&shot, &Preset::Draft.options()), Some(&plate));
         assert!(out.pixels().iter().zip(plate.pixels()).all(|(a, &b)| *a == b.opaque()));
     }
 }
@@ -245,7 +245,7 @@ fn pixels_that_no_card_can_shadow_keep_the_plate_s_bits() {
         0.1,
         grey(0.7),
     ));
-    let deep = cast(&shot, &Quality::Fast.options());
+    let deep = cast(&shot, &Preset::Fast.options());
     let out = composite::frame(&deep, Some(&plate));
     for (x, y) in [(0, 0), (63, 0), (63, 47), (40, 10)] {
         assert_eq!(out[(x, y)], plate[(x, y)].opaque());
@@ -256,8 +256,8 @@ fn pixels_that_no_card_can_shadow_keep_the_plate_s_bits() {
 #[test]
 fn ways_agree_on_a_pile() {
     let shot = pile();
-    let exact = composite::frame(&reference(&shot, &Quality::High.options()), Some(&plate(64, 48)));
-    for (quality, limit) in [(Quality::Draft, 0.012), (Quality::Fast, 0.008), (Quality::High, 0.005)] {
+    let exact = composite::frame(&reference(&shot, &Preset::High.options()), Some(&plate(64, 48)));
+    for (quality, limit) in [(Preset::Draft, 0.012), (Preset::Fast, 0.008), (Preset::High, 0.005)] {
         let fast = composite::frame(&cast(&shot, &quality.options()), Some(&plate(64, 48)));
         let squares = fast.pixels().iter().zip(exact.pixels()).map(|(a, b)| f64::from((a.g - b.g).powi(2)));
         let rmse = (squares.sum::<f64>() / (64.0 * 48.0)).sqrt();
@@ -327,7 +327,7 @@ fn brightest(shot: &Shot, light: &AreaLight) -> f32 {
 fn everything_stays_within_its_bounds() {
     let shot = pile();
     let most = brightest(&shot, &square_light());
-    for quality in [Quality::Draft, Quality::Fast, Quality::High] {
+    for quality in [Preset::Draft, Preset::Fast, Preset::High] {
         let deep = cast(&shot, &quality.options());
         assert!(deep.shadow().pixels().iter().all(|s| (0.0..=1.0).contains(&s.r) && (0.0..=1.0).contains(&s.b)));
         for p in composite::frame(&deep, None).pixels() {
@@ -390,7 +390,7 @@ fn awkward() -> Vec<(&'static str, Shot)> {
 fn awkward_shots_give_defined_pictures() {
     for (name, shot) in awkward() {
         for way in [cast, reference] {
-            let deep = way(&shot, &Quality::Fast.options());
+            let deep = way(&shot, &Preset::Fast.options());
             let out = composite::frame(&deep, None);
             assert!(out.pixels().iter().all(|p| p.color().is_finite() && (0.0..=1.0).contains(&p.a)), "{name}");
             assert!(deep.shadow().pixels().iter().all(|s| (0.0..=1.0).contains(&s.g)), "{name}");
@@ -419,7 +419,7 @@ fn grey_film_gives_the_bits_of_alpha() {
     let as_alpha = tinted(|film| grey(film).into());
     let as_film = tinted(|film| Texture::Film(Arc::new(crate::filter::Pyramid::new(grey(film)))));
     for way in [cast, reference] {
-        let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &Quality::Fast.options()));
+        let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &Preset::Fast.options()));
         assert_eq!(a.shadow(), b.shadow());
         assert_eq!(composite::frame(&a, Some(&plate(64, 48))), composite::frame(&b, Some(&plate(64, 48))));
         let tinted = |deep: &DeepImage| (0..48).any(|y| (0..64).any(|x| !deep.tints(x, y).is_empty()));
@@ -447,7 +447,7 @@ fn film_tints_what_is_behind_and_its_shadow() {
 fn both_ways_agree_on_film() {
     let shot = tinted(Texture::from);
     let [a, b] =
-        [cast, reference].map(|way| composite::frame(&way(&shot, &Quality::High.options()), Some(&plate(64, 48))));
+        [cast, reference].map(|way| composite::frame(&way(&shot, &Preset::High.options()), Some(&plate(64, 48))));
     assert!(difference(&a, &b) < 0.006, "{}", difference(&a, &b));
 }
 
@@ -509,7 +509,7 @@ fn an_even_map_lights_as_the_constant_environment_does() {
     let shot = Shot::new(above(5, 5, 400.0)).with_card(level(1, [0.0, 0.0, 0.1], 1.0, grey(1.0)));
     let shot = shot.with_environment(surroundings(Image::filled(16, 8, radiance), 0.3));
     for way in [cast, reference] {
-        let c = way(&shot, &Quality::Fast.options()).at(2, 2)[0].light;
+        let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
         assert!((c.r - 0.25).abs() < 1e-3 && (c.b - 1.0).abs() < 4e-3, "{c:?}");
     }
 }
@@ -531,7 +531,7 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
         let pixel = ((40.5 + 100.0 * x) as usize, (40.5 - 100.0 * y) as usize);
         let across = ((40.5 - 100.0 * x) as usize, (40.5 + 100.0 * y) as usize);
         for way in [cast, reference] {
-            let options = RenderOptions { ambient_samples: 128, subsamples: 1, ..Quality::Good.options() };
+            let options = RenderOptions { ambient_samples: 128, subsamples: 1, ..Preset::Good.options() };
             let deep = way(&shot, &options);
             let (dark, bright) = (deep.shadow()[pixel].g, deep.shadow()[across].g);
             assert!(dark < 0.6 && bright > 0.9, "{rotation}: {dark} and {bright}");
@@ -543,7 +543,7 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
 fn both_ways_agree_under_a_map() {
     let mut shot = pile().with_environment(sun(1.0));
     shot.ambient = LinearRgb::BLACK;
-    let options = RenderOptions { ambient_samples: 400, ..Quality::High.options() };
+    let options = RenderOptions { ambient_samples: 400, ..Preset::High.options() };
     let exact = RenderOptions { ambient_samples: 3200, subsamples: 2, light_samples: 3, cell_px: 1.0 };
     let a = composite::frame(&cast(&shot, &options), Some(&plate(64, 48)));
     let b = composite::frame(&reference(&shot, &exact), Some(&plate(64, 48)));
@@ -589,6 +589,6 @@ fn the_closed_form_is_what_a_bare_surface_gets() {
         PremulRgba::new(1.0, 1.0, 1.0, 1.0),
     ));
     let e = light::irradiance(&square_light(), Point3::origin(), Vector3::z());
-    let c = cast(&shot, &Quality::High.options()).at(2, 2)[0].light;
+    let c = cast(&shot, &Preset::High.options()).at(2, 2)[0].light;
     assert!((c.g - e.g / std::f32::consts::PI).abs() < 1e-5);
 }

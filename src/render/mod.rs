@@ -38,5 +38,5 @@ pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{id_of, murmur3};
 pub use deep::{DeepImage, DeepSample};
 pub use interreflection::interreflect;
-pub use options::{Quality, RenderOptions};
+pub use options::{Preset, RenderOptions};
 pub use reference::reference;

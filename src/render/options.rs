@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// A named point on the curve of error against time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Quality {
+pub enum Preset {
     /// For a look.
     Draft,
     /// For training pictures.
@@ -34,7 +34,7 @@ pub struct RenderOptions {
     pub cell_px: f64,
 }
 
-impl Quality {
+impl Preset {
     /// All of them with their names, the quickest first.
     pub const ALL: [(&'static str, Self); 5] = [
         ("draft", Self::Draft),
@@ -66,7 +66,7 @@ impl Quality {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Quality::Fast.options()
+        Preset::Fast.options()
     }
 }
 
@@ -83,7 +83,7 @@ impl RenderOptions {
     }
 }
 
-impl std::str::FromStr for Quality {
+impl std::str::FromStr for Preset {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self, Error> {
@@ -95,8 +95,8 @@ impl std::str::FromStr for Quality {
     }
 }
 
-impl From<Quality> for RenderOptions {
-    fn from(quality: Quality) -> Self {
+impl From<Preset> for RenderOptions {
+    fn from(quality: Preset) -> Self {
         quality.options()
     }
 }

@@ -3,13 +3,17 @@
 //! Views are drawn by [`simulate`](crate::camera::simulate) from fixed seeds; every method sees the same ones. `joint` sees
 //! each of them with seven more photos of the same camera, at the same tilt.
 
+mod diagram;
+
+pub use diagram::diagrams;
+
+use super::clock::cpu_seconds;
 use super::{Axis, Chart, Curve};
 use crate::camera::simulate::{Scenario, View, distorted};
 use crate::camera::{self, Effort, Priors, Solution, SolveOptions};
 use crate::geom::Point3;
 use crate::{Error, Result, io};
 use std::path::Path;
-use std::time::Instant;
 
 /// Noise of the corners, pixels.
 const NOISES: [f64; 4] = [0.1, 0.5, 1.0, 2.0];
@@ -74,7 +78,7 @@ pub struct Row {
     pub focal_percent: [f64; 2],
     /// Error of where points 50 mm above the surface are seen, root mean square over the rectangle, pixels; likewise.
     pub height_px: [f64; 2],
-    /// Median run time of a photo, microseconds.
+    /// Median CPU time of a photo, microseconds.
     pub time_us: f64,
 }
 
@@ -189,9 +193,9 @@ impl Cell {
         let options = method.options(self.lens);
         let (mut focal, mut height, mut times) = (Vec::new(), Vec::new(), Vec::new());
         for views in photos {
-            let start = Instant::now();
+            let start = cpu_seconds();
             let solution = method.solve(views, &options);
-            times.push(start.elapsed().as_secs_f64() * 1e6 / method.photos() as f64);
+            times.push((cpu_seconds() - start) * 1e6 / method.photos() as f64);
             focal.push(solution.as_ref().map_or(f64::INFINITY, |s| focal_percent(&views[0], s)));
             height.push(solution.as_ref().map_or(f64::INFINITY, |s| height_error_px(&views[0], s)));
         }

@@ -5,13 +5,17 @@
 //! by `F + T K`, with the noise of the same sensor: on the photo's screen, and on one with green and blue swapped. (The
 //! photo itself departs from the model by what blurs and refracts the screen, which a second shot would do alike.)
 
+mod diagram;
+mod made;
 mod method;
 mod score;
 mod truth;
 
+pub use diagram::diagrams;
 pub use method::Method;
 pub use score::Score;
 
+use super::clock::cpu_seconds;
 use super::{Axis, Chart, Page, Table};
 use crate::error::Result;
 use crate::image::Image;
@@ -20,7 +24,6 @@ use crate::pixel::LinearRgb;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::path::Path;
-use std::time::Instant;
 use truth::{Known, Truths};
 
 /// What a method made of a photo.
@@ -34,7 +37,7 @@ pub struct Row {
     pub score: Option<Score>,
     /// Why a person should look at the cut-out, or why there is none.
     pub doubts: Vec<String>,
-    /// Run time from the photo in memory to the cut-out on one thread, milliseconds.
+    /// CPU time from the photo in memory to the cut-out on one thread, milliseconds.
     pub time_ms: f64,
 }
 
@@ -72,12 +75,17 @@ const PATCH_PX: usize = 24;
 /// A folder without truth, or files of it that cannot be read.
 pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     let truths = Truths::of(folder)?;
+    measure_known(truths.len(), |i| truths.read(i), progress)
+}
+
+/// Measures every method on so many photos.
+fn measure_known(count: usize, read: impl Fn(usize) -> Result<Known>, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     // One thread, so that run times can be compared.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let mut rows = Vec::new();
-    for i in 0..truths.len() {
-        progress(i as u64, truths.len() as u64);
-        let known = truths.read(i)?;
+    for i in 0..count {
+        progress(i as u64, count as u64);
+        let known = read(i)?;
         let on = |screen: &Image<LinearRgb>, shot: u64| known.on(screen, SHOTS * i as u64 + shot);
         let shots = [on(&known.screen, 0), on(&known.screen.map(swapped), 1)];
         let backgrounds: Vec<_> = (0..BACKGROUNDS).map(|k| background(known.photo.size(), k)).collect();
@@ -95,9 +103,9 @@ fn swapped(c: LinearRgb) -> LinearRgb {
 }
 
 fn row(method: Method, known: &Known, shots: &[Image<LinearRgb>; 2], backgrounds: &[Image<LinearRgb>]) -> Row {
-    let start = Instant::now();
+    let start = cpu_seconds();
     let cut = method.run(known, shots);
-    let time_ms = 1e3 * start.elapsed().as_secs_f64();
+    let time_ms = 1e3 * (cpu_seconds() - start);
     let (score, doubts) = match &cut {
         Ok(cut) => {
             let doubts = cut.found.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect();

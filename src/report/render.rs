@@ -2,16 +2,20 @@
 //!
 //! Times are CPU seconds of the rendering itself, textures read and their pyramids built.
 
+mod diagram;
+
+pub use diagram::diagrams;
+
+use super::clock::timed;
 use super::{Axis, Chart, Table};
 use crate::diff::{Likeness, triple};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::{Quality, RenderOptions, cast, reference};
+use crate::render::{Preset, RenderOptions, cast, reference};
 use crate::scene::{Shot, cycles};
 use crate::{Error, Result, composite, io};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// Options of the report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -24,7 +28,7 @@ pub struct RenderReportOptions {
     pub cycles: PathBuf,
     /// Folder of golden scenes; one without scenes is left out.
     pub golden: PathBuf,
-    /// Renderings per preset, of which the quickest is told. Default: 5.
+    /// Renderings per preset, of which the median is told. Default: 5.
     pub repeats: usize,
 }
 
@@ -68,7 +72,7 @@ pub fn write(folder: impl AsRef<Path>, options: &RenderReportOptions) -> Result<
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let rows = measure(options)?;
-    let (golden, sheet) = golden(&options.golden, Quality::Good)?;
+    let (golden, sheet) = golden(&options.golden, Preset::Good)?;
     io::write_text(folder.join("render.csv"), &table(&rows).csv())?;
     io::write_text(folder.join("render.md"), &markdown(&rows, &golden, options))?;
     io::write_text(folder.join("render.svg"), &Chart::row(&charts(&rows)))?;
@@ -90,14 +94,15 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
     let others = Others::read(&options.cycles)?;
     let best = others.best()?;
     let mut rows = Vec::new();
-    for (name, quality) in Quality::ALL {
-        let (picture, cpu_seconds) = timed(&shot, &quality.options(), options.repeats)?;
+    for (name, quality) in Preset::ALL {
+        let sampling = quality.options();
+        let (picture, cpu_seconds) = timed(options.repeats, || Ok(render(&shot, &sampling)))?;
         rows.push(Row {
             program: "petcomp".into(),
             setting: name.into(),
             cpu_seconds,
             cycles: best.as_ref().and_then(|best| Likeness::of(&picture, best)),
-            quadrature: Likeness::of(&render(&small, &quality.options()), &truth),
+            quadrature: Likeness::of(&render(&small, &sampling), &truth),
         });
     }
     for entry in &others.pictures {
@@ -120,47 +125,6 @@ fn render(shot: &Shot, options: &RenderOptions) -> Image<LinearRgb> {
 
 fn finished(frame: &Image<PremulRgba>) -> Image<LinearRgb> {
     frame.map(PremulRgba::color)
-}
-
-/// A picture and the CPU seconds that one thread takes for it, the least of several.
-fn timed(shot: &Shot, options: &RenderOptions, repeats: usize) -> Result<(Image<LinearRgb>, f64)> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::value("threads", e))?;
-    let once = || {
-        let start = Clock::start();
-        let picture = render(shot, options);
-        (picture, start.seconds())
-    };
-    let (picture, mut least) = pool.install(once);
-    for _ in 1..repeats {
-        least = least.min(pool.install(once).1);
-    }
-    Ok((picture, least))
-}
-
-/// CPU time of the current thread where Linux tells it, or else the time that passes.
-struct Clock {
-    cpu: Option<f64>,
-    wall: Instant,
-}
-
-impl Clock {
-    fn start() -> Self {
-        Self { cpu: Self::cpu_seconds(), wall: Instant::now() }
-    }
-
-    fn seconds(&self) -> f64 {
-        match (self.cpu, Self::cpu_seconds()) {
-            (Some(start), Some(end)) => end - start,
-            _ => self.wall.elapsed().as_secs_f64(),
-        }
-    }
-
-    /// The first number of `schedstat` is the thread's time on a processor, in nanoseconds.
-    fn cpu_seconds() -> Option<f64> {
-        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-        let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
-        Some(nanoseconds * 1e-9)
-    }
 }
 
 /// The pictures of the other program.
@@ -206,7 +170,7 @@ impl Others {
 ///
 /// # Errors
 /// A scene or a reference that cannot be read.
-pub fn golden(folder: &Path, shown: Quality) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
+pub fn golden(folder: &Path, shown: Preset) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut cases: Vec<PathBuf> = entries.filter(|case| case.join("reference.exr").exists()).collect();
     cases.sort();
@@ -215,7 +179,7 @@ pub fn golden(folder: &Path, shown: Quality) -> Result<(Vec<GoldenRow>, Option<I
         let wanted: Image<LinearRgb> = io::read(case.join("reference.exr"))?;
         let shot = cycles::import(case.join("scene.json"), None)?;
         let name = case.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        for (quality_name, quality) in Quality::ALL {
+        for (quality_name, quality) in Preset::ALL {
             let picture = render(&shot, &quality.options());
             let likeness = Likeness::of(&picture, &wanted).ok_or_else(|| {
                 Error::file(&case, format!("{:?} pixels, reference has {:?}", picture.size(), wanted.size()))
@@ -388,7 +352,7 @@ mod tests {
             repeats: 1,
         };
         let (rows, golden) = write(folder.path(), &options).unwrap();
-        assert_eq!((rows.len(), golden.len()), (Quality::ALL.len(), 0));
+        assert_eq!((rows.len(), golden.len()), (Preset::ALL.len(), 0));
         // So small a picture may be done before the system's clock of CPU time moves.
         assert!(rows.iter().all(|row| row.cpu_seconds >= 0.0 && row.quadrature.unwrap().rmse < 0.1));
         let text = io::read_text(folder.path().join("render.md")).unwrap();

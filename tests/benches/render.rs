@@ -3,7 +3,7 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use petcomp::asset::Texture;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
-use petcomp::render::{Quality, cast};
+use petcomp::render::{Preset, cast};
 use petcomp::scene::{AreaLight, Card, Grade, LightShape};
 use petcomp::{Camera, Image, LinearRgb, ObjectId, PremulRgba, Shot, composite};
 use std::hint::black_box;
@@ -63,8 +63,7 @@ fn presets(c: &mut Criterion) {
     let all = rayon::ThreadPoolBuilder::new().build().expect("threads can be had");
     let mut group = c.benchmark_group("render/640x480/20_cards");
     group.sample_size(10);
-    let presets =
-        [("draft", Quality::Draft), ("fast", Quality::Fast), ("good", Quality::Good), ("high", Quality::High)];
+    let presets = [("draft", Preset::Draft), ("fast", Preset::Fast), ("good", Preset::Good), ("high", Preset::High)];
     for (name, quality) in presets {
         let options = quality.options();
         let render = || composite::frame(&cast(black_box(&shot), &options), Some(&plate));

@@ -5,7 +5,7 @@
 //! share of pixels that the case states.
 
 use crate::case::Case;
-use petcomp::render::{Quality, RenderOptions, cast, check};
+use petcomp::render::{Preset, RenderOptions, cast, check};
 use petcomp::scene::cycles;
 use petcomp::{Image, LinearRgb, PremulRgba, Shot, composite, io};
 
@@ -17,7 +17,7 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
     let limits = case.table.get("limits").and_then(toml::Value::as_table).ok_or("case.toml: no table `limits`")?;
     for (name, limit) in limits {
         let limit = limit.as_float().ok_or_else(|| format!("limits.{name}: expected a number"))?;
-        let options = name.parse::<Quality>().map_err(|e| format!("limits: {e}"))?.options();
+        let options = name.parse::<Preset>().map_err(|e| format!("limits: {e}"))?.options();
         judge(case, name, &render(&shot, &options), &reference, limit)?;
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use crate::common::Common;
 use petcomp::asset::{self, AddPhoto, Library, Manifest, Scale, ScreenSource};
-use petcomp::io;
+use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -63,6 +63,9 @@ pub(crate) struct Add {
     /// Or: width and height of the object, metres
     #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2, conflicts_with_all = ["scale", "length"])]
     size: Option<Vec<f64>>,
+    /// draft, normal or reference: how finely the object is searched and kept
+    #[arg(long, default_value_t)]
+    quality: Quality,
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -118,6 +121,7 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
     let first = args.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default();
     let name = args.name.clone().unwrap_or_else(|| first.to_string_lossy().into_owned());
     let add = AddPhoto { screen: args.screen.clone(), ..AddPhoto::new(name, &args.class, scale) };
+    let add = AddPhoto { options: args.quality.cut_out(add.options), ..add };
     for photo in &args.photos {
         let record = asset::add_photo(&args.output, photo, &add)?;
         let ([length, width], error) = (record.object_m.map(|m| m * 1e3), record.error_m * 1e3);

@@ -4,8 +4,7 @@ use crate::common::{Common, RecipeArgs};
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
 use petcomp::io::exr_parts::write_parts;
-use petcomp::render::Quality;
-use petcomp::{Image, LinearRgb, PremulRgba, Scene, io};
+use petcomp::{Image, LinearRgb, PremulRgba, Quality, Scene, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -17,7 +16,7 @@ pub(crate) struct Args {
     /// Picture to write: .png, .jpg, or .exr for scene-linear values with alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
-    /// draft, fast, good, high or reference; by default what the recipe says
+    /// draft, normal or reference: how finely everything is computed; by default what the recipe says
     #[arg(long)]
     quality: Option<Quality>,
     /// Parts of a multi-part .exr: beauty,coverage,shadow,id,depth,position,uv,cryptomatte,layers
@@ -34,7 +33,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
     let mut setup = args.recipe.setup()?;
-    setup.render = args.quality.map_or(setup.render, Quality::options);
+    if let Some(quality) = args.quality {
+        setup = quality.setup(setup);
+    }
     let studio = petcomp::dataset::Studio::open_for(setup, &scene)?;
     let (scene, shot) = studio.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
     let (deep, frame) = studio.shoot(&scene, &shot);

@@ -2,7 +2,7 @@
 
 use crate::common::Common;
 use petcomp::settle::{SettleOptions, preview, settle_traced, trace_csv};
-use petcomp::{Scene, io};
+use petcomp::{Quality, Scene, io};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -15,6 +15,9 @@ pub(crate) struct Args {
     /// Settle options to use instead of the defaults, as TOML
     #[arg(long, value_name = "FILE")]
     options: Option<PathBuf>,
+    /// draft, normal or reference: how finely the fall is computed; by default what the options say
+    #[arg(long)]
+    quality: Option<Quality>,
     /// Where every object was during the fall, as CSV: a line for each 60th of a second and object
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -29,6 +32,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         Some(path) => io::read_toml(path)?,
         None => SettleOptions::default(),
     };
+    let options = args.quality.map_or(options, |quality| quality.settle(options));
     // 60 a second at the default step.
     let every = if args.trace.is_some() { 8 } else { 0 };
     let (settled, samples) = settle_traced(scene, &options, every).map_err(|e| e.in_file(&args.scene))?;

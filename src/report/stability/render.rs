@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::geom::UnitQuaternion;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::{DeepImage, Quality, RenderOptions, cast, interreflect, reference};
+use crate::render::{DeepImage, Preset, RenderOptions, cast, interreflect, reference};
 use crate::scene::{Card, Shot};
 use std::f64::consts::FRAC_PI_2;
 
@@ -200,7 +200,7 @@ fn one_pixel() -> Case {
                 let shot = Shot::new(above([side; 2], 50.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
                 let sheet = Image::filled(64, 64, grey(0.6));
                 let shot = shot.with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet));
-                let deep = cast(&shot, &Quality::Good.options());
+                let deep = cast(&shot, &Preset::Good.options());
                 let middle = (side / 2) as usize;
                 (deep.flat(middle, middle), deep.shadow()[(middle, middle)])
             };
@@ -252,7 +252,7 @@ fn sixteen_k() -> Case {
             let center = [from_corner(1100.0), -from_corner(1100.0), 0.0];
             let sheet = level(1, center, 0.2, grey(1.0));
             let shot = Shot::new(above([SIXTEEN_K; 2], 10_000.0)).with_ambient(LinearRgb::WHITE).with_card(sheet);
-            let (deep, peak) = memory::peak_gib(|| cast(&shot, &Quality::Draft.options()));
+            let (deep, peak) = memory::peak_gib(|| cast(&shot, &Preset::Draft.options()));
             let (found, last) = (covered(&deep), SIXTEEN_K as usize - 1);
             let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
             let right = (found / SHOWN - 1.0).abs() < 1e-4 && deep.shadow()[(last, last)] == LinearRgb::WHITE;

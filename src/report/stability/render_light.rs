@@ -8,7 +8,7 @@ use crate::geom::{Point3, UnitQuaternion, Vector3};
 use crate::image::Image;
 use crate::light::{frame, polygon_irradiance, radiance};
 use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::{Quality, RenderOptions, cast};
+use crate::render::{Preset, RenderOptions, cast};
 use crate::scene::{AreaLight, EnvironmentMap, Shot};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 pub(super) fn cases() -> Vec<Case> {
     let mut cases: Vec<Case> = [10.0, 1.0, 0.1].map(grazing).into();
     cases.extend([1e-2, 1e-4, 1e-6, 0.0].map(small_light));
-    cases.extend([Quality::Fast, Quality::High, Quality::Reference].map(cut_by_the_horizon));
+    cases.extend([Preset::Fast, Preset::High, Preset::Reference].map(cut_by_the_horizon));
     cases.extend([through_a_card(), bright_beside_dim(), dim_in_the_shade(), sun(), sun_in_the_shade()]);
     cases
 }
@@ -64,7 +64,7 @@ fn small_light(side: f64) -> Case {
 }
 
 /// At the default quality, of 3 x 3 nodes, one row of which counts, the light comes out 18 % too dark.
-fn cut_by_the_horizon(quality: Quality) -> Case {
+fn cut_by_the_horizon(quality: Preset) -> Case {
     let light = lamp([1.0, 0.0, 0.0], 1.0, 10.0);
     let white = f64::from(radiance(&light).g) / PI;
     let expected = polygon_irradiance(&frame(&light).corners(light.size), Point3::origin(), Vector3::z()) * white;
@@ -97,7 +97,7 @@ fn through_a_card() -> Case {
         move || {
             let upright = card(1, [0.0, 0.0, 0.5], tilted(FRAC_PI_2), [0.3; 2], Image::filled(64, 64, grey(1.0)));
             let shot = Shot::new(at(0.3, 0.0, [3, 3])).with_light(light).with_card(upright);
-            Ok(Outcome::near(cast(&shot, &Quality::High.options()).shadow()[(1, 1)].g.into(), expected, 0.02, ""))
+            Ok(Outcome::near(cast(&shot, &Preset::High.options()).shadow()[(1, 1)].g.into(), expected, 0.02, ""))
         },
     )
 }
@@ -184,7 +184,7 @@ fn sun_in_the_shade() -> Case {
             let facing = UnitQuaternion::rotation_between(&Vector3::z(), &to_sun).unwrap_or_default();
             let shade = card(1, (to_sun * 0.1).into(), facing, [0.02; 2], Image::filled(64, 64, grey(1.0)));
             let shot = Shot::new(at(0.0, 0.0, [3, 3])).with_environment(map).with_card(shade);
-            let left = f64::from(cast(&shot, &Quality::Good.options()).shadow()[(1, 1)].g);
+            let left = f64::from(cast(&shot, &Preset::Good.options()).shadow()[(1, 1)].g);
             Ok(Outcome::near(left, expected, 1e-4, ""))
         },
     )

@@ -101,7 +101,7 @@ fn quality_where_it_does_not_apply_changes_nothing() {
     let no_sky = Scene { ambient: LinearRgb::BLACK, ..scene.clone() };
     assert!(with(|setup| setup.render.ambient_samples = 99, &no_sky) == with(|_| {}, &no_sky));
     let no_cards = Scene { objects: vec![], ..scene.clone() };
-    let finest = |setup: &mut Setup| setup.render = crate::render::Quality::Reference.options();
+    let finest = |setup: &mut Setup| setup.render = crate::render::Preset::Reference.options();
     assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
     // How cards fall does not matter to cards that lie.
     let longer = |setup: &mut Setup| setup.scene.settle.time_limit *= 2.0;

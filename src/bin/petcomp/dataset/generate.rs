@@ -2,7 +2,7 @@
 
 use crate::common::{Common, RecipeArgs, interruption};
 use petcomp::dataset::{self, Numbers, Plan, Report, Setup, ShardChoice, Studio, contact_sheet_of};
-use petcomp::io;
+use petcomp::{Quality, io};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -18,6 +18,10 @@ pub(crate) struct Args {
     /// Folder to write into
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+    /// draft, normal or reference: how finely everything is computed; by default what the recipe says. Falls differ between
+    /// qualities, and so do the places where things come to lie
+    #[arg(long)]
+    quality: Option<Quality>,
     /// Go on with a dataset that was begun before: refuse a new folder, and check every file against its checksum
     #[arg(long)]
     resume: bool,
@@ -60,6 +64,9 @@ pub(crate) struct Merge {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let mut setup = args.recipe.setup()?;
+    if let Some(quality) = args.quality {
+        setup = quality.setup(setup);
+    }
     if args.preview.is_some() {
         setup = setup.preview();
     }

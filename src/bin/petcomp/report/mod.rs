@@ -1,5 +1,6 @@
 //! `petcomp report`: how good a stage is, measured: one file per stage.
 
+mod all;
 mod camera;
 mod experiments;
 mod matte;
@@ -13,6 +14,8 @@ use crate::common::Common;
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
+    /// Everything that is measured on one page, in about three minutes: report.html, report.md and the data as CSV
+    All(all::Args),
     /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
     Camera(camera::Args),
     /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
@@ -33,6 +36,7 @@ pub(crate) enum Command {
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
+        Command::All(args) => all::run(args, common),
         Command::Camera(args) => camera::run(args, common),
         Command::Settle(args) => settle::run(args, common),
         Command::Stability(args) => stability::run(args, common),

@@ -21,7 +21,7 @@ pub(crate) struct Args {
     /// Golden scenes to compare as well
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
-    /// Renderings per preset, of which the quickest is told
+    /// Renderings per preset, of which the median is told
     #[arg(long, value_name = "N", default_value_t = 5)]
     repeats: usize,
 }
