@@ -123,6 +123,21 @@ impl CutOut {
 /// A matte that leaves more than this of the screen is worth a remark: what it leaves veils the object, too.
 const RESIDUE: f32 = 0.2;
 
+/// A screen that is clipped in more of its pixels than this is worth a look: a plate goes on under the object, so a corner
+/// beside a lamp may be clipped.
+const CLIPPED_SCREEN: f32 = 0.1;
+
+/// The remark on a screen that is too bright for the camera; none where the matte does not ask for the screen.
+fn clipped_screen(photo: &Image<LinearRgb>, found: &Segmentation, method: MatteMethod, clipped: f32) -> Option<Remark> {
+    if method == MatteMethod::Outline {
+        return None;
+    }
+    let outside = || photo.pixels().iter().zip(found.mask.pixels()).filter(|(_, m)| m.0 <= 0.0).map(|(p, _)| p);
+    let count = outside().filter(|p| p.r.max(p.g).max(p.b) >= clipped).count();
+    let share = count as f32 / outside().count().max(1) as f32;
+    (share > CLIPPED_SCREEN).then_some(Remark::ClippedScreen(share))
+}
+
 /// Cuts the one object out of a photo on a uniform screen or board.
 ///
 /// `photo` is scene-linear. A screen too grey to be keyed gives a matte from the outline, and a [`Remark`].
@@ -164,6 +179,7 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
         _ if matted.residue > RESIDUE => remarks.push(Remark::Residue(matted.residue)),
         _ => {}
     }
+    remarks.extend(clipped_screen(photo, &segmentation, method, opts.film.clipped));
     Ok(CutOut {
         film: reduced(matted.film.crop(roi), scale),
         transmittance: reduced(matted.transmittance.crop(roi), scale),

@@ -6,8 +6,8 @@
 //! photo itself departs from the model by what blurs and refracts the screen, which a second shot would do alike.)
 
 mod method;
-mod score;
-mod truth;
+pub(super) mod score;
+pub(super) mod truth;
 
 pub use method::Method;
 pub use score::Score;
@@ -56,9 +56,9 @@ pub struct Summary {
 }
 
 /// A box that a person would draw, pixels.
-const GOOD_BOX_PX: f64 = 2.0;
+pub(super) const GOOD_BOX_PX: f64 = 2.0;
 /// The outline that is promised.
-const GOOD_IOU: f64 = 0.95;
+pub(super) const GOOD_IOU: f64 = 0.95;
 /// Shots made of each photo's truth: their noise is drawn from seeds of their own.
 const SHOTS: u64 = 2;
 /// New backgrounds per photo.
@@ -125,7 +125,7 @@ fn background((w, h): (usize, usize), seed: u64) -> Image<LinearRgb> {
 }
 
 /// Normal numbers: sums of twelve uniform ones.
-fn normal(seed: u64) -> impl FnMut() -> f64 {
+pub(super) fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     move || (0..12).map(|_| f64::from(rng.next_u32()) / f64::from(u32::MAX)).sum::<f64>() - 6.0
 }

@@ -7,6 +7,7 @@ mod chart;
 pub mod dataset;
 pub mod eval;
 pub mod experiments;
+pub mod flags;
 mod histogram;
 pub mod matte;
 mod page;
