@@ -14,6 +14,9 @@ pub enum Remark {
         /// Where the object is, in words.
         object: String,
     },
+    /// What was taken for one object may be two beside each other.
+    #[error("there may be two objects, {} and {}: nothing but a narrow gap joins them", .0[0], .0[1])]
+    Parted([String; 2]),
     /// The object reaches these borders of the photo.
     #[error("the object reaches the {} border: what lies beyond is missing from its size", .0.join(" and "))]
     Truncated(Vec<&'static str>),
@@ -30,7 +33,9 @@ pub enum Remark {
     #[error("the outline is unsure: only {:.0} % of it lies on edges; is the object in focus, and is all of it seen?", 100.0 * .0)]
     Unsupported(f64),
     /// A side of the box moves by so many pixels of the picture that was searched when edges must be stronger.
-    #[error("the outline is unsure: a search for stronger edges moves its box by {0:.0} pixels; is a part of it as faint as the screen?")]
+    #[error(
+        "the outline is unsure: a search for stronger edges moves its box by {0:.0} pixels; is a part of it as faint as the screen?"
+    )]
     Drifting(f64),
     /// The object's edges are blurred by this standard deviation, pixels of the picture that was searched.
     #[error("the object's edges are blurred by {0:.1} pixels: out of focus, or moved")]
@@ -72,6 +77,7 @@ impl Remark {
     pub fn is_doubt(&self) -> bool {
         match self {
             Self::LeftOut { .. }
+            | Self::Parted(_)
             | Self::Truncated(_)
             | Self::Residue(_)
             | Self::Unstable(_)

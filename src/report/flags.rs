@@ -212,7 +212,8 @@ mod tests {
 
     #[test]
     fn a_plain_slab_ends_right_on_any_screen() {
-        for variant in [Variant::Plain, Variant::Uneven, Variant::VeryUneven, Variant::OtherScreen, Variant::GreyScreen] {
+        for variant in [Variant::Plain, Variant::Uneven, Variant::VeryUneven, Variant::OtherScreen, Variant::GreyScreen]
+        {
             assert_eq!(end(variant), End::Right, "{}", variant.name());
         }
     }
@@ -246,7 +247,10 @@ mod tests {
         let row = |variant, end| Row { photo: "a".into(), variant, found: None, end, doubts: vec!["x; y".into()] };
         let rows = [row(Variant::Plain, End::Right), row(Variant::Plain, End::SilentlyWrong)];
         let table = table(&rows);
-        assert_eq!((table.rows.len(), &table.rows[0][1..]), (Variant::ALL.len(), &["2", "1", "0", "0", "0", "1"].map(String::from)[..]));
+        assert_eq!(
+            (table.rows.len(), &table.rows[0][1..]),
+            (Variant::ALL.len(), &["2", "1", "0", "0", "0", "1"].map(String::from)[..])
+        );
         assert_eq!(details(&rows).rows.len(), 2);
     }
 }

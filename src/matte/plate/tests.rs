@@ -87,7 +87,8 @@ fn a_photographed_screen_is_aligned_and_its_exposure_matched() {
         let [dx, dy] = found.shift_px;
         assert!((dx - shift[0]).abs() < 0.2 && (dy - shift[1]).abs() < 0.2, "{:?}, expected {shift:?}", found.shift_px);
         assert_eq!(found.degree, None);
-        let mean = |image: &Image<LinearRgb>| image.pixels().iter().map(|p| p.g).sum::<f32>() / (SIZE.0 * SIZE.1) as f32;
+        let mean =
+            |image: &Image<LinearRgb>| image.pixels().iter().map(|p| p.g).sum::<f32>() / (SIZE.0 * SIZE.1) as f32;
         assert!((mean(&found.image) / mean(&truth) - 1.0).abs() < 0.02, "the exposure is matched");
     }
 }

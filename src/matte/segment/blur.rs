@@ -25,7 +25,8 @@ const STEEPEST: f64 = 0.398_942;
 /// Along profiles across the outline, the steepest change over one pixel as a share of the whole change: `1 / (sqrt(2 pi)
 /// sigma)` for a blurred step. The median over the outline.
 pub(super) fn blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> f64 {
-    let points: Vec<_> = outline.rings.iter().flat_map(|ring| across(&evenly(ring, SPACING * scale.max(1.0)))).collect();
+    let points: Vec<_> =
+        outline.rings.iter().flat_map(|ring| across(&evenly(ring, SPACING * scale.max(1.0)))).collect();
     let mut slopes: Vec<f32> = points.par_iter().filter_map(|(at, normal)| slope(roots, *at, *normal, scale)).collect();
     let middle = slopes.len() / 2;
     if slopes.is_empty() {
@@ -42,12 +43,7 @@ fn across(ring: &[crate::geom::Point2<f64>]) -> Vec<(crate::geom::Point2<f64>, V
 }
 
 /// The steepest change over a pixel, as a share of the whole change; nothing where hardly anything changes.
-fn slope(
-    roots: &Image<LinearRgb>,
-    at: crate::geom::Point2<f64>,
-    normal: Vector2<f64>,
-    scale: f64,
-) -> Option<f32> {
+fn slope(roots: &Image<LinearRgb>, at: crate::geom::Point2<f64>, normal: Vector2<f64>, scale: f64) -> Option<f32> {
     let values: Vec<LinearRgb> =
         (-2 * REACH..=2 * REACH).map(|k| lanes(roots, at, normal, 0.5 * f64::from(k), scale)).collect();
     let pairs = values.iter().enumerate().flat_map(|(i, a)| values[i..].iter().map(move |b| distance(*a, *b)));

@@ -56,8 +56,7 @@ pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<
         .enumerate()
         .map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i), ..Default::default() })
         .collect();
-    let wanted =
-        |i: usize| opts.levels.is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels);
+    let wanted = |i: usize| opts.levels.is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels);
     let most = (0..searched.len()).filter(|&i| wanted(i)).map(|i| beliefs[i].value()).fold(0.0, f64::max);
     let pick = (0..searched.len()).find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most).unwrap_or(0);
     let confidence = Confidence { drift_px: drift_px(&searched, pick, &scales, opts), ..beliefs[pick] };

@@ -127,7 +127,26 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
         }
     }
     let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
-    Ok((groups.only(belongs).zip_map(edges, |near, edge| near && edge), remarks))
+    let object = groups.only(belongs).zip_map(edges, |near, edge| near && edge);
+    remarks.extend(parted(&object, PARTED * join_px));
+    Ok((object, remarks))
+}
+
+/// Edges that fall apart into two clusters when they are joined over this share of the gap may be of two objects.
+const PARTED: f64 = 0.5;
+
+/// The remark on an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
+fn parted(object: &Image<bool>, join_px: f64) -> Option<Remark> {
+    let groups = Groups::of(&filter::dilate(object, join_px / 2.0));
+    let sizes = groups.sizes(object);
+    let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
+    let member = |i: usize| groups.only(move |group| group == i).zip_map(object, |near, edge| near && edge);
+    let first = member(main);
+    let hull = hull::coverage(&hull::convex_hull(&first), object.width(), object.height()).map(|c| c.0 > 0.0);
+    let inside = groups.sizes(&object.zip_map(&hull, |edge, inside| edge && inside));
+    let rival = |i: &usize| *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64;
+    let other = (0..sizes.len()).find(rival)?;
+    Some(Remark::Parted([place(&first), place(&member(other))]))
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.
