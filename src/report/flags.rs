@@ -223,7 +223,7 @@ mod tests {
         for variant in [Variant::OverBorder, Variant::Two, Variant::Empty, Variant::EmptyUneven] {
             assert_eq!(end(variant), End::Right, "{}", variant.name());
         }
-        assert_eq!(end(Variant::Blurred), End::RightAndFlagged);
+        assert!(matches!(end(Variant::Blurred), End::RightAndFlagged | End::Told));
     }
 
     #[test]
