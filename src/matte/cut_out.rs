@@ -282,7 +282,11 @@ impl Matted {
 }
 
 fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
-    if sigma_px > 0.0 { filter::gaussian_blur(mask, sigma_px) } else { mask.clone() }
+    if sigma_px <= 0.0 {
+        return mask.clone();
+    }
+    // The weights of the blur sum to 1 only as far as rounding goes; more than all of a pixel is not sound.
+    filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
 fn mean(matte: &Image<Coverage>, set: &Image<bool>) -> f32 {
@@ -343,6 +347,14 @@ mod tests {
         let centre = image[(image.width() / 2, image.height() / 2)];
         assert!((centre.a - 1.0).abs() < 1e-5 && (centre.r - 0.5).abs() < 1e-5);
         assert_eq!(image[(0, 0)].a, 0.0);
+    }
+
+    #[test]
+    fn softening_covers_no_pixel_more_than_all() {
+        for sigma in [0.3, 0.6, 1.0, 2.5] {
+            let soft = softened(&Image::filled(40, 30, Coverage(1.0)), sigma);
+            assert!(soft.pixels().iter().all(|c| (0.0..=1.0).contains(&c.0) && c.0 > 0.999));
+        }
     }
 
     #[test]
