@@ -123,6 +123,21 @@ impl CutOut {
 /// A matte that leaves more than this of the screen is worth a remark: what it leaves veils the object, too.
 const RESIDUE: f32 = 0.2;
 
+/// A screen that is clipped in more of its pixels than this is worth a look: a plate goes on under the object, so a corner
+/// beside a lamp may be clipped.
+const CLIPPED_SCREEN: f32 = 0.1;
+
+/// The remark on a screen that is too bright for the camera; none where the matte does not ask for the screen.
+fn clipped_screen(photo: &Image<LinearRgb>, found: &Segmentation, method: MatteMethod, clipped: f32) -> Option<Remark> {
+    if method == MatteMethod::Outline {
+        return None;
+    }
+    let outside = || photo.pixels().iter().zip(found.mask.pixels()).filter(|(_, m)| m.0 <= 0.0).map(|(p, _)| p);
+    let count = outside().filter(|p| p.r.max(p.g).max(p.b) >= clipped).count();
+    let share = count as f32 / outside().count().max(1) as f32;
+    (share > CLIPPED_SCREEN).then_some(Remark::ClippedScreen(share))
+}
+
 /// Cuts the one object out of a photo on a uniform screen or board.
 ///
 /// `photo` is scene-linear. A screen too grey to be keyed gives a matte from the outline, and a [`Remark`].
@@ -164,6 +179,7 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
         _ if matted.residue > RESIDUE => remarks.push(Remark::Residue(matted.residue)),
         _ => {}
     }
+    remarks.extend(clipped_screen(photo, &segmentation, method, opts.film.clipped));
     Ok(CutOut {
         film: reduced(matted.film.crop(roi), scale),
         transmittance: reduced(matted.transmittance.crop(roi), scale),
@@ -266,7 +282,11 @@ impl Matted {
 }
 
 fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
-    if sigma_px > 0.0 { filter::gaussian_blur(mask, sigma_px) } else { mask.clone() }
+    if sigma_px <= 0.0 {
+        return mask.clone();
+    }
+    // The weights of the blur sum to 1 only as far as rounding goes; more than all of a pixel is not sound.
+    filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
 fn mean(matte: &Image<Coverage>, set: &Image<bool>) -> f32 {
@@ -327,6 +347,14 @@ mod tests {
         let centre = image[(image.width() / 2, image.height() / 2)];
         assert!((centre.a - 1.0).abs() < 1e-5 && (centre.r - 0.5).abs() < 1e-5);
         assert_eq!(image[(0, 0)].a, 0.0);
+    }
+
+    #[test]
+    fn softening_covers_no_pixel_more_than_all() {
+        for sigma in [0.3, 0.6, 1.0, 2.5] {
+            let soft = softened(&Image::filled(40, 30, Coverage(1.0)), sigma);
+            assert!(soft.pixels().iter().all(|c| (0.0..=1.0).contains(&c.0) && c.0 > 0.999));
+        }
     }
 
     #[test]

@@ -97,7 +97,13 @@ impl ScreenPlate {
             let ((w, h), (pw, ph)) = (empty.size(), photo.size());
             return Err(refused(format!("the empty screen is {w} x {h} pixels, the photo {pw} x {ph}")));
         }
-        let Registered { shift_px, .. } = register::shift(photo, empty, background, [1.0; 3]);
+        let no_background = || refused("the object leaves no background to check the empty screen on");
+        let on_free = |picture: &Image<LinearRgb>| cells::means(picture, background);
+        let gain = cells::gain(&on_free(photo), &on_free(empty)).ok_or_else(no_background)?;
+        // The object's edges must not be seen: the filters of the search reach over them into the free screen.
+        let without_object = photo.zip_map(background, |p, free| free.then_some(p));
+        let without_object = without_object.zip_map(empty, |p, e| p.unwrap_or(e * gain));
+        let Registered { shift_px, .. } = register::shift(&without_object, empty, background, [1.0; 3]);
         if shift_px.iter().any(|s| s.abs() > opts.max_shift_px) {
             return Err(refused(format!(
                 "the empty screen lies ({:.1}, {:.1}) pixels off the photo, expected at most {}; did the camera move?",
@@ -106,8 +112,7 @@ impl ScreenPlate {
         }
         let moved = register::moved(empty, shift_px);
         let smooth = filter::gaussian_blur(&moved, PHOTO_BLUR_PX);
-        let gain = cells::gain(&cells::means(photo, background), &cells::means(&smooth, background))
-            .ok_or_else(|| refused("the object leaves no background to check the empty screen on"))?;
+        let gain = cells::gain(&on_free(photo), &on_free(&smooth)).ok_or_else(no_background)?;
         let plate = Self::of(smooth.map(|p| p * gain), photo, background, None, shift_px);
         plate.check_mismatch(photo, background, opts)?;
         Ok(plate)

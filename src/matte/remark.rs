@@ -14,6 +14,9 @@ pub enum Remark {
         /// Where the object is, in words.
         object: String,
     },
+    /// What was taken for one object may be two beside each other.
+    #[error("there may be two objects, {} and {}: nothing but a narrow gap joins them", .0[0], .0[1])]
+    Parted([String; 2]),
     /// The object reaches these borders of the photo.
     #[error("the object reaches the {} border: what lies beyond is missing from its size", .0.join(" and "))]
     Truncated(Vec<&'static str>),
@@ -29,6 +32,17 @@ pub enum Remark {
     /// Only this share of the outline lies on edges.
     #[error("the outline is unsure: only {:.0} % of it lies on edges; is the object in focus, and is all of it seen?", 100.0 * .0)]
     Unsupported(f64),
+    /// A side of the box moves by so many pixels of the picture that was searched when edges must be stronger.
+    #[error(
+        "the outline is unsure: a search for stronger edges moves its box by {0:.0} pixels; is a part of it as faint as the screen?"
+    )]
+    Drifting(f64),
+    /// The object's edges are blurred by this standard deviation, pixels of the picture that was searched.
+    #[error("the object's edges are blurred by {0:.1} pixels: out of focus, or moved")]
+    Blurred(f64),
+    /// This share of the screen is clipped: brighter than the camera can tell.
+    #[error("{:.0} % of the screen is clipped: what the object lets through cannot be told; photograph it darker", 100.0 * .0)]
+    ClippedScreen(f32),
     /// The key leaves this share of the screen.
     #[error("the key leaves {:.0} % of the screen: uneven light, or an object of the screen's hue", 100.0 * .0)]
     Residue(f32),
@@ -54,16 +68,23 @@ pub enum Remark {
     Undetermined(&'static str),
 }
 
-/// Share of the object in the screen's hue from which a person should look: a cap.
-const LEAST_HUE_SHARE: f32 = 0.02;
+/// Share of the object in the screen's hue from which a person should look. Caps and labels (a fifth of a bottle) are taken
+/// for opaque, which they are; where more has the hue, it is the plastic itself, and the screen the wrong one.
+const LEAST_HUE_SHARE: f32 = 0.25;
 
 impl Remark {
     /// A person should look at the cut-out: it may be wrong. Otherwise it is merely less than it could be.
     pub fn is_doubt(&self) -> bool {
         match self {
-            Self::LeftOut { .. } | Self::Truncated(_) | Self::Residue(_) | Self::Unstable(_) | Self::Unsupported(_) => {
-                true
-            }
+            Self::LeftOut { .. }
+            | Self::Parted(_)
+            | Self::Truncated(_)
+            | Self::Residue(_)
+            | Self::Unstable(_)
+            | Self::Unsupported(_)
+            | Self::Drifting(_)
+            | Self::Blurred(_)
+            | Self::ClippedScreen(_) => true,
             Self::ScreenHue(share) => *share > LEAST_HUE_SHARE,
             Self::GreyScreen(_) | Self::Clipped(_) | Self::Moved { .. } | Self::Undetermined(_) => false,
         }

@@ -1,6 +1,7 @@
 //! Segmentation: where the object is, from two bands of a Laplacian pyramid.
 
 mod band;
+mod blur;
 mod choose;
 mod cluster;
 mod confidence;
@@ -150,19 +151,21 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let margin_px = HOLE_MARGIN * longer_side(&resized) as f64;
     let solid = holes::without_holes(&resized, &found.inside, &holes::around(&found.inside, margin_px));
     let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
-    let outline = snap::snapped(&around.map(to_photo), photo, reduction);
+    let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
+    let outline = snap::snapped(&around.map(to_photo), &roots, reduction);
+    let confidence = Confidence { blur_px: blur::blur_px(&outline, &roots, reduction), ..chosen.confidence };
     let tips: Vec<_> = inset(&found.hull, TIP_INSET_PX).into_iter().map(to_photo).collect();
     let hull = Outline { rings: outline.rings.iter().cloned().chain([tips]).collect() }.hull();
     let mut remarks = found.remarks.clone();
     remarks.extend(truncation(found.touches));
-    remarks.extend(chosen.confidence.remarks());
+    remarks.extend(confidence.remarks());
     Ok(Segmentation {
         mask: Outline { rings: vec![hull.clone()] }.coverage(w, h),
         tight: outline.coverage(w, h),
         hull,
         outline,
         touches: found.touches,
-        confidence: chosen.confidence,
+        confidence,
         levels: chosen.levels,
         reduction,
         remarks,

@@ -8,8 +8,8 @@
 mod diagram;
 mod made;
 mod method;
-mod score;
-mod truth;
+pub(super) mod score;
+pub(super) mod truth;
 
 pub use diagram::diagrams;
 pub use method::Method;

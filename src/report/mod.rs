@@ -13,6 +13,7 @@ mod diagram;
 pub mod encode;
 pub mod eval;
 pub mod experiments;
+pub mod flags;
 mod histogram;
 pub mod keying;
 pub mod label;

@@ -63,14 +63,53 @@ fn noise_of_3_percent_is_survived() {
     assert!(worst(&found, &truth) < 0.12, "{}", worst(&found, &truth));
 }
 
+/// Blobs of dirt at places that do not repeat: what tells where a screen lies.
+fn dirty(clean: &Image<LinearRgb>, [dx, dy]: [f64; 2]) -> Image<LinearRgb> {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let (w, h) = (SIZE.0 as f64, SIZE.1 as f64);
+    let blobs: Vec<[f64; 3]> =
+        (0..150).map(|_| [w * rng.random::<f64>(), h * rng.random::<f64>(), 1.5 + 2.0 * rng.random::<f64>()]).collect();
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (x, y) = (x as f64 + 0.5 - dx, y as f64 + 0.5 - dy);
+        let blob = |[u, v, r]: &[f64; 3]| 0.3 * libm::exp(-((x - u).powi(2) + (y - v).powi(2)) / (2.0 * r * r));
+        let light = 1.0 - blobs.iter().map(blob).sum::<f64>().min(0.6);
+        clean[(x as usize % SIZE.0, y as usize % SIZE.1)].scale(light as f32)
+    })
+}
+
 #[test]
-fn a_photographed_screens_exposure_is_matched() {
+fn a_photographed_screen_is_aligned_and_its_exposure_matched() {
+    let truth = dirty(&screen(0.0), [0.0; 2]);
+    for shift in [[0.0, 0.0], [3.0, 2.0], [-1.6, 0.7]] {
+        // The empty screen was photographed darker, and lies so far off.
+        let empty = dirty(&screen(0.0), shift.map(|s: f64| -s)).map(|p| p.scale(0.9));
+        let found = ScreenPlate::from_photo(&empty, &photo(&truth, 0.002), &free(), &PlateOptions::default()).unwrap();
+        let [dx, dy] = found.shift_px;
+        assert!((dx - shift[0]).abs() < 0.2 && (dy - shift[1]).abs() < 0.2, "{:?}, expected {shift:?}", found.shift_px);
+        assert_eq!(found.degree, None);
+        let mean =
+            |image: &Image<LinearRgb>| image.pixels().iter().map(|p| p.g).sum::<f32>() / (SIZE.0 * SIZE.1) as f32;
+        assert!((mean(&found.image) / mean(&truth) - 1.0).abs() < 0.02, "the exposure is matched");
+    }
+}
+
+#[test]
+fn a_photographed_screen_without_dirt_is_taken_as_it_lies() {
     let truth = screen(0.3);
     let empty = truth.map(|p| p.scale(0.9));
     let found = ScreenPlate::from_photo(&empty, &photo(&truth, 0.002), &free(), &PlateOptions::default()).unwrap();
     assert_eq!((found.degree, found.shift_px), (None, [0.0; 2]));
     // The border of the blur is flat where the screen slopes.
     assert!(worst(&found, &truth) < 0.03, "{}", worst(&found, &truth));
+}
+
+#[test]
+fn an_empty_screen_that_lies_too_far_off_is_refused() {
+    let empty = dirty(&screen(0.0), [-6.0, 0.0]);
+    let near = PlateOptions { max_shift_px: 4.0, ..PlateOptions::default() };
+    let photo = photo(&dirty(&screen(0.0), [0.0; 2]), 0.002);
+    let said = ScreenPlate::from_photo(&empty, &photo, &free(), &near).unwrap_err().to_string();
+    assert!(said.contains("did the camera move?"), "{said}");
 }
 
 #[test]

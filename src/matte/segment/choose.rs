@@ -1,7 +1,7 @@
 //! The depth of the search, chosen by how well searches agree.
 
 use super::pass::{Pass, Search};
-use super::{Confidence, SMALLEST, SegmentOptions};
+use super::{Confidence, SMALLEST, SegmentOptions, hull};
 use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
@@ -43,54 +43,86 @@ const COMPARED: usize = 256;
 /// # Errors
 /// That of the usual search when more than half of the searches fail.
 pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Chosen> {
-    let mut searched = searches(picture, opts);
+    let scales = scales(picture, opts);
+    let mut searched = searches(&scales, opts);
     let failed = searched.iter().filter(|s| s.pass.is_err()).count();
     if 2 * failed > searched.len() {
         let first = searched.iter().position(|s| s.pass.is_err()).unwrap_or(0);
-        return searched.swap_remove(first).chosen(Confidence::default());
+        return searched.swap_remove(first).chosen(scales, Confidence::default());
     }
     let outlines: Vec<Option<Image<bool>>> = searched.iter().map(|s| s.compared(picture.size())).collect();
     let beliefs: Vec<Confidence> = searched
         .iter()
         .enumerate()
-        .map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i) })
+        .map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i), ..Default::default() })
         .collect();
-    let wanted = |i: usize| opts.levels.is_none_or(|levels| searched[i].reduction == 1 && searched[i].levels == levels);
+    let wanted = |i: usize| opts.levels.is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels);
     let most = (0..searched.len()).filter(|&i| wanted(i)).map(|i| beliefs[i].value()).fold(0.0, f64::max);
     let pick = (0..searched.len()).find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most).unwrap_or(0);
-    searched.swap_remove(pick).chosen(beliefs[pick])
+    let confidence = Confidence { drift_px: drift_px(&searched, pick, &scales, opts), ..beliefs[pick] };
+    searched.swap_remove(pick).chosen(scales, confidence)
+}
+
+/// A picture of one size, ready to be searched, and at which depths.
+struct Scale {
+    /// Pixels of the whole picture for one of this one.
+    reduction: usize,
+    search: Search,
+    depths: Vec<usize>,
 }
 
 /// One search and its setting.
 struct Searched {
-    reduction: usize,
+    /// Which of the scales it was done at.
+    scale: usize,
     levels: usize,
-    first: (Image<Coverage>, Image<bool>),
     pass: Result<Pass>,
 }
 
-fn searches(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Searched> {
+fn scales(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Scale> {
     let (w, h) = picture.size();
     let large_enough = |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST;
     let sizes: Vec<_> = SIZES.into_iter().filter(|(reduction, _)| large_enough(*reduction)).collect();
-    let at_size = |&(reduction, depths): &(usize, &[usize])| {
+    let scale = |&(reduction, depths): &(usize, &[usize])| {
         let longer = w.max(h) / reduction;
         let mut depths: Vec<usize> = depths.iter().copied().filter(|&d| d == 2 || longer >> d >= LEAST_CELLS).collect();
         depths.extend(opts.levels.filter(|levels| reduction == 1 && !depths.contains(levels)));
         let smaller = (reduction > 1).then(|| filter::resize(picture, w / reduction, h / reduction));
         let search = Search::of(smaller.as_ref().unwrap_or(picture), opts, depths.iter().copied().max().unwrap_or(2));
-        let at = |&levels: &usize| {
-            let (first, binary) = search.first();
-            Searched { reduction, levels, first: (first.clone(), binary.clone()), pass: search.at(levels, opts) }
-        };
-        depths.par_iter().map(at).collect::<Vec<_>>()
+        Scale { reduction, search, depths }
     };
-    sizes.par_iter().map(at_size).collect::<Vec<_>>().into_iter().flatten().collect()
+    sizes.par_iter().map(scale).collect()
+}
+
+fn searches(scales: &[Scale], opts: &SegmentOptions) -> Vec<Searched> {
+    let settings = scales.iter().enumerate().flat_map(|(i, scale)| scale.depths.iter().map(move |&levels| (i, levels)));
+    let settings: Vec<(usize, usize)> = settings.collect();
+    let search = |&(scale, levels): &(usize, usize)| {
+        let picture: &Scale = &scales[scale];
+        Searched { scale, levels, pass: picture.search.at(levels, opts) }
+    };
+    settings.par_iter().map(search).collect()
+}
+
+/// So many times the cut of the first band is a stricter search: half a step of exposure.
+const STRICTER: f32 = 1.4;
+
+/// How far a side of the hull's box moves when edges must be stronger, or when the same picture is searched at another
+/// depth, pixels of the whole picture. What such a search does not find at all moves by the picture's longer side.
+fn drift_px(searched: &[Searched], pick: usize, scales: &[Scale], opts: &SegmentOptions) -> f64 {
+    let (own, scale) = (&searched[pick], &scales[searched[pick].scale]);
+    let Ok(pass) = &own.pass else { return 0.0 };
+    let stricter = scale.search.at_cut(own.levels, STRICTER, opts);
+    let lost = pass.inside.width().max(pass.inside.height()) as f64;
+    let deeper = searched.iter().filter(|other| other.scale == own.scale).filter_map(|other| other.pass.as_ref().ok());
+    let moved = deeper.map(|other| hull::farthest_side(&pass.hull, &other.hull));
+    let stricter = stricter.map_or(lost, |other| hull::farthest_side(&pass.hull, &other.hull));
+    scale.reduction as f64 * moved.fold(stricter, f64::max)
 }
 
 impl Searched {
-    fn chosen(self, confidence: Confidence) -> Result<Chosen> {
-        let (first, first_binary) = self.first;
+    fn chosen(self, mut scales: Vec<Scale>, confidence: Confidence) -> Result<Chosen> {
+        let (first, first_binary) = scales.swap_remove(self.scale).search.into_first();
         Ok(Chosen { pass: self.pass?, first, first_binary, levels: self.levels, confidence })
     }
 

@@ -3,30 +3,64 @@
 use crate::matte::remark::Remark;
 use serde::{Deserialize, Serialize};
 
-/// How far an outline can be believed, 0 to 1 in each respect.
+/// How far an outline can be believed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Confidence {
-    /// Share of the outline that lies on edges.
+    /// Share of the outline that lies on edges, 0 to 1.
     pub support: f64,
-    /// Mean overlap (intersection over union) with what searches at other depths found.
+    /// Mean overlap (intersection over union) with what searches at other depths found, 0 to 1.
     pub agreement: f64,
+    /// How far a side of the hull's box moves when edges must be stronger, or at another depth: pixels of the picture that
+    /// was searched.
+    pub drift_px: f64,
+    /// Blur of the object's edges, standard deviation in pixels of the picture that was searched.
+    pub blur_px: f64,
 }
 
 /// An outline with less of itself on edges is worth a look.
 const LEAST_SUPPORT: f64 = 0.6;
 /// An outline that agrees less with other searches is worth a look.
-const LEAST_AGREEMENT: f64 = 0.8;
+const LEAST_AGREEMENT: f64 = 0.75;
+/// A box that moves farther than it may be wrong is worth a look.
+const MOST_DRIFT_PX: f64 = 2.0;
+/// Edges that are softer than this are worth a look: their band reaches 2 pixels, what a box may be wrong, to either side
+/// (the half of a Gaussian's foot that is above 5 % of a step, 1.64 deviations).
+const MOST_BLUR_PX: f64 = 1.2;
 
 impl Confidence {
-    /// Both in one number: their product.
+    /// Support and agreement in one number: their product.
     pub fn value(self) -> f64 {
         self.support * self.agreement
     }
 
     /// Why it is low; nothing where it is not.
     pub(super) fn remarks(self) -> Vec<Remark> {
-        let unstable = (self.agreement < LEAST_AGREEMENT).then_some(Remark::Unstable(self.agreement));
-        let unsupported = (self.support < LEAST_SUPPORT).then_some(Remark::Unsupported(self.support));
-        unstable.into_iter().chain(unsupported).collect()
+        let doubts = [
+            (self.agreement < LEAST_AGREEMENT).then_some(Remark::Unstable(self.agreement)),
+            (self.support < LEAST_SUPPORT).then_some(Remark::Unsupported(self.support)),
+            (self.drift_px > MOST_DRIFT_PX).then_some(Remark::Drifting(self.drift_px)),
+            (self.blur_px > MOST_BLUR_PX).then_some(Remark::Blurred(self.blur_px)),
+        ];
+        doubts.into_iter().flatten().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_reason_is_said_alone() {
+        let sure = Confidence { support: 0.9, agreement: 0.95, drift_px: 1.0, blur_px: 0.7 };
+        assert!(sure.remarks().is_empty());
+        let said = |unsure: Confidence| unsure.remarks().iter().map(ToString::to_string).collect::<Vec<_>>();
+        for (unsure, reason) in [
+            (Confidence { support: 0.5, ..sure }, "50 % of it lies on edges"),
+            (Confidence { agreement: 0.5, ..sure }, "agree with it to 50 %"),
+            (Confidence { drift_px: 7.0, ..sure }, "7 pixels"),
+            (Confidence { blur_px: 2.0, ..sure }, "blurred by 2.0 pixels"),
+        ] {
+            assert!(matches!(&said(unsure)[..], [only] if only.contains(reason)), "{:?}", said(unsure));
+        }
     }
 }

@@ -36,6 +36,17 @@ fn center_or_border(i: usize, len: usize) -> f64 {
     }
 }
 
+/// Left, top, right and bottom of a polygon; infinite where it has no corner.
+pub(super) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
+    let least = |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
+    [least(|p| p.x), least(|p| p.y), -least(|p| -p.x), -least(|p| -p.y)]
+}
+
+/// The largest distance between a side of one polygon's box and that of another.
+pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
+    sides(a).into_iter().zip(sides(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
 /// Scan lines per row of pixels; each contributes exact spans, so only slanted edges are approximated.
 const LINES: usize = 8;
 
@@ -92,6 +103,13 @@ mod tests {
         let mut corners: Vec<_> = hull.iter().map(|p| (p.x as i32, p.y as i32)).collect();
         corners.sort_unstable();
         assert_eq!(corners, [(0, 0), (0, 6), (8, 0), (8, 6)]);
+    }
+
+    #[test]
+    fn boxes_are_compared_side_by_side() {
+        let square = |x: f64, w: f64| [[x, 1.0], [x + w, 1.0], [x + w, 5.0], [x, 5.0]].map(Point2::from);
+        assert_eq!(sides(&square(2.0, 3.0)), [2.0, 1.0, 5.0, 5.0]);
+        assert_eq!(farthest_side(&square(2.0, 3.0), &square(1.0, 7.0)), 3.0);
     }
 
     #[test]

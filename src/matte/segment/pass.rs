@@ -14,6 +14,8 @@ use crate::pixel::{Coverage, LinearRgb};
 /// A picture ready to be searched at any depth.
 pub(super) struct Search {
     bands: Bands,
+    /// Cut of the first band, in units of noise.
+    cut: f32,
     /// Where the first band is above its cut.
     first_binary: Image<bool>,
     /// Where the first band is no mere smear of a stronger edge.
@@ -54,20 +56,30 @@ impl Search {
         let first_binary = first.map(|c| c.0 > cut);
         let strongest = band::largest_around(first, SMEAR);
         let ridges = first.zip_map(&strongest, |c, most| c.0 >= opts.ridge * most.0);
-        Self { bands, first_binary, ridges }
+        Self { bands, cut, first_binary, ridges }
     }
 
     /// The first band and where it is above its cut.
-    pub(super) fn first(&self) -> (&Image<Coverage>, &Image<bool>) {
-        (&self.bands.first, &self.first_binary)
+    pub(super) fn into_first(self) -> (Image<Coverage>, Image<bool>) {
+        (self.bands.first, self.first_binary)
     }
 
     /// Finds the object with band `levels` as the last one.
     pub(super) fn at(&self, levels: usize, opts: &SegmentOptions) -> Result<Pass> {
+        self.pass(levels, &self.first_binary, opts)
+    }
+
+    /// The same with so many times the cut of the first band.
+    pub(super) fn at_cut(&self, levels: usize, times: f32, opts: &SegmentOptions) -> Result<Pass> {
+        let cut = times * self.cut;
+        self.pass(levels, &self.bands.first.map(|c| c.0 > cut), opts)
+    }
+
+    fn pass(&self, levels: usize, first_binary: &Image<bool>, opts: &SegmentOptions) -> Result<Pass> {
         let last = self.bands.last(levels);
         let cut = opts.last_threshold.of(&last);
         let last_binary = last.map(|c| c.0 > cut);
-        let both = self.first_binary.zip_map(&last_binary, |a, b| a && b);
+        let both = first_binary.zip_map(&last_binary, |a, b| a && b);
         let edges = cluster::without_specks(&both.zip_map(&self.ridges, |a, b| a && b), opts.speck);
         let join_px = (opts.join * longer_side(&edges) as f64).max(LEAST_JOIN_PX);
         let (object, remarks) = main_cluster(&edges, join_px)?;
@@ -115,7 +127,26 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
         }
     }
     let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
-    Ok((groups.only(belongs).zip_map(edges, |near, edge| near && edge), remarks))
+    let object = groups.only(belongs).zip_map(edges, |near, edge| near && edge);
+    remarks.extend(parted(&object, PARTED * join_px));
+    Ok((object, remarks))
+}
+
+/// Edges that fall apart into two clusters when they are joined over this share of the gap may be of two objects.
+const PARTED: f64 = 0.5;
+
+/// The remark on an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
+fn parted(object: &Image<bool>, join_px: f64) -> Option<Remark> {
+    let groups = Groups::of(&filter::dilate(object, join_px / 2.0));
+    let sizes = groups.sizes(object);
+    let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
+    let member = |i: usize| groups.only(move |group| group == i).zip_map(object, |near, edge| near && edge);
+    let first = member(main);
+    let hull = hull::coverage(&hull::convex_hull(&first), object.width(), object.height()).map(|c| c.0 > 0.0);
+    let inside = groups.sizes(&object.zip_map(&hull, |edge, inside| edge && inside));
+    let rival = |i: &usize| *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64;
+    let other = (0..sizes.len()).find(rival)?;
+    Some(Remark::Parted([place(&first), place(&member(other))]))
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.

@@ -26,16 +26,15 @@ const NEIGHBOURS: usize = 2;
 
 /// An outline whose points lie where the photo changes halfway from the outside to the object's rim.
 ///
-/// `scale` is pixels of the photo for a pixel of the picture that was searched. Points without a clear change stay.
+/// `roots` are the square roots of the photo, `scale` is its pixels for one of the picture that was searched. Points without a clear change stay.
 ///
 /// # Method
 /// Along the normal through each point, from the outside inwards: the first local maximum of the difference from the
 /// outside (of square roots, all channels) that stands out of the noise; the outline is where the difference has half
 /// that value. Displacements pass a median of five along the outline. A blurred step has half its height at its true
 /// place, whatever the blur.
-pub(super) fn snapped(outline: &Outline, photo: &Image<LinearRgb>, scale: f64) -> Outline {
-    let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
-    let ring = |ring: &Vec<Point2<f64>>| snapped_ring(&evenly(ring, scale.max(1.0)), &roots, scale);
+pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> Outline {
+    let ring = |ring: &Vec<Point2<f64>>| snapped_ring(&evenly(ring, scale.max(1.0)), roots, scale);
     Outline { rings: outline.rings.iter().map(ring).collect() }
 }
 
@@ -65,8 +64,18 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
     (0..n).map(moved).collect()
 }
 
+/// The mean of a few pixels along the outline at a distance `t` outwards, pixels of the search.
+pub(super) fn lanes(roots: &Image<LinearRgb>, at: Point2<f64>, normal: Vector2<f64>, t: f64, scale: f64) -> LinearRgb {
+    let along = Vector2::new(-normal.y, normal.x);
+    let lanes = (-(LANES / 2)..=LANES / 2).map(|lane| {
+        let p = at + normal * (t * scale) + along * (f64::from(lane) * scale / 2.0);
+        filter::sample_bilinear_clamped(roots, p.x, p.y)
+    });
+    lanes.fold(LinearRgb::BLACK, |sum, p| sum + p).scale(1.0 / LANES as f32)
+}
+
 /// Unit normal to the outside of a ring that goes from `a` to `b`, clockwise as seen.
-fn normal(a: Point2<f64>, b: Point2<f64>) -> Vector2<f64> {
+pub(super) fn normal(a: Point2<f64>, b: Point2<f64>) -> Vector2<f64> {
     let along = b - a;
     Vector2::new(along.y, -along.x).try_normalize(0.0).unwrap_or_default()
 }
@@ -81,14 +90,7 @@ struct Profile {
 
 impl Profile {
     fn of(roots: &Image<LinearRgb>, at: Point2<f64>, normal: Vector2<f64>, scale: f64) -> Self {
-        let along = Vector2::new(-normal.y, normal.x);
-        let sample = |t: f64| {
-            let lanes = (-(LANES / 2)..=LANES / 2).map(|lane| {
-                let p = at + normal * (t * scale) + along * (f64::from(lane) * scale / 2.0);
-                filter::sample_bilinear_clamped(roots, p.x, p.y)
-            });
-            lanes.fold(LinearRgb::BLACK, |sum, p| sum + p).scale(1.0 / LANES as f32)
-        };
+        let sample = |t: f64| lanes(roots, at, normal, t, scale);
         let step = 1.0 / STEPS as f64;
         let outside: Vec<_> = (0..(OUTSIDE * STEPS as f64) as usize).map(|k| sample(REACH + k as f64 * step)).collect();
         let mean = outside.iter().fold(LinearRgb::BLACK, |sum, p| sum + *p).scale(1.0 / outside.len() as f32);
@@ -112,13 +114,13 @@ impl Profile {
     }
 }
 
-fn distance(a: LinearRgb, b: LinearRgb) -> f32 {
+pub(super) fn distance(a: LinearRgb, b: LinearRgb) -> f32 {
     let d = a + b.scale(-1.0);
     (d.r * d.r + d.g * d.g + d.b * d.b).sqrt()
 }
 
 /// Points of a ring at equal distances of about `spacing`.
-fn evenly(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
+pub(super) fn evenly(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
     let sides = || ring.iter().zip(ring.iter().cycle().skip(1));
     let length: f64 = sides().map(|(a, b)| (b - a).norm()).sum();
     let step = length / (length / spacing).round().max(1.0);

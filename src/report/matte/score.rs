@@ -109,7 +109,7 @@ fn residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
 }
 
 /// Intersection over union of what is covered by at least a half.
-pub(super) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
+pub(in crate::report) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     let pairs = a.pixels().iter().zip(b.pixels()).map(|(a, b)| (a.0 >= 0.5, b.0 >= 0.5));
     let (both, any) =
         pairs.fold((0u64, 0u64), |(both, any), (a, b)| (both + u64::from(a && b), any + u64::from(a || b)));

@@ -8,21 +8,21 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// A photo and all that its renderer knows of it; all pictures are scene-linear and of one size.
-pub(super) struct Known {
-    pub(super) name: String,
-    pub(super) photo: Image<LinearRgb>,
+pub(in crate::report) struct Known {
+    pub(in crate::report) name: String,
+    pub(in crate::report) photo: Image<LinearRgb>,
     /// Premultiplied foreground F.
-    pub(super) foreground: Image<LinearRgb>,
+    pub(in crate::report) foreground: Image<LinearRgb>,
     /// Transmittance T as a screen under the object shows it, 1 outside the object.
-    pub(super) transmittance: Image<LinearRgb>,
+    pub(in crate::report) transmittance: Image<LinearRgb>,
     /// View transmittance V, 1 outside the object.
-    pub(super) view: Image<LinearRgb>,
+    pub(in crate::report) view: Image<LinearRgb>,
     /// The empty screen K.
-    pub(super) screen: Image<LinearRgb>,
-    pub(super) mask: Image<Coverage>,
+    pub(in crate::report) screen: Image<LinearRgb>,
+    pub(in crate::report) mask: Image<Coverage>,
     /// Left, top, right and bottom of the outline, pixels.
-    pub(super) box_px: [f64; 4],
-    pub(super) noise: Noise,
+    pub(in crate::report) box_px: [f64; 4],
+    pub(in crate::report) noise: Noise,
 }
 
 #[derive(Deserialize)]
@@ -50,20 +50,20 @@ struct Files {
 
 /// Sensor noise: the variance of a value is `shot^2 * value + read^2`.
 #[derive(Clone, Copy, Debug, Deserialize)]
-pub(super) struct Noise {
-    pub(super) shot: f64,
-    pub(super) read: f64,
+pub(in crate::report) struct Noise {
+    pub(in crate::report) shot: f64,
+    pub(in crate::report) read: f64,
 }
 
 /// The records of a folder, by file name, still to be read.
-pub(super) struct Truths {
+pub(in crate::report) struct Truths {
     folder: PathBuf,
     records: Vec<Record>,
 }
 
 impl Truths {
     /// Finds the records (`*.json`) of a folder.
-    pub(super) fn of(folder: &Path) -> Result<Self> {
+    pub(in crate::report) fn of(folder: &Path) -> Result<Self> {
         let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
         let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::file(folder, e)));
         let mut paths: Vec<PathBuf> = paths.collect::<Result<_>>()?;
@@ -77,12 +77,12 @@ impl Truths {
         Ok(Self { folder: folder.into(), records })
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::report) fn len(&self) -> usize {
         self.records.len()
     }
 
     /// Reads photo `i`.
-    pub(super) fn read(&self, i: usize) -> Result<Known> {
+    pub(in crate::report) fn read(&self, i: usize) -> Result<Known> {
         let record = &self.records[i];
         let color = |name: &Path| io::read::<LinearRgb>(self.folder.join(name));
         let mask: Image<Coverage> = io::read(self.folder.join(&record.files.mask))?;
@@ -105,7 +105,7 @@ impl Truths {
 
 impl Known {
     /// The object on another screen: `F + T K` with sensor noise, in 8 bits.
-    pub(super) fn on(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
+    pub(in crate::report) fn on(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
         let mut draw = super::normal(seed);
         let mut seen = self.foreground.clone();
         for ((pixel, t), k) in seen.pixels_mut().iter_mut().zip(self.transmittance.pixels()).zip(screen.pixels()) {

@@ -3,6 +3,7 @@
 mod all;
 mod camera;
 mod experiments;
+mod flags;
 mod matte;
 mod render;
 mod scale;
@@ -26,6 +27,8 @@ pub(crate) enum Command {
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
     Matte(matte::Args),
+    /// Whether cut-outs that are wrong say so, on photos with known outlines made harder in many ways: flags.csv, flags.md
+    Flags(flags::Args),
     /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
     Render(render::Args),
     /// What scenes pay for, counted: work.csv and work.md
@@ -42,6 +45,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Stability(args) => stability::run(args, common),
         Command::Experiments(args) => experiments::run(args, common),
         Command::Matte(args) => matte::run(args, common),
+        Command::Flags(args) => flags::run(args, common),
         Command::Render(args) => render::run(args, common),
         Command::Work(args) => work::run(args, common),
         Command::Scale(args) => scale::run(args, common),
