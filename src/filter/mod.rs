@@ -7,6 +7,7 @@
 //! Every filter takes a picture of any size, the empty one included, and gives the same bits at any thread count.
 
 mod blur;
+mod distance;
 mod morphology;
 mod pyramid;
 mod resize;
@@ -14,6 +15,7 @@ mod sample;
 mod separable;
 
 pub use blur::{box_blur, gaussian_blur};
+pub use distance::depth;
 pub use morphology::{dilate, erode};
 pub use pyramid::{Pyramid, expand, halve, reduce};
 pub use resize::resize;

@@ -43,7 +43,7 @@ fn reach_by_distance(mask: &Image<bool>, radius: f64) -> Vec<usize> {
 }
 
 /// For every pixel the distance to the nearest set pixel of its column; very large where there is none.
-fn vertical_distances(mask: &Image<bool>) -> Vec<u32> {
+pub(super) fn vertical_distances(mask: &Image<bool>) -> Vec<u32> {
     let (width, height) = mask.size();
     let mut distances = vec![u32::MAX; width * height];
     for (distance, &set) in distances.iter_mut().zip(mask.pixels()) {

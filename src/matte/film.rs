@@ -3,7 +3,7 @@
 mod bright;
 mod planes;
 mod solve;
-mod tint;
+pub(super) mod tint;
 mod view;
 
 pub use planes::film_planes;
@@ -167,7 +167,7 @@ fn composed(
     let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
     let transmittance = plastic.zip_map(inside, covered);
     let reflected = photo.zip_map(&plate.image, |p, k| (p, k)).zip_map(&transmittance, |(p, k), t| without(p, t * k));
-    let seen = plastic.zip_map(inside, |t, c| covered(view(t, flat), c));
+    let seen = view(&plastic, flat, inside).zip_map(inside, covered);
     let reflected = reflected.zip_map(inside, |f, c| f.scale(c.0));
     let most = flat.r.max(flat.g).max(flat.b);
     let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));

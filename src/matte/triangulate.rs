@@ -1,5 +1,6 @@
 //! Triangulation: exact film from photos of the same object on two or more screens.
 
+mod dye;
 mod lines;
 
 use super::film::{covered, view};
@@ -61,7 +62,8 @@ pub struct Triangulated {
 /// # Method
 /// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the photos' values over the
 /// screens'. A channel in which the screens are alike (red, on green and blue) leaves T open there: its ratio to the
-/// determined channels is fitted over the whole object, and the two estimates are mixed by their variances.
+/// determined channels is that of the dye of PET which explains these, and what little the screens differ in it says over
+/// the whole object, mixed by their variances.
 ///
 /// Photos are aligned first. Between two screens grey film changes only along the difference of their colours; the light
 /// across it is the same in both photos, and tells how far they lie apart.
@@ -86,7 +88,7 @@ pub fn triangulate(
     if determined == [false; 3] {
         return Err(refused("the screens are too alike in every channel to tell film from background"));
     }
-    let borrowed = Borrowed::fit(&lines, inside, determined);
+    let borrowed = Borrowed::fit(&lines, inside, determined, dye::told(&lines, inside, determined));
     let solved = lines.map(|line| borrowed.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|shot| shot.shift_px).collect();
     let moves = (1..).zip(&shift_px).filter(|(_, s)| **s != [0.0; 2]);
@@ -95,7 +97,7 @@ pub fn triangulate(
     let remarks = moved.chain(names.map(|(name, _)| Remark::Undetermined(name))).collect();
     let flat = lines::flat(&solved, inside);
     let transmittance = solved.zip_map(inside, |p, c| covered(p.transmittance, c));
-    let seen = solved.zip_map(inside, |p, c| covered(view(p.transmittance, flat), c));
+    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
     let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),

@@ -2,7 +2,7 @@
 //!
 //! The truth is a renderer's: light added, transmittance with and without the object's own shadow, coverage, screen.
 //! Every method sees the same photos and finds the object itself. The two-screen method sees two shots made of the truth
-//! by `F + T K`, with the noise of the same sensor: on the photo's screen, and on one with green and blue swapped. (The
+//! by `F + T K`, with the noise of the same sensor: on the photo's screen, green or blue, and on the other one. (The
 //! photo itself departs from the model by what blurs and refracts the screen, which a second shot would do alike.)
 
 mod diagram;
@@ -87,7 +87,7 @@ fn measure_known(count: usize, read: impl Fn(usize) -> Result<Known>, progress: 
         progress(i as u64, count as u64);
         let known = read(i)?;
         let on = |screen: &Image<LinearRgb>, shot: u64| known.on(screen, SHOTS * i as u64 + shot);
-        let shots = [on(&known.screen, 0), on(&known.screen.map(swapped), 1)];
+        let shots = [on(&known.screen, 0), on(&known.other_screen(), 1)];
         let backgrounds: Vec<_> = (0..BACKGROUNDS).map(|k| background(known.photo.size(), k)).collect();
         for method in Method::ALL {
             let work = || row(method, &known, &shots, &backgrounds);
@@ -95,11 +95,6 @@ fn measure_known(count: usize, read: impl Fn(usize) -> Result<Known>, progress: 
         }
     }
     Ok(rows)
-}
-
-/// A green screen from a blue one, and the other way round.
-fn swapped(c: LinearRgb) -> LinearRgb {
-    LinearRgb::new(c.r, c.b, c.g)
 }
 
 fn row(method: Method, known: &Known, shots: &[Image<LinearRgb>; 2], backgrounds: &[Image<LinearRgb>]) -> Row {

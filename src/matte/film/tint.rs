@@ -14,7 +14,7 @@ pub(super) struct Tint {
 }
 
 /// Transmittance of two clear walls of PET, looked through and lit through: 8 surfaces that reflect 5 to 10 % each.
-pub(super) const CLEAR: f32 = 0.56;
+pub(in crate::matte) const CLEAR: f32 = 0.56;
 
 /// Absorbances per channel of the dyes that PET bottles have: light blue, green and brown, the fractions that
 /// recyclers sort clear bottles from. Only the ratios count; the amount is fitted.
@@ -50,11 +50,15 @@ pub(super) fn body(flat: [f32; 3]) -> [f32; 3] {
 pub(super) fn fit(photo: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Image<Coverage>, key: usize) -> Tint {
     let pixels = darkest(photo, plate, inside, key);
     let clear = judged([CLEAR; 3], &pixels, 0.0);
+    let tints = dyed().filter(|flat| flat[key] >= LEAST).map(|flat| judged(flat, &pixels, DYED));
+    tints.fold(clear, |best, tint| if tint.misfit < best.misfit { tint } else { best })
+}
+
+/// Transmittance of flat plastic with each dye in each amount.
+pub(in crate::matte) fn dyed() -> impl Iterator<Item = [f32; 3]> {
     let count = ((AMOUNTS[1] - AMOUNTS[0]) / AMOUNTS[2]) as usize;
     let amounts = (0..=count).map(|i| AMOUNTS[0] + i as f32 * AMOUNTS[2]);
-    let dyed = amounts.flat_map(|amount| DYES.map(|dye| dye.map(|a| CLEAR * libm::expf(-amount * a))));
-    let tints = dyed.filter(|flat| flat[key] >= LEAST).map(|flat| judged(flat, &pixels, DYED));
-    tints.fold(clear, |best, tint| if tint.misfit < best.misfit { tint } else { best })
+    amounts.flat_map(|amount| DYES.map(|dye| dye.map(|a| CLEAR * libm::expf(-amount * a))))
 }
 
 /// A pixel of the photo and of the screen behind it.
@@ -76,7 +80,7 @@ fn darkest(photo: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Image<Coverag
 }
 
 /// Coverage from which on a pixel is wholly inside: one 8-bit code below 1.
-pub(super) const WHOLE: f32 = 0.99;
+pub(in crate::matte) const WHOLE: f32 = 0.99;
 
 fn judged(flat: [f32; 3], pixels: &[Pair], handicap: f32) -> Tint {
     let scattered = body(flat);

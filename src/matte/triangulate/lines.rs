@@ -27,6 +27,11 @@ impl Line {
         (self.xx - self.x * self.x / self.count).max(0.0)
     }
 
+    /// By how much a share that all x are off changes the slope, as a share of it.
+    fn lever(&self) -> f32 {
+        self.x / self.count / self.spread().sqrt().max(f32::MIN_POSITIVE)
+    }
+
     fn slope(&self) -> f32 {
         (self.xy - self.x * self.y / self.count) / self.spread().max(f32::MIN_POSITIVE)
     }
@@ -45,6 +50,11 @@ pub(super) struct Pixel {
 }
 
 impl Pixel {
+    /// Transmittance of a channel as its line has it.
+    pub(super) fn slope(&self, channel: usize) -> f32 {
+        self.lines[channel].slope()
+    }
+
     /// Standard deviation of a channel's slope.
     pub(super) fn sigma(&self, channel: usize) -> f32 {
         (self.noise / self.lines[channel].spread().sqrt().max(f32::MIN_POSITIVE)).min(UNKNOWN)
@@ -73,21 +83,40 @@ pub(super) struct Borrowed {
 }
 
 impl Borrowed {
-    /// Fits the ratio of each open channel over the object, by what little its screens differ.
-    pub(super) fn fit(pixels: &Image<Pixel>, inside: &Image<Coverage>, determined: [bool; 3]) -> Self {
+    /// The ratio of each open channel: that of `plastic`, the transmittance believed of it where it lies flat, and what
+    /// little the screens differ in the channel says over the whole object, by their variances.
+    pub(super) fn fit(
+        pixels: &Image<Pixel>,
+        inside: &Image<Coverage>,
+        determined: [bool; 3],
+        plastic: [f32; 3],
+    ) -> Self {
         let mut borrowed = Self { determined, ratio: [1.0; 3] };
+        let told = || (0..3).filter(|&c| determined[c]);
+        let mean = told().map(|c| plastic[c]).sum::<f32>() / told().count().max(1) as f32;
         for channel in (0..3).filter(|&c| !determined[c]) {
-            // A weak belief in grey plastic, for screens that do not differ at all.
-            let (mut top, mut bottom) = (BELIEF, BELIEF);
-            for (pixel, _) in pixels.pixels().iter().zip(inside.pixels()).filter(|(_, inside)| inside.0 > 0.5) {
-                let mean = borrowed.mean(pixel);
-                let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
-                top += weight * f64::from(pixel.lines[channel].slope().clamp(-1.0, 2.0) * mean);
-                bottom += weight * f64::from(mean * mean);
-            }
-            borrowed.ratio[channel] = (top / bottom).clamp(0.0, 1.0 / LEAST_MEAN) as f32;
+            let belief = plastic[channel] / mean.max(f32::MIN_POSITIVE);
+            let (measured, variance) = borrowed.measured(pixels, inside, channel);
+            let trust = (BELIEF * belief).max(BELIEF_LEAST).powi(2);
+            let ratio = (belief * variance + measured * trust) / (variance + trust);
+            borrowed.ratio[channel] = ratio.clamp(0.0, 1.0 / LEAST_MEAN);
         }
         borrowed
+    }
+
+    /// The ratio of an open channel as its own lines have it, and its variance: noise, and plates that are a little off.
+    fn measured(&self, pixels: &Image<Pixel>, inside: &Image<Coverage>, channel: usize) -> (f32, f32) {
+        let (mut top, mut bottom, mut levers) = (0.0, f64::MIN_POSITIVE, Vec::new());
+        for (pixel, _) in pixels.pixels().iter().zip(inside.pixels()).filter(|(_, inside)| inside.0 > 0.5) {
+            let mean = self.mean(pixel);
+            let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
+            top += weight * f64::from(pixel.lines[channel].slope().clamp(-1.0, 2.0) * mean);
+            bottom += weight * f64::from(mean * mean);
+            levers.push(pixel.lines[channel].lever());
+        }
+        let ratio = (top / bottom) as f32;
+        let off = PLATE_ERROR * median(levers.into_iter()).unwrap_or(UNKNOWN).min(UNKNOWN) * ratio.max(1.0);
+        (ratio, (1.0 / bottom) as f32 + off * off)
     }
 
     /// Mean transmittance of the determined channels.
@@ -117,10 +146,13 @@ impl Borrowed {
     }
 }
 
-/// Weight of the belief that an open channel passes what the others do: that of one well told pixel.
-const BELIEF: f64 = 100.0;
+/// Standard deviation of the ratio of an open channel that is told from the dye: a share of it, and at least.
+const BELIEF: f32 = 0.15;
+const BELIEF_LEAST: f32 = 0.03;
+/// Plates are so much off, as a share.
+const PLATE_ERROR: f32 = 0.01;
 /// Plastic passes in no channel more than the inverse of this times the mean of the others.
-const LEAST_MEAN: f64 = 0.3;
+const LEAST_MEAN: f32 = 0.3;
 /// Pixels that pass at least this share of what the clearest do are plastic that lies flat, or nearly.
 const FLAT: f32 = 0.5;
 /// The clearest: this share of the object passes more.

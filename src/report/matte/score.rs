@@ -158,7 +158,7 @@ mod tests {
         let photo = Image::from_fn(w, h, |x, y| foreground[(x, y)] + transmittance[(x, y)] * GREEN);
         let mask = Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y)))));
         let (box_px, noise) = ([40.0, 30.0, 120.0, 70.0], Noise { shot: 0.0, read: 0.0 });
-        Known { name: "slab".into(), photo, foreground, transmittance, view, screen, mask, box_px, noise }
+        Known { name: "slab".into(), photo, foreground, transmittance, view, screen, mask, box_px, noise, paint: GREEN }
     }
 
     fn truth(known: &Known) -> Cut {

@@ -23,7 +23,12 @@ pub(in crate::report) struct Known {
     /// Left, top, right and bottom of the outline, pixels.
     pub(in crate::report) box_px: [f64; 4],
     pub(in crate::report) noise: Noise,
+    /// Colour of the screen's paint.
+    pub(in crate::report) paint: LinearRgb,
 }
+
+/// The paints of the sample world's two screens.
+const PAINTS: [LinearRgb; 2] = [LinearRgb::new(0.045, 0.42, 0.085), LinearRgb::new(0.03, 0.095, 0.52)];
 
 #[derive(Deserialize)]
 struct Document {
@@ -36,6 +41,12 @@ struct Record {
     bbox_px: [f64; 4],
     files: Files,
     sensor: Noise,
+    screen: Paint,
+}
+
+#[derive(Deserialize)]
+struct Paint {
+    albedo_linear: [f32; 3],
 }
 
 #[derive(Deserialize)]
@@ -99,11 +110,19 @@ impl Truths {
             mask,
             box_px: record.bbox_px,
             noise: record.sensor,
+            paint: record.screen.albedo_linear.into(),
         })
     }
 }
 
 impl Known {
+    /// The empty screen painted green where it is blue, and blue where it is green, under the same light.
+    pub(super) fn other_screen(&self) -> Image<LinearRgb> {
+        let other = if self.paint.g > self.paint.b { PAINTS[1] } else { PAINTS[0] };
+        let change = LinearRgb::new(other.r / self.paint.r, other.g / self.paint.g, other.b / self.paint.b);
+        self.screen.map(|k| k * change)
+    }
+
     /// The object on another screen: `F + T K` with sensor noise, in 8 bits.
     pub(in crate::report) fn on(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
         let mut draw = super::normal(seed);

@@ -74,7 +74,7 @@ fn cut_by_the_horizon(quality: Preset) -> Case {
         format!("Lambert's formula for the upper half, {expected:.6}: to 5 %, 0.07 stops"),
         move || Ok(Outcome::near(seen(small().with_light(light), &quality.options()) / expected, 1.0, 0.05, "of it")),
     );
-    if quality == Quality::Fast { case.for_the_report() } else { case }
+    if quality == Preset::Fast { case.for_the_report() } else { case }
 }
 
 /// A camera that sees the surface around `x`, `y` from straight above and very near to it.
