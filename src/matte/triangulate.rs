@@ -61,9 +61,9 @@ pub struct Triangulated {
 ///
 /// # Method
 /// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the photos' values over the
-/// screens'. A channel in which the screens are alike (red, on green and blue) leaves T open there: its ratio to the
-/// determined channels is that of the dye of PET which explains these, and what little the screens differ in it says over
-/// the whole object, mixed by their variances.
+/// screens'. A channel in which the screens are alike (red, on green and blue) leaves T open there. The determined ones
+/// tell the dye of PET, and by how much a pixel is such plastic and by how much bare; what little the screens differ in
+/// the open channel corrects the dye over the whole object, and the pixel, by the variances.
 ///
 /// Photos are aligned first. Between two screens grey film changes only along the difference of their colours; the light
 /// across it is the same in both photos, and tells how far they lie apart.

@@ -75,84 +75,95 @@ pub(super) struct Solved {
     pub(super) sigma: f32,
 }
 
-/// How the channels that the screens leave open follow from the others.
+/// How the channels that the screens leave open follow from the others: a pixel is plastic in some share, and bare in some.
 pub(super) struct Borrowed {
     determined: [bool; 3],
-    /// Transmittance of each channel over the mean of the determined ones.
-    ratio: [f32; 3],
+    /// Transmittance of the plastic where it lies flat.
+    plastic: [f32; 3],
 }
 
 impl Borrowed {
-    /// The ratio of each open channel: that of `plastic`, the transmittance believed of it where it lies flat, and what
-    /// little the screens differ in the channel says over the whole object, by their variances.
+    /// `plastic` is what is believed of flat plastic; in open channels it is scaled by what little the screens differ there,
+    /// over the whole object, mixed by the variances.
     pub(super) fn fit(
         pixels: &Image<Pixel>,
         inside: &Image<Coverage>,
         determined: [bool; 3],
         plastic: [f32; 3],
     ) -> Self {
-        let mut borrowed = Self { determined, ratio: [1.0; 3] };
-        let told = || (0..3).filter(|&c| determined[c]);
-        let mean = told().map(|c| plastic[c]).sum::<f32>() / told().count().max(1) as f32;
-        for channel in (0..3).filter(|&c| !determined[c]) {
-            let belief = plastic[channel] / mean.max(f32::MIN_POSITIVE);
-            let (measured, variance) = borrowed.measured(pixels, inside, channel);
-            let trust = (BELIEF * belief).max(BELIEF_LEAST).powi(2);
-            let ratio = (belief * variance + measured * trust) / (variance + trust);
-            borrowed.ratio[channel] = ratio.clamp(0.0, 1.0 / LEAST_MEAN);
-        }
-        borrowed
+        let believed = Self { determined, plastic };
+        let scaled = |c: usize| {
+            let (gain, variance) = believed.gain(pixels, inside, c);
+            let trust = BELIEF * BELIEF;
+            (plastic[c] * (variance + gain * trust) / (variance + trust)).clamp(0.0, 1.0)
+        };
+        Self { plastic: std::array::from_fn(|c| if determined[c] { plastic[c] } else { scaled(c) }), ..believed }
     }
 
-    /// The ratio of an open channel as its own lines have it, and its variance: noise, and plates that are a little off.
-    fn measured(&self, pixels: &Image<Pixel>, inside: &Image<Coverage>, channel: usize) -> (f32, f32) {
+    /// By what the plastic of an open channel must be multiplied by its own lines, and the variance of that: noise, and
+    /// plates that are a little off.
+    fn gain(&self, pixels: &Image<Pixel>, inside: &Image<Coverage>, channel: usize) -> (f32, f32) {
         let (mut top, mut bottom, mut levers) = (0.0, f64::MIN_POSITIVE, Vec::new());
         for (pixel, _) in pixels.pixels().iter().zip(inside.pixels()).filter(|(_, inside)| inside.0 > 0.5) {
-            let mean = self.mean(pixel);
+            let (share, bare) = self.shares(pixel);
+            let expected = f64::from(share * self.plastic[channel]);
             let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
-            top += weight * f64::from(pixel.lines[channel].slope().clamp(-1.0, 2.0) * mean);
-            bottom += weight * f64::from(mean * mean);
+            top += weight * f64::from(pixel.slope(channel).clamp(-1.0, 2.0) - bare) * expected;
+            bottom += weight * expected * expected;
             levers.push(pixel.lines[channel].lever());
         }
-        let ratio = (top / bottom) as f32;
-        let off = PLATE_ERROR * median(levers.into_iter()).unwrap_or(UNKNOWN).min(UNKNOWN) * ratio.max(1.0);
-        (ratio, (1.0 / bottom) as f32 + off * off)
+        let gain = (top / bottom) as f32;
+        let off = PLATE_ERROR * median(levers.into_iter()).unwrap_or(UNKNOWN).min(UNKNOWN) * gain.max(1.0);
+        (gain, (1.0 / bottom) as f32 + off * off)
     }
 
-    /// Mean transmittance of the determined channels.
-    fn mean(&self, pixel: &Pixel) -> f32 {
-        let told = (0..3).filter(|&c| self.determined[c]);
-        let (sum, count) =
-            told.fold((0.0, 0.0), |(sum, count), c| (sum + pixel.lines[c].slope().clamp(0.0, 1.0), count + 1.0));
-        sum / f32::max(count, 1.0)
+    /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with beliefs
+    /// that hold where the channels do not tell them apart. No less than nothing is bare.
+    fn shares(&self, pixel: &Pixel) -> (f32, f32) {
+        let (mut pp, mut pb, mut bb) = (SHARE_SIGMA.powi(-2), 0.0, BARE_SIGMA.powi(-2));
+        let (mut tp, mut tb) = (0.0, 0.0);
+        for c in (0..3).filter(|&c| self.determined[c]) {
+            let weight = 1.0 / (pixel.sigma(c).powi(2) + MODEL_SIGMA * MODEL_SIGMA);
+            let (plastic, told) = (self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
+            pp += weight * plastic * plastic;
+            pb += weight * plastic;
+            bb += weight;
+            tp += weight * told * plastic;
+            tb += weight * told;
+        }
+        let bare = ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (((tp - pb * bare) / pp).max(0.0), bare)
     }
 
     /// The film of one pixel: what is measured, mixed with what the other channels say by the variances.
     pub(super) fn complete(&self, pixel: &Pixel) -> Solved {
-        let mean = self.mean(pixel);
+        let (share, bare) = self.shares(pixel);
         let mut worst = 0.0_f32;
         let told: [f32; 3] = std::array::from_fn(|c| {
-            let (slope, sigma) = (pixel.lines[c].slope(), pixel.sigma(c));
+            let (slope, sigma) = (pixel.slope(c), pixel.sigma(c));
             if self.determined[c] {
                 worst = worst.max(sigma);
                 return slope.clamp(0.0, 1.0);
             }
             let (measured, borrowed) = (1.0 / (sigma * sigma), 1.0 / (BORROWED * BORROWED));
             worst = worst.max((measured + borrowed).sqrt().recip());
-            ((slope * measured + self.ratio[c] * mean * borrowed) / (measured + borrowed)).clamp(0.0, 1.0)
+            ((slope * measured + (share * self.plastic[c] + bare) * borrowed) / (measured + borrowed)).clamp(0.0, 1.0)
         });
         let reflected = std::array::from_fn(|c| pixel.lines[c].intercept(told[c]).max(0.0));
         Solved { transmittance: told.into(), reflected: LinearRgb::from(reflected), sigma: worst }
     }
 }
 
-/// Standard deviation of the ratio of an open channel that is told from the dye: a share of it, and at least.
+/// Standard deviation of an open channel of the plastic that is told from its dye, as a share of it.
 const BELIEF: f32 = 0.15;
-const BELIEF_LEAST: f32 = 0.03;
 /// Plates are so much off, as a share.
 const PLATE_ERROR: f32 = 0.01;
-/// Plastic passes in no channel more than the inverse of this times the mean of the others.
-const LEAST_MEAN: f32 = 0.3;
+/// What is believed of the two shares of a pixel before it is looked at, standard deviations around 0: plastic up to one
+/// and a half times as clear as flat, and now and then a rim with screen beside it.
+const SHARE_SIGMA: f32 = 1.5;
+const BARE_SIGMA: f32 = 0.27;
+/// Standard deviation of transmittances around any sum of plastic and nothing.
+const MODEL_SIGMA: f32 = 0.015;
 /// Pixels that pass at least this share of what the clearest do are plastic that lies flat, or nearly.
 const FLAT: f32 = 0.5;
 /// The clearest: this share of the object passes more.
