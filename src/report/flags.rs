@@ -203,6 +203,7 @@ mod tests {
             mask: Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y))))),
             box_px: [90.0, 60.0, 210.0, 120.0],
             noise: Noise { shot: 0.0, read: 0.003 },
+            paint: GREEN,
         }
     }
 

@@ -77,7 +77,9 @@ mod tests {
     const SIZE: (usize, usize) = (90, 60);
 
     fn slab() -> Image<Coverage> {
-        Image::from_fn(SIZE.0, SIZE.1, |x, y| Coverage(f32::from(u8::from((10..80).contains(&x) && (10..50).contains(&y)))))
+        Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+            Coverage(f32::from(u8::from((10..80).contains(&x) && (10..50).contains(&y))))
+        })
     }
 
     /// V in the middle of a slab, and at its rim.

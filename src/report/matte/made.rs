@@ -52,7 +52,18 @@ pub(super) fn made(i: usize) -> Known {
     let box_px = bounds(i);
     let empty = Image::filled(w, h, LinearRgb::BLACK);
     let name = format!("made {}", i + 1);
-    let known = Known { name, photo: empty, foreground, transmittance, view, screen, mask, box_px, noise: NOISE, paint: SCREEN };
+    let known = Known {
+        name,
+        photo: empty,
+        foreground,
+        transmittance,
+        view,
+        screen,
+        mask,
+        box_px,
+        noise: NOISE,
+        paint: SCREEN,
+    };
     let photo = known.on(&known.screen, FIRST_SEED + i as u64);
     Known { photo, ..known }
 }
