@@ -124,7 +124,8 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
         other => other,
     })?;
     for remark in &cut.remarks {
-        log::info!("{}: {remark}", photo.display());
+        let level = if matches!(remark, Remark::ScreenHue(_)) { log::Level::Warn } else { log::Level::Info };
+        log::log!(level, "{}: {remark}", photo.display());
     }
     let file = cut_out_file(photo, add);
     io::create_folder(folder.join(&add.asset))?;

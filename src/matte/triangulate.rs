@@ -70,7 +70,7 @@ pub struct Triangulated {
 ///
 /// # Errors
 /// [`Error::Value`] (`photos`) for fewer than two or of different size; [`Error::Photo`] where no channel of the screens
-/// differs, the object moved farther than `max_shift_px`, or moved otherwise (`least_agreement`).
+/// differs, the object moved farther than `max_shift_px`, turned, or moved otherwise (`least_agreement`).
 /// # Panics
 /// When a photo and its plate differ in size.
 ///
@@ -164,11 +164,45 @@ fn aligned(
                 found.agreement, opts.least_agreement
             )));
         }
+        if let Some(apart) = turned_px(first, photo, &near, across) {
+            return Err(refused(format!(
+                "the two ends of the object in {place} moved {apart:.1} pixels apart from the first, expected at most \
+                 {MOST_APART_PX}; did it turn?"
+            )));
+        }
         let (photo, screen) = (register::moved(photo, [x, y]), register::moved(&plate.image, [x, y]));
         // Told as where the object lay, not as where it was moved.
         Ok(Shot { photo, screen, shift_px: [0.0 - x, 0.0 - y] })
     };
     shots.iter().enumerate().map(shot).collect()
+}
+
+/// How far the ends of an object moved apart, in pixels, where that is more than they may and surely so.
+fn turned_px(first: &Image<LinearRgb>, photo: &Image<LinearRgb>, near: &Image<bool>, across: [f32; 3]) -> Option<f64> {
+    let [low, high] = ends(near).map(|end| register::shift(first, photo, &end, across));
+    let apart = libm::hypot(low.shift_px[0] - high.shift_px[0], low.shift_px[1] - high.shift_px[1]);
+    let sigma = libm::hypot(low.sigma_px, high.sigma_px);
+    (apart > MOST_APART_PX.max(SURE * sigma)).then_some(apart)
+}
+
+/// Ends that move farther apart than this leave double edges.
+const MOST_APART_PX: f64 = 1.0;
+/// Standard deviations beyond which a difference is one.
+const SURE: f64 = 4.0;
+
+/// The two halves of an object, cut across the longer side of its box.
+fn ends(mask: &Image<bool>) -> [Image<bool>; 2] {
+    let (w, h) = mask.size();
+    let set = || (0..w * h).filter(|&i| mask.pixels()[i]).map(|i| [i % w, i / w]);
+    let span = |side: usize| {
+        let [low, high] = set().fold([usize::MAX, 0], |[low, high], at| [low.min(at[side]), high.max(at[side])]);
+        [low.min(high), high]
+    };
+    let spans = [span(0), span(1)];
+    let side = usize::from(spans[1][1] - spans[1][0] > spans[0][1] - spans[0][0]);
+    let middle = usize::midpoint(spans[side][0], spans[side][1]);
+    let half = |above: bool| Image::from_fn(w, h, |x, y| mask[(x, y)] && ([x, y][side] > middle) == above);
+    [half(false), half(true)]
 }
 
 /// A shift known worse than this says nothing of how well the photos agree.

@@ -90,6 +90,11 @@ impl Common {
         Ok(options.make_default()?)
     }
 
+    /// Nothing but results and errors is asked for.
+    pub(crate) fn quiet(&self) -> bool {
+        self.quiet
+    }
+
     /// Prints a result line, unless told to be quiet.
     pub(crate) fn say(&self, line: impl std::fmt::Display) {
         if !self.quiet {

@@ -89,17 +89,20 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(Verdict::Unreadable.exit_code()));
         }
     };
-    let report = compare(&a, &b, &args.thresholds());
+    let report = match has_alpha(&args.a)? || has_alpha(&args.b)? {
+        true => compare(&a, &b, &args.thresholds()),
+        false => compare(&a.map(opaque), &b.map(opaque), &args.thresholds()),
+    };
     let different = report.max_error > 0.0 && report.verdict != Verdict::Incomparable;
     if let Some(path) = args.output.as_ref().filter(|_| different || !args.only_different)
         && report.verdict != Verdict::Incomparable
     {
         let difference = absolute_difference(&a, &b, args.scale);
-        io::write(path, &difference.map(|[r, g, b, _]| LinearRgb::new(r, g, b)))?;
+        io::write(path, &difference.map(opaque))?;
     }
     common.say(format_args!("Comparing \"{}\" and \"{}\"", args.a.display(), args.b.display()));
     common.say(format_args!("{report}"));
-    if let Some(likeness) = likeness(&args.a, &args.b) {
+    if let Some(likeness) = (!common.quiet()).then(|| likeness(&args.a, &args.b)).flatten() {
         common.say(format_args!("Scene-linear {likeness}"));
     }
     Ok(ExitCode::from(report.verdict.exit_code()))
@@ -110,6 +113,15 @@ fn likeness(a: &Path, b: &Path) -> Option<Likeness> {
     let [picture, reference] =
         [a, b].map(|path| io::read::<PremulRgba>(path).map(|image| image.map(PremulRgba::color)));
     Likeness::of(&picture.ok()?, &reference.ok()?)
+}
+
+/// Pictures without alpha have three channels, over which means are taken.
+fn has_alpha(path: &Path) -> petcomp::Result<bool> {
+    Ok(io::read_header(path)?.channels.iter().any(|name| name == "A"))
+}
+
+fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
+    LinearRgb::new(r, g, b)
 }
 
 /// The values as the file stores them, which is what `idiff` compares: codes of integer formats as shares of full scale,

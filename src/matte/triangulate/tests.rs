@@ -101,6 +101,31 @@ fn an_object_that_moved_far_is_refused() {
     assert!(far.contains("did it move?"), "{far}");
 }
 
+/// The object on a screen, turned around its middle.
+fn turned(screen: LinearRgb, degrees: f64) -> Image<LinearRgb> {
+    let (sin, cos) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        let (dx, dy) = (x as f64 - 80.0, y as f64 - 50.0);
+        let (f, t) = truth(80.0 + cos * dx + sin * dy, 50.0 - sin * dx + cos * dy);
+        f + t * screen
+    })
+}
+
+#[test]
+fn an_object_that_turned_is_refused_and_one_that_hardly_did_is_not() {
+    let plates = [ScreenPlate::even(GREEN, SIZE), ScreenPlate::even(BLUE, SIZE)];
+    let first = turned(GREEN, 0.0);
+    let on_blue = |degrees| {
+        let second = turned(BLUE, degrees);
+        triangulate(&[(&first, &plates[0]), (&second, &plates[1])], &inside(), &TriangulateOptions::default())
+    };
+    for degrees in [-3.0, 2.0, 4.0] {
+        let refusal = on_blue(degrees).unwrap_err().to_string();
+        assert!(refusal.contains("turn"), "{degrees}: {refusal}");
+    }
+    assert!(on_blue(0.1).is_ok());
+}
+
 #[test]
 fn screens_that_are_alike_and_single_photos_are_refused() {
     let alike = solved(&[GREEN, GREEN], [0.0; 2], 0.002).unwrap_err().to_string();

@@ -233,7 +233,6 @@ fn underexposed() -> Case {
         let unsure = found.uncertainty.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>() / inside_area();
         Ok(Outcome::new(format!("off by {error:.3}, uncertainty {unsure:.3}"), error < 0.02 || unsure > 0.5 * error))
     })
-    .for_the_report()
 }
 
 /// Mean error of the green transmittance inside.
@@ -317,7 +316,6 @@ fn clipped_screen() -> Case {
             Ok(Outcome::new(format!("T off by {error:.3}, {numbers}"), error < 0.05 || told))
         },
     )
-    .for_the_report()
 }
 
 fn one_screen() -> Case {
