@@ -96,7 +96,7 @@ pub fn build(
     folder: impl AsRef<Path>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Built> {
-    let (path, folder) = (list_in(list.as_ref()), folder.as_ref());
+    let (path, folder) = (list_in(list.as_ref())?, folder.as_ref());
     let path = path.as_path();
     let list = List::read(path)?;
     let mut manifest = read_or_new(folder)?;
@@ -136,9 +136,12 @@ pub fn build(
 }
 
 /// The list itself, or the one in a folder.
-fn list_in(path: &Path) -> PathBuf {
+fn list_in(path: &Path) -> Result<PathBuf> {
+    if !path.is_dir() {
+        return Ok(path.into());
+    }
     let inside = LISTS.iter().map(|name| path.join(name)).find(|list| list.exists());
-    inside.filter(|_| path.is_dir()).unwrap_or_else(|| path.into())
+    inside.ok_or_else(|| Error::file(path, format!("expected {} in it, a list of the photos", LISTS.join(" or "))))
 }
 
 impl List {
@@ -248,6 +251,13 @@ mod tests {
 
     const TWO: &str = "[[photos]]\nfile = \"one.png\"\nasset = \"a\"\nclass = \"cap\"\nlength = 0.3\n\
                        [[photos]]\nfile = \"two.png\"\nasset = \"a\"\nclass = \"cap\"\npx_per_metre = 100.0\n";
+
+    #[test]
+    fn a_folder_without_a_list_is_told_what_is_expected_in_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err().to_string();
+        assert!(error.contains("expected photos.toml or photos.csv in it"), "{error}");
+    }
 
     #[test]
     fn a_list_becomes_a_library_of_the_right_size() {

@@ -47,6 +47,10 @@ pub(in crate::matte) fn view(
     let share = depths.map(|depth| depth / side.max(f32::MIN_POSITIVE));
     let grainless = smooth.map(|p| p.color().scale(p.a.max(f32::MIN_POSITIVE).recip()));
     grainless.zip_map(&share, |t, depth| (t, flatness(depth))).zip_map(transmittance, |(smooth, inner), t| {
+        // Outside the object, where nothing is asked, there is nothing to smooth either.
+        if smooth == LinearRgb::BLACK {
+            return smooth;
+        }
         let channel = |smooth: f32, flat: f32, t: f32| {
             let plastic = (FLAT * flat.sqrt() * relative(smooth / flat.max(f32::MIN_POSITIVE), inner)).clamp(0.0, 1.0);
             let bare = ((t - BARE.start()) / (BARE.end() - BARE.start())).clamp(0.0, 1.0);

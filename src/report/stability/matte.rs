@@ -33,7 +33,7 @@ enum Promise {
 
 impl Promise {
     fn told(self) -> String {
-        let right = format!("outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px)");
+        let right = format!("outline right (IoU {GOOD_IOU}, box to {GOOD_BOX_PX} px of the picture that is searched)");
         match self {
             Self::Right => format!("{right} without a doubt, matte of the bare screen below {MOST_RESIDUE}"),
             Self::RightOrTold => format!("{right}, or doubted, or refused; never silently wrong"),
