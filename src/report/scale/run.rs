@@ -8,6 +8,7 @@ use crate::dataset::{Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::label::{LabelOptions, label};
 use crate::render::{DeepImage, RenderOptions, cast};
+use crate::report::pile::above;
 use crate::report::settle::median_and_worst;
 use crate::scene::{
     AreaLight, CameraSource, Exposure, Grade, LightShape, Look, Object, Placement, Scene, Shot, Surface,
@@ -149,14 +150,8 @@ fn mean_layers(deep: &DeepImage) -> f64 {
 
 /// Cards in a heap under a lamp and an even sky, seen from above.
 fn scene(case: &Case) -> Scene {
-    let [w, h] = case.image.map(f64::from);
-    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-    let camera = Camera {
-        image: case.image,
-        focal_px: Vector2::repeat(FOCAL_BY_WIDTH * w),
-        principal_px: Point2::new(0.5 * w, 0.5 * h),
-        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, HEIGHT).into(), down),
-    };
+    let focal_px = Vector2::repeat(FOCAL_BY_WIDTH * f64::from(case.image[0]));
+    let camera = Camera { focal_px, ..above(case.image, HEIGHT) };
     let lamp = AreaLight {
         shape: LightShape::Rectangle,
         position: [0.5, 0.3, 1.2],
