@@ -234,7 +234,17 @@ mod tests {
     use super::super::raster::{Raster, Samples, Wanted};
     use super::super::{Format, Window};
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
+    use std::io::Write;
+
+    /// Written by a process of its own: a program that this one had open for writing cannot be started while any other
+    /// test's child, forked at that moment, still holds it open (ETXTBSY).
+    fn write_program(program: &Path, text: &str) {
+        let mut shell = Command::new("/bin/sh");
+        shell.args(["-c", "cat >\"$0\" && chmod 755 \"$0\""]).arg(program).stdin(Stdio::piped());
+        let mut child = shell.spawn().unwrap();
+        child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+        assert!(child.wait().unwrap().success());
+    }
 
     /// A worker that greets and then does what a shell script says; `$n` counts how many were started in its folder.
     fn asked(script: &str, limits: &Limits) -> Result<Raster, String> {
@@ -245,8 +255,7 @@ mod tests {
             count = folder.path().join("count").display(),
             version = env!("CARGO_PKG_VERSION"),
         );
-        std::fs::write(&program, text).unwrap();
-        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+        write_program(&program, &text);
         let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
         let pool = Pool { idle: Mutex::new(Vec::new()) };
         let ask = Ask::Pixels { wanted: Wanted::Coverage, window: Window::Display };
