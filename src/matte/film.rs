@@ -82,8 +82,9 @@ impl FilmMatte {
 /// to opaque where more is reflected than plastic can, by their variances, and the uncertainty says how much was measured.
 /// `F = photo - T * plate` leaves nothing of the screen's light: there is no spill to take away.
 ///
-/// What is brighter in the screen's hue than the screen itself through plastic is opaque (a label, a cap); clipped pixels
-/// have the factor of their surroundings.
+/// What is brighter in the screen's hue than the screen itself through plastic, or has a colour that neither glints nor the
+/// plastic have, is opaque (a label, a cap). Glints hide what is seen through: the brighter, the more such pixels have the
+/// factor of their surroundings, clipped ones all of it.
 ///
 /// # Errors
 /// [`Error::Photo`] where `inside` is empty or a pixel of the photo is not a finite number; [`Error::Value`] for an option that cannot be right.
@@ -117,7 +118,7 @@ pub fn film(
     let solver = Solver::new(key, flat, plate.residual, opts);
     let mut factors = calm.zip_map(&plate.image, |pixel, screen| solver.solve(pixel.into(), screen.into()));
     let painted = bright::make_opaque(&mut factors, &calm, &plate.image, inside);
-    let clipped = bright::fill_clipped(&mut factors, photo, inside, opts.clipped);
+    let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
     let remarks = painted.into_iter().chain(clipped).collect();
     Ok(composed(photo, plate, inside, &factors, flat.into(), remarks))
 }

@@ -1,4 +1,4 @@
-//! Pixels too bright for plastic: paint of the screen's hue, and clipped glints.
+//! Pixels that are no bare plastic: paint, and glints that hide what is seen through.
 
 use super::solve::Factor;
 use super::tint::WHOLE;
@@ -6,6 +6,7 @@ use crate::filter;
 use crate::image::Image;
 use crate::matte::remark::Remark;
 use crate::pixel::{Coverage, LinearRgb};
+use std::ops::RangeInclusive;
 
 /// Flat plastic passes 1; so many times that is the screen's hue from elsewhere.
 const PAINTED: f32 = 1.65;
@@ -20,7 +21,8 @@ const WORTH_SAYING: f32 = 0.002;
 /// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest channel, it may be.
 const SCREEN: f32 = 0.06;
 
-/// Makes what is painted in the screen's hue opaque; bare screen that a wide mask lets in is not.
+/// Makes opaque what is painted: in the screen's hue, or in colours that the plastic has not. Bare screen that a wide mask
+/// lets in is not paint.
 pub(super) fn make_opaque(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
@@ -29,19 +31,21 @@ pub(super) fn make_opaque(
 ) -> Option<Remark> {
     let bare = photo.zip_map(plate, |p, k| is_screen(p.into(), k.into()));
     let bright = factors.zip_map(&bare, |f, bare| f.raw > PAINTED && !bare);
-    if !bright.pixels().iter().any(|b| *b) {
+    let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
+    if !painted.pixels().iter().any(|p| *p) {
         return None;
     }
     let rim_px = (RIM * factors.width().max(factors.height()) as f64).max(2.0);
     let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px);
-    let painted = bright.zip_map(&interior, |b, i| Coverage(f32::from(u8::from(b && i))));
+    let painted = painted.zip_map(&interior, |p, i| Coverage(f32::from(u8::from(p && i))));
     let painted = filter::gaussian_blur(&painted, BLUR_PX);
     let paint = painted.map(|p| ((p.0 - TURNS[0]) / (TURNS[1] - TURNS[0])).clamp(0.0, 1.0));
     for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {
         factor.value *= 1.0 - paint;
         factor.sigma = factor.sigma.max(*paint);
     }
-    let share = share(paint.pixels().iter().map(|p| *p > 0.5), inside);
+    let of_hue = paint.pixels().iter().zip(bright.pixels()).map(|(paint, bright)| *bright && *paint > 0.5);
+    let share = share(of_hue, inside);
     (share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
 }
 
@@ -53,33 +57,43 @@ fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
     (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= SCREEN * strongest)
 }
 
-/// Reach of the surroundings that a clipped pixel is filled from, standard deviation in pixels.
+/// Scene-linear reflected light from which on to which a glint hides what is seen through.
+const GLINT: RangeInclusive<f32> = 0.14..=0.96;
+/// Reach of the surroundings that hidden pixels are filled from, standard deviation as a share of the side of a square of
+/// the object's area, and least, pixels.
+const FILL: f32 = 0.01;
 const FILL_PX: f32 = 3.0;
 /// Weight of surroundings, as a share of the window, that is enough.
 const ENOUGH: f32 = 0.05;
 
-/// Gives clipped pixels the factor of their surroundings, where these are not clipped.
-pub(super) fn fill_clipped(
+/// Gives pixels under glints the factor of their surroundings, as far as they are hidden: clipped ones wholly, others
+/// only more of it, since what reflects much is taken for paint by itself.
+pub(super) fn fill_glints(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
     inside: &Image<Coverage>,
     clipped_at: f32,
 ) -> Option<Remark> {
     let clipped = photo.zip_map(inside, |p, c| c.0 > 0.0 && p.r.max(p.g).max(p.b) >= clipped_at);
-    if !clipped.pixels().iter().any(|c| *c) {
-        return None;
-    }
-    let told = clipped.zip_map(inside, |clipped, c| if clipped { 0.0 } else { c.0 });
+    let hidden = factors.zip_map(&clipped, |f, clipped| if clipped { 1.0 } else { hides(f.reflected) });
     // Weight and weighted factor ride in one picture: one blur for both.
+    let told = hidden.zip_map(inside, |hidden, c| (1.0 - hidden) * c.0);
     let weighted = told.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
-    let around = filter::gaussian_blur(&weighted, FILL_PX);
-    let pixels = factors.pixels_mut().iter_mut().zip(clipped.pixels()).zip(around.pixels());
-    for ((factor, _), around) in pixels.filter(|((_, clipped), around)| **clipped && around.r > ENOUGH) {
-        factor.value = around.g / around.r;
-        factor.sigma = factor.sigma.max(FILLED_SIGMA);
+    let side = inside.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>().sqrt() as f32;
+    let around = filter::gaussian_blur(&weighted, (FILL * side).max(FILL_PX));
+    let pixels = factors.pixels_mut().iter_mut().zip(hidden.pixels()).zip(around.pixels());
+    for ((factor, hidden), around) in pixels.filter(|((_, hidden), around)| **hidden > 0.0 && around.r > ENOUGH) {
+        let more = around.g / around.r - factor.value;
+        factor.value += if *hidden < 1.0 { hidden * more.max(0.0) } else { more };
+        factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
     }
     let share = share(clipped.pixels().iter().copied(), inside);
     (share > CLIPPED_WORTH_SAYING).then_some(Remark::Clipped(share))
+}
+
+/// How much of what is seen through so much reflected light hides.
+fn hides(reflected: f32) -> f32 {
+    ((reflected - GLINT.start()) / (GLINT.end() - GLINT.start())).clamp(0.0, 1.0)
 }
 
 /// Standard deviation of a factor that is only its surroundings': that of plastic around its median.

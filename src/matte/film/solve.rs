@@ -13,6 +13,10 @@ pub(super) struct Factor {
     pub(super) sigma: f32,
     /// What the photo alone says, before anything bounds it.
     pub(super) raw: f32,
+    /// Reflected light, of the channels that the screen has little of.
+    pub(super) reflected: f32,
+    /// Whether that light has a colour that this plastic cannot have.
+    pub(super) coloured: bool,
 }
 
 /// What is the same for all pixels of a photo.
@@ -22,6 +26,8 @@ pub(super) struct Solver {
     flat: [f32; 3],
     /// Shares of the others' reflection that make up the key channel's.
     shares: [f32; 2],
+    /// The second of the others over the first in the light that the plastic scatters.
+    cast: f32,
     noise: f32,
     reflection_error: f32,
     spread: f32,
@@ -36,16 +42,23 @@ const DUE_TO_TINT: f32 = 0.8;
 /// Scene-linear value from which on to which reflected light passes from that of plastic to that of paint. An exposure that
 /// has the screen at 0.3 to 0.45 has white paper at 0.5.
 const PAINT: [f32; 2] = [0.15, 0.3];
+/// Difference of two channels from what plastic can reflect, as a share of the larger, beyond which it is paint; lights a
+/// fifth warmer or colder than the photo's white make a third of it.
+const COLOURED: f32 = 0.4;
+/// The same, scene-linear light, that noise and rounding leave in dark places; single pixels of noise are no paint yet.
+const COLOURED_LEAST: f32 = 0.02;
 
 impl Solver {
     pub(super) fn new(key: usize, flat: [f32; 3], noise: LinearRgb, opts: &FilmOptions) -> Self {
         let others = [(key + 1) % 3, (key + 2) % 3];
         let tinted = 1.0 - (flat[key] / CLEAR).clamp(0.0, 1.0) * DUE_TO_TINT;
+        let body = body(flat);
         Self {
             key,
             others,
             flat,
-            shares: shares(key, others, body(flat)),
+            shares: shares(key, others, body),
+            cast: body[others[1]] / body[others[0]],
             noise: noise.r.max(noise.g).max(noise.b).max(FINEST),
             reflection_error: opts.reflection_error * tinted,
             spread: opts.thickness_spread,
@@ -65,7 +78,22 @@ impl Solver {
         // Nothing reflects less than no light: no channel shows more screen than light.
         let bound = (0..3).map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE)).fold(f32::MAX, f32::min);
         let most = 1.0 / self.flat.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-        Factor { value: drawn.min(bound).clamp(0.0, most), sigma: (prior * variance / (prior + variance)).sqrt(), raw }
+        let value = drawn.min(bound).clamp(0.0, most);
+        let [a, b] = self.others.map(|c| pixel[c] - value * through[c]);
+        Factor {
+            value,
+            sigma: (prior * variance / (prior + variance)).sqrt(),
+            raw,
+            reflected: (0.5 * (a + b)).max(0.0),
+            coloured: self.is_coloured(a, b),
+        }
+    }
+
+    /// Plastic reflects neutrally, scatters in its own tint, or both: what lies beyond is paint.
+    fn is_coloured(&self, a: f32, b: f32) -> bool {
+        let [least, most] = if self.cast < 1.0 { [self.cast * a, a] } else { [a, self.cast * a] };
+        let beyond = (least - b).max(b - most);
+        beyond > COLOURED_LEAST + COLOURED * a.abs().max(b.abs())
     }
 
     /// The factor of a pixel of which nothing but its brightness is known: plastic, or paint.
@@ -102,6 +130,16 @@ mod tests {
             let found = clear().solve(pixel, GREEN);
             assert!((found.value - u).abs() < 0.02, "{found:?} for {u} and {glint}");
         }
+    }
+
+    #[test]
+    fn paint_of_another_colour_than_the_plastic_is_told_from_its_glints() {
+        let seen = |reflected: [f32; 3]| {
+            let pixel = std::array::from_fn(|c| 0.5 * CLEAR * GREEN[c] + reflected[c]);
+            clear().solve(pixel, GREEN).coloured
+        };
+        assert!(seen([0.3, 0.35, 0.02]) && seen([0.02, 0.1, 0.3]));
+        assert!(!seen([0.2; 3]) && !seen([0.22, 0.2, 0.17]) && !seen([0.0; 3]));
     }
 
     #[test]

@@ -197,6 +197,34 @@ fn a_label_of_the_screens_hue_is_opaque_and_said() {
 }
 
 #[test]
+fn a_label_of_a_hue_beside_the_screens_is_opaque() {
+    // Lime on green, sky on blue: as bright in the screen's channel as the screen through plastic.
+    for (label, screen) in [([0.3, 0.4, 0.04], GREEN), ([0.04, 0.25, 0.45], BLUE)] {
+        let world = World { label: label.into(), screen, ..World::default() };
+        let found = world.solved();
+        // Seen through it would be 0.2; what is left are its edges, 3 of 30 columns.
+        let error = world.error(&found, is_label);
+        assert!(error < 0.03, "{error}");
+        assert!(found.film[(95, 60)].opacity.g > 0.98 && found.remarks.is_empty(), "{:?}", found.remarks);
+    }
+}
+
+#[test]
+fn dyed_plastic_is_seen_through_under_a_glint_as_beside_it() {
+    let flat = LinearRgb::new(0.17, 0.38, 0.54);
+    let world = World { flat, glint: 0.0, noise: 0.0, ..World::default() };
+    let (glint, plain) = ((50, 60), world.solved());
+    let mut photo = world.photo();
+    for y in 58..=62 {
+        (48..=52).for_each(|x| photo[(x, y)] = photo[(x, y)] + LinearRgb::grey(0.7));
+    }
+    let plate = ScreenPlate::fit(&photo, &inside().map(|c| c.0 == 0.0), &PlateOptions::default()).unwrap();
+    let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
+    let off = found.film[glint].opacity.g - plain.film[glint].opacity.g;
+    assert!(off.abs() < 0.1 && found.film[glint].color.g > 0.6, "{off}");
+}
+
+#[test]
 fn on_a_grey_screen_the_object_is_opaque_and_said() {
     let found = World { screen: LinearRgb::grey(0.3), ..World::default() }.solved();
     assert!(matches!(found.remarks[..], [Remark::GreyScreen(_)]));
