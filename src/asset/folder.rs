@@ -8,6 +8,7 @@ use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::{CutOut, CutOutOptions, Remark, cut_out_on};
+use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
 /// What is known of a photo that is not in the photo.
@@ -116,13 +117,16 @@ pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
 
 /// Cuts the object out of a photo and writes cut-out, outline and thumbnail.
 pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<PhotoRecord> {
+    let mut watch = Stopwatch::start();
     let picture = io::read(photo)?;
+    watch.lap("read");
     let empty = add.screen.empty()?;
     let options = CutOutOptions { screen: add.screen.color().or(add.options.screen), ..add.options.clone() };
     let cut = cut_out_on(&picture, empty.as_ref(), &options).map_err(|e| match e {
         Error::Photo { what } => Error::Photo { what: format!("{}: {what}", photo.display()) },
         other => other,
     })?;
+    watch.lap("cut out");
     for remark in &cut.remarks {
         let level = if matches!(remark, Remark::ScreenHue(_)) { log::Level::Warn } else { log::Level::Info };
         log::log!(level, "{}: {remark}", photo.display());
@@ -130,7 +134,11 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
     let file = cut_out_file(photo, add);
     io::create_folder(folder.join(&add.asset))?;
     files::write(&folder.join(&file), &cut)?;
-    Ok(record(&cut, add, file, photo))
+    watch.lap("write");
+    let record = record(&cut, add, file, photo);
+    watch.lap("measure");
+    watch.log(photo.display());
+    Ok(record)
 }
 
 /// Where the cut-out of a photo goes.

@@ -12,6 +12,7 @@ use crate::filter;
 use crate::geom::Point2;
 use crate::image::{Image, Roi};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
+use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 
 /// How a photo becomes a cut-out.
@@ -155,8 +156,11 @@ pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut>
 /// Those of [`cut_out`] and of [`ScreenPlate::from_photo`].
 pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, opts: &CutOutOptions) -> Result<CutOut> {
     opts.check()?;
+    let mut watch = Stopwatch::start();
     let segmentation = segment(photo, &opts.segment).map_err(|e| e.within("segment"))?;
+    watch.lap("segment");
     let plate = plate(photo, empty, &segmentation, opts)?;
+    watch.lap("plate");
     let screen = plate.color();
     let method = opts.method.unwrap_or_else(|| method_for(screen));
     let cut = match opts.within {
@@ -168,6 +172,7 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
         MatteMethod::Key => Matted::keyed(photo, &plate, &segmentation, &cut, opts)?,
         MatteMethod::Outline => Matted::grey(photo.zip_map(&cut, |p, m| p.opaque().masked(m)), 0.0),
     };
+    watch.lap("matte");
     let roi = trimmed(&segmentation.hull, opts.margin_px, photo.size());
     let scale = (opts.longest_side as f64 / roi.width.max(roi.height) as f64).min(1.0);
     let corner = Point2::new(roi.x as f64, roi.y as f64);
@@ -180,10 +185,15 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
         _ => {}
     }
     remarks.extend(clipped_screen(photo, &segmentation, method, opts.film.clipped));
+    let film = reduced(matted.film.crop(roi), scale);
+    let transmittance = reduced(matted.transmittance.crop(roi), scale);
+    let uncertainty = reduced(matted.uncertainty.crop(roi), scale);
+    watch.lap("trim");
+    watch.log("cut out");
     Ok(CutOut {
-        film: reduced(matted.film.crop(roi), scale),
-        transmittance: reduced(matted.transmittance.crop(roi), scale),
-        uncertainty: reduced(matted.uncertainty.crop(roi), scale),
+        film,
+        transmittance,
+        uncertainty,
         hull: segmentation.hull.iter().map(|p| moved(*p)).collect(),
         outline: segmentation.outline.map(moved),
         roi,

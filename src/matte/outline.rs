@@ -95,19 +95,26 @@ impl Outline {
 type Side = [Point2<f64>; 2];
 
 /// Scan lines per row of pixels; each contributes exact spans, so only slanted sides are approximated.
-const LINES: usize = 8;
+pub(super) const LINES: usize = 8;
+/// What one of them counts.
+const LINE: f32 = 1.0 / LINES as f32;
 
 /// Where a side crosses the horizontal line at `y`.
 fn crossing([a, b]: &Side, y: f64) -> Option<f64> {
     ((a.y <= y) != (b.y <= y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
 }
 
-fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
-    let first = (x0.max(0.0) as usize).min(row.len());
-    let end = (x1.max(0.0).ceil() as usize).min(row.len());
-    for (x, pixel) in row[..end].iter_mut().enumerate().skip(first) {
+/// Adds what one scan line covers from `x0` to `x1`.
+pub(super) fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
+    let within = |x: f64| (x.max(0.0) as usize).min(row.len());
+    let (first, end) = (within(x0), within(x1.ceil()));
+    // Between its ends a span covers whole pixels.
+    let whole = within(x0.ceil())..within(x1);
+    let whole = if whole.is_empty() { end..end } else { whole };
+    row[whole.clone()].iter_mut().for_each(|pixel| pixel.0 += LINE);
+    for x in (first..whole.start).chain(whole.end..end) {
         let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
-        pixel.0 += overlap.clamp(0.0, 1.0) as f32 / LINES as f32;
+        row[x].0 += overlap.clamp(0.0, 1.0) as f32 * LINE;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::geom::Point2;
 use crate::image::Image;
+use crate::matte::outline::{LINES, add_span};
 use crate::pixel::Coverage;
 use geo::{Area, ConvexHull, MultiPoint, Point};
 use rayon::prelude::*;
@@ -47,9 +48,6 @@ pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     sides(a).into_iter().zip(sides(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// Scan lines per row of pixels; each contributes exact spans, so only slanted edges are approximated.
-const LINES: usize = 8;
-
 /// The share of every pixel that lies inside a convex polygon (pixel-corner coordinates).
 pub(super) fn coverage(polygon: &[Point2<f64>], width: usize, height: usize) -> Image<Coverage> {
     let mut image = Image::new(width, height);
@@ -62,15 +60,6 @@ pub(super) fn coverage(polygon: &[Point2<f64>], width: usize, height: usize) -> 
         }
     });
     image
-}
-
-fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
-    let first = (x0.max(0.0) as usize).min(row.len());
-    let end = (x1.max(0.0).ceil() as usize).min(row.len());
-    for (x, pixel) in row[..end].iter_mut().enumerate().skip(first) {
-        let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
-        pixel.0 += overlap.clamp(0.0, 1.0) as f32 / LINES as f32;
-    }
 }
 
 /// Where the horizontal line at `y` is inside a convex polygon.
