@@ -11,7 +11,9 @@ use exr::meta::BlockDescription;
 use exr::meta::attribute::{AttributeValue, ChannelDescription, LineOrder, SampleType};
 use exr::meta::header::Header;
 use exr::prelude::{Compression, LayerAttributes, SmallVec, Text, Vec2, f16};
-use miniz_oxide::deflate::core::{CompressorOxide, TDEFLFlush, TDEFLStatus, compress, create_comp_flags_from_zip_params};
+use miniz_oxide::deflate::core::{
+    CompressorOxide, TDEFLFlush, TDEFLStatus, compress, create_comp_flags_from_zip_params,
+};
 use rayon::prelude::*;
 use std::io::Cursor;
 
@@ -40,7 +42,7 @@ pub(super) fn encode(
     }
     let header = header((width, height), channels.iter().map(|(name, _)| *name), metadata)?;
     let first_rows: Vec<usize> = (0..height).step_by(ROWS).collect();
-    let block = |y: &usize| deflated(rows(&channels, width, *y..(*y + ROWS).min(height)));
+    let block = |y: &usize| deflated(&samples_of(&channels, width, *y..(*y + ROWS).min(height)));
     let blocks: Vec<Vec<u8>> = first_rows.par_iter().map(block).collect();
     let mut out = Cursor::new(Vec::new());
     let written = exr::block::write(&mut out, SmallVec::from_elem(header, 1), true, |_, writer| {
@@ -71,42 +73,31 @@ fn header<'a>(
     Ok(header.with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing))
 }
 
-/// The bytes of some rows as a block has them: row by row, channel by channel.
-fn rows(channels: &[(&str, Vec<f16>)], width: usize, rows: std::ops::Range<usize>) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(2 * width * rows.len() * channels.len());
-    for y in rows {
-        for (_, samples) in channels {
-            bytes.extend(samples[y * width..][..width].iter().flat_map(|v| v.to_le_bytes()));
-        }
-    }
-    bytes
+/// The samples of some rows as a block has them: row by row, channel by channel.
+fn samples_of(channels: &[(&str, Vec<f16>)], width: usize, rows: std::ops::Range<usize>) -> Vec<f16> {
+    let lines = rows.flat_map(|y| channels.iter().map(move |(_, samples)| &samples[y * width..][..width]));
+    lines.collect::<Vec<_>>().concat()
 }
 
 /// What EXR deflates: all low bytes before all high ones, each as its difference from the one before, plus 128.
-fn predicted(bytes: &[u8]) -> Vec<u8> {
-    let (low, high) = (bytes.iter().step_by(2), bytes.iter().skip(1).step_by(2));
-    let mut out: Vec<u8> = low.chain(high).copied().collect();
-    let mut before = 0;
-    for (i, byte) in out.iter_mut().enumerate() {
-        let difference = byte.wrapping_sub(before).wrapping_add(128);
-        before = *byte;
-        if i > 0 {
-            *byte = difference;
-        }
-    }
-    out
+fn predicted(samples: &[f16]) -> Vec<u8> {
+    let bits = || samples.iter().map(|v| v.to_bits().to_le_bytes());
+    let bytes: Vec<u8> = bits().map(|[low, _]| low).chain(bits().map(|[_, high]| high)).collect();
+    let differences = bytes.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
+    bytes.first().copied().into_iter().chain(differences).collect()
 }
 
 /// A block as the file has it: deflated, or as it is where that is not larger.
-fn deflated(block: Vec<u8>) -> Vec<u8> {
+fn deflated(samples: &[f16]) -> Vec<u8> {
+    let plain = predicted(samples);
     let mut deflate = CompressorOxide::new(create_comp_flags_from_zip_params(LEVEL, WINDOW_BITS, RUNS));
-    let mut out = vec![0; block.len()];
-    match compress(&mut deflate, &predicted(&block), &mut out, TDEFLFlush::Finish) {
-        (TDEFLStatus::Done, _, length) if length < block.len() => {
+    let mut out = vec![0; plain.len()];
+    match compress(&mut deflate, &plain, &mut out, TDEFLFlush::Finish) {
+        (TDEFLStatus::Done, _, length) if length < plain.len() => {
             out.truncate(length);
             out
         }
-        _ => block,
+        _ => samples.iter().flat_map(|v| v.to_le_bytes()).collect(),
     }
 }
 
@@ -137,7 +128,8 @@ mod tests {
         let names = ["R", "G", "B"];
         let notes = [("petcomp:note".to_string(), "text".to_string())];
         let ours = encode(size, names.map(|name| (name, samples(&values))).into(), &notes).unwrap();
-        let usual = encode_any(size, names.map(|name| (name, halves(&values))).into(), Compression::Zip, &notes).unwrap();
+        let usual =
+            encode_any(size, names.map(|name| (name, halves(&values))).into(), Compression::Zip, &notes).unwrap();
         assert_eq!(decoded(&ours), decoded(&usual));
         let end = sort_attributes(&mut usual.clone(), HEADER).unwrap();
         assert_eq!(String::from_utf8_lossy(&ours[..end]), String::from_utf8_lossy(&usual[..end]));

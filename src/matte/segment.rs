@@ -170,18 +170,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let steps = steps(chosen, &picture);
     watch.lap("masks");
     watch.log("segment");
-    Ok(Segmentation {
-        mask,
-        tight,
-        hull,
-        outline,
-        touches,
-        confidence,
-        levels,
-        reduction,
-        remarks,
-        steps,
-    })
+    Ok(Segmentation { mask, tight, hull, outline, touches, confidence, levels, reduction, remarks, steps })
 }
 
 /// Width of the zone around the object that is not asked for the screen, as a share of the longer side: contact shadows.

@@ -21,18 +21,20 @@ const WORTH_SAYING: f32 = 0.002;
 const SCREEN: f32 = 0.06;
 
 /// Makes what is painted in the screen's hue opaque; bare screen that a wide mask lets in is not.
+///
+/// `longer_side` is that of the whole photo, pixels.
 pub(super) fn make_opaque(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
     plate: &Image<LinearRgb>,
     inside: &Image<Coverage>,
+    longer_side: usize,
 ) -> Option<Remark> {
-    let bare = photo.zip_map(plate, |p, k| is_screen(p.into(), k.into()));
-    let bright = factors.zip_map(&bare, |f, bare| f.raw > PAINTED && !bare);
+    let bright = factors.zip3_map(photo, plate, |f, p, k| f.raw > PAINTED && !is_screen(p.into(), k.into()));
     if !bright.pixels().iter().any(|b| *b) {
         return None;
     }
-    let rim_px = (RIM * factors.width().max(factors.height()) as f64).max(2.0);
+    let rim_px = (RIM * longer_side as f64).max(2.0);
     let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px);
     let painted = bright.zip_map(&interior, |b, i| Coverage(f32::from(u8::from(b && i))));
     let painted = filter::gaussian_blur(&painted, BLUR_PX);
@@ -72,9 +74,9 @@ pub(super) fn fill_clipped(
     let told = clipped.zip_map(inside, |clipped, c| if clipped { 0.0 } else { c.0 });
     // Weight and weighted factor ride in one picture: one blur for both.
     let weighted = told.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
-    let around = filter::gaussian_blur(&weighted, FILL_PX);
-    let pixels = factors.pixels_mut().iter_mut().zip(clipped.pixels()).zip(around.pixels());
-    for ((factor, _), around) in pixels.filter(|((_, clipped), around)| **clipped && around.r > ENOUGH) {
+    let around = filter::gaussian_blur_at(&weighted, FILL_PX, &clipped);
+    let filled = factors.pixels_mut().iter_mut().zip(clipped.pixels()).filter(|(_, clipped)| **clipped).zip(around);
+    for ((factor, _), around) in filled.filter(|(_, around)| around.r > ENOUGH) {
         factor.value = around.g / around.r;
         factor.sigma = factor.sigma.max(FILLED_SIGMA);
     }
