@@ -175,6 +175,25 @@ impl<P: Copy> Image<P> {
         Image { width: self.width, height: self.height, pixels: pairs.map(|(&p, &q)| f(p, q)).collect() }
     }
 
+    /// A picture of the same size from three, pixel by pixel, rows in parallel.
+    ///
+    /// # Panics
+    /// When the sizes differ.
+    pub fn zip3_map<Q: Copy + Sync, R: Copy + Sync, S: Copy + Send>(
+        &self,
+        second: &Image<Q>,
+        third: &Image<R>,
+        f: impl Fn(P, Q, R) -> S + Sync,
+    ) -> Image<S>
+    where
+        P: Sync,
+    {
+        assert!(self.size() == second.size() && self.size() == third.size(), "images of different size");
+        let firsts = self.pixels.par_iter().with_min_len(self.width.max(1));
+        let all = firsts.zip(second.pixels.par_iter()).zip(third.pixels.par_iter());
+        Image { width: self.width, height: self.height, pixels: all.map(|((&p, &q), &r)| f(p, q, r)).collect() }
+    }
+
     /// A copy of a part.
     ///
     /// # Panics

@@ -25,6 +25,7 @@ pub mod report;
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;
+mod stopwatch;
 pub mod train;
 pub mod work;
 

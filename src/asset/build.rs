@@ -106,7 +106,7 @@ pub fn build(
     let done = AtomicUsize::new(0);
     progress(0, count);
     let work = list.photos.par_iter().zip(&adds).map(|(photo, add)| {
-        let record = write_photo(folder, &at.join(&photo.file), add);
+        let record = write_photo(folder, &at.join(&photo.file), add).map(|photo| photo.record);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
         record
     });

@@ -1,11 +1,11 @@
 //! A sheet of all cut-outs of a folder over four backgrounds, so that a person sees faults at once.
 
-use super::{Library, Photo};
+use super::{Library, Photo, Texture};
 use crate::color::to_srgb8;
 use crate::filter;
 use crate::image::Image;
 use crate::label::draw::{self, TextSize};
-use crate::pixel::{Film, LinearRgb, Srgb8};
+use crate::pixel::{Film, LinearRgb, Mix, Srgb8};
 use rayon::prelude::*;
 
 /// Longer side of a cut-out on the sheet, pixels.
@@ -54,7 +54,7 @@ pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
 
 /// One cut-out over all backgrounds under a line of text.
 fn strip(photo: &Photo) -> Image<Srgb8> {
-    let cutout = small(photo.texture.to_film());
+    let cutout = small(&photo.texture);
     let (w, h) = cutout.size();
     let record = &photo.record;
     let lines = 1 + record.doubts.len();
@@ -86,14 +86,18 @@ fn fitting(text: &str, width: usize) -> String {
     text.chars().take(room).collect()
 }
 
-fn small(cutout: Image<Film>) -> Image<Film> {
-    let (w, h) = cutout.size();
-    let longest = w.max(h).max(1);
-    if longest <= SIDE {
-        return cutout;
+fn small(cutout: &Texture) -> Image<Film> {
+    match cutout {
+        Texture::Rgba(pyramid) => fitted(pyramid.base()).map(Film::from),
+        Texture::Film(pyramid) => fitted(pyramid.base()),
     }
+}
+
+fn fitted<P: Mix>(cutout: &Image<P>) -> Image<P> {
+    let (w, h) = cutout.size();
+    let longest = w.max(h).max(SIDE);
     let side = |len: usize| (len * SIDE).div_ceil(longest).max(1);
-    filter::resize(&cutout, side(w), side(h))
+    filter::resize(cutout, side(w), side(h))
 }
 
 #[cfg(test)]

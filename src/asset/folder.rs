@@ -1,6 +1,7 @@
 //! Putting photos into an asset folder.
 
 use super::files;
+use super::library::Photo;
 use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_name, check_positive};
 use super::measure::Measured;
 use super::screen_source::ScreenSource;
@@ -8,6 +9,7 @@ use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::{CutOut, CutOutOptions, Remark, cut_out_on};
+use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
 /// What is known of a photo that is not in the photo.
@@ -86,14 +88,14 @@ impl AddPhoto {
 /// # Errors
 /// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of [`cut_out`](crate::matte::cut_out), naming the photo;
 /// those of writing.
-pub fn add_photo(folder: impl AsRef<Path>, photo: impl AsRef<Path>, add: &AddPhoto) -> Result<PhotoRecord> {
+pub fn add_photo(folder: impl AsRef<Path>, photo: impl AsRef<Path>, add: &AddPhoto) -> Result<Photo> {
     let folder = folder.as_ref();
     let mut manifest = read_or_new(folder)?;
     add.check(&manifest)?;
-    let record = write_photo(folder, photo.as_ref(), add)?;
-    manifest.insert(asset_of(add, record.clone()))?;
+    let photo = write_photo(folder, photo.as_ref(), add)?;
+    manifest.insert(asset_of(add, photo.record.clone()))?;
     manifest.write(folder)?;
-    Ok(record)
+    Ok(photo)
 }
 
 /// The manifest of a folder; a new one where there is no manifest.
@@ -115,14 +117,17 @@ pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
 }
 
 /// Cuts the object out of a photo and writes cut-out, outline and thumbnail.
-pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<PhotoRecord> {
+pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<Photo> {
+    let mut watch = Stopwatch::start();
     let picture = io::read(photo)?;
+    watch.lap("read");
     let empty = add.screen.empty()?;
     let options = CutOutOptions { screen: add.screen.color().or(add.options.screen), ..add.options.clone() };
     let cut = cut_out_on(&picture, empty.as_ref(), &options).map_err(|e| match e {
         Error::Photo { what } => Error::Photo { what: format!("{}: {what}", photo.display()) },
         other => other,
     })?;
+    watch.lap("cut out");
     for remark in &cut.remarks {
         let level = if matches!(remark, Remark::ScreenHue(_)) { log::Level::Warn } else { log::Level::Info };
         log::log!(level, "{}: {remark}", photo.display());
@@ -130,7 +135,11 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
     let file = cut_out_file(photo, add);
     io::create_folder(folder.join(&add.asset))?;
     files::write(&folder.join(&file), &cut)?;
-    Ok(record(&cut, add, file, photo))
+    watch.lap("write");
+    let record = record(&cut, add, file, photo);
+    watch.lap("measure");
+    watch.log(photo.display());
+    Ok(Photo::new(cut.film, record))
 }
 
 /// Where the cut-out of a photo goes.

@@ -65,13 +65,25 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_some(folder: impl AsRef<Path>, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        let folder = folder.as_ref();
+        Self::load(folder.as_ref(), wanted, &[])
+    }
+
+    /// The same with photos that were just [added](super::add_photo), which need not be read.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_with(folder: impl AsRef<Path>, added: &[Photo]) -> Result<Self> {
+        Self::load(folder.as_ref(), |_| true, added)
+    }
+
+    fn load(folder: &Path, wanted: impl Fn(&str) -> bool, added: &[Photo]) -> Result<Self> {
         let mut manifest = Manifest::read(folder)?;
         manifest.assets.retain(|asset| wanted(&asset.name));
         let photos: Vec<(usize, usize)> = manifest.assets.iter().enumerate().flat_map(places).collect();
         let load = |&(i, j): &(usize, usize)| {
-            let at = format!("assets[{i}].photos[{j}]");
-            load(folder, &manifest.assets[i].photos[j], &at)
+            let record = &manifest.assets[i].photos[j];
+            let known = added.iter().find(|photo| photo.record == *record).cloned();
+            known.map_or_else(|| load(folder, record, &format!("assets[{i}].photos[{j}]")), Ok)
         };
         let loaded: Vec<Result<Photo>> = photos.par_iter().map(load).collect();
         let mut loaded = loaded.into_iter();
@@ -115,12 +127,20 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
         let what = format!("{:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1", image.pixels()[i]);
         return Err(Error::file(folder.join(&record.file), what));
     }
-    Ok(Photo {
-        size: record.size_m,
-        texture: image.into(),
-        outline_uv: record.outline_px.iter().map(|&[x, y]| Point2::new(x / w, y / h)).collect(),
-        record: record.clone(),
-    })
+    Ok(Photo::new(image, record.clone()))
+}
+
+impl Photo {
+    /// A cut-out and what the manifest says of it.
+    pub(super) fn new(image: Image<Film>, record: PhotoRecord) -> Self {
+        let (w, h) = (image.width() as f64, image.height() as f64);
+        Self {
+            size: record.size_m,
+            texture: image.into(),
+            outline_uv: record.outline_px.iter().map(|&[x, y]| Point2::new(x / w, y / h)).collect(),
+            record,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -149,6 +169,18 @@ mod tests {
         assert_eq!((asset.class, asset.photos.len()), (2, 1));
         assert_eq!(asset.photos[0].texture.texel(3, 3), PremulRgba::new(0.25, 0.5, 0.125, 0.75).into());
         assert_eq!(asset.photos[0].outline_uv[0], Point2::new(1.0 / 40.0, 1.0 / 20.0));
+    }
+
+    #[test]
+    fn photos_in_memory_are_not_read() {
+        let folder = folder_with(None);
+        let record = Manifest::read(folder.path()).unwrap().assets.remove(0).photos.remove(0);
+        let film = Image::filled(40, 20, Film::from(PremulRgba::new(0.25, 0.5, 0.125, 0.75)));
+        let library = Library::open_with(folder.path(), &[Photo::new(film, record.clone())]).unwrap();
+        assert_eq!(library.assets[0].photos[0].texture.size(), (40, 20));
+        let other = PhotoRecord { file: "b.exr".into(), ..record };
+        let stranger = Photo::new(Image::filled(40, 20, Film::default()), other);
+        assert!(Library::open_with(folder.path(), &[stranger]).is_err());
     }
 
     #[test]

@@ -45,6 +45,7 @@ mod document;
 mod exif;
 pub mod exr;
 pub mod exr_parts;
+mod exr_runs;
 #[cfg(feature = "oiio")]
 mod ffi;
 mod format;

@@ -1,6 +1,6 @@
 //! Cut-out: segmentation, screen plate and matte in one go, trimmed to the object.
 
-use super::film::{FilmOptions, film};
+use super::film::{FilmMatte, FilmOptions, PartOf, film_of_part};
 use super::key::{KeyOptions, Keying, Screen};
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
@@ -12,6 +12,7 @@ use crate::filter;
 use crate::geom::Point2;
 use crate::image::{Image, Roi};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
+use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 
 /// How a photo becomes a cut-out.
@@ -132,9 +133,10 @@ fn clipped_screen(photo: &Image<LinearRgb>, found: &Segmentation, method: MatteM
     if method == MatteMethod::Outline {
         return None;
     }
-    let outside = || photo.pixels().iter().zip(found.mask.pixels()).filter(|(_, m)| m.0 <= 0.0).map(|(p, _)| p);
-    let count = outside().filter(|p| p.r.max(p.g).max(p.b) >= clipped).count();
-    let share = count as f32 / outside().count().max(1) as f32;
+    let outside = photo.pixels().iter().zip(found.mask.pixels()).filter(|(_, m)| m.0 <= 0.0);
+    let (all, count) = outside
+        .fold((0_u64, 0_u64), |(all, count), (p, _)| (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped)));
+    let share = count as f32 / all.max(1) as f32;
     (share > CLIPPED_SCREEN).then_some(Remark::ClippedScreen(share))
 }
 
@@ -155,20 +157,33 @@ pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut>
 /// Those of [`cut_out`] and of [`ScreenPlate::from_photo`].
 pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, opts: &CutOutOptions) -> Result<CutOut> {
     opts.check()?;
+    let mut watch = Stopwatch::start();
     let segmentation = segment(photo, &opts.segment).map_err(|e| e.within("segment"))?;
+    watch.lap("segment");
     let plate = plate(photo, empty, &segmentation, opts)?;
+    watch.lap("plate");
     let screen = plate.color();
     let method = opts.method.unwrap_or_else(|| method_for(screen));
-    let cut = match opts.within {
-        Within::Tight => softened(&segmentation.tight, opts.soften_px),
-        Within::Hull => softened(&segmentation.mask, opts.soften_px),
-    };
-    let matted = match method {
-        MatteMethod::Physical => Matted::physical(photo, &plate, &cut, opts)?,
-        MatteMethod::Key => Matted::keyed(photo, &plate, &segmentation, &cut, opts)?,
-        MatteMethod::Outline => Matted::grey(photo.zip_map(&cut, |p, m| p.opaque().masked(m)), 0.0),
+    let whole = match opts.within {
+        Within::Tight => &segmentation.tight,
+        Within::Hull => &segmentation.mask,
     };
     let roi = trimmed(&segmentation.hull, opts.margin_px, photo.size());
+    // There is nothing to solve far from the object; near it blurs must find what they would find in the whole photo.
+    let around = trimmed(&segmentation.hull, opts.margin_px.max(opts.reach_px()), photo.size());
+    let part = photo.crop(around);
+    let cut = softened(&whole.crop(around), opts.soften_px);
+    watch.lap("cut");
+    let matted = match method {
+        MatteMethod::Physical => {
+            let known = PartOf { screen, longer_side: photo.width().max(photo.height()) };
+            Matted::physical(&part, &plate.crop(around), &cut, known, opts)?
+        }
+        MatteMethod::Key => Matted::keyed(photo, &plate, &segmentation, &cut, around, opts)?,
+        MatteMethod::Outline => Matted::grey(part.zip_map(&cut, |p, m| p.opaque().masked(m)), 0.0),
+    };
+    watch.lap("matte");
+    let trim = Roi { x: roi.x - around.x, y: roi.y - around.y, ..roi };
     let scale = (opts.longest_side as f64 / roi.width.max(roi.height) as f64).min(1.0);
     let corner = Point2::new(roi.x as f64, roi.y as f64);
     let moved = |p: Point2<f64>| Point2::from((p - corner) * scale);
@@ -180,10 +195,15 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
         _ => {}
     }
     remarks.extend(clipped_screen(photo, &segmentation, method, opts.film.clipped));
+    let film = reduced(matted.film.crop(trim), scale);
+    let transmittance = reduced(matted.transmittance.crop(trim), scale);
+    let uncertainty = reduced(matted.uncertainty.crop(trim), scale);
+    watch.lap("trim");
+    watch.log("cut out");
     Ok(CutOut {
-        film: reduced(matted.film.crop(roi), scale),
-        transmittance: reduced(matted.transmittance.crop(roi), scale),
-        uncertainty: reduced(matted.uncertainty.crop(roi), scale),
+        film,
+        transmittance,
+        uncertainty,
         hull: segmentation.hull.iter().map(|p| moved(*p)).collect(),
         outline: segmentation.outline.map(moved),
         roi,
@@ -197,7 +217,17 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
     })
 }
 
+/// How far the film of a pixel looks around, pixels: to fill in what is clipped.
+const FILM_REACH_PX: usize = 16;
+/// Standard deviations at which a soft edge ends.
+const SOFT_REACH: f32 = 4.0;
+
 impl CutOutOptions {
+    /// How far around the object something may depend on, pixels.
+    fn reach_px(&self) -> usize {
+        FILM_REACH_PX + (SOFT_REACH * self.soften_px).ceil() as usize
+    }
+
     fn check(&self) -> Result<()> {
         if !(0.0..=100.0).contains(&self.soften_px) {
             return Err(Error::value("soften_px", format!("{}, expected 0 to 100", self.soften_px)));
@@ -234,7 +264,7 @@ fn method_for(screen: LinearRgb) -> MatteMethod {
     if is_keyable(screen) { MatteMethod::Physical } else { MatteMethod::Outline }
 }
 
-/// What a method makes of the whole photo.
+/// What a method makes of the part of the photo around the object.
 struct Matted {
     film: Image<Film>,
     transmittance: Image<LinearRgb>,
@@ -248,13 +278,13 @@ impl Matted {
         photo: &Image<LinearRgb>,
         plate: &ScreenPlate,
         cut: &Image<Coverage>,
+        known: PartOf,
         opts: &CutOutOptions,
     ) -> Result<Self> {
-        let solved = film(photo, plate, cut, &opts.film).map_err(|e| e.within("film"))?;
-        let outside = cut.map(|c| c.0 == 0.0);
-        let residue = mean(&solved.film.map(|f| Coverage(f.to_rgba().a)), &outside);
-        let (transmittance, uncertainty) = (solved.transmittance, solved.uncertainty);
-        Ok(Self { film: solved.film, transmittance, uncertainty, residue, remarks: solved.remarks })
+        let solved = film_of_part(photo, plate, cut, known, &opts.film).map_err(|e| e.within("film"))?;
+        let FilmMatte { film, transmittance, uncertainty, remarks, .. } = solved;
+        // Film is empty outside the cut.
+        Ok(Self { film, transmittance, uncertainty, residue: 0.0, remarks })
     }
 
     fn keyed(
@@ -262,11 +292,12 @@ impl Matted {
         plate: &ScreenPlate,
         found: &Segmentation,
         cut: &Image<Coverage>,
+        around: Roi,
         opts: &CutOutOptions,
     ) -> Result<Self> {
         let keyed = Keying::new(photo, Screen::Plate(&plate.image)).run(&opts.key).map_err(|e| e.within("key"))?;
         let residue = mean(&keyed.matte, &screen_pixels(&found.mask));
-        Ok(Self::grey(keyed.cutout.zip_map(cut, |p, m| p.masked(m)), residue))
+        Ok(Self::grey(keyed.cutout.crop(around).zip_map(cut, |p, m| p.masked(m)), residue))
     }
 
     /// A cut-out of one alpha for all channels, which is taken for the transmittance as well.

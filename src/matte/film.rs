@@ -16,8 +16,9 @@ use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, Film, LinearRgb};
+use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
-use solve::Solver;
+use solve::{Factor, Solver};
 use std::borrow::Cow;
 
 /// How film is solved for.
@@ -98,7 +99,30 @@ pub fn film(
     inside: &Image<Coverage>,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
+    let longer_side = photo.width().max(photo.height());
+    film_of_part(photo, plate, inside, PartOf { screen: plate.color(), longer_side }, opts)
+}
+
+/// What a part of a photo does not tell of all of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PartOf {
+    /// Mean colour of the screen.
+    pub(super) screen: LinearRgb,
+    /// Longer side of the photo, pixels.
+    pub(super) longer_side: usize,
+}
+
+/// As [`film`], of the part of a photo around the object: there is nothing to solve elsewhere. All pictures are of the
+/// part's size.
+pub(super) fn film_of_part(
+    photo: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Image<Coverage>,
+    PartOf { screen, longer_side }: PartOf,
+    opts: &FilmOptions,
+) -> Result<FilmMatte> {
     opts.check()?;
+    let mut watch = Stopwatch::start();
     assert_eq!(photo.size(), plate.image.size(), "photo and plate differ in size");
     assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
     if !inside.pixels().iter().any(|c| c.0 > 0.0) {
@@ -108,19 +132,27 @@ pub fn film(
         let (x, y) = (i % photo.width(), i / photo.width());
         return Err(Error::Photo { what: format!("pixel ({x}, {y}) is not a finite number") });
     }
-    let screen = plate.color();
     if !is_keyable(screen) {
         return Ok(opaque(photo, inside, screen));
     }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);
     let flat = opts.flat.map_or_else(|| tint::fit(&calm, plate, inside, key).flat, Into::into);
+    watch.lap("tint");
     let solver = Solver::new(key, flat, plate.residual, opts);
-    let mut factors = calm.zip_map(&plate.image, |pixel, screen| solver.solve(pixel.into(), screen.into()));
-    let painted = bright::make_opaque(&mut factors, &calm, &plate.image, inside);
+    let mut factors = calm.zip3_map(&plate.image, inside, |pixel, screen, inside| {
+        if inside.0 > 0.0 { solver.solve(pixel.into(), screen.into()) } else { Factor::default() }
+    });
+    watch.lap("factors");
+    let painted = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
+    watch.lap("paint");
     let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
+    watch.lap("glints");
     let remarks = painted.into_iter().chain(clipped).collect();
-    Ok(composed(photo, plate, inside, &factors, flat.into(), remarks))
+    let matte = composed(photo, plate, inside, &factors, flat.into(), remarks);
+    watch.lap("compose");
+    watch.log("film");
+    Ok(matte)
 }
 
 impl FilmOptions {
@@ -161,18 +193,18 @@ fn composed(
     photo: &Image<LinearRgb>,
     plate: &ScreenPlate,
     inside: &Image<Coverage>,
-    factors: &Image<solve::Factor>,
+    factors: &Image<Factor>,
     flat: LinearRgb,
     remarks: Vec<Remark>,
 ) -> FilmMatte {
     let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
     let transmittance = plastic.zip_map(inside, covered);
-    let reflected = photo.zip_map(&plate.image, |p, k| (p, k)).zip_map(&transmittance, |(p, k), t| without(p, t * k));
-    let seen = view(&plastic, flat, inside).zip_map(inside, covered);
-    let reflected = reflected.zip_map(inside, |f, c| f.scale(c.0));
+    let reflected = photo.zip3_map(&plate.image, &transmittance, |p, k, t| without(p, t * k));
+    let seen = view(&plastic, flat, inside);
+    let film = reflected.zip3_map(&seen, inside, |f, v, c| Film::new(f.scale(c.0), covered(v, c)));
     let most = flat.r.max(flat.g).max(flat.b);
     let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
-    FilmMatte { film: reflected.zip_map(&seen, Film::new), transmittance, uncertainty, flat, remarks }
+    FilmMatte { film, transmittance, uncertainty, flat, remarks }
 }
 
 /// A transmittance that holds for the covered share of a pixel only.

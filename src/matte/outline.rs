@@ -96,18 +96,25 @@ type Side = [Point2<f64>; 2];
 
 /// Scan lines per row of pixels; each contributes exact spans, so only slanted sides are approximated.
 const LINES: usize = 8;
+/// What one of them counts.
+const LINE: f32 = 1.0 / LINES as f32;
 
 /// Where a side crosses the horizontal line at `y`.
 fn crossing([a, b]: &Side, y: f64) -> Option<f64> {
     ((a.y <= y) != (b.y <= y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
 }
 
+/// Adds what one scan line covers from `x0` to `x1`.
 fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
-    let first = (x0.max(0.0) as usize).min(row.len());
-    let end = (x1.max(0.0).ceil() as usize).min(row.len());
-    for (x, pixel) in row[..end].iter_mut().enumerate().skip(first) {
+    let within = |x: f64| (x.max(0.0) as usize).min(row.len());
+    let (first, end) = (within(x0), within(x1.ceil()));
+    // Between its ends a span covers whole pixels.
+    let whole = within(x0.ceil())..within(x1);
+    let whole = if whole.is_empty() { end..end } else { whole };
+    row[whole.clone()].iter_mut().for_each(|pixel| pixel.0 += LINE);
+    for x in (first..whole.start).chain(whole.end..end) {
         let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
-        pixel.0 += overlap.clamp(0.0, 1.0) as f32 / LINES as f32;
+        row[x].0 += overlap.clamp(0.0, 1.0) as f32 * LINE;
     }
 }
 
@@ -156,6 +163,19 @@ mod tests {
         let hull = Outline { rings: vec![Outline::around(&ell).hull()] };
         let [full, corner] = [900.0, 0.5 * 20.0 * 21.0];
         assert!((hull.area() - (full - corner)).abs() < 40.0, "{}", hull.area());
+    }
+
+    #[test]
+    fn coverage_sums_to_the_area_also_of_what_lies_outside() {
+        let sum = |ring: &[[f64; 2]], side: usize| -> f32 {
+            let outline = Outline { rings: vec![ring.iter().map(|p| Point2::from(*p)).collect()] };
+            outline.coverage(side, side).pixels().iter().map(|c| c.0).sum()
+        };
+        let triangle = sum(&[[1.0, 1.0], [9.0, 2.5], [3.0, 8.0]], 10);
+        assert!((f64::from(triangle) - 0.5 * (8.0 * 7.0 - 2.0 * 1.5)).abs() < 0.1, "{triangle}");
+        assert_eq!(sum(&[[-5.0, -5.0], [2.0, -5.0], [2.0, 2.0], [-5.0, 2.0]], 4), 4.0);
+        let thin = sum(&[[1.25, 0.0], [1.5, 0.0], [1.5, 4.0], [1.25, 4.0]], 4);
+        assert_eq!(thin, 1.0);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::register::{self, Registered};
 use super::screen::{screen_pixels, strongest_channel};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Roi};
 use crate::pixel::{Coverage, LinearRgb};
 use polynomial::Polynomial;
 use serde::{Deserialize, Serialize};
@@ -158,6 +158,15 @@ impl ScreenPlate {
         }
         let n = self.image.pixels().len().max(1) as f64;
         sum.map(|s| (s / n) as f32).into()
+    }
+
+    /// The part of the plate behind a part of the photo; what is known of all of it stays.
+    ///
+    /// # Panics
+    /// When `roi` reaches outside the plate.
+    pub(super) fn crop(&self, roi: Roi) -> Self {
+        let Self { unevenness, residual, degree, shift_px, .. } = *self;
+        Self { image: self.image.crop(roi), unevenness, residual, degree, shift_px }
     }
 
     fn of(

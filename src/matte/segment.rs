@@ -23,6 +23,7 @@ use crate::filter;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb};
+use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 
 /// How an object is found on a uniform background.
@@ -140,9 +141,12 @@ impl Step {
 pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmentation> {
     opts.check()?;
     check_photo(photo)?;
+    let mut watch = Stopwatch::start();
     let picture = reduced(photo, opts.working_size);
+    watch.lap("reduce");
     let chosen = choose::best(&picture, opts)?;
-    let found = &chosen.pass;
+    watch.lap("search");
+    let (found, levels, touches) = (&chosen.pass, chosen.levels, chosen.pass.touches);
     let (w, h) = photo.size();
     let scale = [w as f64 / found.inside.width() as f64, h as f64 / found.inside.height() as f64];
     let reduction = scale[0].max(scale[1]);
@@ -151,6 +155,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let margin_px = HOLE_MARGIN * longer_side(&resized) as f64;
     let solid = holes::without_holes(&resized, &found.inside, &holes::around(&found.inside, margin_px));
     let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
+    watch.lap("holes");
     let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
     let outline = snap::snapped(&around.map(to_photo), &roots, reduction);
     let confidence = Confidence { blur_px: blur::blur_px(&outline, &roots, reduction), ..chosen.confidence };
@@ -159,18 +164,13 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let mut remarks = found.remarks.clone();
     remarks.extend(truncation(found.touches));
     remarks.extend(confidence.remarks());
-    Ok(Segmentation {
-        mask: Outline { rings: vec![hull.clone()] }.coverage(w, h),
-        tight: outline.coverage(w, h),
-        hull,
-        outline,
-        touches: found.touches,
-        confidence,
-        levels: chosen.levels,
-        reduction,
-        remarks,
-        steps: steps(chosen, &picture),
-    })
+    watch.lap("outline");
+    let mask = Outline { rings: vec![hull.clone()] }.coverage(w, h);
+    let tight = outline.coverage(w, h);
+    let steps = steps(chosen, &picture);
+    watch.lap("masks");
+    watch.log("segment");
+    Ok(Segmentation { mask, tight, hull, outline, touches, confidence, levels, reduction, remarks, steps })
 }
 
 /// Width of the zone around the object that is not asked for the screen, as a share of the longer side: contact shadows.

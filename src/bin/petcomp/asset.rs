@@ -1,7 +1,7 @@
 //! `petcomp asset`: cut-outs with real size and class, kept in a folder.
 
 use crate::common::Common;
-use petcomp::asset::{self, AddPhoto, Library, Manifest, Scale, ScreenSource};
+use petcomp::asset::{self, AddPhoto, Library, Manifest, Photo, Scale, ScreenSource};
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
 
@@ -102,12 +102,13 @@ pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Resu
     built.refused.iter().for_each(|refusal| log::warn!("{refusal}"));
     built.doubtful.iter().for_each(|doubt| common.say(format_args!("look at {doubt}")));
     common.say(format_args!("{}: {} photos, {} assets", folder.display(), built.photos, built.assets));
-    sheet(folder, common)
+    sheet(folder, &[], common)
 }
 
-fn sheet(folder: &Path, common: &Common) -> anyhow::Result<()> {
+/// Writes the contact sheet of a folder; what was just added need not be read.
+fn sheet(folder: &Path, added: &[Photo], common: &Common) -> anyhow::Result<()> {
     let path = folder.join(SHEET);
-    io::write(&path, &asset::contact_sheet(&Library::open(folder)?))?;
+    io::write(&path, &asset::contact_sheet(&Library::open_with(folder, added)?))?;
     common.say(format_args!("look at {}", path.display()));
     Ok(())
 }
@@ -122,13 +123,16 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
     let name = args.name.clone().unwrap_or_else(|| first.to_string_lossy().into_owned());
     let add = AddPhoto { screen: args.screen.clone(), ..AddPhoto::new(name, &args.class, scale) };
     let add = AddPhoto { options: args.quality.cut_out(add.options), ..add };
+    let mut added = Vec::new();
     for photo in &args.photos {
-        let record = asset::add_photo(&args.output, photo, &add)?;
+        let photo = asset::add_photo(&args.output, photo, &add)?;
+        let record = &photo.record;
         let ([length, width], error) = (record.object_m.map(|m| m * 1e3), record.error_m * 1e3);
         common.say(format_args!("{}: {length:.1} x {width:.1} mm (+- {error:.1})", record.file));
         record.doubts.iter().for_each(|doubt| common.say(format_args!("look at {}: {doubt}", record.file)));
+        added.push(photo);
     }
-    sheet(&args.output, common)
+    sheet(&args.output, &added, common)
 }
 
 fn list(folder: &Path) -> anyhow::Result<()> {

@@ -23,19 +23,21 @@ const SCREEN: f32 = 0.06;
 
 /// Makes opaque what is painted: in the screen's hue, or in colours that the plastic has not. Bare screen that a wide mask
 /// lets in is not paint.
+///
+/// `longer_side` is that of the whole photo, pixels.
 pub(super) fn make_opaque(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
     plate: &Image<LinearRgb>,
     inside: &Image<Coverage>,
+    longer_side: usize,
 ) -> Option<Remark> {
-    let bare = photo.zip_map(plate, |p, k| is_screen(p.into(), k.into()));
-    let bright = factors.zip_map(&bare, |f, bare| f.raw > PAINTED && !bare);
+    let bright = factors.zip3_map(photo, plate, |f, p, k| f.raw > PAINTED && !is_screen(p.into(), k.into()));
     let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
     if !painted.pixels().iter().any(|p| *p) {
         return None;
     }
-    let rim_px = (RIM * factors.width().max(factors.height()) as f64).max(2.0);
+    let rim_px = (RIM * longer_side as f64).max(2.0);
     let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px);
     let painted = painted.zip_map(&interior, |p, i| Coverage(f32::from(u8::from(p && i))));
     let painted = filter::gaussian_blur(&painted, BLUR_PX);
@@ -80,9 +82,10 @@ pub(super) fn fill_glints(
     let told = hidden.zip_map(inside, |hidden, c| (1.0 - hidden) * c.0);
     let weighted = told.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
     let side = inside.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>().sqrt() as f32;
-    let around = filter::gaussian_blur(&weighted, (FILL * side).max(FILL_PX));
-    let pixels = factors.pixels_mut().iter_mut().zip(hidden.pixels()).zip(around.pixels());
-    for ((factor, hidden), around) in pixels.filter(|((_, hidden), around)| **hidden > 0.0 && around.r > ENOUGH) {
+    let asked = hidden.map(|hidden| hidden > 0.0);
+    let around = filter::gaussian_blur_at(&weighted, (FILL * side).max(FILL_PX), &asked);
+    let pixels = factors.pixels_mut().iter_mut().zip(hidden.pixels()).filter(|(_, hidden)| **hidden > 0.0).zip(around);
+    for ((factor, hidden), around) in pixels.filter(|(_, around)| around.r > ENOUGH) {
         let more = around.g / around.r - factor.value;
         factor.value += if *hidden < 1.0 { hidden * more.max(0.0) } else { more };
         factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);

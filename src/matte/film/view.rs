@@ -42,13 +42,13 @@ pub(in crate::matte) fn view(
     let depths = filter::depth(&inside.map(|c| c.0 >= 0.5));
     let weighted = transmittance.zip_map(inside, |t, c| PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0));
     let smooth = filter::gaussian_blur(&weighted, GRAIN * side);
-    let share = depths.map(|depth| depth / side.max(f32::MIN_POSITIVE));
-    let grainless = smooth.map(|p| p.color().scale(p.a.max(f32::MIN_POSITIVE).recip()));
-    grainless.zip_map(&share, |t, depth| (t, flatness(depth))).zip_map(transmittance, |(smooth, inner), t| {
+    smooth.zip3_map(&depths, transmittance, |smooth, depth, t| {
+        let smooth = smooth.color().scale(smooth.a.max(f32::MIN_POSITIVE).recip());
         // Outside the object, where nothing is asked, there is nothing to smooth either.
         if smooth == LinearRgb::BLACK {
             return smooth;
         }
+        let inner = flatness(depth / side.max(f32::MIN_POSITIVE));
         let channel = |smooth: f32, flat: f32, t: f32| {
             let plastic = (FLAT * flat.sqrt() * relative(smooth / flat.max(f32::MIN_POSITIVE), inner)).clamp(0.0, 1.0);
             let bare = ((t - BARE.start()) / (BARE.end() - BARE.start())).clamp(0.0, 1.0);

@@ -3,6 +3,7 @@
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What the pyramid is made of.
@@ -102,11 +103,25 @@ fn joined(bands: Vec<Image<Coverage>>) -> Image<Coverage> {
 /// The largest value at most `reach` columns and rows away, for every pixel.
 pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Coverage> {
     let (w, h) = band.size();
-    let largest = |values: &mut dyn Iterator<Item = Coverage>| Coverage(values.fold(0.0, |most, c| c.0.max(most)));
-    let along = Image::from_fn(w, h, |x, y| {
-        largest(&mut band.row(y)[x.saturating_sub(reach)..(x + reach + 1).min(w)].iter().copied())
+    let mut along = band.clone();
+    along.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for by in 1..=reach.min(w) {
+            raise(row, &band.row(y)[by..]);
+            raise(&mut row[by..], band.row(y));
+        }
     });
-    Image::from_fn(w, h, |x, y| largest(&mut (y.saturating_sub(reach)..(y + reach + 1).min(h)).map(|v| along[(x, v)])))
+    let mut around = along.clone();
+    around.par_rows_mut().enumerate().for_each(|(y, row)| {
+        (y.saturating_sub(reach)..(y + reach + 1).min(h)).for_each(|v| raise(row, along.row(v)));
+    });
+    around
+}
+
+/// Raises values to others, where those are larger.
+fn raise(row: &mut [Coverage], other: &[Coverage]) {
+    for (value, other) in row.iter_mut().zip(other) {
+        value.0 = if other.0 > value.0 { other.0 } else { value.0 };
+    }
 }
 
 /// Width of the frame along the border that shows the background, as a share of the longer side.
@@ -126,10 +141,12 @@ const ROUNDING: f32 = 1.0 / 255.0 / 3.464;
 fn noise(magnitudes: &Image<Coverage>) -> f32 {
     let (w, h) = magnitudes.size();
     let frame = ((w.max(h) as f64 * FRAME) as usize).max(1);
-    let on_frame = |x: usize, y: usize| x < frame || y < frame || x + frame >= w || y + frame >= h;
-    let rows = magnitudes.rows().enumerate();
-    let pixels = rows.flat_map(|(y, row)| row.iter().enumerate().filter(move |(x, _)| on_frame(*x, y)));
-    let mut values: Vec<f32> = pixels.map(|(_, c)| c.0).collect();
+    let (left, right) = (frame.min(w), w.saturating_sub(frame).max(frame.min(w)));
+    let on_frame = |(y, row): (usize, &'_ [Coverage])| match y < frame || y + frame >= h {
+        true => row.to_vec(),
+        false => [&row[..left], &row[right..]].concat(),
+    };
+    let mut values: Vec<f32> = magnitudes.rows().enumerate().flat_map(on_frame).map(|c| c.0).collect();
     let rank = (values.len() as f64 * QUIET) as usize;
     if rank >= values.len() {
         return ROUNDING;
@@ -165,6 +182,18 @@ mod tests {
         let busy = Image::from_fn(200, 200, |x, y| if x < 90 || y < 50 { Coverage(0.5) } else { quiet[(x, y)] });
         // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the noise, 3.7 times its own.
         assert!(noise(&busy) < 4.0 * noise(&quiet));
+    }
+
+    #[test]
+    fn the_largest_around_a_pixel_is_found_up_to_the_border() {
+        let band = Image::from_fn(7, 5, |x, y| Coverage(((x * 7919 + y * 104_729) % 31) as f32));
+        for reach in [1, 2, 9] {
+            let found = largest_around(&band, reach);
+            for (x, y) in (0..35).map(|i| (i % 7, i / 7)) {
+                let near = (0..35).filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
+                assert_eq!(found[(x, y)].0, near.map(|i| band.pixels()[i].0).fold(0.0, f32::max));
+            }
+        }
     }
 
     #[test]

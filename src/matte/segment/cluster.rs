@@ -1,65 +1,114 @@
 //! Connected groups of pixels.
 
 use crate::image::Image;
+use std::ops::Range;
 
-/// The connected groups (8 neighbours) of a set, numbered from 1 in the order of their first pixel, row by row.
+/// The connected groups (8 neighbours) of a set, in the order of their first pixel, row by row.
 pub(super) struct Groups {
-    /// The group of every pixel, 0 outside the set.
-    pub(super) labels: Image<u32>,
+    size: (usize, usize),
+    /// The set as runs of pixels, row by row.
+    runs: Vec<Run>,
     /// Number of groups.
     count: usize,
 }
 
+/// Set pixels side by side.
+struct Run {
+    row: usize,
+    columns: Range<usize>,
+    /// Until all groups are found: an earlier run of the same group, or itself.
+    group: usize,
+}
+
 impl Groups {
-    /// Finds the groups.
+    /// Finds the groups: runs that touch the same run, corners included, are of one.
     pub(super) fn of(set: &Image<bool>) -> Self {
-        let mut labels = Image::new(set.width(), set.height());
-        let mut count = 0;
-        for at in 0..set.pixels().len() {
-            if set.pixels()[at] && labels.pixels()[at] == 0 {
-                count += 1;
-                flood(set, &mut labels, at, count);
+        let mut runs: Vec<Run> = Vec::new();
+        let (mut above, mut here) = (0, 0);
+        for (row, pixels) in set.rows().enumerate() {
+            for columns in runs_of(pixels) {
+                let group = runs.len();
+                // What ends before this run touches neither it nor a later one.
+                while above < here && runs[above].columns.end < columns.start {
+                    above += 1;
+                }
+                runs.push(Run { row, columns, group });
+                let touches = |run: &Run| run.columns.start <= runs[group].columns.end;
+                let end = above + runs[above..here].iter().take_while(|run| touches(run)).count();
+                (above..end).for_each(|other| join(&mut runs, group, other));
             }
+            (above, here) = (here, runs.len());
         }
-        Self { labels, count: count as usize }
+        let count = number(&mut runs);
+        Self { size: set.size(), runs, count }
     }
 
-    /// How many pixels of `members` are in each group; index 0 is group 1.
+    /// How many pixels of `members` are in each group.
     pub(super) fn sizes(&self, members: &Image<bool>) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
-        let counted = self.labels.pixels().iter().zip(members.pixels());
-        for (&label, _) in counted.filter(|(label, member)| **label != 0 && **member) {
-            sizes[label as usize - 1] += 1;
+        for run in &self.runs {
+            sizes[run.group] += members.row(run.row)[run.columns.clone()].iter().filter(|p| **p).count();
         }
         sizes
     }
 
     /// The pixels of the groups for which a claim, by index from 0, holds.
-    pub(super) fn only(&self, holds: impl Fn(usize) -> bool + Sync) -> Image<bool> {
-        self.labels.map(|label| label != 0 && holds(label as usize - 1))
+    pub(super) fn only(&self, holds: impl Fn(usize) -> bool) -> Image<bool> {
+        let mut only = Image::new(self.size.0, self.size.1);
+        for run in self.runs.iter().filter(|run| holds(run.group)) {
+            only.row_mut(run.row)[run.columns.clone()].fill(true);
+        }
+        only
+    }
+
+    /// Whether each group reaches the border of the picture.
+    fn reaching_border(&self) -> Vec<bool> {
+        let (w, h) = self.size;
+        let mut reaching = vec![false; self.count];
+        for run in &self.runs {
+            reaching[run.group] |= run.row == 0 || run.row + 1 == h || run.columns.start == 0 || run.columns.end == w;
+        }
+        reaching
     }
 }
 
-/// Labels everything that is connected with the pixel `start`.
-fn flood(set: &Image<bool>, labels: &mut Image<u32>, start: usize, label: u32) {
-    labels.pixels_mut()[start] = label;
-    let mut open = vec![start];
-    while let Some(at) = open.pop() {
-        for next in neighbours(at, set.size()) {
-            if set.pixels()[next] && labels.pixels()[next] == 0 {
-                labels.pixels_mut()[next] = label;
-                open.push(next);
-            }
+/// The runs of set pixels in a row.
+fn runs_of(row: &[bool]) -> impl Iterator<Item = Range<usize>> {
+    let mut at = 0;
+    std::iter::from_fn(move || {
+        let start = at + row[at..].iter().position(|p| *p)?;
+        at = row[start..].iter().position(|p| !p).map_or(row.len(), |length| start + length);
+        Some(start..at)
+    })
+}
+
+/// The first run of a run's group; what is on the way points nearer to it from then on.
+fn first_of(runs: &mut [Run], mut run: usize) -> usize {
+    while runs[run].group != run {
+        runs[run].group = runs[runs[run].group].group;
+        run = runs[run].group;
+    }
+    run
+}
+
+fn join(runs: &mut [Run], a: usize, b: usize) {
+    let (a, b) = (first_of(runs, a), first_of(runs, b));
+    runs[a.max(b)].group = a.min(b);
+}
+
+/// Numbers the groups in the order of their first runs; how many there are.
+fn number(runs: &mut [Run]) -> usize {
+    let mut count = 0;
+    for i in 0..runs.len() {
+        // Earlier runs have their number by now.
+        if runs[i].group == i {
+            runs[i].group = count;
+            count += 1;
+        } else {
+            runs[i].group = runs[runs[i].group].group;
         }
     }
-}
-
-/// The (up to) 8 pixels around a pixel.
-fn neighbours(at: usize, (w, h): (usize, usize)) -> impl Iterator<Item = usize> {
-    let (x, y) = (at % w, at / w);
-    let rows = y.saturating_sub(1)..(y + 2).min(h);
-    let columns = x.saturating_sub(1)..(x + 2).min(w);
-    rows.flat_map(move |v| columns.clone().map(move |u| v * w + u)).filter(move |&next| next != at)
+    count
 }
 
 /// The set without its groups of fewer than `least` pixels.
@@ -72,12 +121,9 @@ pub(super) fn without_specks(set: &Image<bool>, least: usize) -> Image<bool> {
 /// The set with its holes filled: all that cannot be reached from the border of the picture. Outlines must be two
 /// pixels thick, since the way around goes over corners too.
 pub(super) fn filled(set: &Image<bool>) -> Image<bool> {
-    let (w, h) = set.size();
-    let outside = set.map(|inside| !inside);
-    let border = Image::from_fn(w, h, |x, y| x == 0 || y == 0 || x + 1 == w || y + 1 == h);
-    let groups = Groups::of(&outside);
-    let reaching = groups.sizes(&border);
-    groups.only(|group| reaching[group] > 0).map(|open| !open)
+    let groups = Groups::of(&set.map(|inside| !inside));
+    let reaching = groups.reaching_border();
+    groups.only(|group| reaching[group]).map(|open| !open)
 }
 
 #[cfg(test)]

@@ -24,24 +24,23 @@ const RIM_PX: [f64; 2] = [2.0, 5.0];
 pub(super) fn without_holes(picture: &Image<LinearRgb>, inside: &Image<bool>, background: &Image<bool>) -> Image<bool> {
     let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else { return inside.clone() };
     let smooth = filter::box_blur(picture, 1);
-    let off = |i: usize| differences(smooth.pixels()[i], plate.image.pixels()[i]);
-    let (w, h) = picture.size();
     let noise: [f32; 3] = plate.residual.into();
-    let strongest = |i: usize| <[f32; 3]>::from(plate.image.pixels()[i]).into_iter().fold(0.0, f32::max);
-    let like = Image::from_fn(w, h, |x, y| {
-        let i = y * w + x;
-        let k: [f32; 3] = plate.image.pixels()[i].into();
-        inside.pixels()[i] && (0..3).all(|c| off(i)[c] <= (LIKE_SHARE * k[c]).max(LIKE_NOISE * noise[c]))
+    let like = smooth.zip3_map(&plate.image, inside, |p, k, inside| {
+        let (off, k) = (differences(p, k), <[f32; 3]>::from(k));
+        inside && (0..3).all(|c| off[c] <= (LIKE_SHARE * k[c]).max(LIKE_NOISE * noise[c]))
     });
-    let unlike = Image::from_fn(w, h, |x, y| {
-        let i = y * w + x;
-        off(i).into_iter().any(|d| d >= UNLIKE_SHARE * strongest(i))
-    });
-    let area = count(inside) as f64;
     let groups = Groups::of(&filter::erode(&like, 1.0));
-    let sizes = groups.sizes(&like);
+    let (sizes, area) = (groups.sizes(&like), count(inside) as f64);
+    let large: Vec<usize> = (0..sizes.len()).filter(|&g| sizes[g] as f64 >= LEAST_AREA * area).collect();
+    if large.is_empty() {
+        return inside.clone();
+    }
+    let unlike = smooth.zip_map(&plate.image, |p, k| {
+        let strongest = <[f32; 3]>::from(k).into_iter().fold(0.0, f32::max);
+        differences(p, k).into_iter().any(|d| d >= UNLIKE_SHARE * strongest)
+    });
     let mut kept = inside.clone();
-    for group in (0..sizes.len()).filter(|&g| sizes[g] as f64 >= LEAST_AREA * area) {
+    for group in large {
         let hole = filter::dilate(&groups.only(|g| g == group), RIM_PX[0]);
         let rim = filter::dilate(&hole, RIM_PX[1] - RIM_PX[0]).zip_map(&hole, |near, hole| near && !hole);
         let opaque = rim.zip_map(&unlike, |rim, unlike| rim && unlike);

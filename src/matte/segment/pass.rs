@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::filter;
 use crate::geom::Point2;
 use crate::image::Image;
+use crate::matte::Outline;
 use crate::matte::remark::Remark;
 use crate::pixel::{Coverage, LinearRgb};
 
@@ -110,7 +111,7 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
     };
     let member = |i: usize| groups.only(move |group| group == i).zip_map(edges, |near, edge| near && edge);
     let object = member(main);
-    let hull = hull::coverage(&hull::convex_hull(&object), edges.width(), edges.height()).map(|c| c.0 > 0.0);
+    let hull = under_hull(&object, 0.0);
     let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
     let mut remarks = Vec::new();
     for i in (0..sizes.len()).filter(|&i| i != main && 2 * inside[i] < sizes[i]) {
@@ -142,11 +143,17 @@ fn parted(object: &Image<bool>, join_px: f64) -> Option<Remark> {
     let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
     let member = |i: usize| groups.only(move |group| group == i).zip_map(object, |near, edge| near && edge);
     let first = member(main);
-    let hull = hull::coverage(&hull::convex_hull(&first), object.width(), object.height()).map(|c| c.0 > 0.0);
+    let hull = under_hull(&first, 0.0);
     let inside = groups.sizes(&object.zip_map(&hull, |edge, inside| edge && inside));
     let rival = |i: &usize| *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64;
     let other = (0..sizes.len()).find(rival)?;
     Some(Remark::Parted([place(&first), place(&member(other))]))
+}
+
+/// The pixels of which more than a share lies in the convex hull of a set.
+fn under_hull(set: &Image<bool>, share: f32) -> Image<bool> {
+    let hull = Outline { rings: vec![hull::convex_hull(set)] };
+    hull.coverage(set.width(), set.height()).map(|c| c.0 > share)
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.
@@ -165,7 +172,7 @@ const LEAK: f64 = 1.1;
 /// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
 /// area jump, for then the outline had a gap through which the inside leaked out.
 fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
-    let hull = hull::coverage(&hull::convex_hull(edges), edges.width(), edges.height()).map(|c| c.0 > 0.5);
+    let hull = under_hull(edges, 0.5);
     let area = |set: &Image<bool>| set.pixels().iter().filter(|p| **p).count() as f64;
     let mut narrow = closed(edges, &hull, join_px / 2.0);
     for times in [1.0, 2.0, 4.0] {

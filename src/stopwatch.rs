@@ -1,0 +1,62 @@
+//! Where the time of a job goes, told in the log: `petcomp -vv asset add ...` shows it.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+/// Takes the time of a job's stages, one after the other. What it tells decides nothing.
+pub(crate) struct Stopwatch {
+    stages: Vec<(&'static str, Duration)>,
+    last: Instant,
+}
+
+impl Stopwatch {
+    pub(crate) fn start() -> Self {
+        Self { stages: Vec::new(), last: Instant::now() }
+    }
+
+    /// A stage is over; the next one begins.
+    pub(crate) fn lap(&mut self, stage: &'static str) {
+        let now = Instant::now();
+        self.stages.push((stage, now - self.last));
+        self.last = now;
+    }
+
+    /// Tells what the stages of a job took.
+    pub(crate) fn log(&self, job: impl fmt::Display) {
+        log::debug!("{job}: {self}");
+    }
+}
+
+impl fmt::Display for Stopwatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = self.stages.iter().map(|(_, took)| took.as_secs_f64()).sum::<f64>();
+        write!(f, "{:.1} ms", 1e3 * whole)?;
+        for (i, (stage, took)) in self.stages.iter().enumerate() {
+            let (mark, seconds) = (if i == 0 { ':' } else { ',' }, took.as_secs_f64());
+            write!(f, "{mark} {stage} {:.1} ({:.0} %)", 1e3 * seconds, 100.0 * seconds / whole.max(f64::MIN_POSITIVE))?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_are_told_with_their_shares() {
+        let stages = vec![("read", Duration::from_millis(30)), ("write", Duration::from_millis(90))];
+        let watch = Stopwatch { stages, last: Instant::now() };
+        assert_eq!(watch.to_string(), "120.0 ms: read 30.0 (25 %), write 90.0 (75 %)");
+        assert_eq!(Stopwatch { stages: vec![], ..watch }.to_string(), "0.0 ms");
+    }
+
+    #[test]
+    fn a_lap_takes_the_time_since_the_last_one() {
+        let mut watch = Stopwatch::start();
+        std::thread::sleep(Duration::from_millis(2));
+        watch.lap("slept");
+        watch.lap("woke");
+        assert!(watch.stages[0].1 >= Duration::from_millis(2) && watch.stages[1].1 < watch.stages[0].1);
+    }
+}
