@@ -241,6 +241,20 @@ fn a_scene_goes_through_the_stages_one_by_one() {
     desk.ok(&["label", "rest.json", "demo/recipe.toml", "-o", "labels.json", "--overlay", "overlay.png"]);
     assert!(desk.path("overlay.png").exists());
 
+    // Borders of the masks, with every corner and with fewer.
+    let corners = |tolerance: &str| -> usize {
+        let set = format!("labels.simplify={tolerance}");
+        let args = ["label", "rest.json", "demo/recipe.toml", "-o", "again.json", "--polygons", "borders.json"];
+        desk.ok(&[&args[..], &["--set", &set]].concat());
+        let borders: Vec<petcomp::label::Border> = petcomp::io::read_json(desk.path("borders.json")).unwrap();
+        borders.iter().flat_map(|border| &border.amodal).map(Vec::len).sum()
+    };
+    let [all, few] = ["0", "1"].map(corners);
+    assert!(few >= 3 && all > 4 * few, "{all} {few}");
+    let refused =
+        desk.refused(&["label", "rest.json", "demo/recipe.toml", "-o", "no.json", "--set", "labels.simplify=-1"]);
+    assert!(refused.contains("labels.simplify: -1, expected pixels"), "{refused}");
+
     // The same picture in parts, at another quality, and for Blender.
     let parts = ["render", "rest.json", "demo/recipe.toml", "-o", "parts.exr", "--quality", "draft"];
     desk.ok(&[&parts[..], &["--aov", "beauty,id,depth,cryptomatte,layers", "--preview", "look.png"]].concat());

@@ -348,6 +348,11 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
     };
     assert_eq!(sorted(&text(dir.path(), "labels/train/000001.txt")), sorted(row));
     assert_eq!(faults(dir.path()), [""; 0]);
+    // A rectangle has no corner to spare.
+    let simplified = tempfile::tempdir().unwrap();
+    let yolo = Yolo { task: YoloTask::Segment, simplify: 2.0, ..Yolo::default() };
+    make(&Plan { folder: simplified.path().into(), writers: vec![Box::new(yolo)], ..plan }).unwrap();
+    assert_eq!(sorted(&text(simplified.path(), "labels/train/000001.txt")), sorted(row));
     let exr: Image<PremulRgba> = io::read(dir.path().join("exr/train/000001.exr")).unwrap();
     assert_eq!(exr.size(), (64, 48));
 }

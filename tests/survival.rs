@@ -32,9 +32,9 @@ impl Desk {
         self.command(args).output().unwrap()
     }
 
-    /// The program in a shell that may map so many KiB of memory.
+    /// The program in a shell that may map so many KiB of memory, and take ten seconds of a processor.
     fn run_within(&self, kib: u64, args: &str) -> Output {
-        let script = format!("ulimit -v {kib}; exec {PETCOMP} {args}");
+        let script = format!("ulimit -v {kib}; ulimit -t 10; exec {PETCOMP} {args}");
         Command::new("sh").args(["-c", &script]).current_dir(self.0.path()).output().unwrap()
     }
 }
@@ -93,13 +93,11 @@ fn plain_png(width: u32, height: u32) -> Vec<u8> {
 fn a_picture_larger_than_memory_is_refused_and_not_attempted() {
     let desk = Desk::new();
     desk.write("large.png", plain_png(9_000, 9_000));
-    let start = Instant::now();
     // 81 million pixels of 16 bytes.
     let output = desk.run_within(1_000_000, "-j 1 diff large.png large.png");
     let text = said(&output);
     assert!(output.status.signal().is_none(), "{text}");
     assert!(text.contains("large.png: needs 1235 MiB of memory, more than the system gives"), "{text}");
-    assert!(start.elapsed() < Duration::from_secs(10));
 }
 
 #[test]
@@ -122,6 +120,9 @@ fn little_memory_is_enough_or_said() {
     assert!(worked >= 3);
 }
 
+/// Nothing here takes as long, on however busy a machine: what does will not end.
+const HANGS: Duration = Duration::from_secs(300);
+
 /// Waits, and not for ever.
 fn ends(mut child: Child) -> std::process::ExitStatus {
     let start = Instant::now();
@@ -129,7 +130,7 @@ fn ends(mut child: Child) -> std::process::ExitStatus {
         if let Some(status) = child.try_wait().unwrap() {
             return status;
         }
-        if start.elapsed() > Duration::from_secs(60) {
+        if start.elapsed() > HANGS {
             child.kill().unwrap();
             panic!("did not end");
         }
@@ -141,7 +142,7 @@ fn ends(mut child: Child) -> std::process::ExitStatus {
 fn wait_for_a_sample(folder: &Path) {
     let start = Instant::now();
     while std::fs::metadata(folder.join("index.jsonl")).map_or(0, |m| m.len()) == 0 {
-        assert!(start.elapsed() < Duration::from_secs(120), "no picture in two minutes");
+        assert!(start.elapsed() < HANGS, "no picture in {HANGS:?}");
         std::thread::sleep(Duration::from_millis(20));
     }
 }
@@ -219,19 +220,29 @@ fn an_output_folder_with_a_link_inside_is_refused() {
     assert_eq!(std::fs::read_dir(outside.path()).unwrap().count(), 0);
 }
 
+/// So many make the hundredths of a second that a shell counts in small.
+const HELPS: u32 = 50;
+
+/// What a shell says (`times`) that so many runs of the program took, whatever else the machine did meanwhile.
+fn processor_seconds_of_children(runs: u32, args: &str) -> f64 {
+    let script = format!("i=0; while [ $i -lt {runs} ]; do {PETCOMP} {args} >&2 || exit 1; i=$((i+1)); done; times");
+    let output = Command::new("sh").args(["-c", &script]).stderr(Stdio::null()).output().unwrap();
+    assert!(output.status.success());
+    // Two lines, the shell's own and that of its children, both `0m0.010000s 0m0.020000s` for user and system.
+    let text = String::from_utf8(output.stdout).unwrap();
+    let seconds = |time: &str| -> Option<f64> {
+        let (minutes, seconds) = time.strip_suffix('s')?.split_once('m')?;
+        Some(60.0 * minutes.parse::<f64>().ok()? + seconds.parse::<f64>().ok()?)
+    };
+    text.lines().nth(1).unwrap().split_whitespace().map(|time| seconds(time).unwrap()).sum()
+}
+
 /// Loading OpenImageIO would cost 0.2 s and 130 MB.
 #[test]
 fn help_is_quick_and_small() {
-    let mut times = Vec::new();
-    for _ in 0..15 {
-        let start = Instant::now();
-        assert!(Command::new(PETCOMP).arg("--help").output().unwrap().status.success());
-        times.push(start.elapsed());
-    }
-    times.sort();
-    println!("--help: {:?} at best, {:?} in the middle", times[0], times[7]);
-    // The best of them: other tests run beside this one.
-    assert!(times[0] < Duration::from_millis(20), "{times:?}");
+    let each = processor_seconds_of_children(HELPS, "--help") / f64::from(HELPS);
+    println!("--help: {:.1} ms of a processor", 1e3 * each);
+    assert!(each < 0.02, "{each} s");
     let measured = Command::new("/usr/bin/time").args(["-f", "%M", PETCOMP, "--help"]).output();
     let Ok(output) = measured else { return };
     let kib: u64 = String::from_utf8_lossy(&output.stderr).trim().parse().unwrap();

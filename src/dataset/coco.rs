@@ -1,5 +1,6 @@
 //! Labels as COCO writes them: one JSON document for each part of the dataset.
 
+use crate::dataset::formats::is_exact;
 use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
@@ -20,7 +21,7 @@ const KIND: &str = "coco";
 /// The id of an image is its number; categories are numbered from 1, since trainers take 0 for background, and so are
 /// annotations, since COCO's evaluation takes 0 for none. Objects that are to be ignored are `iscrowd`, with run lengths
 /// whatever `masks` says. Annotations also have `visible_fraction` and `topmost`, which other programs pass over.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Coco {
     /// How masks are written. Default: `rle`.
@@ -30,6 +31,9 @@ pub struct Coco {
     /// Format of the pictures that it names; in a recipe, that of `pictures`.
     #[serde(skip)]
     pub pictures: PictureFormat,
+    /// How far polygons may be from the border of a mask, pixels; in a recipe, that of `labels`. Default: 0, along pixels.
+    #[serde(skip_deserializing, skip_serializing_if = "is_exact")]
+    pub simplify: f64,
 }
 
 /// How masks are written.
@@ -39,7 +43,7 @@ pub enum CocoMask {
     /// Compressed run lengths: exact.
     #[default]
     Rle,
-    /// Polygons along the edges of pixels, one for each part, holes joined by slits.
+    /// Polygons along the edges of pixels or near them (`labels.simplify`), one for each part, holes joined by slits.
     Polygon,
 }
 
@@ -134,7 +138,7 @@ impl Coco {
 
     fn segmentation(&self, mask: &Mask, ignored: bool) -> Segmentation {
         let polygons = match self.masks {
-            CocoMask::Polygon if !ignored => trace::polygons(mask),
+            CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
             _ => Vec::new(),
         };
         // Readers do not take a list without polygons.

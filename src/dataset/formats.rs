@@ -1,6 +1,7 @@
 //! The part of a recipe that says how labels are made and written: its table `[labels]`.
 
 use crate::dataset::{Coco, Layers, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
+use crate::error::{Error, Result};
 use crate::label::{AmodalBox, BBox, LabelOptions, Mask, ObjectLabel};
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +19,9 @@ pub struct LabelSetup {
     pub alpha_threshold: f32,
     /// What an amodal box is drawn around: `mask` or `outline`. Default: `mask`.
     pub amodal: AmodalBox,
+    /// How far polygons (YOLO's `segment`, COCO's `polygon`) may be from the border of a mask, pixels: fewer corners.
+    /// Default: 0, along the edges of pixels.
+    pub simplify: f64,
     /// Layouts to write beside the images and their scenes. Default: `["yolo"]`.
     pub formats: Vec<Format>,
     /// Settings of YOLO.
@@ -77,6 +81,7 @@ impl Default for LabelSetup {
             overlap_iou,
             alpha_threshold,
             amodal,
+            simplify: 0.0,
             formats: vec![Format::Yolo],
             yolo: Yolo::default(),
             coco: Coco::default(),
@@ -88,6 +93,21 @@ impl Default for LabelSetup {
 }
 
 impl LabelSetup {
+    /// # Errors
+    /// [`Error::Value`] for the first number that cannot be right.
+    pub fn check(&self) -> Result<()> {
+        let share = |at: &str, value: f64| match (0.0..=1.0).contains(&value) {
+            true => Ok(()),
+            false => Err(Error::value(at, format!("{value}, expected 0 to 1"))),
+        };
+        share("overlap_iou", self.overlap_iou)?;
+        share("alpha_threshold", f64::from(self.alpha_threshold))?;
+        match self.simplify.is_finite() && self.simplify >= 0.0 {
+            true => Ok(()),
+            false => Err(Error::value("simplify", format!("{}, expected pixels, at least 0", self.simplify))),
+        }
+    }
+
     /// How labels are made.
     pub fn options(&self) -> LabelOptions {
         LabelOptions { amodal: self.amodal, alpha_threshold: self.alpha_threshold, overlap_iou: self.overlap_iou }
@@ -104,8 +124,8 @@ impl LabelSetup {
 
     fn writer(&self, format: Format, pictures: &Pictures) -> Box<dyn Writer> {
         match format {
-            Format::Yolo => Box::new(self.yolo),
-            Format::Coco => Box::new(Coco { pictures: pictures.format, ..self.coco }),
+            Format::Yolo => Box::new(Yolo { simplify: self.simplify, ..self.yolo }),
+            Format::Coco => Box::new(Coco { pictures: pictures.format, simplify: self.simplify, ..self.coco }),
             Format::Voc => Box::new(Voc { pictures: pictures.format, ..self.voc }),
             Format::Layers => Box::new(self.layers),
             Format::WebDataset => Box::new(self.webdataset),
@@ -113,9 +133,39 @@ impl LabelSetup {
     }
 }
 
+/// Whether polygons keep every corner: a setting that need not be told.
+pub(super) fn is_exact(tolerance_px: &f64) -> bool {
+    *tolerance_px == 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_tolerance_reaches_the_formats_with_polygons_and_none_is_not_told() {
+        let told = |recipe: &str| {
+            let setup: LabelSetup = toml::from_str(recipe).unwrap();
+            setup.check().unwrap();
+            setup.writers(&Pictures::default()).iter().map(|w| w.settings().to_string()).collect::<String>()
+        };
+        assert_eq!(told("formats = ['yolo', 'coco']\nsimplify = 1.5").matches("\"simplify\":1.5").count(), 2);
+        assert!(!told("formats = ['yolo', 'coco']").contains("simplify"));
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_right_are_named() {
+        for (recipe, at) in [
+            ("simplify = -1", "simplify: -1"),
+            ("simplify = inf", "simplify: inf"),
+            ("alpha_threshold = 2", "alpha_threshold: 2"),
+            ("overlap_iou = nan", "overlap_iou: NaN"),
+        ] {
+            let e = toml::from_str::<LabelSetup>(recipe).unwrap().check().unwrap_err().to_string();
+            assert!(e.contains(at), "{e}");
+        }
+        assert!(toml::from_str::<LabelSetup>("yolo = { simplify = 1 }").is_err(), "one place to say it");
+    }
 
     #[test]
     fn formats_are_written_once_and_archives_last() {

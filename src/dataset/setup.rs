@@ -53,6 +53,7 @@ impl Setup {
         let path = path.as_ref();
         let mut setup: Self = io::read_toml_with(path, overrides)?;
         setup.scene.check().map_err(|e| e.within("scene").in_file(path))?;
+        setup.labels.check().map_err(|e| e.within("labels").in_file(path))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         setup.assets = folder.join(&setup.assets);
         setup.backgrounds = folder.join(&setup.backgrounds);

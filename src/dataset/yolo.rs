@@ -1,5 +1,6 @@
 //! Labels for YOLO: one text file per image, one line per object, and `data.yaml`.
 
+use crate::dataset::formats::is_exact;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Entry, Extent, Labelled, Part, Writer};
 use crate::error::{Error, Result};
@@ -21,13 +22,16 @@ pub(crate) const LEAST_SIDE_PX: u32 = 10;
 ///
 /// `data.yaml` names its folders relative to itself, so the dataset may be moved: Ultralytics looks for them beside the
 /// file; YOLOv5 wants `path:` added, or to be started with the dataset as its working folder.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Yolo {
     /// What is learned. Default: `detect`.
     pub task: YoloTask,
     /// Whether rows tell of the whole object or of what is seen. Default: `amodal`.
     pub boxes: Extent,
+    /// How far a border may be from that of the mask, pixels; in a recipe, that of `labels`. Default: 0, along pixels.
+    #[serde(skip_deserializing, skip_serializing_if = "is_exact")]
+    pub simplify: f64,
 }
 
 /// What a row tells.
@@ -37,7 +41,8 @@ pub enum YoloTask {
     /// A box.
     #[default]
     Detect,
-    /// The border of the mask, along the edges of its pixels: one closed line, holes and parts joined by slits.
+    /// The border of the mask, along the edges of its pixels or near them (`labels.simplify`): one closed line, holes and
+    /// parts joined by slits.
     Segment,
 }
 
@@ -87,7 +92,7 @@ impl Yolo {
             _ if chosen.is_empty() => None,
             YoloTask::Detect => Some(box_row(class, &chosen, image)),
             YoloTask::Segment if mask.is_empty() => None,
-            YoloTask::Segment => Some(ring_row(class, &trace::polygon(mask), image)),
+            YoloTask::Segment => Some(ring_row(class, &trace::polygon(mask, self.simplify), image)),
         }
     }
 }

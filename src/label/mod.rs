@@ -4,16 +4,19 @@
 //! topmost rule are geometry: the cards' outlines as the camera sees them.
 
 mod bbox;
+mod border;
 pub(crate) mod draw;
 mod mask;
 mod outline;
 pub(crate) mod overlay;
 mod rle;
+mod simplify;
 mod topmost;
 pub mod trace;
 mod visibility;
 
 pub use bbox::BBox;
+pub use border::{Border, borders};
 pub use mask::Mask;
 pub use overlay::overlay;
 pub use topmost::knotted;

@@ -3,40 +3,44 @@
 //! # Method
 //! Every side of a pixel inside that has a pixel outside beyond it is an edge, directed so that the inside lies to its
 //! right; edges chain into rings, and where two pixels touch only at a corner the chain turns right, so that each ring
-//! encloses pixels joined by their sides. Formats know neither holes nor several parts: a hole is joined to what lies
+//! encloses pixels joined by their sides. Corners are then dropped as far as a tolerance allows, of all rings together
+//! ([`super::simplify`]). Formats know neither holes nor several parts: a hole is joined to what lies
 //! left of it, and a part to the one before it, by a slit of no width, as triangulations do (Eberly, "Triangulation by
-//! Ear Clipping", 2002). The area, by the shoelace formula, stays that of the mask.
+//! Ear Clipping", 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
 
+use super::simplify::{Ring, simplified};
 use crate::geom::Point2;
 use crate::label::Mask;
-
-/// A closed line through corners of pixels, without a repeated last point.
-type Ring = Vec<[i64; 2]>;
 
 /// Steps to the right, down, left and up: each a right turn from the one before.
 const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 
 /// The parts of a mask, joined by the sides of their pixels: one closed polygon each, clockwise in the picture, holes
 /// joined by slits. Together they cover what the mask covers.
-pub fn polygons(mask: &Mask) -> Vec<Vec<Point2<f64>>> {
-    parts(mask).into_iter().map(points).collect()
+///
+/// Corners that the border goes without are dropped: no point of it is then farther than `tolerance_px` from the polygons,
+/// and no side crosses another. 0 keeps all corners; parts and holes are kept at any tolerance.
+pub fn polygons(mask: &Mask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
+    parts(mask, tolerance_px).into_iter().map(points).collect()
 }
 
-/// The whole mask as one closed polygon, parts and holes joined by slits; without points for an empty mask.
-pub fn polygon(mask: &Mask) -> Vec<Point2<f64>> {
-    let mut parts = parts(mask).into_iter();
+/// The whole mask as one closed polygon, parts and holes joined by slits, simplified as [`polygons`] are; without points
+/// for an empty mask.
+pub fn polygon(mask: &Mask, tolerance_px: f64) -> Vec<Point2<f64>> {
+    let mut parts = parts(mask, tolerance_px).into_iter();
     let first = parts.next().unwrap_or_default();
     points(parts.fold(first, join))
 }
 
 fn points(ring: Ring) -> Vec<Point2<f64>> {
-    ring.into_iter().map(|[x, y]| Point2::new(x as f64, y as f64)).collect()
+    ring.into_iter().map(Point2::from).collect()
 }
 
-fn parts(mask: &Mask) -> Vec<Ring> {
-    let (mut parts, mut holes): (Vec<_>, Vec<_>) = Grid::new(mask).rings().into_iter().partition(|r| area2(r) > 0);
+fn parts(mask: &Mask, tolerance_px: f64) -> Vec<Ring> {
+    let rings = simplified(Grid::new(mask).rings(), tolerance_px);
+    let (mut parts, mut holes): (Vec<_>, Vec<_>) = rings.into_iter().partition(|r| area2(r) > 0.0);
     // What lies left of a hole is then joined before it.
-    holes.sort_by_key(|hole| leftmost(hole).1);
+    holes.sort_by(|a, b| in_order(&leftmost(a).1, &leftmost(b).1));
     holes.into_iter().for_each(|hole| cut_to(&mut parts, hole));
     parts
 }
@@ -99,7 +103,7 @@ impl Grid {
         let (mut at, mut d, mut came) = (start, 0, usize::MAX);
         loop {
             if d != came {
-                ring.push(at);
+                ring.push(at.map(|v| v as f64));
             }
             let here = self.index(at);
             self.leaving[here] &= !(1 << d);
@@ -119,25 +123,31 @@ fn step([x, y]: [i64; 2], d: usize) -> [i64; 2] {
 }
 
 /// Twice the area; negative for a hole.
-fn area2(ring: &Ring) -> i64 {
+fn area2(ring: &Ring) -> f64 {
     ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum()
 }
 
+/// From left to right, then from above.
+fn in_order(a: &[f64; 2], b: &[f64; 2]) -> std::cmp::Ordering {
+    a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
+}
+
 /// The place in the ring and the position of its upper one of the leftmost corners.
-fn leftmost(ring: &Ring) -> (usize, [i64; 2]) {
-    ring.iter().copied().enumerate().min_by_key(|&(_, corner)| corner).unwrap_or_default()
+fn leftmost(ring: &Ring) -> (usize, [f64; 2]) {
+    ring.iter().copied().enumerate().min_by(|a, b| in_order(&a.1, &b.1)).unwrap_or_default()
 }
 
 /// Joins a hole to the ring whose border is next to its left.
 fn cut_to(parts: &mut [Ring], hole: Ring) {
     let (first, [x, y]) = leftmost(&hole);
-    let mut nearest: Option<(i64, usize, usize)> = None;
+    let mut nearest: Option<(f64, usize, usize)> = None;
     for (p, part) in parts.iter().enumerate() {
         for (i, (a, b)) in part.iter().zip(part.iter().cycle().skip(1)).enumerate() {
             // Edges that go up have the inside to their right.
-            let is_left = a[0] == b[0] && a[0] < x && b[1] <= y && y < a[1];
-            if is_left && nearest.is_none_or(|(at, ..)| at < a[0]) {
-                nearest = Some((a[0], p, i));
+            let goes_up = b[1] <= y && y < a[1];
+            let across = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
+            if goes_up && across < x && nearest.is_none_or(|(at, ..)| at < across) {
+                nearest = Some((across, p, i));
             }
         }
     }
@@ -152,8 +162,8 @@ fn cut_to(parts: &mut [Ring], hole: Ring) {
 /// Joins a part to the corner that is nearest to its first.
 fn join(mut whole: Ring, part: Ring) -> Ring {
     let Some(&first) = part.first() else { return whole };
-    let distance = |a: &[i64; 2]| (a[0] - first[0]).pow(2) + (a[1] - first[1]).pow(2);
-    if let Some(i) = (0..whole.len()).min_by_key(|&i| distance(&whole[i])) {
+    let distance = |i: usize| (whole[i][0] - first[0]).powi(2) + (whole[i][1] - first[1]).powi(2);
+    if let Some(i) = (0..whole.len()).min_by(|&i, &k| distance(i).total_cmp(&distance(k))) {
         let slit: Ring = part.iter().copied().chain([first, whole[i]]).collect();
         whole.splice(i + 1..i + 1, slit);
     }
@@ -190,7 +200,7 @@ mod tests {
             bits in prop::collection::vec(prop::bool::weighted(0.6), 12 * 9)
         ) {
             let mask = Mask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
-            let (parts, whole) = (polygons(&mask), polygon(&mask));
+            let (parts, whole) = (polygons(&mask, 0.0), polygon(&mask, 0.0));
             prop_assert_eq!(parts.iter().map(|ring| area(ring)).sum::<f64>(), mask.area() as f64);
             prop_assert_eq!(area(&whole), mask.area() as f64);
             for (x, y) in (0..12).flat_map(|x| (0..9).map(move |y| (x, y))) {
@@ -201,16 +211,62 @@ mod tests {
         }
     }
 
+    /// Whether two lines cross in a point that is no end of either.
+    fn cross(a: [[f64; 2]; 2], b: [[f64; 2]; 2]) -> bool {
+        let side = |p: [[f64; 2]; 2], q: [f64; 2]| {
+            (p[1][0] - p[0][0]) * (q[1] - p[0][1]) - (p[1][1] - p[0][1]) * (q[0] - p[0][0])
+        };
+        side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
+    }
+
+    fn sides(ring: &Ring) -> Vec<[[f64; 2]; 2]> {
+        ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| [*a, *b]).collect()
+    }
+
+    fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {
+        let [a, b, p] = [a, b, p].map(Point2::from);
+        let share = ((p - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+        (a + (b - a) * share - p).norm()
+    }
+
+    proptest! {
+        #[test]
+        fn fewer_corners_keep_parts_and_holes_and_cross_nothing(
+            bits in prop::collection::vec(prop::bool::weighted(0.6), 12 * 9), tolerance in 0.0..3.0_f64
+        ) {
+            let mask = Mask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
+            let rings = Grid::new(&mask).rings();
+            let fewer = simplified(rings.clone(), tolerance);
+            prop_assert_eq!(rings.len(), fewer.len());
+            for (ring, fewer) in rings.iter().zip(&fewer) {
+                prop_assert!(fewer.len() >= 3 && area2(ring) * area2(fewer) > 0.0);
+                let off = |p: &[f64; 2]| sides(fewer).into_iter().map(|s| distance(*p, s)).fold(f64::INFINITY, f64::min);
+                prop_assert!(ring.iter().all(|p| off(p) <= tolerance + 1e-9));
+            }
+            let all: Vec<_> = fewer.iter().flat_map(sides).collect();
+            prop_assert!(all.iter().enumerate().all(|(i, a)| all[..i].iter().all(|b| !cross(*a, *b))));
+            let whole = polygon(&mask, tolerance);
+            let sum: f64 = fewer.iter().map(area2).sum();
+            prop_assert!((2.0 * area(&whole) - sum).abs() < 1e-9, "slits have no area");
+            let parts = polygons(&mask, tolerance);
+            for (x, y) in (0..12).flat_map(|x| (0..9).map(move |y| (x, y))) {
+                let windings: i32 = parts.iter().map(|ring| winding(ring, x, y)).sum();
+                prop_assert!([0, 1].contains(&windings) && winding(&whole, x, y) == windings);
+            }
+        }
+    }
+
     #[test]
     fn a_rectangle_has_four_corners() {
         let mask = Mask::from_fn([8, 8], |x, y| (2..5).contains(&x) && (3..7).contains(&y));
         let corners = [[2.0, 3.0], [5.0, 3.0], [5.0, 7.0], [2.0, 7.0]].map(Point2::from);
-        assert_eq!(polygons(&mask), [corners.to_vec()]);
+        assert_eq!(polygons(&mask, 0.0), [corners.to_vec()]);
     }
 
     #[test]
     fn an_empty_mask_has_no_polygon() {
         let none = Mask::from_fn([5, 5], |_, _| false);
-        assert!(polygons(&none).is_empty() && polygon(&none).is_empty() && polygons(&Mask::default()).is_empty());
+        assert!(polygons(&none, 1.0).is_empty() && polygon(&none, 1.0).is_empty());
+        assert!(polygons(&Mask::default(), 0.0).is_empty());
     }
 }

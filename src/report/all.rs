@@ -59,9 +59,10 @@ impl AllOptions {
 type Measure = fn(&AllOptions, &Amount) -> Result<Vec<Diagram>>;
 
 /// What is measured, in the order of the data.
-const STAGES: [Measure; 9] = [
+const STAGES: [Measure; 10] = [
     |_, _| color::diagrams(),
     |options, _| matte::diagrams(&options.truth),
+    |_, _| matte::searches(),
     |_, _| keying::diagrams(),
     |_, amount| Ok(camera::diagrams(amount.views)),
     |_, amount| {
@@ -184,7 +185,7 @@ fn paid_for() -> Result<Section> {
              scenes keep their promises.",
             rows.len()
         ))
-        .table("work", work::table(&rows)))
+        .table("work", work::table(&rows).transposed()))
 }
 
 fn memory_and_scale() -> Result<Section> {

@@ -25,7 +25,8 @@ const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
 /// What powers of ten may be off by.
 const HAIR: f64 = 1e-9;
 /// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
-const COLORS: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"];
+/// Yellow, which is faint on white, comes last.
+const COLORS: [&str; 8] = ["#000000", "#e69f00", "#56b4e9", "#009e73", "#d55e00", "#0072b2", "#cc79a7", "#f0e442"];
 
 /// Charts next to each other; curves of one place in the list share colour and name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -183,12 +184,13 @@ impl Chart {
         }
         let labels = beside.labels.iter().filter_map(|(p, text)| Some(([x(p[0])?, y(p[1])?], text.as_str())));
         let points = self.curves.iter().flatten().filter_map(|p| Some([x(p[0])?, y(p[1])?]));
-        *svg += &set_beside(labels.collect(), points.collect(), [left, left + w, TOP]);
+        *svg += &set_beside(labels.collect(), points.collect(), [left, left + w, TOP, TOP + h]);
     }
 }
 
-/// Words beside points, where they cover neither each other nor another point, and stay between two sides and below a top.
-fn set_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right, top]: [f64; 3]) -> String {
+/// Words beside points, where they cover neither each other nor another point, and stay between two sides, a top and a bottom;
+/// lines that run behind them are kept off by a rim.
+fn set_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right, top, bottom]: [f64; 4]) -> String {
     let mut taken: Vec<[f64; 4]> = points.iter().map(|[x, y]| [x - 3.0, y - 3.0, x + 3.0, y + 3.0]).collect();
     let mut svg = String::new();
     for ([x, y], text) in labels {
@@ -197,12 +199,16 @@ fn set_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right
         let free = places.into_iter().map(|[dx, dy]| [x + dx, y + dy]).find(|[x, y]| {
             let own = [*x, y - 0.8 * LABEL, x + width, *y];
             let apart = |b: &[f64; 4]| own[2] < b[0] || b[2] < own[0] || own[3] < b[1] || b[3] < own[1];
-            own[0] >= left && own[2] <= right && own[1] >= top && taken.iter().all(apart)
+            own[0] >= left && own[2] <= right && own[1] >= top && own[3] <= bottom && taken.iter().all(apart)
         });
         let Some([x, y]) = free else { continue };
         taken.push([x, y - 0.8 * LABEL, x + width, y]);
         let text = plain(text);
-        let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LABEL}\" fill=\"#444\">{text}</text>");
+        let _ = writeln!(
+            svg,
+            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LABEL}\" fill=\"#444\" stroke=\"white\" stroke-width=\"3\" \
+             stroke-linejoin=\"round\" paint-order=\"stroke\">{text}</text>"
+        );
     }
     svg
 }
@@ -275,13 +281,15 @@ mod tests {
 
     #[test]
     fn words_beside_points_do_not_cover_each_other() {
-        let text = set_beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [0.0, 200.0, 0.0]);
+        let text = set_beside(vec![([50.0, 50.0], "one"), ([51.0, 50.0], "two")], vec![], [0.0, 200.0, 0.0, 200.0]);
         assert_eq!(text.matches("<text").count(), 2);
         let crowd = vec![([50.0, 50.0], "a long word"); 9];
-        assert!(set_beside(crowd, vec![], [0.0, 200.0, 0.0]).matches("<text").count() < 9);
-        assert!(!set_beside(vec![([199.0, 50.0], "wide")], vec![], [0.0, 200.0, 0.0]).contains("x=\"206"));
+        assert!(set_beside(crowd, vec![], [0.0, 200.0, 0.0, 200.0]).matches("<text").count() < 9);
+        let low = set_beside(vec![([50.0, 198.0], "low")], vec![], [0.0, 200.0, 0.0, 200.0]);
+        assert!(low.contains("y=\"195.0\""), "not below the frame: {low}");
+        assert!(!set_beside(vec![([199.0, 50.0], "wide")], vec![], [0.0, 200.0, 0.0, 200.0]).contains("x=\"206"));
         assert_eq!(
-            set_beside(vec![([10.0, 50.0], "a word as wide as the chart itself is")], vec![], [0.0, 200.0, 0.0]),
+            set_beside(vec![([10.0, 50.0], "a word as wide as the chart itself is")], vec![], [0.0, 200.0, 0.0, 200.0]),
             ""
         );
     }

@@ -125,7 +125,7 @@ fn box_of(object: &ObjectLabel, classes: &[String]) -> String {
 
 fn mask_of(object: &ObjectLabel) -> String {
     let mut path = String::new();
-    for polygon in trace::polygons(&object.visible_mask) {
+    for polygon in trace::polygons(&object.visible_mask, 0.0) {
         for (i, p) in polygon.iter().enumerate() {
             let _ = write!(path, "{}{} {}", if i == 0 { "M" } else { "L" }, p.x, p.y);
         }

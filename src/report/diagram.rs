@@ -31,6 +31,8 @@ pub struct Diagram {
     pub why: String,
     /// Points of one curve do not follow from each other, so that no line joins them.
     pub apart: bool,
+    /// Curves are of different inputs: a point is held only against those of its own.
+    pub inputs: bool,
 }
 
 /// A setting.
@@ -101,8 +103,20 @@ impl Diagram {
     /// The cheapest setting that is at least as exact as the default, where it is another and cheaper by more than noise.
     pub fn cheaper_than_default(&self) -> Option<&Point> {
         let default = self.default_point()?;
-        let as_exact = self.points.iter().filter(|p| p.error <= default.error && p.cost * NOISE < default.cost);
+        let as_exact = self.rivals(default).filter(|p| p.error <= default.error && p.cost * NOISE < default.cost);
         as_exact.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// What a point is held against: the points of the same input.
+    fn rivals(&self, point: &Point) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(|p| !self.inputs || p.curve == point.curve)
+    }
+
+    /// Whether nothing beats a point.
+    fn is_on_front(&self, point: &Point) -> bool {
+        let at = |p: &Point| [p.cost, p.error];
+        let rivals: Vec<[f64; 2]> = self.rivals(point).map(at).collect();
+        front(&rivals).into_iter().any(|i| rivals[i] == at(point))
     }
 
     /// The cheapest setting under the limit.
@@ -192,10 +206,9 @@ impl Diagram {
     /// The points as a table, with the front marked.
     pub fn table(&self) -> Table {
         let mut table = Table::new(["form", "setting", &self.cost, &self.error, "quality", "on the front"]);
-        let front = front(&self.points.iter().map(|p| [p.cost, p.error]).collect::<Vec<_>>());
-        for (i, p) in self.points.iter().enumerate() {
+        for p in &self.points {
             let used = p.qualities.iter().map(|q| q.name()).collect::<Vec<_>>().join(", ");
-            let on_front = if front.contains(&i) { "yes" } else { "" };
+            let on_front = if self.is_on_front(p) { "yes" } else { "" };
             table.push([p.curve.as_str(), &p.setting, &three(p.cost), &three(p.error), &used, on_front]);
         }
         table
@@ -276,6 +289,14 @@ mod tests {
             said.contains("is 1 (b), at 0.250 of its cost") && said.contains("(error 0.300 beside 0.400)"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn a_smaller_input_beats_nothing() {
+        let points = vec![normal(Point::new("large", "2", 2.0, 0.4)), Point::new("small", "1", 1.0, 0.1)];
+        let found = Diagram { inputs: true, ..diagram(points.clone()) };
+        assert!(found.cheaper_than_default().is_none() && found.table().rows.iter().all(|row| row[5] == "yes"));
+        assert!(diagram(points).cheaper_than_default().is_some());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Labels of a shape whose area is known: polygon against raster, error against run time and points.
 //!
 //! The shape is an ellipse, the reference its closed form. The error is 1 - IoU: for the pixels of a mask by 16 x 16 points
-//! each; for a polygon inscribed in the ellipse it is the area that it lacks.
+//! each; for a polygon inscribed in the ellipse it is the area that it lacks; for any other by chords along 16 lines a pixel.
 
 use super::clock::timed;
 use super::pile::above;
@@ -23,6 +23,8 @@ const THRESHOLDS: [f32; 4] = [0.02, 0.1, 0.25, 0.5];
 /// Corners of the polygon.
 const CORNERS: [usize; 5] = [8, 16, 32, 64, 128];
 const USUAL_CORNERS: usize = 64;
+/// How far a simplified border may be from that of the mask, pixels.
+const TOLERANCES: [f64; 6] = [0.5, 0.75, 1.0, 1.5, 2.0, 4.0];
 /// Half lengths of the ellipse and how it lies, metres and radians.
 const HALF: [f64; 2] = [0.13, 0.045];
 const TURN: f64 = 0.5;
@@ -50,11 +52,16 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
             };
             let is_default = size == USUAL && alpha_threshold == usual_threshold();
             times.push(Point::new("mask", &name, seconds, error).used_where(|_| is_default));
-            let (rings, more) = timed(RUNS, || Ok(trace::polygons(&mask)))?;
+            let (rings, more) = timed(RUNS, || Ok(trace::polygons(&mask, 0.0)))?;
             times.push(Point::new("polygon along pixels", &name, seconds + more, error));
-            let count = rings.iter().map(Vec::len).sum::<usize>() as f64;
-            points.push(Point::new("polygon along pixels", &name, count, error).used_where(|_| is_default));
+            points.push(Point::new("polygon along pixels", &name, corners(&rings), error).used_where(|_| is_default));
             points.push(Point::new("mask (runs)", &name, mask.runs().len() as f64, error));
+            for tolerance in TOLERANCES.into_iter().filter(|_| is_default) {
+                let (rings, more) = timed(RUNS, || Ok(trace::polygons(&mask, tolerance)))?;
+                let (error, name) = (1.0 - ellipse.iou_of_rings(&rings), format!("within {tolerance} px"));
+                times.push(Point::new("simplified polygon", &name, seconds + more, error));
+                points.push(Point::new("simplified polygon", &name, corners(&rings), error));
+            }
         }
     }
     let ellipse = Ellipse::seen_by(USUAL);
@@ -64,7 +71,7 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
         let error = 1.0 - rings.iter().map(|ring| area(ring)).sum::<f64>() / ellipse.area();
         let name = format!("{corners} corners");
         times.push(Point::new("projected outline", &name, seconds, error));
-        points.push(Point::new("projected outline", &name, rings.iter().map(Vec::len).sum::<usize>() as f64, error));
+        points.push(Point::new("projected outline", &name, self::corners(&rings), error));
     }
     Ok(vec![
         diagram("label_time", "label: polygon and raster, error against time", "CPU seconds of a picture", times),
@@ -95,7 +102,8 @@ fn diagram(file: &str, title: &str, cost: &str, points: Vec<Point>) -> Diagram {
         points,
         why: "Masks are read from the deep samples, like the picture, so they agree with what is seen of see-through objects; the \
               outline is what the geometry says. A pixel counts from a coverage of 0.1, where film is still told from noise: \
-              masks are a fraction of a pixel too wide for that, and boxes hold all of the object."
+              masks are a fraction of a pixel too wide for that, and boxes hold all of the object. Polygons keep all corners of their \
+              pixels unless a recipe says how far they may be off (`labels.simplify`)."
             .into(),
         ..Diagram::default()
     }
@@ -110,10 +118,23 @@ fn mask(labels: &Labels) -> Mask {
     labels.objects.first().map(|object| object.amodal_mask.clone()).unwrap_or_default()
 }
 
+fn corners(rings: &[Vec<Point2<f64>>]) -> f64 {
+    rings.iter().map(Vec::len).sum::<usize>() as f64
+}
+
 /// Area of a ring, by the shoelace formula.
 fn area(ring: &[Point2<f64>]) -> f64 {
     let sides = ring.iter().zip(ring.iter().cycle().skip(1));
     0.5 * sides.map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>().abs()
+}
+
+/// The parts of a line along the rows that lie in an odd number of rings.
+fn inside(rings: &[Vec<Point2<f64>>], y: f64) -> Vec<[f64; 2]> {
+    let sides = rings.iter().flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
+    let crossed = sides.filter(|(a, b)| (a.y <= y) != (b.y <= y));
+    let mut crossings: Vec<f64> = crossed.map(|(a, b)| a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y)).collect();
+    crossings.sort_by(f64::total_cmp);
+    crossings.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
 }
 
 /// The ellipse in a picture.
@@ -154,6 +175,32 @@ impl Ellipse {
     fn iou(&self, mask: &Mask) -> f64 {
         let both: f64 = mask.pixels().map(|(x, y)| self.coverage(x, y)).sum();
         both / (mask.area() as f64 + self.area() - both)
+    }
+
+    /// The same for what lies in an odd number of rings.
+    fn iou_of_rings(&self, rings: &[Vec<Point2<f64>>]) -> f64 {
+        let step = 1.0 / POINTS as f64;
+        let lines = (0..self.image[1] as usize * POINTS).map(|i| (i as f64 + 0.5) * step);
+        let (both, own) = lines.fold((0.0, 0.0), |(both, own), y| {
+            let chord = self.chord(y).unwrap_or_default();
+            let inside = inside(rings, y);
+            let shared = |[a, b]: &[f64; 2]| (b.min(chord[1]) - a.max(chord[0])).max(0.0);
+            (
+                both + step * inside.iter().map(shared).sum::<f64>(),
+                own + step * inside.iter().map(|[a, b]| b - a).sum::<f64>(),
+            )
+        });
+        both / (own + self.area() - both)
+    }
+
+    /// Where the ellipse crosses a line along the rows; none where it does not.
+    fn chord(&self, y: f64) -> Option<[f64; 2]> {
+        // The level is a parabola along the line: through three points of it.
+        let [low, middle, high] = [-1.0, 0.0, 1.0].map(|dx| self.level(self.center.x + dx, y) - 1.0);
+        let (a, b) = (0.5 * (low + high) - middle, 0.5 * (high - low));
+        let discriminant = b * b - 4.0 * a * middle;
+        let at = |sign: f64| self.center.x + (sign * discriminant.sqrt() - b) / (2.0 * a);
+        (discriminant > 0.0).then(|| [at(-1.0), at(1.0)])
     }
 
     /// A card whose outline has so many corners on the ellipse.
@@ -212,6 +259,27 @@ mod tests {
         // A pixel on the border is wrong by at most a half, and by a quarter in the mean.
         let border: f64 = ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| (b - a).norm()).sum();
         assert!(1.0 - ellipse.iou(&mask) < 0.5 * border / ellipse.area(), "{}", ellipse.iou(&mask));
+    }
+
+    #[test]
+    fn chords_measure_a_polygon_as_its_area_does() {
+        let ellipse = Ellipse::seen_by([160, 120]);
+        let rings = outline_of(&ellipse.shot(32).cards[0], &ellipse.shot(32).camera);
+        // An inscribed polygon shares all of its area; lines are 1/16 of a pixel apart.
+        assert!((ellipse.iou_of_rings(&rings) - area(&rings[0]) / ellipse.area()).abs() < 1e-3);
+        let y = ellipse.center.y + 3.0;
+        assert!(ellipse.chord(y).unwrap().iter().all(|x| (ellipse.level(*x, y) - 1.0).abs() < 1e-9));
+        assert_eq!((ellipse.chord(0.0), ellipse.iou_of_rings(&[])), (None, 0.0));
+    }
+
+    #[test]
+    fn a_looser_polygon_has_fewer_corners() {
+        let ellipse = Ellipse::seen_by([160, 120]);
+        let mask = mask(&label(&ellipse.deep(), &ellipse.shot(32), &LabelOptions::default()));
+        let [exact, loose, looser] = [0.0, 1.0, 4.0].map(|tolerance| trace::polygons(&mask, tolerance));
+        assert!(corners(&exact) > 3.0 * corners(&loose) && corners(&loose) > corners(&looser));
+        // The mask's own IoU is by points and this one by lines, both 1/16 of a pixel apart.
+        assert!((ellipse.iou_of_rings(&exact) - ellipse.iou(&mask)).abs() < 2e-3);
     }
 
     #[test]

@@ -9,11 +9,13 @@ mod diagram;
 mod made;
 mod method;
 pub(super) mod score;
+mod search;
 pub(super) mod truth;
 
 pub use diagram::diagrams;
 pub use method::Method;
 pub use score::Score;
+pub use search::searches;
 
 use super::clock::cpu_seconds;
 use super::{Axis, Chart, Page, Table};

@@ -30,17 +30,23 @@ pub(super) fn above(image: [u32; 2], height: f64) -> Camera {
     }
 }
 
-/// So many see-through bottles on and over each other, under one light and a dim sky.
-pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
-    let light = AreaLight {
+/// A square lamp that shines at the origin from above its right.
+pub(super) fn lamp(color: LinearRgb) -> AreaLight {
+    AreaLight {
         shape: LightShape::Rectangle,
         position: [0.5, 0.3, 1.2],
         target: [0.0; 3],
         size: [0.35; 2],
         power: 9.0,
-        color: LinearRgb::new(1.0, 0.95, 0.85),
-    };
-    let shot = Shot::new(above(image, HEIGHT)).with_light(light).with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
+        color,
+    }
+}
+
+/// So many see-through bottles on and over each other, under one light and a dim sky.
+pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
+    let shot = Shot::new(above(image, HEIGHT))
+        .with_light(lamp(LinearRgb::new(1.0, 0.95, 0.85)))
+        .with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
     let textures: Vec<Texture> = (0..TEXTURES).map(|k| bottle(k).into()).collect();
     (0..cards).map(|k| card(k, &textures)).fold(shot, Shot::with_card)
 }

@@ -4,8 +4,8 @@
 //! # Method
 //! Every point is a dataset of its own, made by [`generate`](crate::dataset::generate) in a process of its own: pictures
 //! are rendered, labelled, encoded and written, one to a thread, as in any run. A first picture tells how many more are
-//! worth the time. Seconds are the processor's (`CLOCK_PROCESS_CPUTIME_ID`), so that other programs on the machine
-//! disturb little; the rate is by the clock, and memory the most that was ever resident (`VmHWM`). Scenes are made in
+//! worth the time, in a few rounds of which the least counts. Seconds are the processor's (`CLOCK_PROCESS_CPUTIME_ID`), so
+//! that other programs on the machine disturb little; the rate is by the clock, and memory the most that was ever resident (`VmHWM`). Scenes are made in
 //! code, at rest; falling is measured by itself, in this process.
 
 mod fit;

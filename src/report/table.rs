@@ -27,6 +27,13 @@ impl Table {
         self.rows.push(row);
     }
 
+    /// The same with a column for each row: for tables that are wider than long.
+    pub fn transposed(&self) -> Self {
+        let column = |i: usize| self.lines().map(|row| row[i].clone()).collect();
+        let mut columns = (0..self.columns.len()).map(column);
+        Self { columns: columns.next().unwrap_or_default(), rows: columns.collect() }
+    }
+
     /// As comma-separated values (RFC 4180), the titles first.
     pub fn csv(&self) -> String {
         let cell = |text: &String| {
@@ -62,6 +69,15 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn turned_twice_it_is_the_same() {
+        let mut table = awkward();
+        table.push(["c", "d"]);
+        assert_eq!(table.transposed().columns, ["case", "a|b <c>", "c"]);
+        assert_eq!(table.transposed().transposed(), table);
+        assert_eq!(Table::default().transposed(), Table::default());
+    }
 
     fn awkward() -> Table {
         let mut table = Table::new(["case", "error, px"]);

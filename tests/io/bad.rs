@@ -2,16 +2,15 @@
 
 use crate::build::crc32;
 use crate::make::{Folder, behind, codes, light, opaque_codes, tiff};
+use crate::promptness::quickly;
 use petcomp::io::{self, Bits, Limits, ReadOptions, WriteOptions};
 use petcomp::{Coverage, LinearRgb, PremulRgba};
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 /// The message for a file, which is one line that starts with the file, and comes quickly.
 fn refusal(path: &Path) -> String {
-    let start = Instant::now();
-    let message = io::read::<PremulRgba>(path).expect_err("a picture out of a bad file").to_string();
-    assert!(start.elapsed() < Duration::from_secs(2), "{message} took {:?}", start.elapsed());
+    let (read, _) = quickly(&path.to_string_lossy(), || io::read::<PremulRgba>(path));
+    let message = read.expect_err("a picture out of a bad file").to_string();
     assert!(!message.contains('\n') && message.len() < 400, "{message:?}");
     let front = format!("{}: ", path.display());
     message.strip_prefix(&front).unwrap_or_else(|| panic!("{message} does not start with {front}")).to_string()

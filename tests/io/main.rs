@@ -13,9 +13,9 @@ mod fuzz;
 mod kinds;
 mod make;
 mod meaning;
+mod processes;
+mod promptness;
 mod sweep;
 mod valid;
 #[cfg(feature = "oiio")]
 mod worker;
-#[cfg(feature = "oiio")]
-mod worker_life;

@@ -1,10 +1,9 @@
-//! Whole small files of every kind that is read, and the workers that read some of them.
+//! Whole small files of every kind that is read.
 
 use crate::build::{ihdr, png, stored, tags};
 use crate::make::{Folder, codes, light, opaque_codes, tiff};
 use petcomp::io::{self, Bits, Compression, ToFile, WriteOptions};
 use petcomp::{Coverage, Depth, Image};
-use std::time::Duration;
 
 /// Twenty files, none of them large.
 pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
@@ -65,22 +64,4 @@ fn hdr(w: usize, h: usize) -> Vec<u8> {
 fn palette_png() -> Vec<u8> {
     let rows = [0, 0, 1, 0, 1, 0];
     png(&[ihdr(2, 2, 8, 3, 0), (b"PLTE", vec![255, 0, 0, 0, 0, 255]), (b"IDAT", stored(&rows)), (b"IEND", vec![])])
-}
-
-/// Processes that this one started and that still run.
-pub(crate) fn workers() -> Vec<u32> {
-    let own = std::process::id().to_string();
-    let started_here = |pid: &u32| {
-        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-        // Behind the name in brackets: state, then the parent.
-        let mut rest = stat.rsplit(") ").next().unwrap_or_default().split(' ');
-        rest.next() != Some("Z") && rest.next() == Some(&own) && stat.contains("(petcomp-oiio-wo")
-    };
-    let Ok(processes) = std::fs::read_dir("/proc") else { return Vec::new() };
-    processes.flatten().filter_map(|p| p.file_name().to_str()?.parse().ok()).filter(started_here).collect()
-}
-
-/// How long loading OpenImageIO may take on a busy machine.
-pub(crate) fn start_of_a_worker() -> Duration {
-    if cfg!(feature = "oiio") { Duration::from_secs(8) } else { Duration::ZERO }
 }

@@ -1,27 +1,8 @@
 //! Files that only OpenImageIO reads come through its worker; programs that meet none do not load it.
 
-use crate::make::{Folder, behind, tiff};
+use crate::make::{Folder, palette_tiff};
 use petcomp::io::{self, WriteOptions};
 use petcomp::{Image, LinearRgb, Srgb8, color};
-
-/// A TIFF of two palette colours.
-pub(crate) fn palette_tiff() -> Vec<u8> {
-    let tags = [
-        (256, 3, 1, 2),
-        (257, 3, 1, 1),
-        (258, 3, 1, 8),
-        (259, 3, 1, 1),
-        (262, 3, 1, 3),
-        (273, 4, 1, behind(9) + 1536),
-        (278, 3, 1, 1),
-        (279, 4, 1, 2),
-        (320, 3, 768, behind(9)),
-    ];
-    let mut palette = [0_u16; 768];
-    (palette[0], palette[256 + 1], palette[512 + 1]) = (0xffff, 0x8080, 0xffff);
-    let strip: Vec<u8> = palette.iter().flat_map(|v| v.to_le_bytes()).chain([0, 1]).collect();
-    tiff(&tags, &strip)
-}
 
 #[test]
 fn a_palette_tiff_is_read_by_the_worker() {

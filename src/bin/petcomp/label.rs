@@ -17,6 +17,9 @@ pub(crate) struct Args {
     /// Also write the picture with outlines and boxes drawn on it
     #[arg(long, value_name = "PNG")]
     overlay: Option<PathBuf>,
+    /// Also write the borders of the masks as polygons, simplified as the recipe's `labels.simplify` says
+    #[arg(long, value_name = "JSON")]
+    polygons: Option<PathBuf>,
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
@@ -31,6 +34,9 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         }
     };
     io::write_json(&args.output, &labels)?;
+    if let Some(path) = &args.polygons {
+        io::write_json(path, &label::borders(&labels, studio.setup().labels.simplify))?;
+    }
     let objects = &labels.objects;
     let topmost = objects.iter().filter(|o| o.is_topmost()).count();
     common.say(format_args!("{}: {} objects, {topmost} on top", args.output.display(), objects.len()));

@@ -38,8 +38,14 @@ struct Place {
 
 /// Photo `i`.
 pub(super) fn made(i: usize) -> Known {
-    let (w, h) = SIZE;
-    let places = Image::from_fn(w, h, |x, y| place(i, (x as f64 + 0.5, y as f64 + 0.5)));
+    enlarged(i, 1)
+}
+
+/// Photo `i` by a camera of so many times the pixels along each side: as sharp, and as noisy in each pixel.
+pub(super) fn enlarged(i: usize, times: usize) -> Known {
+    let (w, h) = (times * SIZE.0, times * SIZE.1);
+    let px = 1.0 / times as f64;
+    let places = Image::from_fn(w, h, |x, y| place(i, [x, y].map(|v| (v as f64 + 0.5) * px), px));
     let color = |c: [f64; 3]| LinearRgb::from(c.map(|v| v as f32));
     let foreground = places.map(|p| color(p.foreground));
     let transmittance = places.map(|p| color([0, 1, 2].map(|c| p.view[c] * p.lit[c])));
@@ -49,7 +55,7 @@ pub(super) fn made(i: usize) -> Known {
         let [dx, dy] = [x as f64 / w as f64 - 0.4, y as f64 / h as f64 - 0.6];
         SCREEN.scale((1.0 - 0.35 * (dx * dx + dy * dy)) as f32)
     });
-    let box_px = bounds(i);
+    let box_px = bounds(i).map(|side| side / px);
     let empty = Image::filled(w, h, LinearRgb::BLACK);
     let name = format!("made {}", i + 1);
     let known = Known {
@@ -94,9 +100,10 @@ fn bounds(i: usize) -> [f64; 4] {
     [low(0), low(1), high(0), high(1)]
 }
 
-fn place(i: usize, (x, y): (f64, f64)) -> Place {
+/// What is at a place; an edge is as wide as `px`.
+fn place(i: usize, [x, y]: [f64; 2], px: f64) -> Place {
     let (along, depth) = body(i, x, y);
-    let cover = (depth / EDGE_PX + 0.5).clamp(0.0, 1.0);
+    let cover = (depth / (EDGE_PX * px) + 0.5).clamp(0.0, 1.0);
     let inside = cover * cover * (3.0 - 2.0 * cover);
     // Walls seen at a grazing angle near the outline are thicker, and wrinkles fold them.
     let rim = 1.0 + 2.0 * libm::exp(-depth.max(0.0) / 6.0);

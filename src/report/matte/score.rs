@@ -3,6 +3,7 @@
 use super::method::Cut;
 use super::truth::Known;
 use crate::filter;
+use crate::geom::Point2;
 use crate::image::Image;
 use crate::pixel::{Coverage, Film, LinearRgb};
 
@@ -53,7 +54,7 @@ impl Score {
             psnr_shaded,
             residue: residue(&alpha, &known.mask),
             iou: overlap(&found.outline, &known.mask),
-            box_px: box_error(found, known.box_px),
+            box_px: box_error(&found.found.hull, known.box_px),
         }
     }
 }
@@ -116,10 +117,10 @@ pub(in crate::report) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f6
     both as f64 / any.max(1) as f64
 }
 
-fn box_error(found: &Cut, truth: [f64; 4]) -> f64 {
-    let hull = &found.found.hull;
-    let low = |along: fn(&crate::geom::Point2<f64>) -> f64| hull.iter().map(along).fold(f64::INFINITY, f64::min);
-    let high = |along: fn(&crate::geom::Point2<f64>) -> f64| hull.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
+/// The side of a hull's box that is farthest from left, top, right or bottom.
+pub(super) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
+    let low = |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::INFINITY, f64::min);
+    let high = |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
     let sides = [low(|p| p.x), low(|p| p.y), high(|p| p.x), high(|p| p.y)];
     sides.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }

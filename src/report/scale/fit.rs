@@ -26,22 +26,36 @@ pub struct Model {
     pub memory: Fit,
 }
 
-/// Layers shade each other, so that light costs as many readings as there are pairs of layers, and any card may stand
-/// in another's light.
+/// Light is looked up on a lattice that is finest along the sides of cards, however small these are in the picture, and every
+/// place of it looks through as many layers as may lie above; and any card may stand in another's light.
 const TIME: [&str; 6] =
-    ["picture", "megapixel", "card", "megapixel of a layer", "megapixel of layers, squared", "pair of cards"];
-const MEMORY: [&str; 4] = ["process", "megapixel in hand", "megapixel of a layer in hand", "pair of cards in hand"];
+    ["picture", "megapixel", "card", "megapixel of a layer", "1000 px of card sides under a layer", "pair of cards"];
+/// Textures of cards are held with a border, and light with what lies above it: cards that overlap.
+const MEMORY: [&str; 5] = [
+    "process",
+    "megapixel in hand",
+    "megapixel of a layer in hand",
+    "1000 px of card sides in hand",
+    "pair of cards that overlap in hand",
+];
 
 /// What a picture has of each term of its time.
 fn time_terms(point: &Point) -> Vec<f64> {
-    let (pixels, layers) = (point.case.megapixels(), point.layers);
-    vec![1.0, pixels, point.case.cards as f64, pixels * layers, pixels * layers * layers, pairs(point)]
+    let (pixels, cards, layers) = (point.case.megapixels(), point.case.cards as f64, point.layers);
+    vec![1.0, pixels, cards, pixels * layers, sides(point) * layers, pairs(point)]
 }
 
 /// What a process has of each term of its memory.
 fn memory_terms(point: &Point) -> Vec<f64> {
-    let (pictures, pixels) = (point.case.threads as f64, point.case.megapixels());
-    vec![1.0, pictures * pixels, pictures * pixels * point.layers, pictures * pairs(point)]
+    let (pixels, overlaps) = (point.case.megapixels(), point.case.cards as f64 * point.layers);
+    let in_hand = [pixels, pixels * point.layers, sides(point), overlaps].map(|v| point.case.threads as f64 * v);
+    std::iter::once(1.0).chain(in_hand).collect()
+}
+
+/// Thousands of pixels along the sides of all cards, were each a square: the root of each card's megapixels.
+fn sides(point: &Point) -> f64 {
+    let cards = point.case.cards as f64;
+    cards * (point.case.megapixels() * point.layers / cards.max(1.0)).sqrt()
 }
 
 fn pairs(point: &Point) -> f64 {

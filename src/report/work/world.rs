@@ -5,9 +5,8 @@ use crate::camera::Label;
 use crate::dataset::Setup;
 use crate::geom::{Pose, UnitQuaternion, Vector3};
 use crate::matte::MatteMethod;
-use crate::scene::{
-    AreaLight, CameraSource, Environment, Exposure, Grade, LightShape, Object, Placement, Recipe, Scene, Surface,
-};
+use crate::report::pile::lamp;
+use crate::scene::{AreaLight, CameraSource, Environment, Exposure, Grade, Object, Placement, Recipe, Scene, Surface};
 use crate::{Error, Film, Image, LinearRgb, PremulRgba, Result, io};
 use tempfile::TempDir;
 
@@ -83,14 +82,7 @@ impl World {
 
     /// A few see-through cards at rest over the photo, one on another, under a lamp and an even sky.
     pub(super) fn scene(&self) -> Scene {
-        let lamp = AreaLight {
-            shape: LightShape::Rectangle,
-            position: [0.3, 0.2, 1.0],
-            target: [0.0; 3],
-            size: [0.2; 2],
-            power: 6.0,
-            color: LinearRgb::WHITE,
-        };
+        let lamp = AreaLight { position: [0.3, 0.2, 1.0], size: [0.2; 2], power: 6.0, ..lamp(LinearRgb::WHITE) };
         Scene {
             image: IMAGE,
             plate: "tray".into(),

@@ -1,20 +1,10 @@
 //! `petcomp report matte`: the matting methods on photos with known mattes.
 
+use super::TruthArgs;
 use crate::common::Common;
 use petcomp::report::matte;
-use std::path::PathBuf;
 
-#[derive(clap::Args)]
-pub(crate) struct Args {
-    /// Folder with photos and their truth, as the sample world has them
-    #[arg(long, value_name = "FOLDER")]
-    truth: PathBuf,
-    /// Folder to write
-    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
-    output: PathBuf,
-}
-
-pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
     let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
     drop(progress);

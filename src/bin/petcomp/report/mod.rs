@@ -12,6 +12,18 @@ mod stability;
 mod work;
 
 use crate::common::Common;
+use std::path::PathBuf;
+
+/// What a report of photos with known mattes needs.
+#[derive(clap::Args)]
+pub(crate) struct TruthArgs {
+    /// Folder with photos and their truth, as the sample world has them
+    #[arg(long, value_name = "FOLDER")]
+    truth: PathBuf,
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+}
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
@@ -26,9 +38,9 @@ pub(crate) enum Command {
     /// Our trainings beside the values of the paper, with intervals and a test
     Experiments(experiments::Args),
     /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
-    Matte(matte::Args),
+    Matte(TruthArgs),
     /// Whether cut-outs that are wrong say so, on photos with known outlines made harder in many ways: flags.csv, flags.md
-    Flags(flags::Args),
+    Flags(TruthArgs),
     /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
     Render(render::Args),
     /// What scenes pay for, counted: work.csv and work.md

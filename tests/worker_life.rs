@@ -1,23 +1,28 @@
 //! Workers live long, see little, and may die at any moment.
+//!
+//! A program of its own: it counts workers and kills them, which must be nobody else's.
+#![cfg(all(feature = "oiio", target_os = "linux"))]
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use crate::make::Folder;
-use crate::valid::workers;
-use crate::worker::palette_tiff;
+#[path = "io/make.rs"]
+#[allow(dead_code, reason = "other tests need the rest of it")]
+mod make;
+#[path = "io/processes.rs"]
+mod processes;
+
+use make::{Folder, palette_tiff};
 use petcomp::io::{self, ReadOptions};
 use petcomp::{Image, LinearRgb};
+use processes::{status, workers};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Tests that count workers, and kill them, run one at a time.
+/// They run one at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
 fn read(folder: &Folder) -> Result<Image<LinearRgb>, String> {
     io::read(folder.file("palette.tif")).map_err(|e| e.to_string())
-}
-
-fn status(pid: u32) -> String {
-    std::fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default()
 }
 
 #[test]
@@ -111,6 +116,7 @@ fn killed_workers_spoil_no_picture() {
 /// A file as bytes is all a worker gets: one whose name says nothing, in a folder it could not open.
 #[test]
 fn a_worker_reads_files_it_could_not_open() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
     let folder = Folder::new();
     std::fs::create_dir(folder.file("private")).unwrap();
     let path = folder.with("private/\u{1F5BC} picture", &palette_tiff());
