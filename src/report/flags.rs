@@ -113,7 +113,8 @@ impl Trial {
         };
         let doubts: Vec<String> = cut.remarks.iter().filter(|r| r.is_doubt()).map(Remark::to_string).collect();
         let [iou, box_px] = self.errors(&cut);
-        let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX;
+        // Pixels of a reduced search are that much larger.
+        let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
         let end = match (self.expected, right, doubts.is_empty()) {
             (Expected::Right, true, true) => End::Right,
             (Expected::Right, true, false) => End::RightAndFlagged,
@@ -241,6 +242,17 @@ mod tests {
         assert_eq!(trial.run().1, End::SilentlyWrong);
         let unexpected = Trial { expected: Expected::Refused, ..trial };
         assert_eq!(unexpected.run().1, End::SilentlyWrong);
+    }
+
+    #[test]
+    #[ignore = "a driver"]
+    fn driver() {
+        let dirs = std::env::var("DIRS").unwrap();
+        let out = std::env::var("OUT").unwrap();
+        for (i, dir) in dirs.split(',').enumerate() {
+            let table = write(Path::new(dir), &Path::new(&out).join(i.to_string()), |_, _| {}).unwrap();
+            println!("{dir}\n{}", table.markdown());
+        }
     }
 
     #[test]
