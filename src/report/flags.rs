@@ -245,17 +245,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "a driver"]
-    fn driver() {
-        let dirs = std::env::var("DIRS").unwrap();
-        let out = std::env::var("OUT").unwrap();
-        for (i, dir) in dirs.split(',').enumerate() {
-            let table = write(Path::new(dir), &Path::new(&out).join(i.to_string()), |_, _| {}).unwrap();
-            println!("{dir}\n{}", table.markdown());
-        }
-    }
-
-    #[test]
     fn rows_become_counts() {
         let row = |variant, end| Row { photo: "a".into(), variant, found: None, end, doubts: vec!["x; y".into()] };
         let rows = [row(Variant::Plain, End::Right), row(Variant::Plain, End::SilentlyWrong)];

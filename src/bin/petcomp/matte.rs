@@ -2,8 +2,8 @@
 
 use crate::common::Common;
 use crate::{matte_film, matte_key, matte_nodes};
-use petcomp::matte::{CutOutOptions, Remark, SegmentOptions, cut_out, segment};
-use petcomp::{LinearRgb, io};
+use petcomp::matte::{CutOutOptions, PlateOptions, Remark, ScreenPlate, SegmentOptions, cut_out, segment};
+use petcomp::{Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -48,11 +48,15 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Node(command) => matte_nodes::run(command)?,
         Command::Segment { photo, output, options } => {
             let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
-            let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
+            let picture: Image<LinearRgb> = io::read(photo)?;
+            let found = segment(&picture, &options).map_err(|e| e.in_file(photo))?;
             io::create_folder(output)?;
             warn(photo, &found.remarks);
             let steps = found.steps.iter().map(|step| (step.name, step.shown()));
-            let outcome = [("hull", found.mask.clone()), ("outline", found.tight.clone())];
+            let plate = ScreenPlate::fit_outside(&picture, &found.mask, &PlateOptions::default())?;
+            let [garbage, core] = found.mattes(&picture, &plate.image);
+            let outcome =
+                [("hull", found.mask.clone()), ("outline", found.tight.clone()), ("garbage", garbage), ("core", core)];
             for (i, (name, picture)) in steps.chain(outcome).enumerate() {
                 let path = output.join(format!("{i}_{name}.png"));
                 io::write(&path, &picture)?;

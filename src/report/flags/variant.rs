@@ -176,7 +176,7 @@ impl Variant {
     }
 
     /// The photo in this variant; nothing where it cannot be made of it.
-    pub(super) fn of(self, known: &Known, seed: u64) -> Option<Trial> {
+    pub(in crate::report) fn of(self, known: &Known, seed: u64) -> Option<Trial> {
         let plain = || Trial {
             photo: known.photo.clone(),
             mask: known.mask.clone(),
