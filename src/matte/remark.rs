@@ -44,7 +44,9 @@ pub enum Remark {
     #[error("the outline is unsure: its box lies {0:.0} pixels beyond its outline, where edges enclose nothing")]
     Strayed(f64),
     /// So many specks lie on the screen.
-    #[error("{0} specks lie on the screen: one beside the object may have been taken for a part of it; wipe it, or look")]
+    #[error(
+        "{0} specks lie on the screen: one beside the object may have been taken for a part of it; wipe it, or look"
+    )]
     Specks(usize),
     /// The object is only so many pixels wide.
     #[error("the object is only {0:.0} pixels wide: its outline is told to a pixel; photograph it from nearer")]

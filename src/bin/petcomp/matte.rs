@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
-    /// Find the object and write every intermediate picture
+    /// Find the object and write every intermediate picture, and the garbage and core matte that a keyer takes
     Segment {
         /// Photo of one object on a uniform screen or board
         photo: PathBuf,
@@ -53,11 +53,12 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             io::create_folder(output)?;
             warn(photo, &found.remarks);
             let steps = found.steps.iter().map(|step| (step.name, step.shown()));
-            let plate = ScreenPlate::fit_outside(&picture, &found.mask, &PlateOptions::default())?;
-            let [garbage, core] = found.mattes(&picture, &plate.image);
-            let outcome =
-                [("hull", found.mask.clone()), ("outline", found.tight.clone()), ("garbage", garbage), ("core", core)];
-            for (i, (name, picture)) in steps.chain(outcome).enumerate() {
+            let outcome = [("hull", found.mask.clone()), ("outline", found.tight.clone())];
+            // An object that leaves no screen has no plate, and what is opaque of it is not known.
+            let plate = ScreenPlate::fit_outside(&picture, &found.mask, &PlateOptions::default()).ok();
+            let mattes = plate.map(|plate| found.mattes(&picture, &plate.image));
+            let mattes = mattes.into_iter().flat_map(|[garbage, core]| [("garbage", garbage), ("core", core)]);
+            for (i, (name, picture)) in steps.chain(outcome).chain(mattes).enumerate() {
                 let path = output.join(format!("{i}_{name}.png"));
                 io::write(&path, &picture)?;
                 common.say(path.display());

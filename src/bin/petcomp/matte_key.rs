@@ -56,7 +56,9 @@ impl Args {
         crate::matte::warn(&self.input, &found.remarks);
         let [garbage, core] = match plate {
             Some(plate) => found.mattes(&photo, plate),
-            None => found.mattes(&photo, &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image),
+            None => {
+                found.mattes(&photo, &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image)
+            }
         };
         Ok([Some(garbage), Some(core)])
     }

@@ -201,9 +201,7 @@ impl Variant {
             Self::OverBorder => framing::cut_off(plain(), 0.1),
             Self::Two => framing::two(&plain()),
             Self::Empty => with(sensor::noisy(&known.screen, read, seed)),
-            Self::EmptyUneven => {
-                with(sensor::noisy(&lighting::fallen_off(&known.screen, direction, 0.6), read, seed))
-            }
+            Self::EmptyUneven => with(sensor::noisy(&lighting::fallen_off(&known.screen, direction, 0.6), read, seed)),
             Self::Tiny => framing::tiny(&plain()),
             Self::Huge => {
                 let large = framing::huge(&plain());

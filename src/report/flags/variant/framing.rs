@@ -80,7 +80,8 @@ pub(super) fn full_frame(whole: Trial) -> Trial {
     let (width, height) = (right - left, bottom - top);
     let sum = width + height;
     let margin = 0.25 * ((sum * sum + 4.0 * width * height * (1.0 / FULL - 1.0)).sqrt() - sum);
-    let range = |low: f64, high: f64, len: usize| (low - margin).max(0.0) as usize..((high + margin).ceil() as usize).min(len);
+    let range =
+        |low: f64, high: f64, len: usize| (low - margin).max(0.0) as usize..((high + margin).ceil() as usize).min(len);
     let roi = Roi::spanning(range(left, right, w), range(top, bottom, h));
     let (x, y) = (roi.x as f64, roi.y as f64);
     let box_px = [left - x, top - y, right - x, bottom - y];
