@@ -3,7 +3,9 @@
 use super::header::{Header, Notes, lines_of_notes, notes_of_lines};
 use super::limits::{Demand, Limits, at_most};
 use super::raster::{Raster, Refusal, Samples, usual_names};
+use crate::image::Image;
 use crate::io::Format;
+use crate::pixel::Srgb8;
 use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
 use image::{ExtendedColorType, ImageDecoder, ImageError};
 use std::io::{Cursor, Read};
@@ -161,6 +163,14 @@ pub(super) fn encode(
         .map_err(|e| e.to_string())?;
     insert_comment(&mut bytes, &metadata.to_vec())?;
     Ok(bytes)
+}
+
+/// A picture as it comes back from a file of a quality, 1 to 100; nothing for one without pixels.
+pub(crate) fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
+    let file = encode(image.size(), bytemuck::cast_slice(image.pixels()), quality, &[]).ok()?;
+    let raster = decode(&file, &Limits::default()).ok()?;
+    let Samples::U8(codes) = raster.samples else { return None };
+    Some(Image::from_vec(raster.width, raster.height, bytemuck::pod_collect_to_vec(&codes)))
 }
 
 /// Puts the notes into a comment segment right behind the start marker.

@@ -80,6 +80,7 @@ pub use document::{
 };
 pub use format::Format;
 pub use header::Header;
+pub(crate) use jpeg::through_jpeg;
 pub use limits::{Limits, Raise};
 pub use overrides::Override;
 pub use place::{below, clean_name, refuse_links};

@@ -57,6 +57,16 @@ impl Outline {
         self.rings.iter().map(|ring| signed_area(ring)).sum()
     }
 
+    /// How wide it is, if it were a long strip: twice the area over the length of its rings, pixels; 0 for nothing.
+    pub fn width(&self) -> f64 {
+        let length = |ring: &Vec<Point2<f64>>| {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter().zip(next).map(|(a, b)| (b - a).norm()).sum::<f64>()
+        };
+        let around: f64 = self.rings.iter().map(length).sum();
+        if around > 0.0 { 2.0 * self.area() / around } else { 0.0 }
+    }
+
     /// Every point moved by a function.
     pub fn map(&self, f: impl Fn(Point2<f64>) -> Point2<f64>) -> Self {
         Self { rings: self.rings.iter().map(|ring| ring.iter().map(|p| f(*p)).collect()).collect() }

@@ -40,6 +40,17 @@ pub enum Remark {
     /// The object's edges are blurred by this standard deviation, pixels of the picture that was searched.
     #[error("the object's edges are blurred by {0:.1} pixels: out of focus, or moved")]
     Blurred(f64),
+    /// A side of the box lies so many pixels of the picture that was searched beyond the outline.
+    #[error("the outline is unsure: its box lies {0:.0} pixels beyond its outline, where edges enclose nothing")]
+    Strayed(f64),
+    /// So many specks lie on the screen.
+    #[error(
+        "{0} specks lie on the screen: one beside the object may have been taken for a part of it; wipe it, or look"
+    )]
+    Specks(usize),
+    /// The object is only so many pixels wide.
+    #[error("the object is only {0:.0} pixels wide: its outline is told to a pixel; photograph it from nearer")]
+    Narrow(f64),
     /// This share of the screen is clipped: brighter than the camera can tell.
     #[error("{:.0} % of the screen is clipped: what the object lets through cannot be told; photograph it darker", 100.0 * .0)]
     ClippedScreen(f32),
@@ -84,6 +95,9 @@ impl Remark {
             | Self::Unsupported(_)
             | Self::Drifting(_)
             | Self::Blurred(_)
+            | Self::Strayed(_)
+            | Self::Specks(_)
+            | Self::Narrow(_)
             | Self::ClippedScreen(_) => true,
             Self::ScreenHue(share) => *share > LEAST_HUE_SHARE,
             Self::GreyScreen(_) | Self::Clipped(_) | Self::Moved { .. } | Self::Undetermined(_) => false,

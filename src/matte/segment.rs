@@ -117,7 +117,7 @@ impl Step {
 
 /// Finds the one object on a uniform background.
 ///
-/// `photo` is scene-linear, at least 32 pixels a side. The object may reach the border of the photo (which is warned
+/// `photo` is scene-linear, at least 16 pixels a side. The object may reach the border of the photo (which is warned
 /// of), but not all four.
 ///
 /// # Method
@@ -158,9 +158,14 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     watch.lap("holes");
     let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
     let outline = snap::snapped(&around.map(to_photo), &roots, reduction);
-    let confidence = Confidence { blur_px: blur::blur_px(&outline, &roots, reduction), ..chosen.confidence };
     let tips: Vec<_> = inset(&found.hull, TIP_INSET_PX).into_iter().map(to_photo).collect();
     let hull = Outline { rings: outline.rings.iter().cloned().chain([tips]).collect() }.hull();
+    let confidence = Confidence {
+        blur_px: blur::blur_px(&outline, &roots, reduction.max(1.0)),
+        width_px: outline.width() / reduction.max(1.0),
+        stray_px: hull::growth(&outline.hull(), &hull) / reduction,
+        ..chosen.confidence
+    };
     let mut remarks = found.remarks.clone();
     remarks.extend(truncation(found.touches));
     remarks.extend(confidence.remarks());
@@ -227,15 +232,21 @@ impl SegmentOptions {
         if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
             return Err(Error::value("tone.grey", format!("{weights:?}, expected weights of 0 to 1e6, not all 0")));
         }
-        if self.working_size < SMALLEST {
-            return Err(Error::value("working_size", format!("{}, expected at least {SMALLEST}", self.working_size)));
+        if self.working_size < LEAST_WORKING_SIZE {
+            let what = format!("{}, expected at least {LEAST_WORKING_SIZE}", self.working_size);
+            return Err(Error::value("working_size", what));
         }
         Ok(())
     }
 }
 
+/// Least longer side of a picture that is searched, pixels.
+const LEAST_WORKING_SIZE: usize = 32;
 /// Shortest side that can hold an object and its background, pixels.
-const SMALLEST: usize = 32;
+const SMALLEST: usize = 16;
+/// A photo with a longer side below the first is searched enlarged, to the second at least: bands and gaps of a few pixels
+/// are wide beside an object of 20.
+const SMALL: [usize; 2] = [128, 256];
 
 fn check_photo(photo: &Image<LinearRgb>) -> Result<()> {
     let (w, h) = photo.size();
@@ -256,13 +267,17 @@ fn longer_side<P: Copy>(image: &Image<P>) -> usize {
     image.width().max(image.height())
 }
 
-/// The photo, or a copy whose longer side is `working_size`.
+/// The photo, or a copy whose longer side is `working_size`; a small photo enlarged.
 fn reduced(photo: &Image<LinearRgb>, working_size: usize) -> std::borrow::Cow<'_, Image<LinearRgb>> {
     let longer = longer_side(photo);
+    if longer < SMALL[0].min(working_size) {
+        let times = SMALL[1].div_ceil(longer);
+        return std::borrow::Cow::Owned(filter::resize(photo, times * photo.width(), times * photo.height()));
+    }
     if longer <= working_size {
         return std::borrow::Cow::Borrowed(photo);
     }
-    let side = |len: usize| (len * working_size).div_ceil(longer).max(SMALLEST);
+    let side = |len: usize| (len * working_size).div_ceil(longer).max(LEAST_WORKING_SIZE);
     std::borrow::Cow::Owned(filter::resize(photo, side(photo.width()), side(photo.height())))
 }
 

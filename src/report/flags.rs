@@ -113,7 +113,8 @@ impl Trial {
         };
         let doubts: Vec<String> = cut.remarks.iter().filter(|r| r.is_doubt()).map(Remark::to_string).collect();
         let [iou, box_px] = self.errors(&cut);
-        let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX;
+        // Pixels of a reduced search are that much larger.
+        let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
         let end = match (self.expected, right, doubts.is_empty()) {
             (Expected::Right, true, true) => End::Right,
             (Expected::Right, true, false) => End::RightAndFlagged,

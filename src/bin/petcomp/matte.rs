@@ -2,13 +2,13 @@
 
 use crate::common::Common;
 use crate::{matte_film, matte_key, matte_nodes};
-use petcomp::matte::{CutOutOptions, Remark, SegmentOptions, cut_out, segment};
-use petcomp::{LinearRgb, io};
+use petcomp::matte::{CutOutOptions, PlateOptions, Remark, ScreenPlate, SegmentOptions, cut_out, segment};
+use petcomp::{Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
-    /// Find the object and write every intermediate picture
+    /// Find the object and write every intermediate picture, and the garbage and core matte that a keyer takes
     Segment {
         /// Photo of one object on a uniform screen or board
         photo: PathBuf,
@@ -48,12 +48,17 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Node(command) => matte_nodes::run(command)?,
         Command::Segment { photo, output, options } => {
             let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
-            let found = segment(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
+            let picture: Image<LinearRgb> = io::read(photo)?;
+            let found = segment(&picture, &options).map_err(|e| e.in_file(photo))?;
             io::create_folder(output)?;
             warn(photo, &found.remarks);
             let steps = found.steps.iter().map(|step| (step.name, step.shown()));
             let outcome = [("hull", found.mask.clone()), ("outline", found.tight.clone())];
-            for (i, (name, picture)) in steps.chain(outcome).enumerate() {
+            // An object that leaves no screen has no plate, and what is opaque of it is not known.
+            let plate = ScreenPlate::fit_outside(&picture, &found.mask, &PlateOptions::default()).ok();
+            let mattes = plate.map(|plate| found.mattes(&picture, &plate.image));
+            let mattes = mattes.into_iter().flat_map(|[garbage, core]| [("garbage", garbage), ("core", core)]);
+            for (i, (name, picture)) in steps.chain(outcome).chain(mattes).enumerate() {
                 let path = output.join(format!("{i}_{name}.png"));
                 io::write(&path, &picture)?;
                 common.say(path.display());

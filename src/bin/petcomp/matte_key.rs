@@ -3,6 +3,7 @@
 use anyhow::Result;
 use petcomp::io::{self, Bits, Override, ToFile, WriteOptions};
 use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
+use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use std::path::{Path, PathBuf};
 
@@ -32,6 +33,9 @@ pub(crate) struct Args {
     /// A matte of what is surely foreground
     #[arg(long, value_name = "FILE")]
     core: Option<PathBuf>,
+    /// Find the object first: what lies around it is garbage, and what surely lets nothing through is core
+    #[arg(long, conflicts_with_all = ["garbage", "core"])]
+    auto_mattes: bool,
     /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust
     #[arg(long, value_name = "NAME", default_value = "blender-3.4")]
     profile: Profile,
@@ -40,12 +44,31 @@ pub(crate) struct Args {
     settings: Vec<Override>,
 }
 
+impl Args {
+    /// Garbage and core matte, those that there are.
+    fn mattes(&self, plate: Option<&Image<LinearRgb>>) -> Result<[Option<Image<Coverage>>; 2]> {
+        if !self.auto_mattes {
+            let [garbage, core] = [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
+            return Ok([garbage?, core?]);
+        }
+        let photo: Image<LinearRgb> = io::read(&self.input)?;
+        let found = segment(&photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
+        crate::matte::warn(&self.input, &found.remarks);
+        let [garbage, core] = match plate {
+            Some(plate) => found.mattes(&photo, plate),
+            None => {
+                found.mattes(&photo, &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image)
+            }
+        };
+        Ok([Some(garbage), Some(core)])
+    }
+}
+
 pub(crate) fn run(args: &Args) -> Result<()> {
     let opts = KeyOptions { profile: args.profile, ..io::from_overrides("key", &args.settings)? };
     let photo: Image<PremulRgba> = io::read(&args.input)?;
     let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
-    let [garbage, core] = [&args.garbage, &args.core].map(|path| path.as_ref().map(io::read::<Coverage>).transpose());
-    let (garbage, core) = (garbage?, core?);
+    let [garbage, core] = args.mattes(plate.as_ref())?;
     let screen = plate.as_ref().map_or(Screen::Color(args.screen.unwrap_or_default()), Screen::Plate);
     let mut job = Keying::new(&photo, screen);
     job = garbage.iter().fold(job, |job, matte| job.with_garbage(matte));

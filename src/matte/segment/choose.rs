@@ -1,7 +1,7 @@
 //! The depth of the search, chosen by how well searches agree.
 
 use super::pass::{Pass, Search};
-use super::{Confidence, SMALLEST, SegmentOptions, hull};
+use super::{Confidence, SegmentOptions, hull};
 use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
@@ -28,6 +28,8 @@ pub(super) struct Chosen {
 const SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
 /// The last band has at least so many pixels along the longer side: below that, it does not tell an object from the rest.
 const LEAST_CELLS: usize = 30;
+/// Shorter side of a smaller picture, at least, pixels.
+const SMALLEST_SEARCHED: usize = 32;
 /// A finer picture is preferred to one that scores better by less than this factor.
 const PREFERENCE: f64 = 0.8;
 /// Longer side of the pictures in which outlines are compared, pixels.
@@ -81,7 +83,7 @@ struct Searched {
 
 fn scales(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Scale> {
     let (w, h) = picture.size();
-    let large_enough = |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST;
+    let large_enough = |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST_SEARCHED;
     let sizes: Vec<_> = SIZES.into_iter().filter(|(reduction, _)| large_enough(*reduction)).collect();
     let scale = |&(reduction, depths): &(usize, &[usize])| {
         let longer = w.max(h) / reduction;

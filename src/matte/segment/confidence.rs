@@ -13,19 +13,30 @@ pub struct Confidence {
     /// How far a side of the hull's box moves when edges must be stronger, or at another depth: pixels of the picture that
     /// was searched.
     pub drift_px: f64,
+    /// How far a side of the hull's box lies beyond that of the outline: pixels of the picture that was searched.
+    pub stray_px: f64,
     /// Blur of the object's edges, standard deviation in pixels of the picture that was searched.
     pub blur_px: f64,
+    /// How wide the object is, if it were a long strip: pixels of the picture that was searched, or of the photo where that
+    /// is smaller. Twice the area over the outline's length.
+    pub width_px: f64,
 }
 
-/// An outline with less of itself on edges is worth a look.
-const LEAST_SUPPORT: f64 = 0.6;
+/// An outline with less of itself on edges is worth a look: where it is open, a faint part of the object may lie beyond. On
+/// 24 photos in 29 variants, the outlines that were wrong without another doubt had up to 0.8, one in twelve of those that
+/// were right had.
+const LEAST_SUPPORT: f64 = 0.8;
 /// An outline that agrees less with other searches is worth a look.
 const LEAST_AGREEMENT: f64 = 0.75;
 /// A box that moves farther than it may be wrong is worth a look.
 const MOST_DRIFT_PX: f64 = 2.0;
+/// A box that lies farther beyond the outline than it may be wrong is worth a look: what is there encloses nothing.
+const MOST_STRAY_PX: f64 = 2.0;
 /// Edges that are softer than this are worth a look: their band reaches 2 pixels, what a box may be wrong, to either side
-/// (the half of a Gaussian's foot that is above 5 % of a step, 1.64 deviations).
-const MOST_BLUR_PX: f64 = 1.2;
+/// (twice a Gaussian's deviation). Photos in focus have 0.9 at most, and those of a camera that moved by 6 pixels 0.97.
+const MOST_BLUR_PX: f64 = 0.95;
+/// Narrower objects are worth a look: half a pixel around them is 3 % of them, and their tips are fainter than that.
+const LEAST_WIDTH_PX: f64 = 30.0;
 
 impl Confidence {
     /// Support and agreement in one number: their product.
@@ -39,7 +50,9 @@ impl Confidence {
             (self.agreement < LEAST_AGREEMENT).then_some(Remark::Unstable(self.agreement)),
             (self.support < LEAST_SUPPORT).then_some(Remark::Unsupported(self.support)),
             (self.drift_px > MOST_DRIFT_PX).then_some(Remark::Drifting(self.drift_px)),
+            (self.stray_px > MOST_STRAY_PX).then_some(Remark::Strayed(self.stray_px)),
             (self.blur_px > MOST_BLUR_PX).then_some(Remark::Blurred(self.blur_px)),
+            (self.width_px < LEAST_WIDTH_PX).then_some(Remark::Narrow(self.width_px)),
         ];
         doubts.into_iter().flatten().collect()
     }
@@ -51,7 +64,8 @@ mod tests {
 
     #[test]
     fn each_reason_is_said_alone() {
-        let sure = Confidence { support: 0.9, agreement: 0.95, drift_px: 1.0, blur_px: 0.7 };
+        let sure =
+            Confidence { support: 0.9, agreement: 0.95, drift_px: 1.0, stray_px: 1.0, blur_px: 0.7, width_px: 100.0 };
         assert!(sure.remarks().is_empty());
         let said = |unsure: Confidence| unsure.remarks().iter().map(ToString::to_string).collect::<Vec<_>>();
         for (unsure, reason) in [
@@ -59,6 +73,8 @@ mod tests {
             (Confidence { agreement: 0.5, ..sure }, "agree with it to 50 %"),
             (Confidence { drift_px: 7.0, ..sure }, "7 pixels"),
             (Confidence { blur_px: 2.0, ..sure }, "blurred by 2.0 pixels"),
+            (Confidence { stray_px: 5.0, ..sure }, "5 pixels beyond its outline"),
+            (Confidence { width_px: 12.0, ..sure }, "only 12 pixels wide"),
         ] {
             assert!(matches!(&said(unsure)[..], [only] if only.contains(reason)), "{:?}", said(unsure));
         }

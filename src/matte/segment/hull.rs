@@ -45,6 +45,12 @@ pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
     sides(a).into_iter().zip(sides(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
+/// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where none does.
+pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
+    let ([l, t, r, b], [left, top, right, bottom]) = (sides(from), sides(to));
+    [l - left, t - top, right - r, bottom - b].into_iter().fold(0.0, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

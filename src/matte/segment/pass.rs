@@ -97,6 +97,10 @@ const RIVAL: f64 = 0.3;
 /// A smaller cluster is worth a warning from this share on.
 const REMNANT: f64 = 0.05;
 
+/// So many clusters too small for a warning are worth one together: where they lie on the screen, one may lie beside the
+/// object.
+const SPECKS: usize = 3;
+
 /// The edges of the one object.
 ///
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
@@ -114,6 +118,7 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
     let hull = under_hull(&object, 0.0);
     let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
     let mut remarks = Vec::new();
+    let mut specks = 0;
     for i in (0..sizes.len()).filter(|&i| i != main && 2 * inside[i] < sizes[i]) {
         let share = sizes[i] as f64 / sizes[main] as f64;
         if share >= RIVAL {
@@ -125,8 +130,11 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
         }
         if share >= REMNANT {
             remarks.push(Remark::LeftOut { what: place(&member(i)), object: place(&object) });
+        } else {
+            specks += 1;
         }
     }
+    remarks.extend((specks >= SPECKS).then_some(Remark::Specks(specks)));
     let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
     let object = groups.only(belongs).zip_map(edges, |near, edge| near && edge);
     remarks.extend(parted(&object, PARTED * join_px));
@@ -190,11 +198,16 @@ fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool
     whole.zip_map(hull, |inside, hull| inside && hull)
 }
 
+/// An object whose edges come so near to the border, pixels, may go on beyond: an edge has two sides, and a faint tip is
+/// seen a few pixels late.
+const NEAR_BORDER: usize = 4;
+
 fn touches(set: &Image<bool>) -> [bool; 4] {
     let (w, h) = set.size();
-    let column = |x: usize| set.rows().any(|row| row[x]);
-    let row = |y: usize| set.row(y).iter().any(|p| *p);
-    [column(0), row(0), column(w - 1), row(h - 1)]
+    let columns = |xs: std::ops::Range<usize>| set.rows().any(|row| row[xs.clone()].contains(&true));
+    let rows = |ys: std::ops::Range<usize>| ys.into_iter().any(|y| set.row(y).contains(&true));
+    let near = |len: usize| NEAR_BORDER.min(len);
+    [columns(0..near(w)), rows(0..near(h)), columns(w - near(w)..w), rows(h - near(h)..h)]
 }
 
 /// Least length of an object as a share of the photo's longer side; anything smaller is dirt.

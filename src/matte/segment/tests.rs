@@ -154,11 +154,38 @@ fn a_picture_full_of_object_is_refused() {
 
 #[test]
 fn tiny_and_broken_photos_are_refused() {
-    assert!(said(&Image::filled(31, 100, GREEN)).contains("31 x 100"));
+    assert!(said(&Image::filled(15, 100, GREEN)).contains("15 x 100"));
     assert!(said(&Image::new(0, 0)).contains("0 x 0"));
     let mut broken = Image::filled(64, 64, GREEN);
     broken[(5, 9)] = LinearRgb::grey(f32::NAN);
     assert!(said(&broken).contains("pixel (5, 9)"));
+}
+
+#[test]
+fn a_photo_of_64_pixels_is_searched_enlarged() {
+    let red = LinearRgb::new(0.5, 0.04, 0.05);
+    let found = find(&photo(64, 64, GREEN, |x, y| disc(x, y, [30.0, 33.0, 18.0]).then_some(red))).unwrap();
+    assert_box(&found, [12.0, 15.0, 48.0, 51.0]);
+    assert_eq!((found.mask.size(), found.reduction), ((64, 64), 0.25));
+}
+
+#[test]
+fn what_lies_near_a_border_may_go_on_beyond() {
+    let near = |gap: f64| photo(300, 200, GREEN, move |x, y| disc(x, y, [50.0 + gap, 100.0, 50.0]).then_some(WHITE));
+    assert!(find(&near(1.0)).unwrap().touches[0] && !find(&near(8.0)).unwrap().touches[0]);
+}
+
+#[test]
+fn specks_all_over_are_told() {
+    let specks = [[40.0, 20.0, 2.0], [260.0, 30.0, 2.0], [30.0, 180.0, 2.0], [270.0, 170.0, 2.0]];
+    let taken = |count: usize| {
+        photo(300, 200, GREEN, move |x, y| match disc(x, y, [150.0, 100.0, 40.0]) {
+            true => Some(WHITE),
+            false => specks[..count].iter().any(|speck| disc(x, y, *speck)).then_some(LinearRgb::BLACK),
+        })
+    };
+    let told = |count: usize| find(&taken(count)).unwrap().remarks.contains(&Remark::Specks(count));
+    assert!(told(4) && !told(1));
 }
 
 #[test]
