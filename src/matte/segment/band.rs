@@ -189,7 +189,7 @@ mod tests {
         let band = Image::from_fn(7, 5, |x, y| Coverage(((x * 7919 + y * 104_729) % 31) as f32));
         for reach in [1, 2, 9] {
             let found = largest_around(&band, reach);
-            for (x, y) in (0..35).map(|i| (i % 7, i / 7)) {
+            for (x, y) in (0..35_usize).map(|i| (i % 7, i / 7)) {
                 let near = (0..35).filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
                 assert_eq!(found[(x, y)].0, near.map(|i| band.pixels()[i].0).fold(0.0, f32::max));
             }
