@@ -29,7 +29,7 @@ impl Stopwatch {
 
 impl fmt::Display for Stopwatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let whole = self.stages.iter().map(|(_, took)| took.as_secs_f64()).sum::<f64>();
+        let whole = self.stages.iter().map(|(_, took)| *took).sum::<Duration>().as_secs_f64();
         write!(f, "{:.1} ms", 1e3 * whole)?;
         for (i, (stage, took)) in self.stages.iter().enumerate() {
             let (mark, seconds) = (if i == 0 { ':' } else { ',' }, took.as_secs_f64());

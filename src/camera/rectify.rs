@@ -8,7 +8,7 @@ use crate::image::Image;
 use crate::pixel::Mix;
 use nalgebra::{Matrix2, Matrix3};
 
-/// No pixel is the mean of more samples along its longer axis than this; beyond, it is blurred instead.
+/// No pixel is the mean of more samples along an axis than this; beyond, they are taken from coarser levels.
 const MOST_SAMPLES: f64 = 32.0;
 /// Larger pictures are a typing error.
 const MOST_PIXELS: f64 = 1e9;
@@ -51,8 +51,11 @@ fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
 /// Empty where the map comes from behind (its last coordinate is not positive) or from outside the source.
 ///
 /// # Method
-/// The footprint of a pixel is an ellipse, from the map's derivative. Its short axis chooses the levels of the pyramid, its
-/// long axis the number of samples along it (Heckbert's elliptical footprint, sampled as graphics hardware does).
+/// The footprint of a pixel is an ellipse, from the map's derivative ([Heckbert]). It is the mean of a grid of samples along
+/// its axes, one or more a pixel of the level of the pyramid that they are taken from: the last that is twice as fine as
+/// the short axis, so that its own blur hardly adds to the footprint's.
+///
+/// [Heckbert]: https://www2.eecs.berkeley.edu/Pubs/TechRpts/1989/5504.html
 pub fn warp<P: Mix>(source: &Pyramid<P>, source_from_target: &Homography, width: usize, height: usize) -> Image<P> {
     let m = source_from_target.0;
     Image::from_fn(width, height, |x, y| {
@@ -67,41 +70,44 @@ pub fn warp<P: Mix>(source: &Pyramid<P>, source_from_target: &Homography, width:
 }
 
 fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2<f64>) -> P {
-    let (long, short) = axes(slope);
-    let length = long.norm();
-    let blur = short.max(1.0).max(length / MOST_SAMPLES);
-    let count = (length / blur).ceil().max(1.0);
+    let axes = axes(slope);
+    let [long, short] = axes.map(|axis| axis.norm());
+    let level = level_below((0.5 * short).max(long / MOST_SAMPLES)).min(source.levels() - 1);
+    let (picture, scale) = (source.level(level), f64::from(1_u32 << level));
+    let counts = [long, short].map(|length| (length / scale).round().clamp(1.0, MOST_SAMPLES));
+    let weight = (1.0 / (counts[0] * counts[1])) as f32;
     let mut sum = P::default();
-    for i in 0..count as usize {
-        let along = (i as f64 + 0.5) / count - 0.5;
-        sum = sum.add_scaled((1.0 / count) as f32, between_levels(source, at + long * along, blur));
+    for i in 0..counts[0] as u32 {
+        for j in 0..counts[1] as u32 {
+            let [along, across] = [(i, counts[0]), (j, counts[1])].map(|(k, count)| (f64::from(k) + 0.5) / count - 0.5);
+            let place = (at + axes[0] * along + axes[1] * across) / scale;
+            sum = sum.add_scaled(weight, sample_bilinear(picture, place.x, place.y));
+        }
     }
     sum
 }
 
-/// The long axis of a footprint and the length of its short one, pixels of the source.
-fn axes(slope: &Matrix2<f64>) -> (Vector2<f64>, f64) {
-    let square = slope * slope.transpose();
-    let (mean, half) = (square.trace() / 2.0, (square[(0, 0)] - square[(1, 1)]) / 2.0);
-    let spread = libm::hypot(half, square[(0, 1)]);
-    let angle = libm::atan2(square[(0, 1)], half) / 2.0;
-    let long = Vector2::new(libm::cos(angle), libm::sin(angle)) * (mean + spread).sqrt();
-    (long, (mean - spread).max(0.0).sqrt())
+/// The last level of a pyramid whose pixels are at most so large, in pixels of the first.
+fn level_below(size: f64) -> usize {
+    if size < 2.0 { 0 } else { libm::log2(size).min(MOST_LEVELS) as usize }
 }
 
-/// The value at a position of the full picture, averaged over a width of `blur` pixels.
-fn between_levels<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, blur: f64) -> P {
-    let level = libm::log2(blur).clamp(0.0, source.levels() as f64 - 1.0);
-    let (fine, part) = (level as usize, level - level.floor());
-    let sample = |level: usize| {
-        let scale = f64::from(1u32 << level.min(31));
-        sample_bilinear(source.level(level), at.x / scale, at.y / scale)
+/// No picture has more levels.
+const MOST_LEVELS: f64 = 31.0;
+
+/// The long and the short axis of a footprint, whole, pixels of the source: the eigenvectors of the slope times its
+/// transpose, as long as the roots of the eigenvalues.
+fn axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
+    let square = slope * slope.transpose();
+    let (mean, half) = (square.trace() / 2.0, (square[(0, 0)] - square[(1, 1)]) / 2.0);
+    let spread = (half * half + square[(0, 1)] * square[(0, 1)]).sqrt();
+    // Two ways to write the same direction; the one that does not cancel.
+    let direction = match half >= 0.0 {
+        true => Vector2::new(spread + half, square[(0, 1)]),
+        false => Vector2::new(square[(0, 1)], spread - half),
     };
-    let mut value = P::default().add_scaled((1.0 - part) as f32, sample(fine));
-    if part > 0.0 {
-        value = value.add_scaled(part as f32, sample(fine + 1));
-    }
-    value
+    let along = direction.try_normalize(0.0).unwrap_or(Vector2::x());
+    [along * (mean + spread).sqrt(), Vector2::new(-along.y, along.x) * (mean - spread).max(0.0).sqrt()]
 }
 
 #[cfg(test)]
@@ -141,6 +147,43 @@ mod tests {
         let same = warp(&Pyramid::new(picture.clone()), &Homography(Matrix3::identity()), 31, 17);
         let worst = same.pixels().iter().zip(picture.pixels()).map(|(a, b)| (a.0 - b.0).abs()).fold(0.0, f32::max);
         assert!(worst < 1e-6, "{worst}");
+    }
+
+    /// A zone plate, seen through a map that shrinks it by so much: what `warp` makes of it, and its mean over each pixel.
+    fn shrunk_rings(by: [f64; 2]) -> (Image<Coverage>, Image<Coverage>) {
+        let rings = |x: f64, y: f64| 0.5 + 0.4 * libm::cos(4e-3 * (x * x + y * y));
+        let mean = |x: usize, y: usize, [w, h]: [f64; 2]| {
+            let part = |k: usize, at: usize, side: f64| (at as f64 + (k as f64 + 0.5) / 8.0) * side;
+            let sum: f64 = (0..64).map(|k| rings(part(k % 8, x, w), part(k / 8, y, h))).sum();
+            Coverage((sum / 64.0) as f32)
+        };
+        let picture = Image::from_fn(240, 240, |x, y| mean(x, y, [1.0; 2]));
+        let (w, h) = ((240.0 / by[0]) as usize, (240.0 / by[1]) as usize);
+        let shrink = Homography(Matrix3::from_diagonal(&nalgebra::Vector3::new(by[0], by[1], 1.0)));
+        (warp(&Pyramid::new(picture), &shrink, w, h), Image::from_fn(w, h, |x, y| mean(x, y, by)))
+    }
+
+    #[test]
+    fn a_pixel_is_the_mean_over_what_it_covers() {
+        // Bilinear samples blur by a pixel of their level: a seventh of the rings, the finest of which are 3 pixels wide.
+        for by in [[1.3, 1.3], [2.0, 2.0], [3.0, 2.5], [1.0, 5.0]] {
+            let (found, wanted) = shrunk_rings(by);
+            let inner = |i: &usize| (4..found.width() - 4).contains(&(i % found.width())) && *i >= 4 * found.width();
+            let square = |i: usize| f64::from(found.pixels()[i].0 - wanted.pixels()[i].0).powi(2);
+            let inside: Vec<f64> = (0..found.width() * (found.height() - 4)).filter(inner).map(square).collect();
+            let rms = (inside.iter().sum::<f64>() / inside.len() as f64).sqrt();
+            assert!(rms < 0.04, "{by:?}: {rms}");
+        }
+    }
+
+    #[test]
+    fn axes_are_those_of_the_ellipse() {
+        for (a, b, turn) in [(3.0, 1.0, 0.3), (2.0, 2.0, 1.0), (5.0, 0.0, -1.2), (4.0, 1.5, 1.6)] {
+            let rotation = nalgebra::Rotation2::new(turn).into_inner();
+            let [long, short] = axes(&(rotation * Matrix2::new(a, 0.0, 0.0, b)));
+            assert!((long.norm() - a).abs() < 1e-9 && (short.norm() - b).abs() < 1e-6, "{long} {short}");
+            assert!(a == b || long.perp(&(rotation * Vector2::x())).abs() < 1e-9, "{long}");
+        }
     }
 
     #[test]

@@ -91,8 +91,16 @@ fn mix_along<P: Mix>(line: &[P], run: &[Taps], out: &mut [P]) {
 /// The weighted sum of lines: `line(k)`, at least as long as `out`, by the weight `k`.
 fn mix<'a, P: Mix + 'a>(weights: &[f32], line: impl Fn(usize) -> &'a [P], out: &mut [P]) {
     out.fill(P::default());
-    for (k, &weight) in weights.iter().enumerate() {
-        for (sum, &p) in out.iter_mut().zip(line(k)) {
+    // Four lines at once: a sum stays in its register for four additions, whose order is the same.
+    let (fours, rest) = weights.as_chunks::<4>();
+    for (i, &[a, b, c, d]) in fours.iter().enumerate() {
+        let [p, q, r, s] = [0, 1, 2, 3].map(|k| line(4 * i + k));
+        for (sum, (((&p, &q), &r), &s)) in out.iter_mut().zip(p.iter().zip(q).zip(r).zip(s)) {
+            *sum = sum.add_scaled(a, p).add_scaled(b, q).add_scaled(c, r).add_scaled(d, s);
+        }
+    }
+    for (k, &weight) in rest.iter().enumerate() {
+        for (sum, &p) in out.iter_mut().zip(line(4 * fours.len() + k)) {
             *sum = sum.add_scaled(weight, p);
         }
     }

@@ -72,11 +72,12 @@ fn darkest(photo: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Image<Coverag
         let p: [f32; 3] = photo.pixels()[i].into();
         p[(key + 1) % 3] + p[(key + 2) % 3]
     };
-    let mut asked: Vec<usize> = whole.into_iter().step_by(step).collect();
-    asked.sort_by(|&a, &b| others(a).total_cmp(&others(b)).then(a.cmp(&b)));
+    let mut asked: Vec<(f32, usize)> = whole.into_iter().step_by(step).map(|i| (others(i), i)).collect();
+    asked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     asked.truncate((asked.len() as f64 * DARKEST).ceil() as usize);
     let step = (asked.len() / ASKED[1]).max(1);
-    asked.into_iter().step_by(step).map(|i| (photo.pixels()[i].into(), plate.image.pixels()[i].into())).collect()
+    let pair = |(_, i): (f32, usize)| (photo.pixels()[i].into(), plate.image.pixels()[i].into());
+    asked.into_iter().step_by(step).map(pair).collect()
 }
 
 /// Coverage from which on a pixel is wholly inside: one 8-bit code below 1.
