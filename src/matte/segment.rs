@@ -163,6 +163,8 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     };
     let mut remarks = found.remarks.clone();
     remarks.extend(truncation(found.touches));
+    let halved = picture.width() as f64 / found.inside.width() as f64;
+    remarks.extend((halved > 1.0).then_some(Remark::Noisy(halved)));
     remarks.extend(confidence.remarks());
     Ok(Segmentation {
         mask: Outline { rings: vec![hull.clone()] }.coverage(w, h),
