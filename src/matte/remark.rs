@@ -45,6 +45,11 @@ pub enum Remark {
         "the photo is noisy: the object was searched in a picture {0:.0} times smaller, and told no better than that"
     )]
     Noisy(f64),
+    /// Something inside the object looks like the screen.
+    #[error(
+        "parts of the object look like the screen: taken for holes, or on a grey board for clear plastic; are they?"
+    )]
+    Hollow,
     /// A side of the box lies so many pixels of the picture that was searched beyond the outline.
     #[error("the outline is unsure: its box lies {0:.0} pixels beyond its outline, where edges enclose nothing")]
     Strayed(f64),
@@ -102,6 +107,7 @@ impl Remark {
             | Self::Blurred(_)
             | Self::Noisy(_)
             | Self::Strayed(_)
+            | Self::Hollow
             | Self::Specks(_)
             | Self::Narrow(_)
             | Self::ClippedScreen(_) => true,
