@@ -40,6 +40,16 @@ pub enum Remark {
     /// The object's edges are blurred by this standard deviation, pixels of the picture that was searched.
     #[error("the object's edges are blurred by {0:.1} pixels: out of focus, or moved")]
     Blurred(f64),
+    /// Only a picture so many times smaller let the object stand out from the noise.
+    #[error(
+        "the photo is noisy: the object was searched in a picture {0:.0} times smaller, and told no better than that"
+    )]
+    Noisy(f64),
+    /// Something inside the object looks like the screen.
+    #[error(
+        "parts of the object look like the screen: taken for holes, or on a grey board for clear plastic; are they?"
+    )]
+    Hollow,
     /// A side of the box lies so many pixels of the picture that was searched beyond the outline.
     #[error("the outline is unsure: its box lies {0:.0} pixels beyond its outline, where edges enclose nothing")]
     Strayed(f64),
@@ -95,7 +105,9 @@ impl Remark {
             | Self::Unsupported(_)
             | Self::Drifting(_)
             | Self::Blurred(_)
+            | Self::Noisy(_)
             | Self::Strayed(_)
+            | Self::Hollow
             | Self::Specks(_)
             | Self::Narrow(_)
             | Self::ClippedScreen(_) => true,

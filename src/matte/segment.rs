@@ -153,7 +153,11 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     let to_photo = |p: Point2<f64>| Point2::new(p.x * scale[0], p.y * scale[1]);
     let resized = filter::resize(picture.as_ref(), found.inside.width(), found.inside.height());
     let margin_px = HOLE_MARGIN * longer_side(&resized) as f64;
-    let solid = holes::without_holes(&resized, &found.inside, &holes::around(&found.inside, margin_px));
+    let background = holes::around(&found.inside, margin_px);
+    let holed = holes::without_holes(&resized, &found.inside, &background);
+    let is_hollow = holed != found.inside;
+    // What is like a grey board may be clear plastic before it.
+    let solid = if holes::are_told(&resized, &background) { holed } else { found.inside.clone() };
     let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
     watch.lap("holes");
     let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
@@ -168,6 +172,9 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     };
     let mut remarks = found.remarks.clone();
     remarks.extend(truncation(found.touches));
+    remarks.extend(is_hollow.then_some(Remark::Hollow));
+    let halved = picture.width() as f64 / found.inside.width() as f64;
+    remarks.extend((halved > 1.0).then_some(Remark::Noisy(halved)));
     remarks.extend(confidence.remarks());
     watch.lap("outline");
     let mask = Outline { rings: vec![hull.clone()] }.coverage(w, h);

@@ -4,6 +4,7 @@ use super::cluster::Groups;
 use crate::filter;
 use crate::image::Image;
 use crate::matte::plate::{PlateOptions, ScreenPlate};
+use crate::matte::screen::is_keyable;
 use crate::pixel::LinearRgb;
 
 /// A pixel is like the screen when no channel differs from the plate by more than this share, or this many times the noise.
@@ -52,6 +53,12 @@ pub(super) fn without_holes(picture: &Image<LinearRgb>, inside: &Image<bool>, ba
     kept
 }
 
+/// Whether the screen has enough colour to be told from clear plastic.
+pub(super) fn are_told(picture: &Image<LinearRgb>, background: &Image<bool>) -> bool {
+    let seen = picture.pixels().iter().zip(background.pixels()).filter(|(_, free)| **free);
+    is_keyable(seen.fold(LinearRgb::BLACK, |sum, (p, _)| sum + *p))
+}
+
 fn differences(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     [(a.r - b.r).abs(), (a.g - b.g).abs(), (a.b - b.b).abs()]
 }
@@ -86,6 +93,13 @@ mod tests {
         let kept = kept(LinearRgb::new(0.5, 0.05, 0.05));
         assert!(!kept[(60, 50)] && kept[(60, 80)] && kept[(60, 79)]);
         assert!((count(&disc(20.0)) as f64 / (count(&disc(40.0)) - count(&kept)) as f64 - 1.0).abs() < 0.15);
+    }
+
+    #[test]
+    fn a_grey_board_tells_no_holes() {
+        let background = disc(40.0).map(|inside| !inside);
+        let board = |color: LinearRgb| Image::filled(120, 100, color);
+        assert!(are_told(&board(GREEN), &background) && !are_told(&board(LinearRgb::grey(0.6)), &background));
     }
 
     #[test]

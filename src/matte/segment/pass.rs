@@ -99,7 +99,7 @@ const REMNANT: f64 = 0.05;
 
 /// So many clusters too small for a warning are worth one together: where they lie on the screen, one may lie beside the
 /// object.
-const SPECKS: usize = 3;
+const SPECKS: usize = 2;
 
 /// The edges of the one object.
 ///
