@@ -4,7 +4,7 @@
 //! Every side of a pixel inside that has a pixel outside beyond it is an edge, directed so that the inside lies to its
 //! right; edges chain into rings, and where two pixels touch only at a corner the chain turns right, so that each ring
 //! encloses pixels joined by their sides. Corners are then dropped as far as a tolerance allows, of all rings together
-//! ([`super::simplify`]). Formats know neither holes nor several parts: a hole is joined to what lies
+//! (`simplify.rs`). Formats know neither holes nor several parts: a hole is joined to what lies
 //! left of it, and a part to the one before it, by a slit of no width, as triangulations do (Eberly, "Triangulation by
 //! Ear Clipping", 2002). Without a tolerance the area, by the shoelace formula, stays that of the mask.
 

@@ -42,6 +42,7 @@ impl Default for AllOptions {
 /// How much is measured.
 struct Amount {
     views: u64,
+    bottles: usize,
     heaps: u64,
     runs: usize,
 }
@@ -49,8 +50,8 @@ struct Amount {
 impl AllOptions {
     fn amount(&self) -> Amount {
         match self.quick {
-            true => Amount { views: 20, heaps: 2, runs: 1 },
-            false => Amount { views: 200, heaps: 10, runs: 5 },
+            true => Amount { views: 20, bottles: 1, heaps: 2, runs: 1 },
+            false => Amount { views: 200, bottles: 4, heaps: 10, runs: 5 },
         }
     }
 }
@@ -62,7 +63,7 @@ type Measure = fn(&AllOptions, &Amount) -> Result<Vec<Diagram>>;
 const STAGES: [Measure; 10] = [
     |_, _| color::diagrams(),
     |options, _| matte::diagrams(&options.truth),
-    |_, _| matte::searches(),
+    |_, amount| matte::searches(amount.bottles),
     |_, _| keying::diagrams(),
     |_, amount| Ok(camera::diagrams(amount.views)),
     |_, amount| {

@@ -31,14 +31,14 @@ struct Found {
     seconds: f64,
 }
 
-/// Overlap of the outline, and the box, each against time.
+/// Overlap of the outline, and the box, each against time, of so many bottles: four, or fewer for a look.
 ///
 /// # Errors
 /// As [`segment`]; a thread that cannot be had.
-pub fn searches() -> Result<Vec<Diagram>> {
+pub fn searches(bottles: usize) -> Result<Vec<Diagram>> {
     let (mut outlines, mut boxes) = (Vec::new(), Vec::new());
     for times in TIMES {
-        let photos: Vec<Known> = (0..made::COUNT).map(|i| made::enlarged(i, times)).collect();
+        let photos: Vec<Known> = (0..bottles.min(made::COUNT)).map(|i| made::enlarged(i, times)).collect();
         let longer = photos.iter().map(|known| known.photo.width()).max().unwrap_or(0);
         // A photo is not enlarged to be searched.
         for side in SIDES.into_iter().filter(|side| *side <= longer) {
@@ -52,8 +52,14 @@ pub fn searches() -> Result<Vec<Diagram>> {
         }
     }
     Ok(vec![
-        diagram("matte_search_outline", "matte: size of the search, outline", "1 - IoU", outlines),
-        diagram("matte_search_box", "matte: size of the search, box", "px of the photo", boxes),
+        diagram("matte_search_outline", "matte: size of the search, outline", "1 - IoU", bottles, outlines),
+        diagram(
+            "matte_search_box",
+            "matte: size of the search, box",
+            "error of the box, px of the photo",
+            bottles,
+            boxes,
+        ),
     ])
 }
 
@@ -82,11 +88,11 @@ fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
     sum(f32::min) / sum(f32::max).max(f64::MIN_POSITIVE)
 }
 
-fn diagram(file: &str, title: &str, error: &str, points: Vec<Point>) -> Diagram {
+fn diagram(file: &str, title: &str, error: &str, bottles: usize, points: Vec<Point>) -> Diagram {
     Diagram {
         file: file.into(),
         title: title.into(),
-        input: format!("{} see-through bottles on an uneven screen with noise, made in code", made::COUNT),
+        input: format!("{bottles} see-through bottles on an uneven screen with noise, made in code"),
         error: error.into(),
         cost: "CPU seconds per photo".into(),
         reference: "the bottles' outline (closed form)".into(),
