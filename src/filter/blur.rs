@@ -1,6 +1,6 @@
 //! Blurs.
 
-use super::separable::{Taps, filter, filter_at};
+use super::separable::{Taps, filter};
 use crate::image::Image;
 use crate::pixel::Mix;
 use crate::work::{self, Kind};
@@ -20,26 +20,6 @@ pub fn gaussian_blur<P: Mix>(image: &Image<P>, sigma_px: f32) -> Image<P> {
     work::add(Kind::Filters, 1);
     filter(image, &taps(image.width()), &taps(image.height()))
 }
-
-/// What [`gaussian_blur`] gives at some pixels only, row by row: the quicker way to few of them, and the same bits.
-///
-/// # Panics
-/// When the sizes differ.
-pub fn gaussian_blur_at<P: Mix>(image: &Image<P>, sigma_px: f32, wanted: &Image<bool>) -> Vec<P> {
-    assert_eq!(image.size(), wanted.size(), "images of different size");
-    let many = wanted.pixels().iter().filter(|p| **p).count() > (FEW * wanted.pixels().len() as f32) as usize;
-    if many || sigma_px.is_nan() || sigma_px <= 0.0 {
-        let blurred = gaussian_blur(image, sigma_px);
-        return blurred.pixels().iter().zip(wanted.pixels()).filter(|(_, wanted)| **wanted).map(|(p, _)| *p).collect();
-    }
-    work::add(Kind::Filters, 1);
-    let taps = |len: usize| gaussian(len, f64::from(sigma_px));
-    filter_at(image, &taps(image.width()), &taps(image.height()), wanted)
-}
-
-/// Share of the pixels up to which it is quicker to blur them one by one: by themselves they cost the window's area, not
-/// its sides.
-const FEW: f32 = 0.05;
 
 /// A picture of which each pixel is the mean of the square of `2 radius + 1` pixels around it; unchanged where that is
 /// one pixel.
@@ -82,18 +62,6 @@ mod tests {
             assert!((mass - 1.0).abs() < 1e-5);
             assert!((variance / f64::from(sigma * sigma) - 1.0).abs() < 2e-3, "{sigma}: {variance}");
         }
-    }
-
-    #[test]
-    fn at_some_pixels_it_is_the_same_blur() {
-        let img = Image::from_fn(40, 30, |x, y| Coverage(((x * 7919 + y * 104_729) % 101) as f32));
-        for step in [2, 97] {
-            let wanted = Image::from_fn(40, 30, |x, y| (x + 40 * y) % step == 0);
-            let blurred = gaussian_blur(&img, 2.3);
-            let expected: Vec<_> = (0..40 * 30).filter(|i| wanted.pixels()[*i]).map(|i| blurred.pixels()[i]).collect();
-            assert_eq!(gaussian_blur_at(&img, 2.3, &wanted), expected);
-        }
-        assert!(gaussian_blur_at(&img, 2.3, &Image::new(40, 30)).is_empty());
     }
 
     fn column(image: &Image<Coverage>, x: usize) -> f64 {

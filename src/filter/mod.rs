@@ -14,7 +14,7 @@ mod resize;
 mod sample;
 mod separable;
 
-pub use blur::{box_blur, gaussian_blur, gaussian_blur_at};
+pub use blur::{box_blur, gaussian_blur};
 pub use distance::depth;
 pub use morphology::{dilate, erode};
 pub use pyramid::{Pyramid, expand, halve, reduce};

@@ -63,23 +63,6 @@ pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) 
     out
 }
 
-/// The same at some pixels only, row by row: sums in the same order, hence the same bits.
-pub(super) fn filter_at<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps], wanted: &Image<bool>) -> Vec<P> {
-    let in_row = |(down, wanted): (&Taps, &[bool])| -> Vec<P> {
-        let columns = columns.iter().zip(wanted).filter(|(_, wanted)| **wanted).map(|(along, _)| along);
-        columns.map(|along| mean_at(image, along, down)).collect()
-    };
-    let rows: Vec<_> = rows.iter().zip(wanted.rows()).collect();
-    rows.into_par_iter().flat_map_iter(in_row).collect()
-}
-
-/// One output pixel: the rows mixed where the column's window is, then those along themselves.
-fn mean_at<P: Mix>(image: &Image<P>, along: &Taps, down: &Taps) -> P {
-    let mut mixed = vec![P::default(); along.weights.len()];
-    mix(&down.weights, |k| &image.row(down.first + k)[along.first..], &mut mixed);
-    mixed.iter().zip(&along.weights).fold(P::default(), |sum, (&p, &w)| sum.add_scaled(w, p))
-}
-
 /// A run of output pixels, each the weighted mean of samples of `line`.
 fn mix_along<P: Mix>(line: &[P], run: &[Taps], out: &mut [P]) {
     match run {

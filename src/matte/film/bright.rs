@@ -6,6 +6,7 @@ use crate::filter;
 use crate::image::Image;
 use crate::matte::remark::Remark;
 use crate::pixel::{Coverage, LinearRgb};
+use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
 /// Flat plastic passes 1; so many times that is the screen's hue from elsewhere.
@@ -82,16 +83,24 @@ pub(super) fn fill_glints(
     let told = hidden.zip_map(inside, |hidden, c| (1.0 - hidden) * c.0);
     let weighted = told.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
     let side = inside.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>().sqrt() as f32;
-    let asked = hidden.map(|hidden| hidden > 0.0);
-    let around = filter::gaussian_blur_at(&weighted, (FILL * side).max(FILL_PX), &asked);
-    let pixels = factors.pixels_mut().iter_mut().zip(hidden.pixels()).filter(|(_, hidden)| **hidden > 0.0).zip(around);
-    for ((factor, hidden), around) in pixels.filter(|(_, around)| around.r > ENOUGH) {
-        let more = around.g / around.r - factor.value;
-        factor.value += if *hidden < 1.0 { hidden * more.max(0.0) } else { more };
-        factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
-    }
+    // Half the size is enough for what is smooth.
+    let around = filter::gaussian_blur(&filter::halve(&weighted), (FILL * side).max(FILL_PX) / 2.0);
+    factors.par_rows_mut().enumerate().for_each(|(y, row)| {
+        for (x, (factor, &hidden)) in row.iter_mut().zip(hidden.row(y)).enumerate() {
+            let around = around[(x / 2, y / 2)];
+            if hidden > 0.0 && around.r > ENOUGH {
+                fill(factor, hidden, around.g / around.r);
+            }
+        }
+    });
     let share = share(clipped.pixels().iter().copied(), inside);
     (share > CLIPPED_WORTH_SAYING).then_some(Remark::Clipped(share))
+}
+
+fn fill(factor: &mut Factor, hidden: f32, around: f32) {
+    let more = around - factor.value;
+    factor.value += if hidden < 1.0 { hidden * more.max(0.0) } else { more };
+    factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
 }
 
 /// How much of what is seen through so much reflected light hides.
