@@ -16,8 +16,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlateOptions {
-    /// Highest degree of the polynomial, 0 to 6. Default: 3.
+    /// Highest degree of the polynomial, 0 to 6. Default: 4.
     pub max_degree: usize,
+    /// A higher degree must lower the residual by this share to be taken, 0 to 1. Default: 0.6: around
+    /// the object only, a higher degree fits shadows and swings beneath it.
+    pub least_gain: f64,
     /// An empty-screen photo may be shifted by so many pixels. Default: 8.
     pub max_shift_px: f64,
     /// An empty-screen photo may differ from the photo by this share of the screen's brightness once it is aligned and
@@ -27,7 +30,7 @@ pub struct PlateOptions {
 
 impl Default for PlateOptions {
     fn default() -> Self {
-        Self { max_degree: 3, max_shift_px: 8.0, max_mismatch: 0.05 }
+        Self { max_degree: 4, least_gain: 0.6, max_shift_px: 8.0, max_mismatch: 0.05 }
     }
 }
 
@@ -55,8 +58,8 @@ impl ScreenPlate {
     /// # Method
     /// The logarithm of each channel is a polynomial of the position, fitted to the means of small cells by iteratively
     /// reweighted least squares with [Tukey]'s biweight, narrower on the dark side, so that shadows and dirt do not count. Light falls off by
-    /// factors and never goes below 0: hence the logarithm. The degree is the one
-    /// that errs least where a sector of the screen is left out of the fit, what it swings under the object added.
+    /// factors and never goes below 0: hence the logarithm. The degree is the lowest that no higher one beats by
+    /// `least_gain` in the residual of cells that were left out of the fit.
     ///
     /// # Errors
     /// [`Error::Photo`] where there is not enough background, or no light on it; [`Error::Value`] for an option that cannot
@@ -202,6 +205,9 @@ impl PlateOptions {
     fn check(&self) -> Result<()> {
         if self.max_degree > HIGHEST_DEGREE {
             return Err(Error::value("max_degree", format!("{}, expected 0 to {HIGHEST_DEGREE}", self.max_degree)));
+        }
+        if !(0.0..=1.0).contains(&self.least_gain) {
+            return Err(Error::value("least_gain", format!("{}, expected 0 to 1", self.least_gain)));
         }
         if self.max_shift_px.is_nan() || self.max_shift_px < 0.0 {
             return Err(Error::value("max_shift_px", format!("{}, expected at least 0", self.max_shift_px)));

@@ -23,14 +23,9 @@ pub(super) struct Cell {
 pub(super) fn means(photo: &Image<LinearRgb>, background: &Image<bool>) -> Vec<Cell> {
     assert_eq!(photo.size(), background.size(), "photo and background differ in size");
     let (w, h) = photo.size();
-    let side = cell_side((w, h));
+    let side = w.max(h).div_ceil(ALONG).max(1);
     let columns = w.div_ceil(side);
     (0..columns * h.div_ceil(side)).filter_map(|i| mean(photo, background, [i % columns, i / columns], side)).collect()
-}
-
-/// Side of the square cells of a picture, pixels.
-pub(super) fn cell_side((w, h): (usize, usize)) -> usize {
-    w.max(h).div_ceil(ALONG).max(1)
 }
 
 fn mean(photo: &Image<LinearRgb>, background: &Image<bool>, index: [usize; 2], side: usize) -> Option<Cell> {

@@ -1,6 +1,6 @@
 //! Polynomials of the position, one a channel, for the logarithm of the screen.
 
-use super::cells::{Cell, SIGMA_OF_MEDIAN, cell_side, median};
+use super::cells::{Cell, SIGMA_OF_MEDIAN, median};
 use super::{PlateOptions, refused};
 use crate::error::Result;
 use crate::image::Image;
@@ -28,30 +28,29 @@ const SHADOWED: f64 = 1.5;
 const FINEST: f64 = 2e-3;
 /// Cells a coefficient, at least.
 const CELLS_A_COEFFICIENT: usize = 4;
-/// Sectors around the middle of what is hidden; one after the other is left out of the fits that choose the degree.
-const SECTORS: usize = 8;
-/// So many neighbouring cells err alike: shadows and reflections are as wide as a sixth of a picture of 48 x 26 cells.
-const ALIKE: f64 = 200.0;
+/// Every so many-th cell is left out of the fit that chooses the degree.
+const LEFT_OUT: usize = 3;
 
-/// A cell as the fit sees it: the monomials of its place, lower degrees first, its channels' logarithms, and the sector it
-/// lies in.
+/// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
 struct Sample {
-    sector: usize,
     basis: Vec<f64>,
     log: [f64; 3],
 }
 
 impl Polynomial {
     pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
-        let hidden = hidden(cells, size);
-        let samples = samples(cells, size, middle(&hidden, size), opts.max_degree)?;
+        let samples = samples(cells, size, opts.max_degree)?;
+        let most = |degree: usize| samples.len() >= CELLS_A_COEFFICIENT * terms(degree);
+        let degrees: Vec<usize> = (0..=opts.max_degree).filter(|&d| d == 0 || most(d)).collect();
+        let (left, asked): (Vec<_>, Vec<_>) = samples.iter().enumerate().partition(|(i, _)| i % LEFT_OUT == 0);
+        let strip = |part: Vec<(usize, _)>| part.into_iter().map(|(_, s)| s).collect::<Vec<&Sample>>();
+        let (left, asked) = (strip(left), strip(asked));
+        let errors: Vec<f64> = degrees.iter().map(|&degree| left_out_error(&asked, &left, degree)).collect();
         let all: Vec<&Sample> = samples.iter().collect();
-        let channel = brightest(&all);
-        let enough = |degree: usize| samples.len() >= CELLS_A_COEFFICIENT * terms(degree);
-        let degrees = (0..=opts.max_degree).filter(|&d| d == 0 || enough(d));
-        let scored = degrees.map(|degree| (degree, expected_error(&all, &hidden, degree, channel, size)));
-        let (degree, _) = scored.fold((0, f64::MAX), |best, next| if next.1 < best.1 { next } else { best });
-        Ok(Self { degree, coefficients: [0, 1, 2].map(|c| robust(&all, degree, c).0) })
+        let best = errors.iter().copied().fold(f64::MAX, f64::min).max(FINEST);
+        let enough = errors.iter().position(|e| *e <= best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE));
+        let degree = degrees[enough.unwrap_or(degrees.len() - 1)];
+        Ok(Self { degree, coefficients: [0, 1, 2].map(|c| robust(&all, degree, c)) })
     }
 
     /// The screen in every pixel.
@@ -124,35 +123,7 @@ fn place([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
     [(x - 0.5 * w as f64) / half, (y - 0.5 * h as f64) / half]
 }
 
-/// The middles of the cells that do not show the screen; of a screen that is all seen, none.
-fn hidden(cells: &[Cell], (w, h): (usize, usize)) -> Vec<[f64; 2]> {
-    let side = cell_side((w, h));
-    let (columns, rows) = (w.div_ceil(side), h.div_ceil(side));
-    let mut seen = vec![false; columns * rows];
-    cells.iter().for_each(|cell| seen[cell.index[1] * columns + cell.index[0]] = true);
-    let middle = |i: usize| [i % columns, i / columns].map(|k| (k as f64 + 0.5) * side as f64);
-    (0..seen.len()).filter(|&i| !seen[i]).map(middle).collect()
-}
-
-/// The mean of some places; the middle of the picture where there are none.
-fn middle(places: &[[f64; 2]], (w, h): (usize, usize)) -> [f64; 2] {
-    if places.is_empty() {
-        return [0.5 * w as f64, 0.5 * h as f64];
-    }
-    [0, 1].map(|axis| places.iter().map(|p| p[axis]).sum::<f64>() / places.len() as f64)
-}
-
-/// The sector that a place lies in, of a picture made square.
-fn sector([x, y]: [f64; 2], around: [f64; 2], (w, h): (usize, usize)) -> usize {
-    let turn = 0.5 + libm::atan2((y - around[1]) / h as f64, (x - around[0]) / w as f64) / std::f64::consts::TAU;
-    ((turn * SECTORS as f64) as usize) % SECTORS
-}
-
-fn monomials([u, v]: [f64; 2], exponents: &[[usize; 2]]) -> Vec<f64> {
-    exponents.iter().map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32)).collect()
-}
-
-fn samples(cells: &[Cell], size: (usize, usize), around: [f64; 2], max_degree: usize) -> Result<Vec<Sample>> {
+fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<Sample>> {
     let brightest = cells.iter().flat_map(|cell| cell.color).fold(0.0, f64::max);
     if cells.is_empty() {
         return Err(refused("the object leaves no background to fit the screen to"));
@@ -161,58 +132,26 @@ fn samples(cells: &[Cell], size: (usize, usize), around: [f64; 2], max_degree: u
         return Err(refused("the background is black; a screen plate needs light on the screen"));
     }
     let exponents = exponents(max_degree);
-    let sample = |cell: &Cell| Sample {
-        sector: sector(cell.at_px, around, size),
-        basis: monomials(place(cell.at_px, size), &exponents),
-        log: cell.color.map(|c| libm::log(c.max(DARKEST * brightest))),
+    let sample = |cell: &Cell| {
+        let [u, v] = place(cell.at_px, size);
+        Sample {
+            basis: exponents.iter().map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32)).collect(),
+            log: cell.color.map(|c| libm::log(c.max(DARKEST * brightest))),
+        }
     };
     Ok(cells.iter().map(sample).collect())
 }
 
-/// The channel whose logarithm sums to most: the others have its shape and more noise.
-fn brightest(samples: &[&Sample]) -> usize {
-    let brightness = |c: usize| samples.iter().map(|s| s.log[c]).sum::<f64>();
-    (1..3).fold(0, |best, c| if brightness(c) > brightness(best) { c } else { best })
-}
-
-/// What a polynomial of a degree can be expected to be off where the object hides the screen, squared.
-///
-/// # Method
-/// Sector by sector, the median error of cells that a fit to the others leaves: that is what going on into the unseen
-/// costs. Under the object it grows by the polynomial's leverage there, `b (B' W B)^-1 b`, as often as cells err alike.
-fn expected_error(
-    samples: &[&Sample],
-    hidden: &[[f64; 2]],
-    degree: usize,
-    channel: usize,
-    size: (usize, usize),
-) -> f64 {
-    let left_out = |sector: usize| {
-        let (asked, left): (Vec<&Sample>, Vec<&Sample>) = samples.iter().partition(|s| s.sector != sector);
-        let possible = asked.len() >= terms(degree) && !left.is_empty();
-        possible.then(|| {
-            let (k, _) = robust(&asked, degree, channel);
-            median(left.iter().map(|s| (s.log[channel] - value(&k, s)).abs())).unwrap_or(0.0)
-        })
-    };
-    let errors: Vec<f64> = (0..SECTORS).filter_map(left_out).collect();
-    let error = (errors.iter().sum::<f64>() / errors.len().max(1) as f64).max(FINEST);
-    error * error * (1.0 + ALIKE * leverage(samples, hidden, degree, channel, size))
-}
-
-/// Mean variance of a polynomial at some places, for a variance of 1 of every cell that it is fitted to.
-fn leverage(samples: &[&Sample], places: &[[f64; 2]], degree: usize, channel: usize, size: (usize, usize)) -> f64 {
-    let weights = robust(samples, degree, channel).1;
-    let Some(normal) = normal_equations(samples, channel, &weights, terms(degree)).0.cholesky() else {
+/// Median absolute error of the cells that a fit to the others leaves, of the brightest channel: the others have its shape
+/// and more noise.
+fn left_out_error(asked: &[&Sample], left: &[&Sample], degree: usize) -> f64 {
+    if asked.len() < terms(degree) {
         return f64::MAX;
-    };
-    let inverse = normal.inverse();
-    let exponents = exponents(degree);
-    let variance = |at: &[f64; 2]| {
-        let basis = DVector::from_vec(monomials(place(*at, size), &exponents));
-        basis.dot(&(&inverse * &basis))
-    };
-    places.iter().map(variance).sum::<f64>() / places.len().max(1) as f64
+    }
+    let brightness = |c: usize| asked.iter().map(|s| s.log[c]).sum::<f64>();
+    let brightest = (1..3).fold(0, |best, c| if brightness(c) > brightness(best) { c } else { best });
+    let k = robust(asked, degree, brightest);
+    median(left.iter().map(|s| (s.log[brightest] - value(&k, s)).abs())).unwrap_or(f64::MAX)
 }
 
 /// The polynomial where a sample is; the basis may go on to higher degrees.
@@ -220,8 +159,8 @@ fn value(k: &DVector<f64>, sample: &Sample) -> f64 {
     k.iter().zip(&sample.basis).map(|(k, b)| k * b).sum()
 }
 
-/// Iteratively reweighted least squares for one channel: the coefficients, and what every sample counts in the end.
-fn robust(samples: &[&Sample], degree: usize, channel: usize) -> (DVector<f64>, Vec<f64>) {
+/// Iteratively reweighted least squares for one channel.
+fn robust(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
     let mut weights = vec![1.0; samples.len()];
     let mut k = DVector::zeros(terms(degree));
     for _ in 0..ROUNDS {
@@ -235,26 +174,21 @@ fn robust(samples: &[&Sample], degree: usize, channel: usize) -> (DVector<f64>, 
         let reach = |r: f64| if r > 0.0 { above } else { below };
         weights = residuals.iter().map(|r| (1.0 - (r / reach(*r)).powi(2)).max(0.0).powi(2)).collect();
     }
-    (k, weights)
+    k
 }
 
-/// Weighted least squares by the first `n` monomials.
+/// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
 fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
-    let (normal, right) = normal_equations(samples, channel, weights, n);
-    normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
-}
-
-/// Their lower half, which is all that Cholesky reads, a trace of the identity added so that too few cells are no disaster.
-fn normal_equations(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> (DMatrix<f64>, DVector<f64>) {
     let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE, DVector::zeros(n));
     for (sample, weight) in samples.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
         for i in 0..n {
             let scaled = weight * sample.basis[i];
             right[i] += scaled * sample.log[channel];
+            // The lower half is all that Cholesky reads.
             (0..=i).for_each(|j| normal[(i, j)] += scaled * sample.basis[j]);
         }
     }
-    (normal, right)
+    normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
 }
 
 /// Far below what a single cell adds.
