@@ -112,6 +112,44 @@ fn doctor_finds_nothing_wrong() {
 }
 
 #[test]
+fn global_options_are_explained_once() {
+    let desk = Desk::new();
+    assert!(desk.ok(&["--help"]).contains("Global options:\n  -j, --threads <N>"));
+    let help = desk.ok(&["dataset", "generate", "--help"]);
+    let last = help.lines().last().unwrap_or_default();
+    assert!(last.starts_with("Global options (see `petcomp --help`): -j, -q"), "{help}");
+    assert!(!help.contains("--oiio <"), "{help}");
+    // Hidden in the help, they are taken as before.
+    desk.ok(&["dataset", "init", "recipe.toml", "-q", "--oiio", "off", "-j", "1"]);
+}
+
+#[test]
+fn a_check_fails_on_what_needs_a_look_where_that_is_asked_for() {
+    let desk = Desk::new();
+    let photo = sample("bottles/b0006_0.png");
+    desk.ok(&["asset", "add", &photo, "--class", "none", "--length", "0.2", "-o", "assets"]);
+    let said = desk.ok(&["asset", "check", "assets"]);
+    assert!(said.contains("look at "), "the sample has the screen's hue: {said}");
+    let strict = desk.run(&["asset", "check", "assets", "--strict"]);
+    assert_eq!(strict.status.code(), Some(1), "{}", text(&strict.stderr));
+}
+
+/// What a terminal shows of a job, from its start.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_progress_bar_begins_at_nothing() {
+    let desk = Desk::new();
+    let job = format!("stty cols 80; {} asset build list.csv -o assets", env!("CARGO_BIN_EXE_petcomp"));
+    desk.write("list.csv", format!("file,asset,class,length\n{},a,none,0.2\n", sample("bottles/b0006_0.png")));
+    let mut command = Command::new("script");
+    let output =
+        command.args(["-qec", &job, "/dev/null"]).current_dir(desk.0.path()).output().expect("Debian has script");
+    let shown = text(&output.stdout);
+    let first = shown.split(['\r', '\n']).find(|line| line.contains("cut-outs")).unwrap_or_default();
+    assert!(first.contains("0/1") && !first.contains('█'), "{first:?} of {shown}");
+}
+
+#[test]
 fn a_missing_file_is_named() {
     let error = Desk::new().refused(&["matte", "cut", "nowhere.png", "-o", "out.exr"]);
     assert!(error.contains("nowhere.png: no such file"), "{error}");

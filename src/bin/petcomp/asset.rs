@@ -1,6 +1,6 @@
 //! `petcomp asset`: cut-outs with real size and class, kept in a folder.
 
-use crate::common::Common;
+use crate::common::{Common, NeedsReview};
 use petcomp::asset::{self, AddPhoto, Library, Manifest, Photo, Scale, ScreenSource};
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
@@ -26,6 +26,9 @@ pub(crate) enum Command {
     Check {
         /// Asset folder
         folder: PathBuf,
+        /// Exit with status 1 where a person should look
+        #[arg(long)]
+        strict: bool,
     },
     /// Show every cut-out over a checkerboard, black, white and green
     Sheet {
@@ -73,7 +76,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Build { list, output } => build(list, output, common),
         Command::Add(args) => add(args, common),
         Command::List { folder } => list(folder),
-        Command::Check { folder } => check(folder, common),
+        Command::Check { folder, strict } => check(folder, *strict, common),
         Command::Sheet { folder, output } => Ok(io::write(output, &asset::contact_sheet(&Library::open(folder)?))?),
     }
 }
@@ -81,7 +84,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
 /// Name of the contact sheet in an asset folder.
 const SHEET: &str = "contact_sheet.png";
 
-fn check(folder: &Path, common: &Common) -> anyhow::Result<()> {
+fn check(folder: &Path, strict: bool, common: &Common) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
     let photos: Vec<_> = library.assets.iter().flat_map(|asset| &asset.photos).collect();
     let doubted: Vec<_> = photos.iter().filter(|photo| !photo.record.doubts.is_empty()).collect();
@@ -91,7 +94,10 @@ fn check(folder: &Path, common: &Common) -> anyhow::Result<()> {
     let counts =
         format!("{} assets, {} cut-outs, all whole, {} to look at", library.assets.len(), photos.len(), doubted.len());
     common.say(format_args!("{}: {counts}", folder.display()));
-    Ok(())
+    match doubted.len() {
+        n if strict && n > 0 => Err(NeedsReview(format!("{}: {n} cut-outs to look at", folder.display())).into()),
+        _ => Ok(()),
+    }
 }
 
 /// Cuts out all photos of a list, showing progress.

@@ -9,8 +9,9 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Flags that mean the same everywhere.
+/// Flags that mean the same everywhere: explained once, in `petcomp --help`.
 #[derive(clap::Args)]
+#[command(next_help_heading = GLOBAL_HEADING)]
 pub(crate) struct Common {
     /// Worker threads; 0 is one per core
     #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true)]
@@ -31,6 +32,28 @@ pub(crate) struct Common {
     /// What reads pictures that petcomp's own decoders do not know
     #[arg(long, value_enum, default_value_t, global = true)]
     oiio: OpenImageIo,
+}
+
+const GLOBAL_HEADING: &str = "Global options";
+
+/// The same program, its global options a line at the end of every subcommand's help.
+pub(crate) fn with_short_help(program: clap::Command) -> clap::Command {
+    let global: Vec<clap::Arg> = program.get_arguments().filter(|arg| arg.is_global_set()).cloned().collect();
+    let names: Vec<String> = global.iter().map(flag).collect();
+    let line = format!("{GLOBAL_HEADING} (see `petcomp --help`): {}", names.join(", "));
+    program.mut_subcommands(|command| shortened(command, &global, &line))
+}
+
+/// What clap would copy from the program is there already, and hidden.
+fn shortened(command: clap::Command, global: &[clap::Arg], line: &str) -> clap::Command {
+    let hidden = global.iter().map(|arg| arg.clone().hide(true));
+    command.args(hidden).after_help(line.to_owned()).mut_subcommands(|inner| shortened(inner, global, line))
+}
+
+/// `-j` or, where it has no letter, `--limit`.
+fn flag(arg: &clap::Arg) -> String {
+    let long = || arg.get_long().map(|long| format!("--{long}"));
+    arg.get_short().map(|short| format!("-{short}")).or_else(long).unwrap_or_default()
 }
 
 /// Where OpenImageIO runs.
@@ -134,6 +157,8 @@ impl RecipeArgs {
 /// How far a long job is.
 pub(crate) struct Progress {
     bar: ProgressBar,
+    /// On a terminal; elsewhere there are lines, or nothing.
+    drawn: bool,
     lines: Option<std::sync::Mutex<Lines>>,
     what: &'static str,
 }
@@ -154,15 +179,15 @@ impl Progress {
     fn new(what: &'static str, quiet: bool, shown: Shown) -> Self {
         let (terminal, json) = (std::io::stderr().is_terminal(), shown == Shown::Json);
         let drawn = terminal && !quiet && !json;
-        let target = if drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(0), target);
+        // Of no length yet, it would be drawn full.
+        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {per_sec}  {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(what);
         let every = if json { Self::JSON_EVERY } else { Self::LINE_EVERY };
         let lines = Lines { json, every, began: None, last: Instant::now() };
         let told = json || (!terminal && !quiet);
-        Self { bar, lines: told.then(|| std::sync::Mutex::new(lines)), what }
+        Self { bar, drawn, lines: told.then(|| std::sync::Mutex::new(lines)), what }
     }
 
     /// So many steps of so many are done; the first call tells what was done before.
@@ -171,6 +196,9 @@ impl Progress {
             self.bar.set_length(total);
             self.bar.set_position(done);
             self.bar.reset_eta();
+            if self.drawn {
+                self.bar.set_draw_target(ProgressDrawTarget::stderr());
+            }
         }
         self.bar.set_position(done);
         if let Some(Ok(mut lines)) = self.lines.as_ref().map(|lines| lines.lock()) {
@@ -285,6 +313,19 @@ impl std::fmt::Debug for Incomplete {
 
 impl std::error::Error for Incomplete {}
 
+/// Everything was done, and `--strict` asked for a failure where a person should look.
+#[derive(Debug)]
+pub(crate) struct NeedsReview(pub(crate) String);
+
+impl std::fmt::Display for NeedsReview {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for NeedsReview {}
+
+const NEEDS_REVIEW: u8 = 1;
 const INCOMPLETE: u8 = 2;
 const DATA: u8 = 3;
 const FILE: u8 = 4;
@@ -292,11 +333,14 @@ const INTERRUPTED: u8 = 130;
 /// As of a program that SIGPIPE ended.
 const READER_GONE: u8 = 141;
 
-/// Prints one line of causes and gives the exit status: 2 where some of many files could not be used, 3 for data that cannot be right, 4 for files that cannot be used,
-/// 130 after an interruption. (2 is a wrong command line too; clap says that.)
+/// Prints one line of causes and gives the exit status: 1 where `--strict` found something to review, 2 where some of many
+/// files could not be used, 3 for data that cannot be right, 4 for files that cannot be used, 130 after an interruption. (2 is a wrong command line too; clap says that.)
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     let line = format!("{error:#}").replace('\n', " ");
     eprintln!("error: {line}");
+    if error.is::<NeedsReview>() {
+        return ExitCode::from(NEEDS_REVIEW);
+    }
     if error.is::<Incomplete>() {
         return ExitCode::from(INCOMPLETE);
     }

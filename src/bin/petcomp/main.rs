@@ -22,7 +22,7 @@ mod settle;
 #[cfg(feature = "train")]
 mod train;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
 /// From photographs to labelled training images.
@@ -78,7 +78,9 @@ enum Stage {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse_from(diff::accept_idiff_spelling(std::env::args()));
+    let arguments = diff::accept_idiff_spelling(std::env::args());
+    let matches = common::with_short_help(Cli::command()).get_matches_from(arguments);
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     match cli.common.apply().and_then(|()| run(&cli)) {
         Ok(code) => code,
         Err(error) => common::report(&error),

@@ -1,6 +1,6 @@
 //! `petcomp dataset check`, `report` and `sheet`: what is in a dataset.
 
-use crate::common::Common;
+use crate::common::{Common, NeedsReview};
 use petcomp::dataset::{self, Checked, contact_sheet_of};
 use petcomp::{io, report};
 use std::path::PathBuf;
@@ -9,6 +9,9 @@ use std::path::PathBuf;
 pub(crate) struct Check {
     /// Folder of the dataset
     folder: PathBuf,
+    /// Exit with status 1 where there is a note, too: classes without labels, very small boxes
+    #[arg(long)]
+    strict: bool,
 }
 
 #[derive(clap::Args)]
@@ -40,12 +43,16 @@ pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
     let checked = dataset::check(&args.folder)?;
     let Checked { faults, images, .. } = &checked;
     common.say(checked.balance().markdown());
-    checked.remarks().iter().for_each(|remark| common.say(format_args!("note: {remark}")));
+    let notes = checked.remarks();
+    notes.iter().for_each(|note| common.say(format_args!("note: {note}")));
     faults.iter().for_each(|fault| println!("{fault}"));
     anyhow::ensure!(faults.is_empty(), "{folder}: {} faults", faults.len());
     let rows: usize = checked.rows.iter().sum();
     common.say(format_args!("{folder}: {images} images, {rows} labels, no fault"));
-    Ok(())
+    match notes.len() {
+        n if args.strict && n > 0 => Err(NeedsReview(format!("{folder}: {n} notes")).into()),
+        _ => Ok(()),
+    }
 }
 
 pub(crate) fn report(args: &Report, common: &Common) -> anyhow::Result<()> {
