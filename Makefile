@@ -2,7 +2,6 @@
 # make test   every test
 # Both install the Debian packages they need if they are missing, and need nothing else but Rust.
 #
-# make train-test   the trainer behind the feature `train`
 # make soak   100,000 damaged pictures; make fuzz   each reader of text and headers, a minute each
 
 CARGO     := cargo
@@ -25,7 +24,7 @@ PEERS        := blender python3-numpy python3-venv openimageio-tools ffmpeg
 PEERS_PYTHON := numpy OpenEXR opencv-python-headless pymatting pybullet pycocotools
 CORE         := 0
 
-.PHONY: peers demo test train-test lint bench golden formats python packages blender soak soak-dataset fuzz
+.PHONY: peers demo test lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
 	$(CARGO) build --release --locked --bins
@@ -59,10 +58,6 @@ fuzz: packages
 	  echo "no cargo-fuzz with a nightly compiler here: seeds and chance instead"; \
 	  $(CARGO) test --release --locked --test io -- --ignored --nocapture fuzz::; \
 	fi
-
-# The trainer, which burn takes minutes to compile for: it learns sixteen images by heart.
-train-test: packages
-	$(CARGO) test --release --locked --no-default-features --features train --lib -- train::detector
 
 lint: packages
 	$(CARGO) fmt --check

@@ -27,8 +27,6 @@ pub use curve::{Curves, curves};
 pub use overlap::iou;
 pub use picture::{confusion_picture, f1_picture, precision_recall_picture};
 pub use tag::{Tags, read_tags};
-#[cfg(feature = "train")]
-pub(crate) use yolo::read_yolo_boxes;
 pub use yolo::{YoloTruth, read_yolo_found, read_yolo_truth};
 pub use yolov5::yolov5;
 

@@ -55,13 +55,6 @@ pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
     Ok(())
 }
 
-/// The boxes of one label file in pixels of an image of `size`; none where there is no file: an image without objects.
-#[cfg(feature = "train")]
-pub(crate) fn read_yolo_boxes(labels: &Path, size: [u32; 2]) -> Result<Vec<TrueBox>> {
-    let rows = if labels.exists() { rows(labels, 0)? } else { Vec::new() };
-    Ok(rows.into_iter().map(|row| row.truth(size)).collect())
-}
-
 /// The text files of a folder by their names without extension, in order.
 fn texts(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;

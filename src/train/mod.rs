@@ -3,14 +3,11 @@
 //! Plain functions for any trainer: the balance of two sources of images ([`Balance`], equation 2), batches of one
 //! source each ([`batches`]), how a network's numbers become boxes ([`decode`], equation 1), anchors that fit a
 //! dataset ([`anchors()`]), how many epochs make equally many updates ([`Updates`]), and a [`kit`] of files for PyTorch.
-//! With the feature `train` there is a trainer of our own, too: `detector`.
 
 mod anchors;
 mod balance;
 mod batches;
 mod decode;
-#[cfg(feature = "train")]
-pub mod detector;
 pub mod kit;
 mod updates;
 

@@ -19,8 +19,6 @@ mod render;
 mod report;
 mod scene;
 mod settle;
-#[cfg(feature = "train")]
-mod train;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -65,9 +63,6 @@ enum Stage {
     Dataset(dataset::Command),
     /// Detections against the truth: average precision, curves, confusion
     Eval(eval::Args),
-    /// Train a small detector on real and synthetic images
-    #[cfg(feature = "train")]
-    Train(train::Args),
     /// Compare two pictures, with the flags and exit codes of OpenImageIO's idiff
     Diff(diff::Args),
     /// Measure how good a stage is, on simulated data: tables and plots
@@ -100,8 +95,6 @@ fn run(cli: &Cli) -> anyhow::Result<ExitCode> {
         Stage::Label(args) => label::run(args, common)?,
         Stage::Dataset(command) => dataset::run(command, common)?,
         Stage::Eval(args) => eval::run(args, common)?,
-        #[cfg(feature = "train")]
-        Stage::Train(args) => train::run(args, common)?,
         Stage::Report(command) => report::run(command, common)?,
         Stage::Diff(args) => return diff::run(args, common),
         Stage::Doctor(args) => return doctor::run(args),
