@@ -36,8 +36,8 @@ impl Roi {
     pub fn grown(self, by: usize, width: usize, height: usize) -> Self {
         let x0 = self.x.saturating_sub(by);
         let y0 = self.y.saturating_sub(by);
-        let x1 = (self.x + self.width + by).min(width);
-        let y1 = (self.y + self.height + by).min(height);
+        let x1 = (self.x + self.width).saturating_add(by).min(width);
+        let y1 = (self.y + self.height).saturating_add(by).min(height);
         Self::spanning(x0..x1, y0..y1)
     }
 

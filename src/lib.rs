@@ -2,6 +2,7 @@
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 pub mod asset;
+mod bounds;
 pub mod camera;
 pub mod color;
 pub mod composite;

@@ -1,75 +1,23 @@
 //! Many photos into an asset folder, from a list.
 
-use super::folder::{AddPhoto, Scale, asset_of, cut_out_file, read_or_new, write_photo};
-use super::screen_source::ScreenSource;
-use super::{DEFAULT_MASS, DEFAULT_THICKNESS, Manifest};
+use super::List;
+use super::folder::{asset_of, read_or_new, write_photo};
 use crate::error::{Error, Result};
-use crate::io;
-use crate::matte::CutOutOptions;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A list of photos: `photos.toml`, or `photos.csv` with the fields of [`ListedPhoto`] for columns.
-///
-/// ```toml
-/// [[photos]]
-/// file = "IMG_0001.jpg"       # relative to the list
-/// asset = "bottle_01"
-/// class = "cap"
-/// px_per_metre = 1966.7       # or: length = 0.265, and width where it is known
-/// ```
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct List {
-    /// Names of the classes, where they are not the [default](super::default_classes) ones.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub classes: Vec<String>,
-    /// How the objects are cut out.
-    #[serde(default)]
-    pub cut_out: CutOutOptions,
-    /// The photos.
-    pub photos: Vec<ListedPhoto>,
-}
-
-/// A photo of a [`List`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ListedPhoto {
-    /// The photo, relative to the list.
-    pub file: String,
-    /// Name of the object.
-    pub asset: String,
-    /// Name of its class.
-    pub class: String,
-    /// Pixels of the photo for a metre.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub px_per_metre: Option<f64>,
-    /// Or: length of the object along its longest side, metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub length: Option<f64>,
-    /// And its width, metres: then both fix the scale, and contradict an outline of other proportions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub width: Option<f64>,
-    /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen. Default: `auto`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub screen: Option<String>,
-    /// Thickness, metres. Default: 0.005.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub thickness: Option<f64>,
-    /// Mass, kilograms. Default: 0.025.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mass: Option<f64>,
-}
-
 /// What [`build`] did.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Built {
     /// Photos that were cut out.
     pub photos: usize,
     /// Assets in the folder.
     pub assets: usize,
+    /// Names of the folder's classes, in order.
+    pub classes: Vec<String>,
+    /// Lengths of the objects that were cut out, with their standard errors, metres, in the order of the list.
+    pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
     /// Cut-outs that a person should look at, and why.
@@ -106,7 +54,7 @@ pub fn build(
     let done = AtomicUsize::new(0);
     progress(0, count);
     let work = list.photos.par_iter().zip(&adds).map(|(photo, add)| {
-        let record = write_photo(folder, &at.join(&photo.file), add).map(|photo| photo.record);
+        let record = write_photo(folder, &as_written(at.join(&photo.file)), add).map(|photo| photo.record);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
         record
     });
@@ -118,11 +66,12 @@ pub fn build(
                 built.refused.push(refusal.to_string());
                 continue;
             }
-            other => other?,
+            other => other.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?,
         };
         if !record.doubts.is_empty() {
             built.doubtful.push(format!("{}: {}", record.file, record.doubts.join("; ")));
         }
+        built.lengths.push([record.object_m[0], record.error_m]);
         let inserted = manifest.insert(asset_of(add, record));
         inserted.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?;
         built.photos += 1;
@@ -132,7 +81,30 @@ pub fn build(
     }
     manifest.write(folder)?;
     built.assets = manifest.assets.len();
+    built.classes = manifest.classes;
     Ok(built)
+}
+
+/// The file of that name, or where there is none the only one beside it that is called so but for capitals and the
+/// spelling of `.jpg`.
+fn as_written(path: PathBuf) -> PathBuf {
+    if path.exists() {
+        return path;
+    }
+    let entries = path.parent().and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
+    let mut alike = entries.map(|entry| entry.path()).filter(|other| plain_name(other) == plain_name(&path));
+    match (alike.next(), alike.next()) {
+        (Some(only), None) => only,
+        _ => path,
+    }
+}
+
+/// A file's name in small letters, with the short endings of pictures.
+fn plain_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let ending = [(".jpeg", ".jpg"), (".tiff", ".tif")];
+    let long = ending.iter().find_map(|(long, short)| Some(format!("{}{short}", name.strip_suffix(long)?)));
+    long.unwrap_or(name)
 }
 
 /// The list itself, or the one in a folder.
@@ -144,86 +116,12 @@ fn list_in(path: &Path) -> Result<PathBuf> {
     inside.ok_or_else(|| Error::file(path, format!("expected {} in it, a list of the photos", LISTS.join(" or "))))
 }
 
-impl List {
-    /// Reads a list: CSV where the file is called so, else TOML.
-    ///
-    /// # Errors
-    /// [`Error::File`] for a file that cannot be read or understood, with its line.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        let path = path.as_ref();
-        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
-            return io::read_toml(path);
-        }
-        let text = io::read_text(path)?;
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let photos: std::result::Result<Vec<ListedPhoto>, _> = reader.deserialize().collect();
-        Ok(Self { photos: photos.map_err(|e| Error::file(path, e))?, ..Self::default() })
-    }
-
-    /// The photos with all that is known of them, checked against the folder's manifest.
-    fn adds(&self, manifest: &mut Manifest, at: &Path) -> Result<Vec<AddPhoto>> {
-        if !self.classes.is_empty() {
-            if !manifest.assets.is_empty() && manifest.classes != self.classes {
-                let what = format!("{:?}, but the folder has {:?}", self.classes, manifest.classes);
-                return Err(Error::value("classes", what));
-            }
-            manifest.classes.clone_from(&self.classes);
-        }
-        if self.photos.is_empty() {
-            return Err(Error::value("photos", "empty, expected at least one"));
-        }
-        let adds = self.photos.iter().enumerate().map(|(i, photo)| {
-            let add = photo.add(&self.cut_out, at).and_then(|add| add.check(manifest).map(|()| add));
-            add.map_err(|e| e.within(&format!("photos[{i}]")))
-        });
-        let adds: Vec<AddPhoto> = adds.collect::<Result<_>>()?;
-        self.check_files(&adds)?;
-        Ok(adds)
-    }
-
-    /// No two photos become the same file.
-    fn check_files(&self, adds: &[AddPhoto]) -> Result<()> {
-        let mut seen = std::collections::BTreeMap::new();
-        for (i, (photo, add)) in self.photos.iter().zip(adds).enumerate() {
-            if let Some(first) = seen.insert(cut_out_file(Path::new(&photo.file), add), i) {
-                let what = format!("\"{}\", would become the same cut-out as photos[{first}]", photo.file);
-                return Err(Error::value(format!("photos[{i}].file"), what));
-            }
-        }
-        Ok(())
-    }
-}
-
-impl ListedPhoto {
-    fn add(&self, options: &CutOutOptions, at: &Path) -> Result<AddPhoto> {
-        let scale = match (self.px_per_metre, self.length, self.width) {
-            (Some(scale), None, None) => Scale::PxPerMetre(scale),
-            (None, Some(length), None) => Scale::Length(length),
-            (None, Some(length), Some(width)) => Scale::Size([length, width]),
-            (None, None, _) => return Err(Error::value("px_per_metre", "missing; expected it, or length")),
-            (Some(_), _, _) => return Err(Error::value("length", "expected either it or px_per_metre, not both")),
-        };
-        let screen = match self.screen.as_deref().unwrap_or("auto").parse()? {
-            ScreenSource::Photo(path) => ScreenSource::Photo(at.join(path)),
-            told => told,
-        };
-        Ok(AddPhoto {
-            asset: self.asset.clone(),
-            class: self.class.clone(),
-            scale,
-            thickness: self.thickness.unwrap_or(DEFAULT_THICKNESS),
-            mass: self.mass.unwrap_or(DEFAULT_MASS),
-            screen,
-            options: options.clone(),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{Library, MANIFEST};
     use super::*;
     use crate::image::Image;
+    use crate::io;
     use crate::pixel::LinearRgb;
 
     /// A red slab of 60 x 30 pixels on a green screen.
@@ -263,7 +161,7 @@ mod tests {
     fn a_list_becomes_a_library_of_the_right_size() {
         let library = built(TWO).unwrap();
         let [asset] = &library.assets[..] else { panic!("one asset") };
-        assert_eq!((asset.class, asset.photos.len()), (1, 2));
+        assert_eq!((asset.class, asset.photos.len()), (0, 2));
         // An edge is told to a pixel, so a length to two: 60 px are 0.3 m to within 1 in 30.
         assert!((asset.photos[0].record.px_per_metre / 200.0 - 1.0).abs() < 1.0 / 30.0);
         assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
@@ -289,8 +187,10 @@ mod tests {
             assert!(!folder.path().join("out").exists());
             error.to_string()
         };
-        assert!(said(&TWO.replace("\"cap\"", "\"cup\"")).contains("photos[0].class: \"cup\", expected one of"));
-        assert!(said(&TWO.replace("length = 0.3", "")).contains("photos[0].px_per_metre: missing"));
+        let declared = |classes: &str| format!("classes = {classes}\n{TWO}");
+        assert!(said(&declared("[\"cup\"]")).contains("photos[0].class: \"cap\", expected one of cup"));
+        assert!(said(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice"));
+        assert!(said(&TWO.replace("length = 0.3", "")).contains("photos[0].length: missing, expected it, or px"));
         assert!(said(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1"));
         assert!(said(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
         assert!(said(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));
@@ -307,7 +207,60 @@ mod tests {
         std::fs::remove_file(folder.path().join("photos.toml")).unwrap();
         assert_eq!(build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap().photos, 2);
         std::fs::write(folder.path().join("photos.csv"), "file,asset\none.png,a\n").unwrap();
-        assert!(List::read(folder.path().join("photos.csv")).unwrap_err().to_string().contains("photos.csv"));
+        let told = List::read(folder.path().join("photos.csv")).unwrap_err().to_string();
+        assert!(told.ends_with("photos.csv: line 2: missing key \"class\""), "{told}");
+    }
+
+    #[test]
+    fn classes_are_declared_or_come_in_the_order_of_the_list() {
+        let three = TWO.replacen("\"a\"", "\"b\"", 1).replacen("\"cap\"", "\"see-through bag\"", 1);
+        let folder = folder_with(&three);
+        let list = folder.path().join("photos.toml");
+        let classes = |out: &str| build(&list, folder.path().join(out), &|_, _| ()).map(|built| built.classes);
+        assert_eq!(classes("met").unwrap(), ["see-through bag", "cap"]);
+        let declared = format!("classes = [\"cap\", \"jar\", \"see-through bag\"]\n{three}");
+        std::fs::write(&list, declared).unwrap();
+        assert_eq!(classes("declared").unwrap(), ["cap", "jar", "see-through bag"]);
+        assert!(classes("met").unwrap_err().to_string().contains("expected to begin with those that the folder has"));
+    }
+
+    #[test]
+    fn sizes_in_another_unit_are_asked_about_where_they_are_given() {
+        let told = |from: &str, to: &str| built(&TWO.replace(from, to)).unwrap_err().to_string();
+        let length = told("length = 0.3", "length = 229");
+        let expected = "expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
+        assert!(length.ends_with(&format!("photos.toml: photos[0].length: 229, {expected}")), "{length}");
+        assert!(told("length = 0.3", "length = 22.9").ends_with("is it in centimetres?"));
+        let scale = told("px_per_metre = 100.0", "px_per_metre = 1e308");
+        assert!(scale.ends_with("photos[1].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"), "{scale}");
+        let scale = told("px_per_metre = 100.0", "px_per_metre = 2.0");
+        assert!(scale.contains("photos.toml: photos[1].px_per_metre: 2, makes what is in two.png 30"), "{scale}");
+        assert!(scale.ends_with("; is it pixels for a centimetre?"), "{scale}");
+        assert!(told("length = 0.3", "length = 0.3\nthickness = 5").contains("photos[0].thickness: 5, expected"));
+        assert!(told("length = 0.3", "length = 0.3\nmass = 1e300").contains("photos[0].mass: 1e300, expected"));
+    }
+
+    #[test]
+    fn a_photo_is_found_by_its_name_in_capitals_and_by_either_spelling_of_jpeg() {
+        let folder = folder_with(&TWO.replace("one.png", "ONE.PNG"));
+        let list = folder.path().join("photos.toml");
+        assert_eq!(build(&list, folder.path().join("out"), &|_, _| ()).unwrap().photos, 2);
+        for (there, asked) in [("a.jpeg", "a.jpg"), ("B.JPG", "b.jpeg"), ("c.jpg", "c.jpg")] {
+            std::fs::write(folder.path().join(there), "").unwrap();
+            assert_eq!(as_written(folder.path().join(asked)), folder.path().join(there));
+        }
+        // Two that might be meant are none.
+        std::fs::write(folder.path().join("A.jpeg"), "").unwrap();
+        assert_eq!(as_written(folder.path().join("a.jpg")), folder.path().join("a.jpg"));
+    }
+
+    #[test]
+    fn names_of_any_language_name_assets_and_files() {
+        let folder = folder_with(&TWO.replace("\"a\"", "\"Flasche_gr\u{fc}n\"").replace("one.png", "\u{fc}.png"));
+        std::fs::rename(folder.path().join("one.png"), folder.path().join("\u{fc}.png")).unwrap();
+        build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap();
+        assert!(folder.path().join("out/Flasche_gr\u{fc}n/\u{fc}.exr").exists());
+        assert_eq!(Library::open(folder.path().join("out")).unwrap().assets[0].name, "Flasche_gr\u{fc}n");
     }
 
     #[test]

@@ -2,10 +2,11 @@
 
 use super::files;
 use super::library::Photo;
-use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_name, check_positive};
+use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_class, check_name};
 use super::measure::Measured;
 use super::screen_source::ScreenSource;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
+use crate::bounds::{MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH, number};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::{CutOut, CutOutOptions, Remark, cut_out_on};
@@ -15,7 +16,7 @@ use std::path::Path;
 /// What is known of a photo that is not in the photo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AddPhoto {
-    /// Name of the object: letters, digits, `_`, `-` and `.`.
+    /// Name of the object: letters and digits of any language, `_`, `-` and `.`.
     pub asset: String,
     /// Name of its class.
     pub class: String,
@@ -29,6 +30,9 @@ pub struct AddPhoto {
     pub screen: ScreenSource,
     /// How it is cut out.
     pub options: CutOutOptions,
+    /// Names of the folder's classes in order, where they are declared. Default: a class that the folder does not have
+    /// comes behind those that it has.
+    pub classes: Vec<String>,
 }
 
 /// How large the things in a photo are.
@@ -53,6 +57,7 @@ impl AddPhoto {
             mass: DEFAULT_MASS,
             screen: ScreenSource::Auto,
             options: CutOutOptions::default(),
+            classes: Vec::new(),
         }
     }
 
@@ -63,20 +68,34 @@ impl AddPhoto {
             Error::Value { what, .. } => Error::value("asset", what),
             other => other,
         })?;
+        check_class(&self.class)?;
         manifest.class(&self.class)?;
         match self.scale {
-            Scale::PxPerMetre(scale) => check_positive("px_per_metre", scale)?,
-            Scale::Length(length) => check_positive("length", length)?,
+            Scale::PxPerMetre(scale) => PX_PER_METRE.check("px_per_metre", scale)?,
+            Scale::Length(length) => OBJECT.check("length", length)?,
             Scale::Size([length, width]) => {
-                check_positive("length", length)?;
-                check_positive("width", width)?;
+                OBJECT.check("length", length)?;
+                WIDTH.check("width", width)?;
                 if width > length {
                     return Err(Error::value("width", format!("{width}, expected at most the length of {length}")));
                 }
             }
         }
-        check_positive("thickness", self.thickness)?;
-        check_positive("mass", self.mass)
+        THICKNESS.check("thickness", self.thickness)?;
+        MASS.check("mass", self.mass)
+    }
+
+    /// The scale makes a thing of the object that can be photographed on a screen.
+    fn check_length(&self, record: &PhotoRecord) -> Result<()> {
+        let length = record.object_m[0];
+        let Scale::PxPerMetre(scale) = self.scale else { return Ok(()) };
+        if OBJECT.contains(length) {
+            return Ok(());
+        }
+        let question = OBJECT.unit_meant(length).map_or(String::new(), |unit| format!("; is it pixels for a {unit}?"));
+        let (source, length) = (&record.source, number((1e4 * length).round() / 1e4));
+        let what = format!("{scale}, makes what is in {source} {length} m long, expected {OBJECT}{question}");
+        Err(Error::value("px_per_metre", what))
     }
 }
 
@@ -91,6 +110,7 @@ impl AddPhoto {
 pub fn add_photo(folder: impl AsRef<Path>, photo: impl AsRef<Path>, add: &AddPhoto) -> Result<Photo> {
     let folder = folder.as_ref();
     let mut manifest = read_or_new(folder)?;
+    manifest.learn(&add.classes, std::iter::once(add.class.as_str()))?;
     add.check(&manifest)?;
     let photo = write_photo(folder, photo.as_ref(), add)?;
     manifest.insert(asset_of(add, photo.record.clone()))?;
@@ -132,12 +152,12 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
         let level = if matches!(remark, Remark::ScreenHue(_)) { log::Level::Warn } else { log::Level::Info };
         log::log!(level, "{}: {remark}", photo.display());
     }
-    let file = cut_out_file(photo, add);
-    io::create_folder(folder.join(&add.asset))?;
-    files::write(&folder.join(&file), &cut)?;
-    watch.lap("write");
-    let record = record(&cut, add, file, photo);
+    let record = record(&cut, add, cut_out_file(photo, add), photo);
+    add.check_length(&record)?;
     watch.lap("measure");
+    io::create_folder(folder.join(&add.asset))?;
+    files::write(&folder.join(&record.file), &cut)?;
+    watch.lap("write");
     watch.log(photo.display());
     Ok(Photo::new(cut.film, record))
 }
@@ -150,7 +170,7 @@ pub(super) fn cut_out_file(photo: &Path, add: &AddPhoto) -> String {
 /// The photo's name without ending, safe as a name anywhere.
 fn stem(photo: &Path) -> String {
     let stem = photo.file_stem().unwrap_or_default().to_string_lossy();
-    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
     stem.chars().map(plain).collect()
 }
 

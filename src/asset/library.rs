@@ -153,7 +153,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let photos = vec![photo("a.exr")];
         let record = AssetRecord { name: "a".into(), class: "label".into(), thickness: 0.01, mass: 0.02, photos };
-        Manifest { assets: vec![record], ..Manifest::default() }.write(folder.path()).unwrap();
+        let classes = ["cap_label", "cap", "label"].map(String::from).into();
+        Manifest { classes, assets: vec![record] }.write(folder.path()).unwrap();
         if let Some((w, h)) = picture {
             let image = Image::filled(w, h, PremulRgba::new(0.25, 0.5, 0.125, 0.75));
             io::write(folder.path().join("a.exr"), &image).unwrap();

@@ -1,6 +1,7 @@
 //! The manifest of an asset folder: what is in it, as TOML.
 
 use super::MANIFEST;
+use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::MatteMethod;
@@ -9,11 +10,11 @@ use serde::{Deserialize, Serialize};
 use std::path::{Component, Path};
 
 /// What is in an asset folder, without the pictures.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Names of the classes; a label's number is the place in this list.
-    #[serde(default = "default_classes")]
+    /// Names of the classes; a label's number is the place in this list. Default: those of the assets, in their order.
+    #[serde(default)]
     pub classes: Vec<String>,
     /// The assets, by name.
     #[serde(default)]
@@ -24,7 +25,7 @@ pub struct Manifest {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AssetRecord {
-    /// Its name: letters, digits, `_`, `-` and `.`.
+    /// Its name: letters and digits of any language, `_`, `-` and `.`.
     pub name: String,
     /// Name of its class.
     pub class: String,
@@ -82,17 +83,6 @@ fn certain() -> f64 {
     1.0
 }
 
-/// The classes of bottles, in the order of the paper.
-pub fn default_classes() -> Vec<String> {
-    ["cap_label", "cap", "label", "none"].map(String::from).into()
-}
-
-impl Default for Manifest {
-    fn default() -> Self {
-        Self { classes: default_classes(), assets: Vec::new() }
-    }
-}
-
 impl Manifest {
     /// Reads and checks the manifest of a folder.
     ///
@@ -100,7 +90,11 @@ impl Manifest {
     /// [`Error::File`] where there is none; [`Error::Field`] for a value that cannot be right.
     pub fn read(folder: impl AsRef<Path>) -> Result<Self> {
         let path = folder.as_ref().join(MANIFEST);
-        let manifest: Self = io::read_toml(&path)?;
+        let mut manifest: Self = io::read_toml(&path)?;
+        if manifest.classes.is_empty() {
+            let met: Vec<String> = manifest.assets.iter().map(|asset| asset.class.clone()).collect();
+            manifest.learn(&[], met.iter().map(String::as_str))?;
+        }
         manifest.check().map_err(|e| e.in_file(&path))?;
         Ok(manifest)
     }
@@ -140,6 +134,30 @@ impl Manifest {
         Ok(())
     }
 
+    /// Takes classes into the list: those that are declared, in that order, or else those met, behind the ones that are
+    /// there, in the order in which they appear. No class that is there changes its number.
+    ///
+    /// # Errors
+    /// [`Error::Value`] (`classes`) for declared ones that do not begin with those that are there.
+    pub(super) fn learn<'a>(&mut self, declared: &[String], met: impl Iterator<Item = &'a str>) -> Result<()> {
+        if !declared.is_empty() {
+            unique("classes", declared.iter().map(String::as_str))?;
+            if !declared.starts_with(&self.classes) {
+                let (told, known) = (declared.join(", "), self.classes.join(", "));
+                let what = format!("{told}; expected to begin with those that the folder has: {known}");
+                return Err(Error::value("classes", what));
+            }
+            self.classes = declared.to_vec();
+            return Ok(());
+        }
+        for class in met {
+            if !self.classes.iter().any(|known| known == class) {
+                self.classes.push(class.to_owned());
+            }
+        }
+        Ok(())
+    }
+
     /// Place of a class in the list.
     ///
     /// # Errors
@@ -156,6 +174,9 @@ impl Manifest {
             return Err(Error::value("classes", "empty, expected at least one"));
         }
         unique("classes", self.classes.iter().map(String::as_str))?;
+        for (i, class) in self.classes.iter().enumerate() {
+            check_class(class).map_err(|e| e.within(&format!("classes[{i}]")))?;
+        }
         unique("assets", self.assets.iter().map(|asset| asset.name.as_str()))?;
         for (i, asset) in self.assets.iter().enumerate() {
             let inside = |e: Error| e.within(&format!("assets[{i}]"));
@@ -169,8 +190,8 @@ impl Manifest {
 impl AssetRecord {
     fn check(&self) -> Result<()> {
         check_name(&self.name)?;
-        check_positive("thickness", self.thickness)?;
-        check_positive("mass", self.mass)?;
+        THICKNESS.check("thickness", self.thickness)?;
+        MASS.check("mass", self.mass)?;
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
@@ -188,10 +209,11 @@ impl PhotoRecord {
         if !inside || self.file.is_empty() {
             return Err(Error::value("file", format!("\"{}\", expected a path inside the folder", self.file)));
         }
-        check_positive("px_per_metre", self.px_per_metre)?;
-        for (at, sides) in [("size_m", self.size_m), ("object_m", self.object_m)] {
-            sides.into_iter().try_for_each(|side| check_positive(at, side))?;
-        }
+        PX_PER_METRE.check("px_per_metre", self.px_per_metre)?;
+        self.size_m.into_iter().try_for_each(|side| CARD.check("size_m", side))?;
+        OBJECT.check("object_m[0]", self.object_m[0])?;
+        WIDTH.check("object_m[1]", self.object_m[1])?;
+        Bounds::new(0.0, 1.0, "a share").check("confidence", self.confidence)?;
         if self.outline_px.len() < 3 {
             let what = format!("{} points, expected at least 3", self.outline_px.len());
             return Err(Error::value("outline_px", what));
@@ -209,20 +231,32 @@ impl PhotoRecord {
     }
 }
 
-/// A name that is safe as the name of a file anywhere.
+/// Side of a whole cut-out, metres: the object's, and the margin around it.
+const CARD: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m long");
+
+/// A name that is safe as the name of a file: letters and digits of any language.
 pub(super) fn check_name(name: &str) -> Result<()> {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-    if !name.is_empty() && name.chars().all(plain) && !name.starts_with('.') {
+    let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
+    if !name.is_empty() && name.len() <= LONGEST_NAME && name.chars().all(plain) && !name.starts_with('.') {
         return Ok(());
     }
-    Err(Error::value("name", format!("\"{name}\", expected letters, digits, _ and -")))
+    Err(Error::value("name", format!("\"{}\", expected letters, digits, _ and -", shown(name))))
 }
 
-pub(super) fn check_positive(at: &str, value: f64) -> Result<()> {
-    if value > 0.0 && value.is_finite() {
+/// File systems allow 255 bytes with what is put behind.
+const LONGEST_NAME: usize = 120;
+
+/// A name that stands on a line of its own in every format of labels.
+pub(super) fn check_class(name: &str) -> Result<()> {
+    if !name.trim().is_empty() && name.len() <= LONGEST_NAME && !name.chars().any(char::is_control) {
         return Ok(());
     }
-    Err(Error::value(at, format!("{value}, expected a number above 0")))
+    Err(Error::value("class", format!("\"{}\", expected a name on one line", shown(name))))
+}
+
+/// The beginning of a name, on one line.
+fn shown(name: &str) -> String {
+    name.chars().take(LONGEST_NAME).flat_map(char::escape_debug).collect()
 }
 
 fn unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
@@ -265,7 +299,8 @@ pub(super) mod tests {
     }
 
     fn two() -> Manifest {
-        Manifest { assets: vec![asset("b", "cap"), asset("a", "none")], ..Manifest::default() }
+        let classes = ["cap", "label", "none"].map(String::from).into();
+        Manifest { classes, assets: vec![asset("b", "cap"), asset("a", "none")] }
     }
 
     #[test]
@@ -279,9 +314,32 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_default_classes_are_those_of_the_paper() {
-        assert_eq!(Manifest::default().classes, ["cap_label", "cap", "label", "none"]);
-        assert_eq!(Manifest::default().class("label").unwrap(), 2);
+    fn classes_are_those_declared_or_those_met_and_keep_their_numbers() {
+        let learned = |known: &[&str], declared: &[&str], met: &[&str]| {
+            let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+            let mut manifest = Manifest { classes: own(known), ..Manifest::default() };
+            manifest.learn(&own(declared), met.iter().copied()).map(|()| manifest.classes).map_err(|e| e.to_string())
+        };
+        assert_eq!(learned(&[], &[], &["can", "bag", "can"]).unwrap(), ["can", "bag"]);
+        assert_eq!(learned(&["bag"], &[], &["can", "bag"]).unwrap(), ["bag", "can"]);
+        assert_eq!(learned(&["bag"], &["bag", "can", "jar"], &["can"]).unwrap(), ["bag", "can", "jar"]);
+        let told = learned(&["bag"], &["can", "bag"], &[]).unwrap_err();
+        assert_eq!(told, "classes: can, bag; expected to begin with those that the folder has: bag");
+        assert!(learned(&[], &["can", "can"], &[]).unwrap_err().contains("is there twice"));
+    }
+
+    #[test]
+    fn names_of_any_language_are_names_and_paths_are_none() {
+        for name in ["Flasche_gr\u{fc}n", "\u{74f6}-1", "a.b"] {
+            assert!(check_name(name).is_ok(), "{name}");
+        }
+        for name in ["", ".a", "a/b", "a b", "a\n", &"a".repeat(121)] {
+            assert!(check_name(name).is_err(), "{name}");
+        }
+        assert!(check_class("see-through bottle").is_ok());
+        for class in ["", " ", "a\nb", "\u{1b}[31m"] {
+            assert!(check_class(class).unwrap_err().to_string().contains("expected a name on one line"));
+        }
     }
 
     #[test]
@@ -292,10 +350,15 @@ pub(super) mod tests {
             manifest.check().unwrap_err().to_string()
         };
         let said = message(|m| m.assets[1].class = "cpa".into());
-        assert_eq!(said, "assets[1].class: \"cpa\", expected one of cap_label, cap, label, none");
+        assert_eq!(said, "assets[1].class: \"cpa\", expected one of cap, label, none");
         assert_eq!(message(|m| m.assets[1].name = "b".into()), "assets[1]: \"b\" is there twice");
         let said = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
-        assert_eq!(said, "assets[0].photos[0].px_per_metre: NaN, expected a number above 0");
+        assert_eq!(said, "assets[0].photos[0].px_per_metre: NaN, expected 1 to 1e7 (pixels for a metre)");
+        let said = message(|m| m.assets[0].photos[0].px_per_metre = 1e308);
+        assert_eq!(said, "assets[0].photos[0].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)");
+        let said = message(|m| m.assets[0].photos[0].object_m[0] = 229.0);
+        let expected = "229, expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
+        assert_eq!(said, format!("assets[0].photos[0].object_m[0]: {expected}"));
         assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("inside the folder"));
         assert!(message(|m| m.assets[0].photos[0].outline_px[2] = [50.0, 2.0]).contains("outline_px[2]"));
         assert!(message(|m| m.assets[0].photos.clear()).starts_with("assets[0].photos: empty"));

@@ -50,7 +50,7 @@ pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
-pub use read::{photo_of, read_label, with_photo};
+pub use read::{check_distance, check_size, photo_of, read_label, with_photo};
 pub use rectify::{project_picture, rectify, warp};
 pub use solution::{Fit, FocalFinding, Sigma, Solution};
 pub use solve::solve;

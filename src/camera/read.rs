@@ -1,6 +1,8 @@
 //! Labels from files, with what their photos know.
 
 use super::label::Label;
+use super::solution::Solution;
+use crate::bounds::{CAMERA, SURFACE, number};
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -15,6 +17,7 @@ const ZOOMED_SIGMA: f64 = 0.25;
 pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
     let label: Label = io::read_json(path)?;
+    check_size(&label).map_err(|e| e.in_file(path))?;
     if !label.image.file.is_empty() {
         io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
     }
@@ -46,6 +49,30 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
         }
     }
     Ok(label)
+}
+
+/// Sides that a surface with objects on it can have; a label may be in centimetres by mistake.
+///
+/// # Errors
+/// [`Error::Value`] that names the side.
+pub fn check_size(label: &Label) -> Result<()> {
+    let sides = [("surface.width_m", label.surface.width_m), ("surface.height_m", label.surface.height_m)];
+    sides.into_iter().try_for_each(|(at, side)| side.map_or(Ok(()), |metres| SURFACE.check(at, metres)))
+}
+
+/// A camera that is near enough to see objects on the surface: how far it is follows from the label's lengths.
+///
+/// # Errors
+/// [`Error::Value`] with the distance.
+pub fn check_distance(solution: &Solution) -> Result<()> {
+    let distance = solution.camera.center().coords.norm();
+    if CAMERA.contains(distance) {
+        return Ok(());
+    }
+    let unit = CAMERA.unit_meant(distance).map_or(String::new(), |unit| format!("; is the size in {unit}s?"));
+    let what =
+        format!("the camera would be {} m away, expected {CAMERA}{unit}", number((1e3 * distance).round() / 1e3));
+    Err(Error::value("surface", what))
 }
 
 /// The picture of a label that was read from `path`, where it is there.

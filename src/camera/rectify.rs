@@ -1,5 +1,6 @@
 //! The surface as a map: photo to metric top view, and a picture on the surface to the photo.
 
+use crate::bounds::number;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::filter::{Pyramid, sample_bilinear};
@@ -10,8 +11,8 @@ use nalgebra::{Matrix2, Matrix3};
 
 /// No pixel is the mean of more samples along an axis than this; beyond, they are taken from coarser levels.
 const MOST_SAMPLES: f64 = 32.0;
-/// Larger pictures are a typing error.
-const MOST_PIXELS: f64 = 1e9;
+/// Larger pictures are a typing error; so many take 800 MB.
+const MOST_PIXELS: f64 = 67_108_864.0;
 
 /// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its top left corner first.
 ///
@@ -19,11 +20,18 @@ const MOST_PIXELS: f64 = 1e9;
 /// empty.
 ///
 /// # Errors
-/// [`Error::Value`] for a map without pixels or of more than a thousand million.
+/// [`Error::Value`] for a map without pixels or of more than 64 million.
 pub fn rectify<P: Mix>(photo: &Pyramid<P>, camera: &Camera, size: [f64; 2], px_per_metre: f64) -> Result<Image<P>> {
     let [width, height] = size.map(|metres| (metres * px_per_metre).round());
     if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
-        return Err(Error::value("px_per_metre", format!("{px_per_metre} makes a map of {width} x {height} pixels")));
+        return Err(Error::value(
+            "px_per_metre",
+            format!(
+                "{px_per_metre} makes a map of {} x {} pixels, expected at most {MOST_PIXELS}",
+                number(width),
+                number(height)
+            ),
+        ));
     }
     let photo_from_map = Homography(camera.pixel_from_surface().0 * surface_from_map(size, [width, height]).0);
     Ok(warp(photo, &photo_from_map, width as usize, height as usize))

@@ -1,7 +1,8 @@
 //! The part of a recipe that says how labels are made and written: its table `[labels]`.
 
+use crate::bounds::Bounds;
 use crate::dataset::{Coco, Layers, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::label::{AmodalBox, BBox, LabelOptions, Mask, ObjectLabel};
 use serde::{Deserialize, Serialize};
 
@@ -94,18 +95,13 @@ impl Default for LabelSetup {
 
 impl LabelSetup {
     /// # Errors
-    /// [`Error::Value`] for the first number that cannot be right.
+    /// [`Error::Value`](crate::Error::Value) for the first number that cannot be right.
     pub fn check(&self) -> Result<()> {
-        let share = |at: &str, value: f64| match (0.0..=1.0).contains(&value) {
-            true => Ok(()),
-            false => Err(Error::value(at, format!("{value}, expected 0 to 1"))),
-        };
-        share("overlap_iou", self.overlap_iou)?;
-        share("alpha_threshold", f64::from(self.alpha_threshold))?;
-        match self.simplify.is_finite() && self.simplify >= 0.0 {
-            true => Ok(()),
-            false => Err(Error::value("simplify", format!("{}, expected pixels, at least 0", self.simplify))),
-        }
+        let share = Bounds::new(0.0, 1.0, "a share");
+        share.check("overlap_iou", self.overlap_iou)?;
+        share.check("alpha_threshold", self.alpha_threshold.into())?;
+        Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
+        Bounds::new(1.0, 1e6, "samples in an archive").check("webdataset.samples", self.webdataset.samples as f64)
     }
 
     /// How labels are made.

@@ -19,6 +19,7 @@
 mod check;
 mod coco;
 mod contact_sheet;
+mod estimate;
 mod folder;
 mod formats;
 mod generate;
@@ -48,6 +49,7 @@ mod yolo_yaml;
 pub use check::{Checked, Fault, check};
 pub use coco::{Coco, CocoMask};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
+pub use estimate::LongRun;
 pub use formats::{Extent, Format, LabelSetup};
 pub use generate::{Plan, generate};
 pub(crate) use journal::JOURNAL;

@@ -1,5 +1,6 @@
 //! The images of a dataset.
 
+use crate::bounds::Bounds;
 use crate::dataset::{Entry, Part, Writer};
 use crate::error::Result;
 use crate::io::{self, WriteOptions};
@@ -23,6 +24,12 @@ impl Default for Pictures {
     fn default() -> Self {
         let format = PictureFormat::default();
         Self { format, jpeg_quality: WriteOptions::default().jpeg_quality, exr: false }
+    }
+}
+
+impl Pictures {
+    pub(crate) fn check(&self) -> Result<()> {
+        Bounds::new(1.0, 100.0, "a JPEG's quality").check("jpeg_quality", self.jpeg_quality.into())
     }
 }
 

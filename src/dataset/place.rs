@@ -41,6 +41,7 @@ impl Place {
     fn open(path: &Path, image: [u32; 2]) -> Result<Self> {
         let label = camera::read_label(path)?;
         let solution = camera::solve(&label, &SolveOptions::default()).map_err(|e| Error::from(e).in_file(path))?;
+        camera::check_distance(&solution).map_err(|e| e.in_file(path))?;
         for warning in &solution.warnings {
             log::warn!("{}: {warning}", path.display());
         }
@@ -51,6 +52,11 @@ impl Place {
         let length = std::fs::metadata(&photo).map_err(|e| Error::file(&photo, e))?.len();
         let checksum = crc32fast::hash(format!("{length} {}", io::read_text(path)?).as_bytes());
         Ok(Self { background, checksum, photo, kept, image, plate: OnceLock::new() })
+    }
+
+    /// Name of the label's file.
+    pub(crate) fn label_name(&self) -> String {
+        format!("{}{LABEL_SUFFIX}", self.background.name)
     }
 
     /// The photo at the picture's size, scene-linear; read once.

@@ -52,12 +52,23 @@ impl Setup {
     pub fn read(path: impl AsRef<Path>, overrides: &[io::Override]) -> Result<Self> {
         let path = path.as_ref();
         let mut setup: Self = io::read_toml_with(path, overrides)?;
-        setup.scene.check().map_err(|e| e.within("scene").in_file(path))?;
-        setup.labels.check().map_err(|e| e.within("labels").in_file(path))?;
+        setup.check().map_err(|e| e.in_file(path))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         setup.assets = folder.join(&setup.assets);
         setup.backgrounds = folder.join(&setup.backgrounds);
         Ok(setup)
+    }
+
+    /// Fails on the first value that cannot be right, by its path: `render.subsamples`.
+    ///
+    /// # Errors
+    /// [`Error::Value`] with the value and what was expected.
+    pub fn check(&self) -> Result<()> {
+        self.scene.check().map_err(|e| e.within("scene"))?;
+        self.render.check().map_err(|e| e.within("render"))?;
+        self.labels.check().map_err(|e| e.within("labels"))?;
+        self.split.check().map_err(|e| e.within("split"))?;
+        self.pictures.check().map_err(|e| e.within("pictures"))
     }
 
     /// A recipe file that says what every default is, with its unit: to be changed by hand.
@@ -142,6 +153,51 @@ mod tests {
         assert_eq!(missing(&told, &all, ""), [""; 0], "not in template.toml, or otherwise");
         assert_eq!(missing(&all, &told, ""), [""; 0], "only in template.toml");
         assert_eq!(toml::from_str::<Setup>(Setup::template()).unwrap(), Setup::default());
+    }
+
+    /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
+    fn told_bounds() -> Vec<(String, [f64; 2])> {
+        let (mut table, mut comment, mut told) = (String::new(), String::new(), Vec::new());
+        for line in Setup::template().lines() {
+            if let Some(header) = line.strip_prefix('[') {
+                table = header.trim_matches(['[', ']']).replace("scene.lights", "scene.lights[0]");
+            } else if let Some((key, _)) = line.strip_prefix('#').and_then(|l| l.split_once(" = ")).filter(is_key) {
+                told.extend(ends(&comment).map(|ends| (format!("{table}.{key}"), ends)));
+                comment.clear();
+            } else {
+                comment = format!("{comment} {}", line.trim_start_matches('#'));
+            }
+        }
+        told
+    }
+
+    fn is_key((key, _): &(&str, &str)) -> bool {
+        key.chars().all(|c| c.is_ascii_lowercase() || c == '_')
+    }
+
+    fn ends(comment: &str) -> Option<[f64; 2]> {
+        let words: Vec<&str> = comment.split_whitespace().map(|w| w.trim_end_matches([',', '.', ';', ':'])).collect();
+        words.windows(3).rev().find_map(|w| Some([w[0].parse().ok().filter(|_| w[1] == "to")?, w[2].parse().ok()?]))
+    }
+
+    #[test]
+    fn the_template_tells_the_bounds_that_are_checked() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("recipe.toml");
+        io::write_text(&path, Setup::template()).unwrap();
+        let with = |key: &str, value: f64| Setup::read(&path, &[format!("{key}={value}").parse().unwrap()]);
+        let told = told_bounds();
+        assert!(told.len() > 35, "{told:?}");
+        for (key, [low, high]) in told {
+            for end in [low, high] {
+                assert!(with(&key, end).is_ok(), "{key} = {end}: {:?}", with(&key, end));
+            }
+            let beyond = [low - low.abs().max(1e-9).min(1.0), high + (0.01 * high).max(1.0)];
+            for value in beyond.map(|v| if low.fract() == 0.0 { v.floor() } else { v }) {
+                let e = with(&key, value).map(|_| ()).unwrap_err().to_string();
+                assert!(e.contains(&format!("{key}: ")), "{key} = {value}: {e}");
+            }
+        }
     }
 
     #[test]

@@ -121,7 +121,7 @@ impl ShardChoice {
             return slurm(id, of, number);
         }
         match (number("JOB_COMPLETION_INDEX")?, of) {
-            (Some(index), Some(of)) => Shard::new(index + 1, of),
+            (Some(index), Some(of)) => Shard::new(index.saturating_add(1), of),
             (Some(_), None) => Err(Error::value("shard", "Kubernetes does not tell the number of shards: say auto/N")),
             (None, _) => {
                 let what = "auto, but neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
@@ -147,7 +147,7 @@ fn slurm(id: u64, of: Option<u64>, number: impl Fn(&str) -> Result<Option<u64>>)
         return Err(Error::value("shard", "SLURM_ARRAY_TASK_COUNT is not set: say auto/N"));
     };
     match id.checked_sub(first) {
-        Some(past) => Shard::new(past / step + 1, of),
+        Some(past) => Shard::new((past / step).saturating_add(1), of),
         None => Err(Error::value("SLURM_ARRAY_TASK_ID", format!("{id}, expected at least {first}"))),
     }
 }
@@ -202,6 +202,10 @@ mod tests {
         assert!(within("auto", &pod).unwrap_err().contains("say auto/N"));
         assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).is_err());
         assert!(within("auto", &[]).unwrap_err().contains("neither"));
+        let last = [("JOB_COMPLETION_INDEX", "18446744073709551615")];
+        assert!(within("auto/4", &last).unwrap_err().contains("expected at most 4/4"));
+        let last = [("SLURM_ARRAY_TASK_ID", "18446744073709551615")];
+        assert!(within("auto/4", &last).unwrap_err().contains("expected at most 4/4"));
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Which samples are for training and which for validation.
 
+use crate::bounds::Bounds;
+use crate::error::Result;
 use serde::{Deserialize, Serialize};
 
 /// A part of a dataset.
@@ -53,6 +55,10 @@ pub enum SplitOrder {
 }
 
 impl Split {
+    pub(crate) fn check(&self) -> Result<()> {
+        Bounds::new(0.0, 100.0, "percent").check("val_percent", self.val_percent.into())
+    }
+
     /// The part of sample `k` of `count`.
     pub fn part(&self, k: u64, count: u64) -> Part {
         let percent = 100 - u128::from(self.val_percent.min(100));

@@ -1,6 +1,7 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
 use crate::asset::{Asset, Library, Panorama};
+use crate::bounds::{Bounds, LEAST_OBJECT_PX};
 use crate::camera;
 use crate::composite;
 use crate::dataset::place::Place;
@@ -12,7 +13,7 @@ use crate::label::{self, Labels};
 use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self, DeepImage};
-use crate::scene::{Background, Choice, Drawn, Draws, Look, Scene, Shot, stock};
+use crate::scene::{Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, stock};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -27,6 +28,8 @@ pub struct Studio {
     stock: Vec<Choice>,
 }
 
+/// Most pictures of a dataset.
+const MOST_PICTURES: f64 = 1e7;
 /// Scenes that will not settle are drawn again this often.
 const REDRAWS: usize = 8;
 
@@ -36,7 +39,29 @@ impl Studio {
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
     pub fn open(setup: Setup) -> Result<Self> {
-        Self::with_assets(setup, |_| true)
+        let studio = Self::with_assets(setup, |_| true)?;
+        studio.places.iter().try_for_each(|place| studio.check_size_in(place))?;
+        Ok(studio)
+    }
+
+    /// Refuses a place in whose pictures the median object is too small to have an outline: a length is in another unit.
+    fn check_size_in(&self, place: &Place) -> Result<()> {
+        let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
+        let mut lengths: Vec<f64> = photos.map(|photo| photo.record.object_m[0]).collect();
+        lengths.sort_by(f64::total_cmp);
+        let Some(&median) = lengths.get(lengths.len() / 2) else { return Ok(()) };
+        let (median, factor) = (median, self.setup.scene.scale.middle().min);
+        let CameraSource::Known(camera) = &place.background.camera else { return Ok(()) };
+        let px = camera.focal_px.x * median * factor / camera.center().coords.norm();
+        if px >= LEAST_OBJECT_PX {
+            return Ok(());
+        }
+        let ([w, h], label) = (self.setup.scene.image, self.setup.backgrounds.join(place.label_name()));
+        let what = format!(
+            "the median object of {median:.3} m is {px:.1} px long in pictures of {w} x {h}, expected at least \
+             {LEAST_OBJECT_PX}; are width_m and height_m in metres?"
+        );
+        Err(Error::value("surface", what).in_file(label))
     }
 
     /// The same for one scene that is there already: only cut-outs of the assets that it names are read, and known.
@@ -68,8 +93,9 @@ impl Studio {
     /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
     ///
     /// # Errors
-    /// Classes that the setup's policy for obstructed objects cannot add to.
+    /// Classes that the setup's policy for obstructed objects cannot add to; more pictures than a folder can hold.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
+        Bounds::new(0.0, MOST_PICTURES, "what a folder can hold").check("count", count as f64)?;
         let labels = &self.setup.labels;
         let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
         writers.extend(labels.writers(&self.setup.pictures));

@@ -65,7 +65,7 @@ pub struct CocoTruth {
 /// [`Error::File`] for a file that is not such a document; [`Error::Field`] for an annotation of an unknown image or
 /// category.
 pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
-    let document: Document = io::read_json(path)?;
+    let document: Document = io::read_json_data(path)?;
     let mut truth = CocoTruth::new(&document);
     for (i, a) in document.annotations.iter().enumerate() {
         let bbox = corners(a.bbox);
@@ -82,7 +82,7 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// # Errors
 /// As [`read_coco_truth`].
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
-    let found: Vec<Detection> = io::read_json(path)?;
+    let found: Vec<Detection> = io::read_json_data(path)?;
     for (i, d) in found.iter().enumerate() {
         let (image, class) =
             truth.place(d.image_id, d.category_id).map_err(|e| e.within(&format!("[{i}]")).in_file(path))?;

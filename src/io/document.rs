@@ -4,14 +4,13 @@ use super::atomic::write_bytes;
 use super::format::read_regular;
 use super::overrides::Override;
 use super::raster::one_line;
-use super::soundness::{endless_number, unique_keys};
+use super::soundness::{sound_json, unsound_toml};
+use super::{Limits, ReadOptions};
 use crate::{Error, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
-
-/// Larger documents are not written by hand nor by petcomp.
-const MOST_BYTES: u64 = 64 << 20;
+use toml::de::DeTable;
 
 /// Reads a TOML document.
 ///
@@ -52,8 +51,20 @@ pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) 
     if let Some(key) = document.keys().next() {
         return Err(Error::value(key, format!("no such table, expected {table}.NAME=VALUE")));
     }
-    serde_path_to_error::deserialize(settings).map_err(|e| {
-        let at = format!("{table}.{}", e.path());
+    from_value(settings, &format!("{table}."))
+}
+
+/// A document from a table in memory.
+///
+/// # Errors
+/// As [`parse_toml`].
+pub(crate) fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
+    from_value(table.into(), "")
+}
+
+fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T> {
+    serde_path_to_error::deserialize(value).map_err(|e| {
+        let at = format!("{outer}{}", e.path());
         let e: toml::de::Error = e.into_inner();
         Mistake { at: at.trim_end_matches('.').into(), line: None, what: e.message().into() }.into_error()
     })
@@ -88,13 +99,33 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     parse_json(&read_text(path)?).map_err(|e| e.in_file(path))
 }
 
+/// Reads a JSON document that holds data, not settings (truth and detections as COCO has them): as large as a picture may
+/// be ([`Limits::file_bytes`]).
+///
+/// # Errors
+/// As [`read_toml`].
+pub fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    let limits = ReadOptions::default().limits;
+    let text = text_of(path, read_regular(path, (limits.file_bytes, "file_bytes"), "text file")?)?;
+    parse_json(&text).map_err(|e| e.in_file(path))
+}
+
 /// Reads a text file.
 ///
 /// # Errors
-/// [`Error::File`] for a file that is missing, not regular, larger than 64 MiB or not UTF-8.
+/// [`Error::File`] for a file that is missing, not regular, larger than [`Limits::document_bytes`] or not UTF-8.
 pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
     let path = path.as_ref();
-    let bytes = read_regular(path, MOST_BYTES, "text file")?;
+    text_of(path, read_bytes(path)?)
+}
+
+/// The bytes of a text file.
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    read_regular(path, (ReadOptions::default().limits.document_bytes, "document_bytes"), "text file")
+}
+
+fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
     String::from_utf8(bytes).map_err(|_| Error::file(path, "not text (UTF-8)"))
 }
 
@@ -139,12 +170,11 @@ fn parse_toml_lines<T: DeserializeOwned>(text: &str, line: impl Fn(usize) -> Opt
         let line = e.span().and_then(|span| line(span.start));
         Mistake { at, line, what: e.message().into() }.into_error()
     };
-    let document = toml::Deserializer::parse(text).map_err(|e| mistake(e, String::new()))?;
-    if let Some((number, span)) = endless_number(text) {
-        let what = format!("{number}, expected a finite number");
+    let document = DeTable::parse(text).map_err(|e| mistake(e, String::new()))?;
+    if let Some((what, span)) = unsound_toml(&document, deepest()) {
         return Err(Mistake { at: String::new(), line: line(span.start), what }.into_error());
     }
-    serde_path_to_error::deserialize(document).map_err(|e| {
+    serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
         let at = e.path().to_string();
         mistake(e.into_inner(), at)
     })
@@ -162,12 +192,18 @@ pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
         let line = Some(e.line()).filter(|&line| line > 0);
         Mistake { at, line, what }.into_error()
     };
-    unique_keys(text).map_err(|e| mistake(&e, String::new()))?;
+    sound_json(text, deepest()).map_err(|e| mistake(&e, String::new()))?;
     let mut document = serde_json::Deserializer::from_str(text);
     let value =
         serde_path_to_error::deserialize(&mut document).map_err(|e| mistake(e.inner(), e.path().to_string()))?;
     document.end().map_err(|e| mistake(&e, String::new()))?;
     Ok(value)
+}
+
+/// Levels that a document may be nested.
+fn deepest() -> u64 {
+    let Limits { document_depth, .. } = ReadOptions::default().limits;
+    document_depth
 }
 
 fn line_of(text: &str, byte: usize) -> usize {
@@ -221,7 +257,8 @@ fn missing_key(said: &str) -> Option<&str> {
 /// Share of letters that agree from which a key is taken for a slip of the finger.
 const SIMILAR: f64 = 0.5;
 
-fn suggestion(key: &str, known: &[&str]) -> String {
+/// What was probably meant by a name that is none of those known.
+pub(crate) fn suggestion(key: &str, known: &[&str]) -> String {
     let likeness = |candidate: &&&str| strsim::damerau_levenshtein(key, candidate);
     let nearest = known.iter().min_by_key(likeness);
     match nearest {
@@ -332,15 +369,26 @@ mod tests {
     fn nesting_without_end_is_an_error_and_not_a_crash() {
         for depth in [200, 1_000_000] {
             let e = json(&"[".repeat(depth));
-            assert!(e.contains("recursion limit"), "{e}");
+            assert!(e.contains("nested deeper than 64 levels"), "{e}");
             let objects = "{\"a\":".repeat(depth);
-            assert!(json(&objects).contains("recursion limit"));
+            assert!(json(&objects).contains("nested deeper than 64 levels"));
         }
         for text in ["[", "{a=", "[["] {
             let e = toml(&format!("a = {}", text.repeat(100_000)));
             assert!(e.len() < 300 && !e.contains('\n'), "{e}");
         }
         assert!(toml(&format!("[{}a]", "a.".repeat(100_000))).len() < 300);
+    }
+
+    #[test]
+    fn a_document_beyond_the_limit_is_refused_and_data_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.json");
+        write_text(&path, &format!("[{}1]", "1,".repeat(8 << 20))).unwrap();
+        let told = read_json::<Vec<u8>>(&path).unwrap_err().to_string();
+        let expected = "16777219 bytes, over the limit of 16777216 (Limits::document_bytes; --limit document_bytes=N)";
+        assert!(told.ends_with(expected), "{told}");
+        assert_eq!(read_json_data::<Vec<u8>>(&path).unwrap().len(), (8 << 20) + 1);
     }
 
     #[test]

@@ -100,7 +100,7 @@ pub(super) struct Opened {
 impl Opened {
     /// Opens a picture file that is worth decoding: regular, not empty, of a known kind, not larger than allowed.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        let (file, bytes) = open_regular(path, limits.file_bytes, "picture")?;
+        let (file, bytes) = open_regular(path, (limits.file_bytes, "file_bytes"), "picture")?;
         let mut file = BufReader::new(file);
         let start = file.fill_buf().map_err(|e| Error::file(path, reason(&e)))?;
         let format = recognized(path, start).map_err(|e| Error::file(path, e))?;
@@ -133,15 +133,16 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
     }
 }
 
-/// Opens a regular file, and no other: a FIFO would block, a device never ends. Also gives its length.
-pub(super) fn open_regular(path: &Path, most: u64, expected: &str) -> Result<(File, u64)> {
+/// Opens a regular file, and no other: a FIFO would block, a device never ends. Also gives its length. `most` is the
+/// largest length, and the name of that limit.
+pub(super) fn open_regular(path: &Path, most: (u64, &str), expected: &str) -> Result<(File, u64)> {
     let failed = |e: std::io::Error| Error::file(path, reason(&e));
     // Looked at before it is opened, because opening may wait, and after, because it may be another by then.
     regular(&std::fs::metadata(path).map_err(failed)?, expected).map_err(|e| Error::file(path, e))?;
     let file = File::open(path).map_err(failed)?;
     let meta = file.metadata().map_err(failed)?;
     regular(&meta, expected)
-        .and_then(|()| at_most(meta.len(), most, "bytes", "file_bytes"))
+        .and_then(|()| at_most(meta.len(), most.0, "bytes", most.1))
         .map_err(|e| Error::file(path, e))?;
     Ok((file, meta.len()))
 }
@@ -155,9 +156,9 @@ fn regular(meta: &Metadata, expected: &str) -> std::result::Result<(), String> {
 }
 
 /// The bytes of a regular file.
-pub(super) fn read_regular(path: &Path, most: u64, expected: &str) -> Result<Vec<u8>> {
+pub(super) fn read_regular(path: &Path, most: (u64, &str), expected: &str) -> Result<Vec<u8>> {
     let (file, bytes) = open_regular(path, most, expected)?;
-    all_of(file, bytes, most).map_err(|e| Error::file(path, e))
+    all_of(file, bytes, most.0).map_err(|e| Error::file(path, e))
 }
 
 /// What is left of a file that had so many bytes when it was opened, and may have grown.

@@ -26,9 +26,22 @@ pub struct Limits {
     pub metadata_bytes: u64,
     /// Parts of a multi-part EXR. Default: 1,024.
     pub parts: u64,
-    /// Wall-clock seconds for a file in the OpenImageIO worker, and one more for each 10 million pixels. Default: 10.
+    /// Wall-clock seconds for a file in the OpenImageIO worker, and one more for each 10 million pixels; at most 86,400.
+    /// Default: 10.
     pub seconds: u64,
+    /// Bytes of a document (TOML, JSON, YAML, CSV): recipes, labels, manifests. Truth and detections in COCO's JSON are
+    /// data, for which `file_bytes` counts. Default: 16 MiB.
+    pub document_bytes: u64,
+    /// Levels that a document is nested, at most 80. Default: 64.
+    pub document_depth: u64,
 }
+
+/// A day: who waits longer does not wait for a picture.
+const MOST_SECONDS: u64 = 86_400;
+/// What the readers of TOML and JSON follow by themselves.
+const DEEPEST: u64 = 80;
+/// Other limits: sums of a few such numbers cannot wrap.
+const HIGHEST: u64 = 1 << 53;
 
 /// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very well.
 const RATIO_FREE_BYTES: u64 = 64 << 20;
@@ -45,6 +58,8 @@ impl Default for Limits {
             metadata_bytes: 64 << 20,
             parts: 1_024,
             seconds: 10,
+            document_bytes: 16 << 20,
+            document_depth: 64,
         }
     }
 }
@@ -80,24 +95,30 @@ impl Limits {
     /// These limits with another value for one of them.
     ///
     /// # Errors
-    /// [`Error::Value`] for a name that no limit has.
+    /// [`Error::Value`] for a name that no limit has, and for a value that none can have.
     pub fn with(mut self, raise: &Raise) -> Result<Self> {
-        let mut named: [(&str, &mut u64); 9] = [
-            ("side", &mut self.side),
-            ("pixels", &mut self.pixels),
-            ("channels", &mut self.channels),
-            ("decoded_bytes", &mut self.decoded_bytes),
-            ("ratio", &mut self.ratio),
-            ("file_bytes", &mut self.file_bytes),
-            ("metadata_bytes", &mut self.metadata_bytes),
-            ("parts", &mut self.parts),
-            ("seconds", &mut self.seconds),
+        let mut named: [(&str, &mut u64, u64); 11] = [
+            ("side", &mut self.side, HIGHEST),
+            ("pixels", &mut self.pixels, HIGHEST),
+            ("channels", &mut self.channels, HIGHEST),
+            ("decoded_bytes", &mut self.decoded_bytes, HIGHEST),
+            ("ratio", &mut self.ratio, HIGHEST),
+            ("file_bytes", &mut self.file_bytes, HIGHEST),
+            ("metadata_bytes", &mut self.metadata_bytes, HIGHEST),
+            ("parts", &mut self.parts, HIGHEST),
+            ("seconds", &mut self.seconds, MOST_SECONDS),
+            ("document_bytes", &mut self.document_bytes, HIGHEST),
+            ("document_depth", &mut self.document_depth, DEEPEST),
         ];
-        match named.iter_mut().find(|(name, _)| *name == raise.name) {
-            Some((_, limit)) => **limit = raise.value,
+        let Raise { name, value } = raise;
+        match named.iter_mut().find(|(known, ..)| known == name) {
+            Some((_, _, most)) if *value > *most => {
+                return Err(Error::value(name, format!("{value}, expected at most {most}")));
+            }
+            Some((_, limit, _)) => **limit = *value,
             None => {
-                let known = named.map(|(name, _)| name).join(", ");
-                return Err(Error::value(&raise.name, format!("no such limit, expected one of {known}")));
+                let known = named.map(|(name, ..)| name).join(", ");
+                return Err(Error::value(name, format!("no such limit, expected one of {known}")));
             }
         }
         Ok(self)
@@ -180,9 +201,12 @@ mod tests {
     fn every_limit_has_a_name() {
         let json = serde_json::to_value(Limits::default()).unwrap();
         for name in json.as_object().unwrap().keys() {
-            let raised = Limits::default().with(&format!("{name}=3K").parse().unwrap()).unwrap();
-            assert_eq!(serde_json::to_value(raised).unwrap()[name], 3072);
+            let raised = Limits::default().with(&format!("{name}=80").parse().unwrap()).unwrap();
+            assert_eq!(serde_json::to_value(raised).unwrap()[name], 80);
+            let most = format!("{name}={}", u64::MAX).parse::<Raise>().unwrap_err().to_string();
+            assert!(most.starts_with(&format!("{name}: 18446744073709551615, expected at most ")), "{most}");
         }
+        assert_eq!(Limits::default().with(&"side=3K".parse().unwrap()).unwrap().side, 3072);
         for bad in ["side", "side=x", "side=99999999999G", "sides=3", "side=-1", "side=G"] {
             assert!(bad.parse::<Raise>().is_err(), "{bad}");
         }

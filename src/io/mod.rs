@@ -75,9 +75,10 @@ mod write;
 
 pub use atomic::{copy, create_folder, relative, sync, write_through};
 pub use document::{
-    from_overrides, parse_json, parse_toml, read_document, read_json, read_text, read_toml, read_toml_with,
-    write_document, write_json, write_text, write_toml,
+    from_overrides, parse_json, parse_toml, read_document, read_json, read_json_data, read_text, read_toml,
+    read_toml_with, write_document, write_json, write_text, write_toml,
 };
+pub(crate) use document::{from_table, read_bytes, suggestion};
 pub use format::Format;
 pub use header::Header;
 pub(crate) use jpeg::through_jpeg;

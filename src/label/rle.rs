@@ -6,6 +6,7 @@
 //! sixth bit of a group says that another follows, the highest bit of the last group is the sign; a group is the
 //! character that many places after `0`.
 
+use crate::bounds::{LONGEST_SIDE_PX, MOST_PIXELS};
 use crate::label::Mask;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,11 @@ impl TryFrom<Text> for Mask {
 
     fn try_from(text: Text) -> Result<Self, String> {
         let [h, w] = text.size;
+        if w.max(h) > LONGEST_SIDE_PX || u64::from(w) * u64::from(h) > MOST_PIXELS {
+            return Err(format!(
+                "size: {w} x {h} pixels, expected at most {LONGEST_SIDE_PX} a side, {MOST_PIXELS} in all"
+            ));
+        }
         let runs = decode(&text.counts).ok_or("counts: not COCO's compressed run lengths")?;
         let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
         Mask::from_runs([w, h], runs).ok_or_else(|| format!("counts: runs of {sum} pixels in all, expected {w} x {h}"))
@@ -134,5 +140,11 @@ mod tests {
         assert!(read(r#"{"size":[2,3],"counts":"06"}"#).is_ok());
         assert!(read(r#"{"size":[2,2],"counts":"06"}"#).unwrap_err().contains("6 pixels in all, expected 2 x 2"));
         assert!(read(r#"{"size":[2,3],"counts":"\u0007"}"#).is_err());
+        let huge = |h: u32, w: u32| {
+            let counts = encode(&[u32::try_from(u64::from(h) * u64::from(w)).unwrap_or(u32::MAX)]);
+            read(&serde_json::json!({ "size": [h, w], "counts": counts }).to_string()).unwrap_err()
+        };
+        assert!(huge(1, u32::MAX).starts_with("size: 4294967295 x 1 pixels, expected at most 16384 a side"));
+        assert!(huge(16_384, 16_384).starts_with("size: 16384 x 16384 pixels"));
     }
 }

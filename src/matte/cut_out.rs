@@ -7,6 +7,7 @@ use super::plate::{PlateOptions, ScreenPlate};
 use super::remark::Remark;
 use super::screen::{is_keyable, screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
@@ -228,13 +229,15 @@ impl CutOutOptions {
         FILM_REACH_PX + (SOFT_REACH * self.soften_px).ceil() as usize
     }
 
-    fn check(&self) -> Result<()> {
-        if !(0.0..=100.0).contains(&self.soften_px) {
-            return Err(Error::value("soften_px", format!("{}, expected 0 to 100", self.soften_px)));
-        }
-        if self.longest_side < 16 {
-            return Err(Error::value("longest_side", format!("{}, expected at least 16", self.longest_side)));
-        }
+    /// Fails on the first option that cannot be right, of whichever stage.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.segment.check().map_err(|e| e.within("segment"))?;
+        self.plate.check().map_err(|e| e.within("plate"))?;
+        self.film.check().map_err(|e| e.within("film"))?;
+        self.key.check()?;
+        Bounds::new(0.0, 100.0, "pixels").check("soften_px", self.soften_px.into())?;
+        Bounds::new(0.0, 10_000.0, "pixels").check("margin_px", self.margin_px as f64)?;
+        Bounds::new(16.0, 32_768.0, "pixels").check("longest_side", self.longest_side as f64)?;
         if let Some(screen) = self.screen.filter(|c| !c.is_finite() || [c.r, c.g, c.b].iter().any(|v| *v < 0.0)) {
             return Err(Error::value("screen", format!("{screen:?}, expected numbers of at least 0")));
         }

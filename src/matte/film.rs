@@ -156,7 +156,7 @@ pub(super) fn film_of_part(
 }
 
 impl FilmOptions {
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         if let Some(flat) = self.flat
             && !<[f32; 3]>::from(flat).iter().all(|t| (0.001..=1.0).contains(t))
         {

@@ -202,7 +202,7 @@ const PHOTO_BLUR_PX: f32 = 3.0;
 const HIGHEST_DEGREE: usize = 6;
 
 impl PlateOptions {
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         if self.max_degree > HIGHEST_DEGREE {
             return Err(Error::value("max_degree", format!("{}, expected 0 to {HIGHEST_DEGREE}", self.max_degree)));
         }

@@ -18,6 +18,7 @@ pub use threshold::Threshold;
 
 use super::Outline;
 use super::remark::Remark;
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
@@ -225,7 +226,7 @@ fn steps(chosen: choose::Chosen, picture: &Image<LinearRgb>) -> Vec<Step> {
 impl SegmentOptions {
     /// # Errors
     /// [`Error::Value`] for the first option that cannot be right.
-    fn check(&self) -> Result<()> {
+    pub(super) fn check(&self) -> Result<()> {
         if let Some(levels) = self.levels.filter(|levels| !(2..=8).contains(levels)) {
             return Err(Error::value("levels", format!("{levels}, expected 2 to 8")));
         }
@@ -239,11 +240,8 @@ impl SegmentOptions {
         if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
             return Err(Error::value("tone.grey", format!("{weights:?}, expected weights of 0 to 1e6, not all 0")));
         }
-        if self.working_size < LEAST_WORKING_SIZE {
-            let what = format!("{}, expected at least {LEAST_WORKING_SIZE}", self.working_size);
-            return Err(Error::value("working_size", what));
-        }
-        Ok(())
+        let sizes = Bounds::new(LEAST_WORKING_SIZE as f64, 32_768.0, "pixels");
+        sizes.check("working_size", self.working_size as f64)
     }
 }
 

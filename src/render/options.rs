@@ -1,6 +1,7 @@
 //! How much work goes into a picture.
 
-use crate::error::Error;
+use crate::bounds::Bounds;
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// A named point on the curve of error against time.
@@ -24,13 +25,13 @@ pub enum Preset {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RenderOptions {
-    /// Samples along each side of a pixel. Default: 2.
+    /// Samples along each side of a pixel, 1 to 16. Default: 2.
     pub subsamples: usize,
-    /// Samples along each side of a light. Default: 3.
+    /// Samples along each side of a light, 1 to 32. Default: 3.
     pub light_samples: usize,
-    /// Directions that the environment is seen from. Default: 32.
+    /// Directions that the environment is seen from, 1 to 4096. Default: 32.
     pub ambient_samples: usize,
-    /// Distance of two samples of the irradiance, pixels. Default: 1.5.
+    /// Distance of two samples of the irradiance, 0.25 to 16 pixels. Default: 1.5.
     pub cell_px: f64,
 }
 
@@ -70,8 +71,25 @@ impl Default for RenderOptions {
     }
 }
 
+/// The reference preset has 6; beyond 16 the error is below a code of 8 bits, and the time without bounds.
+const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "the reference preset has 6");
+const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "the reference preset has 8");
+const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "the reference preset has 400");
+const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells see no more");
+
 impl RenderOptions {
-    /// The same with every number inside the range that works: at least one sample, cells of 0.25 to 16 pixels.
+    /// Fails on the first number that has no use: none at all, or so many that a picture takes hours.
+    ///
+    /// # Errors
+    /// [`Error::Value`] with the option's name.
+    pub fn check(&self) -> Result<()> {
+        SUBSAMPLES.check("subsamples", self.subsamples as f64)?;
+        LIGHT_SAMPLES.check("light_samples", self.light_samples as f64)?;
+        AMBIENT_SAMPLES.check("ambient_samples", self.ambient_samples as f64)?;
+        CELL_PX.check("cell_px", self.cell_px)
+    }
+
+    /// The same with every number inside the range that the arithmetic bears: at least one sample, cells of 0.25 to 16 pixels.
     pub(super) fn clamped(self) -> Self {
         let cell_px = if self.cell_px.is_finite() { self.cell_px.clamp(0.25, 16.0) } else { 1.0 };
         Self {
@@ -86,7 +104,7 @@ impl RenderOptions {
 impl std::str::FromStr for Preset {
     type Err = Error;
 
-    fn from_str(name: &str) -> Result<Self, Error> {
+    fn from_str(name: &str) -> Result<Self> {
         let known = Self::ALL.iter().find(|(n, _)| *n == name);
         known.map(|&(_, quality)| quality).ok_or_else(|| {
             let names = Self::ALL.map(|(n, _)| n).join(", ");
@@ -98,5 +116,25 @@ impl std::str::FromStr for Preset {
 impl From<Preset> for RenderOptions {
     fn from(quality: Preset) -> Self {
         quality.options()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_without_an_end_or_a_beginning_are_refused() {
+        assert!(Preset::ALL.iter().all(|(_, preset)| preset.options().check().is_ok()));
+        let usual = RenderOptions::default();
+        let told = |options: RenderOptions| options.check().unwrap_err().to_string();
+        let said = told(RenderOptions { subsamples: 1_000_000, ..usual });
+        assert_eq!(said, "subsamples: 1000000, expected 1 to 16 (the reference preset has 6)");
+        assert!(told(RenderOptions { subsamples: 0, ..usual }).starts_with("subsamples: 0, expected 1 to 16"));
+        assert!(told(RenderOptions { light_samples: usize::MAX, ..usual }).starts_with("light_samples: 1.8"));
+        assert!(told(RenderOptions { ambient_samples: 0, ..usual }).starts_with("ambient_samples: 0"));
+        for cell_px in [0.0, -1.0, f64::NAN] {
+            assert!(told(RenderOptions { cell_px, ..usual }).starts_with("cell_px: "), "{cell_px}");
+        }
     }
 }

@@ -1,48 +1,54 @@
 //! Is a scene possible? Asked once, before any work.
 
+use crate::bounds::{Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::UnitQuaternion;
 use crate::pixel::LinearRgb;
+use crate::scene::bounds::{
+    ALBEDO, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MOST_LIGHTS, MOST_OBJECTS, PHOTO_SIDE, PIXEL, PLACE,
+    RADIANCE, SHARE, TURN,
+};
 use crate::scene::hull::turn;
-use crate::scene::{AreaLight, CameraSource, Cast, Exposure, Object, Placement, Scene, Surface};
-use std::fmt::Debug;
+use crate::scene::{AreaLight, CameraSource, Cast, Exposure, Object, Placement, Scene};
+use std::fmt::{Debug, Display};
 
 /// How far the norm of a quaternion may be from 1: what six written decimals leave.
 const UNIT_TOLERANCE: f64 = 1e-5;
 /// How far a corner may be outside its card, as a share of the card: the same decimals.
 const OUTLINE_TOLERANCE: f64 = 1e-5;
+/// Most corners of an outline: contacts are sought between all of them.
+const MOST_OUTLINE: usize = 256;
 
 impl Scene {
-    /// Fails on the first value that cannot be right, by its path: `objects[3].size: [0.0, 0.1], expected two lengths
-    /// above 0`.
+    /// Fails on the first value that cannot be right, by its path: `objects[3].size: [0.0, 0.1], expected within 1e-9 to
+    /// 1000000 (metres)`.
     pub fn check(&self) -> Result<()> {
-        expect(self.image.iter().all(|&n| n > 0), "image", self.image, "two numbers above 0")?;
-        expect_lengths(self.surface.size, "surface.size")?;
-        let Surface { friction, restitution, .. } = self.surface;
-        expect(friction.is_finite() && friction >= 0.0, "surface.friction", friction, "at least 0")?;
-        expect((0.0..=1.0).contains(&restitution), "surface.restitution", restitution, "0 to 1")?;
+        check_image(self.image)?;
+        within(&self.surface.size, "surface.size", &LENGTH)?;
+        FRICTION.check("surface.friction", self.surface.friction)?;
+        SHARE.check("surface.restitution", self.surface.restitution)?;
         check_camera(&self.camera)?;
+        check_count(self.objects.len(), "objects", MOST_OBJECTS)?;
         each(&self.objects, "objects", check_object)?;
+        check_count(self.lights.len(), "lights", MOST_LIGHTS)?;
         each(&self.lights, "lights", check_light)?;
-        expect_color(self.ambient, "ambient")?;
+        check_color(self.ambient, "ambient")?;
         self.environment.as_ref().map_or(Ok(()), |map| map.check("environment"))?;
         check_cast(&self.cast)?;
         self.finish.check("finish")?;
         match self.exposure {
-            Exposure::Ev(ev) => expect(ev.is_finite(), "exposure.ev", ev, "a finite number"),
-            Exposure::MatchPlate { gain_ev } => {
-                expect(gain_ev.is_finite(), "exposure.match_plate.gain_ev", gain_ev, "a finite number")
-            }
+            Exposure::Ev(ev) => EV.check("exposure.ev", ev),
+            Exposure::MatchPlate { gain_ev } => EV.check("exposure.match_plate.gain_ev", gain_ev),
             Exposure::MatchSurface { albedo, gain_ev } => {
-                expect(is_length(albedo), "exposure.match_surface.albedo", albedo, "a number above 0")?;
-                expect(gain_ev.is_finite(), "exposure.match_surface.gain_ev", gain_ev, "a finite number")
+                ALBEDO.check("exposure.match_surface.albedo", albedo)?;
+                EV.check("exposure.match_surface.gain_ev", gain_ev)
             }
         }
     }
 }
 
-fn expect(claim: bool, at: &str, found: impl Debug, expected: &str) -> Result<()> {
+fn expect(claim: bool, at: &str, found: impl Debug, expected: impl Display) -> Result<()> {
     if claim { Ok(()) } else { Err(Error::value(at, format!("{found:?}, expected {expected}"))) }
 }
 
@@ -50,38 +56,41 @@ fn each<T>(items: &[T], name: &str, check: impl Fn(&T, &str) -> Result<()>) -> R
     items.iter().enumerate().try_for_each(|(i, item)| check(item, &format!("{name}[{i}]")))
 }
 
-fn is_length(x: f64) -> bool {
-    x.is_finite() && x > 0.0
+/// All of some numbers within bounds.
+fn within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
+    expect(numbers.iter().all(|&x| bounds.contains(x)), at, numbers, format_args!("within {bounds}"))
 }
 
-fn expect_lengths(size: [f64; 2], at: &str) -> Result<()> {
-    expect(size.iter().all(|&x| is_length(x)), at, size, "two lengths above 0")
+/// A picture that can be held in memory.
+pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
+    let [w, h] = image;
+    expect(w > 0 && h > 0, "image", image, "two numbers above 0")?;
+    let fits = w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS;
+    expect(fits, "image", image, format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all"))
 }
 
-fn expect_finite(numbers: &[f64], at: &str) -> Result<()> {
-    expect(numbers.iter().all(|x| x.is_finite()), at, numbers, "finite numbers")
+/// No more of something than scenes may have.
+pub(super) fn check_count(count: usize, at: &str, most: usize) -> Result<()> {
+    expect(count <= most, at, count, format_args!("at most {most}"))
 }
 
-fn expect_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
+fn check_color(color: LinearRgb, at: &str) -> Result<()> {
+    let channels: [f32; 3] = color.into();
+    within(&channels.map(f64::from), at, &RADIANCE)
+}
+
+fn check_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
     let norm = rotation.as_ref().norm();
-    let found = format_args!("a quaternion of norm {norm}").to_string();
     if (norm - 1.0).abs() <= UNIT_TOLERANCE {
         return Ok(());
     }
-    Err(Error::value(at, format!("{found}, expected norm 1")))
+    Err(Error::value(at, format!("a quaternion of norm {norm}, expected norm 1")))
 }
 
-fn expect_color(color: LinearRgb, at: &str) -> Result<()> {
-    let LinearRgb { r, g, b } = color;
-    expect([r, g, b].iter().all(|x| x.is_finite() && *x >= 0.0), at, [r, g, b], "three numbers of at least 0")
-}
-
-fn check_cast(cast: &Cast) -> Result<()> {
+pub(super) fn check_cast(cast: &Cast) -> Result<()> {
     match *cast {
-        Cast::Known(color) => expect_color(color, "cast.known"),
-        Cast::MatchSurface { share } => {
-            expect(share.is_finite(), "cast.match_surface.share", share, "a finite number, 0 to 1 as a rule")
-        }
+        Cast::Known(color) => check_color(color, "cast.known"),
+        Cast::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
     }
 }
 
@@ -90,51 +99,49 @@ fn check_camera(camera: &CameraSource) -> Result<()> {
         CameraSource::Known(camera) => check_known_camera(camera),
         CameraSource::Rectangle { corners_px, photo, focal_px } => {
             let at = |field: &str| format!("camera.rectangle.{field}");
-            expect(
-                corners_px.iter().flatten().all(|x| x.is_finite()),
-                &at("corners_px"),
-                corners_px,
-                "finite numbers",
-            )?;
-            expect(photo.iter().all(|&n| n > 0), &at("photo"), photo, "two numbers above 0")?;
-            focal_px.map_or(Ok(()), |f| expect(is_length(f), &at("focal_px"), f, "a length above 0"))
+            within(corners_px.as_flattened(), &at("corners_px"), &PIXEL)?;
+            within(&photo.map(f64::from), &at("photo"), &PHOTO_SIDE)?;
+            focal_px.map_or(Ok(()), |f| FOCAL.check(&at("focal_px"), f))
         }
     }
 }
 
 fn check_known_camera(camera: &Camera) -> Result<()> {
-    expect(camera.image.iter().all(|&n| n > 0), "camera.known.image", camera.image, "two numbers above 0")?;
-    expect_lengths([camera.focal_px.x, camera.focal_px.y], "camera.known.focal_px")?;
-    expect_finite(camera.principal_px.coords.as_slice(), "camera.known.principal_px")?;
+    let at = |field: &str| format!("camera.known.{field}");
+    within(&camera.image.map(f64::from), &at("image"), &PHOTO_SIDE)?;
+    within(camera.focal_px.as_slice(), &at("focal_px"), &FOCAL)?;
+    within(camera.principal_px.coords.as_slice(), &at("principal_px"), &PIXEL)?;
     let pose = &camera.camera_from_world;
-    expect_finite(pose.translation.vector.as_slice(), "camera.known.camera_from_world.translation")?;
-    expect_unit(&pose.rotation, "camera.known.camera_from_world.rotation")
+    within(pose.translation.vector.as_slice(), &at("camera_from_world.translation"), &PLACE)?;
+    check_unit(&pose.rotation, &at("camera_from_world.rotation"))
 }
 
 fn check_object(object: &Object, at: &str) -> Result<()> {
     let field = |name: &str| format!("{at}.{name}");
     expect(!object.asset.is_empty(), &field("asset"), &object.asset, "the name of an asset")?;
-    expect_lengths(object.size, &field("size"))?;
-    expect(is_length(object.thickness), &field("thickness"), object.thickness, "a length above 0")?;
+    within(&object.size, &field("size"), &LENGTH)?;
+    LENGTH.check(&field("thickness"), object.thickness)?;
     check_outline(&object.outline, object.size, &field("outline"))?;
-    expect(is_length(object.mass), &field("mass"), object.mass, "a mass above 0")?;
-    let grade = [object.grade.hue_deg, object.grade.saturation, object.grade.value].map(f64::from);
-    expect_finite(&grade, &field("grade"))?;
+    MASS.check(&field("mass"), object.mass)?;
+    TURN.check(&field("grade.hue_deg"), object.grade.hue_deg.into())?;
+    GRADE.check(&field("grade.saturation"), object.grade.saturation.into())?;
+    GRADE.check(&field("grade.value"), object.grade.value.into())?;
     match &object.placement {
         Placement::At(pose) => {
-            expect_finite(pose.translation.vector.as_slice(), &field("placement.at.translation"))?;
-            expect_unit(&pose.rotation, &field("placement.at.rotation"))
+            within(pose.translation.vector.as_slice(), &field("placement.at.translation"), &PLACE)?;
+            check_unit(&pose.rotation, &field("placement.at.rotation"))
         }
         Placement::Drop { above, height, rotation } => {
-            expect_finite(above, &field("placement.drop.above"))?;
-            expect(is_length(*height), &field("placement.drop.height"), height, "a length above 0")?;
-            expect_unit(rotation, &field("placement.drop.rotation"))
+            within(above, &field("placement.drop.above"), &PLACE)?;
+            LENGTH.check(&field("placement.drop.height"), *height)?;
+            check_unit(rotation, &field("placement.drop.rotation"))
         }
     }
 }
 
 /// A convex polygon inside its card, or nothing.
 fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
+    check_count(outline.len(), at, MOST_OUTLINE)?;
     let inside = |p: &[f64; 2]| (0..2).all(|axis| p[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE));
     let around = outline.len() != 1 && outline.len() != 2 && outline.iter().all(inside);
     let left = (0..outline.len()).all(|i| turn(outline, i) > 0.0);
@@ -143,19 +150,19 @@ fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
 
 fn check_light(light: &AreaLight, at: &str) -> Result<()> {
     let field = |name: &str| format!("{at}.{name}");
-    expect_finite(&light.position, &field("position"))?;
-    expect_finite(&light.target, &field("target"))?;
+    within(&light.position, &field("position"), &PLACE)?;
+    within(&light.target, &field("target"), &PLACE)?;
     expect(light.position != light.target, &field("target"), light.target, "another point than its position")?;
-    expect_lengths(light.size, &field("size"))?;
-    expect(light.power.is_finite() && light.power >= 0.0, &field("power"), light.power, "at least 0")?;
-    expect_color(light.color, &field("color"))
+    within(&light.size, &field("size"), &LENGTH)?;
+    RADIANCE.check(&field("power"), light.power)?;
+    check_color(light.color, &field("color"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geom::Pose;
-    use crate::scene::{Grade, LightShape};
+    use crate::scene::{Grade, LightShape, Surface};
 
     fn scene() -> Scene {
         let object = Object {
@@ -207,15 +214,19 @@ mod tests {
     #[test]
     fn a_complaint_names_the_field_the_value_and_what_was_expected() {
         let told = complaint(|s| s.objects[1].size = [0.0, 0.1]);
-        assert_eq!(told, "objects[1].size: [0.0, 0.1], expected two lengths above 0");
+        assert_eq!(told, "objects[1].size: [0.0, 0.1], expected within 1e-9 to 1000000 (metres)");
         assert_eq!(complaint(|s| s.image = [0, 3]), "image: [0, 3], expected two numbers above 0");
+        let told = complaint(|s| s.image = [60_000, 40_000]);
+        assert_eq!(told, "image: [60000, 40000], expected at most 16384 a side and 67108864 in all");
+        let told = complaint(|s| s.objects = vec![s.objects[0].clone(); 1_001]);
+        assert_eq!(told, "objects: 1001, expected at most 1000");
         let told = complaint(|s| s.surface.restitution = 1.5);
-        assert_eq!(told, "surface.restitution: 1.5, expected 0 to 1");
+        assert_eq!(told, "surface.restitution: 1.5, expected 0 to 1 (a share)");
         let clockwise = [[0.0, 0.0], [0.0, 0.05], [0.1, 0.0]];
         let told = complaint(|s| s.objects[0].outline = clockwise.into());
         assert!(told.starts_with("objects[0].outline: [[0.0, 0.0], "), "{told}");
         let told = complaint(|s| s.lights[0].power = f64::NAN);
-        assert_eq!(told, "lights[0].power: NaN, expected at least 0");
+        assert_eq!(told, "lights[0].power: NaN, expected 0 to 1e9 (what single precision adds up)");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::asset::Panorama;
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
+use crate::scene::bounds::{RADIANCE, TURN};
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -34,18 +35,11 @@ impl Environment {
 
     /// Fails on the first value that cannot be right.
     pub(super) fn check(&self, at: &str) -> Result<()> {
-        let expect = |claim: bool, field: &str, what: String| {
-            if claim { Ok(()) } else { Err(Error::value(format!("{at}.{field}"), what)) }
-        };
-        expect(!self.file.is_empty(), "file", "\"\", expected the name of a picture".into())?;
-        let turn = self.rotation_deg;
-        expect(turn.is_finite(), "rotation_deg", format!("{turn:?}, expected a finite number"))?;
-        let strength = self.strength;
-        expect(
-            strength.is_finite() && strength >= 0.0,
-            "strength",
-            format!("{strength:?}, expected a number of at least 0"),
-        )
+        if self.file.is_empty() {
+            return Err(Error::value(format!("{at}.file"), "\"\", expected the name of a picture"));
+        }
+        TURN.check(&format!("{at}.rotation_deg"), self.rotation_deg)?;
+        RADIANCE.check(&format!("{at}.strength"), self.strength)
     }
 }
 
@@ -115,8 +109,8 @@ impl EnvironmentRanges {
             let what = "\"\", expected the name of a picture";
             return Err(Error::value(format!("environment.files[{i}]"), what));
         }
-        self.rotation_deg.check("environment.rotation_deg", -f64::INFINITY, f64::INFINITY)?;
-        self.strength.check("environment.strength", 0.0, f64::INFINITY)
+        self.rotation_deg.check("environment.rotation_deg", &TURN)?;
+        self.strength.check("environment.strength", &RADIANCE)
     }
 }
 
@@ -145,7 +139,7 @@ mod tests {
         let told = |e: Environment| e.check("environment").unwrap_err().to_string();
         assert!(told(Environment { file: String::new(), ..good.clone() }).starts_with("environment.file"));
         assert!(told(Environment { rotation_deg: f64::NAN, ..good.clone() }).starts_with("environment.rotation_deg"));
-        assert!(told(Environment { strength: -1.0, ..good }).starts_with("environment.strength: -1.0"));
+        assert!(told(Environment { strength: -1.0, ..good }).starts_with("environment.strength: -1,"));
     }
 
     #[test]

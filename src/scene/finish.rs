@@ -3,6 +3,7 @@
 use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
+use crate::scene::bounds::{EV, GAIN, KELVIN, NOISE, SHARPENING};
 use crate::scene::{Draws, Range};
 use serde::{Deserialize, Serialize};
 
@@ -61,19 +62,17 @@ impl Finish {
 
     /// Fails on the first value that cannot be right.
     pub(super) fn check(&self, at: &str) -> Result<()> {
-        let expect = |claim: bool, field: &str, value: &dyn std::fmt::Debug, wanted: &str| {
-            let told = || Error::value(format!("{at}.{field}"), format!("{value:?}, expected {wanted}"));
-            claim.then_some(()).ok_or_else(told)
-        };
-        expect(self.exposure_ev.is_finite(), "exposure_ev", &self.exposure_ev, "a finite number")?;
+        let field = |name: &str| format!("{at}.{name}");
+        EV.check(&field("exposure_ev"), self.exposure_ev)?;
         let gains: [f32; 3] = self.white_balance.into();
-        let positive = gains.iter().all(|g| g.is_finite() && *g > 0.0);
-        expect(positive, "white_balance", &gains, "three numbers above 0")?;
-        let sharpening = self.sharpening;
-        expect(sharpening.is_finite() && sharpening >= 0.0, "sharpening", &sharpening, "a number of at least 0")?;
+        if !gains.iter().all(|gain| GAIN.contains((*gain).into())) {
+            let what = format!("{gains:?}, expected three numbers of {GAIN}");
+            return Err(Error::value(field("white_balance"), what));
+        }
+        SHARPENING.check(&field("sharpening"), self.sharpening)?;
         let Noise::Known { shot, read } = self.noise else { return Ok(()) };
-        let fine = [shot, read].iter().all(|v| v.is_finite() && *v >= 0.0);
-        expect(fine, "noise.known", &[shot, read], "numbers of at least 0")
+        NOISE.check(&field("noise.known.shot"), shot)?;
+        NOISE.check(&field("noise.known.read"), read)
     }
 }
 
@@ -93,8 +92,6 @@ pub struct FinishRanges {
 
 /// Temperature of the white of Rec. 709, kelvin: nothing is changed there.
 pub(super) const NEUTRAL_K: f64 = 6504.0;
-/// Temperatures that [`planckian`] knows.
-pub(super) const KELVIN: [f64; 2] = [1667.0, 25_000.0];
 
 impl Default for FinishRanges {
     fn default() -> Self {
@@ -119,9 +116,9 @@ impl FinishRanges {
     }
 
     pub(super) fn check(&self) -> Result<()> {
-        self.exposure_ev.check("finish.exposure_ev", -32.0, 32.0)?;
-        self.white_k.check("finish.white_k", KELVIN[0], KELVIN[1])?;
-        self.sharpening.check("finish.sharpening", 0.0, f64::INFINITY)?;
+        self.exposure_ev.check("finish.exposure_ev", &EV)?;
+        self.white_k.check("finish.white_k", &KELVIN)?;
+        self.sharpening.check("finish.sharpening", &SHARPENING)?;
         Finish { noise: self.noise, ..Finish::default() }.check("finish")
     }
 }
@@ -164,7 +161,7 @@ mod tests {
         assert!(told(Finish { exposure_ev: f64::NAN, ..good }).starts_with("finish.exposure_ev: NaN"));
         assert!(told(Finish { white_balance: LinearRgb::BLACK, ..good }).starts_with("finish.white_balance"));
         let noise = Noise::Known { shot: -1.0, read: 0.0 };
-        assert!(told(Finish { noise, ..good }).starts_with("finish.noise.known: [-1.0, 0.0]"));
+        assert!(told(Finish { noise, ..good }).starts_with("finish.noise.known.shot: -1,"));
         let read: Finish = toml::from_str("noise = 'match_plate'").unwrap();
         assert_eq!(read.noise, Noise::MatchPlate);
     }

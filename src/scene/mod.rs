@@ -5,6 +5,7 @@
 //! [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each turn their own unknown into the known one
 //! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
 
+pub(crate) mod bounds;
 mod check;
 pub mod cycles;
 mod draw;

@@ -1,5 +1,6 @@
 //! What a recipe says instead of a number.
 
+use crate::bounds::{Bounds, number};
 use crate::error::{Error, Result};
 use crate::scene::{Distribution, Draws};
 use serde::{Deserialize, Serialize};
@@ -68,32 +69,22 @@ impl Range {
         count
     }
 
-    /// Fails unless `lowest <= min <= max <= highest`, all finite.
-    pub(crate) fn check(&self, at: &str, lowest: f64, highest: f64) -> Result<()> {
-        let ordered = lowest <= self.min && self.min <= self.max && self.max <= highest;
-        if ordered && self.min.is_finite() && self.max.is_finite() {
+    /// Fails unless `min <= max`, both within bounds.
+    pub(crate) fn check(&self, at: &str, bounds: &Bounds) -> Result<()> {
+        let Self { min, max } = *self;
+        if min == max {
+            return bounds.check(at, min);
+        }
+        if min < max && bounds.contains(min) && bounds.contains(max) {
             return Ok(());
         }
-        let bounds = match (lowest.is_finite(), highest.is_finite()) {
-            (true, true) => format!(" between {lowest} and {highest}"),
-            (true, false) => format!(" of at least {lowest}"),
-            (false, true) => format!(" of at most {highest}"),
-            (false, false) => String::new(),
-        };
-        Err(Error::value(at, format!("[{}, {}], expected [min, max]{bounds}", self.min, self.max)))
+        let found = format!("[{}, {}]", number(min), number(max));
+        Err(Error::value(at, format!("{found}, expected [min, max] within {bounds}{}", bounds.question(max))))
     }
 
-    /// Fails unless `0 < min <= max`, both finite.
-    pub(crate) fn check_positive(&self, at: &str) -> Result<()> {
-        if self.min > 0.0 && self.min <= self.max && self.max.is_finite() {
-            return Ok(());
-        }
-        Err(Error::value(at, format!("[{}, {}], expected [min, max] above 0", self.min, self.max)))
-    }
-
-    /// Fails unless both ends are whole numbers from 0 to `highest`.
-    pub(crate) fn check_count(&self, at: &str, highest: usize) -> Result<()> {
-        self.check(at, 0.0, highest as f64)?;
+    /// Fails unless both ends are whole numbers within bounds.
+    pub(crate) fn check_count(&self, at: &str, bounds: &Bounds) -> Result<()> {
+        self.check(at, bounds)?;
         if self.min.fract() == 0.0 && self.max.fract() == 0.0 {
             return Ok(());
         }
@@ -143,15 +134,14 @@ mod tests {
 
     #[test]
     fn a_range_that_cannot_be_right_is_told() {
-        let told = |e: Result<()>| e.unwrap_err().to_string();
-        assert_eq!(
-            told(Range::new(2.0, 1.0).check("scale", 0.0, 9.0)),
-            "scale: [2, 1], expected [min, max] between 0 and 9"
-        );
-        assert_eq!(
-            told(Range::fixed(f64::NAN).check_positive("scale")),
-            "scale: [NaN, NaN], expected [min, max] above 0"
-        );
-        assert_eq!(told(Range::new(1.0, 2.5).check_count("objects", 9)), "objects: [1, 2.5], expected whole numbers");
+        let (scale, told) = (Bounds::new(0.0, 9.0, ""), |e: Result<()>| e.unwrap_err().to_string());
+        let expected = "scale: [2, 1], expected [min, max] within 0 to 9";
+        assert_eq!(told(Range::new(2.0, 1.0).check("scale", &scale)), expected);
+        assert_eq!(told(Range::fixed(-1.0).check("scale", &scale)), "scale: -1, expected 0 to 9");
+        assert!(Range::fixed(f64::NAN).check("scale", &scale).is_err());
+        let said = told(Range::new(1.0, 2.5).check_count("objects", &scale));
+        assert_eq!(said, "objects: [1, 2.5], expected whole numbers");
+        let gap = Range::new(5.0, 20.0).check("gap", &Bounds::metres(0.0, 1.0, ""));
+        assert_eq!(told(gap), "gap: [5, 20], expected [min, max] within 0 to 1 m; is it in centimetres?");
     }
 }

@@ -1,9 +1,14 @@
 //! Recipe: the distributions that scenes are drawn from.
 
+use crate::bounds::Bounds;
 use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
-use crate::scene::finish::KELVIN;
+use crate::scene::bounds::{
+    ALBEDO, EV, FRICTION, GRADE, KELVIN, LIGHT_HEIGHT, LIGHT_OFFSET, LIGHT_SIZE, MOST_LIGHTS, MOST_OBJECTS, RADIANCE,
+    SCALE, SHARE, TURN,
+};
+use crate::scene::check::{check_cast, check_count, check_image};
 use crate::scene::stack::{Column, Start};
 use crate::scene::{
     AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, FinishRanges, Grade, LightShape,
@@ -11,9 +16,6 @@ use crate::scene::{
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-
-/// Most objects in one scene.
-const MOST_OBJECTS: usize = 10_000;
 
 /// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this document.
 ///
@@ -300,26 +302,25 @@ impl Recipe {
 
     /// Fails on the first value that cannot be right.
     pub fn check(&self) -> Result<()> {
-        let any = f64::INFINITY;
-        if self.image.contains(&0) {
-            return Err(Error::value("image", format!("{:?}, expected two numbers above 0", self.image)));
-        }
-        self.objects.check_count("objects", MOST_OBJECTS)?;
-        Range::fixed(self.negatives).check("negatives", 0.0, 1.0)?;
-        self.scale.check_positive("scale")?;
+        check_image(self.image)?;
+        self.objects.check_count("objects", &Bounds::new(0.0, MOST_OBJECTS as f64, "what comes to rest in a heap"))?;
+        SHARE.check("negatives", self.negatives)?;
+        self.scale.check("scale", &SCALE)?;
         self.start.check()?;
-        self.grade.hue_deg.check("grade.hue_deg", -any, any)?;
-        self.grade.saturation.check("grade.saturation", 0.0, any)?;
-        self.grade.value.check("grade.value", 0.0, any)?;
+        self.grade.hue_deg.check("grade.hue_deg", &TURN)?;
+        self.grade.saturation.check("grade.saturation", &GRADE)?;
+        self.grade.value.check("grade.value", &GRADE)?;
+        check_count(self.lights.len(), "lights", MOST_LIGHTS)?;
         self.lights.iter().enumerate().try_for_each(|(i, light)| light.check(&format!("lights[{i}]")))?;
-        self.ambient.check("ambient", 0.0, any)?;
+        self.ambient.check("ambient", &RADIANCE)?;
         self.environment.check()?;
-        self.gain_ev.check("gain_ev", -32.0, 32.0)?;
-        self.friction.check("friction", 0.0, any)?;
-        self.restitution.check("restitution", 0.0, 1.0)?;
+        self.gain_ev.check("gain_ev", &EV)?;
+        self.friction.check("friction", &FRICTION)?;
+        self.restitution.check("restitution", &SHARE)?;
         if let Some(albedo) = self.surface_albedo {
-            Range::fixed(albedo).check_positive("surface_albedo")?;
+            ALBEDO.check("surface_albedo", albedo)?;
         }
+        check_cast(&self.cast)?;
         self.finish.check()?;
         self.settle.check()
     }
@@ -410,15 +411,15 @@ impl LightRanges {
     }
 
     fn check(&self, at: &str) -> Result<()> {
-        self.height.check_positive(&format!("{at}.height"))?;
-        self.offset.check(&format!("{at}.offset"), 0.0, f64::INFINITY)?;
-        self.azimuth_deg.check(&format!("{at}.azimuth_deg"), -f64::INFINITY, f64::INFINITY)?;
-        self.size.check_positive(&format!("{at}.size"))?;
-        self.power.check(&format!("{at}.power"), 0.0, f64::INFINITY)?;
+        self.height.check(&format!("{at}.height"), &LIGHT_HEIGHT)?;
+        self.offset.check(&format!("{at}.offset"), &LIGHT_OFFSET)?;
+        self.azimuth_deg.check(&format!("{at}.azimuth_deg"), &TURN)?;
+        self.size.check(&format!("{at}.size"), &LIGHT_SIZE)?;
+        self.power.check(&format!("{at}.power"), &RADIANCE)?;
         if let Some(range) = &self.temperature_k {
-            range.check(&format!("{at}.temperature_k"), KELVIN[0], KELVIN[1])?;
+            range.check(&format!("{at}.temperature_k"), &KELVIN)?;
         }
-        (0..3).try_for_each(|c| self.color[c].check(&format!("{at}.color[{c}]"), 0.0, f64::INFINITY))
+        (0..3).try_for_each(|c| self.color[c].check(&format!("{at}.color[{c}]"), &RADIANCE))
     }
 }
 
@@ -527,7 +528,10 @@ mod tests {
         assert!(told("selections = 0").contains("expected \"unique\" or a number above 0"));
         assert!(told("selections = 'all'").contains("expected \"unique\" or a number above 0"));
         let wrong: Recipe = toml::from_str("lights = [{ size = [-1, 1] }]").unwrap();
-        assert_eq!(wrong.check().unwrap_err().to_string(), "lights[0].size: [-1, 1], expected [min, max] above 0");
+        assert_eq!(
+            wrong.check().unwrap_err().to_string(),
+            "lights[0].size: [-1, 1], expected [min, max] within 0.0001 to 1000 m (from a point to a sky)"
+        );
     }
 
     #[test]
@@ -632,7 +636,7 @@ mod tests {
         let wrong = Recipe { restitution: Range::new(0.0, 1.2), ..Recipe::default() };
         assert_eq!(
             wrong.check().unwrap_err().to_string(),
-            "restitution: [0, 1.2], expected [min, max] between 0 and 1"
+            "restitution: [0, 1.2], expected [min, max] within 0 to 1 (a share)"
         );
     }
 

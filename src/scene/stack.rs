@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
+use crate::scene::bounds::{ACROSS, GAP, TILT, TURN};
 use crate::scene::fall::half_extent;
 use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
 use nalgebra::Unit;
@@ -48,12 +49,12 @@ impl Start {
     }
 
     pub(super) fn check(&self) -> Result<()> {
-        self.x.check("start.x", -1.0, 1.0)?;
-        self.y.check("start.y", -1.0, 1.0)?;
-        self.yaw_deg.check("start.yaw_deg", -f64::INFINITY, f64::INFINITY)?;
-        self.tilt_deg.check("start.tilt_deg", -180.0, 180.0)?;
-        self.tilt_axis_deg.check("start.tilt_axis_deg", -f64::INFINITY, f64::INFINITY)?;
-        self.gap.check_positive("start.gap")
+        self.x.check("start.x", &ACROSS)?;
+        self.y.check("start.y", &ACROSS)?;
+        self.yaw_deg.check("start.yaw_deg", &TURN)?;
+        self.tilt_deg.check("start.tilt_deg", &TILT)?;
+        self.tilt_axis_deg.check("start.tilt_axis_deg", &TURN)?;
+        self.gap.check("start.gap", &GAP)
     }
 }
 

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 pub(crate) enum Command {
     /// Cut out all photos of a list
     Build {
-        /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and px_per_metre or length
+        /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and length (metres, by a tape
+        /// measure) or px_per_metre
         list: PathBuf,
         /// Asset folder
         #[arg(short, long, value_name = "FOLDER")]
@@ -51,18 +52,21 @@ pub(crate) struct Add {
     /// Name of the asset; by default that of the first photo
     #[arg(long)]
     name: Option<String>,
-    /// Name of its class
+    /// Name of its class; one that the folder does not have is added behind those that it has
     #[arg(long)]
     class: String,
+    /// Names of all classes in order: a label's number is the place in this list, and no other class is taken
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    classes: Vec<String>,
     /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty screen
     #[arg(long, value_name = "SCREEN", default_value = "auto")]
     screen: ScreenSource,
-    /// Scale of the photos, pixels per metre
-    #[arg(long, value_name = "PX_PER_M", required_unless_present_any = ["length", "size"])]
-    scale: Option<f64>,
-    /// Or: length of the object's longest side, metres
-    #[arg(long, value_name = "METRES", conflicts_with = "scale")]
+    /// Length of the object's longest side, metres, 0.005 to 5: what a tape measure says
+    #[arg(long, value_name = "METRES", required_unless_present_any = ["scale", "size"])]
     length: Option<f64>,
+    /// Or: scale of the photos at half the object's height, pixels per metre
+    #[arg(long, value_name = "PX_PER_M", conflicts_with = "length")]
+    scale: Option<f64>,
     /// Or: width and height of the object, metres
     #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2, conflicts_with_all = ["scale", "length"])]
     size: Option<Vec<f64>>,
@@ -108,6 +112,9 @@ pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Resu
     built.refused.iter().for_each(|refusal| log::warn!("{refusal}"));
     built.doubtful.iter().for_each(|doubt| common.say(format_args!("look at {doubt}")));
     common.say(format_args!("{}: {} photos, {} assets", folder.display(), built.photos, built.assets));
+    let (lengths, errors) = spread(&built.lengths);
+    common.say(format_args!("objects are {lengths} mm long, to {errors} mm; `petcomp asset list` shows each"));
+    tell_classes(&built.classes, "`classes = [...]` in the list", common);
     sheet(folder, &[], common)
 }
 
@@ -128,7 +135,7 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
     let first = args.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default();
     let name = args.name.clone().unwrap_or_else(|| first.to_string_lossy().into_owned());
     let add = AddPhoto { screen: args.screen.clone(), ..AddPhoto::new(name, &args.class, scale) };
-    let add = AddPhoto { options: args.quality.cut_out(add.options), ..add };
+    let add = AddPhoto { options: args.quality.cut_out(add.options), classes: args.classes.clone(), ..add };
     let mut added = Vec::new();
     for photo in &args.photos {
         let photo = asset::add_photo(&args.output, photo, &add)?;
@@ -138,7 +145,25 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
         record.doubts.iter().for_each(|doubt| common.say(format_args!("look at {}: {doubt}", record.file)));
         added.push(photo);
     }
+    tell_classes(&Manifest::read(&args.output)?.classes, "--classes", common);
     sheet(&args.output, &added, common)
+}
+
+/// Smallest and largest of lengths, and the same of their errors, millimetres.
+fn spread(lengths: &[[f64; 2]]) -> (String, String) {
+    let of = |i: usize| {
+        let ends = lengths.iter().fold([f64::MAX, 0.0], |[low, high], l| [l[i].min(low), l[i].max(high)]);
+        ends.map(|metres| 1e3 * metres)
+    };
+    let ([short, long], [fine, coarse]) = (of(0), of(1));
+    (format!("{short:.0} to {long:.0}"), format!("{fine:.1} to {coarse:.1}"))
+}
+
+/// Says which number each class has, and what says it otherwise.
+fn tell_classes(classes: &[String], how: &str, common: &Common) {
+    let numbered = classes.iter().enumerate().map(|(i, class)| format!("{i} {class}"));
+    let list = numbered.collect::<Vec<_>>().join(", ");
+    common.say(format_args!("classes {list}; another order: {how}"));
 }
 
 fn list(folder: &Path) -> anyhow::Result<()> {
@@ -146,7 +171,8 @@ fn list(folder: &Path) -> anyhow::Result<()> {
         for photo in &asset.photos {
             let [length, width] = photo.object_m.map(|m| m * 1e3);
             let (name, class, sure) = (&asset.name, &asset.class, photo.confidence);
-            println!("{name:12} {class:10} {length:4.0} x {width:3.0} mm  {sure:.2}  {}", photo.file);
+            let error = photo.error_m * 1e3;
+            println!("{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {sure:.2}  {}", photo.file);
         }
     }
     Ok(())

@@ -195,6 +195,7 @@ fn read_label(path: &Path, size: Option<[f64; 2]>) -> petcomp::Result<Label> {
     match size {
         Some(size) => {
             let label = camera::from_labelme(&io::read_text(path)?, size).map_err(|e| e.in_file(path))?;
+            camera::check_size(&label)?;
             camera::with_photo(label, path)
         }
         None => camera::read_label(path),
@@ -202,7 +203,9 @@ fn read_label(path: &Path, size: Option<[f64; 2]>) -> petcomp::Result<Label> {
 }
 
 fn solved(path: &Path, label: &Label) -> petcomp::Result<Solution> {
-    camera::solve(label, &SolveOptions::default()).map_err(|e| located(e, path))
+    let solution = camera::solve(label, &SolveOptions::default()).map_err(|e| located(e, path))?;
+    camera::check_distance(&solution).map_err(|e| e.in_file(path))?;
+    Ok(solution)
 }
 
 fn located(error: camera::SolveError, path: &Path) -> Error {

@@ -1,9 +1,11 @@
 //! What every subcommand shares: global flags, progress, interruption, and how an error ends the program.
 
+use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
 use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
 use std::io::IsTerminal;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,8 +15,8 @@ use std::time::{Duration, Instant};
 #[derive(clap::Args)]
 #[command(next_help_heading = GLOBAL_HEADING)]
 pub(crate) struct Common {
-    /// Worker threads; 0 is one per core
-    #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true)]
+    /// Worker threads, at most 1024; 0 is one per core
+    #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true, value_parser = count(0..=1024))]
     threads: usize,
     /// Say nothing but results and errors
     #[arg(short, long, global = true, conflicts_with = "verbose")]
@@ -26,7 +28,8 @@ pub(crate) struct Common {
     /// Say more; twice for everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
-    /// Let pictures ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60, ...
+    /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
+    /// document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
     limits: Vec<Raise>,
     /// What reads pictures that petcomp's own decoders do not know
@@ -54,6 +57,11 @@ fn shortened(command: clap::Command, global: &[clap::Arg], line: &str) -> clap::
 fn flag(arg: &clap::Arg) -> String {
     let long = || arg.get_long().map(|long| format!("--{long}"));
     arg.get_short().map(|short| format!("-{short}")).or_else(long).unwrap_or_default()
+}
+
+/// A number of things within a range: more of them would take days, or all of the memory.
+pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(range)
 }
 
 /// Where OpenImageIO runs.

@@ -20,6 +20,8 @@ pub(crate) struct Args {
     /// Seed; the same one gives the same files
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    consent: dataset::Consent,
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
@@ -33,7 +35,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     asset::build(&list, &args.output.join("assets"), common)?;
     let folder = args.output.join("dataset");
     let studio = Studio::open(Setup::read(&recipe, &[])?)?;
-    let report = dataset::make(&studio, &studio.plan(args.count, args.seed, &folder)?, common)?;
+    let report = dataset::make(&studio, &studio.plan(args.count, args.seed, &folder)?, &args.consent, common)?;
     let sheet = args.output.join("contact_sheet.png");
     io::write(&sheet, &contact_sheet_of(&folder, args.count as usize, &Default::default())?)?;
     dataset::tell(&report, common);

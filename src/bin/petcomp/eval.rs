@@ -1,6 +1,6 @@
 //! `petcomp eval`: detections against the truth.
 
-use crate::common::Common;
+use crate::common::{Common, count};
 use petcomp::dataset::YoloSet;
 use petcomp::eval::{Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found, read_yolo_truth};
 use petcomp::report::eval::{self, EvalReportOptions, Run};
@@ -20,8 +20,8 @@ pub(crate) struct Args {
     /// Width and height of all images in pixels, for YOLO labels without images beside them
     #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2)]
     size: Vec<u32>,
-    /// Rounds of the bootstrap over images
-    #[arg(long, value_name = "N", default_value_t = EvalReportOptions::default().rounds)]
+    /// Rounds of the bootstrap over images, at most 100000
+    #[arg(long, value_name = "N", default_value_t = EvalReportOptions::default().rounds, value_parser = count(0..=100_000))]
     rounds: usize,
     /// Seed of the bootstrap
     #[arg(long, default_value_t = 0)]

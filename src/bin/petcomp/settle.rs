@@ -3,7 +3,7 @@
 use crate::common::Common;
 use petcomp::settle::{SettleOptions, preview, settle_traced, trace_csv};
 use petcomp::{Quality, Scene, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -29,7 +29,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
     let options = match &args.options {
-        Some(path) => io::read_toml(path)?,
+        Some(path) => read_options(path)?,
         None => SettleOptions::default(),
     };
     let options = args.quality.map_or(options, |quality| quality.settle(options));
@@ -48,4 +48,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     }
     common.say(format_args!("{}: at rest after {seconds:.2} s, {rejected} tries thrown away", args.output.display()));
     Ok(())
+}
+
+fn read_options(path: &Path) -> petcomp::Result<SettleOptions> {
+    let options: SettleOptions = io::read_toml(path)?;
+    options.check().map_err(|e| e.in_file(path))?;
+    Ok(options)
 }

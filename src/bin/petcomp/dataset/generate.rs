@@ -1,15 +1,18 @@
 //! `petcomp dataset generate`, `ablate` and `merge`: datasets are made.
 
 use crate::common::{Common, RecipeArgs, interruption};
-use petcomp::dataset::{self, Numbers, Plan, Report, Setup, ShardChoice, Studio, contact_sheet_of};
-use petcomp::{Quality, io};
+use petcomp::dataset::{self, LongRun, Numbers, Plan, Progress, Report, Setup, ShardChoice, Studio, contact_sheet_of};
+use petcomp::{Error, Quality, io};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Number of pictures of the whole dataset
+    /// Number of pictures of the whole dataset, at most 10 million
     #[arg(short = 'n', long, value_name = "N", required_unless_present_any = ["only", "preview"])]
     count: Option<u64>,
     /// Seed; the same one gives the same files
@@ -32,9 +35,20 @@ pub(crate) struct Args {
     /// Slurm array or the indexed Kubernetes job that this runs in
     #[arg(long, value_name = "I/N", conflicts_with = "preview")]
     shard: Option<ShardChoice>,
-    /// Make the first N images at half their width and height, and a sheet of them: a look in seconds
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "16", conflicts_with = "count")]
+    /// Make the first N images (of those that -n asks for) at half their width and height, and a sheet of them: a look in
+    /// seconds
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "16")]
     preview: Option<u64>,
+    #[command(flatten)]
+    consent: Consent,
+}
+
+/// Whether a job may take very long.
+#[derive(clap::Args)]
+pub(crate) struct Consent {
+    /// Go on with a job that would take more than an hour; without, it stops with an estimate after its first pictures
+    #[arg(long)]
+    yes: bool,
 }
 
 #[derive(clap::Args)]
@@ -50,6 +64,8 @@ pub(crate) struct Ablate {
     /// Folder to write a folder for each into
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+    #[command(flatten)]
+    consent: Consent,
 }
 
 #[derive(clap::Args)]
@@ -70,7 +86,8 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if args.preview.is_some() {
         setup = setup.preview();
     }
-    let count = args.preview.or(args.count).unwrap_or_else(|| args.only.map_or(0, |k| k + 1));
+    let count = args.count.or(args.preview).unwrap_or_else(|| args.only.map_or(0, |k| k.saturating_add(1)));
+    let count = args.preview.map_or(count, |first| first.min(count));
     let numbers = numbers(args)?;
     let folder = match numbers {
         Numbers::Shard(shard) => args.output.join(shard.folder()),
@@ -82,7 +99,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     }
     let studio = Studio::open(setup)?;
     let plan = Plan { numbers, ..studio.plan(count, args.seed, &folder)? };
-    tell(&make(&studio, &plan, common)?, common);
+    tell(&make(&studio, &plan, &args.consent, common)?, common);
     if args.preview.is_some() {
         let sheet = folder.join("sheet.png");
         io::write(&sheet, &contact_sheet_of(&folder, count as usize, &Default::default())?)?;
@@ -110,7 +127,7 @@ pub(crate) fn ablate(args: &Ablate, common: &Common) -> anyhow::Result<()> {
         if args.count > 0 {
             let studio = Studio::open(Setup::read(&recipe, &[])?)?;
             let plan = studio.plan(args.count, args.seed, folder.join("dataset"))?;
-            tell(&make(&studio, &plan, common)?, common);
+            tell(&make(&studio, &plan, &args.consent, common)?, common);
         }
     }
     Ok(())
@@ -125,11 +142,45 @@ pub(crate) fn merge(args: &Merge, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes the dataset, showing progress, and stops between two pictures when interrupted.
-pub(crate) fn make(studio: &Studio, plan: &Plan, common: &Common) -> anyhow::Result<Report> {
+/// Makes the dataset, showing progress, and stops between two pictures when interrupted, or when the first ones tell that
+/// it takes longer than an hour and nobody has agreed to that.
+pub(crate) fn make(studio: &Studio, plan: &Plan, consent: &Consent, common: &Common) -> anyhow::Result<Report> {
     let progress = common.progress("pictures");
     let sample = |k| studio.sample(plan.seed, k);
-    Ok(dataset::generate(plan, sample, &|p| progress.at(p.done, p.count), interruption())?)
+    let (last, done) = (Mutex::new(None), AtomicBool::new(false));
+    let show = |p: Progress| {
+        progress.at(p.done, p.count);
+        *last.lock().unwrap_or_else(PoisonError::into_inner) = Some(p);
+    };
+    std::thread::scope(|scope| {
+        let watch = scope.spawn(|| if consent.yes { None } else { watch(&last, &done) });
+        let made = dataset::generate(plan, sample, &show, interruption());
+        done.store(true, Ordering::Relaxed);
+        watch.thread().unpark();
+        match (made, watch.join()) {
+            (Err(Error::Interrupted { what }), Ok(Some(long))) => {
+                anyhow::bail!("this would take {long}; say --yes to go on ({what})")
+            }
+            (made, _) => Ok(made?),
+        }
+    })
+}
+
+/// How often it is looked how long the rest will take.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// Stops the run when it is going to take longer than an hour, and tells how long.
+fn watch(last: &Mutex<Option<Progress>>, done: &AtomicBool) -> Option<LongRun> {
+    let (began, threads) = (Instant::now(), rayon::current_num_threads());
+    while !done.load(Ordering::Relaxed) {
+        let progress = *last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(long) = progress.and_then(|progress| LongRun::of(&progress, began.elapsed(), threads)) {
+            interruption().store(true, Ordering::Relaxed);
+            return Some(long);
+        }
+        std::thread::park_timeout(LOOK_EVERY);
+    }
+    None
 }
 
 /// Prints what is in the folder.

@@ -6,7 +6,7 @@ mod recipe;
 mod select;
 mod training;
 
-pub(crate) use generate::{make, tell};
+pub(crate) use generate::{Consent, make, tell};
 
 use crate::common::Common;
 

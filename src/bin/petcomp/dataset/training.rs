@@ -1,6 +1,7 @@
 //! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
-use crate::common::Common;
+use crate::common::{Common, count};
+use clap::value_parser;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::read_yolo_truth;
 use petcomp::io;
@@ -22,8 +23,8 @@ pub(crate) struct Sets {
     /// Twice the paper's weights: alpha = R / (R + S) is then plain concatenation
     #[arg(long)]
     normalize: bool,
-    /// Images in a batch
-    #[arg(long, value_name = "N", default_value_t = BatchOptions::default().size)]
+    /// Images in a batch, 1 to 65536
+    #[arg(long, value_name = "N", default_value_t = BatchOptions::default().size, value_parser = count(1..=65_536))]
     batch: usize,
 }
 
@@ -37,8 +38,8 @@ impl Sets {
 pub(crate) struct Batches {
     #[command(flatten)]
     sets: Sets,
-    /// Epochs to plan
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    /// Epochs to plan, 1 to 10000
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u64).range(1..=10_000))]
     epochs: u64,
     /// Seed of the order
     #[arg(long, default_value_t = 0)]
@@ -52,11 +53,11 @@ pub(crate) struct Batches {
 pub(crate) struct Kit {
     #[command(flatten)]
     sets: Sets,
-    /// Epochs of a training
-    #[arg(long, value_name = "N", default_value_t = 300)]
+    /// Epochs of a training, 1 to 100000
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = value_parser!(u64).range(1..=100_000))]
     epochs: u64,
-    /// Trainings per variant
-    #[arg(long, value_name = "N", default_value_t = 6)]
+    /// Trainings per variant, 1 to 1000
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = value_parser!(u64).range(1..=1000))]
     seeds: u64,
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER")]
@@ -67,11 +68,11 @@ pub(crate) struct Kit {
 pub(crate) struct Anchors {
     /// Folder of the dataset
     folder: PathBuf,
-    /// Number of anchors
-    #[arg(short = 'n', long, value_name = "N", default_value_t = 9)]
+    /// Number of anchors, 1 to 1000
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 9, value_parser = count(1..=1000))]
     count: usize,
-    /// Longer side of the images in training, pixels
-    #[arg(long, value_name = "PX", default_value_t = 640)]
+    /// Longer side of the images in training, pixels, 1 to 65536
+    #[arg(long, value_name = "PX", default_value_t = 640, value_parser = value_parser!(u32).range(1..=65_536))]
     side: u32,
     /// Seed of the clustering
     #[arg(long, default_value_t = 0)]

@@ -9,8 +9,13 @@ pub(crate) struct Args {
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
-    /// Simulated views per kind of camera, noise and tilt
-    #[arg(long, value_name = "N", default_value_t = CameraReportOptions::default().views)]
+    /// Simulated views per kind of camera, noise and tilt, 1 to 100000
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = CameraReportOptions::default().views,
+        value_parser = clap::value_parser!(u64).range(1..=100_000)
+    )]
     views: u64,
 }
 

@@ -1,6 +1,6 @@
 //! `petcomp report render`: the renderer against Cycles and against the quadrature of its definition.
 
-use crate::common::Common;
+use crate::common::{Common, count};
 use petcomp::report::render::{self, RenderReportOptions};
 use std::path::PathBuf;
 
@@ -12,8 +12,14 @@ pub(crate) struct Args {
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
-    /// Width and height of the pictures
-    #[arg(long, num_args = 2, value_names = ["W", "H"], default_values_t = [320, 240])]
+    /// Width and height of the pictures, 1 to 4096
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["W", "H"],
+        default_values_t = [320, 240],
+        value_parser = clap::value_parser!(u32).range(1..=4096)
+    )]
     size: Vec<u32>,
     /// Cycles' pictures of the same scene and size, made by tests/benches/peers/render.py
     #[arg(long, value_name = "FOLDER", default_value = "report/cycles")]
@@ -21,8 +27,8 @@ pub(crate) struct Args {
     /// Golden scenes to compare as well
     #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
     golden: PathBuf,
-    /// Renderings per preset, of which the median is told
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    /// Renderings per preset, of which the median is told, 1 to 1000
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
     repeats: usize,
 }
 

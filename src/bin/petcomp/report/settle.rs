@@ -10,8 +10,13 @@ pub(crate) struct Args {
     /// Folder to write
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
-    /// Heaps for each setting of the solver
-    #[arg(long, value_name = "N", default_value_t = SettleReportOptions::default().heaps)]
+    /// Heaps for each setting of the solver, 1 to 10000
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = SettleReportOptions::default().heaps,
+        value_parser = clap::value_parser!(u64).range(1..=10_000)
+    )]
     heaps: u64,
     /// Instead, settle heaps for a comparison with another program: writes their scenes, ends and times as JSON
     #[arg(long, value_name = "FILE")]

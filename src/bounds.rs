@@ -1,0 +1,124 @@
+//! Which numbers a setting may have, and why no others.
+
+use crate::error::{Error, Result};
+
+/// The numbers that a setting may have, both ends included, and the reason for them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounds {
+    lowest: f64,
+    highest: f64,
+    unit: &'static str,
+    why: &'static str,
+}
+
+/// Length of an object, metres: what a person photographs on a screen and drops on a surface.
+pub(crate) const OBJECT: Bounds = Bounds::metres(0.005, 5.0, "objects are 5 mm to 5 m long");
+/// Width of an object, metres.
+pub(crate) const WIDTH: Bounds = Bounds::metres(1e-4, 5.0, "objects are 5 mm to 5 m long");
+/// Thickness of the body that falls, metres.
+pub(crate) const THICKNESS: Bounds = Bounds::metres(1e-5, 1.0, "from a film to a box");
+/// Mass of an object, kilograms.
+pub(crate) const MASS: Bounds = Bounds::new(1e-6, 1e4, "kilograms");
+/// Pixels of a photo for a metre: of objects of such lengths that fill some of it.
+pub(crate) const PX_PER_METRE: Bounds = Bounds::new(1.0, 1e7, "pixels for a metre");
+/// Side of the surface that objects lie on, metres.
+pub(crate) const SURFACE: Bounds = Bounds::metres(0.01, 50.0, "objects of 5 mm to 5 m lie on it");
+/// Distance of a camera from the surface's centre, metres.
+pub(crate) const CAMERA: Bounds = Bounds::metres(0.001, 50.0, "farther off no object is seen");
+/// What a picture shows with fewer pixels has no outline to be labelled.
+pub(crate) const LEAST_OBJECT_PX: f64 = 8.0;
+
+/// Longest side of a picture that is made, pixels: what shadows and coverage are tested to.
+pub(crate) const LONGEST_SIDE_PX: u32 = 16_384;
+/// Most pixels of a picture that is made: a thread takes about 100 bytes for each.
+pub(crate) const MOST_PIXELS: u64 = 64 << 20;
+
+/// Millimetres and centimetres in a metre, with their names.
+const SMALLER_UNITS: [(f64, &str); 2] = [(1000.0, "millimetre"), (100.0, "centimetre")];
+/// From so many on a length that should be in metres is rather in millimetres than in centimetres.
+const RATHER_MILLIMETRES: f64 = 100.0;
+
+impl Bounds {
+    /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is the quantity's own.
+    pub(crate) const fn new(lowest: f64, highest: f64, why: &'static str) -> Self {
+        Self { lowest, highest, unit: "", why }
+    }
+
+    /// Lengths, metres: a value that would do in millimetres or centimetres is asked about.
+    pub(crate) const fn metres(lowest: f64, highest: f64, why: &'static str) -> Self {
+        Self { lowest, highest, unit: " m", why }
+    }
+
+    /// The number is one of them; NaN is not.
+    pub(crate) fn contains(&self, value: f64) -> bool {
+        (self.lowest..=self.highest).contains(&value)
+    }
+
+    /// # Errors
+    /// [`Error::Value`] for a number that is none of them.
+    pub(crate) fn check(&self, at: &str, value: f64) -> Result<()> {
+        if self.contains(value) {
+            return Ok(());
+        }
+        Err(Error::value(at, format!("{}, expected {self}{}", number(value), self.question(value))))
+    }
+
+    /// Asks about the unit where another one would make sense of a length.
+    pub(crate) fn question(&self, value: f64) -> String {
+        match self.unit_meant(value) {
+            Some(unit) if !self.unit.is_empty() => format!("; is it in {unit}s?"),
+            _ => String::new(),
+        }
+    }
+
+    /// The unit in which a value that is too large for metres would be within bounds.
+    pub(crate) fn unit_meant(&self, value: f64) -> Option<&'static str> {
+        let [millimetres, centimetres] = SMALLER_UNITS;
+        let first = if value >= RATHER_MILLIMETRES { millimetres } else { centimetres };
+        let order = [first, millimetres, centimetres];
+        let meant = order.into_iter().find(|(in_a_metre, _)| self.contains(value / in_a_metre));
+        meant.filter(|_| value > self.highest).map(|(_, unit)| unit)
+    }
+}
+
+impl std::fmt::Display for Bounds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { lowest, highest, unit, why } = *self;
+        write!(f, "{} to {}{unit}", number(lowest), number(highest))?;
+        if why.is_empty() { Ok(()) } else { write!(f, " ({why})") }
+    }
+}
+
+/// A number without hundreds of zeros.
+pub(crate) fn number(value: f64) -> String {
+    let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(bounds: Bounds, value: f64) -> String {
+        bounds.check("x", value).map_or_else(|e| e.to_string(), |()| "fine".into())
+    }
+
+    #[test]
+    fn both_ends_belong_to_bounds_and_no_number_does_not() {
+        let bounds = Bounds::new(1.0, 16.0, "a reason");
+        assert_eq!([1.0, 16.0].map(|v| told(bounds, v)), ["fine"; 2]);
+        assert_eq!(told(bounds, 0.0), "x: 0, expected 1 to 16 (a reason)");
+        assert_eq!(told(bounds, f64::NAN), "x: NaN, expected 1 to 16 (a reason)");
+        assert_eq!(told(Bounds::new(1e-5, 1e9, ""), 1e-300), "x: 1e-300, expected 1e-5 to 1e9");
+    }
+
+    #[test]
+    fn a_length_in_another_unit_is_asked_about() {
+        let object = Bounds::metres(0.005, 5.0, "");
+        assert_eq!(told(object, 229.0), "x: 229, expected 0.005 to 5 m; is it in millimetres?");
+        assert_eq!(told(object, 22.9), "x: 22.9, expected 0.005 to 5 m; is it in centimetres?");
+        assert_eq!(told(object, 1e308), "x: 1e308, expected 0.005 to 5 m");
+        assert_eq!(told(object, 0.001), "x: 0.001, expected 0.005 to 5 m");
+        assert_eq!(told(Bounds::new(0.0, 5.0, ""), 229.0), "x: 229, expected 0 to 5");
+    }
+}
