@@ -14,8 +14,10 @@ use make::{Folder, palette_tiff};
 use petcomp::io::{self, ReadOptions};
 use petcomp::{Image, LinearRgb};
 use processes::{status, workers};
+use std::io::{BufRead, BufReader};
+use std::process::{Command, Stdio};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// They run one at a time.
@@ -83,7 +85,7 @@ fn killed_workers_spoil_no_picture() {
             while !done.load(Ordering::Relaxed) {
                 if let Some(pid) = workers().last() {
                     // It may be gone already.
-                    let _ = std::process::Command::new("sh").args(["-c", &format!("kill -9 {pid}")]).output();
+                    let _ = Command::new("sh").args(["-c", &format!("kill -9 {pid}")]).output();
                     *killed.lock().unwrap() += 1;
                 }
                 std::thread::sleep(Duration::from_millis(40));
@@ -111,6 +113,61 @@ fn killed_workers_spoil_no_picture() {
     println!("{} workers killed, {} of 160 readings refused", killed.lock().unwrap(), refused.lock().unwrap());
     assert!(read(&folder).is_ok(), "nothing works any more");
     assert!(workers().len() <= 8, "more workers than readers ever asked at once");
+}
+
+/// Starts so many workers, eight at a time, while every core has other work, and tells how those ended that gave no
+/// greeting or did not end well.
+fn deaths_at_start(count: usize) -> Vec<String> {
+    let (started, done) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let dead = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..2 * std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| while !done.load(Ordering::Relaxed) {});
+        }
+        let starters: Vec<_> = (0..8)
+            .map(|_| {
+                scope.spawn(|| {
+                    while started.fetch_add(1, Ordering::Relaxed) < count {
+                        dead.lock().unwrap().extend(death_at_start());
+                    }
+                })
+            })
+            .collect();
+        let outcomes: Vec<_> = starters.into_iter().map(|starter| starter.join()).collect();
+        done.store(true, Ordering::Relaxed);
+        assert!(outcomes.iter().all(Result::is_ok));
+    });
+    dead.into_inner().unwrap()
+}
+
+/// A worker's own start, without the parent that would try again.
+fn death_at_start() -> Option<String> {
+    let mut worker = Command::new(env!("CARGO_BIN_EXE_petcomp-oiio-worker"));
+    worker.arg("{}").stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+    let mut child = worker.spawn().unwrap();
+    let mut greeting = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut greeting).unwrap();
+    // Nobody asks any more.
+    drop(child.stdin.take());
+    let status = child.wait().unwrap();
+    let lives = greeting.starts_with("{\"petcomp\"") && status.success();
+    (!lives).then(|| format!("{greeting:?}, {status}"))
+}
+
+/// Threads of the libraries that have not run yet when the filter falls ended 40 of 100 of them.
+#[test]
+fn no_worker_dies_at_its_start() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    assert_eq!(deaths_at_start(24), [""; 0]);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn none_of_a_thousand_workers_dies_at_its_start() {
+    let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
+    let dead = deaths_at_start(1_000);
+    println!("1000 workers started under load, {} died", dead.len());
+    assert_eq!(dead, [""; 0]);
 }
 
 /// A file as bytes is all a worker gets: one whose name says nothing, in a folder it could not open.

@@ -100,8 +100,10 @@ mod linux {
         }
     }
 
-    /// What a decoder that opens nothing calls: its own memory, its pipes, the clock, and its end.
-    const CALLS: [i64; 34] = [
+    /// What a decoder that opens nothing calls: its own memory, its pipes, the clock, and its end. And what a thread calls
+    /// before its first line (`rseq`, `set_robust_list`): libraries start theirs when they are loaded, and on a busy machine
+    /// those have not run yet when the filter falls; the C library ends the process where `rseq` is refused.
+    const CALLS: [i64; 36] = [
         libc::SYS_read,
         libc::SYS_readv,
         libc::SYS_write,
@@ -118,6 +120,8 @@ mod linux {
         libc::SYS_mremap,
         libc::SYS_madvise,
         libc::SYS_futex,
+        libc::SYS_rseq,
+        libc::SYS_set_robust_list,
         libc::SYS_rt_sigaction,
         libc::SYS_rt_sigprocmask,
         libc::SYS_rt_sigreturn,

@@ -34,8 +34,8 @@
 //!   a mistake is named with its line.
 //!
 //! Not promised: that decoders have no mistakes ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
-//! and Debian does not mend them), that a kernel without Landlock or seccomp confines as well (one warning says so), that
-//! the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
+//! and Debian does not mend them), that a kernel without Landlock or seccomp confines as well (one warning says so;
+//! [`Fallback::StrictWorker`] refuses), that the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
 //! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be told from real ones.
 
 mod atomic;
@@ -127,6 +127,8 @@ pub enum Fallback {
     /// OpenImageIO in a process of its own, where petcomp was built with the feature `oiio`.
     #[default]
     Worker,
+    /// As `Worker`, but such files are refused where the system cannot confine it, with Landlock and seccomp.
+    StrictWorker,
     /// OpenImageIO in this process, for people who trust their files: [`oiio::in_process`].
     #[cfg(feature = "oiio")]
     InProcess(oiio::Linked),
@@ -338,7 +340,8 @@ fn header_elsewhere(path: &Path, what: String, options: &ReadOptions) -> Result<
 fn told(source: &Source, what: String, options: &ReadOptions, ask: Ask) -> std::result::Result<Told, Refusal> {
     match options.fallback {
         Fallback::Nothing => Err(Refusal::Unsupported(what)),
-        Fallback::Worker => worker::ask(source, &options.limits, ask),
+        Fallback::Worker => worker::ask(source, &options.limits, false, ask),
+        Fallback::StrictWorker => worker::ask(source, &options.limits, true, ask),
         Fallback::InProcess(linked) => (linked.0)(source, &options.limits, ask),
     }
 }

@@ -33,10 +33,12 @@ pub(super) struct Question {
 }
 
 /// What the worker says first.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Ready {
     /// Version of the program it belongs to.
     pub(super) petcomp: String,
+    /// Version of the OpenImageIO that it links.
+    pub(super) openimageio: String,
     /// Confinement that the system could not give it.
     pub(super) missing: Vec<String>,
 }

@@ -11,22 +11,18 @@ use std::io::{BufRead, BufReader, Read, Result, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Asks the worker for its version instead.
-pub(super) const VERSION: &str = "--version";
-
 /// The whole of the worker program; its argument is the [`Limits`] as JSON.
 pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let argument = arguments.next().unwrap_or_default();
-    let mut out = std::io::stdout().lock();
-    let outcome = if argument == VERSION {
-        writeln!(out, "OpenImageIO {}", oiio::version())
-    } else if let Ok(limits) = serde_json::from_str(&argument.to_string_lossy()) {
-        answer_all(&limits, &mut BufReader::new(std::io::stdin().lock()), &mut out)
-    } else {
+    let Ok(limits) = serde_json::from_str(&argument.to_string_lossy()) else {
         let _ = writeln!(std::io::stderr(), "petcomp starts this program to read pictures; people do not");
         return ExitCode::FAILURE;
     };
-    if outcome.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    let (mut from, mut to) = (BufReader::new(std::io::stdin().lock()), std::io::stdout().lock());
+    match answer_all(&limits, &mut from, &mut to) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) => ExitCode::FAILURE,
+    }
 }
 
 fn answer_all(limits: &Limits, from: &mut impl BufRead, to: &mut impl Write) -> Result<()> {
@@ -34,7 +30,7 @@ fn answer_all(limits: &Limits, from: &mut impl BufRead, to: &mut impl Write) -> 
         return Err(std::io::Error::other(e.to_string()));
     }
     let (memory, missing) = confine(limits);
-    send(to, &Ready { petcomp: env!("CARGO_PKG_VERSION").into(), missing })?;
+    send(to, &Ready { petcomp: env!("CARGO_PKG_VERSION").into(), openimageio: oiio::version(), missing })?;
     to.flush()?;
     while !from.fill_buf()?.is_empty() {
         let question: Question = receive(from)?;

@@ -9,11 +9,10 @@ use super::limits::Limits;
 use super::patience::Pipe;
 use super::protocol::{self, Ask, Ready, Shape, Told};
 use super::raster::Refusal;
-use super::serve::VERSION;
 use crate::Error;
 use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::{Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -29,16 +28,20 @@ const START: Duration = Duration::from_secs(60);
 const PIXELS_PER_SECOND: u64 = 10_000_000;
 /// How often a file is tried.
 const TRIES: usize = 2;
+/// How often a worker is started that ends before it greets: it has seen no file yet, so none is to blame.
+const STARTS: usize = 3;
+/// A worker that closed its pipes is ending, and is waited for so long before it is killed.
+const LAST_BREATH: Duration = Duration::from_secs(2);
 
 /// The workers of this program that have nothing to do.
 static IDLE: Pool = Pool { idle: Mutex::new(Vec::new()) };
 
-/// What a worker says about a file.
-pub(super) fn ask(source: &Source, limits: &Limits, ask: Ask) -> Result<Told, Refusal> {
+/// What a worker says about a file. A strict one refuses to be read by a worker that the system does not confine.
+pub(super) fn ask(source: &Source, limits: &Limits, strict: bool, ask: Ask) -> Result<Told, Refusal> {
     let program = program().ok_or_else(|| {
         format!("needs OpenImageIO, and {PROGRAM} is not beside this program ({PROGRAM_VARIABLE} may name it)")
     })?;
-    IDLE.ask(&program, source, limits, ask)
+    IDLE.ask(&program, source, limits, strict, ask)
 }
 
 /// The OpenImageIO that the worker program links, as that tells it.
@@ -47,11 +50,8 @@ pub(super) fn ask(source: &Source, limits: &Limits, ask: Ask) -> Result<Told, Re
 /// [`Error::File`] where there is no worker program or it does not start.
 pub fn worker_version() -> crate::Result<String> {
     let program = program().ok_or_else(|| Error::file(PROGRAM, "not found beside this program"))?;
-    let output = Command::new(&program).arg(VERSION).output().map_err(|e| Error::file(&program, e))?;
-    match output.status.success() {
-        true => Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned()),
-        false => Err(Error::file(&program, format!("does not run: {}", output.status))),
-    }
+    let worker = Worker::start(&program, &Limits::default()).map_err(|e| Error::file(&program, e))?;
+    Ok(format!("OpenImageIO {}", worker.ready.openimageio))
 }
 
 /// Beside the running program; one folder up serves test programs, which cargo puts below the others.
@@ -79,7 +79,7 @@ enum Failure {
 }
 
 impl Pool {
-    fn ask(&self, program: &Path, source: &Source, limits: &Limits, ask: Ask) -> Result<Told, Refusal> {
+    fn ask(&self, program: &Path, source: &Source, limits: &Limits, strict: bool, ask: Ask) -> Result<Told, Refusal> {
         let mut cause = String::new();
         for attempt in 0..TRIES {
             // The second try is for a worker that nothing has happened to yet.
@@ -88,6 +88,7 @@ impl Pool {
                 Some(worker) => worker,
                 None => Worker::start(program, limits)?,
             };
+            worker.confinement(strict)?;
             match worker.answer(source, ask) {
                 Ok(answer) => {
                     self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
@@ -122,6 +123,7 @@ struct Worker {
     to: Pipe,
     from: BufReader<Pipe>,
     limits: Limits,
+    ready: Ready,
 }
 
 impl Drop for Worker {
@@ -135,36 +137,55 @@ impl Drop for Worker {
 impl Worker {
     fn start(program: &Path, limits: &Limits) -> Result<Self, Refusal> {
         let not_started =
-            |e: std::io::Error| format!("needs OpenImageIO, and {} does not start: {e}", program.display());
-        let argument = serde_json::to_string(limits).map_err(|e| e.to_string())?;
+            |how: &dyn std::fmt::Display| format!("needs OpenImageIO, and {} does not start: {how}", program.display());
+        let mut cause = String::new();
+        for _ in 0..STARTS {
+            let mut worker = Self::launch(program, limits).map_err(|e| not_started(&e))?;
+            let Err(e) = worker.greeting() else { return Ok(worker) };
+            cause = worker.how_it_died(&e);
+            if !has_closed(&e) {
+                break;
+            }
+        }
+        Err(not_started(&cause).into())
+    }
+
+    /// A process that has said nothing yet.
+    fn launch(program: &Path, limits: &Limits) -> std::io::Result<Self> {
         let mut child = Command::new(program)
-            .arg(argument)
+            .arg(serde_json::to_string(limits)?)
             .env_clear()
             .envs(ENVIRONMENT.iter().filter_map(|name| Some((name, std::env::var_os(name)?))))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
-            .spawn()
-            .map_err(not_started)?;
-        let (stdin, stdout) = child.stdin.take().zip(child.stdout.take()).ok_or("no pipe to the OpenImageIO worker")?;
-        let (to, from) = (Pipe::new(stdin.into()), Pipe::new(stdout.into()));
-        let (to, from) = (to.map_err(not_started)?, BufReader::new(from.map_err(not_started)?));
-        let mut worker = Self { child, to, from, limits: limits.clone() };
-        let ready = worker.greeting().map_err(|e| {
-            let how = worker.how_it_died(&e);
-            format!("needs OpenImageIO, and {} does not start: {how}", program.display())
-        })?;
-        warn_of(&ready.missing);
-        Ok(worker)
+            .spawn()?;
+        let pipes = child.stdin.take().zip(child.stdout.take());
+        let (stdin, stdout) = pipes.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
+        let (to, from) = (Pipe::new(stdin.into())?, BufReader::new(Pipe::new(stdout.into())?));
+        Ok(Self { child, to, from, limits: limits.clone(), ready: Ready::default() })
     }
 
-    fn greeting(&mut self) -> std::io::Result<Ready> {
+    fn greeting(&mut self) -> std::io::Result<()> {
         self.from.get_mut().deadline = Instant::now() + START;
-        let ready: Ready = protocol::receive(&mut self.from)?;
-        if ready.petcomp != env!("CARGO_PKG_VERSION") {
-            return Err(std::io::Error::other(format!("belongs to petcomp {}", ready.petcomp)));
+        self.ready = protocol::receive(&mut self.from)?;
+        if self.ready.petcomp != env!("CARGO_PKG_VERSION") {
+            return Err(std::io::Error::other(format!("belongs to petcomp {}", self.ready.petcomp)));
         }
-        Ok(ready)
+        Ok(())
+    }
+
+    /// What the system could not give it is an error where that is asked for, and a warning elsewhere.
+    fn confinement(&self, strict: bool) -> Result<(), Refusal> {
+        let missing = self.ready.missing.join("; ");
+        match (strict, missing.is_empty()) {
+            (_, true) => Ok(()),
+            (true, _) => Err(format!("needs OpenImageIO, and its worker cannot be confined here ({missing})").into()),
+            (false, _) => {
+                warn_of(&missing);
+                Ok(())
+            }
+        }
     }
 
     fn answer(&mut self, source: &Source, ask: Ask) -> Result<Result<Told, Refusal>, Failure> {
@@ -198,21 +219,36 @@ impl Worker {
         }
     }
 
-    /// The signal that ended it, or what else went wrong.
+    /// The signal that ended it, or what else went wrong. It does not run any more.
     fn how_it_died(&mut self, e: &std::io::Error) -> String {
-        let closed = matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe);
-        if !closed {
-            let _ = self.child.kill();
-            return format!("garbled answer: {e}");
-        }
-        match self.child.wait() {
-            Ok(status) => match std::os::unix::process::ExitStatusExt::signal(&status) {
+        let status = if has_closed(e) { self.status_within(LAST_BREATH) } else { None };
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        match status {
+            Some(status) => match std::os::unix::process::ExitStatusExt::signal(&status) {
                 Some(signal) => format!("signal {signal}"),
                 None => status.to_string(),
             },
-            Err(e) => e.to_string(),
+            None if has_closed(e) => "closed its pipes without an end".into(),
+            None => format!("garbled answer: {e}"),
         }
     }
+
+    /// How it ended, if it does so in time.
+    fn status_within(&mut self, patience: Duration) -> Option<ExitStatus> {
+        let deadline = Instant::now() + patience;
+        loop {
+            match self.child.try_wait() {
+                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(1)),
+                status => return status.ok().flatten(),
+            }
+        }
+    }
+}
+
+/// The other end of a pipe is gone.
+fn has_closed(e: &std::io::Error) -> bool {
+    matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe)
 }
 
 fn patience_for(shape: &Shape) -> Duration {
@@ -220,13 +256,9 @@ fn patience_for(shape: &Shape) -> Duration {
 }
 
 /// Confinement that a worker could not have; said once.
-fn warn_of(missing: &[String]) {
+fn warn_of(missing: &str) {
     static SAID: Once = Once::new();
-    if !missing.is_empty() {
-        SAID.call_once(|| {
-            log::warn!("the OpenImageIO worker is less confined than it could be: {}", missing.join("; "))
-        });
-    }
+    SAID.call_once(|| log::warn!("the OpenImageIO worker is less confined than it could be: {missing}"));
 }
 
 #[cfg(test)]
@@ -246,20 +278,25 @@ mod tests {
         assert!(child.wait().unwrap().success());
     }
 
-    /// A worker that greets and then does what a shell script says; `$n` counts how many were started in its folder.
+    const GREETING: &str =
+        concat!(r#"echo '{"petcomp":""#, env!("CARGO_PKG_VERSION"), r#"","openimageio":"0","missing":[]}'"#);
+
+    /// A worker that greets and then does what a shell script says.
     fn asked(script: &str, limits: &Limits) -> Result<Raster, String> {
+        asked_of(&format!("{GREETING}\n{script}"), limits, false)
+    }
+
+    /// A worker that is a shell script; `$n` counts how many were started in its folder.
+    fn asked_of(script: &str, limits: &Limits, strict: bool) -> Result<Raster, String> {
         let folder = tempfile::tempdir().unwrap();
         let program = folder.path().join("worker");
-        let text = format!(
-            "#!/bin/sh\necho x >>{count}\nn=$(wc -l <{count})\necho '{{\"petcomp\":\"{version}\",\"missing\":[]}}'\n{script}\n",
-            count = folder.path().join("count").display(),
-            version = env!("CARGO_PKG_VERSION"),
-        );
+        let count = folder.path().join("count");
+        let text = format!("#!/bin/sh\necho x >>{count}\nn=$(wc -l <{count})\n{script}\n", count = count.display());
         write_program(&program, &text);
         let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
         let pool = Pool { idle: Mutex::new(Vec::new()) };
         let ask = Ask::Pixels { wanted: Wanted::Coverage, window: Window::Display };
-        match pool.ask(&program, &source, limits, ask) {
+        match pool.ask(&program, &source, limits, strict, ask) {
             Ok(Told::Raster(raster)) => Ok(raster),
             Ok(Told::Shape(shape)) => panic!("{shape:?}"),
             Err(e) => Err(e.to_string()),
@@ -291,6 +328,32 @@ mod tests {
     }
 
     #[test]
+    fn a_death_before_the_greeting_is_no_fault_of_the_file() {
+        let script = |deaths: usize| format!("[ $n -le {deaths} ] && kill -ABRT $$\n{GREETING}\n{GREY}; sleep 5");
+        assert!(asked_of(&script(STARTS - 1), &Limits::default(), false).is_ok());
+        let e = asked_of(&script(STARTS), &Limits::default(), false).unwrap_err();
+        assert!(e.ends_with("does not start: signal 6"), "{e}");
+    }
+
+    #[test]
+    fn a_worker_that_closes_its_pipes_and_stays_is_killed() {
+        let start = Instant::now();
+        let e = asked("exec <&- >&- sleep 600", &Limits::default()).unwrap_err();
+        assert!(e.contains("closed its pipes"), "{e}");
+        assert!(start.elapsed() < Duration::from_secs(120), "{:?}", start.elapsed());
+    }
+
+    #[test]
+    fn a_strict_one_asks_no_worker_that_is_not_confined() {
+        let loose = GREETING.replace("[]", "[\"Landlock: not in this kernel\"]");
+        let script = format!("{loose}\n{GREY}; sleep 5");
+        assert!(asked_of(&script, &Limits::default(), false).is_ok());
+        let e = asked_of(&script, &Limits::default(), true).unwrap_err();
+        assert!(e.ends_with("its worker cannot be confined here (Landlock: not in this kernel)"), "{e}");
+        assert!(asked_of(&format!("{GREETING}\n{GREY}; sleep 5"), &Limits::default(), true).is_ok());
+    }
+
+    #[test]
     fn nonsense_and_half_an_answer_are_deaths() {
         let e = asked("echo nonsense; exec sleep 30", &Limits::default()).unwrap_err();
         assert!(e.contains("garbled answer"), "{e}");
@@ -303,7 +366,11 @@ mod tests {
         let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
         let pool = Pool { idle: Mutex::new(Vec::new()) };
         for program in ["/bin/true", "/bin/echo", "/no/such/program"] {
-            let e = pool.ask(Path::new(program), &source, &Limits::default(), Ask::Header).err().unwrap().to_string();
+            let e = pool
+                .ask(Path::new(program), &source, &Limits::default(), false, Ask::Header)
+                .err()
+                .unwrap()
+                .to_string();
             assert!(e.contains(program) && e.contains("does not start"), "{e}");
         }
     }

@@ -70,6 +70,8 @@ enum OpenImageIo {
     /// In a confined process of its own
     #[default]
     Worker,
+    /// The same, and no such picture is read where the system lacks Landlock or seccomp to confine it
+    WorkerStrict,
     /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
     InProcess,
     /// Not at all
@@ -80,6 +82,7 @@ impl OpenImageIo {
     fn fallback(self) -> anyhow::Result<Fallback> {
         match self {
             Self::Worker => Ok(Fallback::Worker),
+            Self::WorkerStrict => Ok(Fallback::StrictWorker),
             Self::Off => Ok(Fallback::Nothing),
             #[cfg(feature = "in-process-oiio")]
             Self::InProcess => Ok(Fallback::InProcess(petcomp::io::oiio::in_process())),
