@@ -6,7 +6,7 @@ use crate::io;
 use crate::matte::MatteMethod;
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
-use std::path::{Component, Path};
+use std::path::Path;
 
 /// What is in an asset folder, without the pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -184,10 +184,7 @@ impl AssetRecord {
 
 impl PhotoRecord {
     fn check(&self) -> Result<()> {
-        let inside = Path::new(&self.file).components().all(|part| matches!(part, Component::Normal(_)));
-        if !inside || self.file.is_empty() {
-            return Err(Error::value("file", format!("\"{}\", expected a path inside the folder", self.file)));
-        }
+        io::below("", &self.file)?;
         check_positive("px_per_metre", self.px_per_metre)?;
         for (at, sides) in [("size_m", self.size_m), ("object_m", self.object_m)] {
             sides.into_iter().try_for_each(|side| check_positive(at, side))?;
@@ -296,7 +293,7 @@ pub(super) mod tests {
         assert_eq!(message(|m| m.assets[1].name = "b".into()), "assets[1]: \"b\" is there twice");
         let said = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
         assert_eq!(said, "assets[0].photos[0].px_per_metre: NaN, expected a number above 0");
-        assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("inside the folder"));
+        assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("expected a path below"));
         assert!(message(|m| m.assets[0].photos[0].outline_px[2] = [50.0, 2.0]).contains("outline_px[2]"));
         assert!(message(|m| m.assets[0].photos.clear()).starts_with("assets[0].photos: empty"));
     }
