@@ -115,7 +115,8 @@ fn places((i, asset): (usize, &AssetRecord)) -> impl Iterator<Item = (usize, usi
 const SLACK_PX: f64 = 0.5;
 
 fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
-    let image: Image<Film> = io::read(folder.join(&record.file))?;
+    let path = io::inside(folder, &record.file).map_err(|e| e.within(at).in_file(folder.join(MANIFEST)))?;
+    let image: Image<Film> = io::read(&path)?;
     let (w, h) = (image.width() as f64, image.height() as f64);
     let told = record.size_m.map(|side| side * record.px_per_metre);
     if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
@@ -125,7 +126,7 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
         let (x, y) = (i % image.width(), i / image.width());
         let what = format!("{:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1", image.pixels()[i]);
-        return Err(Error::file(folder.join(&record.file), what));
+        return Err(Error::file(path, what));
     }
     Ok(Photo::new(image, record.clone()))
 }

@@ -7,7 +7,7 @@ use crate::io;
 use crate::matte::MatteMethod;
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
-use std::path::{Component, Path};
+use std::path::Path;
 
 /// What is in an asset folder, without the pictures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -205,10 +205,7 @@ impl AssetRecord {
 
 impl PhotoRecord {
     fn check(&self) -> Result<()> {
-        let inside = Path::new(&self.file).components().all(|part| matches!(part, Component::Normal(_)));
-        if !inside || self.file.is_empty() {
-            return Err(Error::value("file", format!("\"{}\", expected a path inside the folder", self.file)));
-        }
+        io::below("", &self.file)?;
         PX_PER_METRE.check("px_per_metre", self.px_per_metre)?;
         self.size_m.into_iter().try_for_each(|side| CARD.check("size_m", side))?;
         OBJECT.check("object_m[0]", self.object_m[0])?;
@@ -359,7 +356,7 @@ pub(super) mod tests {
         let said = message(|m| m.assets[0].photos[0].object_m[0] = 229.0);
         let expected = "229, expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
         assert_eq!(said, format!("assets[0].photos[0].object_m[0]: {expected}"));
-        assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("inside the folder"));
+        assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("expected a path below"));
         assert!(message(|m| m.assets[0].photos[0].outline_px[2] = [50.0, 2.0]).contains("outline_px[2]"));
         assert!(message(|m| m.assets[0].photos.clear()).starts_with("assets[0].photos: empty"));
     }

@@ -32,6 +32,8 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
     let Some(photo) = photo_of(&label, path) else { return Ok(label) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
     let header = io::read_header(&photo)?;
     let (seen, told) = ([header.width, header.height], label.image_size().map(|side| side as usize));
     if seen != told {

@@ -30,6 +30,12 @@
 //! * **What is written** stands beside its place first, is put on the disk, and is moved there: whole or not at all. A link in
 //!   the way is replaced, not followed; [`refuse_links`] and [`clean_name`] keep outputs in their folder. No metadata of an input
 //!   gets into an output, so neither places (GPS) nor serial numbers do.
+//! * **Where a document leads.** A path in a document that may come from anywhere (journal and manifest of a dataset or an
+//!   asset folder, label, scene, scene for another renderer) is looked for in the folder of that document alone: [`inside`] refuses `..`, links
+//!   that lead out, and all but regular files. Trusted are documents that people write for themselves and that name files
+//!   elsewhere on purpose: recipes (`assets`, `backgrounds`, `environment.files`), lists of photos, `data.yaml` and the lists it names.
+//!   What they name must be regular files within the limits too. Files that petcomp appends to (`.lock`, `index.jsonl`,
+//!   `.runs.jsonl`) are refused where a link is in their place.
 //! * **Documents** (JSON, TOML) are at most 64 MiB and nested 80 to 128 deep, without a key twice or a number that is not finite;
 //!   a mistake is named with its line.
 //!
@@ -73,7 +79,8 @@ mod tiff;
 mod worker;
 mod write;
 
-pub use atomic::{copy, create_folder, relative, sync, write_through};
+pub use atomic::{Checksum, copy, create_folder, relative, sync, write_through};
+pub(crate) use atomic::{open_own, refuse_foreign};
 pub use document::{
     from_overrides, parse_json, parse_toml, read_document, read_json, read_json_data, read_text, read_toml,
     read_toml_with, write_document, write_json, write_text, write_toml,
@@ -84,7 +91,8 @@ pub use header::Header;
 pub(crate) use jpeg::through_jpeg;
 pub use limits::{Limits, Raise};
 pub use overrides::Override;
-pub use place::{below, clean_name, refuse_links};
+pub(crate) use place::length_inside;
+pub use place::{below, clean_name, inside, refuse_links};
 pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 #[cfg(feature = "oiio")]
 #[doc(hidden)]

@@ -1,6 +1,8 @@
 //! Names that come out of documents, and places below a folder: nothing leads outside.
 
+use super::format::reason;
 use crate::{Error, Result};
+use std::fs::Metadata;
 use std::path::{Component, Path, PathBuf};
 
 /// Longest name that is made, bytes; file systems allow 255 with what is put in front and behind.
@@ -31,6 +33,66 @@ pub fn below(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf
         return Err(Error::value("file", what));
     }
     Ok(folder.as_ref().join(file))
+}
+
+/// The file below a folder that a document names: the one way from a path in a document to a file that is read.
+///
+/// Links are followed where they stay in the folder; the folder itself may be one.
+///
+/// # Errors
+/// [`Error::Value`] as [`below`]; [`Error::File`] for a link that leads out of the folder, for a file that is not there, and
+/// for anything but a regular file, which may block or never end.
+pub fn inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf> {
+    found_inside(folder.as_ref(), file.as_ref()).map(|(path, _)| path)
+}
+
+/// Length of a file below a folder that a document names.
+///
+/// # Errors
+/// As [`inside`].
+pub(crate) fn length_inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<u64> {
+    found_inside(folder.as_ref(), file.as_ref()).map(|(_, meta)| meta.len())
+}
+
+fn found_inside(folder: &Path, file: &Path) -> Result<(PathBuf, Metadata)> {
+    let path = below(folder, file)?;
+    let failed = |e: std::io::Error| Error::file(&path, reason(&e));
+    let meta = match without_links(folder, file).map_err(failed)? {
+        Some(meta) => meta,
+        None => linked(folder, &path).map_err(failed)?.ok_or_else(|| {
+            let what = format!("is a link out of {}, expected a file in that folder", or_here(folder).display());
+            Error::file(&path, what)
+        })?,
+    };
+    match meta.is_file() {
+        true => Ok((path, meta)),
+        false => Err(Error::file(path, "not a regular file")),
+    }
+}
+
+/// What a file is; none where one of the steps to it from the folder is a link.
+fn without_links(folder: &Path, file: &Path) -> std::io::Result<Option<Metadata>> {
+    let (mut place, mut last) = (folder.to_path_buf(), None);
+    for step in file.components() {
+        place.push(step);
+        let meta = std::fs::symlink_metadata(&place)?;
+        if meta.is_symlink() {
+            return Ok(None);
+        }
+        last = Some(meta);
+    }
+    Ok(last)
+}
+
+/// What a path with links leads to; none where that is outside of the folder.
+fn linked(folder: &Path, path: &Path) -> std::io::Result<Option<Metadata>> {
+    let (root, target) = (or_here(folder).canonicalize()?, path.canonicalize()?);
+    if target.starts_with(root) { std::fs::metadata(target).map(Some) } else { Ok(None) }
+}
+
+/// The empty path is the working folder.
+fn or_here(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }
 
 /// Refuses an output folder that holds symbolic links to folders, which would lead outside. The folder itself may be one.
@@ -74,6 +136,39 @@ mod tests {
         assert_eq!(below("labels", "sub/a.jpg").unwrap(), Path::new("labels/sub/a.jpg"));
         for bad in ["", ".", "../a.jpg", "/etc/passwd", "a/../../b"] {
             assert!(below("labels", bad).is_err(), "{bad}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_named_file_is_a_regular_one_of_its_folder() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("shard");
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        std::fs::write(folder.join("sub/a.txt"), "a").unwrap();
+        std::fs::write(dir.path().join("secret.txt"), "b").unwrap();
+        symlink("sub/a.txt", folder.join("near.txt")).unwrap();
+        symlink("../secret.txt", folder.join("far.txt")).unwrap();
+        symlink("..", folder.join("up")).unwrap();
+        symlink(&folder, dir.path().join("alias")).unwrap();
+        symlink("/dev/zero", folder.join("endless")).unwrap();
+        assert!(rustix::fs::mkfifoat(rustix::fs::CWD, folder.join("pipe"), 0o600.into()).is_ok());
+        for good in ["sub/a.txt", "near.txt"] {
+            assert_eq!(inside(&folder, good).unwrap(), folder.join(good));
+            assert!(inside(dir.path().join("alias"), good).is_ok());
+        }
+        let refused = |file: &str| inside(&folder, file).unwrap_err().to_string();
+        for (file, why) in [
+            ("../secret.txt", "expected a path below"),
+            ("far.txt", "is a link out of"),
+            ("up/secret.txt", "is a link out of"),
+            ("endless", "is a link out of"),
+            ("pipe", "not a regular file"),
+            ("sub", "not a regular file"),
+            ("none", "no such file"),
+        ] {
+            assert!(refused(file).contains(why), "{file}: {}", refused(file));
         }
     }
 

@@ -162,7 +162,7 @@ impl Others {
     }
 
     fn picture(&self, entry: &OtherPicture) -> Result<Image<LinearRgb>> {
-        Ok(finished(&io::read(self.folder.join(&entry.file))?))
+        Ok(finished(&io::read(io::inside(&self.folder, &entry.file)?)?))
     }
 }
 

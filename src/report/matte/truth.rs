@@ -95,8 +95,8 @@ impl Truths {
     /// Reads photo `i`.
     pub(in crate::report) fn read(&self, i: usize) -> Result<Known> {
         let record = &self.records[i];
-        let color = |name: &Path| io::read::<LinearRgb>(self.folder.join(name));
-        let mask: Image<Coverage> = io::read(self.folder.join(&record.files.mask))?;
+        let color = |name: &Path| io::inside(&self.folder, name).and_then(io::read::<LinearRgb>);
+        let mask: Image<Coverage> = io::read(io::inside(&self.folder, &record.files.mask)?)?;
         // Linear in 8 bits, which is how coverage is stored and colour is not.
         let view = color(&record.files.transmittance_view)?.map(|p| p.map(crate::color::linear_to_srgb));
         let inside = |t: LinearRgb, c: Coverage| t.map(|t| 1.0 + c.0.min(1.0) * (t - 1.0));

@@ -10,7 +10,7 @@ use crate::io;
 use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
 use crate::scene::resolve::CATCHER;
 use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 /// The shot that a scene file of the reference renderer tells, at the file's own size or another.
@@ -23,21 +23,58 @@ use std::sync::Arc;
 pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let path = path.as_ref();
     let file: File = io::read_json(path)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let files = &Files::of(path)?;
     let camera = camera(&file).resized(size.unwrap_or([file.render.width, file.render.height]));
     let mut shot = Shot::new(camera);
     if let Some(plate) = &file.plate {
-        let photo: Image<PremulRgba> = io::read(folder.join(&plate.path))?;
+        let photo: Image<PremulRgba> = io::read(files.find(&plate.path)?)?;
         shot = shot.with_plate(Arc::new(averaged(&photo.map(PremulRgba::color), camera.image)));
     }
     shot.catcher = file.ground.map_or(file.tray.size.map(|side| CATCHER * side), |ground| ground.extent);
     shot.lights = file.lights.iter().map(light).collect();
-    shot.cards = file.quads.iter().map(|q| card(folder, q)).collect::<Result<_>>()?;
+    shot.cards = file.quads.iter().map(|q| card(files, q)).collect::<Result<_>>()?;
     if let Some(around) = &file.environment {
         shot.ambient = around.color.unwrap_or_default().scale(around.strength);
-        shot.environment = map(folder, around)?;
+        shot.environment = map(files, around)?;
     }
     Ok(shot)
+}
+
+/// The pictures of a scene: they lie in its folder or, where scenes share them, in the folder beside it.
+struct Files {
+    /// The scene's file.
+    scene: PathBuf,
+    /// The folder that holds the scene's own.
+    root: PathBuf,
+    /// Name of the scene's folder in it.
+    own: PathBuf,
+}
+
+impl Files {
+    fn of(scene: &Path) -> Result<Self> {
+        let whole = std::path::absolute(scene).map_err(|e| Error::file(scene, e))?;
+        let folder = whole.parent().unwrap_or(&whole);
+        let root = folder.parent().unwrap_or(folder).to_path_buf();
+        Ok(Self { scene: scene.into(), own: folder.file_name().unwrap_or_default().into(), root })
+    }
+
+    /// The picture of a name: at most one step up.
+    fn find(&self, name: &str) -> Result<PathBuf> {
+        let outside = || {
+            let what = format!("\"{name}\", expected a path below the scene's folder or the one that holds it");
+            Error::value("path", what).in_file(&self.scene)
+        };
+        let mut place = self.own.clone();
+        for step in Path::new(name).components() {
+            match step {
+                Component::Normal(step) => place.push(step),
+                Component::CurDir => {}
+                Component::ParentDir if place.pop() => {}
+                _ => return Err(outside()),
+            }
+        }
+        io::inside(&self.root, place).map_err(|e| e.in_file(&self.scene))
+    }
 }
 
 fn camera(file: &File) -> Camera {
@@ -72,35 +109,37 @@ fn light(l: &Light) -> AreaLight {
     }
 }
 
-fn card(folder: &Path, q: &Quad) -> Result<Card> {
+fn card(files: &Files, q: &Quad) -> Result<Card> {
     let axes = std::array::from_fn(|i| std::array::from_fn(|j| q.pose[i][j]));
     let at = Vector3::new(q.pose[0][3], q.pose[1][3], q.pose[2][3]);
     Ok(Card {
         id: ObjectId(q.id),
         class: 0,
         quad: crate::geom::Quad { world_from_card: Pose::from_parts(at.into(), rotation(axes)), size: q.size },
-        texture: texture(folder, &q.front)?,
-        back: q.back.as_ref().map(|back| texture(folder, back)).transpose()?,
+        texture: texture(files, &q.front)?,
+        back: q.back.as_ref().map(|back| texture(files, back)).transpose()?,
         outline_uv: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from).into(),
         grade: Grade { hue_deg: q.hue_shift, saturation: q.saturation, value: q.value },
     })
 }
 
-fn texture(folder: &Path, side: &Side) -> Result<Texture> {
-    let color: Image<PremulRgba> = io::read(folder.join(&side.texture))?;
+fn texture(files: &Files, side: &Side) -> Result<Texture> {
+    let color: Image<PremulRgba> = io::read(files.find(&side.texture)?)?;
     let Some(film) = &side.film else { return Ok(color.into()) };
-    let opacity: Image<PremulRgba> = io::read(folder.join(film))?;
+    let film = files.find(film)?;
+    let opacity: Image<PremulRgba> = io::read(&film)?;
     if opacity.size() != color.size() {
         let what = format!("{:?} pixels, but its colour has {:?}", opacity.size(), color.size());
-        return Err(Error::file(folder.join(film), what));
+        return Err(Error::file(film, what));
     }
     Ok(color.zip_map(&opacity, |c, o| Film { color: c.color(), opacity: o.color() }).into())
 }
 
-fn map(folder: &Path, around: &Environment) -> Result<Option<EnvironmentMap>> {
+fn map(files: &Files, around: &Environment) -> Result<Option<EnvironmentMap>> {
     let Some(path) = &around.path else { return Ok(None) };
-    let photo: Image<PremulRgba> = io::read(folder.join(path))?;
-    let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(folder.join(path)))?;
+    let path = files.find(path)?;
+    let photo: Image<PremulRgba> = io::read(&path)?;
+    let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))?;
     let rotation = around.rotation_z.to_radians();
     Ok(Some(EnvironmentMap { panorama: Arc::new(panorama), rotation, strength: around.strength }))
 }
@@ -133,6 +172,22 @@ mod tests {
     use super::super::{SCRIPT, export};
     use super::*;
     use crate::geom::Quad;
+
+    #[test]
+    fn a_scene_names_pictures_beside_it_and_none_further_away() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        io::create_folder(at("set/case")).unwrap();
+        io::create_folder(at("set/textures")).unwrap();
+        for name in ["set/textures/a.exr", "set/case/b.exr", "secret.exr"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        let files = Files::of(&at("set/case/scene.json")).unwrap();
+        assert!(files.find("../textures/a.exr").is_ok() && files.find("b.exr").is_ok());
+        for outside in ["../../secret.exr", "../textures/../../secret.exr", "/etc/passwd"] {
+            assert!(files.find(outside).unwrap_err().to_string().contains("expected a path below"), "{outside}");
+        }
+    }
 
     fn shot() -> Shot {
         let camera = Camera {
