@@ -68,7 +68,7 @@ impl Checksum {
     /// [`Error::File`] for one that cannot be read.
     pub fn of(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let (file, _) = open_regular(path, u64::MAX, "file")?;
+        let (file, _) = open_regular(path, (u64::MAX, "file_bytes"), "file")?;
         pump(file, &mut std::io::sink()).map_err(|e| Error::file(path, reason(&e)))
     }
 }
@@ -81,7 +81,7 @@ impl Checksum {
 pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>, expected: Checksum) -> Result<()> {
     let (from, to) = (from.as_ref(), to.as_ref());
     let changed = || Error::file(from, "has other bytes than when it was written");
-    let (file, bytes) = open_regular(from, u64::MAX, "file")?;
+    let (file, bytes) = open_regular(from, (u64::MAX, "file_bytes"), "file")?;
     if bytes != expected.bytes {
         return Err(changed());
     }
