@@ -19,9 +19,11 @@
 mod check;
 mod coco;
 mod contact_sheet;
+mod fingerprint;
 mod folder;
 mod formats;
 mod generate;
+mod inputs;
 mod journal;
 mod layers;
 mod listing;
@@ -38,6 +40,7 @@ mod sidecar;
 mod split;
 mod studio;
 mod summary;
+mod surroundings;
 mod times;
 mod voc;
 mod webdataset;
@@ -50,6 +53,7 @@ pub use coco::{Coco, CocoMask};
 pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use formats::{Extent, Format, LabelSetup};
 pub use generate::{Plan, generate};
+pub use inputs::Inputs;
 pub(crate) use journal::JOURNAL;
 pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report, mend};
@@ -173,6 +177,11 @@ pub trait Writer: Sync {
     /// # Errors
     /// When a file cannot be written, or the sample is one that the layout cannot hold.
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>>;
+
+    /// The files that trainers are given, below the dataset's folder: those that name all others. By default none.
+    fn for_trainers(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
 
     /// Writes the files that hold many samples, from `samples`' own files, which are in order of number and all there;
     /// takes away what an earlier call left and this one has no use for. By default there are no such files.

@@ -77,7 +77,9 @@ impl Listing {
         let all = self.series();
         let train = (all.len() as f64 * ratio).round() as usize;
         let parts = match how {
-            Sharing::Consecutive { guard } => [all[..train].to_vec(), all[(train + guard).min(all.len())..].to_vec()],
+            Sharing::Consecutive { guard } => {
+                [all[..train].to_vec(), all[train.saturating_add(guard).min(all.len())..].to_vec()]
+            }
             Sharing::Random => {
                 let own = |i: usize| i.to_string();
                 grouped(&all, &(0..all.len()).map(own).collect::<Vec<_>>(), train, seed)
