@@ -6,7 +6,7 @@ mod recipe;
 mod select;
 mod training;
 
-pub(crate) use generate::{make, tell};
+pub(crate) use generate::{for_trainers, make, tell};
 
 use crate::common::Common;
 
