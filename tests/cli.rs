@@ -249,8 +249,8 @@ fn the_demo_makes_the_same_files_at_any_thread_count() {
         let root = desk.path(folder);
         let mut files = Vec::new();
         walk(&root, &mut files);
-        // How long the run took is not part of the dataset.
-        files.retain(|f| !f.ends_with(".runs.jsonl"));
+        // How long the run took, and when its inputs were written, are not part of the dataset.
+        files.retain(|f| !f.ends_with(".runs.jsonl") && !f.ends_with(".inputs.json"));
         files.sort();
         let named = |f: &PathBuf| f.strip_prefix(&root).expect("below the root").to_owned();
         files.iter().map(|f| (named(f), std::fs::read(f).expect("a file"))).collect::<Vec<_>>()
@@ -306,6 +306,56 @@ fn a_scene_goes_through_the_stages_one_by_one() {
             .iter()
             .all(|f| desk.path("blender").join(f).exists())
     );
+}
+
+#[test]
+fn an_environment_map_lies_beside_its_recipe() {
+    let desk = Desk::new();
+    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    let sky = petcomp::Image::filled(8, 4, petcomp::LinearRgb::new(0.2, 0.4, 0.9));
+    petcomp::io::write(desk.path("demo/sky.exr"), &sky).unwrap();
+    let set = ["--set", "scene.environment.files=[\"sky.exr\"]"];
+    desk.ok(&[&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-o", "out"][..], &set].concat());
+    // Its content decides the pictures, so another one is another dataset.
+    petcomp::io::write(desk.path("demo/sky.exr"), &sky.map(|p| p.scale(2.0))).unwrap();
+    let again = desk.run(&[&["dataset", "generate", "demo/recipe.toml", "-n", "2", "-o", "out"][..], &set].concat());
+    let told = text(&again.stderr);
+    assert!(
+        told.contains("out/dataset.json: recipe.environments[sky.exr].content: the dataset was begun with"),
+        "{told}"
+    );
+    // A scene file names it as the recipe does, and no file of elsewhere.
+    desk.ok(&[&["scene", "draw", "demo/recipe.toml", "-o", "scene.toml"][..], &set].concat());
+    let render = ["render", "scene.toml", "demo/recipe.toml", "-o", "frame.png"];
+    desk.ok(&[&render[..], &set].concat());
+    desk.ok(&render);
+    let scene = std::fs::read_to_string(desk.path("scene.toml")).unwrap().replace("sky.exr", "../sky.exr");
+    desk.write("scene.toml", scene);
+    let refused = desk.refused(&render);
+    assert!(
+        refused.contains("scene.toml: environment.file: \"../sky.exr\", expected one that the recipe lists"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_summary_tells_what_is_there_and_is_a_result() {
+    let desk = Desk::new();
+    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    let made = |folder: &str, set: &str| {
+        let few = ["--set", "scene.objects=6", "--set", "scene.image=[160,120]", "--set", set];
+        let call = ["-q", "dataset", "generate", "demo/recipe.toml", "-n", "3", "--seed", "2", "-o", folder];
+        desk.ok(&[&call[..], &few].concat())
+    };
+    let told = made("keep", "labels.obstructed=\"keep\"");
+    assert!(told.contains("objects      18, 18 labelled, ") && !told.contains(" 0 obstructed"), "{told}");
+    assert!(told.contains(" obstructed (labelled like the others)\n") && told.ends_with("keep/data.yaml\n"), "{told}");
+    let told = made("drop", "labels.obstructed=\"drop\"");
+    assert!(told.contains(" obstructed (without a label)\n"), "{told}");
+    let told = made("coco", "labels.formats=[\"coco\"]");
+    let places: Vec<&str> = told.lines().filter(|line| line.starts_with("coco/")).collect();
+    assert_eq!(places, ["coco/annotations/instances_train.json", "coco/annotations/instances_val.json"]);
+    assert!(places.iter().all(|place| desk.path(place).is_file()));
 }
 
 #[test]

@@ -2,9 +2,9 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, Shard,
-    SheetOptions, Sidecar, Split, SplitOrder, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate, mend,
-    merge,
+    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, Setup, Shard,
+    SheetOptions, Sidecar, Split, SplitOrder, Studio, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
+    mend, merge,
 };
 use petcomp::geom::{Point2, Pose, Vector2};
 use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
@@ -98,6 +98,7 @@ fn plan(folder: &Path, count: u64) -> Plan {
         split: Split::default(),
         obstructed: Obstructed::Drop,
         writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default()), Box::new(Sidecar)],
+        inputs: Default::default(),
     }
 }
 
@@ -158,7 +159,8 @@ fn a_dataset_has_the_files_that_trainers_read() {
     assert!(dir.path().join("images/val/000005.png").is_file() && dir.path().join("labels/val/000005.txt").is_file());
     assert_eq!(faults(dir.path()), [""; 0]);
     assert_eq!((report.images, report.val, report.made, report.objects), (12, 3, 12, 18));
-    assert_eq!((report.labelled, report.dropped(), report.retries), (12, 6, 12));
+    assert_eq!((report.labelled, report.dropped(), report.obstructed, report.retries), (12, 6, 6, 12));
+    assert_eq!(report.for_trainers, [Path::new("data.yaml")]);
     assert_eq!(check(dir.path()).unwrap().rows.iter().sum::<usize>(), 12);
     assert_eq!(report.classes.iter().map(|c| c.labelled).sum::<u64>(), 12);
 }
@@ -310,7 +312,7 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
         Ok(s)
     };
     let report = generate(&plan, twins, &|_| {}, &AtomicBool::new(false)).unwrap();
-    assert_eq!((report.objects, report.labelled), (3, 3));
+    assert_eq!((report.objects, report.labelled, report.obstructed), (3, 3, 1));
     let rows = "0 0.093750 0.093750 0.187500 0.187500\n0 0.906250 0.906250 0.187500 0.187500\n";
     assert_eq!(text(dir.path(), "labels/val/000000.txt"), rows);
 }
@@ -451,6 +453,25 @@ fn a_writer_of_one_s_own_takes_part() {
     assert_eq!(text(dir.path(), "3.txt"), "2");
 }
 
+#[test]
+fn trainers_are_shown_files_that_are_there() {
+    let shown = |formats: &str| {
+        let dir = tempfile::tempdir().unwrap();
+        let labels: LabelSetup = toml::from_str(formats).unwrap();
+        let report = make(&Plan { writers: labels.writers(&Pictures::default()), ..plan(dir.path(), 6) }).unwrap();
+        assert!(report.for_trainers.iter().all(|file| dir.path().join(file).exists()));
+        report.for_trainers.iter().map(|file| file.display().to_string()).collect::<Vec<_>>()
+    };
+    let coco = ["annotations/instances_train.json", "annotations/instances_val.json"];
+    assert_eq!(shown("formats = ['coco']"), coco);
+    assert_eq!(shown("formats = ['voc', 'yolo']"), ["data.yaml", "voc/train.txt", "voc/val.txt"]);
+    assert_eq!(shown("formats = ['webdataset']"), ["webdataset/train-000000.tar", "webdataset/val-000000.tar"]);
+    assert_eq!(shown("formats = ['layers']"), [""; 0]);
+    // What joins many samples comes when the shards are merged.
+    let dir = tempfile::tempdir().unwrap();
+    assert_eq!(make(&shard(dir.path(), 6, 1, 2)).unwrap().for_trainers, [Path::new("data.yaml")]);
+}
+
 fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
     Plan { numbers: Numbers::Shard(Shard::new(index, of).unwrap()), ..full_plan(folder, count) }
 }
@@ -510,6 +531,189 @@ fn shards_that_do_not_make_a_whole_are_refused() {
     let size = std::fs::metadata(&damaged).unwrap().len();
     std::fs::write(&damaged, vec![b'7'; size as usize]).unwrap();
     assert!(refused(&folders).contains("000003.txt: has other bytes than when it was written"));
+}
+
+/// Changes the first line of a folder's journal, and gives it the checksum of its new bytes if it is to pass for whole.
+fn edit_journal(folder: &Path, from: &str, to: &str, pass: bool) {
+    let (first, rest) =
+        text(folder, "index.jsonl").split_once('\n').map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+    assert!(first.contains(from), "no {from} in {first}");
+    let mut edited = first.replacen(from, to, 1);
+    if pass {
+        let (body, _) = edited.rsplit_once(",\"crc32\":").unwrap();
+        edited = format!("{body},\"crc32\":{}}}", crc32fast::hash(body.as_bytes()));
+    }
+    std::fs::write(folder.join("index.jsonl"), format!("{edited}\n{rest}")).unwrap();
+}
+
+#[test]
+fn a_merge_reads_and_writes_nothing_outside_its_folders() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = shards(dir.path());
+    let out = dir.path().join("deep/out");
+    std::fs::write(dir.path().join("evil.sh"), "evil!").unwrap();
+    let crc32 = crc32fast::hash(b"evil!");
+    for path in ["../evil.sh", "index.jsonl", ".lock", "labels/../../evil.sh"] {
+        let line = text(&folders[0], "index.jsonl");
+        let more = format!(r#""files":[{{"path":"{path}","bytes":5,"crc32":{crc32}}},"#);
+        edit_journal(&folders[0], "\"files\":[", &more, true);
+        let refused = joined(&folders, &out).unwrap_err().to_string();
+        assert!(refused.contains("shard-1/index.jsonl: line 1: file: "), "{path}: {refused}");
+        std::fs::write(folders[0].join("index.jsonl"), line).unwrap();
+    }
+    assert!(!dir.path().join("deep").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_merge_reads_regular_files_of_the_shard_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = shards(dir.path());
+    let file = folders[0].join("labels/train/000003.txt");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(dir.path().join("secret"), &whole).unwrap();
+    let link = |to: &Path| std::os::unix::fs::symlink(to, &file).unwrap();
+    let pipe = || assert!(std::process::Command::new("mkfifo").arg(&file).status().unwrap().success());
+    let cases: [(&dyn Fn(), &str); 3] = [
+        (&|| link(&dir.path().join("secret")), "000003.txt: is a link out of"),
+        (&|| link(Path::new("/dev/zero")), "000003.txt: is a link out of"),
+        (&pipe, "000003.txt: not a regular file"),
+    ];
+    for (spoil, why) in cases {
+        std::fs::remove_file(&file).unwrap();
+        spoil();
+        let refused = joined(&folders, &dir.path().join("out")).unwrap_err().to_string();
+        assert!(refused.contains(why), "{refused}");
+    }
+    std::fs::remove_file(folders[1].join("index.jsonl")).unwrap();
+    let pipe = std::process::Command::new("mkfifo").arg(folders[1].join("index.jsonl")).status();
+    assert!(pipe.unwrap().success());
+    assert!(
+        joined(&folders, &dir.path().join("out")).unwrap_err().to_string().contains("index.jsonl: not a regular file")
+    );
+    assert!(faults(&folders[1]).join("\n").contains("index.jsonl: not a regular file"));
+}
+
+#[test]
+fn edited_lines_are_refused_by_a_merge_and_made_again_by_a_run() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = shards(dir.path());
+    let before = bytes(&folders[1]);
+    let edits = [
+        ("\"part\":\"train\"", "\"part\":\"val\""),
+        ("\"classes\":[[0", "\"classes\":[[9"),
+        ("\"files\":[{", "\"files\":[],\"x\":[{"),
+        (",\"crc32\":", ",\"crc\":"),
+    ];
+    for (from, to) in edits {
+        edit_journal(&folders[1], from, to, false);
+        let refused = joined(&folders, &dir.path().join("out")).unwrap_err().to_string();
+        assert!(refused.contains("shard-2/index.jsonl: line 1: ") && refused.ends_with("--resume"), "{refused}");
+        assert_eq!(mend(&folders[1]).unwrap(), (6, 1), "{from}");
+        assert_eq!(make(&shard(&folders[1], 20, 2, 3)).unwrap().made, 1);
+        assert_eq!(before, bytes(&folders[1]));
+        edit_journal(&folders[1], from, to, false);
+        assert_eq!(make(&shard(&folders[1], 20, 2, 3)).unwrap().made, 1, "without being looked through");
+        assert_eq!(before, bytes(&folders[1]));
+    }
+}
+
+#[test]
+fn numbers_that_no_dataset_has_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let folders = shards(dir.path());
+    let out = dir.path().join("out");
+    let says = |from: &str, to: &str| {
+        let path = folders[0].join("dataset.json");
+        let before = std::fs::read_to_string(&path).unwrap();
+        assert!(before.contains(from), "{before}");
+        std::fs::write(&path, before.replace(from, to)).unwrap();
+        let refused = joined(&folders[..1], &out).unwrap_err().to_string();
+        std::fs::write(&path, before).unwrap();
+        refused
+    };
+    assert!(says("\"of\": 3", "\"of\": 0").ends_with("dataset.json: shard: 1/0, expected at most 0/0"));
+    assert!(says("\"index\": 1", "\"index\": 0").contains("shard: 0/3, expected"));
+    assert!(says("\"count\": 20", "\"count\": 18446744073709551615").contains("count: 18446744073709551615 samples"));
+    edit_journal(&folders[0], "\"k\":0", "\"k\":1", true);
+    assert!(joined(&folders, &out).unwrap_err().to_string().contains("line 1: sample 1 is none of shard 1/3 of 20"));
+    let e = make(&plan(&out, 1_000_000_000_000)).unwrap_err().to_string();
+    assert_eq!(e, "count: 1000000000000 samples, expected at most 1000000000");
+    assert!(!out.exists());
+}
+
+#[test]
+fn one_sample_of_a_great_many_is_made_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let last = 999_999_999;
+    let one = Plan { numbers: Numbers::One(last), ..plan(dir.path(), last + 1) };
+    assert_eq!(make(&one).unwrap().made, 1);
+    let shard = dir.path().join("shard");
+    assert_eq!(make(&self::shard(&shard, last + 1, 5, 500_000_000)).unwrap().made, 2);
+}
+
+#[test]
+fn fewer_than_there_are_is_refused_and_nothing_is_lost() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&full_plan(dir.path(), 12)).unwrap();
+    let before = bytes(dir.path());
+    let refused = make(&full_plan(dir.path(), 5)).unwrap_err().to_string();
+    assert!(refused.contains("has image 11, but only 5 are asked for: ask for at least 12"), "{refused}");
+    assert_eq!(before, bytes(dir.path()));
+    // One of them is made again, and the lists of all of them stay.
+    let one = Plan { numbers: Numbers::One(3), ..full_plan(dir.path(), 4) };
+    assert_eq!(make(&one).unwrap().images, 12);
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[test]
+fn a_dataset_of_an_older_program_is_read_and_not_continued() {
+    let dir = tempfile::tempdir().unwrap();
+    make(&plan(dir.path(), 12)).unwrap();
+    let older = text(dir.path(), "dataset.json").replace("  \"format\": 2,\n", "");
+    std::fs::write(dir.path().join("dataset.json"), older).unwrap();
+    let unsealed = |line: &str| format!("{}}}\n", line.rsplit_once(",\"crc32\":").unwrap().0);
+    let lines: String = text(dir.path(), "index.jsonl").lines().map(unsealed).collect();
+    std::fs::write(dir.path().join("index.jsonl"), lines.replace("\"obstructed\":0,", "")).unwrap();
+    let before = bytes(dir.path());
+    assert_eq!(faults(dir.path()), [""; 0]);
+    assert!(contact_sheet_of(dir.path(), 3, &SheetOptions::default()).is_ok());
+    for refused in [make(&plan(dir.path(), 12)).map(|_| ()), mend(dir.path()).map(|_| ())] {
+        let said = refused.unwrap_err().to_string();
+        assert!(
+            said.contains("dataset.json: was begun by an older petcomp") && said.ends_with("begin a new folder"),
+            "{said}"
+        );
+    }
+    assert_eq!(before, bytes(dir.path()));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_in_place_of_its_own_files_are_refused_by_name() {
+    for name in [".lock", "index.jsonl"] {
+        let dir = tempfile::tempdir().unwrap();
+        let (out, victim) = (dir.path().join("out"), dir.path().join("victim"));
+        std::fs::create_dir(&out).unwrap();
+        std::fs::write(&victim, "mine").unwrap();
+        std::os::unix::fs::symlink(&victim, out.join(name)).unwrap();
+        // A dataset that was begun, so that the folder is not somebody else's.
+        let other = dir.path().join("other");
+        make(&plan(&other, 2)).unwrap();
+        std::fs::copy(other.join("dataset.json"), out.join("dataset.json")).unwrap();
+        let refused = make(&plan(&out, 2)).unwrap_err().to_string();
+        assert!(refused.contains(&format!("{name}: is a link or no regular file")), "{refused}");
+        assert_eq!(std::fs::read_to_string(&victim).unwrap(), "mine");
+    }
+    // The notes of how long runs took are no part of the dataset: without them the run goes on.
+    let dir = tempfile::tempdir().unwrap();
+    let (out, victim) = (dir.path().join("out"), dir.path().join("victim"));
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(&victim, "mine").unwrap();
+    std::os::unix::fs::symlink(&victim, out.join(".runs.jsonl")).unwrap();
+    let refused = make(&plan(&out, 2)).unwrap_err().to_string();
+    assert!(refused.contains(".runs.jsonl: is a link"), "{refused}");
+    assert_eq!(std::fs::read_to_string(&victim).unwrap(), "mine");
 }
 
 #[test]
@@ -595,5 +799,136 @@ fn a_browser_shows_the_report_and_its_switches_work() {
     match browse(&page, script) {
         Some(title) => assert_eq!(title, "true,false,false,true,6,3"),
         None => eprintln!("skipped: no chromium here (Debian: chromium)"),
+    }
+}
+
+/// The files of a recipe, made in code: two assets, a labelled photo, a picture of the surroundings.
+fn write_world(folder: &Path) {
+    let write = |name: &str, text: String| {
+        std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();
+        std::fs::write(folder.join(name), text).unwrap();
+    };
+    let photo = |name: &str| {
+        format!(
+            r#"photos = [{{ file = "{name}.exr", source = "{name}.jpg", px_per_metre = 100.0, size_m = [0.4, 0.2],
+            object_m = [0.35, 0.15], screen = {{ r = 0.1, g = 0.5, b = 0.1 }}, matte = "physical", residue = 0.0,
+            outline_px = [[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]] }}]"#
+        )
+        .replace('\n', " ")
+    };
+    let asset = |name: &str| {
+        format!("[[assets]]\nname = \"{name}\"\nclass = \"cap\"\nthickness = 0.01\nmass = 0.02\n{}\n", photo(name))
+    };
+    write("assets/assets.toml", format!("classes = [\"cap\", \"label\", \"none\"]\n{}{}", asset("a"), asset("b")));
+    for name in ["a", "b"] {
+        let cut_out = Image::filled(40, 20, PremulRgba::new(0.25, 0.5, 0.125, 0.75));
+        io::write(folder.join(format!("assets/{name}.exr")), &cut_out).unwrap();
+    }
+    let label = r#"{"format": "plane-label", "version": 1, "image": {"file": "tray.tif", "width": 64, "height": 48},
+        "camera": {"focal_px": 80}, "surface": {"id": "tray", "width_m": 0.6, "height_m": 0.4,
+        "corners_px": [[10, 10], [50, 11], [51, 40], [9, 39]]}}"#;
+    write("photos/tray.label.json", label.into());
+    io::write(folder.join("photos/tray.tif"), &Image::filled(64, 48, LinearRgb::grey(0.25))).unwrap();
+    io::write(folder.join("sky.exr"), &Image::filled(4, 2, LinearRgb::WHITE)).unwrap();
+    let recipe = "backgrounds = 'photos'\n[scene]\nimage = [64, 48]\nenvironment = { files = ['sky.exr'] }\n";
+    write("recipe.toml", recipe.into());
+}
+
+/// Replaces the first `from` in a file, which keeps its size if both are as long.
+fn replace(path: &Path, from: &[u8], to: &[u8]) {
+    let mut bytes = std::fs::read(path).unwrap();
+    let place = bytes.windows(from.len()).position(|part| part == from);
+    let place = place.unwrap_or_else(|| panic!("no such bytes in {}", path.display()));
+    bytes.splice(place..place + from.len(), to.iter().copied());
+    std::fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let (world, out) = (dir.path().join("world"), dir.path().join("out"));
+    write_world(&world);
+    let run = |count: u64| {
+        let setup = Setup::read(world.join("recipe.toml"), &[])?;
+        make(&Studio::open(setup)?.plan(count, 1, &out)?)
+    };
+    run(2).unwrap();
+    assert_eq!(run(3).unwrap().made, 1, "nothing has changed");
+    let manifest = world.join("assets/assets.toml");
+    let tray = world.join("photos/tray.tif");
+    // A pixel of a cut-out, at the size of before.
+    let repaint = |name: &str, by: f32| {
+        let mut cut_out = Image::filled(40, 20, PremulRgba::new(0.25, 0.5, 0.125, 0.75));
+        cut_out.pixels_mut()[0].r = by;
+        io::write(world.join("assets").join(name), &cut_out).unwrap();
+    };
+    let repaint_tray = || {
+        let (mut photo, length) =
+            (Image::filled(64, 48, LinearRgb::grey(0.25)), std::fs::metadata(&tray).unwrap().len());
+        photo.pixels_mut()[0].g = 0.5;
+        io::write(&tray, &photo).unwrap();
+        assert_eq!(std::fs::metadata(&tray).unwrap().len(), length);
+    };
+    let change = |file: &'static str, from: &'static str, to: &'static str| {
+        let file = world.join(file);
+        move || replace(&file, from.as_bytes(), to.as_bytes())
+    };
+    let in_manifest = |from, to| change("assets/assets.toml", from, to);
+    let changes: [(&dyn Fn(), &str); 11] = [
+        (
+            &in_manifest("class = \"cap\"", "class = \"label\""),
+            r#"assets[a].class: the dataset was begun with "cap", this run has "label""#,
+        ),
+        (
+            &in_manifest("mass = 0.02", "mass = 0.03"),
+            "assets[a].mass: the dataset was begun with 0.02, this run has 0.03",
+        ),
+        (&in_manifest("thickness = 0.01", "thickness = 0.02"), "assets[a].thickness: "),
+        (&in_manifest("px_per_metre = 100.0", "px_per_metre = 100.5"), "assets[a].photos[a.exr].px_per_metre: "),
+        (&in_manifest("[[1.0, 1.0]", "[[2.0, 1.0]"), "assets[a].photos[a.exr].outline_px: "),
+        (
+            &in_manifest("name = \"b\"", "name = \"c\""),
+            r#"assets[1]: the dataset was begun with "b", this run has "c""#,
+        ),
+        (&in_manifest("classes = [\"cap\"", "classes = [\"top\", \"cap\""), "classes[0]: "),
+        (&|| repaint("b.exr", 0.5), "assets[b].photos[b.exr].pixels: the dataset was begun with \"crc32 "),
+        (&repaint_tray, "backgrounds[tray].photo: the dataset was begun with \"crc32 "),
+        (&change("photos/tray.label.json", "[9, 39]", "[9, 38]"), "backgrounds[tray].camera: "),
+        (&change("photos/tray.label.json", "0.6", "0.7"), "backgrounds[tray].camera: "),
+    ];
+    let before = bytes(&out);
+    let inputs = [&manifest, &tray, &world.join("assets/b.exr"), &world.join("photos/tray.label.json")];
+    for (change, said) in changes {
+        let kept = inputs.map(|path| std::fs::read(path).unwrap());
+        change();
+        let refused = run(4).unwrap_err().to_string();
+        assert!(refused.contains(said), "expected {said}: {refused}");
+        inputs.iter().zip(kept).for_each(|(path, bytes)| std::fs::write(path, bytes).unwrap());
+    }
+    io::write(world.join("sky.exr"), &Image::filled(4, 2, LinearRgb::grey(0.5))).unwrap();
+    let refused = run(4).unwrap_err().to_string();
+    assert!(refused.contains("environments[sky.exr].content: "), "{refused}");
+    io::write(world.join("sky.exr"), &Image::filled(4, 2, LinearRgb::WHITE)).unwrap();
+    assert_eq!(before, bytes(&out));
+    assert_eq!(run(4).unwrap().made, 1, "everything is as it was");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_photo_that_a_label_or_a_manifest_names_is_one_of_its_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let world = dir.path().join("world");
+    write_world(&world);
+    let refused = |file: &str| {
+        let (place, away) = (world.join(file), dir.path().join("away"));
+        std::fs::rename(&place, &away).unwrap();
+        std::os::unix::fs::symlink(&away, &place).unwrap();
+        let said = Studio::open(Setup::read(world.join("recipe.toml"), &[]).unwrap()).unwrap_err().to_string();
+        std::fs::rename(&away, &place).unwrap();
+        said
+    };
+    for file in ["photos/tray.tif", "assets/b.exr"] {
+        let said = refused(file);
+        assert!(said.contains(file) && said.contains("is a link out of"), "{said}");
     }
 }

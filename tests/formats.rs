@@ -119,6 +119,7 @@ fn made(labels: &str) -> tempfile::TempDir {
         split: Split::default(),
         obstructed: setup.obstructed,
         writers: vec![Box::new(pictures), Box::new(Sidecar)],
+        inputs: Default::default(),
     };
     plan.writers.extend(setup.writers(&pictures));
     generate(&plan, sample, &|_| {}, &AtomicBool::new(false)).unwrap();

@@ -193,8 +193,71 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
         std::thread::sleep(Duration::from_millis(700));
         send("KILL", &killed);
         assert_eq!(ends(killed).signal(), Some(9));
-        assert_eq!(ends(run("3")).code(), Some(0), "after {signal} and KILL");
+        let lines = std::fs::read_to_string(desk.0.path().join(signal).join("index.jsonl")).unwrap();
+        let last =
+            lines.lines().filter_map(|line| line.strip_prefix("{\"k\":")?.split(',').next()?.parse::<u64>().ok());
+        let count = (last.max().unwrap() + 1).to_string();
+        assert_eq!(ends(run(&count)).code(), Some(0), "after {signal} and KILL");
     }
+}
+
+/// A run whose first picture takes minutes, once it listens to signals.
+fn long_run(desk: &Desk, folder: &str) -> Child {
+    let heap = ["--set", "scene.objects=[250,250]", "--set", "scene.scale=0.4", "--set", "scene.settle.step=0.0001"];
+    let args = ["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-j", "1", "-o", folder];
+    let mut command = desk.command(&[&args[..], &heap].concat());
+    let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let (start, lock) = (Instant::now(), desk.0.path().join(folder).join("index.jsonl"));
+    while !lock.exists() {
+        assert!(start.elapsed() < HANGS, "did not begin");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child
+}
+
+/// Several times what it takes, 8 s after one signal and none after two.
+const ENDS_SOON: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(6)];
+
+#[test]
+fn one_signal_ends_a_long_picture_soon_and_two_at_once() {
+    let desk = Desk::new();
+    demo(&desk);
+    for (signals, limit) in [1, 2].into_iter().zip(ENDS_SOON) {
+        let folder = format!("out{signals}");
+        let child = long_run(&desk, &folder);
+        send("TERM", &child);
+        if signals == 2 {
+            std::thread::sleep(Duration::from_millis(500));
+            send("TERM", &child);
+        }
+        let start = Instant::now();
+        assert_eq!(ends(child).code(), Some(130), "{signals} signals");
+        assert!(start.elapsed() < limit, "{signals} signals: {:?}", start.elapsed());
+        // The folder goes on: with the recipe that it was begun with.
+        let said = said(&desk.run(&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-o", &folder]));
+        assert!(said.contains("recipe.scene.objects"), "{said}");
+    }
+}
+
+#[test]
+fn a_number_that_is_too_great_is_refused_at_once() {
+    let desk = Desk::new();
+    demo(&desk);
+    let run = |args: &[&str]| {
+        let all = [&["dataset", "generate", "demo/recipe.toml", "-q", "-o", "out"], args].concat();
+        let child = desk.command(&all).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let output = child.wait_with_output().unwrap();
+        (output.status.code(), said(&output))
+    };
+    for number in ["1000000000000", "18446744073709551615"] {
+        for flag in ["-n", "--only", "--preview"] {
+            let (code, said) = run(&[flag, number]);
+            assert_eq!(code, Some(3), "{flag} {number}: {said}");
+            assert!(said.contains("samples, expected at most 1000000000"), "{flag} {number}: {said}");
+        }
+    }
+    assert!(!desk.0.path().join("out").exists());
+    assert_eq!(run(&["--only", "999999999"]).0, Some(0));
 }
 
 #[test]

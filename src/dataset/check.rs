@@ -1,6 +1,6 @@
 //! Would trainers take this dataset? Every fault, with its place.
 
-use crate::dataset::journal::{Finished, JOURNAL, Line};
+use crate::dataset::journal::{JOURNAL, numbered_lines_of};
 use crate::dataset::listing::is_image;
 use crate::dataset::near::{NEAR_CODES, Thumbnail, nearest};
 use crate::dataset::yolo::LEAST_SIDE_PX;
@@ -227,20 +227,26 @@ impl Findings<'_> {
 
     /// Compares the journal, where there is one, with what is there.
     fn journal(&mut self, images: &[PathBuf]) {
-        let Ok(text) = std::fs::read_to_string(self.folder.join(JOURNAL)) else { return };
+        if std::fs::symlink_metadata(self.folder.join(JOURNAL)).is_err() {
+            return;
+        }
+        let read = match numbered_lines_of(self.folder) {
+            Ok(read) => read,
+            Err(e) => return self.add(JOURNAL, None, self.short(&e)),
+        };
         let mut named = BTreeSet::new();
         let mut lines = Vec::new();
-        for (i, line) in text.lines().enumerate() {
-            match serde_json::from_str::<Line>(line) {
-                Err(e) => self.add(JOURNAL, Some(i + 1), format!("not a line of a journal: {e}")),
+        for (i, line) in read {
+            match line {
+                Err(e) => self.add(JOURNAL, Some(i), format!("not a line of a journal: {e}")),
                 Ok(line) => {
                     named.extend(line.files.iter().map(|file| PathBuf::from(&file.path)));
-                    lines.push((i + 1, line));
+                    lines.push((i, line));
                 }
             }
         }
         let wrong = lines.par_iter().flat_map_iter(|(i, line)| line.files.iter().map(move |file| (*i, file)));
-        let wrong: Vec<_> = wrong.filter_map(|(i, file)| differs(self.folder, file).map(|what| (i, what))).collect();
+        let wrong: Vec<_> = wrong.filter_map(|(i, file)| file.differs(self.folder).map(|what| (i, what))).collect();
         wrong.into_iter().for_each(|(i, what)| self.add(JOURNAL, Some(i), what));
         for image in images.iter().filter(|image| !named.contains(*image)) {
             self.add(image, None, format!("not in {JOURNAL}"));
@@ -298,9 +304,9 @@ fn look(folder: &Path, image: &Path, class_count: Option<usize>) -> Look {
         }
         Ok(picture) => look.small = Some(Thumbnail::of(&picture.map(|p| p.color()))),
     }
-    look.bytes = Finished::of(folder, image).ok().map(|file| (file.bytes, file.crc32));
+    look.bytes = io::Checksum::of(folder.join(image)).ok().map(|sum| (sum.bytes, sum.crc32));
     let label = YoloSet::label_of(image);
-    match std::fs::read_to_string(folder.join(&label)) {
+    match io::read_text(folder.join(&label)) {
         Err(_) => {
             look.faults.push(fault(label, None, format!("missing or not text, but there is {}", image.display())))
         }
@@ -359,18 +365,4 @@ fn numbers(row: &[&str], outlines: bool, class_count: Option<usize>) -> std::res
         return Err(format!("a box of {} x {}, expected sides above 0", row[3], row[4]));
     }
     Ok(values)
-}
-
-/// How a file differs from what the journal says of it.
-fn differs(folder: &Path, said: &Finished) -> Option<String> {
-    match Finished::of(folder, Path::new(&said.path)) {
-        Err(_) => Some(format!("{} is missing", said.path)),
-        Ok(found) if found.bytes != said.bytes => {
-            Some(format!("{} has {} bytes, expected {}", said.path, found.bytes, said.bytes))
-        }
-        Ok(found) if found.crc32 != said.crc32 => {
-            Some(format!("{} has other bytes than when it was written", said.path))
-        }
-        Ok(_) => None,
-    }
 }

@@ -16,6 +16,14 @@ const IDS_PER_IMAGE: u64 = 1 << 16;
 /// Folder of the parts that are joined.
 const KIND: &str = "coco";
 
+/// Folder of the documents.
+const ANNOTATIONS: &str = "annotations";
+
+/// The document of a part.
+fn document(part: Part) -> PathBuf {
+    Path::new(ANNOTATIONS).join(format!("instances_{}.json", part.name()))
+}
+
 /// Writes `annotations/instances_{train,val}.json`, joined from `coco/{train,val}/NNNNNN.json`.
 ///
 /// The id of an image is its number; categories are numbered from 1, since trainers take 0 for background, and so are
@@ -97,10 +105,14 @@ impl Writer for Coco {
         Ok(vec![path])
     }
 
+    fn for_trainers(&self) -> Vec<PathBuf> {
+        Part::ALL.map(document).into()
+    }
+
     fn finish(&self, folder: &Path, classes: &[String], samples: &[Written]) -> Result<()> {
-        io::create_folder(folder.join("annotations"))?;
+        io::create_folder(folder.join(ANNOTATIONS))?;
         Part::ALL.iter().try_for_each(|&part| {
-            let path = folder.join("annotations").join(format!("instances_{}.json", part.name()));
+            let path = folder.join(document(part));
             let shares = samples.iter().filter(|sample| sample.part == part);
             io::write_through(&path, |out| join(out, folder, classes, shares))
         })
@@ -172,7 +184,8 @@ fn join<'a>(
     write!(out, "\"annotations\":[")?;
     let mut comma = "\n";
     for sample in samples {
-        let share: Share = io::read_json(folder.join(sample.file(KIND)?)).map_err(std::io::Error::other)?;
+        let file = io::inside(folder, sample.file(KIND)?).map_err(std::io::Error::other)?;
+        let share: Share = io::read_json(file).map_err(std::io::Error::other)?;
         images.push(share.image);
         for annotation in &share.annotations {
             write!(out, "{comma}{}", serde_json::to_string(annotation)?)?;

@@ -117,13 +117,8 @@ pub fn contact_sheet_of(folder: &Path, most: usize, options: &SheetOptions) -> R
 }
 
 fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
-    let file = |kind: &str| {
-        let file = line.files.iter().find(|file| file.path.starts_with(kind));
-        file.map(|f| folder.join(&f.path))
-            .ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
-    };
-    let picture = io::read::<LinearRgb>(file("images/")?)?;
-    let record: Record = io::read_json(file("scenes/")?)?;
+    let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
+    let record: Record = io::read_json(line.file(folder, "scenes/")?)?;
     let part = if line.part == Part::Val { "val  " } else { "train" };
     let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
     let caption = format!("{:06} {part} {labelled}/{all} labelled", line.k);

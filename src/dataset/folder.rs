@@ -1,5 +1,7 @@
 //! A dataset's folder: claimed by one run at a time, and only for the plan that it was begun with.
 
+use crate::dataset::journal::JOURNAL;
+use crate::dataset::times::RUNS;
 use crate::dataset::{Numbers, Plan, Shard, SplitOrder};
 use crate::error::{Error, Result};
 use crate::io;
@@ -12,6 +14,9 @@ pub(crate) const IDENTITY: &str = "dataset.json";
 
 /// Locked while a run writes; empty.
 const LOCK: &str = ".lock";
+
+/// Version of [`IDENTITY`] and of the journal: 2 records every input, and the lines of the journal have checksums.
+const FORMAT: u64 = 2;
 
 /// A claimed folder; free again when this is dropped.
 pub(crate) struct Claim {
@@ -30,9 +35,11 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     }
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
+    [LOCK, JOURNAL, RUNS].iter().try_for_each(|name| io::refuse_foreign(&folder.join(name)))?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
+        of_this_format(&before, folder)?;
         same(&before, &now, "").map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))?;
     }
     sweep(folder)?;
@@ -43,16 +50,40 @@ pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
 
 /// Claims the folder of a dataset that was begun before.
 pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
-    match identity(folder)? {
-        Some(_) => Ok(Claim { _lock: lock(folder)? }),
-        None => Err(Error::file(folder, format!("no {IDENTITY}, expected a dataset that was begun before"))),
-    }
+    let before = identity(folder)?;
+    let before = before
+        .ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset that was begun before")))?;
+    io::refuse_links(folder)?;
+    of_this_format(&before, folder)?;
+    Ok(Claim { _lock: lock(folder)? })
+}
+
+/// The folder was begun before every input was recorded and lines had checksums.
+pub(crate) fn is_older(folder: &Path) -> Result<bool> {
+    Ok(identity(folder)?.is_some_and(|before| format_of(&before) < FORMAT))
+}
+
+fn format_of(identity: &Value) -> u64 {
+    identity["format"].as_u64().unwrap_or(1)
+}
+
+/// Refuses what another petcomp recorded otherwise: nobody could tell whether its inputs are still the same.
+pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
+    let (what, others) = match format_of(identity) {
+        FORMAT => return Ok(()),
+        ..FORMAT => ("was begun by an older petcomp, which did not record every input", "older"),
+        _ => ("was begun by a newer petcomp", "newer"),
+    };
+    let what = format!("{what}: finish it with the {others} one, or begin a new folder");
+    Err(Error::file(folder.join(IDENTITY), what))
 }
 
 /// What a folder was made from; none where it is no dataset yet.
 pub(crate) fn identity(folder: &Path) -> Result<Option<Value>> {
-    let path = folder.join(IDENTITY);
-    if path.exists() { io::read_json(&path).map(Some) } else { Ok(None) }
+    match std::fs::symlink_metadata(folder.join(IDENTITY)) {
+        Err(_) => Ok(None),
+        Ok(_) => io::read_json(io::inside(folder, IDENTITY)?).map(Some),
+    }
 }
 
 fn holds_something(folder: &Path) -> Result<bool> {
@@ -66,7 +97,7 @@ fn holds_something(folder: &Path) -> Result<bool> {
 fn lock(folder: &Path) -> Result<File> {
     let path = folder.join(LOCK);
     // The file stays: a lock on a file that another run is about to delete would lock nothing.
-    let file = File::create(&path).map_err(|e| Error::file(&path, e))?;
+    let file = io::open_own(&path)?;
     match file.try_lock() {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => Err(Error::file(folder, "another run is writing this dataset")),
@@ -92,6 +123,7 @@ fn sweep(folder: &Path) -> Result<()> {
 /// Everything that decides the bytes of a dataset's samples, as it reads back from a file.
 fn plan_identity(plan: &Plan) -> Result<Value> {
     let mut identity = json!({
+        "format": FORMAT,
         "petcomp": env!("CARGO_PKG_VERSION"),
         "seed": plan.seed,
         "classes": plan.classes,
@@ -109,15 +141,51 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
     serde_json::from_str(&identity.to_string()).map_err(|e| Error::value("recipe", e))
 }
 
-/// Compares two documents and names the first field in which they differ.
+/// Compares two documents and names the first field in which they differ; entries of lists by their own name or file.
 pub(crate) fn same(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
     match (before, now) {
         (Value::Object(a), Value::Object(b)) => same_keys(a, b, at),
-        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
-            a.iter().zip(b).enumerate().try_for_each(|(i, (a, b))| same(a, b, &format!("{at}[{i}]")))
-        }
+        (Value::Array(a), Value::Array(b)) => same_entries(a, b, at),
         _ if before == now => Ok(()),
-        _ => Err((at.to_owned(), format!("the dataset was begun with {before}, this run has {now}"))),
+        _ => differ(before, now, at),
+    }
+}
+
+fn differ(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
+    let what = format!("the dataset was begun with {}, this run has {}", brief(before), brief(now));
+    Err((at.to_owned(), what))
+}
+
+fn same_entries(a: &[Value], b: &[Value], at: &str) -> std::result::Result<(), (String, String)> {
+    for (i, (before, now)) in a.iter().zip(b).enumerate() {
+        match (name_of(before), name_of(now)) {
+            (Some(first), Some(second)) if first == second => same(before, now, &format!("{at}[{first}]"))?,
+            (Some(first), Some(second)) => differ(&first.into(), &second.into(), &format!("{at}[{i}]"))?,
+            _ => same(before, now, &format!("{at}[{i}]"))?,
+        }
+    }
+    match a.len() == b.len() {
+        true => Ok(()),
+        false => {
+            let what = format!("the dataset was begun with {} entries, this run has {}", a.len(), b.len());
+            Err((at.to_owned(), what))
+        }
+    }
+}
+
+/// What an entry of a list is called.
+fn name_of(entry: &Value) -> Option<&str> {
+    ["name", "file"].iter().find_map(|key| entry.get(key)?.as_str())
+}
+
+/// Longest value that a message shows whole, letters.
+const BRIEF: usize = 80;
+
+fn brief(value: &Value) -> String {
+    let text = value.to_string();
+    match text.char_indices().nth(BRIEF) {
+        Some((end, _)) => format!("{}..", &text[..end]),
+        None => text,
     }
 }
 
@@ -129,4 +197,30 @@ fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> std::r
         same(a.get(key).unwrap_or(&none), b.get(key).unwrap_or(&none), &at)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_is_named_by_entry_and_field() {
+        let asset = |name: &str, mass: f64| json!({ "mass": mass, "name": name });
+        let before = json!({ "assets": [asset("b0", 0.1), asset("b1", 0.2)] });
+        let differs = |now: Value| same(&before, &json!({ "assets": now }), "").unwrap_err();
+        let (at, what) = differs(json!([asset("b0", 0.1), asset("b1", 0.3)]));
+        assert_eq!(
+            (at.as_str(), what.as_str()),
+            ("assets[b1].mass", "the dataset was begun with 0.2, this run has 0.3")
+        );
+        let (at, what) = differs(json!([asset("b0", 0.1), asset("a", 0.4)]));
+        assert_eq!(
+            (at.as_str(), what.as_str()),
+            ("assets[1]", "the dataset was begun with \"b1\", this run has \"a\"")
+        );
+        let (at, what) = differs(json!([asset("b0", 0.1)]));
+        assert_eq!((at.as_str(), what.as_str()), ("assets", "the dataset was begun with 2 entries, this run has 1"));
+        let (_, what) = differs(json!("x".repeat(500)));
+        assert!(what.len() < 260 && what.ends_with(".."), "{what}");
+    }
 }

@@ -3,7 +3,7 @@
 use crate::dataset::journal::Line;
 use crate::dataset::run::{Progress, run};
 use crate::dataset::times::{Times, timed};
-use crate::dataset::{Entry, Numbers, Obstructed, Report, Sample, Split, Writer};
+use crate::dataset::{Entry, Inputs, Numbers, Obstructed, Report, Sample, Split, Writer};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -28,6 +28,8 @@ pub struct Plan {
     pub obstructed: Obstructed,
     /// The files to write, in this order.
     pub writers: Vec<Box<dyn Writer>>,
+    /// Checksums of files that `recipe` tells of, to be kept in the folder. By default there are none.
+    pub inputs: Inputs,
 }
 
 impl Plan {

@@ -1,10 +1,10 @@
 //! Joins the shards of a dataset: the folder that a single run would have made.
 
 use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Finished, Line, lines_of};
-use crate::dataset::run::{Progress, run};
+use crate::dataset::journal::{Finished, JOURNAL, Line, numbered_lines_of};
+use crate::dataset::run::{Progress, check_count, run};
 use crate::dataset::times::Times;
-use crate::dataset::{LabelSetup, Numbers, Pictures, Plan, Report, Shard, Sidecar, Writer};
+use crate::dataset::{Inputs, LabelSetup, Numbers, Pictures, Plan, Report, Shard, Sidecar, Writer};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -18,10 +18,13 @@ use std::sync::atomic::AtomicBool;
 /// The folder is then, byte for byte, what one run without shards makes. Nothing is taken from the shards. A merge that
 /// was interrupted goes on when it is called again.
 ///
+/// A shard is a folder that anybody may have made: what its journal names is looked for in the shard alone, and only
+/// regular files are read.
+///
 /// # Errors
 /// Folders that are no shards, or not all of one dataset: another recipe, seed or program (the message names the field),
-/// a shard that is missing or given twice, a sample that is missing; a file that is not as it was written. As
-/// [`generate`](crate::dataset::generate) for the folder that is written.
+/// a shard that is missing or given twice, a sample that is missing or not the shard's; a line of a journal or a file that
+/// is not as it was written. As [`generate`](crate::dataset::generate) for the folder that is written.
 pub fn merge(
     shards: &[PathBuf],
     folder: &Path,
@@ -31,11 +34,12 @@ pub fn merge(
     let identity = common(shards)?;
     let count = identity.count;
     let mut lines = BTreeMap::new();
-    for shard in shards {
-        lines.extend(lines_of(shard)?.into_iter().map(|line| (line.k, (shard, line))));
+    for (shard, share) in shards.iter().zip(&identity.shares) {
+        lines.extend(lines_in(shard, *share, count)?.into_iter().map(|line| (line.k, (shard, line))));
     }
     if let Some(k) = (0..count).find(|k| !lines.contains_key(k)) {
-        let shard = &shards[identity.place[(k % identity.of) as usize]];
+        let shard = shards.iter().zip(&identity.shares).find(|(_, share)| share.contains(k));
+        let shard = shard.map_or(folder, |(shard, _)| shard);
         return Err(Error::file(shard, format!("sample {k} is missing: finish this shard first")));
     }
     let plan = plan(identity.document, count, folder)?;
@@ -47,19 +51,32 @@ pub fn merge(
     run(&plan, copy, progress, stop)
 }
 
+/// The lines of a shard's journal, all of them as they were written.
+fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<Line>> {
+    let wrong = |i, what: String| Error::file(folder.join(JOURNAL), format!("line {i}: {what}"));
+    let mend = "run this shard again with --resume";
+    let checked = |(i, line): (usize, std::result::Result<Line, String>)| match line {
+        Err(what) => Err(wrong(i, format!("{what}; {mend}"))),
+        Ok(line) if line.k >= count || !shard.contains(line.k) => {
+            Err(wrong(i, format!("sample {} is none of shard {shard} of {count} samples", line.k)))
+        }
+        Ok(line) => Ok(line),
+    };
+    numbered_lines_of(folder)?.into_iter().map(checked).collect()
+}
+
 /// What all shards say of themselves.
 struct Common {
     /// What the dataset was made from, without the shard.
     document: Map<String, Value>,
-    of: u64,
     count: u64,
-    /// Where in the list each shard is, in order of index.
-    place: Vec<usize>,
+    /// Which share each of them is.
+    shares: Vec<Shard>,
 }
 
 fn common(shards: &[PathBuf]) -> Result<Common> {
     let mut first: Option<(Value, u64, u64)> = None;
-    let mut place = BTreeMap::new();
+    let (mut places, mut shares) = (BTreeMap::new(), Vec::new());
     for (i, path) in shards.iter().enumerate() {
         let (document, Share { shard, count }) = open(path)?;
         if let Some((before, of, of_count)) = &first {
@@ -71,16 +88,17 @@ fn common(shards: &[PathBuf]) -> Result<Common> {
         } else {
             first = Some((document, shard.of, count));
         }
-        if let Some(twin) = place.insert(shard.index, i) {
+        if let Some(twin) = places.insert(shard.index, i) {
             return Err(Error::file(path, format!("is shard {shard}, as {} is", shards[twin].display())));
         }
+        shares.push(shard);
     }
     let (document, of, count) = first.ok_or_else(|| Error::value("shards", "none, expected their folders"))?;
-    if let Some(index) = (1..=of).find(|index| !place.contains_key(index)) {
+    if let Some(index) = (1..=of).find(|index| !places.contains_key(index)) {
         return Err(Error::value("shards", format!("shard {index}/{of} is missing")));
     }
     let document = document.as_object().cloned().unwrap_or_default();
-    Ok(Common { document, of, count, place: place.into_values().collect() })
+    Ok(Common { document, count, shares })
 }
 
 /// What the folder of a shard says of its share.
@@ -91,14 +109,24 @@ struct Share {
     count: u64,
 }
 
+impl Share {
+    /// Fails where there can be no such share.
+    fn check(self) -> Result<Self> {
+        Shard::new(self.shard.index, self.shard.of)?;
+        check_count(self.count)?;
+        Ok(self)
+    }
+}
+
 /// What a shard's folder was made from, and which share it is.
 fn open(path: &Path) -> Result<(Value, Share)> {
     let document = folder::identity(path)?;
     let mut document = document.ok_or_else(|| Error::file(path, format!("no {IDENTITY}, expected a shard")))?;
     let share = document.as_object_mut().and_then(|map| map.remove("shard"));
     let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
-    let share = serde_json::from_value(share).map_err(|e| Error::value("shard", e).in_file(path.join(IDENTITY)))?;
-    Ok((document, share))
+    folder::of_this_format(&document, path)?;
+    let share = serde_json::from_value(share).map_err(|e| Error::value("shard", e)).and_then(Share::check);
+    Ok((document, share.map_err(|e| e.in_file(path.join(IDENTITY)))?))
 }
 
 /// The plan that a dataset was made with, but for where its samples come from.
@@ -119,6 +147,7 @@ fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<P
         split: field(&mut document, "split")?,
         obstructed: field(&mut document, "obstructed")?,
         writers: writers.collect::<Result<_>>()?,
+        inputs: Inputs::default(),
     })
 }
 
@@ -144,15 +173,9 @@ fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Wr
     }
 }
 
-/// Copies a file and looks whether it arrived as it was written.
+/// Copies a file, if it is as it was written.
 fn copy(shard: &Path, folder: &Path, file: &Finished) -> Result<()> {
-    let path = Path::new(&file.path);
-    let place = folder.join(path);
-    io::create_folder(place.parent().unwrap_or(folder))?;
-    io::copy(shard.join(path), &place)?;
-    let arrived = Finished::of(folder, path)?;
-    if arrived != *file {
-        return Err(Error::file(shard.join(path), "has other bytes than when it was written"));
-    }
-    Ok(())
+    let (from, to) = (io::inside(shard, &file.path)?, io::below(folder, &file.path)?);
+    io::create_folder(to.parent().unwrap_or(folder))?;
+    io::copy(from, to, file.checksum())
 }

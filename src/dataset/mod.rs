@@ -20,9 +20,11 @@ mod check;
 mod coco;
 mod contact_sheet;
 mod estimate;
+mod fingerprint;
 mod folder;
 mod formats;
 mod generate;
+mod inputs;
 mod journal;
 mod layers;
 mod listing;
@@ -39,6 +41,7 @@ mod sidecar;
 mod split;
 mod studio;
 mod summary;
+mod surroundings;
 mod times;
 mod voc;
 mod webdataset;
@@ -52,6 +55,7 @@ pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
 pub use estimate::LongRun;
 pub use formats::{Extent, Format, LabelSetup};
 pub use generate::{Plan, generate};
+pub use inputs::Inputs;
 pub(crate) use journal::JOURNAL;
 pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report, mend};
@@ -175,6 +179,11 @@ pub trait Writer: Sync {
     /// # Errors
     /// When a file cannot be written, or the sample is one that the layout cannot hold.
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>>;
+
+    /// The files that trainers are given, below the dataset's folder: those that name all others. By default none.
+    fn for_trainers(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
 
     /// Writes the files that hold many samples, from `samples`' own files, which are in order of number and all there;
     /// takes away what an earlier call left and this one has no use for. By default there are no such files.

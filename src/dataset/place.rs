@@ -18,10 +18,10 @@ const LABEL_SUFFIX: &str = ".label.json";
 pub(crate) struct Place {
     /// What a recipe sees of it.
     pub(crate) background: Background,
-    /// Of the label and the photo's length: another one is another place.
-    pub(crate) checksum: u32,
-    photo: PathBuf,
-    kept: Roi,
+    /// The photo's file.
+    pub(crate) photo: PathBuf,
+    /// The part of it that is seen.
+    pub(crate) kept: Roi,
     image: [u32; 2],
     plate: OnceLock<Arc<Image<LinearRgb>>>,
 }
@@ -48,10 +48,9 @@ impl Place {
         let kept = middle(label.image_size(), image);
         let camera = cropped(solution.camera, kept).resized(image);
         let background = Background { name: name(path), size: solution.size, camera: CameraSource::Known(camera) };
-        let photo = path.with_file_name(&label.image.file);
-        let length = std::fs::metadata(&photo).map_err(|e| Error::file(&photo, e))?.len();
-        let checksum = crc32fast::hash(format!("{length} {}", io::read_text(path)?).as_bytes());
-        Ok(Self { background, checksum, photo, kept, image, plate: OnceLock::new() })
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let photo = io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
+        Ok(Self { background, photo, kept, image, plate: OnceLock::new() })
     }
 
     /// Name of the label's file.

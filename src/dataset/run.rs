@@ -7,7 +7,7 @@ use crate::dataset::{Numbers, Plan, Report};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::work;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -25,6 +25,17 @@ pub struct Progress {
     pub made: u64,
 }
 
+/// Most samples that a dataset may have: a number above is a slip of the finger, and no sum of counts can overflow.
+const MOST_SAMPLES: u64 = 1_000_000_000;
+
+/// Fails for a number of samples that nobody can mean.
+pub(super) fn check_count(count: u64) -> Result<()> {
+    match count <= MOST_SAMPLES {
+        true => Ok(()),
+        false => Err(Error::value("count", format!("{count} samples, expected at most {MOST_SAMPLES}"))),
+    }
+}
+
 /// Writes the samples of a plan that are not in its folder yet and returns what the folder then holds; `write` puts the
 /// files of a sample in their places.
 pub(super) fn run(
@@ -33,24 +44,48 @@ pub(super) fn run(
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
 ) -> Result<Report> {
+    check_count(plan.count)?;
     let _lock = folder::claim(plan)?;
+    plan.inputs.keep(&plan.folder);
     let journal = Journal::open(&plan.folder)?;
-    let wanted = (0..plan.count).filter(|&k| plan.numbers.contains(k));
     let again = matches!(plan.numbers, Numbers::One(_));
-    let missing: Vec<u64> = wanted.filter(|&k| again || !journal.has(k)).collect();
-    let asked = (0..plan.count).filter(|&k| plan.numbers.contains(k)).count() as u64;
-    let done = journal.count(plan.count, |k| plan.numbers.contains(k));
+    // One sample is made again whatever the number of the others.
+    let count = if again { plan.count.max(journal.end()) } else { plan.count };
+    nothing_beyond(&journal, count, plan)?;
+    let done = journal.count(count, |k| plan.numbers.contains(k));
+    let asked = plan.numbers.count_below(count);
+    let missing = if again { asked } else { asked.saturating_sub(done) };
+    let next = Mutex::new(plan.numbers.below(count));
     let progressed = Progress { done, count: asked, made: 0 };
     let books = Mutex::new(Books { journal, progressed, times: Times::default(), failure: None });
-    let run = Run { plan, write, progress, stop, books, began: Instant::now() };
+    let run = Run { plan, count, write, progress, stop, books, began: Instant::now() };
     run.tell(&run.books());
-    run.work(&missing)?;
+    run.work(missing, || {
+        let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
+        next.find(|&k| again || !run.books().journal.has(k))
+    })?;
     run.finish()
+}
+
+/// Fails where the folder holds more than is asked for: trainers read all that is there.
+fn nothing_beyond(journal: &Journal, count: u64, plan: &Plan) -> Result<()> {
+    let end = journal.end();
+    if end <= count {
+        return Ok(());
+    }
+    let what = format!(
+        "has image {}, but only {count} are asked for: ask for at least {end}, or begin a new folder (`petcomp dataset \
+         subset` lists a part of one)",
+        end - 1
+    );
+    Err(Error::file(&plan.folder, what))
 }
 
 /// What the threads of one run share.
 struct Run<'a, F> {
     plan: &'a Plan,
+    /// Samples of the whole dataset.
+    count: u64,
     write: F,
     progress: &'a (dyn Fn(Progress) + Sync),
     stop: &'a AtomicBool,
@@ -67,15 +102,14 @@ struct Books {
 }
 
 impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
-    /// Makes samples until there are none left or there is a reason to stop.
-    fn work(&self, missing: &[u64]) -> Result<()> {
+    /// Makes samples until `next` has none, of the `missing` ones, or there is a reason to stop.
+    fn work(&self, missing: u64, next: impl Fn() -> Option<u64> + Sync) -> Result<()> {
         let threads = rayon::current_num_threads();
-        let workers = threads.min(missing.len());
+        let workers = threads.min(usize::try_from(missing).unwrap_or(threads));
         let pool = |_| work::pool(threads / workers.max(1));
         let pools: std::io::Result<Vec<_>> = (0..workers).map(pool).collect();
         let pools = pools.map_err(|e| Error::value("threads", e))?;
-        let next = AtomicUsize::new(0);
-        let take = || missing.get(next.fetch_add(1, Ordering::Relaxed)).copied().filter(|_| self.goes_on());
+        let take = || if self.goes_on() { next() } else { None };
         std::thread::scope(|scope| {
             for pool in &pools {
                 scope.spawn(|| pool.install(|| std::iter::from_fn(take).for_each(|k| self.one(k))));
@@ -117,37 +151,27 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
 
     /// Closes the books, whatever happened, then says what did.
     fn finish(self) -> Result<Report> {
-        let (plan, wall) = (self.plan, self.began.elapsed());
+        let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
         let Books { journal, progressed: Progress { made, .. }, times, failure } =
             self.books.into_inner().unwrap_or_else(PoisonError::into_inner);
         io::sync(&plan.folder);
         times.append(&plan.folder, made, wall);
-        let closed = journal.close(plan.count);
+        let (done, asked) = (journal.count(count, |k| plan.numbers.contains(k)), plan.numbers.count_below(count));
+        let state = format!("{done} of {asked} samples are in {}; the same command goes on", plan.folder.display());
+        let closed = journal.close(count);
         if let Some((k, error)) = failure {
-            let (count, folder) = (plan.count, plan.folder.display());
-            log::warn!("sample {k} failed; {} and the same command goes on", done_of(&closed, count, &folder));
+            log::warn!("sample {k} failed; {state}");
             return Err(error);
         }
         let lines = closed?;
-        let there = |k: &u64| lines.binary_search_by_key(k, |line| line.k).is_ok();
-        if (0..plan.count).filter(|&k| plan.numbers.contains(k)).any(|k| !there(&k)) {
-            let (done, count, folder) = (lines.len(), plan.count, plan.folder.display());
-            return Err(Error::Interrupted {
-                what: format!("{done} of {count} samples are in {folder}; the same command goes on"),
-            });
+        if done < asked {
+            return Err(Error::Interrupted { what: state });
         }
-        if lines.len() as u64 == plan.count {
+        if lines.len() as u64 == count {
             let samples: Vec<_> = lines.iter().map(Line::written).collect();
             plan.writers.iter().try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
         }
-        Ok(Report::of(&lines, &plan.classes, plan.count, made))
-    }
-}
-
-fn done_of(closed: &Result<Vec<Line>>, count: u64, folder: &impl std::fmt::Display) -> String {
-    match closed {
-        Ok(lines) => format!("{} of {count} samples are in {folder}", lines.len()),
-        Err(_) => format!("those before are in {folder}"),
+        Ok(Report::of(&lines, plan, count, made))
     }
 }
 

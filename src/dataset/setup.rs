@@ -1,5 +1,6 @@
 //! The file that a dataset is made from.
 
+use crate::dataset::surroundings::seen_from;
 use crate::dataset::yolo::LEAST_SIDE_PX;
 use crate::dataset::{LabelSetup, Pictures, Split};
 use crate::error::{Error, Result};
@@ -13,6 +14,9 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Setup {
+    /// Folder that the recipe lies in, which names of files in it are relative to; in no file. Default: the working folder.
+    #[serde(skip)]
+    pub folder: PathBuf,
     /// Folder of assets, relative to the file. Default: `assets`.
     pub assets: PathBuf,
     /// Folder of photos of the place with their labels (`NAME.label.json`), relative to the file. Default: `backgrounds`.
@@ -32,6 +36,7 @@ pub struct Setup {
 impl Default for Setup {
     fn default() -> Self {
         Self {
+            folder: PathBuf::new(),
             assets: "assets".into(),
             backgrounds: "backgrounds".into(),
             scene: Recipe::default(),
@@ -47,6 +52,8 @@ impl Setup {
     /// Reads a recipe file, some of its values replaced, and checks it; its folders become relative to the working
     /// folder.
     ///
+    /// A recipe is its author's own: the folders and environment maps that it names may lie anywhere.
+    ///
     /// # Errors
     /// A file that cannot be read; an unknown key; a range that cannot be right.
     pub fn read(path: impl AsRef<Path>, overrides: &[io::Override]) -> Result<Self> {
@@ -56,6 +63,7 @@ impl Setup {
         let folder = path.parent().unwrap_or(Path::new(""));
         setup.assets = folder.join(&setup.assets);
         setup.backgrounds = folder.join(&setup.backgrounds);
+        setup.folder = folder.into();
         Ok(setup)
     }
 
@@ -87,6 +95,9 @@ impl Setup {
         let mut setup = self.clone();
         setup.assets = io::relative(&absolute(&setup.assets)?, &folder);
         setup.backgrounds = io::relative(&absolute(&setup.backgrounds)?, &folder);
+        for file in &mut setup.scene.environment.files {
+            *file = seen_from(&folder, &self.folder, file)?;
+        }
         io::write_toml(path, &setup)
     }
 
@@ -203,15 +214,18 @@ mod tests {
     #[test]
     fn a_written_recipe_gives_the_same_setup_from_another_folder() {
         let dir = tempfile::tempdir().unwrap();
-        io::write_text(dir.path().join("recipe.toml"), "assets = 'a/b'\n[scene]\nobjects = 3\noff = ['light']\n")
-            .unwrap();
+        let recipe = "assets = 'a/b'\n[scene]\nobjects = 3\noff = ['light']\nenvironment = { files = ['sky.hdr'] }\n";
+        io::write_text(dir.path().join("recipe.toml"), recipe).unwrap();
         let setup = Setup::read(dir.path().join("recipe.toml"), &[]).unwrap();
         io::create_folder(dir.path().join("x/y")).unwrap();
         setup.write(dir.path().join("x/y/recipe.toml")).unwrap();
         let text = io::read_text(dir.path().join("x/y/recipe.toml")).unwrap();
         assert!(text.contains("assets = \"../../a/b\""), "{text}");
         let again = Setup::read(dir.path().join("x/y/recipe.toml"), &[]).unwrap();
-        assert_eq!((again.scene, again.labels), (setup.scene, setup.labels));
+        assert_eq!((again.scene.objects, again.labels), (setup.scene.objects, setup.labels));
+        assert_eq!(again.scene.environment.files, ["../../sky.hdr"]);
+        let same = |setup: &Setup| setup.folder.join(&setup.scene.environment.files[0]).to_string_lossy().into_owned();
+        assert_eq!(same(&again).replace("x/y/../../", ""), format!("{}/sky.hdr", dir.path().display()));
     }
 
     #[test]

@@ -26,6 +26,27 @@ impl Numbers {
             Self::One(one) => k == one,
         }
     }
+
+    /// Those of them that are less than `count`, in order.
+    pub(crate) fn below(self, count: u64) -> impl Iterator<Item = u64> + Send {
+        let (first, step, end) = self.steps(count);
+        (first..end).step_by(usize::try_from(step).unwrap_or(usize::MAX))
+    }
+
+    /// How many of them are less than `count`.
+    pub(crate) fn count_below(self, count: u64) -> u64 {
+        let (first, step, end) = self.steps(count);
+        end.saturating_sub(first).div_ceil(step)
+    }
+
+    /// The first of them, the distance to the next, and where they end.
+    fn steps(self, count: u64) -> (u64, u64, u64) {
+        match self {
+            Self::All => (0, 1, count),
+            Self::Shard(Shard { index, of }) => (index.saturating_sub(1), of.max(1), count),
+            Self::One(k) => (k, 1, count.min(k.saturating_add(1))),
+        }
+    }
 }
 
 /// A share of the samples, every `of`-th: each machine makes its own and none has to know of another.
@@ -60,7 +81,7 @@ impl Shard {
 
     /// Sample `k` belongs to it.
     pub fn contains(self, k: u64) -> bool {
-        k % self.of == self.index - 1
+        k.checked_rem(self.of).is_some_and(|rest| rest + 1 == self.index)
     }
 
     /// Name of its folder: names in order are shards in order.
@@ -171,6 +192,30 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_counted_without_counting() {
+        let shard = |index, of| Numbers::Shard(Shard { index, of });
+        for numbers in
+            [Numbers::All, Numbers::One(0), Numbers::One(7), Numbers::One(49), shard(1, 3), shard(3, 3), shard(9, 9)]
+        {
+            for count in [0, 1, 7, 8, 50] {
+                let wanted: Vec<u64> = (0..count).filter(|&k| numbers.contains(k)).collect();
+                assert_eq!(numbers.below(count).collect::<Vec<_>>(), wanted, "{numbers:?} below {count}");
+                assert_eq!(numbers.count_below(count), wanted.len() as u64, "{numbers:?} below {count}");
+            }
+        }
+        assert_eq!(Numbers::One(u64::MAX - 1).below(u64::MAX).collect::<Vec<_>>(), [u64::MAX - 1]);
+        assert_eq!(Numbers::Shard(Shard { index: 2, of: u64::MAX }).count_below(u64::MAX), 1);
+    }
+
+    #[test]
+    fn a_shard_that_cannot_be_holds_nothing() {
+        for (index, of) in [(1, 0), (0, 4), (0, 0), (u64::MAX, u64::MAX)] {
+            assert!(!Shard { index, of }.contains(3));
+        }
+        assert!(Shard::new(1, 0).is_err());
+    }
+
+    #[test]
     fn a_shard_is_given_by_hand() {
         assert_eq!(within("3/8", &[]).unwrap(), "3/8");
         assert_eq!(within("0/8", &[]).unwrap_err(), "shard: 0/8, expected 1/8 to 8/8");
@@ -201,6 +246,9 @@ mod tests {
         assert_eq!(within("auto/8", &pod).unwrap(), "1/8");
         assert!(within("auto", &pod).unwrap_err().contains("say auto/N"));
         assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", "4")]).is_err());
+        let most = u64::MAX.to_string();
+        assert!(within("auto/4", &[("JOB_COMPLETION_INDEX", &most)]).is_err());
+        assert!(within("auto/4", &[("SLURM_ARRAY_TASK_ID", &most)]).is_err());
         assert!(within("auto", &[]).unwrap_err().contains("neither"));
         let last = [("JOB_COMPLETION_INDEX", "18446744073709551615")];
         assert!(within("auto/4", &last).unwrap_err().contains("expected at most 4/4"));

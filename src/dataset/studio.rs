@@ -1,12 +1,14 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
-use crate::asset::{Asset, Library, Panorama};
+use crate::asset::{Library, Panorama};
 use crate::bounds::{Bounds, LEAST_OBJECT_PX};
 use crate::camera;
 use crate::composite;
+use crate::dataset::fingerprint::fingerprint;
 use crate::dataset::place::Place;
+use crate::dataset::surroundings::Surroundings;
 use crate::dataset::times::timed;
-use crate::dataset::{Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
+use crate::dataset::{Inputs, Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label::{self, Labels};
@@ -14,7 +16,6 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self, DeepImage};
 use crate::scene::{Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, stock};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,6 +27,7 @@ pub struct Studio {
     places: Vec<Place>,
     backgrounds: Vec<Background>,
     stock: Vec<Choice>,
+    surroundings: Surroundings,
 }
 
 /// Most pictures of a dataset.
@@ -77,7 +79,8 @@ impl Studio {
         let places = Place::all(&setup.backgrounds, setup.scene.image)?;
         let backgrounds = places.iter().map(|place| place.background.clone()).collect();
         let stock = stock(&library);
-        Ok(Self { setup, library, places, backgrounds, stock })
+        let surroundings = Surroundings::of(&setup);
+        Ok(Self { setup, library, places, backgrounds, stock, surroundings })
     }
 
     /// What it was opened from.
@@ -93,34 +96,26 @@ impl Studio {
     /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
     ///
     /// # Errors
-    /// Classes that the setup's policy for obstructed objects cannot add to; more pictures than a folder can hold.
+    /// Classes that the setup's policy for obstructed objects cannot add to; more pictures than a folder can hold; a photo
+    /// or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         Bounds::new(0.0, MOST_PICTURES, "what a folder can hold").check("count", count as f64)?;
-        let labels = &self.setup.labels;
+        let (folder, labels) = (folder.into(), &self.setup.labels);
+        let mut inputs = Inputs::kept(&folder);
         let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
         writers.extend(labels.writers(&self.setup.pictures));
         Ok(Plan {
-            folder: folder.into(),
+            folder,
             count,
             numbers: Numbers::All,
             seed,
-            recipe: self.fingerprint(),
+            recipe: fingerprint(&self.setup, &self.library, &self.places, &self.surroundings, &mut inputs)?,
             classes: labels.obstructed.classes(&self.library.classes)?,
             split: self.setup.split,
             obstructed: labels.obstructed,
             writers,
+            inputs,
         })
-    }
-
-    /// Everything that decides what a picture or its labels are, cut-outs and labels by checksum; not where folders lie.
-    fn fingerprint(&self) -> serde_json::Value {
-        let assets: BTreeMap<&str, Vec<u32>> =
-            self.library.assets.iter().map(|a| (a.name.as_str(), checksums(a))).collect();
-        let places: BTreeMap<&str, u32> =
-            self.places.iter().map(|place| (place.background.name.as_str(), place.checksum)).collect();
-        let Setup { scene, render, labels, .. } = &self.setup;
-        let label = labels.options();
-        serde_json::json!({ "scene": scene, "render": render, "label": label, "assets": assets, "backgrounds": places })
     }
 
     /// Scene `k` as the recipe draws it: objects still in the air, exposure still open.
@@ -202,7 +197,7 @@ impl Studio {
         if let Some(plate) = &plate {
             scene = light::match_plate(scene, plate);
         }
-        let shot = scene.resolve(|object| Look::of(&self.library, object), plate, panorama(&scene)?)?;
+        let shot = scene.resolve(|object| Look::of(&self.library, object), plate, self.panorama(&scene)?)?;
         Ok((scene, shot))
     }
 
@@ -214,6 +209,12 @@ impl Studio {
     #[cfg(not(feature = "settle"))]
     fn rest(&self, scene: Scene) -> Result<Scene> {
         Ok(scene)
+    }
+
+    /// The picture of the surroundings that a scene names.
+    fn panorama(&self, scene: &Scene) -> Result<Option<Arc<Panorama>>> {
+        let shining = scene.environment.as_ref().filter(|map| map.shines());
+        shining.map(|map| self.surroundings.picture(&map.file)).transpose()
     }
 
     fn plate(&self, name: &str) -> Result<Option<Arc<Image<LinearRgb>>>> {
@@ -228,17 +229,6 @@ impl Studio {
             }
         }
     }
-}
-
-/// The picture of the surroundings that a scene names.
-fn panorama(scene: &Scene) -> Result<Option<Arc<Panorama>>> {
-    let shining = scene.environment.as_ref().filter(|map| map.shines());
-    shining.map(|map| Panorama::read(&map.file).map(Arc::new)).transpose()
-}
-
-/// One checksum for each photo's cut-out.
-fn checksums(asset: &Asset) -> Vec<u32> {
-    asset.photos.iter().map(|photo| photo.texture.checksum()).collect()
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

@@ -86,7 +86,7 @@ impl Summary {
             for (i, (told, line)) in told?.into_iter().zip(part).enumerate() {
                 summary.add(&told, line);
                 if places.binary_search(&(step * STEP + i)).is_ok() {
-                    summary.shown.push(Shown { picture: file(folder, line, "images/")?, record: told.record });
+                    summary.shown.push(Shown { picture: line.file(folder, "images/")?, record: told.record });
                 }
             }
         }
@@ -128,7 +128,7 @@ impl Summary {
         }
         for (class, counts) in self.balance.iter_mut().zip(&line.classes) {
             let of = &mut class[usize::from(*part == Part::Val)];
-            *of = [of[0] + counts[0], of[1] + counts[1]];
+            *of = [of[0] + u64::from(counts[0]), of[1] + u64::from(counts[1])];
         }
         self.rejected.extend(record.rejected.iter().map(|why| (*k, why.clone())));
     }
@@ -138,14 +138,7 @@ impl Summary {
 const STEP: usize = 256;
 
 fn told(folder: &Path, line: &Line) -> Result<Told> {
-    Ok(Told { k: line.k, part: line.part, record: io::read_json(file(folder, line, "scenes/")?)? })
-}
-
-/// The file of a sample in one of the dataset's folders.
-fn file(folder: &Path, line: &Line, kind: &str) -> Result<PathBuf> {
-    let file = line.files.iter().find(|file| file.path.starts_with(kind));
-    file.map(|file| folder.join(&file.path))
-        .ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
+    Ok(Told { k: line.k, part: line.part, record: io::read_json(line.file(folder, "scenes/")?)? })
 }
 
 /// The key in the recipe of a draw's distribution; none for a choice from a list and for a turn that was drawn again.

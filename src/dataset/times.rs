@@ -1,7 +1,8 @@
 //! Where the time of a run goes.
 
+use crate::error::Error;
+use crate::io;
 use serde::{Deserialize, Serialize};
-use std::fs::OpenOptions;
 use std::io::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -63,16 +64,17 @@ impl Times {
             write_s: self.write.as_secs_f64(),
         };
         let text = serde_json::to_string(&line).map(|text| text + "\n").unwrap_or_default();
-        let file = OpenOptions::new().append(true).create(true).open(folder.join(RUNS));
-        if let Err(e) = file.and_then(|mut file| file.write_all(text.as_bytes())) {
-            log::warn!("{}: {e}", folder.join(RUNS).display());
+        let path = folder.join(RUNS);
+        let file = io::open_own(&path);
+        if let Err(e) = file.and_then(|mut f| f.write_all(text.as_bytes()).map_err(|e| Error::file(&path, e))) {
+            log::warn!("{e}");
         }
     }
 }
 
 /// The runs that wrote a folder.
 pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
-    let text = std::fs::read_to_string(folder.join(RUNS)).unwrap_or_default();
+    let text = io::inside(folder, RUNS).and_then(io::read_text).unwrap_or_default();
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
 }
 

@@ -25,6 +25,11 @@ pub struct Voc {
 /// Its folder.
 const KIND: &str = "voc";
 
+/// The list of a part's images.
+fn list(part: Part) -> PathBuf {
+    Path::new(KIND).join(format!("{}.txt", part.name()))
+}
+
 impl Writer for Voc {
     fn settings(&self) -> serde_json::Value {
         serde_json::json!({ "voc": self })
@@ -40,11 +45,15 @@ impl Writer for Voc {
         Ok(vec![path])
     }
 
+    fn for_trainers(&self) -> Vec<PathBuf> {
+        Part::ALL.map(list).into()
+    }
+
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
         Part::ALL.iter().try_for_each(|&part| {
             let numbers =
                 samples.iter().filter(|sample| sample.part == part).map(|sample| format!("{:06}\n", sample.k));
-            io::write_text(folder.join(KIND).join(format!("{}.txt", part.name())), &numbers.collect::<String>())
+            io::write_text(folder.join(list(part)), &numbers.collect::<String>())
         })
     }
 }

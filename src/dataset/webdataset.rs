@@ -47,6 +47,10 @@ impl Writer for WebDataset {
         Ok(Vec::new())
     }
 
+    fn for_trainers(&self) -> Vec<PathBuf> {
+        Part::ALL.map(|part| archive(Path::new(""), part, 0)).into()
+    }
+
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
         for part in Part::ALL {
             let of_part: Vec<_> = samples.iter().filter(|sample| sample.part == part).collect();
@@ -72,12 +76,13 @@ fn pack(out: &mut dyn Write, folder: &Path, samples: &[&Written]) -> std::io::Re
     let mut tar = tar::Builder::new(out);
     for sample in samples {
         for (name, file) in named(sample) {
-            let bytes = std::fs::read(folder.join(file)).map_err(|e| std::io::Error::other(Error::file(file, e)))?;
+            let file = io::inside(folder, file).map_err(std::io::Error::other)?;
+            let file = std::fs::File::open(&file).map_err(|e| std::io::Error::other(Error::file(&file, e)))?;
             let mut header = tar::Header::new_ustar();
-            header.set_size(bytes.len() as u64);
+            header.set_size(file.metadata()?.len());
             header.set_mode(MODE);
             header.set_mtime(0);
-            tar.append_data(&mut header, name, bytes.as_slice())?;
+            tar.append_data(&mut header, name, file)?;
         }
     }
     tar.finish()

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+/// What trainers are given.
+const DATA_YAML: &str = "data.yaml";
+
 /// Least side of an image, pixels: trainers refuse smaller ones.
 pub(crate) const LEAST_SIDE_PX: u32 = 10;
 
@@ -56,7 +59,11 @@ impl Writer for Yolo {
             let dir = folder.join("labels").join(part.name());
             io::create_folder(&dir)?;
         }
-        io::write_text(folder.join("data.yaml"), &DataYaml::write(classes))
+        io::write_text(folder.join(DATA_YAML), &DataYaml::write(classes))
+    }
+
+    fn for_trainers(&self) -> Vec<PathBuf> {
+        vec![DATA_YAML.into()]
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {

@@ -30,9 +30,9 @@ impl DataYaml {
         self.path.as_deref().map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
-    /// Number of classes.
+    /// Number of classes: of names that are there, whatever `nc` claims.
     pub(crate) fn classes(&self) -> Option<usize> {
-        self.nc.or(Some(self.names.len()).filter(|&n| n > 0))
+        Some(self.names.len()).filter(|&n| n > 0)
     }
 
     /// Names of the classes, in order.

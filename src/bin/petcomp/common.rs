@@ -4,7 +4,7 @@ use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
 use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -112,10 +112,9 @@ impl Common {
             _ => log::LevelFilter::Debug,
         };
         let mut logger = env_logger::Builder::new();
-        logger.filter_module("petcomp", level).format(|out, record| {
-            use std::io::Write;
-            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args())
-        });
+        logger
+            .filter_module("petcomp", level)
+            .format(|out, record| writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args()));
         logger.init();
         // Fails only if a pool exists already, and then that pool serves.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
@@ -261,8 +260,12 @@ fn end_with_the_reader() {
     }));
 }
 
-/// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures; the second one ends
-/// the program at once.
+/// From the first Ctrl-C (or SIGTERM) to the end of the program at the latest: schedulers kill after 10 s and more.
+const GRACE: Duration = Duration::from_secs(8);
+
+/// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures. What has not ended by
+/// itself after [`GRACE`] is ended in the middle, as the second signal ends it at once: every file is whole or not there,
+/// so the same command goes on.
 pub(crate) fn interruption() -> &'static AtomicBool {
     static STOP: AtomicBool = AtomicBool::new(false);
     static ONCE: std::sync::Once = std::sync::Once::new();
@@ -271,7 +274,17 @@ pub(crate) fn interruption() -> &'static AtomicBool {
             if STOP.swap(true, Ordering::Relaxed) {
                 std::process::exit(INTERRUPTED.into());
             }
-            eprintln!("stopping after the pictures in hand; interrupt again to stop at once");
+            std::thread::spawn(|| {
+                std::thread::sleep(GRACE);
+                std::process::exit(INTERRUPTED.into());
+            });
+            // Nobody may be there to read it.
+            let _ = writeln!(
+                std::io::stderr(),
+                "stopping after the pictures in hand, in {} s at the latest; the same command goes on; interrupt again \
+                 to stop at once",
+                GRACE.as_secs()
+            );
         };
         if let Err(error) = ctrlc::set_handler(handler) {
             log::warn!("interrupts cannot be caught: {error}");

@@ -38,10 +38,12 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let report = dataset::make(&studio, &studio.plan(args.count, args.seed, &folder)?, &args.consent, common)?;
     let sheet = args.output.join("contact_sheet.png");
     io::write(&sheet, &contact_sheet_of(&folder, args.count as usize, &Default::default())?)?;
-    dataset::tell(&report, common);
-    common.say(format_args!("look at      {}", sheet.display()));
-    common.say(format_args!("train with   {}", folder.join("data.yaml").display()));
-    common.say(format_args!("change       {}", recipe.display()));
+    dataset::tell(&report);
+    println!("look at      {}", sheet.display());
+    for path in dataset::for_trainers(&report, &folder) {
+        println!("train with   {}", path.display());
+    }
+    println!("change       {}", recipe.display());
     Ok(())
 }
 

@@ -155,6 +155,7 @@ fn plan(folder: &std::path::Path, count: u64) -> Plan {
         split: Split::default(),
         obstructed: Obstructed::Keep,
         writers: writers.into(),
+        inputs: Default::default(),
     }
 }
 

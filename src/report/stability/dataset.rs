@@ -100,6 +100,7 @@ impl Made {
             split: Split::default(),
             obstructed: Obstructed::Keep,
             writers,
+            inputs: Default::default(),
         }
     }
 

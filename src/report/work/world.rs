@@ -23,6 +23,8 @@ const PER_METRE: f64 = 400.0;
 /// Cards of the usual scene, and by how much each lies higher than the one below it, metres.
 const CARDS: usize = 3;
 const RISE: f64 = 0.02;
+/// File of the surroundings.
+const PANORAMA: &str = "sky.exr";
 
 /// Names of the assets: a cut-out that is half see-through, one that is opaque all over, one that tints.
 pub(super) const SEE_THROUGH: &str = "bottle";
@@ -71,13 +73,14 @@ impl World {
     }
 
     fn panorama(&self) -> std::path::PathBuf {
-        self.folder.path().join("sky.exr")
+        self.folder.path().join(PANORAMA)
     }
 
     /// The recipe that names the folders.
     pub(super) fn setup(&self) -> Setup {
         let [assets, backgrounds] = ["assets", "photos"].map(|kind| self.folder.path().join(kind));
-        Setup { assets, backgrounds, scene: Recipe { image: IMAGE, ..Recipe::default() }, ..Setup::default() }
+        let scene = Recipe { image: IMAGE, ..Recipe::default() };
+        Setup { folder: self.folder.path().into(), assets, backgrounds, scene, ..Setup::default() }
     }
 
     /// A few see-through cards at rest over the photo, one on another, under a lamp and an even sky.
@@ -100,7 +103,7 @@ impl World {
 
     /// The light of a picture of the surroundings.
     pub(super) fn environment(&self, strength: f64) -> Environment {
-        Environment { file: self.panorama().to_string_lossy().into_owned(), rotation_deg: 0.0, strength }
+        Environment { file: PANORAMA.into(), rotation_deg: 0.0, strength }
     }
 }
 

@@ -1,9 +1,11 @@
 //! `petcomp dataset generate`, `ablate` and `merge`: datasets are made.
 
 use crate::common::{Common, RecipeArgs, interruption};
-use petcomp::dataset::{self, LongRun, Numbers, Plan, Progress, Report, Setup, ShardChoice, Studio, contact_sheet_of};
+use petcomp::dataset::{
+    self, LongRun, Numbers, Obstructed, Plan, Progress, Report, Setup, ShardChoice, Studio, contact_sheet_of,
+};
 use petcomp::{Error, Quality, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -12,7 +14,7 @@ use std::time::{Duration, Instant};
 pub(crate) struct Args {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Number of pictures of the whole dataset, at most 10 million
+    /// Number of pictures of the whole dataset, at most 10 million; a folder that holds more is refused
     #[arg(short = 'n', long, value_name = "N", required_unless_present_any = ["only", "preview"])]
     count: Option<u64>,
     /// Seed; the same one gives the same files
@@ -25,7 +27,8 @@ pub(crate) struct Args {
     /// qualities, and so do the places where things come to lie
     #[arg(long)]
     quality: Option<Quality>,
-    /// Go on with a dataset that was begun before: refuse a new folder, and check every file against its checksum
+    /// Go on with a dataset that was begun before: refuse a new folder, and check every file against its checksum, inputs
+    /// too
     #[arg(long)]
     resume: bool,
     /// Make only image K, whether it is there or not
@@ -95,17 +98,18 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     };
     if args.resume {
         let (good, bad) = dataset::mend(&folder)?;
-        common.say(format_args!("{}: {good} images are as they were written, {bad} are made again", folder.display()));
+        println!("{}: {good} images are as they were written, {bad} are made again", folder.display());
     }
     let studio = Studio::open(setup)?;
     let plan = Plan { numbers, ..studio.plan(count, args.seed, &folder)? };
-    tell(&make(&studio, &plan, &args.consent, common)?, common);
+    let report = make(&studio, &plan, &args.consent, common)?;
+    tell(&report);
     if args.preview.is_some() {
         let sheet = folder.join("sheet.png");
         io::write(&sheet, &contact_sheet_of(&folder, count as usize, &Default::default())?)?;
-        common.say(format_args!("look at      {}", sheet.display()));
+        println!("look at      {}", sheet.display());
     }
-    common.say(folder.join("data.yaml").display());
+    for_trainers(&report, &folder).iter().for_each(|path| println!("{}", path.display()));
     Ok(())
 }
 
@@ -123,11 +127,11 @@ pub(crate) fn ablate(args: &Ablate, common: &Common) -> anyhow::Result<()> {
         io::create_folder(&folder)?;
         let recipe = folder.join("recipe.toml");
         setup.write(&recipe)?;
-        common.say(format_args!("{}", recipe.display()));
+        println!("{}", recipe.display());
         if args.count > 0 {
             let studio = Studio::open(Setup::read(&recipe, &[])?)?;
             let plan = studio.plan(args.count, args.seed, folder.join("dataset"))?;
-            tell(&make(&studio, &plan, &args.consent, common)?, common);
+            tell(&make(&studio, &plan, &args.consent, common)?);
         }
     }
     Ok(())
@@ -137,8 +141,8 @@ pub(crate) fn merge(args: &Merge, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("pictures");
     let report = dataset::merge(&args.shards, &args.output, &|p| progress.at(p.done, p.count), interruption())?;
     drop(progress);
-    tell(&report, common);
-    common.say(args.output.join("data.yaml").display());
+    tell(&report);
+    for_trainers(&report, &args.output).iter().for_each(|path| println!("{}", path.display()));
     Ok(())
 }
 
@@ -183,14 +187,30 @@ fn watch(last: &Mutex<Option<Progress>>, done: &AtomicBool) -> Option<LongRun> {
     None
 }
 
-/// Prints what is in the folder.
-pub(crate) fn tell(report: &Report, common: &Common) {
-    let Report { images, val, made, objects, labelled, retries, .. } = report;
-    common.say(format_args!(
-        "images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again"
-    ));
-    common.say(format_args!("objects      {objects}, {labelled} labelled (on top), {} obstructed", objects - labelled));
+/// Prints what is in the folder: a result, so also where quiet is asked for.
+pub(crate) fn tell(report: &Report) {
+    let Report { images, val, made, objects, labelled, obstructed, retries, .. } = report;
+    println!("images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again");
+    println!("objects      {objects}, {labelled} labelled, {obstructed} obstructed ({})", labels_of(report.policy));
     for class in &report.classes {
-        common.say(format_args!("  {:10} {} labelled of {}", class.name, class.labelled, class.objects));
+        println!("  {:10} {} labelled of {}", class.name, class.labelled, class.objects);
+    }
+}
+
+/// What became of the labels of objects that something lies over.
+fn labels_of(policy: Obstructed) -> &'static str {
+    match policy {
+        Obstructed::Drop => "without a label",
+        Obstructed::Keep => "labelled like the others",
+        Obstructed::Ignore => "to be ignored, in YOLO without a label",
+        Obstructed::Class => "labelled as a class of their own",
+    }
+}
+
+/// What a dataset's trainers are given: the files that name all others, or the folder where there are none.
+pub(crate) fn for_trainers(report: &Report, folder: &Path) -> Vec<PathBuf> {
+    match report.for_trainers.as_slice() {
+        [] => vec![folder.into()],
+        files => files.iter().map(|file| folder.join(file)).collect(),
     }
 }

@@ -6,7 +6,7 @@ mod recipe;
 mod select;
 mod training;
 
-pub(crate) use generate::{Consent, make, tell};
+pub(crate) use generate::{Consent, for_trainers, make, tell};
 
 use crate::common::Common;
 

@@ -1,0 +1,90 @@
+//! What a dataset is made from, by content: all that decides a picture or a label.
+
+use crate::asset::{Asset, Library, Photo};
+use crate::dataset::place::Place;
+use crate::dataset::surroundings::Surroundings;
+use crate::dataset::{Inputs, Setup};
+use crate::error::Result;
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// Everything that decides what a picture or its labels are: values as they are, pictures by checksum; not where folders
+/// lie. Two datasets of equal fingerprint, seed and program have the same samples.
+///
+/// Lists are in the order that draws choose by, so an entry that is added, lost or moved shows.
+///
+/// # Errors
+/// A photo or an environment map that cannot be read.
+pub(super) fn fingerprint(
+    setup: &Setup,
+    library: &Library,
+    places: &[Place],
+    surroundings: &Surroundings,
+    inputs: &mut Inputs,
+) -> Result<Value> {
+    let Setup { scene, render, labels, .. } = setup;
+    let assets: Vec<Value> = library.assets.iter().map(|asset| of_asset(asset, &library.classes)).collect();
+    Ok(json!({
+        "scene": scene,
+        "render": render,
+        "label": labels.options(),
+        "assets": assets,
+        "backgrounds": of_places(places, inputs)?,
+        "environments": of_surroundings(surroundings, inputs)?,
+    }))
+}
+
+fn of_asset(asset: &Asset, classes: &[String]) -> Value {
+    json!({
+        "name": asset.name,
+        "class": classes.get(asset.class as usize),
+        "thickness": asset.thickness,
+        "mass": asset.mass,
+        "photos": asset.photos.iter().map(of_photo).collect::<Vec<_>>(),
+    })
+}
+
+fn of_photo(photo: &Photo) -> Value {
+    json!({
+        "file": photo.record.file,
+        "px_per_metre": photo.record.px_per_metre,
+        "size_m": photo.size,
+        "outline_px": digest(&photo.record.outline_px),
+        "pixels": shown(photo.texture.checksum()),
+    })
+}
+
+fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
+    let files: Vec<(String, &Path)> =
+        places.iter().map(|place| (format!("background {}", place.background.name), place.photo.as_path())).collect();
+    let photos = inputs.checksums(&files)?;
+    let of_place = |(place, photo): (&Place, u32)| {
+        let background = &place.background;
+        json!({
+            "name": background.name,
+            "size": background.size,
+            "camera": digest(&(background.camera, [place.kept.x, place.kept.y, place.kept.width, place.kept.height])),
+            "photo": shown(photo),
+        })
+    };
+    Ok(places.iter().zip(photos).map(of_place).collect())
+}
+
+fn of_surroundings(surroundings: &Surroundings, inputs: &mut Inputs) -> Result<Vec<Value>> {
+    let files: Vec<_> = surroundings.files().collect();
+    let named: Vec<(String, &Path)> =
+        files.iter().map(|(name, path)| (format!("environment {name}"), path.as_path())).collect();
+    let checksums = inputs.checksums(&named)?;
+    let entry = |((name, _), checksum): (&(&str, _), u32)| json!({ "file": name, "content": shown(checksum) });
+    Ok(files.iter().zip(checksums).map(entry).collect())
+}
+
+/// Checksum of a value by its text: numbers are told to the last bit.
+fn digest(value: &impl Serialize) -> String {
+    shown(crc32fast::hash(json!(value).to_string().as_bytes()))
+}
+
+fn shown(crc32: u32) -> String {
+    format!("crc32 {crc32:08x}")
+}
