@@ -3,7 +3,7 @@
 use crate::asset::{Asset, Library, Panorama};
 use crate::camera;
 use crate::composite;
-use crate::dataset::place::Place;
+use crate::dataset::place::{Place, PlaceOptions};
 use crate::dataset::times::timed;
 use crate::dataset::{Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
 use crate::error::{Error, Result};
@@ -49,7 +49,8 @@ impl Studio {
 
     fn with_assets(setup: Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let library = Library::open_some(&setup.assets, wanted)?;
-        let places = Place::all(&setup.backgrounds, setup.scene.image)?;
+        let (image, surface_size, force) = (setup.scene.image, setup.surface_size, setup.force_cameras);
+        let places = Place::all(&setup.backgrounds, PlaceOptions { image, surface_size, force })?;
         let backgrounds = places.iter().map(|place| place.background.clone()).collect();
         let stock = stock(&library);
         Ok(Self { setup, library, places, backgrounds, stock })
@@ -92,9 +93,15 @@ impl Studio {
             self.library.assets.iter().map(|a| (a.name.as_str(), checksums(a))).collect();
         let places: BTreeMap<&str, u32> =
             self.places.iter().map(|place| (place.background.name.as_str(), place.checksum)).collect();
+        let notes: BTreeMap<&str, &Vec<String>> = self
+            .places
+            .iter()
+            .filter(|place| !place.notes.is_empty())
+            .map(|place| (place.background.name.as_str(), &place.notes))
+            .collect();
         let Setup { scene, render, labels, .. } = &self.setup;
         let label = labels.options();
-        serde_json::json!({ "scene": scene, "render": render, "label": label, "assets": assets, "backgrounds": places })
+        serde_json::json!({ "scene": scene, "render": render, "label": label, "assets": assets, "backgrounds": places, "background_notes": notes })
     }
 
     /// Scene `k` as the recipe draws it: objects still in the air, exposure still open.
