@@ -95,11 +95,11 @@ fn lengths_may_be_missing_but_not_both() {
 fn a_cropped_picture_has_its_exif_dropped_and_its_principal_point_loosened() {
     let mut view = Scenario::default().tilted(20.0).view(1, 2);
     view.label.camera.focal_35mm = Some(60.0);
-    view.label.image.cropped = true;
+    view.label.image.cropped = Some(true);
     let solution = solve(&view.label);
     assert_eq!(solution.focal.prior_sigma, 0.35);
     let mut whole = view.label.clone();
-    (whole.image.cropped, whole.camera.focal_35mm) = (false, None);
+    (whole.image.cropped, whole.camera.focal_35mm) = (Some(false), None);
     let principal = |s: &Solution| s.sigma.covariance[(8, 8)].sqrt();
     assert!(principal(&solution) > 3.0 * principal(&solve(&whole)));
 }
@@ -242,7 +242,7 @@ fn a_known_crop_is_as_good_as_the_whole_picture() {
     view.label.camera.focal_35mm = Some(3200.0 / 5000.0 * 36f64.hypot(24.0));
     let whole = solve(&view.label);
     let mut part = view.label.clone();
-    (part.image.width, part.image.height, part.image.cropped) = (3500, 2300, true);
+    (part.image.width, part.image.height, part.image.cropped) = (3500, 2300, Some(true));
     part.surface.corners_px = part.surface.corners_px.map(|c| c.map(|[x, y]| [x - 150.0, y - 400.0]));
     let unknown = solve(&part);
     part.image.crop = Some(camera::Crop { offset_px: [150.0, 400.0], width: 4000, height: 3000 });

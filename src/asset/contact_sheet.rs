@@ -57,11 +57,8 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
     let cutout = small(&photo.texture);
     let (w, h) = cutout.size();
     let record = &photo.record;
-    let lines = 1 + record.doubts.len();
     let line_height = TextSize::Small.height();
-    let text_height = lines * line_height + GAP / 2;
     let width = BACKGROUNDS.len() * (SIDE + GAP);
-    let mut canvas = Image::filled(width, text_height + h, PAPER);
     let [length, across] = record.object_m.map(|m| 1e3 * m);
     let title = format!(
         "{}  {length:.1} x {across:.1} mm (+- {:.1})  confidence {:.2}",
@@ -70,20 +67,19 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
         record.confidence
     );
     let told = std::iter::once((&title, INK)).chain(record.doubts.iter().map(|doubt| (doubt, WARNING)));
-    for (i, (text, ink)) in told.enumerate() {
-        draw::text(&mut canvas, [0, (i * line_height) as isize], &fitting(text, width), ink, TextSize::Small);
+    let lines: Vec<(String, Srgb8)> = told
+        .flat_map(|(text, ink)| draw::wrapped(text, width, TextSize::Small).into_iter().map(move |line| (line, ink)))
+        .collect();
+    let text_height = lines.len() * line_height + GAP / 2;
+    let mut canvas = Image::filled(width, text_height + h, PAPER);
+    for (i, (line, ink)) in lines.iter().enumerate() {
+        draw::text(&mut canvas, [0, (i * line_height) as isize], line, *ink, TextSize::Small);
     }
     for (i, background) in BACKGROUNDS.iter().enumerate() {
         let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over_color(background(x, y)));
         draw::paste(&mut canvas, [i * (SIDE + GAP), text_height], &to_srgb8(&over));
     }
     canvas
-}
-
-/// As much of a text as there is room for.
-fn fitting(text: &str, width: usize) -> String {
-    let room = width / TextSize::Small.width("m").max(1);
-    text.chars().take(room).collect()
 }
 
 fn small(cutout: &Texture) -> Image<Film> {

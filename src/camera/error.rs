@@ -9,6 +9,16 @@ pub enum SolveError {
     /// A number is NaN or infinite.
     #[error("{0} is not finite")]
     NonFinite(&'static str),
+    /// A number is of no label that a person would write.
+    #[error("{at}: {value:e}, expected no more than {most:e}, and no less than its inverse where it is positive")]
+    OutOfRange {
+        /// Which value.
+        at: &'static str,
+        /// What it was.
+        value: f64,
+        /// The largest one.
+        most: f64,
+    },
     /// The picture has no pixels.
     #[error("image: {} x {} pixels, expected at least 1 x 1", .0[0], .0[1])]
     BadImage([u32; 2]),
@@ -18,8 +28,11 @@ pub enum SolveError {
     /// Neither side of the rectangle is known.
     #[error("surface: width_m and height_m are both missing, expected at least one")]
     NoScale,
+    /// Neither the sides nor the corners of the rectangle are there.
+    #[error("surface: missing corners_px (or four points on the surface), and width_m or height_m")]
+    Empty,
     /// There are no corners.
-    #[error("surface: corners_px is missing, and there are no four points on the surface instead")]
+    #[error("surface: corners_px is missing or not filled in, and there are no four points on the surface instead")]
     NoCorners,
     /// A value that must be positive is not.
     #[error("{at}: {value}, expected a positive number")]
@@ -67,7 +80,28 @@ pub enum SolveError {
         /// Which photo, from 0.
         photo: usize,
     },
+    /// The best camera is not within the noise of its label.
+    #[error("surface: no camera fits (corners {rms_px:.1} px off, p = {p_value:.1e}): {}", cure(*.exchanged))]
+    NoFit {
+        /// Root mean square distance of the corners from where the camera sees them, pixels.
+        rms_px: f64,
+        /// Probability of a worse fit by chance.
+        p_value: f64,
+        /// Chi squared with width and height exchanged, where that mends it: as labelled, and exchanged.
+        exchanged: Option<[f64; 2]>,
+    },
     /// No pose has the camera above the surface with the whole rectangle in front of it.
     #[error("surface.corners_px: no camera above the surface sees these corners")]
     NoPose,
+}
+
+/// What to do about a label that no camera fits.
+fn cure(exchanged: Option<[f64; 2]>) -> String {
+    match exchanged {
+        Some([before, after]) => {
+            format!("exchange width_m and height_m (chi squared {before:.1} as labelled, {after:.1} exchanged)")
+        }
+        None => "wrong dimensions, corners of different rectangles, strong distortion, or corner_sigma_px is too small"
+            .into(),
+    }
 }

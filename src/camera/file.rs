@@ -2,13 +2,16 @@
 
 use super::exchange::{BlenderCamera, OpencvCamera};
 use super::focal::FocalSource;
-use super::label::{Label, LabelImage};
+use super::label::{Framing, Label, LabelImage};
 use super::solution::Solution;
 use super::uncertainty::UNKNOWN_NAMES;
 use super::warning::Warning;
 use crate::camera::Camera;
+use crate::error::{Error, Result};
 use crate::geom::{Point2, Vector2};
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A solved camera as a document; numbers read back to the same bits. What is infinite is `null`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,9 +25,28 @@ pub struct CameraFile {
     pub image: LabelImage,
     /// The label's surface.
     pub surface_id: String,
+    /// What the camera was solved from, so that it is not taken for that of another label.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solved_from: Option<SolvedFrom>,
+    /// The camera does not fit its label, and somebody wants it nevertheless. Default: false.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub forced: bool,
     /// The camera and the doubts.
     #[serde(flatten)]
     pub found: FoundCamera,
+}
+
+/// What a camera was solved from, by content.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolvedFrom {
+    /// CRC-32 of the label together with what its photo's EXIF data say.
+    pub label_crc32: u32,
+    /// Width and height of the rectangle as measured, metres, for labels that do not hold them.
+    pub size_m: [Option<f64>; 2],
+    /// The same checksum of each label that was solved together with this one, by file name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub together: BTreeMap<String, u32>,
 }
 
 /// The one word of [`CameraFile::format`].
@@ -57,6 +79,9 @@ pub struct FoundCamera {
     pub sigma: SigmaRecord,
     /// How well the label fits.
     pub fit: FitRecord,
+    /// Which part of what the camera took the picture was taken for.
+    #[serde(default)]
+    pub framing: Framing,
     /// Where the focal length comes from.
     pub focal_source: FocalSource,
     /// Part of the information on the focal length that comes from the picture.
@@ -109,6 +134,8 @@ pub struct SigmaRecord {
     pub center_m: [Option<f64>; 3],
     pub height_px: Option<f64>,
     pub height_ref_m: f64,
+    #[serde(default)]
+    pub principal_point_px: Option<f64>,
     /// Order of the rows and columns of the covariance.
     pub unknowns: Vec<String>,
     pub covariance: Vec<Vec<Option<f64>>>,
@@ -138,6 +165,8 @@ impl CameraFile {
             version: 1,
             image: label.image.clone(),
             surface_id: label.surface.id.clone(),
+            solved_from: Some(SolvedFrom::new(label)),
+            forced: solution.misfit().is_some(),
             found: FoundCamera::new(solution),
         }
     }
@@ -156,6 +185,59 @@ impl CameraFile {
     pub fn size(&self) -> [f64; 2] {
         [self.found.surface.width_m, self.found.surface.height_m]
     }
+
+    /// Checks that the file holds a camera that can have taken a picture of this size.
+    ///
+    /// # Errors
+    /// [`Error::Value`] naming the first value that cannot be right.
+    pub fn check(&self, image: [u32; 2]) -> Result<()> {
+        let FoundCamera { model, opencv, .. } = &self.found;
+        let own = [self.image.width, self.image.height];
+        if own != image || image.contains(&0) {
+            let ([w, h], [a, b]) = (own, image);
+            return Err(Error::value("image", format!("{w} x {h} pixels, expected {a} x {b}")));
+        }
+        positive("model.f_px", model.f_px)?;
+        model.principal_point_px.iter().try_for_each(|v| bounded("model.principal_point_px", *v))?;
+        self.size().iter().try_for_each(|v| positive("surface", *v))?;
+        opencv.t.iter().try_for_each(|v| bounded("opencv.t", *v))?;
+        let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
+        let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+        if !(off < ROTATION && rotation.determinant() > 0.0) {
+            return Err(Error::value("opencv.R", "no rotation"));
+        }
+        let height = self.camera().center().z;
+        if height > 0.0 { Ok(()) } else { Err(Error::value("opencv.t", "the camera is below the surface")) }
+    }
+}
+
+/// A matrix as far from a rotation as this is none.
+const ROTATION: f64 = 1e-6;
+/// Larger numbers, and smaller ones than one over it, are of no camera.
+const LARGEST: f64 = 1e9;
+
+fn bounded(at: &str, value: f64) -> Result<()> {
+    let fits = value.abs() <= LARGEST;
+    if fits { Ok(()) } else { Err(Error::value(at, format!("{value:e}, expected at most {LARGEST:e}"))) }
+}
+
+fn positive(at: &str, value: f64) -> Result<()> {
+    let fits = (1.0 / LARGEST..=LARGEST).contains(&value);
+    if fits { Ok(()) } else { Err(Error::value(at, format!("{value:e}, expected a positive number"))) }
+}
+
+impl SolvedFrom {
+    /// Of a label alone.
+    pub fn new(label: &Label) -> Self {
+        let size_m = [label.surface.width_m, label.surface.height_m];
+        Self { label_crc32: checksum(label), size_m, together: BTreeMap::new() }
+    }
+}
+
+/// CRC-32 of a label as we would write it.
+pub(crate) fn checksum(label: &Label) -> u32 {
+    // A label is made of texts and numbers: JSON says them all.
+    crc32fast::hash(&serde_json::to_vec(label).unwrap_or_default())
 }
 
 impl FoundCamera {
@@ -176,6 +258,7 @@ impl FoundCamera {
             homography: [0, 1, 2].map(|i| [0, 1, 2].map(|j| homography[(i, j)])),
             sigma: SigmaRecord::new(solution),
             fit: FitRecord::new(solution),
+            framing: solution.framing,
             focal_source: solution.focal_source,
             data_share: solution.focal.share,
             focal_from_data: solution.focal.from_data_px,
@@ -196,6 +279,7 @@ impl SigmaRecord {
             center_m: [0, 1, 2].map(|i| finite(sigma.center[(i, i)].max(0.0).sqrt())),
             height_px: finite(sigma.height_px),
             height_ref_m: sigma.reference_height,
+            principal_point_px: finite(sigma.principal_px),
             unknowns: UNKNOWN_NAMES.map(String::from).into(),
             covariance: (0..UNKNOWN_NAMES.len()).map(row).collect(),
         }

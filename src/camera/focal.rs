@@ -1,7 +1,7 @@
 //! What is known of the focal length before the picture is looked at, and where it came from afterwards.
 
 use super::belief::Belief;
-use super::label::Label;
+use super::label::{Framing, Label};
 use super::options::Priors;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +13,9 @@ const USUAL_FOCAL: f64 = 1.0;
 const STATED_SIGMA: f64 = 0.01;
 /// The same of a 35 mm equivalent; the ways to convert it differ by 4 %.
 const EQUIVALENT_SIGMA: f64 = 0.05;
+/// What is added to that where the picture may have been cropped, since the equivalent is then of a longer diagonal: people
+/// keep between half and all of a picture.
+const CROP_SIGMA: f64 = 0.15;
 /// Equivalents that imply a focal length outside this many longer sides are wrong.
 const POSSIBLE_FOCAL: std::ops::RangeInclusive<f64> = 0.2..=20.0;
 
@@ -53,18 +56,20 @@ pub(crate) fn usual_px(image: [u32; 2]) -> f64 {
     USUAL_FOCAL * longer_side(image)
 }
 
-/// What to believe of the logarithm of the focal length in pixels, and who says so.
-pub(crate) fn belief(label: &Label, priors: &Priors) -> (Belief, Witness) {
+/// What to believe of the logarithm of the focal length in pixels of a picture of some framing, and who says so.
+pub(crate) fn belief(label: &Label, framing: Framing, priors: &Priors) -> (Belief, Witness) {
     let (camera, image) = (&label.camera, label.taken_size());
     let equivalent = camera.focal_35mm.map(|mm| focal_from_equivalent(mm, image));
     let believable =
-        equivalent.filter(|f| !label.is_cropped_anywhere() && POSSIBLE_FOCAL.contains(&(f / longer_side(image))));
+        equivalent.filter(|f| framing != Framing::Cropped && POSSIBLE_FOCAL.contains(&(f / longer_side(image))));
     let (focal_px, usual_sigma, witness) = match (camera.focal_px, believable) {
         (Some(px), _) => (px, STATED_SIGMA, Witness::Person),
         (None, Some(px)) => (px, EQUIVALENT_SIGMA, Witness::Exif),
         (None, None) => return (usual(image, priors), Witness::Usual),
     };
     let sigma = if camera.focal_fixed { 0.0 } else { camera.focal_sigma.unwrap_or(usual_sigma) };
+    let cropped_perhaps = framing == Framing::Unknown && witness == Witness::Exif && !camera.focal_fixed;
+    let sigma = if cropped_perhaps { libm::hypot(sigma, CROP_SIGMA) } else { sigma };
     (Belief { mean: libm::log(focal_px), sigma }, witness)
 }
 
@@ -87,19 +92,24 @@ mod tests {
         label
     }
 
+    fn believed(label: &Label, framing: Framing) -> (Belief, Witness) {
+        belief(label, framing, &Priors::default())
+    }
+
     #[test]
     fn an_equivalent_counts_by_the_diagonal() {
-        let (belief, witness) = belief(&label(26.0), &Priors::default());
+        let (belief, witness) = believed(&label(26.0), Framing::Whole);
         assert_eq!((witness, belief.sigma), (Witness::Exif, 0.05));
         assert!((libm::exp(belief.mean) - 26.0 * 5000.0 / 43.2666).abs() < 0.01);
+        assert!(believed(&label(26.0), Framing::Unknown).0.sigma > 0.15);
     }
 
     #[test]
     fn an_impossible_or_cropped_equivalent_is_dropped() {
-        let mut cropped = label(26.0);
-        cropped.image.cropped = true;
-        for label in [label(2.0), label(1e4), cropped] {
-            let (belief, witness) = belief(&label, &Priors::default());
+        for (label, framing) in
+            [(label(2.0), Framing::Whole), (label(1e4), Framing::Whole), (label(26.0), Framing::Cropped)]
+        {
+            let (belief, witness) = believed(&label, framing);
             assert_eq!((witness, belief.sigma), (Witness::Usual, 0.35));
         }
     }
@@ -108,7 +118,7 @@ mod tests {
     fn a_person_s_pixels_come_first() {
         let mut both = label(26.0);
         both.camera.focal_px = Some(3000.0);
-        let (belief, witness) = belief(&both, &Priors::default());
+        let (belief, witness) = believed(&both, Framing::Whole);
         assert_eq!((witness, belief.sigma, libm::exp(belief.mean).round()), (Witness::Person, 0.01, 3000.0));
     }
 }

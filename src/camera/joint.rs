@@ -6,7 +6,8 @@
 
 use super::belief::{Belief, Beliefs};
 use super::error::SolveError;
-use super::label::Label;
+use super::hedge::is_off_center;
+use super::label::{Framing, Label};
 use super::model::{KAPPA, LN_FOCAL, PRINCIPAL, STRETCH, State, UNKNOWNS, Unknowns};
 use super::options::SolveOptions;
 use super::problem::Problem;
@@ -37,7 +38,8 @@ pub struct Joint {
 /// Solves photos of one camera together: they share focal length, principal point and distortion, and photos of one surface
 /// share its sides.
 ///
-/// The labels have to agree in the shape of their pictures; one may be a reduced copy. See [`one_camera`].
+/// The labels have to agree in the shape of their pictures; one may be a reduced copy. See [`one_camera`]. A photo that no
+/// camera fits when it is alone takes no part, and keeps its own solution.
 ///
 /// # Errors
 /// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no photo can be used.
@@ -46,25 +48,89 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
         return Err(SolveError::DifferentPictures { photo: other });
     }
     let mut photos: Vec<_> = labels.iter().map(|label| super::solve(label, options)).collect();
-    let mut used: Vec<usize> = (0..photos.len()).filter(|&i| photos[i].is_ok()).collect();
-    if used.is_empty() {
-        return photos.swap_remove(0).map(|_| Joint { photos: Vec::new(), warnings: Vec::new() });
+    if let Some(Err(error)) = photos.first().filter(|_| photos.iter().all(Result::is_err)) {
+        return Err(error.clone());
     }
-    let mut warnings = Vec::new();
-    let spare = labels.len() / PHOTOS_PER_OUTLIER;
-    loop {
-        let bundle = Bundle::new(labels, &used, options)?;
-        let arrow = bundle.best(&photos).ok_or(SolveError::NoPose)?;
-        let worst = (0..used.len()).max_by(|&a, &b| arrow.chi2[a].total_cmp(&arrow.chi2[b]));
-        match worst.filter(|&w| arrow.chi2[w] > OUTLIER && warnings.len() < spare) {
-            Some(w) => warnings.push(Warning::OutlierPhoto { photo: used.remove(w), chi2: arrow.chi2[w] }),
-            None => {
-                for (solution, &photo) in bundle.solutions(&arrow, options).into_iter().zip(&used) {
-                    photos[photo] = Ok(solution);
+    let misfits = photos.iter().enumerate().filter_map(|(photo, solution)| {
+        let solution = solution.as_ref().ok().filter(|s| s.misfit().is_some())?;
+        Some(Warning::OutlierPhoto { photo, chi2: solution.fit.chi2 })
+    });
+    let mut warnings: Vec<Warning> = misfits.collect();
+    let together = Together { labels, alone: &photos, options };
+    if let Some(agreed) = together.whole_or_cropped()? {
+        for (solution, photo) in agreed.solutions.into_iter().zip(agreed.used) {
+            photos[photo] = Ok(solution);
+        }
+        warnings.extend(agreed.warnings);
+    }
+    Ok(Joint { photos, warnings })
+}
+
+/// Photos of one camera, and what each says alone.
+struct Together<'a> {
+    labels: &'a [Label],
+    alone: &'a [Result<Solution, SolveError>],
+    options: &'a SolveOptions,
+}
+
+/// What photos say together.
+struct Agreed {
+    used: Vec<usize>,
+    states: Vec<State>,
+    solutions: Vec<Solution>,
+    cost: f64,
+    warnings: Vec<Warning>,
+}
+
+impl Together<'_> {
+    /// The camera of whole pictures, or where nobody says that they are whole and the corners deny it, of cropped ones.
+    fn whole_or_cropped(&self) -> Result<Option<Agreed>, SolveError> {
+        let whole = self.agreed(Framing::Whole)?;
+        let unknown = self.labels.iter().any(|label| label.framing() == Framing::Unknown);
+        if !unknown || !self.options.priors.cropping_matters() {
+            return Ok(whole);
+        }
+        let (Some(whole), Some(mut loose)) = (whole, self.agreed(Framing::Unknown)?) else { return Ok(None) };
+        if loose.used.len() > whole.used.len() || is_off_center(whole.cost, loose.cost) {
+            loose.solutions = loose.solutions.into_iter().map(|s| s.off_center(None)).collect();
+            return Ok(Some(loose));
+        }
+        Ok(Some(whole.hedged(&loose, self.options)))
+    }
+
+    /// What the photos that fit say together, but for those that contradict the others; pictures of unknown framing are
+    /// taken for pictures of this one.
+    fn agreed(&self, unknown: Framing) -> Result<Option<Agreed>, SolveError> {
+        let fits = |i: &usize| self.alone[*i].as_ref().is_ok_and(|s| s.misfit().is_none());
+        let mut used: Vec<usize> = (0..self.labels.len()).filter(fits).collect();
+        let mut warnings = Vec::new();
+        let spare = self.labels.len() / PHOTOS_PER_OUTLIER;
+        while !used.is_empty() {
+            let bundle = Bundle::new(self.labels, &used, unknown, self.options)?;
+            let arrow = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
+            let worst = (0..used.len()).max_by(|&a, &b| arrow.chi2[a].total_cmp(&arrow.chi2[b]));
+            match worst.filter(|&w| arrow.chi2[w] > OUTLIER && warnings.len() < spare) {
+                Some(w) => warnings.push(Warning::OutlierPhoto { photo: used.remove(w), chi2: arrow.chi2[w] }),
+                None => {
+                    let solutions = bundle.solutions(&arrow, self.options);
+                    return Ok(Some(Agreed { used, states: arrow.states, solutions, cost: arrow.cost, warnings }));
                 }
-                return Ok(Joint { photos, warnings });
             }
         }
+        Ok(None)
+    }
+}
+
+impl Agreed {
+    /// Whole pictures with the error that they have if they are cropped.
+    fn hedged(mut self, loose: &Self, options: &SolveOptions) -> Self {
+        let unsure = |(i, solution): (usize, Solution)| {
+            let Some(other) = loose.used.iter().position(|photo| *photo == self.used[i]) else { return solution };
+            let apart = self.states[i].step_to(&loose.states[other]);
+            solution.hedged(&loose.solutions[other], &apart, options)
+        };
+        self.solutions = std::mem::take(&mut self.solutions).into_iter().enumerate().map(unsure).collect();
+        self
     }
 }
 
@@ -89,7 +155,8 @@ pub fn one_camera(labels: &[Label]) -> Vec<Vec<usize>> {
 /// Two pictures show the same frame of a camera, in whatever number of pixels: in units of the diagonal, everything that a
 /// camera's photos share is then the same.
 fn same_frame(a: &Label, b: &Label) -> bool {
-    if a.image.crop.is_some() || b.image.crop.is_some() || a.image.cropped || b.image.cropped {
+    let is_part = |label: &Label| label.image.crop.is_some() || label.image.cropped == Some(true);
+    if is_part(a) || is_part(b) {
         return a.image_size() == b.image_size() && a.image.crop == b.image.crop;
     }
     let ([aw, ah], [bw, bh]) = (a.image_size().map(f64::from), b.image_size().map(f64::from));
@@ -118,8 +185,12 @@ struct Arrow {
 }
 
 impl Bundle {
-    fn new(labels: &[Label], used: &[usize], options: &SolveOptions) -> Result<Self, SolveError> {
-        let problems = used.iter().map(|&i| Problem::new(&labels[i], options)).collect::<Result<Vec<_>, _>>()?;
+    fn new(labels: &[Label], used: &[usize], unknown: Framing, options: &SolveOptions) -> Result<Self, SolveError> {
+        let problem = |&i: &usize| {
+            let framing = Some(labels[i].framing()).filter(|&known| known != Framing::Unknown);
+            Problem::new(&labels[i], framing.unwrap_or(unknown), options)
+        };
+        let problems = used.iter().map(problem).collect::<Result<Vec<_>, _>>()?;
         let mut surfaces: Vec<(&str, [f64; 2])> = Vec::new();
         let mut surface = Vec::new();
         for (&i, problem) in used.iter().zip(&problems) {

@@ -54,12 +54,26 @@ pub struct LabelImage {
     pub width: u32,
     /// Height of the upright picture, pixels.
     pub height: u32,
-    /// A part was cut away, so that the lens need not look at the picture's centre. Default: false.
-    #[serde(default)]
-    pub cropped: bool,
+    /// A part was cut away, so that the lens need not look at the picture's centre; `false` says that the picture is
+    /// whole. Default: what the photo's EXIF data say. See [`Label::framing`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cropped: Option<bool>,
     /// Where it was cut out, if that is known; it then does not count as cropped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub crop: Option<Crop>,
+}
+
+/// Which part of the picture that its camera took a picture is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Framing {
+    /// All of it, or a part of known place, or one of known principal point: the label or its photo's EXIF data say so.
+    Whole,
+    /// Nobody says: EXIF data were taken away, or tell of another size.
+    #[default]
+    Unknown,
+    /// A part of unknown place.
+    Cropped,
 }
 
 /// Where a picture was cut out of a larger one.
@@ -226,9 +240,16 @@ impl Label {
         Point2::from(self.taken_size().map(|side| f64::from(side) / 2.0)) - Vector2::from(offset)
     }
 
-    /// A part was cut away, and it is not known which.
-    pub(crate) fn is_cropped_anywhere(&self) -> bool {
-        self.image.cropped && self.image.crop.is_none()
+    /// Which part of the picture that the camera took this one is.
+    pub fn framing(&self) -> Framing {
+        let (image, camera) = (&self.image, &self.camera);
+        let stated = camera.principal_point_px.is_some() || camera.principal_point_sigma_px.is_some();
+        match image.cropped {
+            _ if image.crop.is_some() => Framing::Whole,
+            Some(true) => Framing::Cropped,
+            None if !stated => Framing::Unknown,
+            _ => Framing::Whole,
+        }
     }
 
     /// A labelled pixel position in our convention.
@@ -243,7 +264,10 @@ impl Label {
 
 impl<'de> Deserialize<'de> for Label {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value = without_remarks(Value::deserialize(deserializer)?);
+        let value = without_empty_corners(without_remarks(Value::deserialize(deserializer)?));
+        if let Some(missing) = missing_keys(&value) {
+            return Err(D::Error::custom(missing));
+        }
         let mut track = serde_path_to_error::Track::new();
         let tracked = serde_path_to_error::Deserializer::new(value, &mut track);
         Self::deserialize(tracked).map_err(|e| {
@@ -258,6 +282,41 @@ impl Serialize for Label {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         Self::serialize(self, serializer)
     }
+}
+
+/// Without corners that were left to be filled in and were not.
+fn without_empty_corners(mut value: Value) -> Value {
+    let surface = value.get_mut("surface").and_then(Value::as_object_mut);
+    if let Some(surface) = surface {
+        let corners = surface.get("corners_px").and_then(Value::as_array);
+        let numbers = corners.into_iter().flatten().flat_map(|corner| corner.as_array().map_or(&[][..], Vec::as_slice));
+        let mut numbers = numbers.peekable();
+        if numbers.peek().is_some() && numbers.all(Value::is_null) {
+            surface.remove("corners_px");
+        }
+    }
+    value
+}
+
+/// Keys that every label has, as pointers.
+const NEEDED: [&str; 6] = ["/format", "/version", "/image/file", "/image/width", "/image/height", "/surface/id"];
+
+/// All keys that a label lacks, where it lacks any that every one has.
+fn missing_keys(value: &Value) -> Option<String> {
+    let is_missing = |key: &str| value.pointer(key).is_none_or(Value::is_null);
+    let mut missing: Vec<String> =
+        NEEDED.into_iter().filter(|key| is_missing(key)).map(|key| key[1..].replace('/', ".")).collect();
+    if missing.is_empty() || !value.is_object() {
+        return None;
+    }
+    if is_missing("/surface/corners_px") && is_missing("/markers") && is_missing("/points") {
+        missing.push("surface.corners_px (or markers)".into());
+    }
+    if is_missing("/surface/width_m") && is_missing("/surface/height_m") {
+        missing.push("surface.width_m (or surface.height_m)".into());
+    }
+    let key = if missing.len() == 1 { "key" } else { "keys" };
+    Some(format!("missing {key} {}; `petcomp camera init PHOTO --size WxH` writes them", missing.join(", ")))
 }
 
 fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
@@ -322,8 +381,21 @@ mod tests {
     }
 
     #[test]
+    fn all_missing_keys_are_named_at_once() {
+        let none = message("{}");
+        for key in
+            ["format", "version", "image.file", "image.width", "image.height", "surface.id", "surface.corners_px"]
+        {
+            assert!(none.contains(key), "{none}");
+        }
+        assert!(none.contains("surface.width_m (or surface.height_m)"), "{none}");
+        let two = message(&TRAY.replace("\"id\": \"tray\",", "").replace("\"file\": \"bg_0001.jpg\", ", ""));
+        assert!(two.starts_with("missing keys image.file, surface.id; "), "{two}");
+    }
+
+    #[test]
     fn a_missing_or_wrong_field_is_named() {
-        assert!(message(&TRAY.replace("\"id\": \"tray\",", "")).contains("id"));
+        assert!(message(&TRAY.replace("\"id\": \"tray\",", "")).starts_with("missing key surface.id; "));
         assert!(message(&TRAY.replace("\"version\": 1", "\"version\": 2")).contains("expected 1"));
         assert!(message(&TRAY.replace("plane-label", "plain-label")).contains("plane-label"));
         let three = message(&TRAY.replace(", [498.9, 2622.2]]", "]"));

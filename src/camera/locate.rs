@@ -11,14 +11,14 @@ use crate::scene::{CameraSource, Scene};
 /// A scene whose camera is known stays as it is: `locate(locate(s)) == locate(s)`.
 ///
 /// # Errors
-/// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen.
+/// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen, or that none fits.
 pub fn locate(scene: Scene) -> Result<Scene> {
     let CameraSource::Rectangle { corners_px, photo, focal_px } = scene.camera else { return Ok(scene) };
     let mut label = Label::new(photo, corners_px, scene.surface.size);
     label.camera.focal_px = focal_px;
-    let solution = solve(&label, &SolveOptions::default())?;
+    let solution = solve(&label, &SolveOptions::default())?.fitting()?;
     for warning in &solution.warnings {
-        log::warn!("{}: {warning}", scene.plate);
+        log::info!("{}: {warning}", scene.plate);
     }
     Ok(Scene { camera: CameraSource::Known(solution.camera.resized(scene.image)), ..scene })
 }

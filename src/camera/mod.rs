@@ -14,9 +14,11 @@ mod error;
 mod exchange;
 mod file;
 mod focal;
+mod hedge;
+mod import;
+mod init;
 mod joint;
 mod label;
-mod labelme;
 mod locate;
 mod marker;
 mod model;
@@ -32,27 +34,34 @@ mod search;
 pub mod simulate;
 mod solution;
 mod solve;
+mod stored;
 mod uncertainty;
 mod warning;
 
 pub use doctor::doctor;
 pub use error::SolveError;
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
-pub use file::{CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord};
+pub use file::{
+    CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord, SolvedFrom,
+};
 pub use focal::{FocalSource, focal_from_equivalent};
+pub use import::from_labelme;
+pub use init::{commented, init_label};
 pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
-    Artwork, Crop, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap, PixelOrigin,
+    Artwork, Crop, Framing, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap,
+    PixelOrigin,
 };
-pub use labelme::from_labelme;
 pub use locate::locate;
 pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
-pub use read::{check_distance, check_size, photo_of, read_label, with_photo};
+pub(crate) use read::labels_in;
+pub use read::{Labelled, check_distance, check_size, photo_of, read_label, read_labels, with_photo};
 pub use rectify::{project_picture, rectify, warp};
 pub use solution::{Fit, FocalFinding, Sigma, Solution};
 pub use solve::solve;
+pub use stored::{Sighting, sightings, together};
 pub use uncertainty::UNKNOWN_NAMES as UNKNOWNS;
 pub use warning::Warning;

@@ -122,6 +122,19 @@ impl State {
         moved.with_ln_focal(self.ln_focal + step[LN_FOCAL]).with_stretch(self.stretch + step[STRETCH])
     }
 
+    /// The step that leads from here to another state.
+    pub(crate) fn step_to(&self, other: &Self) -> Unknowns {
+        let turn = Rotation3::from_matrix_unchecked(other.stance.rotation * self.stance.rotation.transpose());
+        let mut step = Unknowns::zeros();
+        step.fixed_rows_mut::<3>(0).copy_from(&turn.scaled_axis());
+        step.fixed_rows_mut::<2>(CENTER).copy_from(&(other.stance.center - self.stance.center));
+        step[LN_SCALE] = libm::log(other.stance.scale / self.stance.scale);
+        for unknown in LN_FOCAL..UNKNOWNS {
+            step[unknown] = other.value(unknown) - self.value(unknown);
+        }
+        step
+    }
+
     /// A point of the rectangle's frame as stretched.
     fn stretched(&self, point: &Vector3<f64>, rigid: bool) -> Vector3<f64> {
         let [x, y] = if rigid { [1.0; 2] } else { self.sides };
@@ -233,6 +246,12 @@ mod tests {
             let expected = differences(state, |s| s.project(&point, rigid).unwrap());
             assert!((slope - expected).abs().max() < 1e-9, "{}", slope - expected);
         }
+    }
+
+    #[test]
+    fn a_step_to_a_state_leads_there() {
+        let (from, step) = (state(Elastic::BOTH), Unknowns::from_fn(|i, _| 0.01 * (i as f64 - 4.0)));
+        assert!((from.step_to(&from.stepped(&step)) - step).norm() < 1e-12);
     }
 
     #[test]

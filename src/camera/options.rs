@@ -48,9 +48,10 @@ pub struct Priors {
     /// Relative, of a focal length of which nothing is known; its median is the picture's longer side.
     /// Default: 0.35 (two lenses of three are between 25 and 51 mm equivalent).
     pub focal_sigma: f64,
-    /// Of the principal point, in picture diagonals. Default: 0.005.
+    /// Of the principal point of a whole picture, in picture diagonals. Default: 0.005.
     pub principal_sigma: f64,
-    /// Of the principal point of a cropped picture, in picture diagonals. Default: 0.05.
+    /// Of the principal point of a picture that is cropped, or may be, in picture diagonals. Default: 0.12 (somebody who
+    /// cuts a third away on one side moves it by 0.2 diagonals; see `petcomp report camera`).
     pub cropped_sigma: f64,
     /// Relative, of the ratio of the sides. Default: 0.005.
     pub ratio_sigma: f64,
@@ -60,7 +61,7 @@ pub struct Priors {
 
 impl Default for Priors {
     fn default() -> Self {
-        Self { focal_sigma: 0.35, principal_sigma: 0.005, cropped_sigma: 0.05, ratio_sigma: 0.005, kappa_sigma: 0.0 }
+        Self { focal_sigma: 0.35, principal_sigma: 0.005, cropped_sigma: 0.12, ratio_sigma: 0.005, kappa_sigma: 0.0 }
     }
 }
 
@@ -70,6 +71,11 @@ impl Priors {
     /// Not for photos: from near above it turns half a percent of tape error into focal errors of hundreds of percent.
     pub fn ideal() -> Self {
         Self { principal_sigma: 0.0, cropped_sigma: 0.0, ratio_sigma: 0.0, kappa_sigma: 0.0, ..Self::default() }
+    }
+
+    /// A cropped picture is another thing than a whole one.
+    pub(crate) fn cropping_matters(&self) -> bool {
+        self.cropped_sigma > self.principal_sigma
     }
 
     /// The same, knowing nothing of the focal length.

@@ -1,9 +1,11 @@
 //! A picture to judge a camera by: rectangle, metric grid and a box of the reference height, drawn over the photo.
 
 use super::solution::Solution;
+use crate::color::{decode_srgb8, encode_srgb8};
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::Image;
-use crate::pixel::LinearRgb;
+use crate::label::draw::{self, TextSize};
+use crate::pixel::{LinearRgb, Srgb8};
 use nalgebra::{Matrix2, SymmetricEigen};
 
 /// Colours, scene-linear.
@@ -18,8 +20,17 @@ const ELLIPSE_POINTS: usize = 48;
 const MOST_LINES: f64 = 12.0;
 /// Half an arm of the cross at a labelled corner, in line widths.
 const CROSS: f64 = 5.0;
+/// The legend is drawn for a picture of at least half so many columns and no more than so many, and made as large as this
+/// one.
+const LEGEND_COLUMNS: usize = 1600;
+/// Room around the legend and between a mark and its text, and the side of a mark, pixels.
+const MARGIN: usize = 8;
+const MARK: usize = 12;
+const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
+const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
+const WARNING: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
 
-/// Draws what a solution says over its photo.
+/// Draws what a solution says over its photo, with a legend below it.
 ///
 /// Green is the rectangle as fitted, white a grid of 1, 2 or 5 times a power of ten metres, orange a box over the rectangle
 /// as high as [`Sigma::reference_height`](super::Sigma), crosses are the labelled corners, the ellipses around them ten
@@ -47,12 +58,63 @@ pub fn overlay(photo: &Image<LinearRgb>, solution: &Solution) -> Image<LinearRgb
     for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
         sheet.mark(corner * zoom, &(covariance * zoom * zoom));
     }
-    sheet.picture
+    let legend = legend(photo.width(), solution);
+    let (width, height) = photo.size();
+    Image::from_fn(width, height + legend.height(), |x, y| match y.checked_sub(height) {
+        None => sheet.picture[(x, y)],
+        Some(below) => legend[(x, below)],
+    })
+}
+
+/// What the colours mean, what was found, and what to look at, as wide as the picture.
+fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
+    let grown = (width * 2).div_ceil(LEGEND_COLUMNS).max(1);
+    let columns = width.div_ceil(grown).max(1);
+    let left = 2 * MARGIN + MARK;
+    let size = TextSize::Small;
+    let lines: Vec<(Option<Srgb8>, String, Srgb8)> = entries(solution)
+        .into_iter()
+        .flat_map(|(mark, text, ink)| {
+            let lines = draw::wrapped(&text, columns.saturating_sub(left + MARGIN), size);
+            lines.into_iter().enumerate().map(move |(i, line)| (mark.filter(|_| i == 0), line, ink))
+        })
+        .collect();
+    let mut canvas = Image::filled(columns, 2 * MARGIN + lines.len() * size.height(), PAPER);
+    for (i, (mark, line, ink)) in lines.into_iter().enumerate() {
+        let top = (MARGIN + i * size.height()) as isize;
+        if let Some(color) = mark {
+            draw::fill(&mut canvas, [MARGIN as isize, top + 2], [MARK, MARK], color);
+        }
+        draw::text(&mut canvas, [left as isize, top], &line, ink, size);
+    }
+    Image::from_fn(width, canvas.height() * grown, |x, y| decode_srgb8(canvas[(x / grown, y / grown)]))
+}
+
+/// Lines of the legend: a mark's colour, a text and its colour.
+fn entries(solution: &Solution) -> Vec<(Option<Srgb8>, String, Srgb8)> {
+    let ([w, h], camera, sigma) = (solution.size, &solution.camera, &solution.sigma);
+    let percent = 100.0 * sigma.ln_focal;
+    let marks = [
+        (RECTANGLE, format!("rectangle as fitted, {w:.3} x {h:.3} m")),
+        (GRID, format!("grid of {:.3} m on the surface", grid_step(solution.size))),
+        (BOX, format!("box {:.3} m high over the rectangle", sigma.reference_height)),
+        (LABELLED, format!("labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it")),
+    ];
+    let found = format!(
+        "focal length {:.0} px (+- {percent:.1} %), {:.3} m high, tilt {:.1} degrees, corners to {:.2} px",
+        camera.focal_px.x,
+        camera.center().z,
+        camera.tilt().to_degrees(),
+        solution.rms_px
+    );
+    let marks = marks.map(|(color, text)| (Some(encode_srgb8(color)), text, INK));
+    let warnings = solution.warnings.iter().map(|warning| (None, warning.to_string(), WARNING));
+    marks.into_iter().chain([(None, found, INK)]).chain(warnings).collect()
 }
 
 /// Lines of a grid over a rectangle: both ends, metres.
 fn grid(size: [f64; 2]) -> Vec<[[f64; 3]; 2]> {
-    let step = round_step(size[0].max(size[1]) / MOST_LINES);
+    let step = grid_step(size);
     let [x, y] = size.map(|s| s / 2.0);
     let lines = |half: f64| {
         let count = (half / step).floor() as i32;
@@ -61,6 +123,10 @@ fn grid(size: [f64; 2]) -> Vec<[[f64; 3]; 2]> {
     let upright = lines(x).map(|at| [[at, -y, 0.0], [at, y, 0.0]]);
     let level = lines(y).map(|at| [[-x, at, 0.0], [x, at, 0.0]]);
     upright.chain(level).collect()
+}
+
+fn grid_step(size: [f64; 2]) -> f64 {
+    round_step(size[0].max(size[1]) / MOST_LINES)
 }
 
 /// The next 1, 2 or 5 times a power of ten.
@@ -154,6 +220,24 @@ mod tests {
         let near = |x: f64, y: f64| drawn[(x as usize, y as usize)];
         assert!(near(middle.x, middle.y).g > 0.3, "{:?}", near(middle.x, middle.y));
         assert!(drawn.pixels().iter().filter(|p| **p != LinearRgb::BLACK).count() > 1000);
+    }
+
+    #[test]
+    fn the_legend_stands_below_the_photo_and_names_the_colours() {
+        let scenario = Scenario { image: [400, 300], focal_px: 320.0, ..Scenario::default() };
+        let solution = solve(&scenario.tilted(30.0).view(1, 0).label, &SolveOptions::default()).unwrap();
+        let texts: Vec<String> = entries(&solution).into_iter().map(|(_, text, _)| text).collect();
+        for word in ["rectangle as fitted", "grid of 0.050 m", "box 0.0", "labelled corner", "focal length"] {
+            assert!(texts.iter().any(|text| text.contains(word)), "{word}: {texts:?}");
+        }
+        for width in [1, 90, 400, 4000] {
+            let drawn = overlay(&Image::filled(width, 300, LinearRgb::BLACK), &solution);
+            assert!(drawn.width() == width && drawn.height() > 350, "{:?}", drawn.size());
+        }
+        let drawn = overlay(&Image::filled(400, 300, LinearRgb::BLACK), &solution);
+        let green = encode_srgb8(RECTANGLE);
+        let below = drawn.rows().skip(300).flatten().filter(|p| encode_srgb8(**p) == green).count();
+        assert_eq!(below, MARK * MARK);
     }
 
     #[test]

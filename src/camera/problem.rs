@@ -5,7 +5,7 @@ use super::corners::{self, Checked};
 use super::dlt;
 use super::error::SolveError;
 use super::focal::{self, Witness};
-use super::label::{Label, LabelPoint};
+use super::label::{Framing, Label, LabelPoint};
 use super::model::{Elastic, Sight, State};
 use super::options::{Priors, SolveOptions};
 use super::rectangle::View;
@@ -18,6 +18,8 @@ use nalgebra::Vector3;
 const LONGEST_FOCAL: f64 = 100.0;
 /// Sides of a more extreme ratio are a typing error.
 const EXTREME_RATIO: f64 = 1e3;
+/// Larger numbers, and smaller ones than one over it where they are positive, are in no label that means something.
+const LARGEST: f64 = 1e9;
 /// Noise of a corner that a person clicked, pixels.
 const CORNER_SIGMA_PX: f64 = 1.0;
 /// Relative noise of a camera height of which only the value is stated.
@@ -43,6 +45,7 @@ pub(crate) struct Frame {
 #[derive(Clone, Debug)]
 pub(crate) struct Problem {
     pub(crate) image: [u32; 2],
+    pub(crate) framing: Framing,
     pub(crate) frame: Frame,
     pub(crate) corners_px: [Point2<f64>; 4],
     pub(crate) view: View,
@@ -56,19 +59,27 @@ pub(crate) struct Problem {
 }
 
 impl Problem {
-    /// Checks a label and brings it into the solver's units.
-    pub(crate) fn new(label: &Label, options: &SolveOptions) -> Result<Self, SolveError> {
-        Self::with_focal(label, None, options)
+    /// Checks a label of a picture of some framing and brings it into the solver's units.
+    pub(crate) fn new(label: &Label, framing: Framing, options: &SolveOptions) -> Result<Self, SolveError> {
+        Self::with_focal(label, framing, None, options)
     }
 
     /// The same, where a stated distortion is to be understood at this focal length (in units) instead of the believed one.
-    pub(crate) fn with_focal(label: &Label, focal: Option<f64>, options: &SolveOptions) -> Result<Self, SolveError> {
+    pub(crate) fn with_focal(
+        label: &Label,
+        framing: Framing,
+        focal: Option<f64>,
+        options: &SolveOptions,
+    ) -> Result<Self, SolveError> {
         let image = label.image_size();
         if let Some(size) = [image, label.taken_size()].into_iter().find(|size| size.contains(&0)) {
             return Err(SolveError::BadImage(size));
         }
         check_numbers(label)?;
         let sigma_px = label.surface.corner_sigma_px.unwrap_or(CORNER_SIGMA_PX);
+        if Sides::are_missing(label, options) && label.surface.corners_px.is_none() && label.points.len() < 4 {
+            return Err(SolveError::Empty);
+        }
         let sides = Sides::new(label, options)?;
         let labelled = label.surface.corners_px.map(|corners| corners.map(|c| label.pixel(c)));
         let quad_px = labelled.or_else(|| sides.predicted(label)).ok_or(SolveError::NoCorners)?;
@@ -81,7 +92,7 @@ impl Problem {
         let diagonal = Vector2::from(image.map(f64::from));
         let center = label.camera.principal_point_px.map_or(label.taken_center(), |px| label.pixel(px));
         let (principal_px, unit_px) = (center, diagonal.norm() / 2.0);
-        let (mut ln_focal, witness) = focal::belief(label, &options.priors);
+        let (mut ln_focal, witness) = focal::belief(label, framing, &options.priors);
         ln_focal.mean -= libm::log(unit_px);
         let usual = focal::usual_px(label.taken_size()) / unit_px;
 
@@ -93,7 +104,7 @@ impl Problem {
         let beliefs = Beliefs {
             ln_focal,
             stretch_sigma: sides.stretch_sigma(label, &options.priors),
-            principal_sigma: principal_sigma(label, &options.priors),
+            principal_sigma: principal_sigma(label, framing, &options.priors),
             kappa,
             ln_height: camera_height(label, &frame),
         };
@@ -108,7 +119,7 @@ impl Problem {
         let sights = corner_sights.chain(further).map(|(p, px, sigma, rigid)| frame.sight(p, px, sigma, rigid));
         let ln_focal_range = [1.0 / LONGEST_FOCAL, LONGEST_FOCAL].map(|f| libm::log(f * usual));
         let evidence = Evidence { sights: sights.collect(), beliefs, ln_focal_range };
-        Ok(Self { image, frame, corners_px, view, size, elastic, evidence, witness, warnings })
+        Ok(Self { image, framing, frame, corners_px, view, size, elastic, evidence, witness, warnings })
     }
 
     /// The closed-form camera for a focal length.
@@ -174,7 +185,7 @@ enum Sides {
 impl Sides {
     fn new(label: &Label, options: &SolveOptions) -> Result<Self, SolveError> {
         let (w, h) = (label.surface.width_m, label.surface.height_m);
-        let possible = |v: f64| v.is_finite() && v > 0.0;
+        let possible = |v: f64| (1.0 / LARGEST..=LARGEST).contains(&v);
         let size = [w.unwrap_or(1.0), h.unwrap_or(1.0)];
         if !size.into_iter().all(possible) {
             return Err(SolveError::BadDimensions(size));
@@ -187,6 +198,10 @@ impl Sides {
             (None, None) if options.unit_scale => Ok(Self::Width(1.0)),
             (None, None) => Err(SolveError::NoScale),
         }
+    }
+
+    fn are_missing(label: &Label, options: &SolveOptions) -> bool {
+        label.surface.width_m.is_none() && label.surface.height_m.is_none() && !options.unit_scale
     }
 
     /// Both sides, given width over height for the case that only one is known.
@@ -244,8 +259,8 @@ fn ratio_without_sides(view: &View, believed: f64) -> f64 {
     view.ratio(focal).clamp(1.0 / EXTREME_RATIO, EXTREME_RATIO)
 }
 
-fn principal_sigma(label: &Label, priors: &Priors) -> f64 {
-    let usual = if label.is_cropped_anywhere() { priors.cropped_sigma } else { priors.principal_sigma };
+fn principal_sigma(label: &Label, framing: Framing, priors: &Priors) -> f64 {
+    let usual = if framing == Framing::Whole { priors.principal_sigma } else { priors.cropped_sigma };
     let diagonal_px = |size: [u32; 2]| libm::hypot(f64::from(size[0]), f64::from(size[1]));
     let unit_px = diagonal_px(label.image_size()) / 2.0;
     label.camera.principal_point_sigma_px.unwrap_or(usual * diagonal_px(label.taken_size())) / unit_px
@@ -284,10 +299,7 @@ pub(crate) fn undistorted(seen: Vector2<f64>, kappa: f64) -> Vector2<f64> {
 /// Everything finite, and positive where it has to be.
 fn check_numbers(label: &Label) -> Result<(), SolveError> {
     let (surface, camera) = (&label.surface, &label.camera);
-    let finite = |at, values: &[f64]| match values.iter().all(|v| v.is_finite()) {
-        true => Ok(()),
-        false => Err(SolveError::NonFinite(at)),
-    };
+    let finite = |at, values: &[f64]| values.iter().try_for_each(|value| bounded(at, *value));
     finite("surface.corners_px", surface.corners_px.as_ref().map_or(&[], |c| c.as_flattened()))?;
     finite("camera.principal_point_px", camera.principal_point_px.as_ref().map_or(&[], |c| c.as_slice()))?;
     finite("image.crop.offset_px", label.image.crop.as_ref().map_or(&[], |c| c.offset_px.as_slice()))?;
@@ -309,8 +321,18 @@ fn check_numbers(label: &Label) -> Result<(), SolveError> {
 
 fn positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError> {
     match value {
-        Some(v) if !v.is_finite() => Err(SolveError::NonFinite(at)),
         Some(v) if v <= 0.0 => Err(SolveError::NotPositive { at, value: v }),
+        Some(v) if v < 1.0 / LARGEST => Err(SolveError::OutOfRange { at, value: v, most: LARGEST }),
+        Some(v) => bounded(at, v),
+        None => Ok(()),
+    }
+}
+
+/// Finite, and no larger than what squares and products of a few of them can bear.
+fn bounded(at: &'static str, value: f64) -> Result<(), SolveError> {
+    match value.abs() {
+        size if !size.is_finite() => Err(SolveError::NonFinite(at)),
+        size if size > LARGEST => Err(SolveError::OutOfRange { at, value, most: LARGEST }),
         _ => Ok(()),
     }
 }

@@ -1,31 +1,207 @@
-//! Labels from files, with what their photos know.
+//! Labels from files, ours and other programs', with what their photos know.
 
+use super::import::{self, Drawing};
+use super::init::ZOOMED_SIGMA;
 use super::label::Label;
-use super::solution::Solution;
+use super::pinhole::Camera;
 use crate::bounds::{CAMERA, SURFACE, number};
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
 
-/// Relative noise of a focal length that was noted together with a digital zoom.
-const ZOOMED_SIGMA: f64 = 0.25;
+/// How our label files are named: the photo's name, then this.
+pub(crate) const LABEL_SUFFIX: &str = ".label.json";
+/// How camera files are named.
+const CAMERA_SUFFIX: &str = ".camera.json";
+
+/// A label, and where it and its camera lie.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labelled {
+    /// The label, with what its photo knows.
+    pub label: Label,
+    /// The file that it was read from; one of another program may hold many labels.
+    pub source: PathBuf,
+    /// What its files are called: `bg0001` of `bg0001.label.json`, or of another program's `bg0001.jpg`.
+    pub name: String,
+}
+
+impl Labelled {
+    /// A file of its own: `bg0001.camera.json` for the ending `camera.json`.
+    pub fn beside(&self, ending: &str) -> PathBuf {
+        self.source.with_file_name(format!("{}.{ending}", self.name))
+    }
+
+    /// Its photo, where that is there.
+    pub fn photo(&self) -> Option<PathBuf> {
+        photo_of(&self.label, &self.source)
+    }
+}
+
+impl std::fmt::Display for Labelled {
+    /// The file, and the picture where the file alone does not say which.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.source.display())?;
+        let file = self.source.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        if file.starts_with(&format!("{}.", self.name)) { Ok(()) } else { write!(f, " ({})", self.name) }
+    }
+}
 
 /// Reads a label (`NAME.label.json`), with what its photo knows of the focal length where it says nothing itself.
 ///
 /// # Errors
-/// A file that cannot be read or understood; a photo that does not lie with its label, or has another size than it says.
+/// As [`read_labels`]; a file with several labels.
 pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
-    let label: Label = io::read_json(path)?;
-    check_size(&label).map_err(|e| e.in_file(path))?;
-    if !label.image.file.is_empty() {
-        io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
+    let mut labels = read_labels(path, None)?;
+    match labels.len() {
+        1 => Ok(labels.remove(0).label),
+        n => Err(Error::file(path, format!("{n} labels, expected one"))),
     }
-    with_photo(label, path)
+}
+
+/// Reads the labels of a file: one of ours, or an array of them, or what LabelMe, CVAT ("for images") or Label Studio
+/// (JSON or JSON-MIN) wrote. `size` is the rectangle's width and height, metres, for labels that do not say them.
+///
+/// # Errors
+/// A file that cannot be read or understood, a photo instead of a label among them; a photo that has another size than its
+/// label says, or a path that leads out of the label's folder.
+pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<Labelled>> {
+    let path = path.as_ref();
+    let text = text_of(path)?;
+    let drawings = import::drawings(&text).map_err(|e| e.in_file(path))?;
+    let labels = match drawings {
+        Some(drawings) => drawings.iter().map(|drawing| drawn(drawing, path)).collect::<Result<Vec<_>>>()?,
+        None => ours(&text, path)?,
+    };
+    if labels.is_empty() {
+        return Err(Error::file(path, "no label, expected at least one"));
+    }
+    labels.into_iter().map(|labelled| completed(labelled, size)).collect()
+}
+
+/// Reads the labels of a folder in order of name. Files that are of no label format are left out, and so are other
+/// programs' labels of photos that have one of ours.
+///
+/// # Errors
+/// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
+pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Labelled>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    // Ours first: what is read later does not come before it.
+    paths.sort_by_key(|path| (!ends_with(path, LABEL_SUFFIX), path.clone()));
+    let mut found: Vec<Labelled> = Vec::new();
+    for path in paths.iter().filter(|path| may_be_label(path)) {
+        let is_ours = ends_with(path, LABEL_SUFFIX);
+        if !is_ours && !is_drawn(path) {
+            log::info!("{}: no label", path.display());
+            continue;
+        }
+        for labelled in read_labels(path, size)? {
+            match found.iter().find(|other| other.name == labelled.name) {
+                None => found.push(labelled),
+                Some(ours) if ends_with(&ours.source, LABEL_SUFFIX) => {
+                    log::info!("{labelled}: left out, since {} is there", ours.source.display());
+                }
+                Some(other) => {
+                    return Err(Error::file(path, format!("labels {} once more, after {other}", labelled.name)));
+                }
+            }
+        }
+    }
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(found)
+}
+
+fn ends_with(path: &Path, suffix: &str) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(suffix))
+}
+
+fn may_be_label(path: &Path) -> bool {
+    (ends_with(path, ".json") && !ends_with(path, CAMERA_SUFFIX)) || ends_with(path, ".xml")
+}
+
+/// Another program's labels are in a file, well or badly written.
+fn is_drawn(path: &Path) -> bool {
+    io::read_text(path).is_ok_and(|text| !matches!(import::drawings(&text), Ok(None)))
+}
+
+/// The text of a label; a photo instead of one is met with what to do.
+fn text_of(path: &Path) -> Result<String> {
+    io::read_text(path).map_err(|error| {
+        if io::read_header(path).is_err() {
+            return error;
+        }
+        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let label = path.with_file_name(format!("{name}{LABEL_SUFFIX}"));
+        let next = match label.is_file() {
+            true => format!("{} lies beside it", label.display()),
+            false => format!("`petcomp camera init {} --size WIDTHxHEIGHT` writes one", path.display()),
+        };
+        Error::file(path, format!("a picture, expected a label of it; {next}"))
+    })
+}
+
+/// A label of ours, or an array of them.
+fn ours(text: &str, path: &Path) -> Result<Vec<Labelled>> {
+    let is_array = text.trim_start().starts_with('[');
+    let labels: Result<Vec<Label>> =
+        if is_array { io::parse_json(text) } else { io::parse_json(text).map(|label| vec![label]) };
+    let labels = labels.map_err(|e| e.in_file(path))?;
+    let name = |label: &Label| match is_array {
+        true => stem(Path::new(&label.image.file)),
+        false => {
+            let file = stem(path);
+            file.strip_suffix(".label").map_or(file.clone(), str::to_owned)
+        }
+    };
+    let labelled = |label: Label| {
+        if !label.image.file.is_empty() {
+            io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
+        }
+        Ok(Labelled { name: name(&label), label, source: path.into() })
+    };
+    labels.into_iter().map(labelled).collect()
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// The label that another program's drawing means, its photo looked for beside the file.
+fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
+    let inside = |file: &&String| io::below("", file.as_str()).is_ok();
+    let base = |file: &String| file.rsplit('/').next().unwrap_or_default().to_owned();
+    let names: Vec<String> =
+        drawing.files.iter().filter(inside).cloned().chain(drawing.files.iter().map(base)).collect();
+    let there = names.iter().find(|name| path.with_file_name(name).is_file());
+    let file = there.or(names.last()).cloned().unwrap_or_default();
+    if file.is_empty() {
+        return Err(Error::file(path, "no name of a picture"));
+    }
+    let place = |e: Error| e.within(&file).in_file(path);
+    io::below("", &file).map_err(place)?;
+    let mut label = drawing.label().map_err(place)?;
+    label.image.file.clone_from(&file);
+    if drawing.size.is_none() {
+        let header = io::read_header(path.with_file_name(&file))?;
+        (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
+    }
+    Ok(Labelled { name: stem(Path::new(&file)), label, source: path.into() })
+}
+
+/// With the sides that were given where the label has none, and with what its photo knows.
+fn completed(labelled: Labelled, size: Option<[f64; 2]>) -> Result<Labelled> {
+    let Labelled { mut label, source, name } = labelled;
+    if let (Some([w, h]), None, None) = (size, label.surface.width_m, label.surface.height_m) {
+        (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
+    }
+    check_size(&label).map_err(|e| e.in_file(&source))?;
+    Ok(Labelled { label: with_photo(label, &source)?, source, name })
 }
 
 /// A label that was read from `path`, with the focal length of its photo's EXIF data where it says nothing itself; as it
-/// is where the photo is not there. A photo of another shape than its EXIF data tell of counts as cropped.
+/// is where the photo is not there. Unless the label says whether the photo is cropped, its EXIF data do: it is where they
+/// tell of another shape, and whole where they tell of its size or a whole multiple of it.
 ///
 /// # Errors
 /// A photo that cannot be read, or has another size than the label says.
@@ -37,12 +213,12 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let header = io::read_header(&photo)?;
     let (seen, told) = ([header.width, header.height], label.image_size().map(|side| side as usize));
     if seen != told {
-        let what = format!("{told:?} pixels, but {} has {seen:?}", photo.display());
+        let [[w, h], [tw, th]] = [seen, told];
+        let what = format!("{tw} x {th} pixels, but {} has {w} x {h}", photo.display());
         return Err(Error::value("image", what).in_file(path));
     }
-    if header.cropped && label.image.crop.is_none() {
-        log::warn!("{}: its EXIF data tell of another shape; taken as cropped", photo.display());
-        label.image.cropped = true;
+    if header.cropped || header.whole {
+        label.image.cropped.get_or_insert(header.cropped);
     }
     if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
         label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
@@ -66,8 +242,8 @@ pub fn check_size(label: &Label) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Value`] with the distance.
-pub fn check_distance(solution: &Solution) -> Result<()> {
-    let distance = solution.camera.center().coords.norm();
+pub fn check_distance(camera: &Camera) -> Result<()> {
+    let distance = camera.center().coords.norm();
     if CAMERA.contains(distance) {
         return Ok(());
     }
@@ -119,7 +295,10 @@ mod tests {
     #[test]
     fn a_photo_tells_its_focal_length() {
         let label = photo_told([0, 1], [4500, 3000]);
-        assert_eq!((label.camera.focal_35mm, label.camera.focal_sigma, label.image.cropped), (Some(28.0), None, false));
+        assert_eq!(
+            (label.camera.focal_35mm, label.camera.focal_sigma, label.image.cropped),
+            (Some(28.0), None, Some(false))
+        );
     }
 
     #[test]
@@ -130,7 +309,8 @@ mod tests {
 
     #[test]
     fn a_photo_of_another_shape_than_it_was_taken_in_is_cropped() {
-        assert!(photo_told([0, 1], [4000, 3000]).image.cropped);
-        assert!(!photo_told([0, 1], [3000, 4500]).image.cropped, "turned");
+        assert_eq!(photo_told([0, 1], [4000, 3000]).image.cropped, Some(true));
+        assert_eq!(photo_told([0, 1], [3000, 4500]).image.cropped, Some(false), "turned");
+        assert_eq!(photo_told([0, 1], [2205, 1470]).image.cropped, None, "reduced, or cut out in its own shape");
     }
 }

@@ -1,9 +1,10 @@
 //! Random views of a rectangle with a known camera: what tests, benches and reports measure the solver against.
 
 use super::label::Label;
+pub(crate) use super::pinhole::distorted;
 use super::problem::corner_points;
 use crate::camera::Camera;
-use crate::geom::{Point2, Point3, Pose, UnitQuaternion, Vector2, Vector3};
+use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use nalgebra::{Matrix3, Rotation3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -31,6 +32,9 @@ pub struct Scenario {
     pub corner_sigma_px: f64,
     /// Noise of the principal point, pixels.
     pub principal_sigma_px: f64,
+    /// Distance of the principal point from the picture's middle before that noise, in longer sides, in a random
+    /// direction: a cropped picture, or a shifted lens. Where it is 0 labels say that the picture is whole.
+    pub off_center: f64,
     /// Radial distortion; its sign is random.
     pub kappa: f64,
     /// Relative noise of the ratio of the sides.
@@ -48,6 +52,7 @@ impl Default for Scenario {
             azimuth: None,
             corner_sigma_px: 0.0,
             principal_sigma_px: 0.0,
+            off_center: 0.0,
             kappa: 0.0,
             ratio_sigma: 0.0,
         }
@@ -57,7 +62,7 @@ impl Default for Scenario {
 /// One view: what a person would label, and the truth.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// Noisy corners and the sides as measured; nothing is said of the camera.
+    /// Noisy corners and the sides as measured; of the camera it is said at most that the picture is whole.
     pub label: Label,
     /// The camera that took the picture.
     pub camera: Camera,
@@ -107,7 +112,12 @@ impl Scenario {
 
     fn lens(&self, dice: &mut Dice) -> Lens {
         let center = Point2::from(self.image.map(|s| f64::from(s) / 2.0));
-        let off = Vector2::new(dice.normal(), dice.normal()) * self.principal_sigma_px;
+        let mut off = Vector2::new(dice.normal(), dice.normal()) * self.principal_sigma_px;
+        if self.off_center > 0.0 {
+            let direction = dice.between(0.0, TAU);
+            let px = self.off_center * f64::from(self.image[0].max(self.image[1]));
+            off += Vector2::new(libm::cos(direction), libm::sin(direction)) * px;
+        }
         let kappa = if dice.between(0.0, 1.0) < 0.5 { -self.kappa } else { self.kappa };
         Lens { principal_px: center + off, kappa, ln_ratio: dice.normal() * self.ratio_sigma }
     }
@@ -120,6 +130,7 @@ impl Scenario {
         let half = libm::exp(lens.ln_ratio / 2.0);
         let mut label = Label::new(self.image, noisy, [self.size[0] * half, self.size[1] / half]);
         label.surface.corner_sigma_px = (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
+        label.image.cropped = (self.off_center == 0.0).then_some(false);
         View { label, camera, kappa: lens.kappa, size: self.size }
     }
 
@@ -176,14 +187,6 @@ impl Scenario {
         let low = seen.iter().fold(Vector2::repeat(f64::MAX), |low, p| low.inf(p));
         (low, seen.iter().fold(Vector2::repeat(f64::MIN), |high, p| high.sup(p)))
     }
-}
-
-/// Where a point is seen through a lens with distortion; not finite behind the camera.
-pub(crate) fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
-    let half = libm::hypot(f64::from(camera.image[0]), f64::from(camera.image[1])) / 2.0;
-    let Some((px, _)) = camera.project(point) else { return Point2::new(f64::NAN, f64::NAN) };
-    let off = px - camera.principal_px;
-    camera.principal_px + off * (1.0 + kappa * (off / half).norm_squared())
 }
 
 fn translation(center_px: Vector2<f64>, distance: f64, focal_px: f64) -> Vector3<f64> {

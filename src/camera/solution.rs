@@ -1,7 +1,9 @@
 //! A solved camera, and how far to trust it.
 
 use super::chi;
+use super::error::SolveError;
 use super::focal::FocalSource;
+use super::label::Framing;
 use super::model::Square;
 use super::options::SolveOptions;
 use super::problem::{Problem, corner_points};
@@ -38,6 +40,8 @@ pub struct Solution {
     pub size: [f64; 2],
     /// The corners as used: clockwise from the labelled first, pixels from the picture's corner.
     pub corners_px: [Point2<f64>; 4],
+    /// Which part of what the camera took the picture is taken for.
+    pub framing: Framing,
     /// Where the focal length comes from.
     pub focal_source: FocalSource,
     /// What was known of the focal length before and what the picture says.
@@ -103,6 +107,8 @@ pub struct Sigma {
     pub reference_height: f64,
     /// Of where a point at that height is seen, pixels.
     pub height_px: f64,
+    /// Of a coordinate of the principal point, pixels.
+    pub principal_px: f64,
     /// Covariance of the unknowns, in the solver's units; the order is that of [`camera::UNKNOWNS`](super::UNKNOWNS).
     pub covariance: Square,
 }
@@ -144,6 +150,7 @@ impl Problem {
             kappa: state.kappa,
             size,
             corners_px: self.corners_px,
+            framing: self.framing,
             focal_source,
             focal,
             rms_px,
@@ -203,6 +210,7 @@ impl Problem {
             corners_px: uncertainty.corners_px(self, state),
             reference_height,
             height_px: uncertainty.height_px(self, state, reference_height),
+            principal_px: uncertainty.principal_px(self),
             covariance: uncertainty.covariance,
         }
     }
@@ -224,9 +232,51 @@ impl Problem {
 }
 
 impl Solution {
+    /// The solution, unless it is one that does not fit its label.
+    ///
+    /// # Errors
+    /// [`SolveError::NoFit`], which says what would mend it.
+    pub fn fitting(self) -> Result<Self, SolveError> {
+        self.misfit().map_or(Ok(self), Err)
+    }
+
+    /// Why the solution does not fit its label, where it does not: so improbable by chance, or so much better with the
+    /// sides exchanged, that it is worth nothing.
+    pub fn misfit(&self) -> Option<SolveError> {
+        let severe = self.warnings.iter().any(|w| matches!(w, Warning::Inconsistent { severe: true, .. }));
+        let exchanged = self.warnings.iter().find_map(|w| match *w {
+            Warning::SidesSwapped { labelled, exchanged } if self.fit.chi2 > exchanged => Some([labelled, exchanged]),
+            _ => None,
+        });
+        let mended = self.alternative.as_ref().is_some_and(|other| other.misfit().is_none());
+        let exchanged = exchanged.filter(|_| mended);
+        let p_value = self.fit.p_value.unwrap_or(0.0);
+        (severe || exchanged.is_some()).then_some(SolveError::NoFit { rms_px: self.rms_px, p_value, exchanged })
+    }
+
+    /// Everything that a camera file holds is finite, but for standard deviations of what nothing is known of.
+    pub(crate) fn is_finite(&self) -> bool {
+        let (camera, fit, focal) = (&self.camera, &self.fit, &self.focal);
+        let center = camera.center();
+        let places = [camera.focal_px.x, camera.principal_px.x, camera.principal_px.y, center.x, center.y, center.z];
+        let fits = [fit.chi2, fit.depth_ratio, fit.px_per_metre, self.rms_px, self.kappa, focal.prior_px, focal.share];
+        places.iter().chain(&fits).chain(&self.size).all(|value| value.is_finite())
+    }
+
+    /// From which error on objects at the reference height are warned of, pixels.
+    pub(crate) fn height_limit_px(&self, options: &SolveOptions) -> f64 {
+        let [w, h] = self.camera.image.map(f64::from);
+        options.max_height_sigma_px.unwrap_or(HEIGHT_SIGMA * libm::hypot(w, h))
+    }
+
+    /// That objects on the surface may be seen at the wrong place, where they may.
+    pub(crate) fn height_warning(&self, options: &SolveOptions) -> Option<Warning> {
+        let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
+        (sigma_px > self.height_limit_px(options)).then_some(Warning::HeightUncertain { height, sigma_px })
+    }
+
     /// Adds what is odd about the solution by itself.
     fn warn(&mut self, options: &SolveOptions) {
-        let [w, h] = self.camera.image.map(f64::from);
         let tilt_deg = self.camera.tilt().to_degrees();
         if tilt_deg > GRAZING_DEG {
             self.warnings.push(Warning::Grazing { tilt_deg });
@@ -238,10 +288,7 @@ impl Solution {
             let severe = p_value < IMPOSSIBLE;
             self.warnings.push(Warning::Inconsistent { p_value, rms_px: self.rms_px, severe });
         }
-        let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
-        if sigma_px > options.max_height_sigma_px.unwrap_or(HEIGHT_SIGMA * libm::hypot(w, h)) {
-            self.warnings.push(Warning::HeightUncertain { height, sigma_px });
-        }
+        self.warnings.extend(self.height_warning(options));
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::error::SolveError;
 use super::focal::Witness;
-use super::label::Label;
+use super::hedge::is_off_center;
+use super::label::{Framing, Label};
 use super::options::{CornerOrder, Effort, SolveOptions};
 use super::problem::Problem;
 use super::refine::Minimum;
@@ -24,7 +25,11 @@ const SETTLED: f64 = 1e-9;
 /// # Method
 /// The most probable camera given the corners and what is known of focal length, tape measure and lens, from several
 /// closed-form starts; the covariance at the optimum tells how well each quantity is known. Where the picture cannot tell
-/// the focal length, the answer rests on what was believed, and [`Solution::focal_source`] says so.
+/// the focal length, the answer rests on what was believed, and [`Solution::focal_source`] says so. A picture of which
+/// nobody says that it is whole is taken for whole as long as its corners allow that, with the error that it has if it is
+/// not ([`Label::framing`]).
+///
+/// A camera that does not fit its label is returned, too: [`Solution::fitting`] refuses it.
 /// # Errors
 /// [`SolveError`], for labels that no camera can have seen. A view from straight above is not an error.
 /// # Examples
@@ -39,27 +44,69 @@ const SETTLED: f64 = 1e-9;
 /// ```
 pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
     if options.effort != Effort::Whole {
-        return as_labelled(label, options).map(|(solution, ..)| solution);
+        return as_labelled(label, options).map(|solved| solved.solution);
     }
     let solution = without_wrong_exif(label, options)?;
     Ok(with_sides_exchanged(label, options, solution))
 }
 
-/// The solution of a label as it stands; another pose that fits as well is its alternative.
-fn as_labelled(label: &Label, options: &SolveOptions) -> Result<(Solution, Problem, Minimum), SolveError> {
-    let (problem, found) = with_stated_distortion(label, options)?;
+/// A solution and what it comes from.
+struct Solved {
+    solution: Solution,
+    problem: Problem,
+    minimum: Minimum,
+}
+
+/// The solution of a label as it stands.
+fn as_labelled(label: &Label, options: &SolveOptions) -> Result<Solved, SolveError> {
+    match label.framing() {
+        Framing::Unknown if options.effort == Effort::Whole && options.priors.cropping_matters() => {
+            perhaps_cropped(label, options)
+        }
+        Framing::Unknown => framed(label, Framing::Whole, options),
+        known => framed(label, known, options),
+    }
+}
+
+/// The solution of a picture of which nobody says that it is whole.
+fn perhaps_cropped(label: &Label, options: &SolveOptions) -> Result<Solved, SolveError> {
+    let whole = framed(label, Framing::Whole, options);
+    let loose = framed(label, Framing::Unknown, options);
+    let (whole, loose) = match (whole, loose) {
+        (Ok(whole), Ok(loose)) => (whole, loose),
+        (Ok(whole), Err(_)) => return Ok(whole),
+        (Err(_), loose) => return loose.map(|l| Solved { solution: l.solution.off_center(None), ..l }),
+    };
+    if is_off_center(whole.minimum.cost, loose.minimum.cost) {
+        let solution = loose.solution.off_center(Some(whole.solution));
+        return Ok(Solved { solution, ..loose });
+    }
+    let apart = whole.minimum.state.step_to(&loose.minimum.state);
+    Ok(Solved { solution: whole.solution.hedged(&loose.solution, &apart, options), ..whole })
+}
+
+/// The solution of a picture of some framing; another pose that fits as well is its alternative.
+fn framed(label: &Label, framing: Framing, options: &SolveOptions) -> Result<Solved, SolveError> {
+    let (problem, found) = with_stated_distortion(label, framing, options)?;
     let mut solution = problem.solution(&found.best, options);
+    if !solution.is_finite() {
+        return Err(SolveError::NoPose);
+    }
     if let Some(other) = found.other.filter(|other| other.cost < found.best.cost + TELLING) {
         let apart_deg = degrees_apart(&found.best.state.stance, &other.state.stance);
         solution.warnings.push(Warning::PoseAmbiguous { apart_deg });
         solution.alternative = Some(Box::new(problem.solution(&other, options)));
     }
-    Ok((solution, problem, found.best))
+    Ok(Solved { solution, problem, minimum: found.best })
 }
 
 /// The search, repeated for a label that states k1 until that is understood at the focal length found.
-fn with_stated_distortion(label: &Label, options: &SolveOptions) -> Result<(Problem, Found), SolveError> {
-    let mut problem = Problem::new(label, options)?;
+fn with_stated_distortion(
+    label: &Label,
+    framing: Framing,
+    options: &SolveOptions,
+) -> Result<(Problem, Found), SolveError> {
+    let mut problem = Problem::new(label, framing, options)?;
     let mut found = search(&problem, options)?;
     let known = label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.evidence.beliefs.ln_focal.is_fact();
     let mut understood = problem.evidence.beliefs.ln_focal.mean;
@@ -69,7 +116,7 @@ fn with_stated_distortion(label: &Label, options: &SolveOptions) -> Result<(Prob
             break;
         }
         understood = ln_focal;
-        problem = Problem::with_focal(label, Some(libm::exp(ln_focal)), options)?;
+        problem = Problem::with_focal(label, framing, Some(libm::exp(ln_focal)), options)?;
         found = search(&problem, options)?;
     }
     Ok((problem, found))
@@ -85,7 +132,7 @@ fn search(problem: &Problem, options: &SolveOptions) -> Result<Found, SolveError
 
 /// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer beside.
 fn without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
-    let (mut solution, problem, minimum) = as_labelled(label, options)?;
+    let Solved { mut solution, problem, minimum } = as_labelled(label, options)?;
     let Some(conflict) = focal_conflict(&problem, &minimum) else { return Ok(solution) };
     if problem.witness != Witness::Exif {
         solution.warnings.push(conflict);
@@ -93,7 +140,7 @@ fn without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution,
     }
     let mut doubted = label.clone();
     (doubted.camera.focal_35mm, doubted.camera.focal_sigma) = (None, None);
-    let (mut second, ..) = as_labelled(&doubted, options)?;
+    let mut second = as_labelled(&doubted, options)?.solution;
     second.warnings.push(conflict);
     second.alternative = Some(Box::new(solution));
     Ok(second)

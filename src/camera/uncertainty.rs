@@ -4,6 +4,7 @@ use super::belief::Belief;
 use super::model::{CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns};
 use super::problem::Problem;
 use super::refine::{Minimum, unit_diagonal};
+use crate::geom::Point3;
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 /// Information on the logarithm of the focal length below this part of its diagonal is rounding.
@@ -90,15 +91,22 @@ impl Uncertainty {
 
     /// Root mean square error, pixels, of points over the rectangle at a height of `height` metres.
     pub(crate) fn height_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
-        let [w, h] = problem.size;
-        let part = |i: usize| i as f64 / (GRID - 1) as f64 - 0.5;
-        let mut sum = 0.0;
-        for i in 0..GRID * GRID {
-            let point = Vector3::new(part(i % GRID) * w, part(i / GRID) * h, height);
-            sum += self.seen(problem, state, point).map_or(f64::INFINITY, |c| c.trace());
-        }
-        (sum / (GRID * GRID) as f64).sqrt()
+        let traces = heights(problem.size, height)
+            .map(|point| self.seen(problem, state, point.coords).map_or(f64::INFINITY, |c| c.trace()));
+        (traces.sum::<f64>() / (GRID * GRID) as f64).sqrt()
     }
+
+    /// Standard deviation of a coordinate of the principal point, pixels.
+    pub(crate) fn principal_px(&self, problem: &Problem) -> f64 {
+        let variance = self.covariance[(PRINCIPAL, PRINCIPAL)] + self.covariance[(PRINCIPAL + 1, PRINCIPAL + 1)];
+        problem.frame.unit_px * (variance / 2.0).sqrt()
+    }
+}
+
+/// Points of a grid over a rectangle, metres, at a height.
+pub(crate) fn heights([w, h]: [f64; 2], height: f64) -> impl Iterator<Item = Point3<f64>> {
+    let part = |i: usize| i as f64 / (GRID - 1) as f64 - 0.5;
+    (0..GRID * GRID).map(move |i| Point3::new(part(i % GRID) * w, part(i / GRID) * h, height))
 }
 
 /// Inverse of the information, and the information left on the focal length when all else is free.
@@ -158,6 +166,9 @@ pub(crate) fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> 
 fn condition(information: &Square, believed: Belief) -> f64 {
     let mut data = *information;
     data[(LN_FOCAL, LN_FOCAL)] -= believed.information();
+    if data.iter().any(|value| !value.is_finite()) {
+        return 1.0 / f64::EPSILON;
+    }
     let values = scaled(&data, &unit_diagonal(&data)).symmetric_eigenvalues();
     values.max() / values.min().max(f64::EPSILON)
 }

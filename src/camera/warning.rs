@@ -49,6 +49,30 @@ pub enum Warning {
         /// The focal length used, pixels.
         focal_px: f64,
     },
+    /// Nothing says that the picture is whole, and it would be sharper knowledge if it were.
+    #[error(
+        "nothing says that the picture is whole, so a point {height:.3} m above the surface is known to {sigma_px:.1} px only; \
+         write \"cropped\": false under \"image\" if it is whole: to {whole_px:.1} px then"
+    )]
+    FramingUnknown {
+        /// Height of the objects, metres.
+        height: f64,
+        /// Standard deviation of where they are seen, pixels.
+        sigma_px: f64,
+        /// The same, if the picture is whole.
+        whole_px: f64,
+    },
+    /// The corners are those of a cropped picture or of a shifted lens, and nobody said so.
+    #[error(
+        "the picture is no whole one: its principal point lies {off_px:.0} px (+- {sigma_px:.0}) off its middle; it was \
+         cropped, the lens was shifted, or the EXIF focal length is wrong"
+    )]
+    OffCenter {
+        /// Distance of the principal point from the picture's middle, pixels.
+        off_px: f64,
+        /// Standard deviation of a coordinate of the principal point, pixels.
+        sigma_px: f64,
+    },
     /// The picture contradicts what was known of the focal length.
     #[error(
         "focal length: {believed_px:.0} px was expected and the corners say {measured_px:.0} px ({sigmas:.1} sigmas apart): \

@@ -7,6 +7,7 @@ use crate::dataset::{Inputs, Setup};
 use crate::error::Result;
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Everything that decides what a picture or its labels are: values as they are, pictures by checksum; not where folders
@@ -31,6 +32,7 @@ pub(super) fn fingerprint(
         "label": labels.options(),
         "assets": assets,
         "backgrounds": of_places(places, inputs)?,
+        "background_notes": notes(places),
         "environments": of_surroundings(surroundings, inputs)?,
     }))
 }
@@ -69,6 +71,12 @@ fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
         })
     };
     Ok(places.iter().zip(photos).map(of_place).collect())
+}
+
+/// What a person should know of the backgrounds, by their names: the report shows it.
+fn notes(places: &[Place]) -> BTreeMap<&str, &[String]> {
+    let noted = places.iter().filter(|place| !place.notes.is_empty());
+    noted.map(|place| (place.background.name.as_str(), place.notes.as_slice())).collect()
 }
 
 fn of_surroundings(surroundings: &Surroundings, inputs: &mut Inputs) -> Result<Vec<Value>> {

@@ -1,8 +1,9 @@
 //! Labelled photos of the place that scenes are set in.
 
-use crate::camera::{self, Camera, SolveOptions};
+use crate::camera::{self, Camera, Labelled, Sighting};
 use crate::error::{Error, Result};
 use crate::filter;
+use crate::geom::Point3;
 use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
@@ -10,52 +11,101 @@ use crate::scene::{Background, CameraSource};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// How a label file is named: the photo's name, then this.
-const LABEL_SUFFIX: &str = ".label.json";
+/// A part of a photo so small is worth a warning where only that fits into the pictures' shape.
+const SMALL_PART: f64 = 0.75;
+/// A rectangle whose corner is cut off by more than this part of a picture's side is not all there any more.
+const CUT_OFF: f64 = 0.02;
 
-/// A labelled photo: its camera is solved once, its pixels are read when a picture first needs them.
+/// A labelled photo: its camera is found once, its pixels are read when a picture first needs them.
 #[derive(Debug)]
 pub(crate) struct Place {
     /// What a recipe sees of it.
     pub(crate) background: Background,
+    /// The file that labels it.
+    pub(crate) label: PathBuf,
     /// The photo's file.
     pub(crate) photo: PathBuf,
     /// The part of it that is seen.
     pub(crate) kept: Roi,
+    /// What a person should know of it, said where it was solved and in the report.
+    pub(crate) notes: Vec<String>,
+    taken: [u32; 2],
     image: [u32; 2],
     plate: OnceLock<Arc<Image<LinearRgb>>>,
 }
 
+/// How labelled photos are opened.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PlaceOptions {
+    /// Width and height of the pictures to be made, pixels.
+    pub(crate) image: [u32; 2],
+    /// Width and height of the rectangle, metres, for labels that do not say them.
+    pub(crate) surface_size: Option<[f64; 2]>,
+    /// Takes cameras that do not fit their labels.
+    pub(crate) force: bool,
+}
+
 impl Place {
-    /// The labelled photos of a folder in order of name, seen at `image` pixels.
-    pub(crate) fn all(folder: &Path, image: [u32; 2]) -> Result<Vec<Self>> {
-        let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-        let mut labels: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(|p| is_label(p)).collect();
-        labels.sort();
+    /// The labelled photos of a folder in order of name.
+    pub(crate) fn all(folder: &Path, options: PlaceOptions) -> Result<Vec<Self>> {
+        let labels = camera::labels_in(folder, options.surface_size)?;
         if labels.is_empty() {
-            return Err(Error::file(folder, format!("no label found, expected at least one NAME{LABEL_SUFFIX}")));
+            let what =
+                "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
+            return Err(Error::file(folder, what));
         }
-        labels.iter().map(|label| Self::open(label, image)).collect()
+        let sightings = camera::sightings(&labels, options.force)?;
+        said(&labels, &sightings);
+        let opened = labels.iter().zip(&sightings).map(|(label, seen)| Self::open(label, seen, options.image));
+        let places = opened.collect::<Result<Vec<_>>>()?;
+        said_of_shapes(&places);
+        Ok(places)
     }
 
-    fn open(path: &Path, image: [u32; 2]) -> Result<Self> {
-        let label = camera::read_label(path)?;
-        let solution = camera::solve(&label, &SolveOptions::default()).map_err(|e| Error::from(e).in_file(path))?;
-        camera::check_distance(&solution).map_err(|e| e.in_file(path))?;
-        for warning in &solution.warnings {
-            log::warn!("{}: {warning}", path.display());
-        }
-        let kept = middle(label.image_size(), image);
-        let camera = cropped(solution.camera, kept).resized(image);
-        let background = Background { name: name(path), size: solution.size, camera: CameraSource::Known(camera) };
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let photo = io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
-        Ok(Self { background, photo, kept, image, plate: OnceLock::new() })
+    fn open(labelled: &Labelled, seen: &Sighting, image: [u32; 2]) -> Result<Self> {
+        let taken = labelled.label.image_size();
+        let kept = middle(taken, image);
+        let camera = cropped(seen.camera, kept).resized(image);
+        let background =
+            Background { name: labelled.name.clone(), size: seen.size, camera: CameraSource::Known(camera) };
+        let folder = labelled.source.parent().unwrap_or(Path::new(""));
+        let inside = |e: Error| e.within("image").in_file(&labelled.source);
+        let photo = io::inside(folder, &labelled.label.image.file).map_err(inside)?;
+        camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
+        let (label, notes, plate) = (labelled.source.clone(), Vec::new(), OnceLock::new());
+        let mut place = Self { background, label, photo, notes, taken, kept, image, plate };
+        place.notes = seen.warnings.iter().map(ToString::to_string).chain(place.shape_note()).collect();
+        Ok(place)
     }
 
-    /// Name of the label's file.
-    pub(crate) fn label_name(&self) -> String {
-        format!("{}{LABEL_SUFFIX}", self.background.name)
+    /// The part of the photo that pictures show.
+    fn part(&self) -> f64 {
+        let area = |[w, h]: [f64; 2]| w * h;
+        area([self.kept.width as f64, self.kept.height as f64]) / area(self.taken.map(f64::from))
+    }
+
+    /// That only a part of the photo fits into the pictures' shape, and what that leaves of its rectangle.
+    fn shape_note(&self) -> Option<String> {
+        if self.part() == 1.0 {
+            return None;
+        }
+        let ([w, h], Roi { width, height, .. }) = (self.taken, self.kept);
+        let rectangle = if self.cuts_off() { ", without a part of the rectangle" } else { "" };
+        Some(format!("of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"))
+    }
+
+    /// A corner of the rectangle that the photo shows is not in the pictures.
+    fn cuts_off(&self) -> bool {
+        let CameraSource::Known(camera) = self.background.camera else { return false };
+        let [x, y] = self.background.size.map(|side| side / 2.0);
+        let [w, h] = self.image.map(f64::from);
+        let grown = [self.taken[0] as f64 / self.kept.width as f64, self.taken[1] as f64 / self.kept.height as f64];
+        let inside = |v: f64, middle: f64, side: f64| (v - middle).abs() < (0.5 + CUT_OFF) * side;
+        let corners = [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| camera.project(Point3::new(x, y, 0.0)));
+        corners.into_iter().flatten().any(|(px, _)| {
+            let whole = inside(px.x, w / 2.0, w * grown[0]) && inside(px.y, h / 2.0, h * grown[1]);
+            whole && !(inside(px.x, w / 2.0, w) && inside(px.y, h / 2.0, h))
+        })
     }
 
     /// The photo at the picture's size, scene-linear; read once.
@@ -64,20 +114,52 @@ impl Place {
             return Ok(plate.clone());
         }
         let photo = io::read::<LinearRgb>(&self.photo)?;
+        let ((w, h), [tw, th]) = (photo.size(), self.taken);
+        if [w, h] != self.taken.map(|side| side as usize) {
+            return Err(Error::file(&self.photo, format!("{w} x {h} pixels, but its label says {tw} x {th}")));
+        }
         let [width, height] = self.image.map(|side| side as usize);
         let plate = Arc::new(filter::resize(&photo.crop(self.kept), width, height));
         Ok(self.plate.get_or_init(|| plate).clone())
     }
 }
 
-fn is_label(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(LABEL_SUFFIX))
+/// Says what is odd about cameras: that some are not used, each; what was said where it was solved not again; and of those
+/// solved now, only where to read it.
+fn said(labels: &[Labelled], sightings: &[Sighting]) {
+    for stale in sightings.iter().filter_map(|seen| seen.stale.as_ref()) {
+        log::warn!("{stale}");
+    }
+    for (labelled, seen) in labels.iter().zip(sightings) {
+        seen.warnings.iter().for_each(|warning| log::info!("{labelled}: {warning}"));
+    }
+    let unsaid: Vec<&str> = labels
+        .iter()
+        .zip(sightings)
+        .filter(|(_, seen)| !seen.stored && !seen.warnings.is_empty())
+        .map(|(labelled, _)| labelled.name.as_str())
+        .collect();
+    if let [first, ..] = unsaid.as_slice() {
+        let (count, more) = (unsaid.len(), if unsaid.len() > 1 { ", ..." } else { "" });
+        log::warn!(
+            "{count} of {} cameras have warnings ({first}{more}): `petcomp camera doctor` says them",
+            labels.len()
+        );
+    }
 }
 
-/// `bg0001` of `photos/bg0001.label.json`.
-fn name(path: &Path) -> String {
-    let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    file.trim_end_matches(LABEL_SUFFIX).to_owned()
+/// Says, once for all, that photos are of another shape than the pictures, where that costs much of them.
+fn said_of_shapes(places: &[Place]) {
+    let odd: Vec<&Place> = places.iter().filter(|place| place.part() < SMALL_PART || place.cuts_off()).collect();
+    let least = odd.iter().min_by(|a, b| a.part().total_cmp(&b.part()));
+    let Some((least, note)) = least.and_then(|place| Some((place, place.shape_note()?))) else { return };
+    let [w, h] = least.image;
+    log::warn!(
+        "{} of {} backgrounds have another shape than the pictures ({w} x {h}): {}: {note}; change scene.image or crop them",
+        odd.len(),
+        places.len(),
+        least.background.name,
+    );
 }
 
 /// The largest middle part of a photo that has the shape of the picture.

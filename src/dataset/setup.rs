@@ -21,6 +21,12 @@ pub struct Setup {
     pub assets: PathBuf,
     /// Folder of photos of the place with their labels (`NAME.label.json`), relative to the file. Default: `backgrounds`.
     pub backgrounds: PathBuf,
+    /// Width and height of the labelled rectangle, metres, for labels that do not say them: those of other programs.
+    /// Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface_size: Option<[f64; 2]>,
+    /// Takes photos of the place whose cameras do not fit their labels. Default: false, an error.
+    pub force_cameras: bool,
     /// What scenes are drawn from.
     pub scene: Recipe,
     /// How finely pictures are sampled.
@@ -39,6 +45,8 @@ impl Default for Setup {
             folder: PathBuf::new(),
             assets: "assets".into(),
             backgrounds: "backgrounds".into(),
+            surface_size: None,
+            force_cameras: false,
             scene: Recipe::default(),
             render: RenderOptions::default(),
             labels: LabelSetup::default(),

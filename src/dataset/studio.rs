@@ -5,7 +5,7 @@ use crate::bounds::{Bounds, LEAST_OBJECT_PX};
 use crate::camera;
 use crate::composite;
 use crate::dataset::fingerprint::fingerprint;
-use crate::dataset::place::Place;
+use crate::dataset::place::{Place, PlaceOptions};
 use crate::dataset::surroundings::Surroundings;
 use crate::dataset::times::timed;
 use crate::dataset::{Inputs, Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
@@ -58,12 +58,12 @@ impl Studio {
         if px >= LEAST_OBJECT_PX {
             return Ok(());
         }
-        let ([w, h], label) = (self.setup.scene.image, self.setup.backgrounds.join(place.label_name()));
+        let [w, h] = self.setup.scene.image;
         let what = format!(
             "the median object of {median:.3} m is {px:.1} px long in pictures of {w} x {h}, expected at least \
              {LEAST_OBJECT_PX}; are width_m and height_m in metres?"
         );
-        Err(Error::value("surface", what).in_file(label))
+        Err(Error::value("surface", what).in_file(&place.label))
     }
 
     /// The same for one scene that is there already: only cut-outs of the assets that it names are read, and known.
@@ -76,7 +76,8 @@ impl Studio {
 
     fn with_assets(setup: Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let library = Library::open_some(&setup.assets, wanted)?;
-        let places = Place::all(&setup.backgrounds, setup.scene.image)?;
+        let (image, surface_size, force) = (setup.scene.image, setup.surface_size, setup.force_cameras);
+        let places = Place::all(&setup.backgrounds, PlaceOptions { image, surface_size, force })?;
         let backgrounds = places.iter().map(|place| place.background.clone()).collect();
         let stock = stock(&library);
         let surroundings = Surroundings::of(&setup);

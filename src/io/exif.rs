@@ -8,6 +8,8 @@ use std::io::{BufRead, Seek};
 const FILM_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
 /// Ratios of sides closer than this belong to one shape: sizes are rounded, and to multiples of 16 at times.
 const SAME_SHAPE: f64 = 0.01;
+/// The same for sizes: no more than the middle of a lens is uncertain anyway.
+const SAME_SIZE: f64 = 0.005;
 
 /// The part of the EXIF data that means something here.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +58,16 @@ impl CameraNotes {
         let digital_zoom = real(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
         let focal_35mm = equivalent.or_else(by_sensor);
         Self { orientation: Orientation(orientation), focal_35mm, digital_zoom, size }
+    }
+
+    /// The camera noted the size that the file has, or a whole multiple of it, whichever way up: nothing was cut away.
+    pub(super) fn taken_whole(&self, stored: [usize; 2]) -> bool {
+        let sorted = |[a, b]: [f64; 2]| [a.max(b), a.min(b)];
+        let stored = sorted(stored.map(|s| s as f64));
+        self.size.map(sorted).is_some_and(|taken| {
+            let reduced = (taken[0] / stored[0]).round();
+            reduced >= 1.0 && taken.iter().zip(stored).all(|(t, s)| (t / (reduced * s) - 1.0).abs() <= SAME_SIZE)
+        })
     }
 
     /// The camera noted a size of another shape than the file has, whichever way up.
@@ -152,6 +164,16 @@ mod tests {
             [rational(0, 1), rational(0, 0), rational(1, 1), rational(3, 2)].map(zoomed),
             [false, false, false, true]
         );
+    }
+
+    #[test]
+    fn the_size_that_the_file_has_or_a_multiple_of_it_is_whole() {
+        let of = reflex(rational(1, 1), None);
+        assert!(
+            [[3888, 2592], [2592, 3888], [3888, 2584], [1944, 1296], [972, 648]].into_iter().all(|s| of.taken_whole(s))
+        );
+        assert!([[3000, 2000], [3888, 2400], [1024, 683], [7776, 5184]].into_iter().all(|s| !of.taken_whole(s)));
+        assert!(!CameraNotes::default().taken_whole([1, 1]));
     }
 
     #[test]

@@ -27,6 +27,8 @@ pub struct Header {
     pub digital_zoom: bool,
     /// The camera noted a picture of another shape: a part was cut away.
     pub cropped: bool,
+    /// The camera noted the size of this picture, or a whole multiple of it: nothing was cut away.
+    pub whole: bool,
     /// Texts that the file carries, by name.
     pub metadata: Vec<(String, String)>,
 }
@@ -44,6 +46,7 @@ impl Default for Header {
             focal_35mm: None,
             digital_zoom: false,
             cropped: false,
+            whole: false,
             metadata: Vec::new(),
         }
     }

@@ -242,6 +242,7 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
         header => header.map_err(|e| Error::file(path, e))?,
     };
     header.cropped = notes.taken_in_another_shape([header.width, header.height]);
+    header.whole = notes.taken_whole([header.width, header.height]);
     (header.width, header.height) = notes.orientation.size((header.width, header.height));
     if header.data_size == [0; 2] {
         header.data_size = [header.width, header.height];

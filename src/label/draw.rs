@@ -150,6 +150,30 @@ impl TextSize {
     }
 }
 
+/// The lines of a text that has room for `width` pixels, broken between words, and within those that are longer.
+pub(crate) fn wrapped(text: &str, width: usize, size: TextSize) -> Vec<String> {
+    let room = (width / size.width("m").max(1)).max(1);
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let letters: Vec<char> = word.chars().collect();
+        for (i, part) in letters.chunks(room).enumerate() {
+            let last = lines.last_mut().filter(|line| {
+                let used = line.chars().count();
+                i == 0 && used + usize::from(used > 0) + part.len() <= room
+            });
+            match last {
+                Some(line) if line.is_empty() => line.extend(part),
+                Some(line) => {
+                    line.push(' ');
+                    line.extend(part);
+                }
+                None => lines.push(part.iter().collect()),
+            }
+        }
+    }
+    lines
+}
+
 /// A line of text with its top left corner at a point; characters beyond ASCII become `?`.
 pub(crate) fn text(canvas: &mut Image<Srgb8>, [x, y]: [isize; 2], line: &str, color: Srgb8, size: TextSize) {
     let advance = get_raster_width(FontWeight::Regular, size.raster()) as isize;
@@ -202,6 +226,16 @@ mod tests {
         // about one more.
         let length = (b - a).norm();
         assert!(ink > length && ink < length + 2.0, "{ink} {length}");
+    }
+
+    #[test]
+    fn text_stays_within_its_width() {
+        let width = TextSize::Small.width("0123456789");
+        let lines = |text| wrapped(text, width, TextSize::Small);
+        assert_eq!(lines("two words or more"), ["two words", "or more"]);
+        assert_eq!(lines("a 0123456789abc z"), ["a", "0123456789", "abc z"]);
+        assert_eq!((lines(""), wrapped("ab", 0, TextSize::Large)), (vec![String::new()], vec!["a".into(), "b".into()]));
+        assert!(lines("none is longer than there is room for").iter().all(|l| TextSize::Small.width(l) <= width));
     }
 
     #[test]

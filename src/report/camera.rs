@@ -3,8 +3,10 @@
 //! Views are drawn by [`simulate`](crate::camera::simulate) from fixed seeds; every method sees the same ones. `joint` sees
 //! each of them with seven more photos of the same camera, at the same tilt.
 
+mod coverage;
 mod diagram;
 
+pub use coverage::Coverage;
 pub use diagram::diagrams;
 
 use super::clock::cpu_seconds;
@@ -240,7 +242,7 @@ fn spread(mut values: Vec<f64>) -> [f64; 2] {
     [0.5, 0.95].map(|q| at(q).copied().unwrap_or(0.0))
 }
 
-/// Writes `camera.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`, `camera_height_LENS.svg` and `camera_time_LENS.svg`
+/// Writes `camera.csv`, `camera_coverage.csv`, `camera.md` and the plots `camera_tilt_LENS.svg`, `camera_height_LENS.svg` and `camera_time_LENS.svg`
 /// into a folder.
 ///
 /// # Errors
@@ -251,8 +253,10 @@ pub fn write(folder: &Path, options: &CameraReportOptions, progress: impl Fn(u64
     }
     let rows = measure(options, progress);
     io::create_folder(folder)?;
+    let coverage = coverage::measure(options.views);
     io::write_text(folder.join("camera.csv"), &csv(&rows))?;
-    io::write_text(folder.join("camera.md"), &markdown(&rows))?;
+    io::write_text(folder.join("camera_coverage.csv"), &coverage::csv(&coverage))?;
+    io::write_text(folder.join("camera.md"), &(markdown(&rows) + &coverage::markdown(&coverage)))?;
     for lens in Lens::ALL {
         let of_lens: Vec<Row> = rows.iter().filter(|r| r.lens == lens).copied().collect();
         let focal = |r: &Row| r.focal_percent[0];

@@ -47,6 +47,7 @@ pub fn page(folder: &Path, most: usize) -> Result<Page> {
     drawn(&mut page, &summary);
     seen(&mut page, &summary);
     page.heading("Classes").table(&balance(&summary));
+    background_notes(&mut page, &summary);
     rejected(&mut page, &summary);
     page.heading("Time").table(&times(&summary));
     let recipe = serde_json::to_string_pretty(&summary.identity).unwrap_or_default();
@@ -212,6 +213,18 @@ fn balance(summary: &Summary) -> Table {
         table.push([name.clone(), a.to_string(), b.to_string(), c.to_string(), d.to_string()]);
     }
     table
+}
+
+/// What was odd about the photos of the place and their cameras.
+fn background_notes(page: &mut Page, summary: &Summary) {
+    let notes = summary.identity["recipe"]["background_notes"].as_object();
+    let Some(notes) = notes.filter(|notes| !notes.is_empty()) else { return };
+    let mut table = Table::new(["background", "what to look at"]);
+    for (name, texts) in notes {
+        let texts = texts.as_array().map_or(&[][..], Vec::as_slice);
+        texts.iter().filter_map(|text| text.as_str()).for_each(|text| table.push([name.clone(), text.to_owned()]));
+    }
+    page.heading("Backgrounds").table(&table);
 }
 
 fn rejected(page: &mut Page, summary: &Summary) {

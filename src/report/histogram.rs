@@ -8,6 +8,8 @@ const FRAME: [f64; 2] = [250.0, 110.0];
 const LEFT: f64 = 40.0;
 const TOP: f64 = 24.0;
 const BELOW: f64 = 24.0;
+/// Width of a letter of 11 units on average, a little more than most sans-serif fonts need.
+const LETTER: f64 = 6.0;
 
 /// Counts in bins of the same width.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -86,15 +88,28 @@ impl Histogram {
         }
         let line = TOP + h;
         let _ = writeln!(svg, "<path d=\"M{LEFT} {line}h{w}\" stroke=\"#888\"/>");
-        let mut words = |x: f64, y: f64, anchor: &str, text: &str| {
-            let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>", escaped(text));
+        let mut words = |[x, y, room]: [f64; 3], anchor: &str, text: &str| {
+            let (shown, whole) = (escaped(&fitted(text, room)), escaped(text));
+            let _ = writeln!(
+                svg,
+                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{shown}<title>{whole}</title></text>"
+            );
         };
-        words(LEFT, TOP - 10.0, "start", &self.title);
-        words(LEFT - 4.0, TOP + 8.0, "end", &short(most));
-        words(LEFT, line + 14.0, "start", &self.ends[0]);
-        words(LEFT + w, line + 14.0, "end", &self.ends[1]);
+        words([LEFT, TOP - 10.0, width - LEFT], "start", &self.title);
+        words([LEFT - 4.0, TOP + 8.0, LEFT - 4.0], "end", &short(most));
+        words([LEFT, line + 14.0, w / 2.0], "start", &self.ends[0]);
+        words([LEFT + w, line + 14.0, w / 2.0], "end", &self.ends[1]);
         svg + "</svg>\n"
     }
+}
+
+/// A text, cut where there is no more room for it.
+fn fitted(text: &str, room: f64) -> String {
+    let most = (room / LETTER) as usize;
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    text.chars().take(most.saturating_sub(1)).chain(['\u{2026}']).collect()
 }
 
 /// A number with as many digits as help.
@@ -123,9 +138,20 @@ mod tests {
     }
 
     #[test]
+    fn words_stay_in_their_cell() {
+        let name = "a_photo_with_a_very_long_name_that_somebody_gave_it";
+        let h = Histogram { title: name.into(), ends: [name.into(), name.into()], counts: vec![1; 3], expected: None };
+        let svg = h.svg();
+        let shown: Vec<&str> = svg.split("<text").skip(1).map(|t| t.split(['>', '<']).nth(1).unwrap_or("")).collect();
+        let lengths: Vec<usize> = shown.iter().map(|text| text.chars().count()).collect();
+        assert_eq!(lengths, [43, 3, 20, 20], "{shown:?}");
+        assert_eq!(svg.matches(&format!("<title>{name}</title>")).count(), 3, "the whole is there to be pointed at");
+    }
+
+    #[test]
     fn a_drawing_has_a_bar_for_each_bin_and_no_nonsense() {
         let svg = Histogram::of("a < b", &[], [0.0, 0.0], 5).uniform().svg();
-        assert_eq!(svg.matches("<title>").count(), 5);
+        assert_eq!(svg.matches("<rect").count(), 1 + 5);
         assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"), "{svg}");
     }
 }

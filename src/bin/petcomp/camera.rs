@@ -1,19 +1,21 @@
 //! `petcomp camera`: four labelled corners -> camera.
 
 use crate::common::{Batch, Common};
-use petcomp::camera::{self, CameraFile, ColmapModel, Label, Solution, SolveOptions};
+use petcomp::camera::{self, CameraFile, ColmapModel, Label, Labelled, Solution, SolveOptions};
 use petcomp::filter::Pyramid;
 use petcomp::{Error, Image, LinearRgb, PremulRgba, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub(crate) enum Command {
+    /// Write a label for a photo, with everything that is known already; its corners are filled in by hand or by markers
+    Init(InitArgs),
     /// Solve the camera of each label; write NAME.camera.json and NAME.overlay.png beside it
     Solve(SolveArgs),
     /// Solve photos of one camera together: labels that share camera.id and shape of the picture
-    Joint(SolveArgs),
+    Joint(JointArgs),
     /// Say in plain words what is known how well, and what to measure
-    Doctor(SolveArgs),
+    Doctor(LabelArgs),
     /// Say solved cameras as another program does
     Export(ExportArgs),
     /// Find printed markers (ArUco DICT_4X4_50, AprilTag tag36h11) in a photo and add their corners to a label as points
@@ -23,16 +25,56 @@ pub(crate) enum Command {
 }
 
 #[derive(clap::Args)]
-pub(crate) struct SolveArgs {
-    /// Labels: NAME.label.json, or LabelMe files together with --size
+pub(crate) struct InitArgs {
+    /// The photo
+    photo: PathBuf,
+    /// Width and height of the rectangle in metres: 0.56x0.37
+    #[arg(long, value_name = "WxH", value_parser = dimensions, required_unless_present = "like")]
+    size: Option<[f64; 2]>,
+    /// Its corners in pixels, "x,y x,y x,y x,y": top left, top right, bottom right, bottom left
+    #[arg(long, value_name = "CORNERS", value_parser = corners)]
+    corners: Option<[[f64; 2]; 4]>,
+    /// Label of another photo of the same rectangle: its size, its markers and its camera's name are taken over, and the
+    /// markers looked for
+    #[arg(long, value_name = "LABEL")]
+    like: Option<PathBuf>,
+    /// Label to write instead of NAME.label.json beside the photo
+    #[arg(short, long, value_name = "LABEL")]
+    output: Option<PathBuf>,
+    /// Replace a label that is there
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct LabelArgs {
+    /// Labels: NAME.label.json, or files of LabelMe, CVAT (for images) or Label Studio together with --size
     #[arg(required = true)]
     labels: Vec<PathBuf>,
+    /// Width and height of the rectangle in metres, for labels that do not say them
+    #[arg(long, value_name = "WxH", value_parser = dimensions)]
+    size: Option<[f64; 2]>,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct SolveArgs {
+    #[command(flatten)]
+    labels: LabelArgs,
     /// Camera file to write instead; for one label only
     #[arg(short, long, value_name = "CAMERA")]
     output: Option<PathBuf>,
-    /// Width and height of the rectangle in metres; the labels are LabelMe's
-    #[arg(long, value_name = "WxH", value_parser = dimensions)]
-    size: Option<[f64; 2]>,
+    /// Write cameras that do not fit their labels, too
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(clap::Args)]
+pub(crate) struct JointArgs {
+    #[command(flatten)]
+    labels: LabelArgs,
+    /// Write cameras that do not fit their labels, too
+    #[arg(long)]
+    force: bool,
 }
 
 #[derive(clap::Args)]
@@ -85,10 +127,17 @@ pub(crate) struct RectifyArgs {
     /// Lay this picture on the rectangle instead, as the photo would show it
     #[arg(long, value_name = "PICTURE")]
     back: Option<PathBuf>,
+    /// Width and height of the rectangle in metres, for labels that do not say them
+    #[arg(long, value_name = "WxH", value_parser = dimensions)]
+    size: Option<[f64; 2]>,
+    /// Take a camera that does not fit its label, too
+    #[arg(long)]
+    force: bool,
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
+        Command::Init(args) => init(args, common),
         Command::Solve(args) => solve(args, common),
         Command::Joint(args) => joint(args, common),
         Command::Doctor(args) => doctor(args, common),
@@ -98,46 +147,123 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     }
 }
 
-fn solve(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
-    anyhow::ensure!(args.output.is_none() || args.labels.len() == 1, "-o: {} labels, expected one", args.labels.len());
-    let one = |path| {
-        let label = read_label(path, args.size)?;
-        write(args, path, &label, &solved(path, &label)?, common)
-    };
-    if let [path] = &args.labels[..] {
-        return one(path);
+fn init(args: &InitArgs, common: &Common) -> anyhow::Result<()> {
+    let path = args.output.clone().unwrap_or_else(|| label_beside(&args.photo));
+    anyhow::ensure!(args.force || !path.exists(), "{}: is there already, and --force is not given", path.display());
+    let like = args.like.as_deref().map(camera::read_label).transpose()?;
+    let mut label = camera::init_label(&args.photo, &path, like.as_ref())?;
+    if let Some([w, h]) = args.size {
+        (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
     }
+    label.surface.corners_px = args.corners;
+    let known = label.points.len();
+    if label.markers.is_some() {
+        let photo: Image<LinearRgb> = io::read(&args.photo)?;
+        label = camera::with_markers(label, &photo).map_err(|e| e.in_file(&args.photo))?;
+    }
+    io::write_text(&path, &camera::commented(&label)?)?;
+    let found = label.points.len() - known;
+    let corners = match (args.corners, found) {
+        (_, 1..) => format!("{found} marker corners found"),
+        (Some(_), _) => "corners as given".into(),
+        _ => "fill in surface.corners_px (top left, top right, bottom right, bottom left)".into(),
+    };
+    common.say(format_args!("{}: {corners}; then `petcomp camera solve {}`", path.display(), path.display()));
+    Ok(())
+}
+
+/// `photos/bg.label.json` of `photos/bg.jpg`.
+fn label_beside(photo: &Path) -> PathBuf {
+    let stem = photo.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    photo.with_file_name(format!("{stem}.label.json"))
+}
+
+impl LabelArgs {
+    /// All labels of all files.
+    fn read(&self) -> anyhow::Result<Vec<Labelled>> {
+        let files = self.labels.iter().map(|path| camera::read_labels(path, self.size));
+        Ok(files.collect::<petcomp::Result<Vec<_>>>()?.concat())
+    }
+
+    /// Does something with every label; where there are several, one that cannot be used does not stop the others.
+    fn each(&self, act: impl Fn(&Labelled) -> anyhow::Result<()>) -> anyhow::Result<()> {
+        if let [path] = &self.labels[..]
+            && let [labelled] = &camera::read_labels(path, self.size)?[..]
+        {
+            return act(labelled);
+        }
+        let mut batch = Batch::default();
+        for path in &self.labels {
+            match camera::read_labels(path, self.size) {
+                Ok(labels) => labels.iter().for_each(|labelled| batch.count(act(labelled))),
+                Err(error) => batch.count(Err(error.into())),
+            }
+        }
+        batch.finish()
+    }
+}
+
+fn solve(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
+    if args.output.is_some() {
+        let count = args.labels.read()?.len();
+        anyhow::ensure!(count == 1, "-o: {count} labels, expected one");
+    }
+    args.labels.each(|labelled| {
+        let solution = accepted(solved(labelled)?, labelled, args.force)?;
+        let target = args.output.clone().unwrap_or_else(|| labelled.beside("camera.json"));
+        write(&target, labelled, &CameraFile::new(&labelled.label, &solution), &solution, common)
+    })
+}
+
+fn joint(args: &JointArgs, common: &Common) -> anyhow::Result<()> {
+    let labels = args.labels.read()?;
+    let all: Vec<Label> = labels.iter().map(|labelled| labelled.label.clone()).collect();
     let mut batch = Batch::default();
-    args.labels.iter().for_each(|path| batch.count(one(path)));
+    for group in camera::one_camera(&all) {
+        let members: Vec<&Labelled> = group.iter().map(|&i| &labels[i]).collect();
+        joint_camera(&members, args.force, common, &mut batch)?;
+    }
     batch.finish()
 }
 
-fn joint(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
-    anyhow::ensure!(args.output.is_none(), "-o: several cameras are written, each beside its label");
-    let labels = args.labels.iter().map(|path| read_label(path, args.size)).collect::<petcomp::Result<Vec<_>>>()?;
-    for group in camera::one_camera(&labels) {
-        let together: Vec<Label> = group.iter().map(|&i| labels[i].clone()).collect();
-        let first = &args.labels[group[0]];
-        let joint = camera::solve_joint(&together, &SolveOptions::default()).map_err(|e| located(e, first))?;
-        for warning in &joint.warnings {
-            eprintln!("warning: photos of {}: {warning}", first.display());
-        }
-        for (&i, photo) in group.iter().zip(joint.photos) {
-            let path = &args.labels[i];
-            write(args, path, &labels[i], &photo.map_err(|e| located(e, path))?, common)?;
-        }
+/// Photos of one camera.
+fn joint_camera(members: &[&Labelled], force: bool, common: &Common, batch: &mut Batch) -> anyhow::Result<()> {
+    let labels: Vec<Label> = members.iter().map(|member| member.label.clone()).collect();
+    let joint = camera::solve_joint(&labels, &SolveOptions::default()).map_err(|e| located(e, members[0]))?;
+    for warning in &joint.warnings {
+        eprintln!("warning: {}", named(warning, members));
+    }
+    for (member, photo) in members.iter().zip(joint.photos) {
+        let one = || {
+            let solution = accepted(photo.map_err(|e| located(e, member))?, member, force)?;
+            let mut file = CameraFile::new(&member.label, &solution);
+            if let Some(from) = file.solved_from.as_mut().filter(|_| members.len() > 1) {
+                from.together = camera::together(members.iter().copied());
+            }
+            write(&member.beside("camera.json"), member, &file, &solution, common)
+        };
+        batch.count(one());
     }
     Ok(())
 }
 
-fn doctor(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
-    for path in &args.labels {
-        let label = read_label(path, args.size)?;
-        let solution = solved(path, &label)?;
-        common.say(format_args!("{}", path.display()));
-        common.say(camera::doctor(&label, &solution, &SolveOptions::default()));
+/// A warning about photos of one camera, with the photo's name instead of its number.
+fn named(warning: &camera::Warning, members: &[&Labelled]) -> String {
+    match warning {
+        camera::Warning::OutlierPhoto { photo, chi2 } if *photo < members.len() => {
+            format!("{}: contradicts the other photos (chi squared {chi2:.1}) and was left out", members[*photo])
+        }
+        other => format!("photos of {}: {other}", members[0]),
     }
-    Ok(())
+}
+
+fn doctor(args: &LabelArgs, common: &Common) -> anyhow::Result<()> {
+    args.each(|labelled| {
+        let solution = solved(labelled)?;
+        common.say(labelled);
+        common.say(camera::doctor(&labelled.label, &solution, &SolveOptions::default()));
+        Ok(accepted(solution, labelled, false).map(drop)?)
+    })
 }
 
 fn export(args: &ExportArgs, common: &Common) -> anyhow::Result<()> {
@@ -177,8 +303,8 @@ fn markers(args: &MarkersArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 fn rectify(args: &RectifyArgs) -> anyhow::Result<()> {
-    let label = read_label(&args.label, None)?;
-    let solution = solved(&args.label, &label)?;
+    let labelled = only(&args.label, args.size)?;
+    let solution = accepted(solved(&labelled)?, &labelled, args.force)?;
     let header = io::read_header(&args.photo)?;
     let seen = solution.camera.resized([header.width as u32, header.height as u32]);
     if let Some(picture) = &args.back {
@@ -190,68 +316,84 @@ fn rectify(args: &RectifyArgs) -> anyhow::Result<()> {
     Ok(io::write(&args.output, &camera::rectify(&photo, &seen, solution.size, px_per_metre)?)?)
 }
 
-/// A label of ours, or with dimensions given one of LabelMe's.
-fn read_label(path: &Path, size: Option<[f64; 2]>) -> petcomp::Result<Label> {
-    match size {
-        Some(size) => {
-            let label = camera::from_labelme(&io::read_text(path)?, size).map_err(|e| e.in_file(path))?;
-            camera::check_size(&label)?;
-            camera::with_photo(label, path)
-        }
-        None => camera::read_label(path),
-    }
+/// The only label of a file.
+fn only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<Labelled> {
+    let mut labels = camera::read_labels(path, size)?;
+    anyhow::ensure!(labels.len() == 1, "{}: {} labels, expected one", path.display(), labels.len());
+    Ok(labels.remove(0))
 }
 
-fn solved(path: &Path, label: &Label) -> petcomp::Result<Solution> {
-    let solution = camera::solve(label, &SolveOptions::default()).map_err(|e| located(e, path))?;
-    camera::check_distance(&solution).map_err(|e| e.in_file(path))?;
+fn solved(labelled: &Labelled) -> petcomp::Result<Solution> {
+    let solution = camera::solve(&labelled.label, &SolveOptions::default()).map_err(|e| located(e, labelled))?;
+    camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
 
-fn located(error: camera::SolveError, path: &Path) -> Error {
-    Error::from(error).in_file(path)
+/// A solution that fits its label, or any where that is asked for.
+fn accepted(solution: Solution, labelled: &Labelled, force: bool) -> anyhow::Result<Solution> {
+    match solution.misfit() {
+        Some(error) if !force => {
+            Err(Error::file(&labelled.source, format!("{error}; --force takes it nevertheless")).into())
+        }
+        _ => Ok(solution),
+    }
+}
+
+fn located(error: camera::SolveError, labelled: &Labelled) -> Error {
+    Error::from(error).in_file(&labelled.source)
 }
 
 /// Writes the camera and, where the photo is there, the overlay; says what was found.
-fn write(args: &SolveArgs, path: &Path, label: &Label, solution: &Solution, common: &Common) -> anyhow::Result<()> {
-    let target = args.output.clone().unwrap_or_else(|| beside(path, "camera.json"));
-    io::write_json(&target, &CameraFile::new(label, solution))?;
-    if let Some(photo) = camera::photo_of(label, path) {
+fn write(
+    target: &Path,
+    labelled: &Labelled,
+    file: &CameraFile,
+    solution: &Solution,
+    common: &Common,
+) -> anyhow::Result<()> {
+    io::write_json(target, file)?;
+    if let Some(photo) = labelled.photo() {
         let photo: Image<LinearRgb> = io::read(photo)?;
-        io::write(beside(&target, "overlay.png"), &camera::overlay(&photo, solution))?;
+        let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = name.strip_suffix(".json").unwrap_or(&name);
+        let stem = stem.strip_suffix(".camera").unwrap_or(stem);
+        io::write(target.with_file_name(format!("{stem}.overlay.png")), &camera::overlay(&photo, solution))?;
     }
-    report(path, solution, common);
+    report(labelled, solution, common);
     Ok(())
 }
 
-/// `bg.camera.json` of `bg.label.json`.
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let stem = name.strip_suffix(".json").unwrap_or(&name);
-    let stem = stem.strip_suffix(".label").or(stem.strip_suffix(".camera")).unwrap_or(stem);
-    path.with_file_name(format!("{stem}.{ending}"))
-}
-
-fn report(path: &Path, solution: &Solution, common: &Common) {
+fn report(labelled: &Labelled, solution: &Solution, common: &Common) {
     let camera = &solution.camera;
     let (tilt, height) = (camera.tilt().to_degrees(), camera.center().z);
     let (focal, percent) = (camera.focal_px.x, 100.0 * solution.sigma.ln_focal);
     common.say(format_args!(
-        "{}: tilt {tilt:.1} deg, height {height:.3} m, focal length {focal:.0} px (+- {percent:.1} %, {:?}), corners to {:.2} px, \
+        "{labelled}: tilt {tilt:.1} deg, height {height:.3} m, focal length {focal:.0} px (+- {percent:.1} %, {}), corners to {:.2} px, \
          {:.0} mm above the surface to {:.1} px",
-        path.display(),
-        solution.focal_source,
+        format!("{:?}", solution.focal_source).to_lowercase(),
         solution.rms_px,
         1000.0 * solution.sigma.reference_height,
         solution.sigma.height_px,
     ));
     for warning in &solution.warnings {
-        eprintln!("warning: {}: {warning}", path.display());
+        eprintln!("warning: {labelled}: {warning}");
     }
 }
 
+/// Four places of two numbers each.
+fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
+    let wrong = || format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"");
+    let place = |part: &str| {
+        let (x, y) = part.split_once(',')?;
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        Some([number(x)?, number(y)?])
+    };
+    let places = text.split([' ', ';']).filter(|part| !part.is_empty()).map(place).collect::<Option<Vec<_>>>();
+    places.and_then(|places| places.try_into().ok()).ok_or_else(wrong)
+}
+
 fn dimensions(text: &str) -> Result<[f64; 2], String> {
-    let side = |part: &str| part.trim().parse::<f64>().map_err(|e| format!("\"{part}\": {e}"));
-    let (w, h) = text.split_once('x').ok_or_else(|| format!("\"{text}\", expected WIDTHxHEIGHT as in 0.6x0.4"))?;
-    Ok([side(w)?, side(h)?])
+    let side = |part: &str| part.trim().parse::<f64>().ok().filter(|side| side.is_finite() && *side > 0.0);
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([side(w)?, side(h)?]));
+    sides.ok_or_else(|| format!("\"{text}\", expected WIDTHxHEIGHT in metres as in 0.6x0.4"))
 }

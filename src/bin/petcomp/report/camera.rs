@@ -24,6 +24,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let rows =
         camera::write(&args.output, &CameraReportOptions { views: args.views }, |done, of| progress.at(done, of))?;
     drop(progress);
-    common.say(format_args!("{}: camera.csv ({} lines), camera.md and six plots", args.output.display(), rows.len()));
+    common.say(format_args!(
+        "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",
+        args.output.display(),
+        rows.len()
+    ));
     Ok(())
 }

@@ -1,0 +1,131 @@
+//! What is not known of a picture that may have been cropped.
+//!
+//! # Method
+//! Two cameras are solved: of a whole picture, whose principal point is in its middle, and of one that may be a part of a
+//! larger picture. As long as the corners allow it the first one is the answer, since most pictures are whole. Its error is
+//! what the second one leaves open, and the distance to it: the mean square error of the answer where the picture is
+//! cropped after all.
+
+use super::Solution;
+use super::label::Framing;
+use super::model::Unknowns;
+use super::options::SolveOptions;
+use super::pinhole::distorted;
+use super::problem::corner_points;
+use super::search::TELLING;
+use super::solution::Sigma;
+use super::uncertainty::heights;
+use super::warning::Warning;
+use crate::geom::{Point2, Vector2};
+
+/// Corners that cost so much in a whole picture, and so little in one that may be cropped, are of a cropped one.
+pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
+    whole > loose + TELLING
+}
+
+impl Solution {
+    /// The camera of a picture taken for whole, `apart` from that of the same picture if it may be cropped, with the
+    /// uncertainty of both.
+    pub(crate) fn hedged(mut self, loose: &Self, apart: &Unknowns, options: &SolveOptions) -> Self {
+        let sure_px = self.sigma.height_px;
+        self.sigma = self.sigma_with(loose, apart);
+        (self.focal.share, self.focal.from_data_px) = (loose.focal.share, loose.focal.from_data_px);
+        (self.focal_source, self.framing) = (loose.focal_source, Framing::Unknown);
+        self.warnings.retain(|w| !matches!(w, Warning::HeightUncertain { .. }));
+        let limit_px = self.height_limit_px(options);
+        if sure_px > limit_px {
+            self.warnings.extend(self.height_warning(options));
+        } else if self.sigma.height_px > limit_px {
+            let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
+            self.warnings.push(Warning::FramingUnknown { height, sigma_px, whole_px: sure_px });
+        }
+        self
+    }
+
+    /// The camera of a picture that is not whole, although nobody said so, and beside it that of a whole one.
+    pub(crate) fn off_center(mut self, whole: Option<Self>) -> Self {
+        let [w, h] = self.camera.image.map(f64::from);
+        let off = self.camera.principal_px - Point2::new(w / 2.0, h / 2.0);
+        self.warnings.push(Warning::OffCenter { off_px: off.norm(), sigma_px: self.sigma.principal_px });
+        self.alternative = self.alternative.or(whole.map(Box::new));
+        self
+    }
+
+    fn sigma_with(&self, loose: &Self, apart: &Unknowns) -> Sigma {
+        let (camera, other, sigma) = (&self.camera, &loose.camera, &loose.sigma);
+        let moved = other.center() - camera.center();
+        let middle = other.principal_px - camera.principal_px;
+        let corners = [0, 1, 2, 3].map(|i| {
+            let off = loose.sees(corner_points(loose.size)[i]) - self.sees(corner_points(self.size)[i]);
+            sigma.corners_px[i] + off * off.transpose()
+        });
+        Sigma {
+            ln_focal: libm::hypot(sigma.ln_focal, libm::log(other.focal_px.x / camera.focal_px.x)),
+            tilt: libm::hypot(sigma.tilt, other.tilt() - camera.tilt()),
+            center: sigma.center + moved * moved.transpose(),
+            corners_px: corners,
+            reference_height: self.sigma.reference_height,
+            height_px: libm::hypot(sigma.height_px, self.height_apart_px(loose)),
+            principal_px: libm::hypot(sigma.principal_px, middle.norm() / std::f64::consts::SQRT_2),
+            covariance: sigma.covariance + apart * apart.transpose(),
+        }
+    }
+
+    /// Root mean square distance of points at the reference height as two cameras see them.
+    fn height_apart_px(&self, other: &Self) -> f64 {
+        let height = self.sigma.reference_height;
+        let pairs = heights(self.size, height).zip(heights(other.size, height));
+        let squares: Vec<f64> = pairs.map(|(a, b)| (other.sees(b) - self.sees(a)).norm_squared()).collect();
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    }
+
+    fn sees(&self, point: crate::geom::Point3<f64>) -> Vector2<f64> {
+        distorted(&self.camera, self.kappa, point).coords
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::simulate::Scenario;
+    use crate::camera::{Label, solve};
+
+    fn solved(label: &Label) -> Solution {
+        solve(label, &SolveOptions::default()).unwrap()
+    }
+
+    fn said(solution: &Solution, kind: &str) -> bool {
+        solution.warnings.iter().any(|w| serde_json::to_value(w).unwrap()["kind"] == kind)
+    }
+
+    #[test]
+    fn a_picture_of_unknown_framing_is_taken_for_whole_with_a_larger_error() {
+        let whole = Scenario::realistic().tilted(25.0).view(1, 3).label;
+        let mut unknown = whole.clone();
+        unknown.image.cropped = None;
+        let (sure, hedged) = (solved(&whole), solved(&unknown));
+        assert_eq!(sure.camera, hedged.camera);
+        assert_eq!((sure.framing, hedged.framing), (Framing::Whole, Framing::Unknown));
+        assert!(hedged.sigma.ln_focal > 3.0 * sure.sigma.ln_focal, "{:?}", hedged.sigma.ln_focal);
+        assert!(hedged.sigma.principal_px > 10.0 * sure.sigma.principal_px);
+        assert!(said(&hedged, "framing_unknown") && !said(&sure, "framing_unknown"));
+    }
+
+    #[test]
+    fn corners_of_a_cropped_picture_are_noticed() {
+        let scenario = Scenario { off_center: 0.23, corner_sigma_px: 0.5, ..Scenario::default() }.tilted(40.0);
+        let view = scenario.view(1, 3);
+        let solution = solved(&view.label);
+        assert!(said(&solution, "off_center"), "{:?}", solution.warnings);
+        let error = libm::log(solution.camera.focal_px.x / view.camera.focal_px.x).abs();
+        assert!(error < 3.0 * solution.sigma.ln_focal, "{error}");
+        assert!(solution.alternative.is_some_and(|whole| whole.camera.principal_px.x - 2000.0 < 200.0));
+    }
+
+    #[test]
+    fn a_stated_principal_point_is_not_hedged() {
+        let mut label = Scenario::realistic().tilted(25.0).view(1, 3).label;
+        (label.image.cropped, label.camera.principal_point_px) = (None, Some([2000.0, 1500.0]));
+        assert_eq!(solved(&label).framing, Framing::Whole);
+    }
+}

@@ -1,0 +1,127 @@
+//! CVAT: the export "CVAT for images 1.1", an XML file for many pictures.
+
+use super::{Drawing, Kind, Shape, between};
+use crate::error::{Error, Result};
+use roxmltree::{Document, Node};
+
+/// The pictures with something on them; none for XML of another kind.
+pub(super) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
+    if !text.contains("<annotations") {
+        return Ok(None);
+    }
+    // Document types are refused: nothing is fetched, and nothing grows.
+    let document = Document::parse(text).map_err(|e| Error::value("document", e))?;
+    let root = document.root_element();
+    if root.tag_name().name() != "annotations" {
+        return Ok(None);
+    }
+    let images = root.children().filter(|node| node.has_tag_name("image"));
+    let all: Result<Vec<Drawing>> = images.enumerate().map(|(i, node)| drawing(node, i)).collect();
+    Ok(Some(all?.into_iter().filter(|drawing| !drawing.shapes.is_empty()).collect()))
+}
+
+/// CVAT's pixels are ours: 0 is the edge of the picture.
+fn drawing(image: Node<'_, '_>, index: usize) -> Result<Drawing> {
+    let at = |e: Error| e.within(&format!("image[{index}]"));
+    let side = |name: &str| number(image, name).map(|px| px as u32);
+    let size = [side("width").map_err(at)?, side("height").map_err(at)?];
+    let shapes: Result<Vec<Option<Shape>>> =
+        image.children().filter(Node::is_element).map(|node| shape(node).map_err(at)).collect();
+    Ok(Drawing {
+        files: vec![image.attribute("name").unwrap_or_default().replace('\\', "/")],
+        size: Some(size),
+        shapes: shapes?.into_iter().flatten().collect(),
+        source: "cvat",
+    })
+}
+
+fn shape(node: Node<'_, '_>) -> Result<Option<Shape>> {
+    let name = node.attribute("label").unwrap_or_default().to_owned();
+    let (kind, points) = match node.tag_name().name() {
+        "polygon" | "polyline" => (Kind::Polygon, points(node)?),
+        "points" => (Kind::Points, points(node)?),
+        "box" => {
+            let side = |name| number(node, name);
+            let corners = between([side("xtl")?, side("ytl")?], [side("xbr")?, side("ybr")?]);
+            (Kind::Rectangle, turned(corners, node.attribute("rotation").map_or(Ok(0.0), |_| side("rotation"))?))
+        }
+        _ => return Ok(None),
+    };
+    Ok(Some(Shape { kind, name, points }))
+}
+
+/// `x,y;x,y` as numbers.
+fn points(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
+    let text = node.attribute("points").unwrap_or_default();
+    let wrong = |part: &str| Error::value("points", format!("\"{part}\", expected x,y"));
+    let one = |part: &str| {
+        let (x, y) = part.split_once(',').ok_or_else(|| wrong(part))?;
+        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong(part));
+        Ok([number(x)?, number(y)?])
+    };
+    text.split(';').filter(|part| !part.trim().is_empty()).map(one).collect()
+}
+
+fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {
+    let text = node.attribute(name).ok_or_else(|| Error::value(name, "missing, expected a number"))?;
+    text.parse().map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+}
+
+/// The corners of a rectangle that was turned clockwise about its middle.
+fn turned(corners: Vec<[f64; 2]>, degrees: f64) -> Vec<[f64; 2]> {
+    if degrees == 0.0 {
+        return corners;
+    }
+    let middle = [0, 1].map(|axis| (corners[0][axis] + corners[2][axis]) / 2.0);
+    let (sin, cos) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
+    let turn = |[x, y]: [f64; 2]| {
+        let [u, v] = [x - middle[0], y - middle[1]];
+        [middle[0] + u * cos - v * sin, middle[1] + u * sin + v * cos]
+    };
+    corners.into_iter().map(turn).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::drawings;
+    use super::super::tests::only;
+
+    const XML: &str = r#"<?xml version="1.0" encoding="utf-8"?>
+<annotations><version>1.1</version><meta><job><id>1</id></job></meta>
+  <image id="0" name="bg0.jpg" width="200" height="100">
+    <polygon label="tray" source="manual" occluded="0" points="10.00,20.00;110.00,22.00;108.00,90.00;9.00,88.00" z_order="0">
+      <attribute name="side">up</attribute></polygon>
+    <tag label="good" source="manual"></tag>
+  </image>
+  <image id="1" name="empty.jpg" width="200" height="100"></image>
+</annotations>"#;
+
+    #[test]
+    fn pictures_with_a_polygon_are_labels() {
+        let drawing = only(XML);
+        assert_eq!((drawing.size, drawing.files.as_slice()), (Some([200, 100]), &["bg0.jpg".to_owned()][..]));
+        let label = drawing.label().unwrap();
+        assert_eq!(label.surface.corners_px, Some([[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]]));
+    }
+
+    #[test]
+    fn points_and_boxes_are_read() {
+        let with = |shape: &str| {
+            let text = format!(r#"<annotations><image name="a" width="9" height="9">{shape}</image></annotations>"#);
+            only(&text).label().unwrap().surface.corners_px.unwrap()
+        };
+        assert_eq!(with(r#"<points label="c" points="1,2;3,4;5,6;7,8"/>"#)[3], [7.0, 8.0]);
+        assert_eq!(with(r#"<box label="c" xtl="1" ytl="2" xbr="5" ybr="8"/>"#)[2], [5.0, 8.0]);
+        let [x, y] = with(r#"<box label="c" xtl="1" ytl="2" xbr="5" ybr="8" rotation="90"/>"#)[0];
+        assert!((x - 6.0).abs() < 1e-12 && (y - 3.0).abs() < 1e-12, "{x} {y}");
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let error = |text: &str| drawings(text).unwrap_err().to_string();
+        assert!(error(&XML.replace("110.00,22.00", "110.00")).contains("image[0].points: \"110.00\", expected x,y"));
+        assert!(error(&XML.replace("width=\"200\"", "")).contains("image[0].width: missing"));
+        assert!(error("<!DOCTYPE a [<!ENTITY b \"c\">]><annotations/>").contains("document"), "no document types");
+        assert!(error("<annotations>").contains("document"));
+    }
+}

@@ -1,0 +1,89 @@
+//! LabelMe: a JSON file for each picture.
+
+use super::{Drawing, Kind, Shape, between};
+use crate::error::{Error, Result};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// What is read of a file; it has more.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct LabelMe {
+    #[serde(default)]
+    image_path: String,
+    #[serde(default)]
+    image_width: Option<u32>,
+    #[serde(default)]
+    image_height: Option<u32>,
+    shapes: Vec<Drawn>,
+}
+
+#[derive(Deserialize)]
+struct Drawn {
+    #[serde(default)]
+    label: String,
+    #[serde(default)]
+    shape_type: String,
+    points: Vec<[f64; 2]>,
+}
+
+pub(super) fn is_one(value: &Value) -> bool {
+    value.get("shapes").is_some_and(Value::is_array)
+}
+
+/// LabelMe's pixels are ours: 0 is the edge of the picture.
+pub(super) fn drawing(value: Value) -> Result<Drawing> {
+    let file: LabelMe =
+        serde_path_to_error::deserialize(value).map_err(|e| Error::value(e.path().to_string(), e.inner()))?;
+    Ok(Drawing {
+        files: vec![file.image_path.replace('\\', "/")],
+        size: file.image_width.zip(file.image_height).map(|(w, h)| [w, h]),
+        shapes: file.shapes.into_iter().map(shape).collect(),
+        source: "labelme",
+    })
+}
+
+fn shape(Drawn { label: name, shape_type, points }: Drawn) -> Shape {
+    let (kind, points) = match (shape_type.as_str(), points.as_slice()) {
+        ("rectangle", [a, b]) => (Kind::Rectangle, between(*a, *b)),
+        ("rectangle", _) => (Kind::Rectangle, points),
+        ("point" | "points", _) => (Kind::Points, points),
+        _ => (Kind::Polygon, points),
+    };
+    Shape { kind, name, points }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::from_labelme;
+
+    const FILE: &str = r#"{ "version": "5.4.1", "flags": {}, "shapes": [
+        { "label": "tray", "points": [[10, 20], [110, 22], [108, 90], [9, 88]], "group_id": null,
+          "shape_type": "polygon", "flags": {} },
+        { "label": "dot", "points": [[1, 2]], "shape_type": "point" } ],
+        "imagePath": "a.jpg", "imageData": null, "imageHeight": 100, "imageWidth": 200 }"#;
+
+    #[test]
+    fn the_polygon_becomes_the_rectangle() {
+        let label = from_labelme(FILE, [0.6, 0.4]).unwrap();
+        assert_eq!((label.image_size(), label.image.file.as_str()), ([200, 100], "a.jpg"));
+        assert_eq!(label.surface.corners_px.unwrap()[2], [108.0, 90.0]);
+        assert_eq!((label.surface.id.as_str(), label.surface.width_m), ("tray", Some(0.6)));
+    }
+
+    #[test]
+    fn two_corners_of_a_rectangle_are_four() {
+        let text = FILE.replace("[[10, 20], [110, 22], [108, 90], [9, 88]]", "[[110, 90], [10, 20]]");
+        let label = from_labelme(&text.replace("\"polygon\"", "\"rectangle\""), [0.6, 0.4]).unwrap();
+        assert_eq!(label.surface.corners_px, Some([[10.0, 20.0], [110.0, 20.0], [110.0, 90.0], [10.0, 90.0]]));
+    }
+
+    #[test]
+    fn another_number_of_polygons_is_an_error() {
+        let none = FILE.replace(", [9, 88]]", "]");
+        assert!(from_labelme(&none, [0.6, 0.4]).unwrap_err().to_string().contains("0 polygons of four points"));
+        assert!(from_labelme("{}", [0.6, 0.4]).unwrap_err().to_string().contains("shapes"));
+        let wrong = from_labelme(&FILE.replace("[10, 20]", "[10]"), [0.6, 0.4]).unwrap_err().to_string();
+        assert!(wrong.contains("shapes[0].points[0]"), "{wrong}");
+    }
+}

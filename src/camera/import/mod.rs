@@ -1,0 +1,217 @@
+//! Labels that were drawn in other programs: LabelMe, CVAT, Label Studio.
+//!
+//! Each format is read into [`Drawing`]s, a picture and the shapes on it; what they mean is decided here: one quadrangle,
+//! or else one upright rectangle, or else four points, is the surface.
+
+mod cvat;
+mod label_studio;
+mod labelme;
+
+use super::label::Label;
+use crate::error::{Error, Result};
+use crate::io;
+use serde_json::Value;
+
+/// What programs write of a picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Drawing {
+    /// Names that its file may have, the most likely first; the program may have added something.
+    pub(crate) files: Vec<String>,
+    /// Width and height, pixels; none where the program does not tell.
+    pub(crate) size: Option<[u32; 2]>,
+    pub(crate) shapes: Vec<Shape>,
+    /// Which program.
+    pub(crate) source: &'static str,
+}
+
+/// Something drawn on a picture, with pixels as ours: 0 is the picture's edge.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Shape {
+    pub(crate) kind: Kind,
+    /// Name of its class.
+    pub(crate) name: String,
+    pub(crate) points: Vec<[f64; 2]>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Polygon,
+    /// Its four corners.
+    Rectangle,
+    Points,
+}
+
+/// The pictures of another program's file; none where the text is of no program that is known.
+///
+/// # Errors
+/// [`Error::Value`] for a file of one of the programs that does not hold what theirs do.
+pub(crate) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
+    let text = text.trim_start_matches('\u{feff}');
+    if text.trim_start().starts_with('<') {
+        return cvat::drawings(text);
+    }
+    let Ok(value) = io::parse_json::<Value>(text) else { return Ok(None) };
+    if labelme::is_one(&value) {
+        return labelme::drawing(value).map(|drawing| Some(vec![drawing]));
+    }
+    if label_studio::is_one(&value) {
+        return label_studio::drawings(value).map(Some);
+    }
+    Ok(None)
+}
+
+/// The label that a LabelMe file means, of a rectangle of `size` metres.
+///
+/// # Errors
+/// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one rectangle or four points.
+pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
+    let mut label = labelme::drawing(io::parse_json(text)?)?.label()?;
+    (label.surface.width_m, label.surface.height_m) = (Some(size[0]), Some(size[1]));
+    Ok(label)
+}
+
+impl Drawing {
+    /// The label that the drawing means; the sides of its rectangle are not known.
+    pub(crate) fn label(&self) -> Result<Label> {
+        let (name, corners_px) = self.rectangle()?;
+        let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
+        (label.surface.width_m, label.surface.height_m) = (None, None);
+        label.image.file = self.files.first().cloned().unwrap_or_default();
+        label.surface.id = if name.is_empty() { "surface".into() } else { name };
+        label.surface.source = Some(self.source.into());
+        Ok(label)
+    }
+
+    /// Name and corners of the only shape that can be the surface.
+    fn rectangle(&self) -> Result<(String, [[f64; 2]; 4])> {
+        if self.shapes.iter().flat_map(|s| s.points.as_flattened()).any(|v| !v.is_finite()) {
+            return Err(Error::value("shapes", "a point is not finite"));
+        }
+        let of = |kind: Kind| self.shapes.iter().filter(move |shape| shape.kind == kind);
+        let four = |shape: &Shape| Some((shape.name.clone(), opened(&shape.points).try_into().ok()?));
+        let quads: Vec<_> = of(Kind::Polygon).filter_map(four).collect();
+        let boxes: Vec<_> = of(Kind::Rectangle).filter_map(four).collect();
+        let points: Vec<_> = of(Kind::Points).flat_map(|s| s.points.iter().map(|p| (&s.name, *p))).collect();
+        match (quads.as_slice(), boxes.as_slice(), points.as_slice()) {
+            ([quad], ..) => Ok(quad.clone()),
+            ([], [one], _) => Ok(one.clone()),
+            ([], [], [a, b, c, d]) => Ok(four_points([*a, *b, *c, *d])),
+            _ => {
+                let others = of(Kind::Polygon).count() - quads.len();
+                Err(Error::value(
+                    "shapes",
+                    format!(
+                        "{} polygons of four points, {others} of another number, {} rectangles and {} points, expected \
+                         one polygon of four points, or one rectangle, or four points",
+                        quads.len(),
+                        boxes.len(),
+                        points.len()
+                    ),
+                ))
+            }
+        }
+    }
+}
+
+/// A polygon without a last point that repeats the first.
+fn opened(points: &[[f64; 2]]) -> &[[f64; 2]] {
+    match points {
+        [first, rest @ .., last] if first == last && !rest.is_empty() => &points[..points.len() - 1],
+        _ => points,
+    }
+}
+
+/// Single points as they were drawn, or where they are called so, from the top left.
+fn four_points(points: [(&String, [f64; 2]); 4]) -> (String, [[f64; 2]; 4]) {
+    const NAMES: [&[&str]; 4] = [
+        &["tl", "top left", "topleft", "left top"],
+        &["tr", "top right", "topright", "right top"],
+        &["br", "bottom right", "bottomright", "right bottom"],
+        &["bl", "bottom left", "bottomleft", "left bottom"],
+    ];
+    let place = |name: &str| {
+        let name = name.to_lowercase().replace(['_', '-'], " ");
+        NAMES.iter().position(|words| words.contains(&name.trim()))
+    };
+    let places = points.map(|(name, _)| place(name));
+    let corners = points.map(|(_, point)| point);
+    if (0..4).all(|corner| places.contains(&Some(corner))) {
+        let mut named = corners;
+        for (place, point) in places.into_iter().flatten().zip(corners) {
+            named[place] = point;
+        }
+        return ("surface".into(), named);
+    }
+    let one_name = points.iter().all(|(name, _)| *name == points[0].0);
+    (if one_name { points[0].0.clone() } else { "surface".into() }, corners)
+}
+
+/// The corners of an upright rectangle between two opposite ones, clockwise from the top left.
+pub(crate) fn between([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> Vec<[f64; 2]> {
+    let ([left, right], [top, bottom]) = ([ax.min(bx), ax.max(bx)], [ay.min(by), ay.max(by)]);
+    vec![[left, top], [right, top], [right, bottom], [left, bottom]]
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn only(text: &str) -> Drawing {
+        let mut drawings = drawings(text).unwrap().unwrap();
+        assert_eq!(drawings.len(), 1);
+        drawings.remove(0)
+    }
+
+    fn shape(kind: Kind, name: &str, points: &[[f64; 2]]) -> Shape {
+        Shape { kind, name: name.into(), points: points.to_vec() }
+    }
+
+    const QUAD: [[f64; 2]; 4] = [[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]];
+
+    fn corners(shapes: Vec<Shape>) -> std::result::Result<[[f64; 2]; 4], String> {
+        let drawing = Drawing { shapes, ..Default::default() };
+        drawing.label().map(|l| l.surface.corners_px.unwrap()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn a_quadrangle_comes_before_a_rectangle_and_that_before_points() {
+        let quad = shape(Kind::Polygon, "tray", &QUAD);
+        let rectangle = shape(Kind::Rectangle, "tray", &between([100.0, 80.0], [10.0, 20.0]));
+        let dots = QUAD.map(|p| shape(Kind::Points, "dot", &[p])).to_vec();
+        let all: Vec<Shape> = dots.iter().cloned().chain([rectangle.clone(), quad]).collect();
+        assert_eq!(corners(all).unwrap(), QUAD);
+        let without: Vec<Shape> = dots.iter().cloned().chain([rectangle]).collect();
+        assert_eq!(corners(without).unwrap(), [[10.0, 20.0], [100.0, 20.0], [100.0, 80.0], [10.0, 80.0]]);
+        assert_eq!(corners(dots).unwrap(), QUAD);
+    }
+
+    #[test]
+    fn points_that_are_called_by_their_corner_are_put_in_order() {
+        let named = [(2, "BR"), (0, "top_left"), (3, "bottom-left"), (1, "tr")];
+        let shapes = named.map(|(i, name)| shape(Kind::Points, name, &[QUAD[i]])).to_vec();
+        assert_eq!(corners(shapes).unwrap(), QUAD);
+    }
+
+    #[test]
+    fn a_closed_polygon_has_one_point_less() {
+        let closed: Vec<[f64; 2]> = QUAD.into_iter().chain([QUAD[0]]).collect();
+        assert_eq!(corners(vec![shape(Kind::Polygon, "", &closed)]).unwrap(), QUAD);
+    }
+
+    #[test]
+    fn anything_else_is_counted_in_the_message() {
+        let two = vec![shape(Kind::Polygon, "a", &QUAD), shape(Kind::Polygon, "b", &QUAD)];
+        assert!(corners(two).unwrap_err().contains("2 polygons of four points"));
+        let three = vec![shape(Kind::Polygon, "a", &QUAD[..3])];
+        assert!(corners(three).unwrap_err().contains("1 of another number"));
+        assert!(corners(vec![]).unwrap_err().contains("0 points"));
+        assert!(corners(vec![shape(Kind::Polygon, "a", &[[f64::NAN, 0.0]; 4])]).unwrap_err().contains("finite"));
+    }
+
+    #[test]
+    fn other_documents_are_of_no_program() {
+        for text in ["{}", "[]", "[1]", "3", "{\"format\": \"plane-label\"}", "<html></html>", "<a>", "{", ""] {
+            assert_eq!(drawings(text).unwrap(), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! A label from nothing: what a photo knows of itself, and what is left to be filled in.
+
+use super::label::{Framing, Label, LabelSurface};
+use crate::error::{Error, Result};
+use crate::io;
+use serde::Serialize;
+use std::path::Path;
+
+/// Relative noise of a focal length that was noted together with a digital zoom.
+pub(super) const ZOOMED_SIGMA: f64 = 0.25;
+
+/// The label, to be written to `path`, of a photo: its size, what its EXIF data say of the lens and of its framing, and the
+/// surface, markers and camera of another label of the same rectangle. Its corners are missing.
+///
+/// # Errors
+/// A file that is no picture; a photo that does not lie in or below the label's folder.
+pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Label> {
+    let header = io::read_header(photo)?;
+    let mut label = Label::new([header.width as u32, header.height as u32], [[0.0; 2]; 4], [1.0; 2]);
+    label.image.file = file_below(photo, path)?;
+    label.image.cropped = (header.cropped || header.whole).then_some(header.cropped);
+    label.surface = LabelSurface { id: "surface".into(), ..LabelSurface::default() };
+    if let Some(like) = like {
+        label.surface = LabelSurface { corners_px: None, source: None, ..like.surface.clone() };
+        (label.camera.id, label.markers) = (like.camera.id.clone(), like.markers.clone());
+        if like.image_size() == label.image_size() {
+            label.camera = super::LabelCamera { height_m: None, height_sigma_m: None, ..like.camera.clone() };
+        }
+    }
+    if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
+        label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
+        label.camera.focal_sigma = label.camera.focal_35mm.filter(|_| header.digital_zoom).map(|_| ZOOMED_SIGMA);
+    }
+    Ok(label)
+}
+
+/// The photo as a label at `path` names it.
+fn file_below(photo: &Path, path: &Path) -> Result<String> {
+    let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
+    let folder = absolute(path)?.parent().map(Path::to_path_buf).unwrap_or_default();
+    let relative = io::relative(&absolute(photo)?, &folder);
+    if io::below("", &relative).is_err() {
+        return Err(Error::file(path, format!("does not lie beside {} nor above it", photo.display())));
+    }
+    Ok(relative.to_string_lossy().replace('\\', "/"))
+}
+
+/// A label as text, with remarks on what is left to be filled in.
+#[derive(Serialize)]
+struct Commented<'a> {
+    #[serde(rename = "_todo", skip_serializing_if = "Vec::is_empty")]
+    todo: Vec<&'static str>,
+    #[serde(flatten)]
+    label: &'a Label,
+}
+
+/// The text of a label file, in which what is missing is there to be filled in: corners of `null`, and what they mean.
+///
+/// # Errors
+/// [`Error::Value`] where JSON cannot say a value.
+pub fn commented(label: &Label) -> Result<String> {
+    let mut shown = label.clone();
+    let mut todo = Vec::new();
+    if label.surface.corners_px.is_none() && label.points.is_empty() {
+        // What is not a number is null.
+        shown.surface.corners_px = Some([[f64::NAN; 2]; 4]);
+        todo.push(
+            "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the picture, clockwise \
+             from its top left; the side from the first to the second is width_m",
+        );
+    }
+    if label.framing() == Framing::Unknown {
+        todo.push("image: add \"cropped\": false if nothing was cut off the picture, true if something was");
+    }
+    let text =
+        serde_json::to_string_pretty(&Commented { todo, label: &shown }).map_err(|e| Error::value("label", e))?;
+    Ok(folded(&text) + "\n")
+}
+
+/// Pretty JSON, its lists of numbers in one line each.
+fn folded(text: &str) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    let mut list: Option<String> = None;
+    for line in text.lines() {
+        let part = line.trim();
+        match &mut list {
+            _ if line.ends_with('[') => {
+                lines.extend(list.take());
+                list = Some(line.to_owned());
+            }
+            Some(open) if part.starts_with(']') => {
+                lines.push(format!("{}{part}", open.trim_end()));
+                list = None;
+            }
+            Some(open) if part.trim_end_matches(',').parse::<f64>().is_ok() || part.starts_with("null") => {
+                *open += part;
+                *open += if part.ends_with(',') { " " } else { "" };
+            }
+            _ => {
+                lines.extend(list.take());
+                lines.push(line.to_owned());
+            }
+        }
+    }
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Image, Srgb8};
+
+    #[test]
+    fn a_label_from_nothing_reads_back_without_its_corners() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("a.png");
+        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let path = folder.path().join("a.label.json");
+        let mut label = init_label(&photo, &path, None).unwrap();
+        (label.surface.width_m, label.surface.height_m) = (Some(0.56), Some(0.37));
+        let text = commented(&label).unwrap();
+        assert!(text.contains("[null, null],\n") && text.contains("\"cropped\\\": false if nothing"), "{text}");
+        io::write_text(&path, &text).unwrap();
+        assert_eq!(crate::camera::read_label(&path).unwrap(), label);
+        let filled = text.replace("[null, null]", "[1, 2]");
+        io::write_text(&path, &filled).unwrap();
+        assert_eq!(crate::camera::read_label(&path).unwrap().surface.corners_px, Some([[1.0, 2.0]; 4]));
+    }
+
+    #[test]
+    fn another_label_of_the_rectangle_lends_what_the_photos_share() {
+        let folder = tempfile::tempdir().unwrap();
+        let photo = folder.path().join("a.png");
+        io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
+        let mut like = Label::new([90, 60], [[1.0; 2]; 4], [0.6, 0.4]);
+        (like.surface.id, like.camera.id) = ("tray".into(), Some("phone".into()));
+        (like.camera.focal_px, like.camera.height_m) = (Some(80.0), Some(1.0));
+        let label = init_label(&photo, &folder.path().join("a.label.json"), Some(&like)).unwrap();
+        assert_eq!((label.surface.id.as_str(), label.surface.width_m), ("tray", Some(0.6)));
+        assert_eq!((label.surface.corners_px, label.camera.height_m), (None, None));
+        assert_eq!((label.camera.id.as_deref(), label.camera.focal_px), (Some("phone"), Some(80.0)));
+    }
+
+    #[test]
+    fn a_label_lies_beside_its_photo_or_above_it() {
+        let at = |path: &str| file_below(Path::new("/photos/a/b.jpg"), Path::new(path));
+        assert_eq!(
+            (at("/photos/a/b.label.json").unwrap(), at("/photos/x.json").unwrap()),
+            ("b.jpg".into(), "a/b.jpg".into())
+        );
+        assert!(at("/labels/b.label.json").unwrap_err().to_string().contains("does not lie beside"));
+    }
+}

@@ -1,0 +1,259 @@
+//! Cameras that were solved before and lie beside their labels, and whether they still are those of their labels.
+
+use super::file::{CameraFile, checksum};
+use super::options::SolveOptions;
+use super::read::Labelled;
+use super::solve::solve;
+use super::warning::Warning;
+use super::{Camera, SolveError};
+use crate::error::{Error, Result};
+use crate::io;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A labelled photo's camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sighting {
+    /// The camera.
+    pub camera: Camera,
+    /// Width and height of the rectangle as fitted, metres.
+    pub size: [f64; 2],
+    /// What a person should look at.
+    pub warnings: Vec<Warning>,
+    /// The camera was read from `NAME.camera.json`, not solved anew.
+    pub stored: bool,
+    /// Why a stored camera was not used, in words.
+    pub stale: Option<String>,
+}
+
+/// The cameras of labelled photos, in order: that beside a label (`NAME.camera.json`) where it is there and was solved from
+/// this label, or else that of the label. One that does not fit its label is refused, unless `force`d here or when it was
+/// solved.
+///
+/// # Errors
+/// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
+pub fn sightings(labels: &[Labelled], force: bool) -> Result<Vec<Sighting>> {
+    let files = labels.iter().map(stored).collect::<Result<Vec<_>>>()?;
+    let labels: Vec<Labelled> = labels.iter().zip(&files).map(|(l, file)| with_size(l, file.as_ref())).collect();
+    let known = together(&labels);
+    let one = |(labelled, file): (&Labelled, &Option<CameraFile>)| {
+        let stale = match file.as_ref().map(|file| (file, staleness(file, labelled, &known))) {
+            Some((file, None)) => return Ok(Sighting::stored(file)),
+            Some((_, Some(why))) => Some(format!("{}: {why}; solved again", path_of(labelled).display())),
+            None => None,
+        };
+        Ok(Sighting { stale, ..Sighting::solved(labelled, force)? })
+    };
+    labels.iter().zip(&files).map(one).collect()
+}
+
+impl Sighting {
+    fn stored(file: &CameraFile) -> Self {
+        let warnings = file.found.warnings.clone();
+        Self { camera: file.camera(), size: file.size(), warnings, stored: true, stale: None }
+    }
+
+    fn solved(labelled: &Labelled, force: bool) -> Result<Self> {
+        let error = |e: SolveError| advised_on_size(Error::from(e).in_file(&labelled.source), labelled);
+        let solution = solve(&labelled.label, &SolveOptions::default()).map_err(error)?;
+        let solution = if force { solution } else { solution.fitting().map_err(error)? };
+        let (camera, size, warnings) = (solution.camera, solution.size, solution.warnings);
+        Ok(Self { camera, size, warnings, stored: false, stale: None })
+    }
+}
+
+fn path_of(labelled: &Labelled) -> PathBuf {
+    labelled.beside("camera.json")
+}
+
+/// The camera file of a label, where there is one.
+fn stored(labelled: &Labelled) -> Result<Option<CameraFile>> {
+    let path = path_of(labelled);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let read = || {
+        let file: CameraFile = io::read_json(&path)?;
+        file.check(labelled.label.image_size()).map_err(|e| e.in_file(&path))?;
+        Ok(Some(file))
+    };
+    read().map_err(|error: Error| {
+        let what = error.to_string();
+        let what = what.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&what);
+        Error::file(&path, format!("{what}; delete it, or run `petcomp camera solve` again"))
+    })
+}
+
+/// An error for want of a size tells where it may be given.
+fn advised_on_size(error: Error, labelled: &Labelled) -> Error {
+    let surface = &labelled.label.surface;
+    if surface.width_m.is_some() || surface.height_m.is_some() {
+        return error;
+    }
+    Error::file(
+        &labelled.source,
+        "width and height of the rectangle are missing, expected surface.width_m and height_m in the label, surface_size \
+         in the recipe, or a camera file by `petcomp camera solve` with --size",
+    )
+}
+
+/// A label without sides, with those that its camera was solved with.
+fn with_size(labelled: &Labelled, file: Option<&CameraFile>) -> Labelled {
+    let mut labelled = labelled.clone();
+    let surface = &mut labelled.label.surface;
+    if let (None, None, Some(from)) = (surface.width_m, surface.height_m, file.and_then(|f| f.solved_from.as_ref())) {
+        [surface.width_m, surface.height_m] = from.size_m;
+    }
+    labelled
+}
+
+/// Why a camera is not that of its label any more; `known` are the labels that are there.
+fn staleness(file: &CameraFile, labelled: &Labelled, known: &BTreeMap<String, u32>) -> Option<String> {
+    let Some(from) = &file.solved_from else {
+        let older = modified(&path_of(labelled)) < modified(&labelled.source);
+        return older.then(|| "older than its label".to_owned());
+    };
+    if from.label_crc32 != checksum(&labelled.label) {
+        return Some("solved from another version of its label, or with another size".into());
+    }
+    let changed = |(name, crc): &(&String, &u32)| known.get(*name).is_some_and(|now| now != *crc);
+    let changed = from.together.iter().find(changed);
+    changed.map(|(name, _)| format!("solved together with another version of {name}"))
+}
+
+fn modified(path: &Path) -> Option<std::time::SystemTime> {
+    std::fs::metadata(path).ok()?.modified().ok()
+}
+
+/// The checksums of labels by name: what each of those that are solved together keeps of the others.
+pub fn together<'a>(labels: impl IntoIterator<Item = &'a Labelled>) -> BTreeMap<String, u32> {
+    labels.into_iter().map(|labelled| (labelled.name.clone(), checksum(&labelled.label))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::simulate::Scenario;
+    use crate::camera::{Label, read_labels};
+
+    fn sighting(labelled: &Labelled, force: bool) -> Result<Sighting> {
+        sightings(std::slice::from_ref(labelled), force).map(|mut all| all.remove(0))
+    }
+
+    struct Desk(tempfile::TempDir);
+
+    impl Desk {
+        fn new() -> Self {
+            Self(tempfile::tempdir().unwrap())
+        }
+
+        fn path(&self, name: &str) -> PathBuf {
+            self.0.path().join(name)
+        }
+
+        fn label(&self, k: u64) -> Label {
+            let mut label = Scenario::realistic().tilted(30.0).view(3, k).label;
+            label.surface.id = "tray".into();
+            label
+        }
+
+        fn write(&self, label: &Label) -> Labelled {
+            io::write_json(self.path("a.label.json"), label).unwrap();
+            read_labels(self.path("a.label.json"), None).unwrap().remove(0)
+        }
+
+        /// A camera file whose focal length tells it from a camera solved anew.
+        fn store(&self, labelled: &Labelled, edit: impl Fn(&mut CameraFile)) {
+            let solution = solve(&labelled.label, &SolveOptions::default()).unwrap();
+            let mut file = CameraFile::new(&labelled.label, &solution);
+            file.found.model.f_px = 3333.0;
+            edit(&mut file);
+            io::write_json(self.path("a.camera.json"), &file).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_camera_beside_its_label_is_used_until_the_label_changes() {
+        let desk = Desk::new();
+        let mut label = desk.label(0);
+        let labelled = desk.write(&label);
+        assert!(!sighting(&labelled, false).unwrap().stored);
+        desk.store(&labelled, |_| {});
+        let found = sighting(&labelled, false).unwrap();
+        assert!(found.stored && found.camera.focal_px.x == 3333.0 && found.stale.is_none());
+        // Written anew with other spaces and a younger time: still the same label.
+        let text = serde_json::to_string(&label).unwrap();
+        io::write_text(desk.path("a.label.json"), &text).unwrap();
+        assert!(sighting(&read_labels(desk.path("a.label.json"), None).unwrap()[0], false).unwrap().stored);
+        label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
+        let found = sighting(&desk.write(&label), false).unwrap();
+        assert!(!found.stored && found.camera.focal_px.x != 3333.0);
+        assert!(found.stale.unwrap().contains("a.camera.json: solved from another version of its label"));
+    }
+
+    #[test]
+    fn a_file_without_a_checksum_counts_by_its_time() {
+        let desk = Desk::new();
+        let labelled = desk.write(&desk.label(0));
+        desk.store(&labelled, |file| file.solved_from = None);
+        assert!(sighting(&labelled, false).unwrap().stored);
+        let file = std::fs::File::options().write(true).open(desk.path("a.camera.json")).unwrap();
+        file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
+        assert!(sighting(&labelled, false).unwrap().stale.unwrap().contains("older than its label"));
+    }
+
+    #[test]
+    fn a_change_of_a_label_that_was_solved_with_it_is_noticed() {
+        let desk = Desk::new();
+        let labelled = desk.write(&desk.label(0));
+        let other = desk.label(1);
+        let path = desk.path("b.label.json");
+        io::write_json(&path, &other).unwrap();
+        let mut labels = [labelled.clone(), read_labels(&path, None).unwrap().remove(0)];
+        desk.store(&labelled, |file| file.solved_from.as_mut().unwrap().together = together(&labels));
+        assert!(sightings(&labels, false).unwrap()[0].stored);
+        labels[1].label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
+        let stale = sightings(&labels, false).unwrap().remove(0).stale.unwrap();
+        assert!(stale.contains("together with another version of b"), "{stale}");
+        assert!(sighting(&labelled, false).unwrap().stored, "a copy of a part of the photos");
+    }
+
+    #[test]
+    fn a_broken_camera_file_is_named() {
+        let desk = Desk::new();
+        let labelled = desk.write(&desk.label(0));
+        type Edit = fn(&mut CameraFile);
+        let edits: [(Edit, &str); 6] = [
+            (|f| f.image.width = 1, "image: 1 x 3000 pixels, expected 4000 x 3000"),
+            (|f| f.found.model.f_px = -1.0, "model.f_px: -1e0"),
+            (|f| f.found.model.principal_point_px[0] = 1e300, "model.principal_point_px: 1e300"),
+            (|f| f.found.opencv.r[0][0] = 7.0, "opencv.R: no rotation"),
+            (|f| f.found.opencv.t = [0.0, 0.0, -1.0], "below the surface"),
+            (|f| f.found.surface.width_m = 0.0, "surface: 0e0"),
+        ];
+        for (edit, expected) in edits {
+            desk.store(&labelled, edit);
+            let error = sighting(&labelled, true).unwrap_err().to_string();
+            assert!(error.contains(expected) && error.contains("a.camera.json: "), "{error}");
+            assert!(error.ends_with("delete it, or run `petcomp camera solve` again"), "{error}");
+        }
+        io::write_text(desk.path("a.camera.json"), "{").unwrap();
+        assert!(sighting(&labelled, false).unwrap_err().to_string().contains("a.camera.json: line 1"));
+    }
+
+    #[test]
+    fn a_camera_that_does_not_fit_needs_force() {
+        let desk = Desk::new();
+        let mut label = desk.label(0);
+        let surface = &mut label.surface;
+        (surface.width_m, surface.height_m) = (surface.height_m, surface.width_m);
+        let labelled = desk.write(&label);
+        let error = sighting(&labelled, false).unwrap_err().to_string();
+        assert!(error.contains("a.label.json") && error.contains("exchange width_m and height_m"), "{error}");
+        assert!(!sighting(&labelled, true).unwrap().stored);
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        assert!(CameraFile::new(&label, &solution).forced);
+        io::write_json(desk.path("a.camera.json"), &CameraFile::new(&labelled.label, &solution)).unwrap();
+        assert!(sighting(&labelled, false).unwrap().stored, "forced when it was solved");
+    }
+}
