@@ -632,7 +632,7 @@ fn numbers_that_no_dataset_has_are_refused() {
         std::fs::write(&path, before).unwrap();
         refused
     };
-    assert!(says("\"of\": 3", "\"of\": 0").ends_with("dataset.json: shard: 1/0, expected at most 0/0"));
+    assert!(says("\"of\": 3", "\"of\": 0").ends_with("dataset.json: shard: 1/0, expected at least one shard"));
     assert!(says("\"index\": 1", "\"index\": 0").contains("shard: 0/3, expected"));
     assert!(says("\"count\": 20", "\"count\": 18446744073709551615").contains("count: 18446744073709551615 samples"));
     edit_journal(&folders[0], "\"k\":0", "\"k\":1", true);
@@ -811,7 +811,7 @@ fn write_world(folder: &Path) {
     let photo = |name: &str| {
         format!(
             r#"photos = [{{ file = "{name}.exr", source = "{name}.jpg", px_per_metre = 100.0, size_m = [0.4, 0.2],
-            object_m = [0.35, 0.15], screen = {{ r = 0.1, g = 0.5, b = 0.1 }}, matte = "physical", residue = 0.0,
+            object_m = [0.35, 0.15], screen = [0.1, 0.5, 0.1], matte = "physical", residue = 0.0,
             outline_px = [[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]] }}]"#
         )
         .replace('\n', " ")

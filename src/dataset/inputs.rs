@@ -75,10 +75,11 @@ impl Inputs {
     /// Keeps the checksums for the next run. They only save time: a folder without room for them is no error.
     pub(crate) fn keep(&self, folder: &Path) {
         let settled: BTreeMap<_, _> = self.now.iter().filter(|(_, input)| input.is_settled).collect();
-        if !settled.is_empty() && settled != self.before.iter().collect() {
-            if let Err(e) = io::write_json(folder.join(INPUTS), &settled) {
-                log::debug!("{e}");
-            }
+        if settled.is_empty() || settled == self.before.iter().collect() {
+            return;
+        }
+        if let Err(e) = io::write_json(folder.join(INPUTS), &settled) {
+            log::debug!("{e}");
         }
     }
 

@@ -73,6 +73,7 @@ impl Shard {
     pub fn new(index: u64, of: u64) -> Result<Self> {
         let shard = Self { index, of };
         match index {
+            _ if of == 0 => Err(Error::value("shard", format!("{shard}, expected at least one shard"))),
             0 => Err(Error::value("shard", format!("{shard}, expected 1/{of} to {of}/{of}"))),
             _ if index > of => Err(Error::value("shard", format!("{shard}, expected at most {of}/{of}"))),
             _ => Ok(shard),
