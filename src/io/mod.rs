@@ -74,6 +74,7 @@ mod worker;
 mod write;
 
 pub use atomic::{copy, create_folder, relative, sync, write_through};
+pub(crate) use document::read_large_json;
 pub use document::{
     from_overrides, parse_json, parse_toml, read_document, read_json, read_text, read_toml, read_toml_with,
     write_document, write_json, write_text, write_toml,

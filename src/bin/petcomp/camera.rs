@@ -1,6 +1,7 @@
 //! `petcomp camera`: four labelled corners -> camera.
 
 use crate::common::{Batch, Common};
+use crate::print;
 use petcomp::camera::{self, CameraFile, ColmapModel, Label, Solution, SolveOptions};
 use petcomp::filter::Pyramid;
 use petcomp::{Error, Image, LinearRgb, PremulRgba, io};
@@ -91,8 +92,8 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Solve(args) => solve(args, common),
         Command::Joint(args) => joint(args, common),
-        Command::Doctor(args) => doctor(args, common),
-        Command::Export(args) => export(args, common),
+        Command::Doctor(args) => doctor(args),
+        Command::Export(args) => export(args),
         Command::Markers(args) => markers(args, common),
         Command::Rectify(args) => rectify(args),
     }
@@ -120,7 +121,7 @@ fn joint(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
         let first = &args.labels[group[0]];
         let joint = camera::solve_joint(&together, &SolveOptions::default()).map_err(|e| located(e, first))?;
         for warning in &joint.warnings {
-            eprintln!("warning: photos of {}: {warning}", first.display());
+            common.warn(format_args!("photos of {}: {warning}", first.display()));
         }
         for (&i, photo) in group.iter().zip(joint.photos) {
             let path = &args.labels[i];
@@ -130,17 +131,17 @@ fn joint(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn doctor(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
+fn doctor(args: &SolveArgs) -> anyhow::Result<()> {
     for path in &args.labels {
         let label = read_label(path, args.size)?;
         let solution = solved(path, &label)?;
-        common.say(format_args!("{}", path.display()));
-        common.say(camera::doctor(&label, &solution, &SolveOptions::default()));
+        print::line(path.display());
+        print::text(camera::doctor(&label, &solution, &SolveOptions::default()));
     }
     Ok(())
 }
 
-fn export(args: &ExportArgs, common: &Common) -> anyhow::Result<()> {
+fn export(args: &ExportArgs) -> anyhow::Result<()> {
     let files = args.cameras.iter().map(io::read_json::<CameraFile>).collect::<petcomp::Result<Vec<_>>>()?;
     let text = match args.to {
         Words::Colmap => return export_colmap(args, &files),
@@ -150,7 +151,7 @@ fn export(args: &ExportArgs, common: &Common) -> anyhow::Result<()> {
     };
     match &args.output {
         Some(path) => io::write_text(path, &text)?,
-        None => common.say(text.trim_end()),
+        None => print::text(text.trim_end()),
     }
     Ok(())
 }
@@ -234,7 +235,7 @@ fn report(path: &Path, solution: &Solution, common: &Common) {
     let (tilt, height) = (camera.tilt().to_degrees(), camera.center().z);
     let (focal, percent) = (camera.focal_px.x, 100.0 * solution.sigma.ln_focal);
     common.say(format_args!(
-        "{}: tilt {tilt:.1} deg, height {height:.3} m, focal length {focal:.0} px (+- {percent:.1} %, {:?}), corners to {:.2} px, \
+        "{}: tilt {tilt:.1} deg, height {height:.3} m, focal length {focal:.0} px (+- {percent:.1} %, {}), corners to {:.2} px, \
          {:.0} mm above the surface to {:.1} px",
         path.display(),
         solution.focal_source,
@@ -243,7 +244,7 @@ fn report(path: &Path, solution: &Solution, common: &Common) {
         solution.sigma.height_px,
     ));
     for warning in &solution.warnings {
-        eprintln!("warning: {}: {warning}", path.display());
+        common.warn(format_args!("{}: {warning}", path.display()));
     }
 }
 

@@ -1,8 +1,10 @@
 //! What every subcommand shares: global flags, progress, interruption, and how an error ends the program.
 
+use crate::print;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
 use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
+use petcomp::printable;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,7 +17,7 @@ pub(crate) struct Common {
     /// Worker threads; 0 is one per core
     #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true)]
     threads: usize,
-    /// Say nothing but results and errors
+    /// Say nothing but results and errors: no progress, no notes, no warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an object a line on the
@@ -70,7 +72,6 @@ enum Shown {
 impl Common {
     /// Sets up threads, messages and what is read; called once.
     pub(crate) fn apply(&self) -> anyhow::Result<()> {
-        end_with_the_reader();
         let level = match (self.quiet, self.verbose) {
             (true, _) => log::LevelFilter::Error,
             (_, 0) => log::LevelFilter::Warn,
@@ -80,7 +81,7 @@ impl Common {
         let mut logger = env_logger::Builder::new();
         logger.filter_module("petcomp", level).format(|out, record| {
             use std::io::Write;
-            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args())
+            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), printable(&record.args().to_string()))
         });
         logger.init();
         // Fails only if a pool exists already, and then that pool serves.
@@ -95,10 +96,18 @@ impl Common {
         self.quiet
     }
 
-    /// Prints a result line, unless told to be quiet.
+    /// Prints a line about the work (what was written, what to look at), unless told to be quiet. What a command is called
+    /// to find out goes through [`print`] instead.
     pub(crate) fn say(&self, line: impl std::fmt::Display) {
         if !self.quiet {
-            println!("{line}");
+            print::line(line);
+        }
+    }
+
+    /// Prints a warning, unless told to be quiet.
+    pub(crate) fn warn(&self, line: impl std::fmt::Display) {
+        if !self.quiet {
+            print::aside(format_args!("warning: {line}"));
         }
     }
 
@@ -192,14 +201,11 @@ impl Lines {
         // JSON has no infinity: what is not known yet is null.
         if self.json {
             let (rate, left) = (rate.is_finite().then_some(rate), left.is_finite().then_some(left));
-            eprintln!(
-                "{}",
-                serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left })
-            );
+            print::aside(serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left }));
         } else if rate > 0.0 {
-            eprintln!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left");
+            print::aside(format_args!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left"));
         } else {
-            eprintln!("{what}: {done} of {total}");
+            print::aside(format_args!("{what}: {done} of {total}"));
         }
     }
 }
@@ -208,18 +214,6 @@ impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
-}
-
-/// `petcomp ... | head` ends when head does: printing to nobody is no failure of ours, and no panic.
-fn end_with_the_reader() {
-    let usual = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        let said = info.payload().downcast_ref::<String>().map_or("", String::as_str);
-        if said.starts_with("failed printing to std") && said.contains("Broken pipe") {
-            std::process::exit(READER_GONE.into());
-        }
-        usual(info);
-    }));
 }
 
 /// Turns true at the first Ctrl-C (or SIGTERM), so that a long job can stop between two pictures; the second one ends
@@ -232,7 +226,7 @@ pub(crate) fn interruption() -> &'static AtomicBool {
             if STOP.swap(true, Ordering::Relaxed) {
                 std::process::exit(INTERRUPTED.into());
             }
-            eprintln!("stopping after the pictures in hand; interrupt again to stop at once");
+            print::aside("stopping after the pictures in hand; interrupt again to stop at once");
         };
         if let Err(error) = ctrlc::set_handler(handler) {
             log::warn!("interrupts cannot be caught: {error}");
@@ -254,7 +248,7 @@ impl Batch {
         self.files += 1;
         if let Err(error) = outcome {
             self.failed += 1;
-            eprintln!("failed: {}", format!("{error:#}").replace('\n', " "));
+            print::aside(format_args!("failed: {error:#}"));
         }
     }
 
@@ -287,16 +281,13 @@ impl std::error::Error for Incomplete {}
 
 const INCOMPLETE: u8 = 2;
 const DATA: u8 = 3;
-const FILE: u8 = 4;
+pub(crate) const FILE: u8 = 4;
 const INTERRUPTED: u8 = 130;
-/// As of a program that SIGPIPE ended.
-const READER_GONE: u8 = 141;
 
 /// Prints one line of causes and gives the exit status: 2 where some of many files could not be used, 3 for data that cannot be right, 4 for files that cannot be used,
 /// 130 after an interruption. (2 is a wrong command line too; clap says that.)
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    let line = format!("{error:#}").replace('\n', " ");
-    eprintln!("error: {line}");
+    print::aside(format_args!("error: {error:#}"));
     if error.is::<Incomplete>() {
         return ExitCode::from(INCOMPLETE);
     }

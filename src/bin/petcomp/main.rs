@@ -1,5 +1,6 @@
 //! The `petcomp` program: reads arguments, calls the library, writes results.
-#![warn(clippy::unwrap_used)]
+// What prints, and does not panic where nobody can take it, is print.rs.
+#![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
 mod allocator;
 mod asset;
@@ -15,6 +16,7 @@ mod matte;
 mod matte_film;
 mod matte_key;
 mod matte_nodes;
+mod print;
 mod render;
 mod report;
 mod scene;
@@ -78,7 +80,10 @@ enum Stage {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse_from(diff::accept_idiff_spelling(std::env::args()));
+    let cli = match Cli::try_parse_from(diff::accept_idiff_spelling(std::env::args_os())) {
+        Ok(cli) => cli,
+        Err(said) => return print::usage(&said),
+    };
     match cli.common.apply().and_then(|()| run(&cli)) {
         Ok(code) => code,
         Err(error) => common::report(&error),

@@ -1,6 +1,7 @@
 //! `petcomp train`: a small detector, learnt from real and synthetic images.
 
 use crate::common::{Common, interruption};
+use crate::print;
 use petcomp::report::eval::{self, EvalReportOptions, Run};
 use petcomp::train::Balance;
 use petcomp::train::detector::{self, FitOptions, Fitted, Mode, TrainingSet};
@@ -66,7 +67,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let options = EvalReportOptions { classes: set.classes, seed: args.seed, ..Default::default() };
     let name = args.output.file_name().map_or_else(|| "train".into(), |n| n.to_string_lossy().into_owned());
     let metrics = eval::write(&args.output, &[Run { name, sheets: fitted.sheets }], &options)?;
-    common.say(eval::scores_table(&metrics, &options).markdown());
+    print::text(eval::scores_table(&metrics, &options).markdown());
     if let Some(best) = fitted.history.best() {
         common.say(format_args!(
             "best epoch {} of {}: {}",
