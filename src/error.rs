@@ -61,9 +61,9 @@ pub enum Error {
 }
 
 impl Error {
-    /// A [`Error::File`] from anything that says what is wrong.
+    /// A [`Error::File`] from anything that says what is wrong; the system's numbers of errors are left out.
     pub fn file(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
-        Self::File { path: path.as_ref().into(), what: what.to_string() }
+        Self::File { path: path.as_ref().into(), what: without_number(&what.to_string()) }
     }
 
     /// A [`Error::Value`] at a field path.
@@ -90,9 +90,59 @@ impl Error {
     }
 }
 
+/// What the system says of an error without its number, in our spelling: `no such file or directory`.
+fn without_number(said: &str) -> String {
+    let Some((front, rest)) = said.split_once(" (os error ") else { return said.into() };
+    let behind = rest.split_once(')').map_or("", |(_, behind)| behind);
+    // The system's own words are the last of the message, and the only ones that begin with a capital.
+    let start = front.rfind(": ").map_or(0, |colon| colon + 2);
+    let (before, words) = front.split_at(start);
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_lowercase().to_string()).unwrap_or_default();
+    format!("{before}{first}{}{behind}", letters.as_str())
+}
+
+/// Text as it may be shown on a line of a terminal or stand in a document: what would move the cursor, change colours,
+/// begin a line or turn the order of letters around is written out, a line feed as `\\n` and an escape as `\\x1b`.
+pub fn printable(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' => shown += "\\n",
+            '\t' => shown += "\\t",
+            '\r' => shown += "\\r",
+            c if is_control(c) => shown += &format!("\\x{:02x}", u32::from(c)),
+            c => shown.push(c),
+        }
+    }
+    shown
+}
+
+/// Control characters, separators of lines and paragraphs, and marks of direction (Unicode Bidirectional Algorithm,
+/// "explicit directional embeddings, overrides and isolates").
+fn is_control(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_terminal_would_obey_is_written_out() {
+        assert_eq!(printable("a\u{1b}[31m\nb\r\t\u{9b}\u{7f}"), "a\\x1b[31m\\nb\\r\\t\\x9b\\x7f");
+        assert_eq!(printable("exe\u{202e}gpj"), "exe\\x202egpj");
+        assert_eq!(printable("größe 3 \\ µm"), "größe 3 \\ µm");
+    }
+
+    #[test]
+    fn the_systems_numbers_are_left_out() {
+        let of = |e: std::io::Error| Error::file("x", e).to_string();
+        assert_eq!(of(std::io::Error::from_raw_os_error(2)), "x: no such file or directory");
+        let nested = format!("cannot start: {}; try again", std::io::Error::from_raw_os_error(13));
+        assert_eq!(Error::file("x", nested).to_string(), "x: cannot start: permission denied; try again");
+        assert_eq!(Error::file("x", "Exif: Bad (3)").to_string(), "x: Exif: Bad (3)");
+    }
 
     #[test]
     fn a_message_names_file_field_and_value() {

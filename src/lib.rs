@@ -31,7 +31,7 @@ pub mod train;
 pub mod work;
 
 pub use camera::Camera;
-pub use error::{Error, Result};
+pub use error::{Error, Result, printable};
 pub use image::{Image, Roi};
 pub use pixel::{Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba};
 pub use quality::Quality;

@@ -125,7 +125,10 @@ fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
     }
     if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
         let (x, y) = (i % image.width(), i / image.width());
-        let what = format!("{:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1", image.pixels()[i]);
+        let Film { color, opacity } = image.pixels()[i];
+        let [color, opacity] = [color, opacity].map(<[f32; 3]>::from);
+        let told = format!("colour {color:?} and opacity {opacity:?} at ({x}, {y})");
+        let what = format!("{told}, expected finite colour and opacity from 0 to 1");
         return Err(Error::file(path, what));
     }
     Ok(Photo::new(image, record.clone()))

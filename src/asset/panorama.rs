@@ -32,7 +32,8 @@ impl Panorama {
         let is_light = |c: &LinearRgb| c.is_finite() && c.r >= 0.0 && c.g >= 0.0 && c.b >= 0.0;
         if let Some(i) = image.pixels().iter().position(|c| !is_light(c)) {
             let (x, y) = (i % image.width(), i / image.width());
-            let what = format!("{:?} at ({x}, {y}), expected numbers of at least 0", image.pixels()[i]);
+            let what =
+                format!("{:?} at ({x}, {y}), expected numbers of at least 0", <[f32; 3]>::from(image.pixels()[i]));
             return Err(Error::value("environment", what));
         }
         Ok(Self { image, sums: OnceLock::new() })

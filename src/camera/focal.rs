@@ -35,6 +35,18 @@ pub enum FocalSource {
     Unbounded,
 }
 
+impl std::fmt::Display for FocalSource {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Measured => "measured",
+            Self::Mixed => "mixed",
+            Self::Prior => "prior",
+            Self::Fixed => "fixed",
+            Self::Unbounded => "unbounded",
+        })
+    }
+}
+
 /// Who says what is believed of the focal length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Witness {

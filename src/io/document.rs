@@ -108,7 +108,8 @@ pub fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> 
     let path = path.as_ref();
     let limits = ReadOptions::default().limits;
     let text = text_of(path, read_regular(path, (limits.file_bytes, "file_bytes"), "text file")?)?;
-    parse_json(&text).map_err(|e| e.in_file(path))
+    // Keeping track of the place costs as much as all the rest, and only a mistake has one.
+    serde_json::from_str(&text).or_else(|_| typed_json(&text)).map_err(|e| e.in_file(path))
 }
 
 /// Reads a text file.
@@ -185,18 +186,15 @@ fn parse_toml_lines<T: DeserializeOwned>(text: &str, line: impl Fn(usize) -> Opt
 /// # Errors
 /// As [`parse_toml`].
 pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
-    let mistake = |e: &serde_json::Error, at: String| {
-        let said = e.to_string();
-        let what = said.split(" at line ").next().unwrap_or_default().into();
-        // A type that reads itself from a tree of values has no lines.
-        let line = Some(e.line()).filter(|&line| line > 0);
-        Mistake { at, line, what }.into_error()
-    };
-    sound_json(text, deepest()).map_err(|e| mistake(&e, String::new()))?;
+    sound_json(text, deepest()).map_err(|e| json_mistake(&e, String::new()))?;
+    typed_json(text)
+}
+
+fn typed_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     let mut document = serde_json::Deserializer::from_str(text);
     let value =
-        serde_path_to_error::deserialize(&mut document).map_err(|e| mistake(e.inner(), e.path().to_string()))?;
-    document.end().map_err(|e| mistake(&e, String::new()))?;
+        serde_path_to_error::deserialize(&mut document).map_err(|e| json_mistake(e.inner(), e.path().to_string()))?;
+    document.end().map_err(|e| json_mistake(&e, String::new()))?;
     Ok(value)
 }
 
@@ -204,6 +202,14 @@ pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
 fn deepest() -> u64 {
     let Limits { document_depth, .. } = ReadOptions::default().limits;
     document_depth
+}
+
+fn json_mistake(e: &serde_json::Error, at: String) -> Error {
+    let said = e.to_string();
+    let what = said.split(" at line ").next().unwrap_or_default().into();
+    // A type that reads itself from a tree of values has no lines.
+    let line = Some(e.line()).filter(|&line| line > 0);
+    Mistake { at, line, what }.into_error()
 }
 
 fn line_of(text: &str, byte: usize) -> usize {
@@ -224,7 +230,7 @@ impl Mistake {
         let what = match (&unknown, missing_key(&self.what)) {
             (Some((_, what)), _) => what.clone(),
             (None, Some(key)) => format!("missing key \"{key}\""),
-            (None, None) => one_line(&self.what),
+            (None, None) => in_words(&one_line(&self.what)),
         };
         let mut at = self.at.as_str();
         if let Some((key, _)) = &unknown {
@@ -239,6 +245,25 @@ impl Mistake {
             (at, line) => Error::value(at, format!("{what} ({line})")),
         }
     }
+}
+
+/// The same without the names that Rust has for what was expected.
+fn in_words(said: &str) -> String {
+    let Some((front, wanted)) = said.rsplit_once("expected ") else { return said.into() };
+    let kind = wanted.split(' ').next().unwrap_or_default();
+    let words = match kind {
+        "u8" => "an integer from 0 to 255",
+        "u16" => "an integer from 0 to 65535",
+        "u32" => "an integer from 0 to 4294967295",
+        "u64" | "usize" => "an integer from 0",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "an integer",
+        "f32" | "f64" => "a number",
+        "struct" | "internally" | "adjacently" => "a table",
+        "enum" | "variant" => "a name",
+        "tuple" => "a list",
+        _ => wanted,
+    };
+    format!("{front}expected {words}")
 }
 
 /// The key and our message, from serde's "unknown field `cuont`, expected one of `count`, `size`".
@@ -319,10 +344,18 @@ mod tests {
 
     #[test]
     fn a_value_of_the_wrong_kind_is_named_with_its_field() {
-        let expected = "objects.count: invalid type: string \"three\", expected u32";
+        let expected = "objects.count: invalid type: string \"three\", expected an integer from 0 to 4294967295";
         assert_eq!(toml("seed = 1\n[objects]\ncount = \"three\""), format!("recipe.toml: {expected} (line 3)"));
         let json = json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}");
         assert_eq!(json, format!("recipe.json: {expected} (line 1)"));
+    }
+
+    #[test]
+    fn no_name_of_a_type_of_rust_is_in_a_message() {
+        assert!(toml("seed = 1\nobjects = 3").contains("objects: invalid type: integer `3`, expected a table"));
+        assert!(json("[1, 2]").contains("expected"), "{}", json("[1, 2]"));
+        assert!(json("3").ends_with("invalid type: integer `3`, expected a table"), "{}", json("3"));
+        assert!(json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": \"x\"}}").contains("expected a number"));
     }
 
     #[test]
@@ -334,7 +367,10 @@ mod tests {
         let objects = made(&["key.count=3", "key.size_m = 0.5"]).unwrap();
         assert_eq!((objects.count, objects.size_m), (3, Some(0.5)));
         assert_eq!(made(&["key.cuont=3"]).unwrap_err(), "key: unknown key \"cuont\", did you mean \"count\"?");
-        assert_eq!(made(&["key.count=x"]).unwrap_err(), "key.count: invalid type: string \"x\", expected u32");
+        assert_eq!(
+            made(&["key.count=x"]).unwrap_err(),
+            "key.count: invalid type: string \"x\", expected an integer from 0 to 4294967295"
+        );
         assert_eq!(made(&["kye.count=3"]).unwrap_err(), "kye: no such table, expected key.NAME=VALUE");
     }
 

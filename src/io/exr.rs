@@ -168,7 +168,8 @@ fn to_rec709(named: Chromaticities) -> std::result::Result<Option<ColorMatrix>, 
     let real = |[x, y]: &[f64; 2]| x.abs() <= 2.0 && (1e-6..=2.0).contains(&y.abs());
     let all_real = space.primaries.iter().chain([&space.white]).all(real);
     if !all_real || area < SMALLEST_GAMUT || space.white[1] < SMALLEST_GAMUT {
-        return Err(format!("chromaticities {named:?}, expected those of a colour space").into());
+        let all = [space.primaries[0], space.primaries[1], space.primaries[2], space.white];
+        return Err(format!("chromaticities {all:?}, expected those of a colour space").into());
     }
     let ours = RgbSpace::REC709;
     let pairs = |a: &RgbSpace| a.primaries.into_iter().chain([a.white]).flatten().collect::<Vec<_>>();

@@ -50,7 +50,7 @@ impl Profile {
                 curves: std::array::from_fn(|_| curve.clone()),
                 to_rec709: Matrix3::identity().into(),
             }),
-            other => return Err(format!("a colour profile for {other:?}")),
+            other => return Err(format!("a colour profile for {}", format!("{other:?}").to_uppercase())),
         };
         let profile = profile.ok_or("a colour profile without primaries and curves")?;
         Ok((!profile.is_srgb()).then_some(profile))

@@ -49,7 +49,10 @@ fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Ope
         ColorType::GrayA(bits) => (2, bits),
         ColorType::RGB(bits) => (3, bits),
         ColorType::RGBA(bits) | ColorType::CMYK(bits) => (4, bits),
-        other => return Err(Refusal::Unsupported(format!("unsupported TIFF: {other:?}"))),
+        other => {
+            let kind = format!("{other:?}").to_lowercase().replace(['(', ')'], " ");
+            return Err(Refusal::Unsupported(format!("unsupported TIFF: {}", kind.trim())));
+        }
     };
     let (w, h) = (width.into(), height.into());
     let bytes_per_pixel = channels * u64::from(bits).div_ceil(8);

@@ -21,6 +21,17 @@ pub enum Bits {
     Float,
 }
 
+impl Bits {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Eight => "8-bit",
+            Self::Sixteen => "16-bit",
+            Self::Half => "half float",
+            Self::Float => "float",
+        }
+    }
+}
+
 /// How an EXR is compressed; all of them lossless.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
@@ -314,12 +325,12 @@ pub fn write_with<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>, options: 
     write_bytes(path, &bytes)
 }
 
-/// The bytes of a JPEG file.
+/// The bytes of a JPEG file of a quality from 1 to 100.
 ///
 /// # Errors
 /// An image without pixels, or with transparent ones.
-pub fn jpeg_bytes<P: ToFile>(image: &Image<P>) -> Result<Vec<u8>> {
-    let options = WriteOptions::default();
+pub fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
+    let options = WriteOptions { jpeg_quality: quality, ..WriteOptions::default() };
     encode(Path::new("picture.jpg"), image, &options).map_err(|what| Error::value("picture", what))
 }
 
@@ -355,7 +366,11 @@ pub(super) fn stored_as<P: ToFile>(format: Option<Format>, asked: Option<Bits>) 
         _ => return Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
     };
     let bits = asked.unwrap_or(possible[0]);
-    if possible.contains(&bits) { Ok(bits) } else { Err(format!("{bits:?} samples, expected one of {possible:?}")) }
+    if possible.contains(&bits) {
+        return Ok(bits);
+    }
+    let possible: Vec<&str> = possible.iter().map(|bits| bits.name()).collect();
+    Err(format!("{} samples, expected {}", bits.name(), possible.join(" or ")))
 }
 
 fn encode_exr<P: ToFile>(image: &Image<P>, bits: Bits, options: &WriteOptions) -> std::result::Result<Vec<u8>, String> {

@@ -73,6 +73,16 @@ pub enum MatteMethod {
     Outline,
 }
 
+impl std::fmt::Display for MatteMethod {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Physical => "physical",
+            Self::Key => "key",
+            Self::Outline => "outline",
+        })
+    }
+}
+
 /// What a matte is cut to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -239,7 +249,8 @@ impl CutOutOptions {
         Bounds::new(0.0, 10_000.0, "pixels").check("margin_px", self.margin_px as f64)?;
         Bounds::new(16.0, 32_768.0, "pixels").check("longest_side", self.longest_side as f64)?;
         if let Some(screen) = self.screen.filter(|c| !c.is_finite() || [c.r, c.g, c.b].iter().any(|v| *v < 0.0)) {
-            return Err(Error::value("screen", format!("{screen:?}, expected numbers of at least 0")));
+            let what = format!("{:?}, expected numbers of at least 0", <[f32; 3]>::from(screen));
+            return Err(Error::value("screen", what));
         }
         Ok(())
     }

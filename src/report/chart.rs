@@ -1,5 +1,6 @@
 //! Charts of curves on logarithmic or linear axes, side by side, as SVG.
 
+use super::escaped;
 use super::number::power;
 use std::fmt::Write;
 
@@ -203,7 +204,7 @@ fn set_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right
         });
         let Some([x, y]) = free else { continue };
         taken.push([x, y - 0.8 * LABEL, x + width, y]);
-        let text = plain(text);
+        let text = escaped(text);
         let _ = writeln!(
             svg,
             "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LABEL}\" fill=\"#444\" stroke=\"white\" stroke-width=\"3\" \
@@ -213,16 +214,12 @@ fn set_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, [left, right
     svg
 }
 
-fn plain(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;")
-}
-
 fn decade(exponent: i32) -> f64 {
     libm::exp10(f64::from(exponent))
 }
 
 fn words(x: f64, y: f64, anchor: &str, text: &str) -> String {
-    let text = plain(text);
+    let text = escaped(text);
     format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>\n")
 }
 
@@ -268,7 +265,7 @@ mod tests {
         };
         let svg = Chart::row(&[chart]);
         assert_eq!(svg.matches("<circle").count(), 2);
-        assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("&lt;x> &amp; y"), "{svg}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("&lt;x&gt; &amp; y"), "{svg}");
     }
 
     #[test]

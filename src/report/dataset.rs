@@ -87,7 +87,7 @@ fn figure(shown: &Shown, classes: &[String]) -> Result<String> {
     let (w, h) = picture.size();
     let width = w.min(PICTURE_WIDTH);
     let small = if width < w { resize(&picture, width, (h * width).div_ceil(w).max(1)) } else { picture };
-    let data = base64(&io::jpeg_bytes(&to_srgb8(&small))?);
+    let data = base64(&io::jpeg_bytes(&to_srgb8(&small), 85)?);
     let record = &shown.record;
     let [lw, lh] = record.labels.image;
     let (labelled, others): (Vec<_>, Vec<_>) =

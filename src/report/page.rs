@@ -1,6 +1,7 @@
 //! A page of text, tables, charts and pictures in one HTML file that needs nothing else.
 
 use super::Table;
+use crate::error::printable;
 
 /// A self-contained HTML page, built from top to bottom.
 #[derive(Clone, Debug)]
@@ -12,8 +13,10 @@ pub struct Page {
 /// Looks like a report and not like a web site; wide things scroll inside their own frame.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}\
     table{border-collapse:collapse;margin:1em 0;font-size:13px}\
-    th,td{border:1px solid #ccc;padding:2px 8px;text-align:left}th{background:#f2f2f2}\
-    figure{margin:1em 0;overflow-x:auto}figcaption{color:#555;font-size:13px}img,svg{max-width:100%}";
+    th,td{border:1px solid #ccc;padding:2px 8px;text-align:left;max-width:32em;overflow-wrap:anywhere}\
+    th{background:#f2f2f2;overflow-wrap:normal}h1,h2,p{overflow-wrap:anywhere}\
+    figure{margin:1em 0;overflow-x:auto}figcaption{color:#555;font-size:13px;overflow-wrap:anywhere}\
+    img,svg{max-width:100%}";
 
 impl Page {
     /// An empty page.
@@ -26,6 +29,11 @@ impl Page {
         self.html(&format!("<h2>{}</h2>\n", escaped(text)))
     }
 
+    /// Starts a part of a section.
+    pub fn subheading(&mut self, text: &str) -> &mut Self {
+        self.html(&format!("<h3>{}</h3>\n", escaped(text)))
+    }
+
     /// A paragraph.
     pub fn text(&mut self, text: &str) -> &mut Self {
         self.html(&format!("<p>{}</p>\n", escaped(text)))
@@ -34,6 +42,15 @@ impl Page {
     /// A table.
     pub fn table(&mut self, table: &Table) -> &mut Self {
         self.html(&format!("<figure>{}</figure>\n", table.html()))
+    }
+
+    /// The first rows of a table that may be long, and where the others are.
+    pub fn beginning(&mut self, table: &Table, rows: usize, file: &str) -> &mut Self {
+        self.table(&Table { columns: table.columns.clone(), rows: table.rows.iter().take(rows).cloned().collect() });
+        match table.rows.len().saturating_sub(rows) {
+            0 => self,
+            more => self.text(&format!("{more} more rows are in {file}.")),
+        }
     }
 
     /// A drawing with what is to be seen in it; `svg` is an SVG document, e.g. of [`Chart::row`](super::Chart::row).
@@ -67,9 +84,9 @@ impl Page {
     }
 }
 
-/// Text as it may stand in HTML, attributes included.
+/// Text as it may stand in HTML and SVG, attributes included; control characters, which SVG does not allow, are written out.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Bytes in the alphabet of RFC 4648 section 4, padded.
@@ -103,5 +120,6 @@ mod tests {
         let html = page.document();
         assert!(html.contains("<title>a &lt; b</title>") && html.contains("&lt;script&gt;"));
         assert!(html.contains("data:image/png;base64,Zm9v") && !html.contains("http"));
+        assert_eq!(escaped("\u{1b}[2J\n<"), "\\x1b[2J\\n&lt;");
     }
 }

@@ -1,6 +1,7 @@
 //! Tables of text: CSV for programs, Markdown for the README, HTML for the page.
 
 use super::page::escaped;
+use crate::error::printable;
 
 /// A table: what the columns are, with their units, and a row of texts for each line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -45,7 +46,7 @@ impl Table {
 
     /// As a Markdown table.
     pub fn markdown(&self) -> String {
-        let cell = |text: &String| text.replace('|', "\\|").replace('\n', " ");
+        let cell = |text: &String| printable(text).replace('|', "\\|");
         let line = |row: &Vec<String>| format!("| {} |\n", row.iter().map(cell).collect::<Vec<_>>().join(" | "));
         let rule = format!("|{}\n", " --- |".repeat(self.columns.len()));
         line(&self.columns) + &rule + &self.rows.iter().map(line).collect::<String>()

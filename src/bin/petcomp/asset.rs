@@ -1,6 +1,7 @@
 //! `petcomp asset`: cut-outs with real size and class, kept in a folder.
 
 use crate::common::{Common, NeedsReview};
+use crate::print;
 use petcomp::asset::{self, AddPhoto, Library, Manifest, Photo, Scale, ScreenSource};
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
@@ -80,7 +81,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Build { list, output } => build(list, output, common),
         Command::Add(args) => add(args, common),
         Command::List { folder } => list(folder),
-        Command::Check { folder, strict } => check(folder, *strict, common),
+        Command::Check { folder, strict } => check(folder, *strict),
         Command::Sheet { folder, output } => Ok(io::write(output, &asset::contact_sheet(&Library::open(folder)?))?),
     }
 }
@@ -88,16 +89,16 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
 /// Name of the contact sheet in an asset folder.
 const SHEET: &str = "contact_sheet.png";
 
-fn check(folder: &Path, strict: bool, common: &Common) -> anyhow::Result<()> {
+fn check(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
     let photos: Vec<_> = library.assets.iter().flat_map(|asset| &asset.photos).collect();
     let doubted: Vec<_> = photos.iter().filter(|photo| !photo.record.doubts.is_empty()).collect();
     for photo in &doubted {
-        common.say(format_args!("look at {}: {}", photo.record.file, photo.record.doubts.join("; ")));
+        print::line(format_args!("look at {}: {}", photo.record.file, photo.record.doubts.join("; ")));
     }
     let counts =
         format!("{} assets, {} cut-outs, all whole, {} to look at", library.assets.len(), photos.len(), doubted.len());
-    common.say(format_args!("{}: {counts}", folder.display()));
+    print::line(format_args!("{}: {counts}", folder.display()));
     match doubted.len() {
         n if strict && n > 0 => Err(NeedsReview(format!("{}: {n} cut-outs to look at", folder.display())).into()),
         _ => Ok(()),
@@ -171,8 +172,8 @@ fn list(folder: &Path) -> anyhow::Result<()> {
         for photo in &asset.photos {
             let [length, width] = photo.object_m.map(|m| m * 1e3);
             let (name, class, sure) = (&asset.name, &asset.class, photo.confidence);
-            let error = photo.error_m * 1e3;
-            println!("{name:12} {class:10} {length:4.0} x {width:3.0} mm (+- {error:.1})  {sure:.2}  {}", photo.file);
+            let size = format!("{length:4.0} x {width:3.0} mm (+- {:.1})", photo.error_m * 1e3);
+            print::line(format_args!("{name:12} {class:10} {size}  {sure:.2}  {}", photo.file));
         }
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! `petcomp camera`: four labelled corners -> camera.
 
 use crate::common::{Batch, Common};
+use crate::print;
 use petcomp::camera::{self, CameraFile, ColmapModel, Label, Labelled, Solution, SolveOptions};
 use petcomp::filter::Pyramid;
 use petcomp::{Error, Image, LinearRgb, PremulRgba, io};
@@ -140,8 +141,8 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Init(args) => init(args, common),
         Command::Solve(args) => solve(args, common),
         Command::Joint(args) => joint(args, common),
-        Command::Doctor(args) => doctor(args, common),
-        Command::Export(args) => export(args, common),
+        Command::Doctor(args) => doctor(args),
+        Command::Export(args) => export(args),
         Command::Markers(args) => markers(args, common),
         Command::Rectify(args) => rectify(args),
     }
@@ -231,7 +232,7 @@ fn joint_camera(members: &[&Labelled], force: bool, common: &Common, batch: &mut
     let labels: Vec<Label> = members.iter().map(|member| member.label.clone()).collect();
     let joint = camera::solve_joint(&labels, &SolveOptions::default()).map_err(|e| located(e, members[0]))?;
     for warning in &joint.warnings {
-        eprintln!("warning: {}", named(warning, members));
+        common.warn(named(warning, members));
     }
     for (member, photo) in members.iter().zip(joint.photos) {
         let one = || {
@@ -257,16 +258,16 @@ fn named(warning: &camera::Warning, members: &[&Labelled]) -> String {
     }
 }
 
-fn doctor(args: &LabelArgs, common: &Common) -> anyhow::Result<()> {
+fn doctor(args: &LabelArgs) -> anyhow::Result<()> {
     args.each(|labelled| {
         let solution = solved(labelled)?;
-        common.say(labelled);
-        common.say(camera::doctor(&labelled.label, &solution, &SolveOptions::default()));
+        print::line(labelled);
+        print::text(camera::doctor(&labelled.label, &solution, &SolveOptions::default()));
         Ok(accepted(solution, labelled, false).map(drop)?)
     })
 }
 
-fn export(args: &ExportArgs, common: &Common) -> anyhow::Result<()> {
+fn export(args: &ExportArgs) -> anyhow::Result<()> {
     let files = args.cameras.iter().map(io::read_json::<CameraFile>).collect::<petcomp::Result<Vec<_>>>()?;
     let text = match args.to {
         Words::Colmap => return export_colmap(args, &files),
@@ -276,7 +277,7 @@ fn export(args: &ExportArgs, common: &Common) -> anyhow::Result<()> {
     };
     match &args.output {
         Some(path) => io::write_text(path, &text)?,
-        None => common.say(text.trim_end()),
+        None => print::text(text.trim_end()),
     }
     Ok(())
 }
@@ -376,7 +377,7 @@ fn report(labelled: &Labelled, solution: &Solution, common: &Common) {
         solution.sigma.height_px,
     ));
     for warning in &solution.warnings {
-        eprintln!("warning: {labelled}: {warning}");
+        common.warn(format_args!("{labelled}: {warning}"));
     }
 }
 

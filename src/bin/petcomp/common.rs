@@ -1,9 +1,11 @@
 //! What every subcommand shares: global flags, progress, interruption, and how an error ends the program.
 
+use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
 use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
+use petcomp::printable;
 use std::io::{IsTerminal, Write as _};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -18,7 +20,7 @@ pub(crate) struct Common {
     /// Worker threads, at most 1024; 0 is one per core
     #[arg(short = 'j', long, value_name = "N", default_value_t = 0, global = true, value_parser = count(0..=1024))]
     threads: usize,
-    /// Say nothing but results and errors
+    /// Say nothing but results and errors: no progress, no notes, no warnings
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
     /// How to show how far a long job is: `bar` (lines where there is no terminal) or `json`, an object a line on the
@@ -104,7 +106,6 @@ enum Shown {
 impl Common {
     /// Sets up threads, messages and what is read; called once.
     pub(crate) fn apply(&self) -> anyhow::Result<()> {
-        end_with_the_reader();
         let level = match (self.quiet, self.verbose) {
             (true, _) => log::LevelFilter::Error,
             (_, 0) => log::LevelFilter::Warn,
@@ -112,9 +113,9 @@ impl Common {
             _ => log::LevelFilter::Debug,
         };
         let mut logger = env_logger::Builder::new();
-        logger
-            .filter_module("petcomp", level)
-            .format(|out, record| writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args()));
+        logger.filter_module("petcomp", level).format(|out, record| {
+            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), printable(&record.args().to_string()))
+        });
         logger.init();
         // Fails only if a pool exists already, and then that pool serves.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
@@ -128,10 +129,18 @@ impl Common {
         self.quiet
     }
 
-    /// Prints a result line, unless told to be quiet.
+    /// Prints a line about the work (what was written, what to look at), unless told to be quiet. What a command is called
+    /// to find out goes through [`print`] instead.
     pub(crate) fn say(&self, line: impl std::fmt::Display) {
         if !self.quiet {
-            println!("{line}");
+            print::line(line);
+        }
+    }
+
+    /// Prints a warning, unless told to be quiet.
+    pub(crate) fn warn(&self, line: impl std::fmt::Display) {
+        if !self.quiet {
+            print::aside(format_args!("warning: {line}"));
         }
     }
 
@@ -230,14 +239,11 @@ impl Lines {
         // JSON has no infinity: what is not known yet is null.
         if self.json {
             let (rate, left) = (rate.is_finite().then_some(rate), left.is_finite().then_some(left));
-            eprintln!(
-                "{}",
-                serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left })
-            );
+            print::aside(serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left }));
         } else if rate > 0.0 {
-            eprintln!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left");
+            print::aside(format_args!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left"));
         } else {
-            eprintln!("{what}: {done} of {total}");
+            print::aside(format_args!("{what}: {done} of {total}"));
         }
     }
 }
@@ -246,18 +252,6 @@ impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
-}
-
-/// `petcomp ... | head` ends when head does: printing to nobody is no failure of ours, and no panic.
-fn end_with_the_reader() {
-    let usual = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        let said = info.payload().downcast_ref::<String>().map_or("", String::as_str);
-        if said.starts_with("failed printing to std") && said.contains("Broken pipe") {
-            std::process::exit(READER_GONE.into());
-        }
-        usual(info);
-    }));
 }
 
 /// From the first Ctrl-C (or SIGTERM) to the end of the program at the latest: schedulers kill after 10 s and more.
@@ -278,13 +272,11 @@ pub(crate) fn interruption() -> &'static AtomicBool {
                 std::thread::sleep(GRACE);
                 std::process::exit(INTERRUPTED.into());
             });
-            // Nobody may be there to read it.
-            let _ = writeln!(
-                std::io::stderr(),
-                "stopping after the pictures in hand, in {} s at the latest; the same command goes on; interrupt again \
-                 to stop at once",
+            print::aside(format_args!(
+                "stopping after the pictures in hand, in {} s at the latest; the same command goes on; interrupt again to \
+                 stop at once",
                 GRACE.as_secs()
-            );
+            ));
         };
         if let Err(error) = ctrlc::set_handler(handler) {
             log::warn!("interrupts cannot be caught: {error}");
@@ -306,7 +298,7 @@ impl Batch {
         self.files += 1;
         if let Err(error) = outcome {
             self.failed += 1;
-            eprintln!("failed: {}", format!("{error:#}").replace('\n', " "));
+            print::aside(format_args!("failed: {error:#}"));
         }
     }
 
@@ -352,16 +344,13 @@ impl std::error::Error for NeedsReview {}
 const NEEDS_REVIEW: u8 = 1;
 const INCOMPLETE: u8 = 2;
 const DATA: u8 = 3;
-const FILE: u8 = 4;
+pub(crate) const FILE: u8 = 4;
 const INTERRUPTED: u8 = 130;
-/// As of a program that SIGPIPE ended.
-const READER_GONE: u8 = 141;
 
 /// Prints one line of causes and gives the exit status: 1 where `--strict` found something to review, 2 where some of many
 /// files could not be used, 3 for data that cannot be right, 4 for files that cannot be used, 130 after an interruption. (2 is a wrong command line too; clap says that.)
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
-    let line = format!("{error:#}").replace('\n', " ");
-    eprintln!("error: {line}");
+    print::aside(format_args!("error: {error:#}"));
     if error.is::<NeedsReview>() {
         return ExitCode::from(NEEDS_REVIEW);
     }

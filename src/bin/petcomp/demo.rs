@@ -4,7 +4,7 @@ use crate::common::Common;
 use crate::{asset, dataset};
 use petcomp::dataset::{Setup, Studio, contact_sheet_of};
 use petcomp::{Error, io};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -49,9 +49,11 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
 
 /// A recipe file that says nothing but where its folders are.
 fn write_recipe(args: &Args) -> anyhow::Result<PathBuf> {
-    let backgrounds = std::path::absolute(args.samples.join("backgrounds"))?;
-    let backgrounds = io::relative(&backgrounds, &std::path::absolute(&args.output)?);
-    let text = format!("assets = \"assets\"\nbackgrounds = {:?}\n", backgrounds.to_string_lossy());
+    let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
+    let backgrounds = io::relative(&absolute(&args.samples.join("backgrounds"))?, &absolute(&args.output)?);
+    // A JSON string is a TOML string.
+    let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
+    let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");
     let path = args.output.join("recipe.toml");
     io::write_text(&path, &text)?;
     Ok(path)

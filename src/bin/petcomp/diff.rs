@@ -1,10 +1,12 @@
 //! `petcomp diff`: compares two pictures with the flags and exit codes of OpenImageIO's `idiff`.
 
 use crate::common::Common;
+use crate::print;
 use petcomp::color::linear_to_srgb;
 use petcomp::diff::{Likeness, Thresholds, Verdict, absolute_difference, compare};
 use petcomp::io::Format;
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -54,7 +56,7 @@ pub(crate) struct Args {
 }
 
 /// `idiff` has long flags with a single dash; they become ours.
-const SINGLE_DASH: [&str; 10] = [
+const SINGLE_DASH: [&str; 11] = [
     "-fail",
     "-failrelative",
     "-failpercent",
@@ -65,15 +67,16 @@ const SINGLE_DASH: [&str; 10] = [
     "-warnpercent",
     "-hardwarn",
     "-scale",
+    "-od",
 ];
 
 /// The command line with `idiff`'s spelling turned into ours, for the `diff` subcommand only.
-pub(crate) fn accept_idiff_spelling(args: impl Iterator<Item = String>) -> Vec<String> {
-    let mut args: Vec<String> = args.collect();
-    if args.iter().skip(1).find(|a| !a.starts_with('-')).is_some_and(|first| first == "diff") {
+pub(crate) fn accept_idiff_spelling(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut args: Vec<OsString> = args.collect();
+    if args.iter().skip(1).find(|a| !a.as_encoded_bytes().starts_with(b"-")).is_some_and(|first| first == "diff") {
         for arg in &mut args {
-            if SINGLE_DASH.contains(&arg.as_str()) || arg == "-od" {
-                arg.insert(0, '-');
+            if let Some(known) = SINGLE_DASH.into_iter().find(|known| arg == known) {
+                *arg = format!("-{known}").into();
             }
         }
     }
@@ -85,7 +88,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
     let (a, b) = match pictures {
         Ok(pictures) => pictures,
         Err(error) => {
-            eprintln!("error: {error}");
+            print::aside(format_args!("error: {error}"));
             return Ok(ExitCode::from(Verdict::Unreadable.exit_code()));
         }
     };
@@ -101,7 +104,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
         io::write(path, &difference.map(opaque))?;
     }
     common.say(format_args!("Comparing \"{}\" and \"{}\"", args.a.display(), args.b.display()));
-    common.say(format_args!("{report}"));
+    print::text(&report);
     if let Some(likeness) = (!common.quiet()).then(|| likeness(&args.a, &args.b)).flatten() {
         common.say(format_args!("Scene-linear {likeness}"));
     }

@@ -1,5 +1,6 @@
 //! The `petcomp` program: reads arguments, calls the library, writes results.
-#![warn(clippy::unwrap_used)]
+// What prints, and does not panic where nobody can take it, is print.rs.
+#![warn(clippy::unwrap_used, clippy::print_stderr, clippy::print_stdout)]
 
 mod allocator;
 mod asset;
@@ -15,6 +16,7 @@ mod matte;
 mod matte_film;
 mod matte_key;
 mod matte_nodes;
+mod print;
 mod render;
 mod report;
 mod scene;
@@ -73,9 +75,12 @@ enum Stage {
 }
 
 fn main() -> ExitCode {
-    let arguments = diff::accept_idiff_spelling(std::env::args());
-    let matches = common::with_short_help(Cli::command()).get_matches_from(arguments);
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let arguments = diff::accept_idiff_spelling(std::env::args_os());
+    let matches = common::with_short_help(Cli::command()).try_get_matches_from(arguments);
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(cli) => cli,
+        Err(said) => return print::usage(&said),
+    };
     match cli.common.apply().and_then(|()| run(&cli)) {
         Ok(code) => code,
         Err(error) => common::report(&error),

@@ -70,9 +70,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             io::write(output, &cut.to_rgba())?;
             warn(photo, &cut.remarks);
             let (w, h) = cut.film.size();
-            common.say(
-                format_args!("{}: {w} x {h}, matte by {:?}", output.display(), cut.method).to_string().to_lowercase(),
-            );
+            common.say(format_args!("{}: {w} x {h}, matte by {}", output.display(), cut.method));
         }
     }
     Ok(())

@@ -87,8 +87,11 @@ impl Files {
     fn inside(&self, path: &Path, photo: &Image<LinearRgb>) -> Result<Image<Coverage>> {
         if let Some(mask) = &self.mask {
             let mask: Image<Coverage> = io::read(mask)?;
-            let (size, expected) = (mask.size(), photo.size());
-            anyhow::ensure!(size == expected, "--mask: {size:?} pixels, expected {expected:?} as the photo");
+            let ((w, h), (width, height)) = (mask.size(), photo.size());
+            anyhow::ensure!(
+                [w, h] == [width, height],
+                "--mask: {w} x {h} pixels, expected {width} x {height} as the photo"
+            );
             return Ok(mask);
         }
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;

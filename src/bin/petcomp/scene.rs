@@ -1,6 +1,7 @@
 //! `petcomp scene`: recipe -> scene.
 
 use crate::common::{Common, RecipeArgs};
+use crate::print;
 use petcomp::scene::cycles;
 use petcomp::{Scene, io};
 use std::path::PathBuf;
@@ -63,7 +64,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Check { scene: path } => {
             let scene: Scene = io::read_document(path)?;
             scene.check().map_err(|e| e.in_file(path))?;
-            common.say(format_args!("{}: possible", path.display()));
+            print::line(format_args!("{}: possible", path.display()));
         }
         Command::Export(args) => export(args, common)?,
     }
@@ -76,10 +77,10 @@ fn export(args: &Export, common: &Common) -> anyhow::Result<()> {
     let (scene, shot) = args.recipe.studio()?.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
     cycles::export(&shot, scene.surface.size, &args.folder)?;
     let folder = args.folder.display();
+    common.say(format_args!("{folder}: {} cards; render it with", shot.cards.len()));
     common.say(format_args!(
-        "{folder}: {} cards; render it with\n  blender -b --factory-startup --python-use-system-env -P {folder}/{} -- \
+        "  blender -b --factory-startup --python-use-system-env -P {folder}/{} -- \
          {folder}/scene.json --out {folder}/cycles --preview",
-        shot.cards.len(),
         cycles::SCRIPT
     ));
     Ok(())

@@ -1,6 +1,7 @@
 //! `petcomp dataset check`, `report` and `sheet`: what is in a dataset.
 
 use crate::common::{Common, NeedsReview};
+use crate::print;
 use petcomp::dataset::{self, Checked, contact_sheet_of};
 use petcomp::{io, report};
 use std::path::PathBuf;
@@ -42,13 +43,13 @@ pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
     let folder = args.folder.display();
     let checked = dataset::check(&args.folder)?;
     let Checked { faults, images, .. } = &checked;
-    common.say(checked.balance().markdown());
+    print::text(checked.balance().markdown());
     let notes = checked.remarks();
     notes.iter().for_each(|note| common.say(format_args!("note: {note}")));
-    faults.iter().for_each(|fault| println!("{fault}"));
+    faults.iter().for_each(print::line);
     anyhow::ensure!(faults.is_empty(), "{folder}: {} faults", faults.len());
     let rows: usize = checked.rows.iter().sum();
-    common.say(format_args!("{folder}: {images} images, {rows} labels, no fault"));
+    print::line(format_args!("{folder}: {images} images, {rows} labels, no fault"));
     match notes.len() {
         n if args.strict && n > 0 => Err(NeedsReview(format!("{folder}: {n} notes")).into()),
         _ => Ok(()),

@@ -43,7 +43,7 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Init(args) => recipe::init(args, common),
-        Command::Explain(args) => recipe::explain(args, common),
+        Command::Explain(args) => recipe::explain(args),
         Command::Generate(args) => generate::run(args, common),
         Command::Ablate(args) => generate::ablate(args, common),
         Command::Merge(args) => generate::merge(args, common),
@@ -53,7 +53,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Report(args) => inspect::report(args, common),
         Command::Sheet(args) => inspect::sheet(args, common),
         Command::Batches(args) => training::batches(args, common),
-        Command::Anchors(args) => training::anchors(args, common),
+        Command::Anchors(args) => training::anchors(args),
         Command::TrainKit(args) => training::kit(args, common),
     }
 }

@@ -1,6 +1,7 @@
 //! `petcomp dataset init` and `explain`: recipes to write and to understand.
 
 use crate::common::{Common, RecipeArgs};
+use crate::print;
 use petcomp::dataset::Setup;
 use petcomp::scene::Drawn;
 use petcomp::{Error, Scene, io};
@@ -35,20 +36,20 @@ pub(crate) fn init(args: &Init, common: &Common) -> anyhow::Result<()> {
 }
 
 /// Makes the image to know which of its scenes came to rest, and prints the draws of that one.
-pub(crate) fn explain(args: &Explain, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
     let sample = args.recipe.studio()?.sample(args.seed, args.index)?;
     for reason in &sample.rejected {
-        common.say(format_args!("# a scene was thrown away: {reason}"));
+        print::line(format_args!("# a scene was thrown away: {reason}"));
     }
     if !sample.rejected.is_empty() {
-        common.say(format_args!("# what follows was drawn with seed {}", sample.scene_seed));
+        print::line(format_args!("# what follows was drawn with seed {}", sample.scene_seed));
     }
     let width = |text: &dyn Fn(&Drawn) -> String| sample.draws.iter().map(|d| text(d).len()).max().unwrap_or(0);
     let (paths, froms) = (width(&|d| d.path.clone()), width(&|d| d.from.to_string()));
     for draw in &sample.draws {
         let from = draw.from.to_string();
         let line = format!("{:paths$}  {from:froms$}  {}  {}", draw.path, draw.value, chosen(draw, &sample.drawn));
-        println!("{}", line.trim_end());
+        print::line(line.trim_end());
     }
     Ok(())
 }

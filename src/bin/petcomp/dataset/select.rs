@@ -1,6 +1,7 @@
 //! `petcomp dataset split` and `subset`: lists of images, without copies.
 
 use crate::common::Common;
+use crate::print;
 use petcomp::Error;
 use petcomp::dataset::{Group, Leaks, Listing, NEAR_CODES, Sharing};
 use std::path::PathBuf;
@@ -60,7 +61,7 @@ pub(crate) fn split(args: &Split, common: &Common) -> anyhow::Result<()> {
         return Err(Error::value("split", format!("{what}: too few groups for this ratio")).into());
     }
     write(&shared, &args.output, common)?;
-    tell(&shared.leaks(NEAR_CODES)?, common);
+    tell(&shared.leaks(NEAR_CODES)?);
     Ok(())
 }
 
@@ -75,13 +76,13 @@ fn write(listing: &Listing, folder: &std::path::Path, common: &Common) -> anyhow
     Ok(())
 }
 
-fn tell(leaks: &Leaks, common: &Common) {
+fn tell(leaks: &Leaks) {
     for (group, [all, shared]) in &leaks.groups {
-        common.say(format_args!("leak: {shared} of {all} {group}s of the validation images are also trained on"));
+        print::line(format_args!("leak: {shared} of {all} {group}s of the validation images are also trained on"));
     }
-    common.say(format_args!("leak: {} validation images look like one that is trained on", leaks.near.len()));
+    print::line(format_args!("leak: {} validation images look like one that is trained on", leaks.near.len()));
     for near in leaks.near.iter().take(10) {
         let (val, train) = (near.val.display(), near.train.display());
-        common.say(format_args!("  {val} and {train} differ by {:.2} codes", near.codes));
+        print::line(format_args!("  {val} and {train} differ by {:.2} codes", near.codes));
     }
 }

@@ -1,6 +1,7 @@
 //! What trainings need of a dataset: batches, anchors, the kit for PyTorch.
 
 use crate::common::{Common, count};
+use crate::print;
 use clap::value_parser;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::read_yolo_truth;
@@ -120,7 +121,7 @@ pub(crate) fn kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-pub(crate) fn anchors(args: &Anchors, common: &Common) -> anyhow::Result<()> {
+pub(crate) fn anchors(args: &Anchors) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
     let labels = set.train.first().and_then(|image| YoloSet::label_of(image).parent().map(Path::to_path_buf));
     let truth = read_yolo_truth(&labels.unwrap_or_default(), None)?;
@@ -130,8 +131,8 @@ pub(crate) fn anchors(args: &Anchors, common: &Common) -> anyhow::Result<()> {
     });
     let found = train::anchors(&scaled.collect::<Vec<_>>(), args.count, args.seed);
     for [w, h] in &found.sizes {
-        common.say(format_args!("{w:.1},{h:.1}"));
+        print::line(format_args!("{w:.1},{h:.1}"));
     }
-    common.say(format_args!("mean IoU {:.3}, best possible recall {:.4}", found.mean_iou, found.best_possible_recall));
+    print::line(format_args!("mean IoU {:.3}, best possible recall {:.4}", found.mean_iou, found.best_possible_recall));
     Ok(())
 }

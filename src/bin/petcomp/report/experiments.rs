@@ -1,6 +1,7 @@
 //! `petcomp report experiments`: our trainings beside the paper's.
 
 use crate::common::Common;
+use crate::print;
 use petcomp::report::experiments;
 use std::path::PathBuf;
 
@@ -15,7 +16,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let table = experiments::write(&args.output, &args.runs)?;
-    common.say(table.markdown());
+    print::text(table.markdown());
     common.say(args.output.join("experiments.html").display());
     Ok(())
 }

@@ -2,13 +2,14 @@
 
 use super::TruthArgs;
 use crate::common::Common;
+use crate::print;
 use petcomp::report::matte;
 
 pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
     let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
     drop(progress);
-    common.say(matte::table(&summaries).markdown().trim_end());
+    print::text(matte::table(&summaries).markdown().trim_end());
     common.say(format_args!("{}: matte.csv, matte.md, matte.svg and matte.html", args.output.display()));
     Ok(())
 }

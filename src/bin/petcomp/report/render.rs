@@ -1,6 +1,7 @@
 //! `petcomp report render`: the renderer against Cycles and against the quadrature of its definition.
 
 use crate::common::{Common, count};
+use crate::print;
 use petcomp::report::render::{self, RenderReportOptions};
 use std::path::PathBuf;
 
@@ -41,7 +42,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         repeats: args.repeats,
     };
     let (rows, golden) = render::write(&args.output, &options)?;
-    common.say(render::table(&rows).markdown());
+    print::text(render::table(&rows).markdown());
     common.say(format_args!(
         "{}: render.csv, render.md, render.svg; {} golden pictures",
         args.output.display(),

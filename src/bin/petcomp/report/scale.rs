@@ -1,6 +1,7 @@
 //! `petcomp report scale`: memory and rate, and what a million pictures take.
 
 use crate::common::{Common, count};
+use crate::print;
 use petcomp::report::scale::{self, Case, ScaleOptions};
 use std::path::PathBuf;
 
@@ -28,7 +29,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(case) = &args.case {
         let case: Case = serde_json::from_str(case)?;
-        common.say(serde_json::to_string(&scale::run(&case, args.seconds)?)?);
+        print::line(serde_json::to_string(&scale::run(&case, args.seconds)?)?);
         return Ok(());
     }
     let options = ScaleOptions { seconds: args.seconds, threads: args.most_threads, ..ScaleOptions::default() };
@@ -36,7 +37,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let measured = scale::write(&args.output, &options, |done, of| progress.at(done, of))?;
     drop(progress);
     for (title, table) in scale::tables(&measured)? {
-        common.say(format_args!("{title}\n{}", table.markdown()));
+        print::text(format_args!("{title}\n{}", table.markdown()));
     }
     common.say(format_args!("{}: scale.csv, scale.md and two charts", args.output.display()));
     Ok(())

@@ -1,6 +1,7 @@
 //! `petcomp report stability`: every stage on stiff and extreme input.
 
 use crate::common::Common;
+use crate::print;
 use petcomp::report::stability;
 use std::path::PathBuf;
 
@@ -21,10 +22,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     drop(progress);
     let failed: Vec<_> = rows.iter().filter(|row| !row.outcome.passed).collect();
     for row in &failed {
-        common.say(format_args!("FAIL {}: {}: {}", row.stage, row.name, row.outcome.measured));
+        print::line(format_args!("FAIL {}: {}: {}", row.stage, row.name, row.outcome.measured));
     }
     let table = args.output.join("stability.md");
-    common.say(format_args!("{}: {} of {} pass", table.display(), rows.len() - failed.len(), rows.len()));
+    print::line(format_args!("{}: {} of {} pass", table.display(), rows.len() - failed.len(), rows.len()));
     anyhow::ensure!(failed.is_empty(), "{} of {} cases fail", failed.len(), rows.len());
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `petcomp report work`: what scenes pay for, counted.
 
 use crate::common::Common;
+use crate::print;
 use petcomp::report::work;
 use std::path::PathBuf;
 
@@ -16,6 +17,6 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let rows = work::write(&args.output, |done, of| progress.at(done, of))?;
     drop(progress);
     let kept = rows.iter().filter(|row| row.is_as_promised()).count();
-    common.say(format_args!("{}: {kept} of {} as promised", args.output.join("work.md").display(), rows.len()));
+    print::line(format_args!("{}: {kept} of {} as promised", args.output.join("work.md").display(), rows.len()));
     Ok(())
 }
