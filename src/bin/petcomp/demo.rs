@@ -1,6 +1,7 @@
 //! `petcomp demo`: a sample dataset from the photographs in the repository.
 
 use crate::common::Common;
+use crate::print;
 use crate::{asset, dataset};
 use petcomp::dataset::{Setup, Studio, contact_sheet_of};
 use petcomp::{Error, io};
@@ -39,11 +40,11 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let sheet = args.output.join("contact_sheet.png");
     io::write(&sheet, &contact_sheet_of(&folder, args.count as usize, &Default::default())?)?;
     dataset::tell(&report);
-    println!("look at      {}", sheet.display());
+    print::line(format_args!("look at      {}", sheet.display()));
     for path in dataset::for_trainers(&report, &folder) {
-        println!("train with   {}", path.display());
+        print::line(format_args!("train with   {}", path.display()));
     }
-    println!("change       {}", recipe.display());
+    print::line(format_args!("change       {}", recipe.display()));
     Ok(())
 }
 

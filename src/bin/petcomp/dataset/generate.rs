@@ -1,6 +1,7 @@
 //! `petcomp dataset generate`, `ablate` and `merge`: datasets are made.
 
 use crate::common::{Common, RecipeArgs, interruption};
+use crate::print;
 use petcomp::dataset::{
     self, LongRun, Numbers, Obstructed, Plan, Progress, Report, Setup, ShardChoice, Studio, contact_sheet_of,
 };
@@ -98,7 +99,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     };
     if args.resume {
         let (good, bad) = dataset::mend(&folder)?;
-        println!("{}: {good} images are as they were written, {bad} are made again", folder.display());
+        print::line(format_args!("{}: {good} images are as they were written, {bad} are made again", folder.display()));
     }
     let studio = Studio::open(setup)?;
     let plan = Plan { numbers, ..studio.plan(count, args.seed, &folder)? };
@@ -107,9 +108,9 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if args.preview.is_some() {
         let sheet = folder.join("sheet.png");
         io::write(&sheet, &contact_sheet_of(&folder, count as usize, &Default::default())?)?;
-        println!("look at      {}", sheet.display());
+        print::line(format_args!("look at      {}", sheet.display()));
     }
-    for_trainers(&report, &folder).iter().for_each(|path| println!("{}", path.display()));
+    for_trainers(&report, &folder).iter().for_each(|path| print::line(path.display()));
     Ok(())
 }
 
@@ -127,7 +128,7 @@ pub(crate) fn ablate(args: &Ablate, common: &Common) -> anyhow::Result<()> {
         io::create_folder(&folder)?;
         let recipe = folder.join("recipe.toml");
         setup.write(&recipe)?;
-        println!("{}", recipe.display());
+        print::line(recipe.display());
         if args.count > 0 {
             let studio = Studio::open(Setup::read(&recipe, &[])?)?;
             let plan = studio.plan(args.count, args.seed, folder.join("dataset"))?;
@@ -142,7 +143,7 @@ pub(crate) fn merge(args: &Merge, common: &Common) -> anyhow::Result<()> {
     let report = dataset::merge(&args.shards, &args.output, &|p| progress.at(p.done, p.count), interruption())?;
     drop(progress);
     tell(&report);
-    for_trainers(&report, &args.output).iter().for_each(|path| println!("{}", path.display()));
+    for_trainers(&report, &args.output).iter().for_each(|path| print::line(path.display()));
     Ok(())
 }
 
@@ -190,10 +191,15 @@ fn watch(last: &Mutex<Option<Progress>>, done: &AtomicBool) -> Option<LongRun> {
 /// Prints what is in the folder: a result, so also where quiet is asked for.
 pub(crate) fn tell(report: &Report) {
     let Report { images, val, made, objects, labelled, obstructed, retries, .. } = report;
-    println!("images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again");
-    println!("objects      {objects}, {labelled} labelled, {obstructed} obstructed ({})", labels_of(report.policy));
+    print::line(format_args!(
+        "images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again"
+    ));
+    print::line(format_args!(
+        "objects      {objects}, {labelled} labelled, {obstructed} obstructed ({})",
+        labels_of(report.policy)
+    ));
     for class in &report.classes {
-        println!("  {:10} {} labelled of {}", class.name, class.labelled, class.objects);
+        print::line(format_args!("  {:10} {} labelled of {}", class.name, class.labelled, class.objects));
     }
 }
 
