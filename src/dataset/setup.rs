@@ -166,7 +166,7 @@ mod tests {
         let text = io::read_text(dir.path().join("x/y/recipe.toml")).unwrap();
         assert!(text.contains("assets = \"../../a/b\""), "{text}");
         let again = Setup::read(dir.path().join("x/y/recipe.toml"), &[]).unwrap();
-        assert_eq!((again.scene.objects, again.labels), (setup.scene.objects, setup.labels));
+        assert_eq!((&again.scene.objects, &again.labels), (&setup.scene.objects, &setup.labels));
         assert_eq!(again.scene.environment.files, ["../../sky.hdr"]);
         let same = |setup: &Setup| setup.folder.join(&setup.scene.environment.files[0]).to_string_lossy().into_owned();
         assert_eq!(same(&again).replace("x/y/../../", ""), format!("{}/sky.hdr", dir.path().display()));
