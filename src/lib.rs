@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
+mod allowance;
 pub mod asset;
 pub mod camera;
 pub mod color;
@@ -29,6 +30,7 @@ mod stopwatch;
 pub mod train;
 pub mod work;
 
+pub use allowance::Allowance;
 pub use camera::Camera;
 pub use error::{Error, Result};
 pub use image::{Image, Roi};

@@ -22,6 +22,8 @@ mod contact_sheet;
 mod folder;
 mod formats;
 mod generate;
+#[cfg(feature = "settle")]
+mod hanging;
 mod journal;
 mod layers;
 mod listing;
