@@ -5,6 +5,7 @@ use petcomp::camera::{self, project_picture};
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Point3};
 use petcomp::{Camera, Image, LinearRgb, PremulRgba};
+use std::sync::LazyLock;
 
 /// The first markers of `DICT_4X4_50`, row by row from the top left, 1 is white.
 const CODES: [u16; 4] = [0xb532, 0x0f9a, 0x332d, 0x9946];
@@ -13,7 +14,7 @@ const BOARD: [f64; 2] = [0.56, 0.37];
 const SIDE: f64 = 0.04;
 const CENTERS: [[f64; 2]; 4] = [[-0.244, 0.149], [0.244, 0.149], [0.244, -0.149], [-0.244, -0.149]];
 /// Resolution of the board's picture, pixels per metre.
-const PRINT: f64 = 3000.0;
+const PRINT: f64 = 2400.0;
 
 /// Light of the board at a place: paper, ink, or the grey tray.
 fn board_light(x: f64, y: f64) -> f32 {
@@ -30,14 +31,19 @@ fn board_light(x: f64, y: f64) -> f32 {
     0.2
 }
 
+/// The board as printed.
+static PRINTED: LazyLock<Pyramid<PremulRgba>> = LazyLock::new(|| {
+    let [w, h] = BOARD.map(|side| (side * PRINT).round() as usize);
+    Pyramid::new(Image::from_fn(w, h, |x, y| {
+        let light =
+            board_light((x as f64 + 0.5) / PRINT - BOARD[0] / 2.0, BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT);
+        PremulRgba { r: light, g: light, b: light, a: 1.0 }
+    }))
+});
+
 /// A photo of the board on a dark table.
 fn photo(camera: &Camera) -> Image<LinearRgb> {
-    let [w, h] = BOARD.map(|side| (side * PRINT).round() as usize);
-    let board = Image::from_fn(w, h, |x, y| {
-        let light = board_light((x as f64 + 0.5) / PRINT - BOARD[0] / 2.0, BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT);
-        PremulRgba { r: light, g: light, b: light, a: 1.0 }
-    });
-    let seen = project_picture(&Pyramid::new(board), camera, BOARD);
+    let seen = project_picture(&PRINTED, camera, BOARD);
     seen.map(|p| LinearRgb { r: p.r + 0.1 * (1.0 - p.a), g: p.g + 0.1 * (1.0 - p.a), b: p.b + 0.1 * (1.0 - p.a) })
 }
 
@@ -74,9 +80,9 @@ fn found(photo: &Image<LinearRgb>, camera: &Camera) -> (Vec<u32>, f64) {
 #[test]
 fn markers_are_found_in_steep_views() {
     let mut missed = 0;
-    for image in [[1280, 960], [960, 720], [2560, 1920]] {
-        for tilt in [45.0, 55.0, 59.0, 65.0] {
-            for k in 0..3 {
+    for image in [[1280, 960], [960, 720]] {
+        for tilt in [45.0, 59.0, 65.0] {
+            for k in 0..2 {
                 let focal_px = 1.07 * f64::from(image[0]);
                 let scenario = Scenario { image, focal_px, size: BOARD, fill: 0.8, ..Scenario::default() };
                 let camera = scenario.tilted(tilt).view(6, k).camera;

@@ -10,10 +10,11 @@ const PROBES: usize = 32;
 const CORNER_PART: f64 = 0.12;
 /// Samples per pixel across a side.
 const STEPS_PER_PX: f64 = 4.0;
-/// How far across is looked, in cells of the marker: its border is one cell wide, and so should be the paper's margin.
+/// How far across is looked, in cells of the marker as they are seen across that side: its border is one cell wide, and so
+/// should be the paper's margin.
 const REACH_CELLS: f64 = 0.6;
 /// Longest and shortest such reach, pixels.
-const REACH_PX: std::ops::RangeInclusive<f64> = 1.5..=5.0;
+const REACH_PX: std::ops::RangeInclusive<f64> = 1.2..=5.0;
 /// The same for edges inside the pattern.
 const INNER_REACH_CELLS: f64 = 0.45;
 /// White that has grown by more, pixels, is another fault; fewer edges than these do not tell.
@@ -36,7 +37,7 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
     for _ in 0..2 {
         let mut lines = [Line { normal: Vector2::zeros(), offset: 0.0 }; 4];
         for (i, line) in lines.iter_mut().enumerate() {
-            *line = side(light, corners[i], corners[(i + 1) % 4])?;
+            *line = side(light, &corners, i)?;
         }
         for i in 0..4 {
             corners[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
@@ -112,11 +113,14 @@ fn inner_edges(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerEdge> {
     edges
 }
 
-/// The edge near the segment from `a` to `b`, dark on its right-hand side (clockwise corners, y down).
-fn side(light: &Image<f32>, a: Point2<f64>, b: Point2<f64>) -> Option<Line> {
+/// The edge near the side from a corner to the next, dark on its right-hand side (clockwise corners, y down).
+fn side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<Line> {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
     let along = b - a;
     let outward = Vector2::new(along.y, -along.x).normalize();
-    let reach = (REACH_CELLS * along.norm() / 6.0).clamp(*REACH_PX.start(), *REACH_PX.end());
+    // From a steep side a marker is much longer than high, and so are its cells.
+    let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
+    let reach = (REACH_CELLS * across / CELLS as f64).clamp(*REACH_PX.start(), *REACH_PX.end());
     let probe = |i: usize| {
         let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBES as f64;
         let foot = a + along * part;
