@@ -250,7 +250,7 @@ fn report(path: &Path, solution: &Solution, common: &Common) {
     }
 }
 
-fn dimensions(text: &str) -> Result<[f64; 2], String> {
+pub(crate) fn dimensions(text: &str) -> Result<[f64; 2], String> {
     let side = |part: &str| part.trim().parse::<f64>().map_err(|e| format!("\"{part}\": {e}"));
     let (w, h) = text.split_once('x').ok_or_else(|| format!("\"{text}\", expected WIDTHxHEIGHT as in 0.6x0.4"))?;
     Ok([side(w)?, side(h)?])
