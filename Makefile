@@ -51,7 +51,7 @@ soak-dataset: demo
 # by seeds and chance on the stable one otherwise.
 fuzz: packages
 	@if $(CARGO) +nightly fuzz --version >/dev/null 2>&1; then \
-	  cd fuzz && for door in label recipe journal worker header; do \
+	  cd fuzz && for door in label recipe journal worker header data_yaml yolo_labels coco; do \
 	    $(CARGO) +nightly fuzz run --sanitizer none $$door -- -max_total_time=$(FUZZ) -timeout=5 -rss_limit_mb=1024 || exit 1; \
 	  done; \
 	else \

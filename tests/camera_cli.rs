@@ -136,17 +136,24 @@ fn a_camera_beside_its_label_is_used_and_decides_the_dataset() {
     desk.label("a", &changed);
     let (again, said) = desk.scene(&[]);
     assert!((again.focal_px.x / alone.focal_px.x - 1.0).abs() < 0.05);
-    assert!(said.contains("a.camera.json: solved from another version of its label") && said.lines().count() <= 2, "{said}");
+    assert!(
+        said.contains("a.camera.json: solved from another version of its label") && said.lines().count() <= 2,
+        "{said}"
+    );
     desk.write("bg/a.camera.json", "{\"format\": \"plane-camera\"}");
     let broken = desk.refused(&["scene", "draw", "recipe.toml", "-o", "scene.json"]);
-    assert!(broken.contains("a.camera.json: missing key") && broken.contains("run `petcomp camera solve` again"), "{broken}");
+    assert!(
+        broken.contains("a.camera.json: missing key") && broken.contains("run `petcomp camera solve` again"),
+        "{broken}"
+    );
 }
 
 #[test]
 fn photos_solved_together_are_used_together() {
     let desk = Desk::new();
     for (name, k) in [("a", 0), ("b", 1), ("c", 2)] {
-        let scenario = Scenario { image: IMAGE, focal_px: 512.0, size: SIZE, corner_sigma_px: 0.5, ..Scenario::default() };
+        let scenario =
+            Scenario { image: IMAGE, focal_px: 512.0, size: SIZE, corner_sigma_px: 0.5, ..Scenario::default() };
         let view = &scenario.views(9, 1, 3, [3.0, 35.0])[k];
         let mut label = desk.photo(name, IMAGE);
         label["surface"]["corners_px"] = json!(view.label.surface.corners_px);
@@ -155,7 +162,9 @@ fn photos_solved_together_are_used_together() {
     }
     let labels = ["bg/a.label.json", "bg/b.label.json", "bg/c.label.json"];
     desk.ok(&[&["camera", "joint"][..], &labels].concat());
-    let focal = |name: &str| io::read_json::<CameraFile>(desk.path(&format!("bg/{name}.camera.json"))).unwrap().found.model.f_px;
+    let focal = |name: &str| {
+        io::read_json::<CameraFile>(desk.path(&format!("bg/{name}.camera.json"))).unwrap().found.model.f_px
+    };
     assert!(focal("a") == focal("b") && focal("b") == focal("c"));
     assert_eq!(desk.scene(&[]).0.focal_px.x, focal("a") / 2.0);
     // A label of the three that changes makes the others' cameras old.
@@ -171,7 +180,10 @@ fn a_label_comes_from_nothing() {
     let desk = Desk::new();
     let label = desk.photo("a", IMAGE);
     let missing = desk.refused(&["camera", "solve", "bg/a.png"]);
-    assert!(missing.contains("a picture, expected a label") && missing.contains("petcomp camera init bg/a.png"), "{missing}");
+    assert!(
+        missing.contains("a picture, expected a label") && missing.contains("petcomp camera init bg/a.png"),
+        "{missing}"
+    );
     let [said, _] = desk.ok(&["camera", "init", "bg/a.png", "--size", "0.56x0.37"]);
     assert!(said.contains("fill in surface.corners_px"), "{said}");
     assert!(desk.refused(&["camera", "init", "bg/a.png", "--size", "1x1"]).contains("is there already"));

@@ -35,8 +35,7 @@ fn board_light(x: f64, y: f64) -> f32 {
 static PRINTED: LazyLock<Pyramid<PremulRgba>> = LazyLock::new(|| {
     let [w, h] = BOARD.map(|side| (side * PRINT).round() as usize);
     Pyramid::new(Image::from_fn(w, h, |x, y| {
-        let light =
-            board_light((x as f64 + 0.5) / PRINT - BOARD[0] / 2.0, BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT);
+        let light = board_light((x as f64 + 0.5) / PRINT - BOARD[0] / 2.0, BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT);
         PremulRgba { r: light, g: light, b: light, a: 1.0 }
     }))
 });

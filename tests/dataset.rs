@@ -789,7 +789,10 @@ fn browse(page: &str, script: &str) -> Option<String> {
 fn a_browser_shows_the_report_and_its_switches_work() {
     let dir = tempfile::tempdir().unwrap();
     make(&plan(dir.path(), 12)).unwrap();
-    let page = report::dataset::page(dir.path(), 6).unwrap().document();
+    let page =
+        report::dataset::page(dir.path(), &report::dataset::DatasetReportOptions { most: 6, ..Default::default() })
+            .unwrap()
+            .document();
     assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
     let script = "const shown = id => getComputedStyle(document.querySelector('.' + id)).display != 'none';\
         const before = [shown('boxes'), shown('masks')];\

@@ -40,7 +40,7 @@ pub struct Checked {
     pub faults: Vec<Fault>,
     /// Images looked at.
     pub images: usize,
-    /// Rows of label files for each class, in order.
+    /// Rows of label files for each class that has a name, in order.
     pub rows: Vec<usize>,
     /// What stands in each good row of boxes.
     pub boxes: Vec<CheckedBox>,
@@ -139,12 +139,13 @@ pub fn check(folder: &Path) -> Result<Checked> {
         parts.resize(images.len(), part);
     }
     let looked: Vec<_> = images.par_iter().map(|image| look(folder, image, yaml.classes())).collect();
-    let mut rows = vec![0; yaml.classes().unwrap_or(0)];
+    // Of classes that have a name: how many others there are, `nc` may say of any number.
+    let mut rows = vec![0; yaml.names().len()];
     let mut boxes = Vec::new();
     let mut same: BTreeMap<(u64, u32), &Path> = BTreeMap::new();
     for ((image, look), &part) in images.iter().zip(&looked).zip(&parts) {
         all.faults.extend(look.faults.iter().cloned());
-        look.rows.iter().for_each(|(class, _)| rows[*class] += 1);
+        look.rows.iter().filter_map(|(class, _)| Some(*rows.get_mut(*class)? += 1)).for_each(drop);
         boxes.extend(look.rows.iter().map(|&(class, sides)| CheckedBox { part, class, sides }));
         // Pictures of an empty place are alike, and rightly so.
         let twin = look.bytes.filter(|_| !look.is_empty).and_then(|bytes| same.insert(bytes, image));

@@ -6,6 +6,7 @@ use crate::dataset::times::{RunTimes, runs_of};
 use crate::dataset::{Part, Record};
 use crate::error::{Error, Result};
 use crate::io;
+use crate::label::{BBox, ObjectLabel};
 use crate::scene::Recipe;
 use rayon::prelude::*;
 use serde_json::Value;
@@ -35,8 +36,57 @@ pub struct Summary {
     pub rejected: Vec<(u64, String)>,
     /// The runs that wrote it.
     pub(crate) runs: Vec<RunTimes>,
-    /// Some of the samples, evenly spread.
-    pub shown: Vec<Shown>,
+    /// How many objects have no label, by the reason.
+    pub unlabelled: BTreeMap<NoLabel, u64>,
+    /// Seen share of each object without a label, 0 to 1.
+    pub unlabelled_visible: Vec<f64>,
+    /// All samples, in order of number.
+    pub glances: Vec<Glance>,
+}
+
+/// What a sample is like in a few numbers.
+#[derive(Clone, Debug)]
+pub struct Glance {
+    /// Its number.
+    pub index: u64,
+    /// The part that it belongs to.
+    pub part: Part,
+    /// Its picture and its record below the dataset's folder.
+    pub files: [String; 2],
+    /// Width and height of the picture, pixels.
+    pub image: [u32; 2],
+    /// How many objects are in it.
+    pub objects: usize,
+    /// Class and box of each object with a label, pixels.
+    pub labels: Vec<(u32, BBox)>,
+    /// Seen share of the object with a label that is seen least; 1 where there is none.
+    pub least_visible: f64,
+    /// How many scenes were thrown away before this one.
+    pub rejected: usize,
+}
+
+/// Why an object has no label.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NoLabel {
+    /// Another lies over it, by the topmost rule.
+    Covered,
+    /// Nothing of it lies in the picture.
+    Outside,
+    /// The recipe or the format leaves it out.
+    LeftOut,
+}
+
+impl NoLabel {
+    /// None for an object with a label.
+    pub fn of(object: &ObjectLabel, record: &Record) -> Option<Self> {
+        let labelled = record.labelled.contains(&object.id);
+        match (labelled, object.amodal_box.is_empty(), object.is_topmost()) {
+            (_, true, _) => Some(Self::Outside),
+            (true, ..) => None,
+            (false, _, false) => Some(Self::Covered),
+            (false, ..) => Some(Self::LeftOut),
+        }
+    }
 }
 
 /// A sample to look at.
@@ -56,11 +106,11 @@ struct Told {
 }
 
 impl Summary {
-    /// Reads a dataset's folder; at most `most` samples are kept to be shown.
+    /// Reads a dataset's folder.
     ///
     /// # Errors
     /// A folder that is no dataset, or was written without its sidecars.
-    pub fn read(folder: &Path, most: usize) -> Result<Self> {
+    pub fn read(folder: &Path) -> Result<Self> {
         let identity = folder::identity(folder)?;
         let identity = identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
         let lines = lines_of(folder)?;
@@ -76,21 +126,29 @@ impl Summary {
             boxes: Vec::new(),
             rejected: Vec::new(),
             runs: runs_of(folder),
-            shown: Vec::new(),
+            unlabelled: BTreeMap::new(),
+            unlabelled_visible: Vec::new(),
+            glances: Vec::with_capacity(lines.len()),
         };
-        let shown = most.min(lines.len());
-        let places: Vec<usize> = (0..shown).map(|i| i * lines.len() / shown).collect();
         // In steps, so that no more records are in memory than threads can read at a time.
-        for (step, part) in lines.chunks(STEP).enumerate() {
+        for part in lines.chunks(STEP) {
             let told: Result<Vec<_>> = part.par_iter().map(|line| told(folder, line)).collect();
-            for (i, (told, line)) in told?.into_iter().zip(part).enumerate() {
+            for (told, line) in told?.into_iter().zip(part) {
                 summary.add(&told, line);
-                if places.binary_search(&(step * STEP + i)).is_ok() {
-                    summary.shown.push(Shown { picture: line.file(folder, "images/")?, record: told.record });
-                }
+                let files = [name(folder, line, "images/")?, name(folder, line, "scenes/")?];
+                summary.glances.push(Glance::of(&told, files));
             }
         }
         Ok(summary)
+    }
+
+    /// A sample to look at, by its place among the glances.
+    ///
+    /// # Errors
+    /// A record that cannot be read.
+    pub fn shown(&self, folder: &Path, place: usize) -> Result<Shown> {
+        let [picture, record] = self.glances[place].files.each_ref().map(|file| folder.join(file));
+        Ok(Shown { picture, record: io::read_json(record)? })
     }
 
     /// The distribution of a drawn number: least and greatest value, and whether it is a whole number.
@@ -122,7 +180,10 @@ impl Summary {
         }
         for object in &record.labels.objects {
             self.visible.push(object.visible_fraction);
-            if record.labelled.contains(&object.id) {
+            if let Some(reason) = NoLabel::of(object, record) {
+                *self.unlabelled.entry(reason).or_default() += 1;
+                self.unlabelled_visible.push(object.visible_fraction);
+            } else {
                 self.boxes.push([object.amodal_box.width(), object.amodal_box.height()]);
             }
         }
@@ -134,11 +195,35 @@ impl Summary {
     }
 }
 
+impl Glance {
+    fn of(told: &Told, files: [String; 2]) -> Self {
+        let Told { k, part, record } = told;
+        let labelled = || record.labels.objects.iter().filter(|object| NoLabel::of(object, record).is_none());
+        Self {
+            index: *k,
+            part: *part,
+            files,
+            image: record.labels.image,
+            objects: record.labels.objects.len(),
+            labels: labelled().map(|object| (object.class, object.amodal_box)).collect(),
+            least_visible: labelled().map(|object| object.visible_fraction).fold(1.0, f64::min),
+            rejected: record.rejected.len(),
+        }
+    }
+}
+
 /// Records that are read at a time.
 const STEP: usize = 256;
 
 fn told(folder: &Path, line: &Line) -> Result<Told> {
     Ok(Told { k: line.k, part: line.part, record: io::read_json(line.file(folder, "scenes/")?)? })
+}
+
+/// The file of a sample in one of the dataset's folders, as the journal has it.
+fn name(folder: &Path, line: &Line, kind: &str) -> Result<String> {
+    line.file(folder, kind)?;
+    let file = line.files.iter().find(|file| file.path.starts_with(kind));
+    file.map(|file| file.path.clone()).ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
 }
 
 /// The key in the recipe of a draw's distribution; none for a choice from a list and for a turn that was drawn again.

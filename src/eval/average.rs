@@ -3,7 +3,7 @@
 use super::rank::Running;
 
 /// Where precision is read: recalls of 0, 0.01 .. 1.
-const POINTS: usize = 101;
+pub(super) const POINTS: usize = 101;
 
 /// The area under the interpolated precision envelope, by trapezoids over 101 recalls.
 ///
@@ -15,7 +15,11 @@ pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
     let xs: Vec<f64> = [0.0].iter().chain(recall).chain(&[1.0]).copied().collect();
     let mut ys: Vec<f64> = [1.0].iter().chain(precision).chain(&[0.0]).copied().collect();
     falling(&mut ys);
-    let read: Vec<f64> = (0..POINTS).map(|i| interpolated(recall_at(i), &xs, &ys)).collect();
+    let mut after = 0;
+    let read: [f64; POINTS] = std::array::from_fn(|i| {
+        after += xs[after..].iter().take_while(|&&at| at <= recall_at(i)).count();
+        between(recall_at(i), after, &xs, &ys)
+    });
     let strip = |i: usize| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0;
     (0..POINTS - 1).map(strip).sum()
 }
@@ -25,10 +29,14 @@ pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
 /// # Method
 /// As the COCO tools compute it (`COCOeval.accumulate`).
 pub(super) fn mean_of_samples(recall: &[f64], precision: &[f64]) -> f64 {
+    samples(recall, precision).into_iter().sum::<f64>() / POINTS as f64
+}
+
+/// The precision envelope at recalls of 0, 0.01 .. 1.
+pub(super) fn samples(recall: &[f64], precision: &[f64]) -> [f64; POINTS] {
     let mut ys = precision.to_vec();
     falling(&mut ys);
-    let read = |i| ys.get(recall.partition_point(|&r| r < recall_at(i))).copied().unwrap_or(0.0);
-    (0..POINTS).map(read).sum::<f64>() / POINTS as f64
+    std::array::from_fn(|i| ys.get(recall.partition_point(|&r| r < recall_at(i))).copied().unwrap_or(0.0))
 }
 
 /// Recall and precision after each detection, `epsilon` keeping the divisions defined.
@@ -40,10 +48,16 @@ pub(super) fn recall_and_precision(sums: &Running, truths: f64, epsilon: [f64; 2
 
 /// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.
 pub(super) fn interpolated(x: f64, xs: &[f64], ys: &[f64]) -> f64 {
-    let after = xs.partition_point(|&at| at <= x);
+    between(x, xs.partition_point(|&at| at <= x), xs, ys)
+}
+
+/// The same where the first position beyond `x` is known.
+fn between(x: f64, after: usize, xs: &[f64], ys: &[f64]) -> f64 {
     match after {
         0 => ys[0],
         n if n == xs.len() => ys[n - 1],
+        // What the line below gives there, without its division.
+        n if ys[n] == ys[n - 1] => ys[n],
         n => (ys[n] - ys[n - 1]) / (xs[n] - xs[n - 1]) * (x - xs[n - 1]) + ys[n - 1],
     }
 }
@@ -57,7 +71,7 @@ fn falling(values: &mut [f64]) {
     }
 }
 
-fn recall_at(i: usize) -> f64 {
+pub(super) fn recall_at(i: usize) -> f64 {
     if i + 1 == POINTS { 1.0 } else { i as f64 * 0.01 }
 }
 

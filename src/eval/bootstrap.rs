@@ -1,6 +1,6 @@
 //! How much a score would move if other images had been taken.
 
-use super::{Definition, Sheet, evaluate};
+use super::{Definition, Matches, Sheet};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -25,10 +25,16 @@ pub struct Interval {
 ///
 /// [Efron 1979]: https://doi.org/10.1214/aos/1176344552
 pub fn bootstrap(sheets: &[Sheet], definition: Definition, rounds: usize, seed: u64) -> Interval {
-    let value = evaluate(sheets, definition, &[]).map();
-    let round = |k: usize| evaluate(sheets, definition, &drawn(sheets.len(), seed, k as u64)).map();
-    let values: Vec<f64> = (0..rounds).into_par_iter().map(round).collect();
-    interval(value, values)
+    Matches::new(sheets, definition).bootstrap(rounds, seed)
+}
+
+impl Matches {
+    /// As [`bootstrap()`].
+    pub fn bootstrap(&self, rounds: usize, seed: u64) -> Interval {
+        let round = |k: usize| self.map(&drawn(self.images(), seed, k as u64));
+        let values: Vec<f64> = (0..rounds).into_par_iter().map(round).collect();
+        interval(self.map(&[]), values)
+    }
 }
 
 /// The percentile interval of resampled values; the value itself where there are none.

@@ -1,8 +1,9 @@
 //! Average precision and recall as the COCO tools compute them.
 
 use super::average::{mean_of_samples, recall_and_precision};
-use super::overlap::{area, intersection, share};
-use super::rank::{self, Hit, Marks};
+use super::by_class::{ByClass, ClassBoxes, ImageBoxes};
+use super::overlap::{BoxIndex, area, intersection, share};
+use super::rank::{Hit, Marks, Ranking};
 use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox, mean, thresholds};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -42,7 +43,7 @@ pub struct CocoScores {
 }
 
 impl AreaRange {
-    const SIZES: [Self; 3] = [Self::Small, Self::Medium, Self::Large];
+    const ALL: [Self; 4] = [Self::All, Self::Small, Self::Medium, Self::Large];
 
     /// Least and greatest area, square pixels, both included.
     pub fn limits(self) -> [f64; 2] {
@@ -69,64 +70,81 @@ impl AreaRange {
 /// When there are weights and not one per sheet.
 pub fn coco(sheets: &[Sheet], weights: &[u32]) -> CocoScores {
     assert!(weights.is_empty() || weights.len() == sheets.len(), "one weight per sheet");
-    let classes = rank::classes(sheets);
-    let measure = |range, count| -> Vec<Measured> {
-        classes.par_iter().filter_map(|&class| Measured::new(sheets, class, range, count, weights)).collect()
-    };
-    let [few, some, most] = MAX_DETECTIONS;
-    let all = measure(AreaRange::All, most);
-    let by_area = AreaRange::SIZES.map(|range| measure(range, most));
+    let classes = ByClass::new(sheets);
+    let rankings = AreaRange::ALL.map(|range| rankings(&classes, range));
+    let [all, by_area @ ..] = rankings.each_ref().map(|rankings| measured(rankings, weights));
+    let recall_within = |count| over(&all, |m| mean(m.recall_within(count)));
     CocoScores {
         ap_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.ap))),
-        ar_by_count: [
-            over(&measure(AreaRange::All, few), Measured::mean_recall),
-            over(&measure(AreaRange::All, some), Measured::mean_recall),
-            over(&all, Measured::mean_recall),
-        ],
-        ar_by_area: by_area.each_ref().map(|m| over(m, Measured::mean_recall)),
+        ar_by_count: MAX_DETECTIONS.map(recall_within),
+        ar_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.recall))),
         scores: Scores { definition: Definition::Coco, classes: all.iter().map(Measured::scores).collect() },
     }
 }
 
-fn over(measured: &[Measured], value: impl Fn(&Measured) -> f64) -> Option<f64> {
+/// The detections of every class with something to find, the surest 100 of each image.
+pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> {
+    let ranking = |boxes: &ClassBoxes<'_>| Ranking::new(boxes, |image| held_against(image, range));
+    classes.classes().par_iter().map(ranking).collect()
+}
+
+pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
+    Scores { definition: Definition::Coco, classes: measured(rankings, weights).iter().map(Measured::scores).collect() }
+}
+
+/// Average precision of a class at every threshold; none where there is nothing to find.
+pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
+    Measured::new(ranking, weights).map(|measured| measured.ap)
+}
+
+fn measured<'a>(rankings: &'a [Ranking], weights: &'a [u32]) -> Vec<Measured<'a>> {
+    rankings.par_iter().filter_map(|ranking| Measured::new(ranking, weights)).collect()
+}
+
+fn over(measured: &[Measured<'_>], value: impl Fn(&Measured<'_>) -> f64) -> Option<f64> {
     (!measured.is_empty()).then(|| mean(measured.iter().map(value)))
 }
 
-/// One class, one range of sizes, one number of detections an image.
-struct Measured {
-    class: u32,
+/// A class in one range of sizes.
+struct Measured<'a> {
+    ranking: &'a Ranking,
+    weights: &'a [u32],
     truths: f64,
     ap: [f64; THRESHOLDS],
     recall: [f64; THRESHOLDS],
     precision: f64,
 }
 
-impl Measured {
+impl<'a> Measured<'a> {
     /// None for a class without an object in the range.
-    fn new(sheets: &[Sheet], class: u32, range: AreaRange, count: usize, weights: &[u32]) -> Option<Self> {
-        let each: Vec<(Vec<Hit>, usize)> =
-            sheets.par_iter().enumerate().map(|(i, sheet)| held_against(sheet, i, class, range, count)).collect();
-        let truths: f64 = each.iter().enumerate().map(|(i, e)| rank::weight(weights, i) * e.1 as f64).sum();
-        let mut hits: Vec<Hit> = each.into_iter().flat_map(|(hits, _)| hits).collect();
-        rank::sort(&mut hits);
-        let curve = |t| recall_and_precision(&rank::running(&hits, t, weights), truths, [0.0, EPSILON]);
-        let curves: [(Vec<f64>, Vec<f64>); THRESHOLDS] = std::array::from_fn(curve);
-        (truths > 0.0).then(|| Self {
-            class,
+    fn new(ranking: &'a Ranking, weights: &'a [u32]) -> Option<Self> {
+        let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
+        let turns = ranking.turns(weights);
+        let curves = turns.each_ref().map(|sums| recall_and_precision(sums, truths, [0.0, EPSILON]));
+        let last = |values: &[f64]| values.last().copied().unwrap_or(0.0);
+        Some(Self {
+            ranking,
+            weights,
             truths,
             ap: curves.each_ref().map(|(recall, precision)| mean_of_samples(recall, precision)),
-            recall: curves.each_ref().map(|(recall, _)| recall.last().copied().unwrap_or(0.0)),
-            precision: curves[0].1.last().copied().unwrap_or(0.0),
+            recall: curves.each_ref().map(|(recall, _)| last(recall)),
+            precision: last(&curves[0].1),
         })
     }
 
-    fn mean_recall(&self) -> f64 {
-        mean(self.recall)
+    /// Recall with so many detections an image.
+    fn recall_within(&self, count: usize) -> [f64; THRESHOLDS] {
+        let mut right = [0.0; THRESHOLDS];
+        for (hit, weight) in self.ranking.counting(self.weights).filter(|(hit, _)| (hit.place as usize) < count) {
+            let marks = hit.right & !hit.ignored;
+            right.iter_mut().enumerate().filter(|(t, _)| marks >> t & 1 == 1).for_each(|(_, sum)| *sum += weight);
+        }
+        right.map(|sum| sum / self.truths)
     }
 
     fn scores(&self) -> ClassScores {
-        let Self { class, truths, ap, recall, precision } = *self;
-        ClassScores { class, truths: truths as u64, precision, recall: recall[0], ap }
+        let Self { ranking, truths, ap, recall, precision, .. } = *self;
+        ClassScores { class: ranking.class, truths: truths as u64, precision, recall: recall[0], ap }
     }
 }
 
@@ -139,24 +157,29 @@ struct Target<'a> {
 }
 
 /// The detections of a class in one image, and how many boxes there are to be found.
-fn held_against(sheet: &Sheet, place: usize, class: u32, range: AreaRange, count: usize) -> (Vec<Hit>, usize) {
-    let target = |truth| Target { truth, ignored: truth.crowd || !range.holds(truth.area), taken: 0 };
-    let mut targets: Vec<Target<'_>> = sheet.truth.iter().filter(|t| t.class == class).map(target).collect();
+fn held_against(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
+    let target = |&truth| Target { truth, ignored: truth.crowd || !range.holds(truth.area), taken: 0 };
+    let mut targets: Vec<Target<'_>> = image.truth.iter().map(target).collect();
     // Those that count come first: a detection takes an ignored box only where none of them is left.
     targets.sort_by_key(|t| t.ignored);
-    let mut found: Vec<&FoundBox> = sheet.found.iter().filter(|f| f.class == class).collect();
-    found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-    found.truncate(count);
-    let hits = found.into_iter().map(|f| hit(f, place, &mut targets, range)).collect();
+    let index = BoxIndex::new(targets.iter().map(|t| t.truth.bbox));
+    let surest = image.found.iter().take(MAX_DETECTIONS[2]).enumerate();
+    let hits = surest.map(|(place, found)| {
+        let overlap = |k: usize| (k, overlap(found, targets[k].truth));
+        let overlaps: Vec<(usize, f64)> = index.near(&found.bbox).into_iter().map(overlap).collect();
+        let (right, ignored) = marks(found, &mut targets, &overlaps, range);
+        Hit { confidence: found.confidence, sheet: image.sheet, place: place as u32, right, ignored }
+    });
+    let hits = hits.collect();
     (hits, targets.iter().filter(|t| !t.ignored).count())
 }
 
-fn hit(found: &FoundBox, place: usize, targets: &mut [Target<'_>], range: AreaRange) -> Hit {
-    let overlaps: Vec<f64> = targets.iter().map(|t| overlap(found, t.truth)).collect();
+/// Thresholds at which a detection finds something, and at which it counts for nobody.
+fn marks(found: &FoundBox, targets: &mut [Target<'_>], overlaps: &[(usize, f64)], range: AreaRange) -> (Marks, Marks) {
     let (mut right, mut ignored) = (0, 0);
     for (i, threshold) in thresholds().into_iter().enumerate() {
         let bit: Marks = 1 << i;
-        match nearest(targets, &overlaps, threshold, bit) {
+        match nearest(targets, overlaps, threshold, bit) {
             Some(k) => {
                 targets[k].taken |= bit;
                 if targets[k].ignored { ignored |= bit } else { right |= bit }
@@ -165,15 +188,16 @@ fn hit(found: &FoundBox, place: usize, targets: &mut [Target<'_>], range: AreaRa
             None => {}
         }
     }
-    Hit { confidence: found.confidence, sheet: place, right, ignored }
+    (right, ignored)
 }
 
 /// The free target with the greatest overlap from `threshold` on, the last of equal ones; those that count before
 /// ignored ones.
-fn nearest(targets: &[Target<'_>], overlaps: &[f64], threshold: f64, bit: Marks) -> Option<usize> {
+fn nearest(targets: &[Target<'_>], overlaps: &[(usize, f64)], threshold: f64, bit: Marks) -> Option<usize> {
     let mut least = threshold.min(ALMOST_ONE);
     let mut best: Option<usize> = None;
-    for (k, (target, &overlap)) in targets.iter().zip(overlaps).enumerate() {
+    for &(k, overlap) in overlaps {
+        let target = &targets[k];
         if target.taken & bit != 0 && !target.truth.crowd {
             continue;
         }

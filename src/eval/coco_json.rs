@@ -1,12 +1,12 @@
 //! Reads truth and detections from COCO JSON.
 
-use super::{FoundBox, Sheet, TrueBox};
+use super::{FARTHEST_PX, FoundBox, Picture, Sheet, TrueBox};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::BBox;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
 #[derive(Deserialize)]
 struct Document {
@@ -22,6 +22,11 @@ struct ImageRecord {
     id: i64,
     #[serde(default)]
     file_name: String,
+    /// LVIS names its images by address alone.
+    #[serde(default)]
+    coco_url: String,
+    width: Option<f64>,
+    height: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -55,6 +60,8 @@ pub struct CocoTruth {
     pub sheets: Vec<Sheet>,
     /// Names of the categories, in order of their ids; a class is a place in this list.
     pub classes: Vec<String>,
+    /// File name of each image, and its width and height where they are told.
+    pub files: Vec<(String, Option<[f64; 2]>)>,
     images: BTreeMap<i64, usize>,
     categories: BTreeMap<i64, u32>,
 }
@@ -62,19 +69,10 @@ pub struct CocoTruth {
 /// Reads `instances.json`: `images`, `annotations` (`bbox` as x, y, width, height), `categories`.
 ///
 /// # Errors
-/// [`Error::File`] for a file that is not such a document; [`Error::Field`] for an annotation of an unknown image or
-/// category.
+/// [`Error::File`] for a file that is not such a document; [`Error::Field`] for an id that is there twice, an annotation
+/// of an unknown image or category, or a box that cannot be one.
 pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
-    let document: Document = io::read_json_data(path)?;
-    let mut truth = CocoTruth::new(&document);
-    for (i, a) in document.annotations.iter().enumerate() {
-        let bbox = corners(a.bbox);
-        let area = a.area.unwrap_or(a.bbox[2] * a.bbox[3]);
-        let (image, class) =
-            truth.place(a.image_id, a.category_id).map_err(|e| e.within(&format!("annotations[{i}]")).in_file(path))?;
-        truth.sheets[image].truth.push(TrueBox { class, bbox, area, crowd: a.iscrowd != 0 });
-    }
-    Ok(truth)
+    CocoTruth::new(&io::read_json_data(path)?).map_err(|e| e.in_file(path))
 }
 
 /// Adds detections: a list of `image_id`, `category_id`, `bbox` (x, y, width, height), `score`.
@@ -82,29 +80,46 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// # Errors
 /// As [`read_coco_truth`].
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
-    let found: Vec<Detection> = io::read_json_data(path)?;
-    for (i, d) in found.iter().enumerate() {
-        let (image, class) =
-            truth.place(d.image_id, d.category_id).map_err(|e| e.within(&format!("[{i}]")).in_file(path))?;
-        truth.sheets[image].found.push(FoundBox { class, bbox: corners(d.bbox), confidence: d.score });
-    }
-    Ok(())
+    truth.add(&io::read_json_data::<Vec<Detection>>(path)?).map_err(|e| e.in_file(path))
+}
+
+/// What documents of truth and of detections give, for the fuzzers.
+pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<Sheet>> {
+    let mut truth = CocoTruth::new(&io::parse_json(truth)?)?;
+    truth.add(&io::parse_json::<Vec<Detection>>(found)?)?;
+    Ok(truth.sheets)
 }
 
 impl CocoTruth {
-    fn new(document: &Document) -> Self {
-        let images: BTreeMap<i64, &ImageRecord> = document.images.iter().map(|image| (image.id, image)).collect();
-        let categories: BTreeMap<i64, &Category> = document.categories.iter().map(|c| (c.id, c)).collect();
-        let sheet = |(id, image): (&i64, &&ImageRecord)| {
-            let stem = Path::new(&image.file_name).file_stem().map(|n| n.to_string_lossy().into_owned());
-            Sheet { image: stem.unwrap_or_else(|| id.to_string()), ..Sheet::default() }
+    fn new(document: &Document) -> Result<Self> {
+        let images = places("images", document.images.iter().map(|image| image.id))?;
+        let categories = places("categories", document.categories.iter().map(|c| c.id))?;
+        let name = |&i: &usize| document.categories[i].name.clone();
+        let mut truth = Self {
+            sheets: images.values().map(|&i| Sheet::new(document.images[i].name(), Vec::new())).collect(),
+            classes: categories.values().map(name).collect(),
+            files: images.values().map(|&i| document.images[i].file()).collect(),
+            images: images.into_keys().zip(0..).collect(),
+            categories: categories.into_keys().zip(0..).collect(),
         };
-        Self {
-            sheets: images.iter().map(sheet).collect(),
-            classes: categories.values().map(|c| c.name.clone()).collect(),
-            images: images.keys().copied().zip(0..).collect(),
-            categories: categories.keys().copied().zip(0..).collect(),
+        for (i, a) in document.annotations.iter().enumerate() {
+            let at = || format!("annotations[{i}]");
+            let (image, class) = truth.place(a.image_id, a.category_id).map_err(|e| e.within(&at()))?;
+            let bbox = corners(a.bbox).map_err(|e| e.within(&at()))?;
+            let area = a.area.unwrap_or(a.bbox[2] * a.bbox[3]);
+            truth.sheets[image].truth.push(TrueBox { class, bbox, area, crowd: a.iscrowd != 0 });
         }
+        Ok(truth)
+    }
+
+    fn add(&mut self, found: &[Detection]) -> Result<()> {
+        for (i, d) in found.iter().enumerate() {
+            let at = || format!("[{i}]");
+            let (image, class) = self.place(d.image_id, d.category_id).map_err(|e| e.within(&at()))?;
+            let bbox = corners(d.bbox).map_err(|e| e.within(&at()))?;
+            self.sheets[image].found.push(FoundBox { class, bbox, confidence: d.score });
+        }
+        Ok(())
     }
 
     fn place(&self, image: i64, category: i64) -> Result<(usize, u32)> {
@@ -113,10 +128,69 @@ impl CocoTruth {
         let class = *self.categories.get(&category).ok_or_else(|| unknown("category_id", category))?;
         Ok((image, class))
     }
+
+    /// Where the images are: in `folder`, or where COCO and petcomp have them for a document at `path`. A file name that
+    /// leads out of a folder leads nowhere.
+    pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
+        let roots = folder.map_or_else(|| beside(path), |folder| vec![folder.to_path_buf()]);
+        let picture = |(name, size): &(String, Option<[f64; 2]>)| {
+            let below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+            let path = roots.iter().map(|root| root.join(name)).find(|path| below && path.is_file())?;
+            let size = size.or_else(|| io::read_header(&path).ok().map(|h| [h.width as f64, h.height as f64]))?;
+            Some(Picture { path, size })
+        };
+        self.files.iter().map(picture).collect()
+    }
 }
 
-fn corners([x, y, w, h]: [f64; 4]) -> BBox {
-    BBox { x0: x, y0: y, x1: x + w, y1: y + h }
+/// Folders that may hold the images of `annotations/instances_val2017.json`.
+fn beside(path: &Path) -> Vec<PathBuf> {
+    let here = path.parent().unwrap_or(Path::new(""));
+    let above = here.join("..");
+    let stem = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let part = stem.rsplit('_').next().unwrap_or_default().to_owned();
+    let roots =
+        |root: &Path| [root.to_path_buf(), root.join("images"), root.join(&part), root.join("images").join(&part)];
+    [roots(here), roots(&above)].concat()
+}
+
+/// Places in the document by id, in order of the ids.
+fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, usize>> {
+    let mut places = BTreeMap::new();
+    for (i, id) in ids.enumerate() {
+        if let Some(first) = places.insert(id, i) {
+            return Err(Error::value(
+                format!("{list}[{i}].id"),
+                format!("{id}, as of {list}[{first}], expected another"),
+            ));
+        }
+    }
+    Ok(places)
+}
+
+impl ImageRecord {
+    fn file(&self) -> (String, Option<[f64; 2]>) {
+        let address = self.coco_url.rsplit('/').next().unwrap_or_default();
+        let name = if self.file_name.is_empty() { address } else { &self.file_name };
+        let side = |side: Option<f64>| side.filter(|side| *side >= 1.0);
+        (name.to_owned(), side(self.width).zip(side(self.height)).map(|(w, h)| [w, h]))
+    }
+
+    /// The file's name without folder and extension; the id of an image without a file.
+    fn name(&self) -> String {
+        let (file, _) = self.file();
+        Path::new(&file).file_stem().map_or_else(|| self.id.to_string(), |n| n.to_string_lossy().into_owned())
+    }
+}
+
+fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
+    let bbox = BBox { x0: x, y0: y, x1: x + w, y1: y + h };
+    let near = [bbox.x0, bbox.y0, bbox.x1, bbox.y1].iter().all(|v| v.abs() <= FARTHEST_PX);
+    if near && w >= 0.0 && h >= 0.0 {
+        return Ok(bbox);
+    }
+    let expected = format!("expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels");
+    Err(Error::value("bbox", format!("{:?}, {expected}", [x, y, w, h])))
 }
 
 #[cfg(test)]
@@ -144,6 +218,39 @@ mod tests {
         let b = truth.sheets[1].truth[0];
         assert_eq!((b.class, b.area, b.crowd, b.bbox.x1), (1, 6.5, true, 4.0));
         assert_eq!(truth.sheets[0].truth[0].area, 4.0);
+    }
+
+    #[test]
+    fn what_cannot_be_is_named_with_its_place() {
+        let truth = |from: &str, to: &str| {
+            let document = io::parse_json(&TRUTH.replace(from, to)).and_then(|d| CocoTruth::new(&d));
+            document.unwrap_err().to_string()
+        };
+        assert_eq!(truth("\"id\": 3,", "\"id\": 7,"), "images[1].id: 7, as of images[0], expected another");
+        assert!(
+            truth("[1, 2, 3, 4]", "[1, 2, -3, 4]")
+                .starts_with("annotations[0].bbox: [1.0, 2.0, -3.0, 4.0], expected x")
+        );
+        assert!(truth("[0, 0, 2, 2]", "[0, 0, 2, 1e300]").contains("within 1000000000 pixels"));
+        assert!(truth("\"image_id\": 3", "\"image_id\": \"3\"").contains("expected an integer"));
+        assert!(truth("\"iscrowd\": 1", "\"iscrowd\": 256").contains("expected an integer from 0 to 255"));
+    }
+
+    #[test]
+    fn pictures_are_looked_for_where_coco_has_them_and_nowhere_else() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("annotations/instances_val.json");
+        for file in ["annotations/instances_val.json", "images/val/b/x.png", "a.png"] {
+            std::fs::create_dir_all(root.path().join(file).parent().unwrap()).unwrap();
+            std::fs::write(root.path().join(file), TRUTH.replace("a.png", "../../a.png")).unwrap();
+        }
+        let found = read_coco_truth(&path).unwrap().pictures(&path, None);
+        // Neither the one above the folder, nor the one whose size nobody tells.
+        assert_eq!(found, [None, None]);
+        let sized = TRUTH.replace("\"width\": 9", "\"width\": 9, \"height\": 6");
+        let truth = CocoTruth::new(&io::parse_json(&sized).unwrap()).unwrap();
+        let picture = truth.pictures(&path, None)[1].clone().unwrap();
+        assert!(picture.path.ends_with("images/val/b/x.png") && picture.size == [9.0, 6.0]);
     }
 
     #[test]

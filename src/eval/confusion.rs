@@ -1,14 +1,15 @@
 //! Which class is taken for which.
 
-use super::overlap::iou;
-use super::{FoundBox, Sheet};
+use super::Sheet;
+use super::pairing::pairs;
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 
-/// Counts of found (rows) against true (columns) classes; the last row and column are the background.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// How often each class was found where each was true; no class is the background. What never happened takes no room.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Confusion {
-    /// `counts[found][true]`, one more of each than there are classes.
-    pub counts: Vec<Vec<u64>>,
+    /// Found and true class, none for the background, and how often.
+    pub counts: BTreeMap<[Option<u32>; 2], u64>,
 }
 
 /// Which detections are looked at.
@@ -28,37 +29,44 @@ impl Default for ConfusionOptions {
 }
 
 impl Confusion {
-    /// Counts over all images, whatever the classes of two boxes that overlap.
-    ///
-    /// Pairs are made from the greatest overlap down. Classes beyond `classes` are left out.
-    pub fn new(sheets: &[Sheet], classes: usize, options: &ConfusionOptions) -> Self {
-        let mut confusion = Self { counts: vec![vec![0; classes + 1]; classes + 1] };
-        sheets.iter().for_each(|sheet| confusion.add(sheet, classes, options));
+    /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from the greatest overlap
+    /// down; crowds, and detections in them, count for nobody.
+    pub fn new(sheets: &[Sheet], options: &ConfusionOptions) -> Self {
+        let mut confusion = Self::default();
+        for sheet in sheets {
+            for pair in pairs(sheet, options) {
+                let key = [pair.found.map(|f| sheet.found[f].class), pair.truth.map(|t| sheet.truth[t].class)];
+                *confusion.counts.entry(key).or_default() += 1;
+            }
+        }
         confusion
     }
 
-    fn add(&mut self, sheet: &Sheet, background: usize, options: &ConfusionOptions) {
-        let known = |class: u32| (class as usize) < background;
-        let truth: Vec<_> = sheet.truth.iter().filter(|t| known(t.class)).collect();
-        let found: Vec<&FoundBox> =
-            sheet.found.iter().filter(|f| known(f.class) && f.confidence > options.confidence).collect();
-        let mut pairs: Vec<(f64, usize, usize)> = (0..truth.len())
-            .flat_map(|t| (0..found.len()).map(move |f| (t, f)))
-            .map(|(t, f)| (iou(&truth[t].bbox, &found[f].bbox), t, f))
-            .filter(|pair| pair.0 > options.iou)
-            .collect();
-        pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let (mut named, mut names) = (vec![false; truth.len()], vec![false; found.len()]);
-        for (_, t, f) in pairs {
-            if !named[t] && !names[f] {
-                (named[t], names[f]) = (true, true);
-                self.counts[found[f].class as usize][truth[t].class as usize] += 1;
-            }
+    /// How often `found` was found where `truth` is.
+    pub fn count(&self, found: Option<u32>, truth: Option<u32>) -> u64 {
+        self.counts.get(&[found, truth]).copied().unwrap_or(0)
+    }
+
+    /// The classes that occur.
+    pub fn classes(&self) -> BTreeSet<u32> {
+        self.counts.keys().flatten().flatten().copied().collect()
+    }
+
+    /// The classes that occur, those first with the most boxes missed, found where nothing is, or taken for another class;
+    /// of equal ones those first with the most boxes.
+    pub fn worst(&self) -> Vec<u32> {
+        let mut sums: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
+        for (&[found, truth], &count) in &self.counts {
+            let wrong = if found == truth { 0 } else { count };
+            let of = BTreeSet::from([found, truth]);
+            of.into_iter().flatten().for_each(|class| {
+                let sums = sums.entry(class).or_default();
+                *sums = [sums[0] + wrong, sums[1] + count];
+            });
         }
-        let missed = truth.iter().zip(named).filter(|(_, named)| !named);
-        missed.for_each(|(t, _)| self.counts[background][t.class as usize] += 1);
-        let alarms = found.iter().zip(names).filter(|(_, names)| !names);
-        alarms.for_each(|(f, _)| self.counts[f.class as usize][background] += 1);
+        let mut classes: Vec<(u32, [u64; 2])> = sums.into_iter().collect();
+        classes.sort_by_key(|&(_, sums)| std::cmp::Reverse(sums));
+        classes.into_iter().map(|(class, _)| class).collect()
     }
 }
 
@@ -72,7 +80,10 @@ mod tests {
         let (a, b) = (bbox(0.0, 0.0, 10.0, 10.0), bbox(50.0, 0.0, 10.0, 10.0));
         let nowhere = bbox(90.0, 90.0, 5.0, 5.0);
         let seen = vec![found(1, a, 0.9), found(0, a, 0.8), found(1, nowhere, 0.9), found(0, b, 0.1)];
-        let confusion = Confusion::new(&[sheet(vec![there(0, a), there(1, b)], seen)], 2, &Default::default());
-        assert_eq!(confusion.counts, [[0, 0, 1], [1, 0, 1], [0, 1, 0]]);
+        let confusion = Confusion::new(&[sheet(vec![there(0, a), there(1, b)], seen)], &Default::default());
+        let count = |found, truth| confusion.count(found, truth);
+        assert_eq!([count(Some(1), Some(0)), count(Some(0), None), count(Some(1), None), count(None, Some(1))], [1; 4]);
+        assert_eq!(confusion.counts.len(), 4);
+        assert_eq!((confusion.classes().len(), confusion.worst()), (2, vec![1, 0]));
     }
 }

@@ -1,11 +1,9 @@
 //! Curves over confidence and over recall, at threshold 0.5.
 
-use super::yolov5::{CONFIDENCES, Ranked, best_confidence, confidence};
-use super::{Sheet, rank};
-use rayon::prelude::*;
-
-/// How many points of a curve are kept.
-const POINTS: usize = 101;
+use super::average::{self, POINTS};
+use super::rank::Ranking;
+use super::yolov5::{self, CONFIDENCES, Ranked, best_confidence, confidence};
+use super::{Definition, Matches, Sheet, mean};
 
 /// Curves of every class that occurs in the truth.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,6 +14,10 @@ pub struct Curves {
     pub precision_recall: Vec<Vec<[f64; 2]>>,
     /// Per class: confidence and F1.
     pub f1: Vec<Vec<[f64; 2]>>,
+    /// Mean precision of the classes at recalls of 0, 0.01 .. 1, of the envelope.
+    pub mean_precision: Vec<[f64; 2]>,
+    /// Confidence and mean F1 of the classes.
+    pub mean_f1: Vec<[f64; 2]>,
     /// Where the mean F1 of the classes, smoothed, is greatest.
     pub best_confidence: f64,
 }
@@ -23,24 +25,45 @@ pub struct Curves {
 /// Precision over recall, and F1 over confidence, at intersection over union 0.5, matched as by
 /// [`yolov5`](super::yolov5()).
 pub fn curves(sheets: &[Sheet]) -> Curves {
-    let ranked: Vec<Ranked> =
-        rank::classes(sheets).into_par_iter().filter_map(|class| Ranked::new(sheets, class, &[])).collect();
+    Matches::new(sheets, Definition::Yolov5).curves()
+}
+
+pub(super) fn of(rankings: &[Ranking]) -> Curves {
+    let ranked = yolov5::ranked(rankings, &[]);
+    let f1: Vec<_> = ranked.iter().map(f1).collect();
     Curves {
-        classes: ranked.iter().map(|r| r.class).collect(),
+        mean_precision: mean_precision(&ranked),
+        mean_f1: mean_over(&f1),
+        classes: ranked.iter().map(|r| r.ranking.class).collect(),
         precision_recall: ranked.iter().map(precision_recall).collect(),
-        f1: ranked.iter().map(f1).collect(),
+        f1,
         best_confidence: confidence(best_confidence(&ranked)),
     }
 }
 
-fn precision_recall(ranked: &Ranked) -> Vec<[f64; 2]> {
+fn precision_recall(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     let all: Vec<[f64; 2]> = ranked.recall.iter().zip(&ranked.precision).map(|(&r, &p)| [r, p]).collect();
     let last = all.len().saturating_sub(1);
     let step = all.len().div_ceil(POINTS).max(1);
     all.into_iter().enumerate().filter(|(i, _)| i % step == 0 || *i == last).map(|(_, p)| p).collect()
 }
 
-fn f1(ranked: &Ranked) -> Vec<[f64; 2]> {
+fn mean_precision(ranked: &[Ranked<'_>]) -> Vec<[f64; 2]> {
+    let read = |r: &Ranked<'_>| -> Vec<[f64; 2]> {
+        let samples = average::samples(&r.recall, &r.precision);
+        samples.into_iter().enumerate().map(|(i, precision)| [average::recall_at(i), precision]).collect()
+    };
+    mean_over(&ranked.iter().map(read).collect::<Vec<_>>())
+}
+
+/// The mean of curves with points at the same places.
+fn mean_over(curves: &[Vec<[f64; 2]>]) -> Vec<[f64; 2]> {
+    let Some(first) = curves.first() else { return Vec::new() };
+    let point = |(i, [x, _]): (usize, &[f64; 2])| [*x, mean(curves.iter().map(|curve| curve[i][1]))];
+    first.iter().enumerate().map(point).collect()
+}
+
+fn f1(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     let at = |i| [confidence(i), ranked.f1_at(confidence(i))];
     (0..CONFIDENCES).step_by(CONFIDENCES / POINTS).map(at).collect()
 }
@@ -59,5 +82,7 @@ mod tests {
         assert!(f1(0.3) > 0.99 && f1(0.9) < 0.01);
         assert!(curves.best_confidence < 0.6);
         assert_eq!(curves.precision_recall, [[[1.0, 1.0]]]);
+        assert!(curves.mean_precision.len() == 101 && curves.mean_precision.iter().all(|p| p[1] == 1.0));
+        assert_eq!(curves.mean_f1, curves.f1[0]);
     }
 }

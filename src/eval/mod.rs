@@ -7,11 +7,15 @@
 
 mod average;
 mod bootstrap;
+mod by_class;
 mod coco;
 mod coco_json;
 mod confusion;
 mod curve;
+mod matches;
+mod mistake;
 mod overlap;
+mod pairing;
 mod picture;
 mod rank;
 mod tag;
@@ -21,17 +25,23 @@ mod yolov5;
 pub use bootstrap::{Interval, bootstrap};
 pub(crate) use bootstrap::{drawn, interval};
 pub use coco::{AreaRange, CocoScores, MAX_DETECTIONS, coco};
+pub(crate) use coco_json::sheets_of as coco_sheets;
 pub use coco_json::{CocoTruth, read_coco_results, read_coco_truth};
 pub use confusion::{Confusion, ConfusionOptions};
 pub use curve::{Curves, curves};
+pub use matches::Matches;
+pub use mistake::{Kind, Mistake, mistakes};
 pub use overlap::iou;
-pub use picture::{confusion_picture, f1_picture, precision_recall_picture};
+pub(crate) use picture::class_name;
+pub use picture::{CURVES_SHOWN, confusion_picture, f1_picture, precision_recall_picture};
 pub use tag::{Tags, read_tags};
+pub(crate) use yolo::sheet_of as yolo_sheet;
 pub use yolo::{YoloTruth, read_yolo_found, read_yolo_truth};
 pub use yolov5::yolov5;
 
 use crate::label::BBox;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// Number of thresholds of intersection over union: 0.50 to 0.95 in steps of 0.05.
 pub const THRESHOLDS: usize = 10;
@@ -70,6 +80,25 @@ pub struct Sheet {
     /// What was found, in any order.
     pub found: Vec<FoundBox>,
 }
+
+impl Sheet {
+    /// An image in which nothing was found yet.
+    pub fn new(image: impl Into<String>, truth: Vec<TrueBox>) -> Self {
+        Self { image: image.into(), truth, found: Vec::new() }
+    }
+}
+
+/// Where the picture of a sheet is, to be shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// The file.
+    pub path: PathBuf,
+    /// Width and height that the sheet's boxes are told in, pixels.
+    pub size: [f64; 2],
+}
+
+/// Boxes lie within so many pixels of the picture's corner: areas then are numbers, and so are overlaps.
+const FARTHEST_PX: f64 = 1e9;
 
 /// Which average precision is meant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -136,10 +165,7 @@ impl ClassScores {
 /// # Panics
 /// When there are weights and not one per sheet.
 pub fn evaluate(sheets: &[Sheet], definition: Definition, weights: &[u32]) -> Scores {
-    match definition {
-        Definition::Yolov5 => yolov5(sheets, weights),
-        Definition::Coco => coco(sheets, weights).scores,
-    }
+    Matches::new(sheets, definition).scores(weights)
 }
 
 /// 0.50, 0.55 .. 0.95, as NumPy's `linspace` gives them.

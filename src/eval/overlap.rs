@@ -24,10 +24,66 @@ pub(super) fn share(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { part / whole } else { 0.0 }
 }
 
+/// Boxes to be asked which of them overlap another one, without looking at each.
+pub(super) struct BoxIndex {
+    boxes: Vec<BBox>,
+    /// Places in `boxes`, in order of their left edges.
+    order: Vec<usize>,
+    /// The greatest right edge of the boxes up to each place of the order.
+    reach: Vec<f64>,
+}
+
+impl BoxIndex {
+    /// So few are looked at one by one.
+    const FEW: usize = 24;
+
+    pub(super) fn new(boxes: impl IntoIterator<Item = BBox>) -> Self {
+        let boxes: Vec<BBox> = boxes.into_iter().collect();
+        let mut order: Vec<usize> = if boxes.len() > Self::FEW { (0..boxes.len()).collect() } else { Vec::new() };
+        order.sort_by(|&a, &b| boxes[a].x0.total_cmp(&boxes[b].x0));
+        let farthest = |reach: &mut f64, &i: &usize| {
+            *reach = reach.max(boxes[i].x1);
+            Some(*reach)
+        };
+        let reach = order.iter().scan(f64::NEG_INFINITY, farthest).collect();
+        Self { boxes, order, reach }
+    }
+
+    /// Those that share more than an edge with a box, in order.
+    pub(super) fn near(&self, b: &BBox) -> Vec<usize> {
+        let overlaps = |i: &usize| self.boxes[*i].overlaps(b);
+        if self.order.is_empty() {
+            return (0..self.boxes.len()).filter(overlaps).collect();
+        }
+        let end = self.order.partition_point(|&i| self.boxes[i].x0 < b.x1);
+        let start = self.reach[..end].partition_point(|&reach| reach <= b.x0);
+        let mut near: Vec<usize> = self.order[start..end].iter().copied().filter(overlaps).collect();
+        near.sort_unstable();
+        near
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::bbox;
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+        #[test]
+        fn the_index_finds_what_looking_at_each_finds(
+            sides in prop::collection::vec([-20_i32..120, -20..120, -3..60, -3..60], 0..80),
+            asked in [-20_i32..120, -20..120, -3..60, -3..60],
+        ) {
+            let made = |[x, y, w, h]: [i32; 4]| bbox(x.into(), y.into(), w.into(), h.into());
+            let (boxes, asked): (Vec<BBox>, BBox) = (sides.into_iter().map(made).collect(), made(asked));
+            let near = BoxIndex::new(boxes.iter().copied()).near(&asked);
+            let sharing: Vec<usize> = (0..boxes.len()).filter(|&i| intersection(&boxes[i], &asked) > 0.0).collect();
+            prop_assert!(sharing.iter().all(|i| near.contains(i)), "{near:?} without some of {sharing:?}");
+            prop_assert!(near.is_sorted() && near.iter().all(|&i| boxes[i].overlaps(&asked)));
+        }
+    }
 
     #[test]
     fn overlap_is_symmetric_and_one_only_for_the_same_box() {

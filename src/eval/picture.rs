@@ -1,83 +1,205 @@
 //! Curves and the confusion matrix as SVG.
 
 use super::{Confusion, Curves};
-use crate::report::{Axis, Chart, escaped};
+use crate::report::{Axis, Chart, clipped, escaped};
+use std::collections::BTreeMap;
+use std::fmt::Write;
 
-/// Side of a cell of the matrix, and room for names, in SVG units.
-const CELL: f64 = 56.0;
+/// Widest and narrowest side of a cell of the matrix, what all of them may take, and room for names, in SVG units.
+const CELL: [f64; 2] = [26.0, 56.0];
+const CELLS: f64 = 900.0;
 const NAMES: f64 = 150.0;
 
-/// Precision over recall, a curve per class.
-pub fn precision_recall_picture(curves: &Curves, names: &[String]) -> String {
-    picture("precision and recall at IoU 0.5", ["recall", "precision"], &curves.precision_recall, curves, names)
+/// So many letters of a name have room beside the matrix, and beside a chart.
+const LETTERS: usize = 20;
+
+/// So many classes have a curve of their own beside the mean: colours are not told apart beyond.
+pub const CURVES_SHOWN: usize = 7;
+
+/// Precision over recall: the mean of all classes, and the first of the classes to be `shown`.
+pub fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
+    let lines = (&curves.mean_precision, &curves.precision_recall[..]);
+    picture("precision and recall at IoU 0.5", ["recall", "precision"], lines, curves, names, shown)
 }
 
-/// F1 over confidence, a curve per class.
-pub fn f1_picture(curves: &Curves, names: &[String]) -> String {
+/// F1 over confidence, for the same classes.
+pub fn f1_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
     let title = format!("F1 at IoU 0.5, best mean at confidence {:.3}", curves.best_confidence);
-    picture(&title, ["confidence", "F1"], &curves.f1, curves, names)
+    picture(&title, ["confidence", "F1"], (&curves.mean_f1, &curves.f1[..]), curves, names, shown)
 }
 
-fn picture(title: &str, axes: [&str; 2], lines: &[Vec<[f64; 2]>], curves: &Curves, names: &[String]) -> String {
+type Line = Vec<[f64; 2]>;
+
+fn picture(
+    title: &str,
+    axes: [&str; 2],
+    (mean, lines): (&Line, &[Line]),
+    curves: &Curves,
+    names: &[String],
+    shown: &[u32],
+) -> String {
     let [across, up] = axes.map(|title| Axis { title: title.into(), range: [0.0, 1.0], logarithmic: false });
-    let names = curves.classes.iter().map(|&class| class_name(class as usize, names)).collect();
-    let chart = Chart { title: title.into(), names, across, up, curves: lines.to_vec(), defaults: Vec::new() };
+    let place = |class: &u32| curves.classes.binary_search(class).ok();
+    let places: Vec<usize> = shown.iter().filter_map(place).take(CURVES_SHOWN).collect();
+    let mut chart = Chart { title: title.into(), across, up, ..Default::default() };
+    if curves.classes.len() > 1 {
+        chart.names.push(format!("mean of {} classes", curves.classes.len()));
+        chart.curves.push(mean.clone());
+    }
+    for place in places {
+        chart.names.push(clipped(&class_name(curves.classes[place], names), LETTERS));
+        chart.curves.push(lines[place].clone());
+    }
     Chart::row(&[chart])
 }
 
-/// Found against true classes: each column's shares as shades, counts in words.
-pub fn confusion_picture(confusion: &Confusion, names: &[String]) -> String {
-    let n = confusion.counts.len();
-    let side = NAMES + CELL * n as f64;
+/// Found against true classes, those to be `shown`: each column's shares as shades, counts in words. Others share a row
+/// and a column, and so does the background.
+pub fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32]) -> String {
+    let matrix = Matrix::new(confusion, names, shown);
+    let n = matrix.titles.len();
+    let cell = (CELLS / n as f64).clamp(CELL[0], CELL[1]);
+    let side = NAMES + cell * n as f64;
     // The turned name of the last column reaches beyond it.
     let width = side + NAMES / 2.0;
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{side}\" font-family=\"sans-serif\" \
-         font-size=\"12\">\n<rect width=\"{width}\" height=\"{side}\" fill=\"white\"/>\n"
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {side}\" width=\"{width}\" height=\"{side}\" \
+         font-family=\"sans-serif\" font-size=\"{:.1}\">\n<rect width=\"{width}\" height=\"{side}\" fill=\"white\"/>\n",
+        (0.42 * cell).min(12.0)
     );
-    svg += &word([NAMES / 2.0, 20.0], "middle", "found, down; true, across", "");
-    for i in 0..n {
-        let name = if i + 1 == n { "background".into() } else { class_name(i, names) };
-        let middle = NAMES + CELL * (i as f64 + 0.5);
-        svg += &word([NAMES / 2.0, middle + 4.0], "middle", &name, "");
-        let turned = format!(" transform=\"rotate(-40 {middle} {})\"", NAMES - 8.0);
-        svg += &word([middle, NAMES - 8.0], "start", &name, &turned);
-        for j in 0..n {
-            svg += &cell(confusion, i, j);
-        }
+    svg += &word([8.0, 20.0], "start", "found, down; true, across", "");
+    for (i, title) in matrix.titles.iter().enumerate() {
+        let (middle, short) = (NAMES + cell * (i as f64 + 0.5), clipped(title, LETTERS));
+        svg += &word([NAMES - 8.0, middle + 4.0], "end", &short, "");
+        let turned = format!(" transform=\"rotate(-40 {middle:.1} {})\"", NAMES - 8.0);
+        svg += &word([middle, NAMES - 8.0], "start", &short, &turned);
     }
+    svg += &matrix.lines(cell);
+    matrix.counts.iter().for_each(|(&at, &count)| svg += &matrix.cell(at, count, cell));
     svg + "</svg>\n"
 }
 
-fn cell(confusion: &Confusion, found: usize, truth: usize) -> String {
-    let count = confusion.counts[found][truth];
-    let all: u64 = confusion.counts.iter().map(|row| row[truth]).sum();
-    let share = if all > 0 { count as f64 / all as f64 } else { 0.0 };
-    let [x, y] = [truth, found].map(|i| NAMES + CELL * i as f64);
-    let light = 255.0 - 200.0 * share;
-    let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
-    format!(
-        "<rect x=\"{x}\" y=\"{y}\" width=\"{CELL}\" height=\"{CELL}\" fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"/>\n"
-    ) + &word([x + CELL / 2.0, y + CELL / 2.0 + 4.0], "middle", &count.to_string(), ink)
+/// A confusion as a table that is not longer than can be shown.
+struct Matrix {
+    /// What the rows and columns are.
+    titles: Vec<String>,
+    /// By column and row; what never happened is left out.
+    counts: BTreeMap<[usize; 2], u64>,
+    /// Sum of each column.
+    sums: Vec<u64>,
+}
+
+impl Matrix {
+    fn new(confusion: &Confusion, names: &[String], shown: &[u32]) -> Self {
+        let mut titles: Vec<String> = shown.iter().map(|&class| class_name(class, names)).collect();
+        let others = confusion.classes().iter().filter(|class| !shown.contains(class)).count();
+        if others > 0 {
+            titles.push(format!("{others} others"));
+        }
+        titles.push("background".into());
+        let places: BTreeMap<u32, usize> = shown.iter().copied().zip(0..).collect();
+        let background = titles.len() - 1;
+        let place = |class: Option<u32>| match class {
+            None => background,
+            Some(class) => places.get(&class).copied().unwrap_or(background - 1),
+        };
+        let (mut counts, mut sums) = (BTreeMap::new(), vec![0; titles.len()]);
+        for (&[found, truth], &count) in &confusion.counts {
+            *counts.entry([place(truth), place(found)]).or_default() += count;
+            sums[place(truth)] += count;
+        }
+        Self { titles, counts, sums }
+    }
+
+    fn lines(&self, cell: f64) -> String {
+        let n = self.titles.len();
+        let all = cell * n as f64;
+        let line = |i: usize| {
+            let at = NAMES + cell * i as f64;
+            format!("M{at:.1} {NAMES}v{all:.1}M{NAMES} {at:.1}h{all:.1}")
+        };
+        let lines: String = (0..=n).map(line).collect();
+        format!("<path d=\"{lines}\" stroke=\"#ddd\" fill=\"none\"/>\n")
+    }
+
+    fn cell(&self, [column, row]: [usize; 2], count: u64, cell: f64) -> String {
+        let share = count as f64 / self.sums[column] as f64;
+        let [x, y] = [column, row].map(|i| NAMES + cell * i as f64);
+        let light = 255.0 - 200.0 * share;
+        let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
+        let mut svg = String::new();
+        let told = format!("found {}, true {}: {count}", self.titles[row], self.titles[column]);
+        let _ = writeln!(
+            svg,
+            "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{cell:.1}\" height=\"{cell:.1}\" \
+             fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"><title>{}</title></rect>",
+            escaped(&told)
+        );
+        svg + &word([x + cell / 2.0, y + cell / 2.0 + 4.0], "middle", &short(count), ink)
+    }
+}
+
+/// A count in four letters at most, up to a thousand million.
+fn short(count: u64) -> String {
+    match count {
+        0..10_000 => count.to_string(),
+        10_000..1_000_000 => format!("{}k", count / 1_000),
+        _ => format!("{}M", count / 1_000_000),
+    }
 }
 
 fn word([x, y]: [f64; 2], anchor: &str, text: &str, more: &str) -> String {
     format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n", escaped(text))
 }
 
-fn class_name(class: usize, names: &[String]) -> String {
-    names.get(class).cloned().unwrap_or_else(|| format!("class {class}"))
+/// What a class is called: by number where it has no name.
+pub(crate) fn class_name(class: u32, names: &[String]) -> String {
+    names.get(class as usize).cloned().unwrap_or_else(|| format!("class {class}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn confusion(counts: &[([Option<u32>; 2], u64)]) -> Confusion {
+        Confusion { counts: counts.iter().copied().collect() }
+    }
+
     #[test]
-    fn the_matrix_has_a_cell_for_every_pair_and_keeps_names_as_text() {
-        let confusion = Confusion { counts: vec![vec![3, 0], vec![1, 0]] };
-        let svg = confusion_picture(&confusion, &["<cap>".into()]);
-        assert_eq!(svg.matches("stroke=\"#ccc\"").count(), 4);
+    fn the_matrix_has_a_cell_for_what_happened_and_keeps_names_as_text() {
+        let some = confusion(&[([Some(0), Some(0)], 3), ([None, Some(0)], 1)]);
+        let svg = confusion_picture(&some, &["<cap>".into()], &[0]);
+        assert_eq!(svg.matches("stroke=\"#ccc\"").count(), 2);
         assert!(svg.contains("&lt;cap&gt;") && svg.contains(">3</text>") && !svg.contains("NaN"));
+    }
+
+    #[test]
+    fn what_is_not_shown_is_counted_as_others() {
+        let many: Vec<_> = (0..2000).map(|class| ([Some(class), Some(class)], 1)).collect();
+        let matrix = Matrix::new(&confusion(&many), &[], &[7, 1999]);
+        assert_eq!(matrix.titles, ["class 7", "class 1999", "1998 others", "background"]);
+        assert_eq!(matrix.counts, BTreeMap::from([([0, 0], 1), ([1, 1], 1), ([2, 2], 1998)]));
+        assert!(
+            confusion_picture(&confusion(&many), &["x".repeat(10_000)], &(0..50).collect::<Vec<_>>()).len() < 100_000
+        );
+    }
+
+    #[test]
+    fn counts_stay_in_their_cells() {
+        assert_eq!([7, 9_999, 12_345, 7_654_321].map(short), ["7", "9999", "12k", "7M"]);
+    }
+
+    #[test]
+    fn of_many_classes_the_mean_and_a_few_have_a_curve() {
+        let line = vec![[0.0, 1.0], [1.0, 0.5]];
+        let curves = Curves {
+            classes: (0..1000).collect(),
+            precision_recall: vec![line.clone(); 1000],
+            mean_precision: line,
+            ..Default::default()
+        };
+        let svg = precision_recall_picture(&curves, &[], &(0..50).collect::<Vec<_>>());
+        assert_eq!(svg.matches("<polyline").count(), 1 + CURVES_SHOWN);
+        assert!(svg.contains("mean of 1000 classes"));
     }
 }

@@ -1,7 +1,8 @@
 //! Detections of one class from all images, the surest first.
 
-use super::{Sheet, THRESHOLDS};
-use std::collections::BTreeSet;
+use super::THRESHOLDS;
+use super::by_class::{ClassBoxes, ImageBoxes};
+use rayon::prelude::*;
 
 /// Bits, one per threshold.
 pub(super) type Marks = u16;
@@ -12,6 +13,8 @@ pub(super) struct Hit {
     pub(super) confidence: f64,
     /// Which sheet it is from.
     pub(super) sheet: usize,
+    /// How many of its class and image are surer.
+    pub(super) place: u32,
     /// Thresholds at which it found something.
     pub(super) right: Marks,
     /// Thresholds at which it counts for nobody.
@@ -19,65 +22,187 @@ pub(super) struct Hit {
 }
 
 /// Running sums of true and false positives at one threshold, the surest detection first.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Running {
     pub(super) right: Vec<f64>,
     pub(super) wrong: Vec<f64>,
 }
 
-/// How often an image counts.
-pub(super) fn weight(weights: &[u32], sheet: usize) -> f64 {
-    if weights.is_empty() { 1.0 } else { f64::from(weights[sheet]) }
+/// The detections of a class, held against the truth once: they can be counted for any weights of the images.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ranking {
+    pub(super) class: u32,
+    /// Sheets with boxes to be found, and how many.
+    truths: Vec<(usize, usize)>,
+    /// The surest first; equal ones in the order of images.
+    pub(super) hits: Vec<Hit>,
 }
 
-/// The surest first; equal ones keep their order.
-pub(super) fn sort(hits: &mut [Hit]) {
-    hits.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-}
-
-/// Sums at a threshold. Images that do not count are left out.
-pub(super) fn running(hits: &[Hit], threshold: usize, weights: &[u32]) -> Running {
-    debug_assert!(threshold < THRESHOLDS);
-    let (mut right, mut wrong) = (0.0, 0.0);
-    let mut sums = Running { right: Vec::with_capacity(hits.len()), wrong: Vec::with_capacity(hits.len()) };
-    for hit in hits {
-        let count = weight(weights, hit.sheet);
-        if count == 0.0 {
-            continue;
-        }
-        let bit = |marks: Marks| marks >> threshold & 1 == 1;
-        match (bit(hit.ignored), bit(hit.right)) {
-            (true, _) => {}
-            (_, true) => right += count,
-            _ => wrong += count,
-        }
-        sums.right.push(right);
-        sums.wrong.push(wrong);
+impl Ranking {
+    /// `held` gives the detections of an image, held against its boxes, and how many of those there are to be found.
+    pub(super) fn new(
+        boxes: &ClassBoxes<'_>,
+        held: impl Fn(&ImageBoxes<'_>) -> (Vec<Hit>, usize) + Send + Sync,
+    ) -> Self {
+        let images = boxes.images();
+        let each: Vec<(Vec<Hit>, usize)> = images.par_iter().map(held).collect();
+        let counted = images.iter().zip(&each).map(|(image, (_, count))| (image.sheet, *count));
+        let truths = counted.filter(|&(_, count)| count > 0).collect();
+        let mut hits: Vec<Hit> = each.into_iter().flat_map(|(hits, _)| hits).collect();
+        hits.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        Self { class: boxes.class, truths, hits }
     }
-    sums
+
+    /// How many boxes there are to be found.
+    pub(super) fn truths(&self, weights: &[u32]) -> f64 {
+        self.truths.iter().map(|&(sheet, count)| weight(weights, sheet) * count as f64).sum()
+    }
+
+    /// Those of images that count.
+    pub(super) fn counting(&self, weights: &[u32]) -> impl Iterator<Item = (&Hit, f64)> {
+        self.hits.iter().map(|hit| (hit, weight(weights, hit.sheet))).filter(|(_, count)| *count > 0.0)
+    }
+
+    /// Sums at a threshold after each detection that counts.
+    pub(super) fn running(&self, threshold: usize, weights: &[u32]) -> Running {
+        debug_assert!(threshold < THRESHOLDS);
+        let (mut right, mut wrong, mut sums) = (0.0, 0.0, Running::default());
+        let bit = |marks: Marks| marks >> threshold & 1 == 1;
+        for (hit, count) in self.counting(weights) {
+            match (bit(hit.ignored), bit(hit.right)) {
+                (true, _) => {}
+                (_, true) => right += count,
+                _ => wrong += count,
+            }
+            sums.push(right, wrong);
+        }
+        sums
+    }
+
+    /// Sums at every threshold where a precision curve can turn: at each true positive, before it, and at the end.
+    ///
+    /// Between two true positives precision falls with every detection and recall stands still. So of those only the last
+    /// is ever read, and the envelope of precision is that of all of them.
+    pub(super) fn turns(&self, weights: &[u32]) -> [Running; THRESHOLDS] {
+        let mut sums: [Running; THRESHOLDS] = Default::default();
+        let (mut right, mut ignored, mut all) = ([0.0; THRESHOLDS], [0.0; THRESHOLDS], 0.0);
+        for (hit, count) in self.counting(weights) {
+            for t in marked(hit.ignored) {
+                ignored[t] += count;
+            }
+            for t in marked(hit.right & !hit.ignored) {
+                sums[t].turn(right[t], all - right[t] - ignored[t]);
+                right[t] += count;
+                sums[t].push(right[t], all + count - right[t] - ignored[t]);
+            }
+            all += count;
+        }
+        for t in 0..THRESHOLDS {
+            sums[t].turn(right[t], all - right[t] - ignored[t]);
+        }
+        sums
+    }
 }
 
-/// The classes that occur, in order.
-pub(super) fn classes(sheets: &[Sheet]) -> Vec<u32> {
-    let all: BTreeSet<u32> = sheets.iter().flat_map(|s| s.truth.iter().map(|t| t.class)).collect();
-    all.into_iter().collect()
+impl Running {
+    fn push(&mut self, right: f64, wrong: f64) {
+        self.right.push(right);
+        self.wrong.push(wrong);
+    }
+
+    /// Adds sums that are others than the last ones.
+    fn turn(&mut self, right: f64, wrong: f64) {
+        let last = self.right.last().copied().zip(self.wrong.last().copied()).unwrap_or_default();
+        if last != (right, wrong) {
+            self.push(right, wrong);
+        }
+    }
+}
+
+/// The thresholds that are marked.
+fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let next = (marks != 0).then(|| marks.trailing_zeros() as usize)?;
+        marks &= marks - 1;
+        Some(next)
+    })
+}
+
+/// How often an image counts.
+fn weight(weights: &[u32], sheet: usize) -> f64 {
+    if weights.is_empty() { 1.0 } else { f64::from(weights[sheet]) }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::average::{mean_of_samples, recall_and_precision, trapezoid};
+    use super::super::by_class::ByClass;
+    use super::super::tests::{bbox, found, sheet, there};
     use super::*;
+    use proptest::prelude::*;
+
+    fn ranking(hits: Vec<Hit>) -> Ranking {
+        Ranking { class: 0, truths: vec![(0, 9)], hits }
+    }
+
+    fn hit(right: Marks, ignored: Marks) -> Hit {
+        Hit { confidence: 0.5, sheet: 0, place: 0, right, ignored }
+    }
 
     #[test]
     fn equal_confidences_keep_their_order() {
-        let hit = |confidence, sheet| Hit { confidence, sheet, right: 0, ignored: 0 };
-        let mut hits = [hit(0.5, 0), hit(0.9, 1), hit(0.5, 2)];
-        sort(&mut hits);
-        assert_eq!(hits.map(|h| h.sheet), [1, 0, 2]);
+        let b = bbox(0.0, 0.0, 9.0, 9.0);
+        let sheets = [0.5, 0.9, 0.5].map(|c| sheet(vec![there(0, b)], vec![found(0, b, c)]));
+        let held = |image: &ImageBoxes<'_>| {
+            let hits = image.found.iter().map(|f| Hit { confidence: f.confidence, sheet: image.sheet, ..hit(0, 0) });
+            (hits.collect(), image.truth.len())
+        };
+        let ranking = Ranking::new(&ByClass::new(&sheets).classes()[0], held);
+        assert_eq!(ranking.hits.iter().map(|h| h.sheet).collect::<Vec<_>>(), [1, 0, 2]);
+        assert_eq!((ranking.truths(&[]), ranking.truths(&[1, 0, 3])), (3.0, 4.0));
     }
 
     #[test]
     fn ignored_detections_move_neither_sum() {
-        let hits = [(1, 0), (0, 1), (0, 0)].map(|(right, ignored)| Hit { confidence: 0.5, sheet: 0, right, ignored });
-        let sums = running(&hits, 0, &[]);
+        let all = ranking([(1, 0), (0, 1), (0, 0)].map(|(right, ignored)| hit(right, ignored)).to_vec());
+        let sums = all.running(0, &[]);
         assert_eq!((sums.right, sums.wrong), (vec![1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0]));
+        let turns = &all.turns(&[])[0];
+        assert_eq!((&turns.right[..], &turns.wrong[..]), (&[1.0, 1.0][..], &[0.0, 1.0][..]));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+        #[test]
+        fn the_turns_of_a_curve_give_the_bits_that_all_of_it_gives(
+            drawn in prop::collection::vec((0_u16..1024, 0_u16..1024, 0_u16..5, 0_usize..4), 0..60),
+            weights in prop::collection::vec(0_u32..3, 4),
+            rare in 0_u16..5,
+        ) {
+            // Most detections are wrong, as in life, and what is right at a threshold is so at those below.
+            let made = |&(right, ignored, kind, sheet): &(u16, u16, u16, usize)| {
+                let right = if kind < rare { 0 } else { right };
+                Hit { sheet, ..hit(right & !ignored, if kind == 4 { ignored } else { 0 }) }
+            };
+            let all = ranking(drawn.iter().map(made).collect());
+            let truths = 60.0;
+            for (t, turns) in all.turns(&weights).iter().enumerate() {
+                let whole = all.running(t, &weights);
+                for epsilon in [[1e-16, 0.0], [0.0, f64::EPSILON]] {
+                    // YOLOv5's definition ignores nothing.
+                    let ignores = all.hits.iter().any(|h| h.ignored != 0);
+                    if whole.right.is_empty() || (epsilon[1] == 0.0 && ignores) {
+                        continue;
+                    }
+                    let [(r, p), (few_r, few_p)] = [&whole, turns].map(|sums| recall_and_precision(sums, truths, epsilon));
+                    prop_assert_eq!(mean_of_samples(&r, &p), mean_of_samples(&few_r, &few_p));
+                    if !ignores {
+                        prop_assert_eq!(trapezoid(&r, &p), trapezoid(&few_r, &few_p));
+                    }
+                    prop_assert_eq!(r.last().copied().unwrap_or(0.0), few_r.last().copied().unwrap_or(0.0));
+                    prop_assert_eq!(p.last().copied().unwrap_or(0.0), few_p.last().copied().unwrap_or(0.0));
+                }
+            }
+        }
     }
 }

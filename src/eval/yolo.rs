@@ -1,9 +1,10 @@
 //! Reads truth and detections from folders of YOLO text files.
 
-use super::{FoundBox, Sheet, TrueBox};
+use super::{FoundBox, Picture, Sheet, TrueBox};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::BBox;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,8 @@ pub struct YoloTruth {
     pub sheets: Vec<Sheet>,
     /// Width and height of each image, pixels.
     pub sizes: Vec<[u32; 2]>,
+    /// The images, where they are found.
+    pub pictures: Vec<Option<Picture>>,
 }
 
 /// Reads `NAME.txt` of a folder of labels: `class cx cy w h`, shares of the image, one box a line; outlines
@@ -25,15 +28,22 @@ pub struct YoloTruth {
 /// # Errors
 /// [`Error::File`] for a folder without labels, a label without an image where no `size` is given, or a bad line.
 pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTruth> {
-    let mut truth = YoloTruth::default();
-    for (name, path) in texts(labels)? {
-        let size = size.map_or_else(|| image_size(labels, &name), Ok)?;
-        let boxes = rows(&path, 0)?.into_iter().map(|row| row.truth(size)).collect();
-        truth.sheets.push(Sheet { image: name, truth: boxes, found: Vec::new() });
-        truth.sizes.push(size);
-    }
-    if truth.sheets.is_empty() {
+    let one = |(name, path): (&String, &PathBuf)| {
+        let image = image_of(labels, name);
+        let size = size.map_or_else(|| image_size(labels, name, image.as_deref()), Ok)?;
+        let boxes = rows(path, 0)?.into_iter().map(|row| row.truth(size)).collect();
+        let picture = image.map(|path| Picture { path, size: size.map(f64::from) });
+        Ok((Sheet::new(name, boxes), size, picture))
+    };
+    let all: Vec<_> = texts(labels)?.par_iter().map(one).collect::<Result<_>>()?;
+    if all.is_empty() {
         return Err(Error::file(labels, "no label files, expected NAME.txt"));
+    }
+    let mut truth = YoloTruth::default();
+    for (sheet, size, picture) in all {
+        truth.sheets.push(sheet);
+        truth.sizes.push(size);
+        truth.pictures.push(picture);
     }
     Ok(truth)
 }
@@ -46,13 +56,22 @@ pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTrut
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
 pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
     let known: BTreeMap<String, usize> = truth.sheets.iter().enumerate().map(|(i, s)| (s.image.clone(), i)).collect();
-    for (name, path) in texts(folder)? {
-        let Some(&i) = known.get(&name) else {
-            return Err(Error::file(&path, format!("no image \"{name}\" in the truth of {} images", known.len())));
+    let one = |(name, path): (&String, &PathBuf)| {
+        let Some(&i) = known.get(name) else {
+            return Err(Error::file(path, format!("no image \"{name}\" in the truth of {} images", known.len())));
         };
-        truth.sheets[i].found = rows(&path, 1)?.into_iter().map(|row| row.found(truth.sizes[i])).collect();
-    }
+        Ok((i, rows(path, 1)?.into_iter().map(|row| row.found(truth.sizes[i])).collect()))
+    };
+    let found: Vec<(usize, Vec<FoundBox>)> = texts(folder)?.par_iter().map(one).collect::<Result<_>>()?;
+    found.into_iter().for_each(|(i, found)| truth.sheets[i].found = found);
     Ok(())
+}
+
+/// What a text of labels and one of detections give, for the fuzzers.
+pub(crate) fn sheet_of(truth: &str, found: &str, size: [u32; 2]) -> std::result::Result<Sheet, String> {
+    let truth = rows_of(truth, 0)?.into_iter().map(|row| row.truth(size)).collect();
+    let found = rows_of(found, 1)?.into_iter().map(|row| row.found(size)).collect();
+    Ok(Sheet { found, ..Sheet::new("", truth) })
 }
 
 /// The text files of a folder by their names without extension, in order.
@@ -69,18 +88,30 @@ fn texts(folder: &Path) -> Result<BTreeMap<String, PathBuf>> {
     Ok(texts)
 }
 
-fn image_size(labels: &Path, name: &str) -> Result<[u32; 2]> {
+/// Where YOLO has the images of a folder of labels.
+fn images_of(labels: &Path) -> PathBuf {
     let parts: Vec<_> = labels.components().collect();
     let place = parts.iter().rposition(|part| part.as_os_str() == "labels");
-    let folder: PathBuf = parts
+    parts
         .iter()
         .enumerate()
         .map(|(i, part)| if Some(i) == place { "images".as_ref() } else { part.as_os_str() })
-        .collect();
-    let candidates = ["jpg", "png", "jpeg", "exr", "tif"].map(|ext| folder.join(format!("{name}.{ext}")));
-    let Some(image) = candidates.iter().find(|path| path.is_file()) else {
+        .collect()
+}
+
+/// The image of a label, beside the labels too.
+fn image_of(labels: &Path, name: &str) -> Option<PathBuf> {
+    let folder = images_of(labels);
+    ["jpg", "png", "jpeg", "exr", "tif"]
+        .map(|ext| folder.join(format!("{name}.{ext}")))
+        .into_iter()
+        .find(|p| p.is_file())
+}
+
+fn image_size(labels: &Path, name: &str, image: Option<&Path>) -> Result<[u32; 2]> {
+    let Some(image) = image else {
         let what = format!("no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead");
-        return Err(Error::file(folder, what));
+        return Err(Error::file(images_of(labels), what));
     };
     let header = io::read_header(image)?;
     Ok([header.width as u32, header.height as u32])
@@ -93,12 +124,17 @@ struct Row {
     confidence: f64,
 }
 
+/// Boxes may reach beyond the image, but not so many times its side.
+const FARTHEST: f64 = 10.0;
+
 /// The lines of a file, with `extra` numbers (a confidence or nothing) at their ends.
 fn rows(path: &Path, extra: usize) -> Result<Vec<Row>> {
-    let text = io::read_text(path)?;
+    rows_of(&io::read_text(path)?, extra).map_err(|what| Error::file(path, what))
+}
+
+fn rows_of(text: &str, extra: usize) -> std::result::Result<Vec<Row>, String> {
     let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    let row = |(i, line)| row(line, extra).map_err(|what| Error::file(path, format!("line {}: {what}", i + 1)));
-    lines.map(row).collect()
+    lines.map(|(i, line)| row(line, extra).map_err(|what| format!("line {}: {what}", i + 1))).collect()
 }
 
 fn row(line: &str, extra: usize) -> std::result::Result<Row, String> {
@@ -112,7 +148,11 @@ fn row(line: &str, extra: usize) -> std::result::Result<Row, String> {
     let numbers: Vec<f64> = words.map(number).collect::<std::result::Result<_, _>>()?;
     let Some(count) = numbers.len().checked_sub(extra) else { return Err(too_few(&numbers, extra)) };
     let (place, behind) = numbers.split_at(count);
+    if let Some(far) = place.iter().find(|share| share.abs() > FARTHEST) {
+        return Err(format!("{far}, expected a share of the image, 0 to 1; is it in pixels?"));
+    }
     let shares = match place {
+        &[_, _, w, h] if w < 0.0 || h < 0.0 => return Err(format!("a box of {w} x {h}, expected sides of at least 0")),
         &[cx, cy, w, h] => BBox { x0: cx - w / 2.0, y0: cy - h / 2.0, x1: cx + w / 2.0, y1: cy + h / 2.0 },
         outline if outline.len() >= 6 && outline.len().is_multiple_of(2) => {
             BBox::around(outline.chunks_exact(2).map(|p| crate::geom::Point2::new(p[0], p[1])))
@@ -182,6 +222,10 @@ mod tests {
         assert!(said("0 0.5 0.5 0.1\n").contains("a.txt: line 1: 3 numbers behind the class"));
         assert!(said("0 0.5 0.5 0.1 0.1\ncap 0 0 0 0\n").contains("line 2: class \"cap\""));
         assert!(said("0 0.5 NaN 0.1 0.1").contains("\"NaN\", expected a number"));
+        assert!(said("0 0.5 1e999 0.1 0.1").contains("\"1e999\", expected a number"));
+        assert!(said("0 320 240 100 80").contains("320, expected a share of the image, 0 to 1; is it in pixels?"));
+        assert!(said("0 0.5 0.5 -0.1 0.1").contains("a box of -0.1 x 0.1, expected sides of at least 0"));
+        assert!(said("4294967296 0.5 0.5 0.1 0.1").contains("class \"4294967296\", expected 0, 1, .."));
     }
 
     #[test]

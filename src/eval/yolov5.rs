@@ -1,8 +1,10 @@
 //! Average precision as YOLOv5 computes it.
 
 use super::average::{interpolated, recall_and_precision, trapezoid};
-use super::rank::{self, Hit, Marks, Running};
-use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox};
+use super::by_class::{ByClass, ImageBoxes};
+use super::overlap::BoxIndex;
+use super::rank::{Hit, Marks, Ranking, Running};
+use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS};
 use crate::label::BBox;
 use rayon::prelude::*;
 
@@ -29,50 +31,60 @@ const SMOOTHING: usize = 50;
 /// When there are weights and not one per sheet.
 pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
     assert!(weights.is_empty() || weights.len() == sheets.len(), "one weight per sheet");
-    let classes: Vec<_> = rank::classes(sheets).into_iter().filter_map(|c| Ranked::new(sheets, c, weights)).collect();
+    scores(&rankings(sheets), weights)
+}
+
+/// The detections of every class with something to find.
+pub(super) fn rankings(sheets: &[Sheet]) -> Vec<Ranking> {
+    ByClass::new(sheets).classes().par_iter().map(|boxes| Ranking::new(boxes, held_against)).collect()
+}
+
+pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
+    let classes = ranked(rankings, weights);
     let best = best_confidence(&classes);
     let scores = classes.par_iter().map(|class| class.scores(best, weights)).collect();
     Scores { definition: Definition::Yolov5, classes: scores }
 }
 
-/// The detections of a class with something to find.
-pub(super) struct Ranked {
-    pub(super) class: u32,
-    pub(super) truths: f64,
-    hits: Vec<Hit>,
-    /// At threshold 0.5.
+/// Average precision of a class at every threshold; none where there is nothing to find.
+pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f64; THRESHOLDS]> {
+    let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
+    let area = |sums: &Running| {
+        let (recall, precision) = curve(sums, truths);
+        if recall.is_empty() { 0.0 } else { trapezoid(&recall, &precision) }
+    };
+    Some(ranking.turns(weights).each_ref().map(area))
+}
+
+/// The classes with something to find, to be read at a confidence.
+pub(super) fn ranked<'a>(rankings: &'a [Ranking], weights: &[u32]) -> Vec<Ranked<'a>> {
+    rankings.par_iter().filter_map(|ranking| Ranked::new(ranking, weights)).collect()
+}
+
+/// The precision and recall of a class over confidence, at threshold 0.5.
+pub(super) struct Ranked<'a> {
+    pub(super) ranking: &'a Ranking,
     pub(super) recall: Vec<f64>,
     pub(super) precision: Vec<f64>,
     /// Negated, so that they rise.
     confidences: Vec<f64>,
 }
 
-impl Ranked {
-    pub(super) fn new(sheets: &[Sheet], class: u32, weights: &[u32]) -> Option<Self> {
-        let counted = |(i, sheet): (usize, &Sheet)| {
-            rank::weight(weights, i) * sheet.truth.iter().filter(|t| t.class == class).count() as f64
-        };
-        let truths: f64 = sheets.iter().enumerate().map(counted).sum();
-        let mut hits: Vec<Hit> =
-            sheets.par_iter().enumerate().flat_map_iter(|(i, sheet)| held_against(sheet, i, class)).collect();
-        rank::sort(&mut hits);
-        let (recall, precision) = curve(&rank::running(&hits, 0, weights), truths);
-        let counting = hits.iter().filter(|h| rank::weight(weights, h.sheet) > 0.0);
-        let confidences = counting.map(|h| -h.confidence).collect();
-        (truths > 0.0).then_some(Self { class, truths, hits, recall, precision, confidences })
+impl<'a> Ranked<'a> {
+    fn new(ranking: &'a Ranking, weights: &[u32]) -> Option<Self> {
+        let truths = ranking.truths(weights);
+        let (recall, precision) = curve(&ranking.running(0, weights), truths);
+        let confidences = ranking.counting(weights).map(|(hit, _)| -hit.confidence).collect();
+        (truths > 0.0).then_some(Self { ranking, recall, precision, confidences })
     }
 
     fn scores(&self, best: usize, weights: &[u32]) -> ClassScores {
-        let ap = |threshold| {
-            let (recall, precision) = curve(&rank::running(&self.hits, threshold, weights), self.truths);
-            if recall.is_empty() { 0.0 } else { trapezoid(&recall, &precision) }
-        };
         ClassScores {
-            class: self.class,
-            truths: self.truths as u64,
+            class: self.ranking.class,
+            truths: self.ranking.truths(weights) as u64,
             precision: self.precision_at(confidence(best)),
             recall: self.recall_at(confidence(best)),
-            ap: std::array::from_fn(ap),
+            ap: average_precision(self.ranking, weights).unwrap_or_default(),
         }
     }
 
@@ -109,7 +121,7 @@ pub(super) fn confidence(i: usize) -> f64 {
 }
 
 /// Where the smoothed mean F1 of the classes is greatest.
-pub(super) fn best_confidence(classes: &[Ranked]) -> usize {
+pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
     let f1 = |i| classes.iter().map(|class| class.f1_at(confidence(i))).sum::<f64>();
     let f1: Vec<f64> = (0..CONFIDENCES).into_par_iter().map(f1).collect();
     let at = |i: isize| f1[i.clamp(0, CONFIDENCES as isize - 1) as usize];
@@ -126,22 +138,23 @@ pub(super) fn best_confidence(classes: &[Ranked]) -> usize {
     best.0
 }
 
-/// The detections of a class in one image, marked right where they found something.
-fn held_against(sheet: &Sheet, place: usize, class: u32) -> impl Iterator<Item = Hit> {
-    let truth: Vec<&TrueBox> = sheet.truth.iter().filter(|t| t.class == class).collect();
-    let mut found: Vec<&FoundBox> = sheet.found.iter().filter(|f| f.class == class).collect();
-    found.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-    let mut taken: Vec<Marks> = vec![0; truth.len()];
-    found.into_iter().map(move |f| {
-        let hit = |right| Hit { confidence: f.confidence, sheet: place, right, ignored: 0 };
-        let overlaps = truth.iter().map(|t| overlap(&t.bbox, &f.bbox)).enumerate();
+/// The detections of a class in one image, marked right where they found something, and how many boxes there are.
+fn held_against(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
+    let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
+    let mut taken: Vec<Marks> = vec![0; image.truth.len()];
+    let hit = |(place, f): (usize, &&FoundBox)| {
+        let overlaps = index.near(&f.bbox).into_iter().map(|t| (t, overlap(&image.truth[t].bbox, &f.bbox)));
         // Of equal overlaps the last: that is how the original's descending sort leaves them.
-        let Some((nearest, most)) = overlaps.max_by(|a, b| a.1.total_cmp(&b.1)) else { return hit(0) };
-        let reached = reached(most);
-        let right = reached & !taken[nearest];
-        taken[nearest] |= reached;
-        hit(right)
-    })
+        let nearest = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
+        let right = nearest.map_or(0, |(nearest, most)| {
+            let reached = reached(most);
+            let right = reached & !taken[nearest];
+            taken[nearest] |= reached;
+            right
+        });
+        Hit { confidence: f.confidence, sheet: image.sheet, place: place as u32, right, ignored: 0 }
+    };
+    (image.found.iter().enumerate().map(hit).collect(), image.truth.len())
 }
 
 /// Intersection over union in single precision.
@@ -169,8 +182,8 @@ mod tests {
     fn the_surer_of_two_that_name_a_box_counts() {
         let b = bbox(0.0, 0.0, 100.0, 100.0);
         let near = bbox(0.0, 0.0, 100.0, 90.0);
-        let hits: Vec<_> =
-            held_against(&sheet(vec![there(0, b)], vec![found(0, b, 0.5), found(0, near, 0.9)]), 0, 0).collect();
+        let sheets = [sheet(vec![there(0, b)], vec![found(0, b, 0.5), found(0, near, 0.9)])];
+        let hits = rankings(&sheets).remove(0).hits;
         assert_eq!(hits[0].confidence, 0.9);
         // The surer one overlaps by 0.9 (just below, with the original's epsilon); the exact one has only the rest.
         assert_eq!((hits[0].right | hits[1].right).count_ones(), 10);

@@ -1,12 +1,14 @@
 //! A detector against the truth: tables, curves and one page; several runs with their spread.
 
-use super::{Page, Table};
+use super::{Page, Table, mistakes};
 use crate::error::Result;
 use crate::eval::{
-    self, CocoScores, Confusion, Definition, Interval, Scores, Sheet, THRESHOLDS, Tags, bootstrap, thresholds,
+    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, Interval, Matches, Picture, Scores, Sheet,
+    THRESHOLDS, Tags, thresholds,
 };
 use crate::io;
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// What one training found.
@@ -29,11 +31,25 @@ pub struct EvalReportOptions {
     pub rounds: usize,
     /// Where its draws come from. Default: 0.
     pub seed: u64,
+    /// Which detections the confusion and the mistakes look at. Default: YOLOv5's.
+    pub confusion: ConfusionOptions,
+    /// The pictures of the sheets, one each or none at all, for mistakes to be shown.
+    pub pictures: Vec<Option<Picture>>,
+    /// Most pictures of mistakes of each kind on the page. Default: 24.
+    pub shown: usize,
 }
 
 impl Default for EvalReportOptions {
     fn default() -> Self {
-        Self { classes: Vec::new(), tags: Tags::default(), rounds: 200, seed: 0 }
+        Self {
+            classes: Vec::new(),
+            tags: Tags::default(),
+            rounds: 200,
+            seed: 0,
+            confusion: ConfusionOptions::default(),
+            pictures: Vec::new(),
+            shown: 24,
+        }
     }
 }
 
@@ -84,18 +100,26 @@ impl Spread {
 impl Metrics {
     /// Scores of a run by both definitions.
     pub fn of(run: &Run, options: &EvalReportOptions) -> Self {
+        let matches = Matches::new(&run.sheets, Definition::Yolov5);
         Self {
             run: run.name.clone(),
             images: run.sheets.len(),
-            map: bootstrap(&run.sheets, Definition::Yolov5, options.rounds, options.seed),
-            yolov5: eval::yolov5(&run.sheets, &[]),
+            map: matches.bootstrap(options.rounds, options.seed),
+            yolov5: matches.scores(&[]),
             coco: eval::coco(&run.sheets, &[]),
         }
+    }
+
+    /// The scores of a class; none of one that is not in the truth.
+    fn class(&self, class: u32) -> Option<&ClassScores> {
+        let classes = &self.yolov5.classes;
+        classes.binary_search_by_key(&class, |c| c.class).ok().map(|i| &classes[i])
     }
 }
 
 /// Evaluates runs and writes `metrics.json` (one run) or `NAME.json` each, `scores.csv`, `classes.csv`, `factors.csv`,
-/// the pictures of the first run as SVG, and everything as one page, `eval.html`.
+/// of the first run `confusion.csv`, `mistakes.csv` and its charts as SVG, and everything as one page, `eval.html`, with
+/// pictures of its worst mistakes.
 ///
 /// # Errors
 /// [`Error::File`](crate::Error::File) for what cannot be written.
@@ -106,22 +130,82 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
         let name = if all.len() == 1 { "metrics.json".into() } else { format!("{}-{}.json", i + 1, metrics.run) };
         io::write_json(folder.join(name), metrics)?;
     }
-    let tables = [
-        ("scores", "Scores", scores_table(&all, options)),
-        ("classes", "Classes", classes_table(&all, options)),
-        ("factors", "Factors", factors_table(runs, options)),
-    ];
     let mut page = Page::new("Detections against the truth");
-    for (name, title, table) in tables.iter().filter(|(.., table)| !table.rows.is_empty()) {
-        io::write_text(folder.join(format!("{name}.csv")), &table.csv())?;
-        page.heading(title).table(table);
-    }
-    for (name, caption, svg) in runs.first().map(|run| pictures(run, options)).into_iter().flatten() {
-        io::write_text(folder.join(format!("{name}.svg")), &svg)?;
-        page.chart(&svg, caption);
+    let mut section = |title: &str, file: &str, table: &Table, shown: &Table| -> Result<()> {
+        if !table.rows.is_empty() {
+            io::write_text(folder.join(file), &table.csv())?;
+            page.heading(title).beginning(shown, MOST_ROWS, file);
+        }
+        Ok(())
+    };
+    let (scores, classes, factors) =
+        (scores_table(&all, options), classes_table(&all, options), factors_table(runs, options));
+    let confusion = runs.first().map(|run| Confusion::new(&run.sheets, &options.confusion)).unwrap_or_default();
+    let shown = shown_classes(&all, &confusion);
+    section("Scores", "scores.csv", &scores, &scores)?;
+    section(&classes_title(&all, &shown), "classes.csv", &classes, &classes_among(&all, options, &shown))?;
+    section("Factors", "factors.csv", &factors, &factors)?;
+    if let Some(run) = runs.first() {
+        put_run(folder, &mut page, run, &confusion, &shown, options)?;
     }
     io::write_text(folder.join("eval.html"), &page.document())?;
     Ok(all)
+}
+
+/// So many classes are shown on the page and on a terminal; the tables (CSV) have all of them.
+const MOST_CLASSES: usize = 50;
+
+/// So many rows of a table are shown on the page.
+const MOST_ROWS: usize = 200;
+
+/// The charts, the confusion and the mistakes of a run.
+fn put_run(
+    folder: &Path,
+    page: &mut Page,
+    run: &Run,
+    confusion: &Confusion,
+    shown: &[u32],
+    options: &EvalReportOptions,
+) -> Result<()> {
+    for (name, caption, svg) in pictures(run, confusion, shown, options) {
+        io::write_text(folder.join(format!("{name}.svg")), &svg)?;
+        page.chart(&svg, &caption);
+    }
+    io::write_text(folder.join("confusion.csv"), &confusion_table(confusion, options).csv())?;
+    let mistakes = eval::mistakes(&run.sheets, &options.confusion);
+    io::write_text(folder.join("mistakes.csv"), &mistakes::table(run, &mistakes, options).csv())?;
+    mistakes::put_on(page, run, &mistakes, options);
+    Ok(())
+}
+
+/// All classes in order, or of many those with the most mistakes, those first.
+fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
+    let known = all.iter().flat_map(|m| m.yolov5.classes.iter().map(|c| c.class)).chain(confusion.classes());
+    let known: BTreeSet<u32> = known.collect();
+    if known.len() <= MOST_CLASSES {
+        known.into_iter().collect()
+    } else {
+        confusion.worst().into_iter().take(MOST_CLASSES).collect()
+    }
+}
+
+fn classes_title(all: &[Metrics], shown: &[u32]) -> String {
+    let count = all.first().map_or(0, |m| m.yolov5.classes.len());
+    let seen = all.first().map_or(0, |m| shown.iter().filter(|class| m.class(**class).is_some()).count());
+    match count - seen {
+        0 => "Classes".into(),
+        others => format!("Classes: the {seen} with the most mistakes; {others} others are in classes.csv"),
+    }
+}
+
+fn confusion_table(confusion: &Confusion, options: &EvalReportOptions) -> Table {
+    let mut table = Table::new(["found", "true", "count"]);
+    let name =
+        |class: Option<u32>| class.map_or("background".into(), |class| eval::class_name(class, &options.classes));
+    for (&[found, truth], count) in &confusion.counts {
+        table.push([name(found), name(truth), count.to_string()]);
+    }
+    table
 }
 
 /// A row per run, and one over all where there are several.
@@ -145,13 +229,37 @@ pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
 
 /// Average precision per class and threshold by the definition of YOLOv5.
 pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
+    let classes: BTreeSet<u32> = all.iter().flat_map(|m| m.yolov5.classes.iter().map(|c| c.class)).collect();
+    classes_among(all, options, &classes.into_iter().collect::<Vec<_>>())
+}
+
+/// The same for a terminal: of many classes those with the lowest average precision, and how many others there are.
+pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table, usize) {
+    let mut classes: BTreeMap<u32, f64> = BTreeMap::new();
+    for class in all.iter().flat_map(|m| &m.yolov5.classes) {
+        let least = classes.entry(class.class).or_insert(f64::INFINITY);
+        *least = least.min(class.mean());
+    }
+    let mut order: Vec<(u32, f64)> = classes.into_iter().collect();
+    let others = order.len().saturating_sub(MOST_CLASSES);
+    if others > 0 {
+        order.sort_by(|a, b| a.1.total_cmp(&b.1));
+        order.truncate(MOST_CLASSES);
+    }
+    let order: Vec<u32> = order.into_iter().map(|(class, _)| class).collect();
+    (classes_among(all, options, &order), others)
+}
+
+fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) -> Table {
     let columns = ["run", "class", "objects", "precision", "recall", "AP@0.5:0.95"].map(String::from);
     let at = thresholds().map(|t| format!("AP@{t:.2}"));
     let mut table = Table { columns: columns.into_iter().chain(at).collect(), rows: Vec::new() };
-    for (m, class) in all.iter().flat_map(|m| m.yolov5.classes.iter().map(move |class| (m, class))) {
-        let name = options.classes.get(class.class as usize).cloned().unwrap_or_else(|| class.class.to_string());
-        let numbers = [class.precision, class.recall, class.mean()].into_iter().chain(class.ap).map(share);
-        table.push([m.run.clone(), name, class.truths.to_string()].into_iter().chain(numbers));
+    for m in all {
+        for class in classes.iter().filter_map(|&class| m.class(class)) {
+            let name = options.classes.get(class.class as usize).cloned().unwrap_or_else(|| class.class.to_string());
+            let numbers = [class.precision, class.recall, class.mean()].into_iter().chain(class.ap).map(share);
+            table.push([m.run.clone(), name, class.truths.to_string()].into_iter().chain(numbers));
+        }
     }
     table
 }
@@ -159,31 +267,50 @@ pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
 /// mAP per level of every factor; empty without tags.
 pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
     let mut table = Table::new(["run", "factor", "level", "images", "yolov5 mAP@0.5:0.95", "coco mAP@0.5:0.95"]);
+    if options.tags.factors.is_empty() {
+        return table;
+    }
+    let definitions = [Definition::Yolov5, Definition::Coco];
+    let matches: Vec<_> = runs.iter().map(|run| definitions.map(|d| Matches::new(&run.sheets, d))).collect();
     for (i, factor) in options.tags.factors.iter().enumerate() {
-        for (level, run) in options.tags.levels(i).into_iter().flat_map(|level| runs.iter().map(move |r| (level, r))) {
-            let inside = |s: &&Sheet| options.tags.of(&s.image, i) == Some(level);
-            let sheets: Vec<Sheet> = run.sheets.iter().filter(inside).cloned().collect();
-            let [ours, theirs] =
-                [Definition::Yolov5, Definition::Coco].map(|d| share(eval::evaluate(&sheets, d, &[]).map()));
-            table.push([&run.name, factor, level, &sheets.len().to_string(), &ours, &theirs]);
+        for level in options.tags.levels(i) {
+            for (run, matches) in runs.iter().zip(&matches) {
+                let inside = |s: &Sheet| u32::from(options.tags.of(&s.image, i) == Some(level));
+                let weights: Vec<u32> = run.sheets.iter().map(inside).collect();
+                let images = weights.iter().filter(|weight| **weight > 0).count();
+                let [ours, theirs] = matches.each_ref().map(|m| share(m.map(&weights)));
+                table.push([&run.name, factor, level, &images.to_string(), &ours, &theirs]);
+            }
         }
     }
     table
 }
 
-/// Name, caption and SVG of each picture of a run.
-fn pictures(run: &Run, options: &EvalReportOptions) -> [(&'static str, &'static str, String); 3] {
-    let curves = eval::curves(&run.sheets);
-    let most = run.sheets.iter().flat_map(|s| s.truth.iter().map(|t| t.class as usize + 1)).max().unwrap_or(0);
-    let confusion = Confusion::new(&run.sheets, most.max(options.classes.len()), &Default::default());
+/// Name, caption and SVG of each chart of a run.
+fn pictures(
+    run: &Run,
+    confusion: &Confusion,
+    shown: &[u32],
+    options: &EvalReportOptions,
+) -> [(&'static str, String, String); 3] {
+    let (curves, names) = (eval::curves(&run.sheets), &options.classes);
+    let ConfusionOptions { confidence, iou } = options.confusion;
+    let told = format!(
+        "Which class is taken for which; detections surer than {confidence} that overlap a box by more than {iou}. \
+         Shades are shares of a column. All counts are in confusion.csv."
+    );
+    let few = match curves.classes.len() {
+        n if n > eval::CURVES_SHOWN => format!(" The mean of {n} classes, and {} of them.", eval::CURVES_SHOWN),
+        _ => String::new(),
+    };
     [
-        ("precision_recall", "Precision over recall.", eval::precision_recall_picture(&curves, &options.classes)),
-        ("f1", "F1 over confidence.", eval::f1_picture(&curves, &options.classes)),
         (
-            "confusion",
-            "Which class is taken for which; detections surer than 0.25 that overlap a box by more than 0.45.",
-            eval::confusion_picture(&confusion, &options.classes),
+            "precision_recall",
+            format!("Precision over recall.{few}"),
+            eval::precision_recall_picture(&curves, names, shown),
         ),
+        ("f1", format!("F1 over confidence.{few}"), eval::f1_picture(&curves, names, shown)),
+        ("confusion", told, eval::confusion_picture(confusion, names, shown)),
     ]
 }
 

@@ -4,6 +4,7 @@
 
 #[cfg(feature = "settle")]
 pub mod all;
+mod beside;
 pub mod camera;
 mod chart;
 mod clock;
@@ -14,6 +15,8 @@ pub mod encode;
 pub mod eval;
 pub mod experiments;
 pub mod flags;
+mod gallery;
+mod heat;
 mod histogram;
 pub mod keying;
 pub mod label;
@@ -21,7 +24,9 @@ pub mod light;
 #[cfg(feature = "settle")]
 mod machine;
 pub mod matte;
+mod mistakes;
 mod number;
+mod outlier;
 mod page;
 pub mod peers;
 mod pile;
@@ -38,6 +43,7 @@ pub mod work;
 
 pub use chart::{Axis, Chart, Curve};
 pub use diagram::{Diagram, Point, front};
+pub(crate) use gallery::clipped;
 pub use histogram::Histogram;
 pub use page::{Page, base64, escaped};
 pub use section::{Document, Section};

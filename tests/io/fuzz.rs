@@ -12,6 +12,17 @@ const LABEL: &str = r#"{"format": "plane-label", "version": 1, "image": {"file":
 const RECIPE: &str = "assets = \"a\"\n[scene]\nobjects = [4, 12]\nscale = [0.9, 1.1]\n[split]\nval = 0.2\n[yolo]\n";
 const JOURNAL: &str = r#"{"k":0,"part":"train","classes":[[3,2]],"knotted":0,"retries":0,"files":[{"path":"images/train/000000.jpg","bytes":1,"crc32":2}]}
 "#;
+const DATA_YAML: &str =
+    "# a\npath: set\ntrain: images/train\nval: images/val\nnc: 2\nnames:\n  0: \"cap\"\n  1: none\n";
+const YOLO: &str =
+    "0 0.5 0.5 0.2 0.4\n1 0.1 0.1 0.3 0.1 0.3 0.3\n===\n0 0.5 0.51 0.2 0.4 0.9\n1 0.2 0.2 0.2 0.2 0.31\n";
+const COCO: &str = r#"{"images": [{"id": 3, "file_name": "a/b.png", "width": 640, "height": 480}],
+    "categories": [{"id": 10, "name": "cap"}, {"id": 20, "name": "none"}],
+    "annotations": [{"image_id": 3, "category_id": 20, "bbox": [1, 2, 30, 4.5], "area": 6.5, "iscrowd": 1},
+    {"image_id": 3, "category_id": 10, "bbox": [100, 20, 30, 40]}]}
+===
+[{"image_id": 3, "category_id": 10, "bbox": [101, 20, 30, 40], "score": 0.9},
+ {"image_id": 3, "category_id": 20, "bbox": [1, 2, 30, 5], "score": 1e-3}]"#;
 const ANSWER: &str = "{\"picture\":{\"width\":2,\"height\":2,\"names\":[\"R\",\"G\",\"B\"],\"sample\":\"u8\",\"display_encoded\":true}}\nabcdefghijkl";
 
 type Door = (&'static str, fn(&[u8]), Vec<Vec<u8>>);
@@ -26,14 +37,19 @@ fn doors() -> Vec<Door> {
         #[cfg(feature = "oiio")]
         ("worker", fuzzing::worker, text(ANSWER)),
         ("header", fuzzing::header, pictures),
+        ("data_yaml", fuzzing::data_yaml, text(DATA_YAML)),
+        ("yolo_labels", fuzzing::yolo_labels, text(YOLO)),
+        ("coco", fuzzing::coco, text(COCO)),
     ]
 }
 
 /// Words that mean something to one of the readers.
-const WORDS: [&[u8]; 12] = [
+const WORDS: [&[u8]; 14] = [
     b"-",
     b"1e308",
     b"99999999999999999999",
+    b"4294967295",
+    b"-1e9",
     b"null",
     b"[",
     b"{\"a\":",

@@ -1,8 +1,11 @@
 //! `petcomp eval`: detections against the truth.
 
 use crate::common::{Common, count};
+use crate::print;
 use petcomp::dataset::YoloSet;
-use petcomp::eval::{Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found, read_yolo_truth};
+use petcomp::eval::{
+    ConfusionOptions, Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found, read_yolo_truth,
+};
 use petcomp::report::eval::{self, EvalReportOptions, Run};
 use std::path::{Path, PathBuf};
 
@@ -18,8 +21,17 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     classes: Vec<String>,
     /// Width and height of all images in pixels, for YOLO labels without images beside them
-    #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2)]
-    size: Vec<u32>,
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<[u32; 2]>,
+    /// Where the images of a COCO document are, if not beside it; for pictures of mistakes
+    #[arg(long, value_name = "FOLDER")]
+    images: Option<PathBuf>,
+    /// Detections surer than this count in the confusion and as mistakes
+    #[arg(long, value_name = "CONFIDENCE", default_value_t = ConfusionOptions::default().confidence)]
+    confidence: f64,
+    /// Most pictures of false alarms, and of misses, on the page
+    #[arg(short = 'n', long, value_name = "N", default_value_t = EvalReportOptions::default().shown)]
+    most: usize,
     /// Rounds of the bootstrap over images, at most 100000
     #[arg(long, value_name = "N", default_value_t = EvalReportOptions::default().rounds, value_parser = count(0..=100_000))]
     rounds: usize,
@@ -38,42 +50,62 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         tags: args.tags.as_deref().map_or_else(|| Ok(Tags::default()), read_tags)?,
         rounds: args.rounds,
         seed: args.seed,
+        confusion: ConfusionOptions { confidence: args.confidence, ..Default::default() },
+        shown: args.most,
+        pictures: Vec::new(),
     };
     let runs: Vec<Run> = predictions
         .iter()
-        .map(|path| Ok(Run { name: name(path), sheets: sheets(path, truth, args, &mut options.classes)? }))
+        .map(|path| Ok(Run { name: name(path), sheets: sheets(path, truth, args, &mut options)? }))
         .collect::<anyhow::Result<_>>()?;
     let metrics = match &args.output {
         Some(folder) => eval::write(folder, &runs, &options)?,
         None => runs.iter().map(|run| eval::Metrics::of(run, &options)).collect(),
     };
+    print::text(eval::scores_table(&metrics, &options).markdown());
+    let (classes, others) = eval::classes_in_brief(&metrics, &options);
+    print::text(classes.markdown());
+    if others > 0 {
+        common.say(format_args!("the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"));
+    }
     let factors = eval::factors_table(&runs, &options);
-    for table in [eval::scores_table(&metrics, &options), eval::classes_table(&metrics, &options), factors] {
-        if !table.rows.is_empty() {
-            common.say(table.markdown());
-        }
+    if !factors.rows.is_empty() {
+        print::text(factors.markdown());
+    }
+    if let Some(folder) = &args.output {
+        common.say(format_args!("look at {}", folder.join("eval.html").display()));
     }
     Ok(())
 }
 
-fn sheets(found: &Path, truth: &Path, args: &Args, classes: &mut Vec<String>) -> anyhow::Result<Vec<Sheet>> {
+/// Truth and detections; the options hear of names of classes and of pictures.
+fn sheets(found: &Path, truth: &Path, args: &Args, options: &mut EvalReportOptions) -> anyhow::Result<Vec<Sheet>> {
+    let classes = &mut options.classes;
     if truth.extension().is_some_and(|e| e == "json") {
         let mut all = read_coco_truth(truth)?;
         read_coco_results(found, &mut all)?;
         if classes.is_empty() {
             classes.clone_from(&all.classes);
         }
+        options.pictures = all.pictures(truth, args.images.as_deref());
         return Ok(all.sheets);
     }
-    let size = args.size.first().zip(args.size.get(1)).map(|(&w, &h)| [w, h]);
-    let mut all = read_yolo_truth(truth, size)?;
+    let mut all = read_yolo_truth(truth, args.size)?;
     read_yolo_found(found, &mut all)?;
     if classes.is_empty() {
         // labels/val of a dataset lie two folders below its data.yaml.
         let set = truth.parent().and_then(Path::parent).and_then(|folder| YoloSet::open(folder).ok());
         *classes = set.map(|set| set.classes).unwrap_or_default();
     }
+    options.pictures = all.pictures;
     Ok(all.sheets)
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let expected = || format!("\"{text}\", expected WIDTHxHEIGHT as in 640x480");
+    let (w, h) = text.split_once(['x', ',']).ok_or_else(expected)?;
+    let side = |side: &str| side.trim().parse().ok().filter(|&side| side > 0).ok_or_else(expected);
+    Ok([side(w)?, side(h)?])
 }
 
 fn name(path: &Path) -> String {

@@ -3,8 +3,9 @@
 use crate::common::{Common, NeedsReview};
 use crate::print;
 use petcomp::dataset::{self, Checked, contact_sheet_of};
+use petcomp::report::dataset::DatasetReportOptions;
 use petcomp::{io, report};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Check {
@@ -25,6 +26,9 @@ pub(crate) struct Report {
     /// Number of sample pictures
     #[arg(short = 'n', long, value_name = "N", default_value_t = 32)]
     most: usize,
+    /// Your own pictures, to compare with: a YOLO dataset, or a folder of images with YOLO labels
+    #[arg(long, value_name = "FOLDER")]
+    beside: Option<PathBuf>,
 }
 
 #[derive(clap::Args)]
@@ -58,8 +62,11 @@ pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
 
 pub(crate) fn report(args: &Report, common: &Common) -> anyhow::Result<()> {
     let output = args.output.clone().unwrap_or_else(|| args.folder.join("report.html"));
-    io::write_text(&output, &report::dataset::page(&args.folder, args.most)?.document())?;
-    common.say(output.display());
+    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let options =
+        DatasetReportOptions { most: args.most, page: Some(folder.to_path_buf()), beside: args.beside.clone() };
+    io::write_text(&output, &report::dataset::page(&args.folder, &options)?.document())?;
+    common.say(format_args!("look at {}", output.display()));
     Ok(())
 }
 

@@ -1,0 +1,147 @@
+//! Which detection names which box, whatever their classes.
+
+use super::overlap::{BoxIndex, area, intersection, iou, share};
+use super::{ConfusionOptions, Sheet};
+use std::collections::BinaryHeap;
+
+/// A detection and the box that it names, by their places in the sheet: without a box it is a false alarm, without a
+/// detection a miss.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pair {
+    pub(super) found: Option<usize>,
+    pub(super) truth: Option<usize>,
+}
+
+/// Every detection and every box that counts, once. Pairs are made from the greatest overlap down; detections in a
+/// crowd count for nobody.
+pub(super) fn pairs(sheet: &Sheet, options: &ConfusionOptions) -> Vec<Pair> {
+    let mut search = Search::new(sheet, options);
+    let sure = |&f: &usize| sheet.found[f].confidence > options.confidence;
+    let found: Vec<usize> = (0..sheet.found.len()).filter(sure).collect();
+    let mut open: BinaryHeap<Candidate> = found.iter().filter_map(|&f| search.best(f)).collect();
+    let mut names = vec![None; sheet.found.len()];
+    while let Some(Candidate { truth, found, .. }) = open.pop() {
+        if search.taken[truth] {
+            // What it would have named has been named; boxes only get fewer, so its next one is no better than this was.
+            open.extend(search.best(found));
+        } else {
+            search.taken[truth] = true;
+            names[found] = Some(truth);
+        }
+    }
+    let missed = (0..sheet.truth.len()).filter(|&t| !search.taken[t] && !sheet.truth[t].crowd);
+    let missed = missed.map(|t| Pair { found: None, truth: Some(t) });
+    let seen = found.iter().map(|&f| Pair { found: Some(f), truth: names[f] });
+    let mut pairs: Vec<Pair> = seen.filter(|p| p.truth.is_some() || !search.in_crowd(p.found)).collect();
+    pairs.extend(missed);
+    pairs
+}
+
+/// A detection and the free box that it overlaps most. The greatest comes first: of equal overlaps the first box, then
+/// the first detection.
+#[derive(Clone, Copy, PartialEq)]
+struct Candidate {
+    overlap: f64,
+    truth: usize,
+    found: usize,
+}
+
+impl Eq for Candidate {}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let by_overlap = self.overlap.total_cmp(&other.overlap);
+        by_overlap.then_with(|| (other.truth, other.found).cmp(&(self.truth, self.found)))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+struct Search<'a> {
+    sheet: &'a Sheet,
+    index: BoxIndex,
+    taken: Vec<bool>,
+    least: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(sheet: &'a Sheet, options: &ConfusionOptions) -> Self {
+        let index = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
+        Self { sheet, index, taken: vec![false; sheet.truth.len()], least: options.iou }
+    }
+
+    fn best(&self, found: usize) -> Option<Candidate> {
+        let bbox = &self.sheet.found[found].bbox;
+        let free = |&t: &usize| !self.taken[t] && !self.sheet.truth[t].crowd;
+        let candidate = |t: usize| Candidate { overlap: iou(&self.sheet.truth[t].bbox, bbox), truth: t, found };
+        let near = self.index.near(bbox).into_iter().filter(free).map(candidate);
+        near.filter(|candidate| candidate.overlap > self.least).max()
+    }
+
+    /// As the COCO tools have it, by the share of the detection that lies in a crowd.
+    fn in_crowd(&self, found: Option<usize>) -> bool {
+        found.is_some_and(|f| {
+            let bbox = &self.sheet.found[f].bbox;
+            let inside = |t: usize| share(intersection(bbox, &self.sheet.truth[t].bbox), area(bbox)) > self.least;
+            self.index.near(bbox).into_iter().any(|t| self.sheet.truth[t].crowd && inside(t))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{bbox, found, sheet, there};
+    use super::super::{FoundBox, TrueBox};
+    use super::*;
+    use proptest::prelude::*;
+
+    /// All pairs in order of overlap: what the search above saves.
+    fn by_sorting(sheet: &Sheet, least: f64) -> Vec<(usize, usize)> {
+        let each = (0..sheet.truth.len()).flat_map(|t| (0..sheet.found.len()).map(move |f| (t, f)));
+        let mut all: Vec<_> = each.map(|(t, f)| (iou(&sheet.truth[t].bbox, &sheet.found[f].bbox), t, f)).collect();
+        all.retain(|pair| pair.0 > least);
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let (mut truths, mut names) = (vec![], vec![]);
+        let mut pairs = Vec::new();
+        for (_, t, f) in all {
+            if !truths.contains(&t) && !names.contains(&f) {
+                truths.push(t);
+                names.push(f);
+                pairs.push((t, f));
+            }
+        }
+        pairs.sort_unstable();
+        pairs
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+        #[test]
+        fn pairs_are_those_of_a_sorted_list_of_all(
+            truth in prop::collection::vec([0_u8..30, 0..30, 1..20, 1..20], 0..40),
+            seen in prop::collection::vec([0_u8..30, 0..30, 1..20, 1..20], 0..40),
+        ) {
+            let made = |[x, y, w, h]: [u8; 4]| bbox(x.into(), y.into(), w.into(), h.into());
+            let truth: Vec<TrueBox> = truth.into_iter().map(|b| there(0, made(b))).collect();
+            let seen: Vec<FoundBox> = seen.into_iter().map(|b| found(0, made(b), 0.9)).collect();
+            let sheet = sheet(truth, seen);
+            let mut made: Vec<_> = pairs(&sheet, &Default::default())
+                .iter().filter_map(|p| p.truth.zip(p.found)).collect();
+            made.sort_unstable();
+            prop_assert_eq!(made, by_sorting(&sheet, 0.45));
+        }
+    }
+
+    #[test]
+    fn a_crowd_is_not_missed_and_what_lies_in_it_is_no_alarm() {
+        let (b, crowd) = (bbox(0.0, 0.0, 10.0, 10.0), bbox(50.0, 0.0, 100.0, 100.0));
+        let seen = vec![found(0, bbox(60.0, 10.0, 9.0, 9.0), 0.9), found(0, bbox(300.0, 0.0, 9.0, 9.0), 0.9)];
+        let all = sheet(vec![there(0, b), TrueBox { crowd: true, ..there(0, crowd) }], seen);
+        let expected = [Pair { found: Some(1), truth: None }, Pair { found: None, truth: Some(0) }];
+        assert_eq!(pairs(&all, &Default::default()), expected);
+    }
+}

@@ -1,0 +1,191 @@
+//! What a detector got wrong, as a table and as pictures, the worst first.
+
+use super::eval::{EvalReportOptions, Run};
+use super::gallery::{self, Figure, gallery, marked_box};
+use super::{Page, Table};
+use crate::eval::{FoundBox, Kind, Mistake, Picture, Sheet, TrueBox, class_name};
+use crate::label::BBox;
+use rayon::prelude::*;
+
+/// Colours of Okabe and Ito, which every kind of colour vision tells apart.
+const TRUTH: &str = "#009e73";
+const FOUND: &str = "#0072b2";
+const WRONG: &str = "#d55e00";
+const CROWD: &str = "#777777";
+
+const THICK: &str = "stroke-width=\"3\"";
+const THIN: &str = "stroke-width=\"1.5\"";
+const DASHED: &str = "stroke-width=\"1.5\" stroke-dasharray=\"5 3\"";
+const THICK_DASHED: &str = "stroke-width=\"3\" stroke-dasharray=\"7 4\"";
+
+/// What is seen around a box: so many times its longer side, but at least this share of the picture's.
+const AROUND: f64 = 3.0;
+const LEAST_SHARE: f64 = 0.15;
+
+/// All mistakes of a run, one a row.
+pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
+    let columns = ["image", "mistake", "true class", "found class", "confidence", "iou", "x0", "y0", "x1", "y1"];
+    let mut table = Table::new(columns);
+    for mistake in mistakes {
+        let case = Case::of(run, mistake);
+        let name = |class: Option<u32>| class.map(|class| class_name(class, &options.classes)).unwrap_or_default();
+        let number = |value: f64, digits: usize| format!("{value:.digits$}");
+        let b = case.wrong();
+        table.push([
+            case.sheet.image.clone(),
+            word(mistake.kind).to_owned(),
+            name(case.truth.map(|t| t.class)),
+            name(case.found.map(|f| f.class)),
+            case.found.map(|f| number(f.confidence, 4)).unwrap_or_default(),
+            number(mistake.iou, 3),
+            number(b.x0, 1),
+            number(b.y0, 1),
+            number(b.x1, 1),
+            number(b.y1, 1),
+        ]);
+    }
+    table
+}
+
+/// The worst mistakes as pictures.
+pub(super) fn put_on(page: &mut Page, run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) {
+    let count = |kind| mistakes.iter().filter(|m| m.kind == kind).count();
+    let [alarms, wrong, missed] = [Kind::FalseAlarm, Kind::WrongClass, Kind::Missed].map(count);
+    page.heading("Mistakes").text(&format!(
+        "{alarms} false alarms, {wrong} of another class than the box that they name, {missed} boxes missed; detections \
+         surer than {} that overlap a box by more than {}. All of them, the worst first, are in mistakes.csv.",
+        options.confusion.confidence, options.confusion.iou
+    ));
+    if options.pictures.iter().flatten().next().is_none() {
+        page.text("No pictures of them: the images were not found; say where they are with --images.");
+        return;
+    }
+    page.html(gallery::STYLE).html(&legend());
+    let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) = mistakes.iter().partition(|m| m.kind == Kind::Missed);
+    put_those(page, "alarm", "False alarms and wrong classes, the surest first", run, &detections, options);
+    put_those(page, "miss", "Boxes that were missed, the largest first", run, &misses, options);
+}
+
+fn put_those(page: &mut Page, name: &str, title: &str, run: &Run, mistakes: &[&Mistake], options: &EvalReportOptions) {
+    let with_picture = |m: &&&Mistake| options.pictures.get(m.sheet).is_some_and(Option::is_some);
+    let shown: Vec<&Mistake> = mistakes.iter().filter(with_picture).take(options.shown).copied().collect();
+    let figures: Vec<Figure> = shown.par_iter().filter_map(|mistake| figure(run, mistake, options)).collect();
+    if !figures.is_empty() {
+        page.subheading(&format!("{title} ({} of {})", figures.len(), mistakes.len()));
+        page.html(&gallery(name, &figures));
+    }
+}
+
+/// None for a picture that cannot be read, which is only warned of: the scores do not depend on it.
+fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
+    let case = Case::of(run, mistake);
+    let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
+    let mut figure = Figure::of(path, *size, case.view(*size)).inspect_err(|error| log::warn!("{error}")).ok()?;
+    figure.drawing = case.drawing(figure.letter(), figure.top(), options);
+    figure.caption = case.caption(options);
+    Some(figure)
+}
+
+/// A mistake with the boxes that it is about.
+struct Case<'a> {
+    mistake: &'a Mistake,
+    sheet: &'a Sheet,
+    truth: Option<&'a TrueBox>,
+    found: Option<&'a FoundBox>,
+}
+
+impl<'a> Case<'a> {
+    fn of(run: &'a Run, mistake: &'a Mistake) -> Self {
+        let sheet = &run.sheets[mistake.sheet];
+        let (truth, found) = (mistake.truth.map(|t| &sheet.truth[t]), mistake.found.map(|f| &sheet.found[f]));
+        Self { mistake, sheet, truth, found }
+    }
+
+    fn is_miss(&self) -> bool {
+        self.mistake.kind == Kind::Missed
+    }
+
+    /// The box that is wrong.
+    fn wrong(&self) -> BBox {
+        let (truth, found) = (self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox));
+        if self.is_miss() { truth } else { found }.unwrap_or_default()
+    }
+
+    /// The part of the picture around it.
+    fn view(&self, [width, height]: [f64; 2]) -> BBox {
+        let boxes = [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)];
+        let both = boxes.into_iter().flatten().reduce(BBox::hull).unwrap_or_default();
+        let side = (AROUND * both.width().max(both.height())).max(LEAST_SHARE * width.max(height));
+        let (w, h, middle) = (side.min(width), side.min(height), both.center());
+        let (x0, y0) = ((middle.x - w / 2.0).clamp(0.0, width - w), (middle.y - h / 2.0).clamp(0.0, height - h));
+        BBox { x0, y0, x1: x0 + w, y1: y0 + h }
+    }
+
+    fn drawing(&self, letter: f64, top: f64, options: &EvalReportOptions) -> String {
+        let mut svg = String::new();
+        for truth in self.sheet.truth.iter().filter(|t| !self.truth.is_some_and(|own| std::ptr::eq(own, *t))) {
+            let color = if truth.crowd { CROWD } else { TRUTH };
+            svg += &marked_box(&truth.bbox, "", letter, top, color, THIN);
+        }
+        let sure = |f: &&FoundBox| f.confidence > options.confusion.confidence;
+        for found in
+            self.sheet.found.iter().filter(sure).filter(|f| !self.found.is_some_and(|own| std::ptr::eq(own, *f)))
+        {
+            svg += &marked_box(&found.bbox, "", letter, top, FOUND, DASHED);
+        }
+        let name = |class: u32| gallery::clipped(&class_name(class, &options.classes), 24);
+        if let Some(truth) = self.truth {
+            let (color, style) = if self.is_miss() { (WRONG, THICK) } else { (TRUTH, THICK) };
+            svg += &marked_box(&truth.bbox, &format!("true: {}", name(truth.class)), letter, top, color, style);
+        }
+        if let Some(found) = self.found {
+            let (color, style) = if self.is_miss() { (FOUND, DASHED) } else { (WRONG, THICK_DASHED) };
+            let words = format!("{} {:.2}", name(found.class), found.confidence);
+            // Beside the words of the truth, which stand at the upper corner.
+            let below = BBox { y0: found.bbox.y1 + 1.2 * letter, ..found.bbox };
+            svg += &marked_box(&found.bbox, "", letter, top, color, style);
+            svg += &gallery::words([below.x0, below.y0], &words, letter, color);
+        }
+        svg
+    }
+
+    fn caption(&self, options: &EvalReportOptions) -> String {
+        let name = |class: u32| class_name(class, &options.classes);
+        let found = self.found.map(|f| format!("{} {:.2}", name(f.class), f.confidence)).unwrap_or_default();
+        let truth = self.truth.map(|t| name(t.class)).unwrap_or_default();
+        let iou = self.mistake.iou;
+        let what = match (self.mistake.kind, self.truth, self.found) {
+            (Kind::Missed, _, Some(_)) => format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}"),
+            (Kind::Missed, ..) => format!("{truth} missed; no detection near"),
+            (Kind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
+            (_, Some(_), _) => format!("false alarm: {found}; nearest box: {truth}, IoU {iou:.2}"),
+            _ => format!("false alarm: {found}; no box near"),
+        };
+        format!("{}: {what}", self.sheet.image)
+    }
+}
+
+fn word(kind: Kind) -> &'static str {
+    match kind {
+        Kind::FalseAlarm => "false alarm",
+        Kind::WrongClass => "wrong class",
+        Kind::Missed => "missed",
+    }
+}
+
+fn legend() -> String {
+    let key = |color: &str, style: &str, words: &str| {
+        format!(
+            "<span style=\"white-space:nowrap;margin-right:1.5em\"><svg width=\"34\" height=\"14\" viewBox=\"0 0 34 14\">\
+             <path d=\"M2 7h30\" stroke=\"{color}\" {style}/></svg> {words}</span>\n"
+        )
+    };
+    let keys = [
+        key(WRONG, THICK_DASHED, "wrong detection"),
+        key(WRONG, THICK, "missed box"),
+        key(TRUTH, THIN, "box of the truth"),
+        key(FOUND, DASHED, "other detection"),
+        key(CROWD, THIN, "crowd"),
+    ];
+    format!("<p>{}Click a picture to enlarge it; Escape and the arrow keys work too.</p>\n", keys.concat())
+}

@@ -1,0 +1,101 @@
+//! What is unlike the rest, in robust standard deviations.
+
+/// A number of every row.
+pub(super) struct Feature<'a> {
+    /// What it is: `objects`.
+    pub(super) name: &'a str,
+    /// One for each row; those that are not finite are not looked at.
+    pub(super) values: Vec<f64>,
+}
+
+/// A row that is unlike the others.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Outlier {
+    /// Which row.
+    pub(super) row: usize,
+    /// How far it is from the median, in robust standard deviations.
+    pub(super) deviations: f64,
+    /// By what: `objects 17, as a rule 8`.
+    pub(super) why: String,
+}
+
+/// From so many deviations on a value is unlike the others ([Iglewicz and Hoaglin 1993]).
+///
+/// [Iglewicz and Hoaglin 1993]: https://www.itl.nist.gov/div898/handbook/eda/section3/eda35h.htm
+const FAR: f64 = 3.5;
+
+/// A normal distribution's standard deviation over its median and its mean absolute deviation.
+const OF_MEDIAN: f64 = 1.4826;
+const OF_MEAN: f64 = 1.2533;
+
+/// The rows that are unlike the others by at least one feature, the strangest first.
+///
+/// # Method
+/// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute deviation, or over the
+/// mean one where most values are the same.
+pub(super) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
+    let mut worst: Vec<Option<Outlier>> = Vec::new();
+    for feature in features {
+        let Some((middle, scale)) = middle_and_scale(&feature.values) else { continue };
+        worst.resize(worst.len().max(feature.values.len()), None);
+        for (row, value) in feature.values.iter().enumerate() {
+            let deviations = (value - middle).abs() / scale;
+            if deviations > FAR && worst[row].as_ref().is_none_or(|known| deviations > known.deviations) {
+                let why = format!("{} {}, as a rule {}", feature.name, short(*value), short(middle));
+                worst[row] = Some(Outlier { row, deviations, why });
+            }
+        }
+    }
+    let mut all: Vec<Outlier> = worst.into_iter().flatten().collect();
+    all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
+    all
+}
+
+/// Median and robust standard deviation; none where all values are the same.
+fn middle_and_scale(values: &[f64]) -> Option<(f64, f64)> {
+    let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let middle = median(finite.clone())?;
+    let off: Vec<f64> = finite.iter().map(|v| (v - middle).abs()).collect();
+    let mean = off.iter().sum::<f64>() / off.len() as f64;
+    let scale = Some(OF_MEDIAN * median(off)?).filter(|&scale| scale > 0.0).unwrap_or(OF_MEAN * mean);
+    (scale > 0.0).then_some((middle, scale))
+}
+
+/// The middle of some values, the upper one of two.
+pub(super) fn median(values: Vec<f64>) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// A value that this share of all are below; the upper one of two.
+pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1))).copied()
+}
+
+/// A number with two decimals at most.
+pub(super) fn short(value: f64) -> String {
+    let text = format!("{value:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_far_off_is_named_with_what_is_usual() {
+        let values = vec![8.0, 7.0, 9.0, 8.0, 8.0, 40.0, 7.0, f64::NAN];
+        let features = [Feature { name: "objects", values }, Feature { name: "same", values: vec![1.0; 8] }];
+        let found = outliers(&features);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].row, found[0].why.as_str()), (5, "objects 40, as a rule 8"));
+        assert!(outliers(&[]).is_empty() && outliers(&[Feature { name: "", values: vec![] }]).is_empty());
+    }
+
+    #[test]
+    fn one_that_differs_from_all_the_same_is_found() {
+        let mut values = vec![0.0; 99];
+        values.push(3.0);
+        assert_eq!(outliers(&[Feature { name: "retries", values }])[0].row, 99);
+    }
+}
