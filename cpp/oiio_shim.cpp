@@ -25,11 +25,17 @@ const char *const FORMATS[] = {"openexr", "png", "jpeg", "tiff", "hdr", "dpx", "
     throw std::runtime_error(said.empty() ? otherwise : said);
 }
 
-// Integers up to 16 bits and halves stay as they are, everything else becomes float.
+// Bytes and halves stay as they are, other integers become 16 bits of the same full scale, everything else float.
 TypeDesc handed_over(const ImageSpec &spec) {
     switch (spec.format.basetype) {
     case TypeDesc::UINT8: return TypeDesc::UINT8;
-    case TypeDesc::UINT16: return TypeDesc::UINT16;
+    case TypeDesc::UINT16:
+    case TypeDesc::INT8:
+    case TypeDesc::INT16:
+    case TypeDesc::UINT32:
+    case TypeDesc::INT32:
+    case TypeDesc::UINT64:
+    case TypeDesc::INT64: return TypeDesc::UINT16;
     case TypeDesc::HALF: return TypeDesc::HALF;
     default: return TypeDesc::FLOAT;
     }
@@ -55,9 +61,11 @@ size_t bytes_of(const ImageSpec &spec, TypeDesc type) {
     return size_t(spec.width) * size_t(spec.height) * size_t(spec.nchannels) * type.size();
 }
 
-// OpenImageIO 2.4 crashes on damaged TIFF strips that it reads several at a time.
+// OpenImageIO 2.4 crashes on damaged TIFF strips that it reads several at a time. Of planes it can only read whole strips:
+// the decoders underneath go forwards, and the next row of the first plane lies before the last one of the others.
 bool row_by_row(const ImageInput &input, const ImageSpec &spec) {
-    return std::string(input.format_name()) == "tiff" && spec.tile_width == 0;
+    const bool planes = spec.get_string_attribute("planarconfig") == "separate";
+    return std::string(input.format_name()) == "tiff" && spec.tile_width == 0 && !planes;
 }
 
 } // namespace

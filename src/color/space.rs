@@ -31,7 +31,8 @@ impl RgbSpace {
 /// # Method
 /// Columns are the primaries, scaled so that they add up to white (SMPTE RP 177).
 pub fn xyz_from_rgb(space: &RgbSpace) -> Matrix3<f64> {
-    let primaries = Matrix3::from_columns(&space.primaries.map(xyz_of));
+    // Of any length, so that primaries without luminance, as those of XYZ itself, are columns like others.
+    let primaries = Matrix3::from_columns(&space.primaries.map(|[x, y]| Vector3::new(x, y, 1.0 - x - y)));
     primaries * Matrix3::from_diagonal(&(inverse(&primaries) * xyz_of(space.white)))
 }
 

@@ -3,7 +3,9 @@
 use super::correlate::{Kernel, channel, correlate};
 use crate::color::{ColorMatrix, srgb_to_linear};
 use crate::image::Image;
+use rayon::prelude::*;
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Pixels per degree of sight: a screen of 3840 pixels on 0.7 m, seen from 0.7 m (the authors' default).
 const PIXELS_PER_DEGREE: f64 = 3840.0 / 0.7 * 0.7 * PI / 180.0;
@@ -37,18 +39,28 @@ pub fn flip(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>) -> Option<f64> 
     if reference.size() != test.size() || reference.is_empty() {
         return None;
     }
+    let sum: f64 = row_sums(reference, test, 0..test.height()).iter().sum();
+    Some(sum / test.pixels().len() as f64)
+}
+
+/// How many rows beside a row have a say in it.
+pub(super) fn reach() -> usize {
+    blur_radius().max(feature_radius()) as usize
+}
+
+/// Sums of the differences in some rows.
+pub(super) fn row_sums(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>, rows: Range<usize>) -> Vec<f64> {
     let eye = Eye::new();
     let [a, b] = [reference, test].map(|image| eye.see(image));
     let largest = eye.largest();
-    let pairs = a.colors.pixels().iter().zip(b.colors.pixels());
-    let features = a.features.pixels().iter().zip(b.features.pixels());
-    let errors = pairs.zip(features).map(|((p, q), (f, g))| {
-        let color = remapped(hyab(*p, *q), largest);
+    let difference = |at: (usize, usize)| {
+        let color = remapped(hyab(a.colors[at], b.colors[at]), largest);
+        let (f, g) = (a.features[at], b.features[at]);
         let feature = (f[0] - g[0]).abs().max((f[1] - g[1]).abs());
         let feature = libm::pow(f64::from(feature) * std::f64::consts::FRAC_1_SQRT_2, FEATURE_EXPONENT);
         libm::pow(color, 1.0 - feature)
-    });
-    Some(errors.sum::<f64>() / a.colors.pixels().len() as f64)
+    };
+    rows.into_par_iter().map(|y| (0..test.width()).map(|x| difference((x, y))).sum()).collect()
 }
 
 /// What is seen of a picture.
@@ -134,9 +146,20 @@ fn remapped(difference: f64, largest: f64) -> f64 {
     KNEE_HEIGHT + (difference - knee) / (largest - knee) * (1.0 - KNEE_HEIGHT)
 }
 
+fn blur_radius() -> i32 {
+    (3.0 * (WIDEST / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32
+}
+
+/// Standard deviation of the detectors of edges and points, pixels.
+const FEATURE_SIGMA: f64 = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
+
+fn feature_radius() -> i32 {
+    (3.0 * FEATURE_SIGMA).ceil() as i32
+}
+
 /// A plane as the eye blurs it.
 fn blurred(plane: &Image<f32>, sensitivity: &[[f64; 2]]) -> Image<f32> {
-    let radius = (3.0 * (WIDEST / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
+    let radius = blur_radius();
     let gaussian =
         |width: f64| move |x: f64| libm::exp(-PI * PI * (x / PIXELS_PER_DEGREE) * (x / PIXELS_PER_DEGREE) / width);
     // The weight of each Gaussian in the whole, which sums to 1.
@@ -155,8 +178,7 @@ fn blurred(plane: &Image<f32>, sensitivity: &[[f64; 2]]) -> Image<f32> {
 
 /// Strength of edges and of points.
 fn features(luminance: &Image<f32>) -> Image<[f32; 2]> {
-    let sigma = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
-    let radius = (3.0 * sigma).ceil() as i32;
+    let (sigma, radius) = (FEATURE_SIGMA, feature_radius());
     let gaussian = |x: f64| libm::exp(-x * x / (2.0 * sigma * sigma));
     let blur = Kernel::gaussian(radius, sigma);
     let strength = |kernel: &Kernel| {

@@ -1,10 +1,12 @@
 //! How alike two pictures are, in the numbers that pictures are judged by.
 
+use super::bands::{Rows, bands, grown};
 use super::{flip, ssim};
 use crate::color::linear_to_srgb;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use std::fmt;
+use std::ops::Range;
 
 /// Error in scene-linear light, and likeness as it is displayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,21 +25,52 @@ impl Likeness {
     /// Compares a scene-linear picture with what it should be.
     ///
     /// Displayed means clipped to 0 to 1 and sRGB-encoded. None for pictures of different size or without pixels.
-    pub fn of(picture: &Image<LinearRgb>, reference: &Image<LinearRgb>) -> Option<Self> {
-        if picture.size() != reference.size() || picture.is_empty() {
+    pub fn of(picture: &impl Rows<LinearRgb>, reference: &impl Rows<LinearRgb>) -> Option<Self> {
+        let (width, height) = picture.size();
+        if (width, height) != reference.size() || width * height == 0 {
             return None;
         }
-        let pairs = picture.pixels().iter().zip(reference.pixels());
-        let differences = pairs.flat_map(|(p, q)| [p.r - q.r, p.g - q.g, p.b - q.b]).map(f64::from);
-        let (sum, squares) = differences.fold((0.0, 0.0), |(s, t), d| (s + d, t + d * d));
-        let count = 3.0 * picture.pixels().len() as f64;
-        let [shown, wanted] = [picture, reference].map(displayed);
+        let mut sums = Sums::default();
+        for band in bands((width, height)) {
+            let outer = grown(&band, flip::reach().max(ssim::RADIUS), height);
+            sums.add([picture.rows(outer.clone()), reference.rows(outer.clone())], band, outer.start, height);
+        }
+        let count = (width * height) as f64;
         Some(Self {
-            rmse: (squares / count).sqrt(),
-            bias: sum / count,
-            ssim: ssim(&wanted, &shown).unwrap_or(f64::NAN),
-            flip: flip(&wanted, &shown)?,
+            rmse: (sums.squares / (3.0 * count)).sqrt(),
+            bias: sums.errors / (3.0 * count),
+            ssim: ssim::mean(&sums.ssim, (width, height)).unwrap_or(f64::NAN),
+            flip: sums.flip / count,
         })
+    }
+}
+
+/// Over the rows so far.
+#[derive(Default)]
+struct Sums {
+    errors: f64,
+    squares: f64,
+    ssim: Vec<[f64; 3]>,
+    flip: f64,
+}
+
+impl Sums {
+    /// Adds a band of a picture of so many rows; the two pictures begin at row `first`, above it.
+    fn add(&mut self, [picture, reference]: [Image<LinearRgb>; 2], band: Range<usize>, first: usize, height: usize) {
+        let inner = |rows: Range<usize>| rows.start - first..rows.end - first;
+        for y in inner(band.clone()) {
+            let pairs = picture.row(y).iter().zip(reference.row(y));
+            let differences = pairs.flat_map(|(p, q)| [p.r - q.r, p.g - q.g, p.b - q.b]).map(f64::from);
+            let (sum, squares) = differences.fold((0.0, 0.0), |(s, t), d| (s + d, t + d * d));
+            (self.errors, self.squares) = (self.errors + sum, self.squares + squares);
+        }
+        let [shown, wanted] = [displayed(&picture), displayed(&reference)];
+        let windows = ssim::inside(height);
+        let windows = band.start.max(windows.start)..band.end.min(windows.end);
+        if !windows.is_empty() {
+            self.ssim.extend(ssim::row_sums(&wanted, &shown, inner(windows)));
+        }
+        self.flip += flip::row_sums(&wanted, &shown, inner(band)).iter().sum::<f64>();
     }
 }
 
@@ -83,6 +116,22 @@ pub(crate) mod tests {
         let likeness = Likeness::of(&grey(0.5), &grey(0.25)).unwrap();
         assert_eq!((likeness.rmse, likeness.bias), (0.25, 0.25));
         assert!(likeness.ssim < 1.0 && likeness.flip > 0.1);
+    }
+
+    /// What is seen of a row depends on the rows around it, of which a band has enough.
+    #[test]
+    fn bands_are_alike_as_the_whole_is() {
+        let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729) % 97) as f32 / 97.0;
+        let (width, height) = (1 << 14, 200);
+        let a = Image::from_fn(width, height, |x, y| LinearRgb::grey(noise(x / 9, y / 5)));
+        let b = a.map(|c| LinearRgb::grey(c.r * 0.9));
+        let likeness = Likeness::of(&a, &b).unwrap();
+        let [shown, wanted] = [displayed(&a), displayed(&b)];
+        assert!((likeness.flip - super::flip::flip(&wanted, &shown).unwrap()).abs() < 1e-12);
+        assert!((likeness.ssim - super::ssim::ssim(&wanted, &shown).unwrap()).abs() < 1e-12);
+        assert!(
+            (likeness.bias - a.pixels().iter().map(|c| f64::from(c.r * 0.1)).sum::<f64>() / 3_276_800.0).abs() < 1e-6
+        );
     }
 
     #[test]

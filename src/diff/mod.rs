@@ -9,6 +9,7 @@
 //! assert_eq!(diff::compare(&a, &b, &loose).verdict, diff::Verdict::Match);
 //! ```
 
+mod bands;
 mod correlate;
 mod flip;
 mod likeness;
@@ -16,14 +17,15 @@ mod report;
 mod ssim;
 mod view;
 
+pub use bands::{Rows, RowsBy};
 pub use flip::flip;
 pub use likeness::Likeness;
 pub use report::{Largest, Report, Verdict};
 pub use ssim::ssim;
 pub use view::{absolute_difference, difference, triple};
 
-use crate::image::Image;
 use crate::pixel::{Coverage, Depth, LinearRgb, PremulRgba, StraightRgba};
+use bands::bands;
 use rayon::prelude::*;
 use report::Tally;
 
@@ -97,7 +99,7 @@ impl Channels for [f32; 4] {
 
 /// Compares two pictures channel by channel.
 ///
-/// Pictures of different size are [`Verdict::Incomparable`].
+/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`]s, or anything else that has [`Rows`].
 ///
 /// # Method
 /// The counts and the verdict of `idiff` 2.4.7: up to `allow_failures` failing pixels the pictures match, whatever
@@ -105,14 +107,17 @@ impl Channels for [f32; 4] {
 /// `hard_warn`. Departs from it where it would let a broken picture pass: a NaN or an infinity that the other picture
 /// does not have in the same place and sign differs by infinity and counts (`idiff` passes over the first one), and
 /// pictures of different size are not compared (`idiff` continues the smaller one with zeros).
-pub fn compare<P: Channels>(a: &Image<P>, b: &Image<P>, thresholds: &Thresholds) -> Report {
-    if a.size() != b.size() {
+pub fn compare<P: Channels>(a: &impl Rows<P>, b: &impl Rows<P>, thresholds: &Thresholds) -> Report {
+    let (width, height) = a.size();
+    if (width, height) != b.size() {
         return Report::incomparable();
     }
-    let tallies = (0..a.height()).into_par_iter().map(|y| compare_rows(a.row(y), b.row(y), y, thresholds));
-    let tallies: Vec<Tally> = tallies.collect();
-    let whole = tallies.into_iter().fold(Tally::default(), Tally::then);
-    Report::new::<P>(whole, a.width() * a.height(), thresholds)
+    let tallies = bands((width, height)).flat_map(|band| {
+        let (a, b) = (a.rows(band.clone()), b.rows(band.clone()));
+        let rows = band.clone().into_par_iter().map(|y| (y, y - band.start));
+        rows.map(|(y, i)| compare_rows(a.row(i), b.row(i), y, thresholds)).collect::<Vec<Tally>>()
+    });
+    Report::new::<P>(tallies.fold(Tally::default(), Tally::then), width * height, thresholds)
 }
 
 fn compare_rows<P: Channels>(a: &[P], b: &[P], y: usize, thresholds: &Thresholds) -> Tally {
@@ -128,6 +133,7 @@ fn compare_rows<P: Channels>(a: &[P], b: &[P], y: usize, thresholds: &Thresholds
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Image;
 
     /// Black, 4 x 3, with the given red values.
     fn picture(reds: &[(usize, usize, f32)]) -> Image<LinearRgb> {
@@ -218,6 +224,23 @@ mod tests {
     fn different_sizes_are_not_compared() {
         let report = compare(&picture(&[]), &Image::new(4, 2), &Thresholds::default());
         assert_eq!(report.verdict.exit_code(), 3);
+    }
+
+    /// Three bands and a row, with the largest difference in the last.
+    #[test]
+    fn large_pictures_are_compared_in_bands() {
+        let (width, height) = (1 << 14, 3 * 64 + 1);
+        let rows = |last: f32| RowsBy {
+            size: (width, height),
+            make: move |rows: std::ops::Range<usize>| {
+                let value = |y: usize| Coverage(if y == height - 1 { last } else { y as f32 });
+                Image::from_fn(width, rows.len(), |_, y| value(rows.start + y))
+            },
+        };
+        let report = compare(&rows(0.5), &rows(0.75), &Thresholds::default());
+        let largest = report.largest.unwrap();
+        assert_eq!((largest.x, largest.y, report.failed, report.max_error), (0, height - 1, width, 0.25));
+        assert!((report.mean_error - 0.25 / height as f64).abs() < 1e-12);
     }
 
     #[test]

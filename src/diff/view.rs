@@ -1,6 +1,7 @@
 //! Differences to look at.
 
 use super::Channels;
+use super::bands::{Rows, bands};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
@@ -21,8 +22,15 @@ pub fn difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<
 ///
 /// # Panics
 /// When the sizes differ.
-pub fn absolute_difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<P> {
-    combined(a, b, |u, v| (u - v).abs() * scale)
+pub fn absolute_difference<P: Channels>(a: &impl Rows<P>, b: &impl Rows<P>, scale: f32) -> Image<P> {
+    let (width, height) = a.size();
+    assert_eq!((width, height), b.size(), "images of different size");
+    let mut pixels = Vec::with_capacity(width * height);
+    for band in bands((width, height)) {
+        let (a, b) = (a.rows(band.clone()), b.rows(band));
+        pixels.extend_from_slice(combined(&a, &b, |u, v| (u - v).abs() * scale).pixels());
+    }
+    Image::from_vec(width, height, pixels)
 }
 
 fn combined<P: Channels>(a: &Image<P>, b: &Image<P>, f: impl Fn(f32, f32) -> f32 + Sync) -> Image<P> {

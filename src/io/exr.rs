@@ -4,24 +4,25 @@
 //! cannot be caught.
 
 use super::atomic::write_bytes;
+use super::exr_blocks::{Job, Order};
+use super::exr_chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
 use super::exr_runs;
 use super::header::{Header, Notes};
-use super::limits::{Demand, Limits, at_most};
-use super::raster::{Raster, Refusal, Samples, Wanted};
+use super::limits::{Demand, Limits, affordable, at_most};
+use super::profile::to_rec709;
+use super::raster::{Fit, Raster, Refusal, Samples, Wanted};
 use super::{Compression, Format, ReadOptions, Source, Window};
-use crate::color::{ColorMatrix, RgbSpace, rgb_from_rgb};
+use crate::color::{ColorMatrix, RgbSpace};
 use crate::work::{self, Kind};
 use crate::{Error, Result};
 use exr::meta::attribute::Chromaticities;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, IntegerBounds, Layer, LayerAttributes, MetaData, ReadChannels,
-    ReadLayers, Text, Vec2, WritableImage, f16,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, IntegerBounds, Layer, LayerAttributes, MetaData, Text, Vec2,
+    WritableImage, f16,
 };
-use half::slice::HalfFloatSliceExt;
+use std::borrow::Cow;
 use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
-
-type Part = Layer<AnyChannels<FlatSamples>>;
 
 impl From<exr::error::Error> for Refusal {
     fn from(e: exr::error::Error) -> Self {
@@ -91,25 +92,79 @@ pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Chan
     if source.format != Format::Exr {
         return Err(Error::file(path, format!("is {}, expected an EXR", source.format.name())));
     }
-    let read = || -> std::result::Result<_, Refusal> {
-        let file = read_parts(&source.bytes, &limits)?;
-        let part = file.parts.first().ok_or("no part with pixels")?;
-        let channels = part
-            .channel_data
-            .list
-            .iter()
-            .map(|c| Channel { name: c.name.to_string(), samples: interleaved(part, &[&c.sample_data], file.window) });
-        Ok((size_of(file.window), channels.collect()))
-    };
-    super::caught(read).map_err(|e| Error::file(path, e))
+    super::caught(|| channels(&source.bytes, &limits)).map_err(|e| Error::file(path, e))
 }
 
-/// The parts that hold flat pixels, and the window they are all shown in.
-struct Parts {
-    parts: Vec<Part>,
-    window: IntegerBounds,
-    /// To the library's primaries, where the file names others.
-    to_rec709: Option<ColorMatrix>,
+fn channels(bytes: &[u8], limits: &Limits) -> std::result::Result<((usize, usize), Vec<Channel>), Refusal> {
+    let file = File::new(bytes, limits)?;
+    let part = file.flat_parts().next().ok_or("no part with pixels")?;
+    let names = file.names(part);
+    let (width, height) = size_of(file.window());
+    limits.room(width, height, names.len())?;
+    let picked: Vec<usize> = (0..names.len()).collect();
+    let samples = file.job(part, &picked, file.window(), Order::Planar)?.read()?;
+    let planes = samples.chunks_exact(width * height).map(<[f32]>::to_vec);
+    Ok(((width, height), names.into_iter().zip(planes).map(|(name, samples)| Channel { name, samples }).collect()))
+}
+
+/// A file whose headers were checked.
+struct File<'a> {
+    bytes: Cow<'a, [u8]>,
+    meta: MetaData,
+    sampling: Option<Sampling>,
+}
+
+impl<'a> File<'a> {
+    fn new(bytes: &'a [u8], limits: &Limits) -> std::result::Result<Self, Refusal> {
+        let (sampling, bytes) = match Sampling::of(bytes) {
+            Some((sampling, even)) => (Some(sampling), Cow::Owned(even)),
+            None => (None, Cow::Borrowed(bytes)),
+        };
+        let meta = check(&*bytes, bytes.len() as u64, limits)?;
+        if let (Some(sampling), [header]) = (&sampling, &meta.headers[..]) {
+            sampling.check(header)?;
+        } else if sampling.is_some() {
+            return Err(Refusal::Unsupported("unsupported EXR: subsampled channels in one of several parts".into()));
+        }
+        Ok(Self { bytes, meta, sampling })
+    }
+
+    /// The parts whose pixels have one sample for each channel.
+    fn flat_parts(&self) -> impl Iterator<Item = usize> {
+        self.meta.headers.iter().enumerate().filter(|(_, header)| !header.deep).map(|(part, _)| part)
+    }
+
+    fn names(&self, part: usize) -> Vec<String> {
+        self.meta.headers[part].channels.list.iter().map(|c| c.name.to_string()).collect()
+    }
+
+    /// What all parts are shown in.
+    fn window(&self) -> IntegerBounds {
+        self.meta.headers[0].shared_attributes.display_window
+    }
+
+    /// The primaries that are named, or ours.
+    fn space(&self) -> RgbSpace {
+        self.meta.headers[0].shared_attributes.chromaticities.map_or(RgbSpace::REC709, space)
+    }
+
+    fn job<'j>(
+        &'j self,
+        part: usize,
+        picked: &'j [usize],
+        window: IntegerBounds,
+        order: Order,
+    ) -> std::result::Result<Job<'j>, String> {
+        let (width, height) = size_of(window);
+        affordable((width * height * picked.len()) as u64 * FLOAT)?;
+        let (bytes, meta, sampling) = (&*self.bytes, &self.meta, self.sampling.as_ref());
+        Ok(Job { bytes, meta, part, picked, window, order, sampling })
+    }
+}
+
+fn space(named: Chromaticities) -> RgbSpace {
+    let xy = |v: Vec2<f32>| [f64::from(v.x()), f64::from(v.y())];
+    RgbSpace { primaries: [named.red, named.green, named.blue].map(xy), white: xy(named.white) }
 }
 
 fn size_of(window: IntegerBounds) -> (usize, usize) {
@@ -135,50 +190,23 @@ fn check(file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Resu
         total += header.layer_size.area() as u64 * bytes_per_pixel;
     }
     at_most(total, limits.decoded_bytes, "decoded bytes", "decoded_bytes")?;
-    if meta.headers.iter().any(|h| h.deep) {
+    if meta.headers.iter().all(|h| h.deep) {
         return Err(Refusal::Unsupported("deep EXR, expected flat pixels".into()));
     }
     Ok(meta)
 }
 
-fn read_parts(bytes: &[u8], limits: &Limits) -> std::result::Result<Parts, Refusal> {
-    check(bytes, bytes.len() as u64, limits)?;
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))?;
-    let to_rec709 = image.attributes.chromaticities.map(to_rec709).transpose()?.flatten();
-    Ok(Parts { parts: image.layer_data.into_vec(), window: image.attributes.display_window, to_rec709 })
-}
+/// Bytes of a sample as it is kept.
+const FLOAT: u64 = 4;
 
-/// Chromaticities that differ by less are the same, written with fewer digits.
-const SAME_CHROMATICITY: f64 = 1e-3;
-/// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
-const SMALLEST_GAMUT: f64 = 1e-3;
+/// More than the attributes of a file take that says where its channels have fewer samples than pixels.
+const FIRST_BYTES: u64 = 1 << 16;
 
-/// The way to the library's primaries from those that a file names; none where they are the same.
-fn to_rec709(named: Chromaticities) -> std::result::Result<Option<ColorMatrix>, Refusal> {
-    let xy = |v: Vec2<f32>| [f64::from(v.x()), f64::from(v.y())];
-    let space = RgbSpace { primaries: [named.red, named.green, named.blue].map(xy), white: xy(named.white) };
-    let [r, g, b] = space.primaries;
-    let area = ((g[0] - r[0]) * (b[1] - r[1]) - (b[0] - r[0]) * (g[1] - r[1])).abs() / 2.0;
-    let real = |[x, y]: &[f64; 2]| x.abs() <= 2.0 && (1e-6..=2.0).contains(&y.abs());
-    let all_real = space.primaries.iter().chain([&space.white]).all(real);
-    if !all_real || area < SMALLEST_GAMUT || space.white[1] < SMALLEST_GAMUT {
-        let all = [space.primaries[0], space.primaries[1], space.primaries[2], space.white];
-        return Err(format!("chromaticities {all:?}, expected those of a colour space").into());
-    }
-    let ours = RgbSpace::REC709;
-    let pairs = |a: &RgbSpace| a.primaries.into_iter().chain([a.white]).flatten().collect::<Vec<_>>();
-    let same = pairs(&space).iter().zip(pairs(&ours)).all(|(v, w)| (v - w).abs() < SAME_CHROMATICITY);
-    Ok((!same).then(|| rgb_from_rgb(&ours, &space).into()))
-}
-
-pub(super) fn header(file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Result<Header, Refusal> {
-    let meta = check(file, file_bytes, limits)?;
+pub(super) fn header(mut file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Result<Header, Refusal> {
+    let mut start = Vec::new();
+    file.by_ref().take(FIRST_BYTES).read_to_end(&mut start).map_err(exr::error::Error::from)?;
+    let start = Sampling::of(&start).map_or(start, |(_, even)| even);
+    let meta = check(start.chain(file), file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
     let shown = first.shared_attributes.display_window;
     let (width, height) = size_of(shown);
@@ -217,47 +245,51 @@ fn texts(header: &exr::meta::header::Header) -> Notes {
     notes
 }
 
-/// The wanted channels of the first part that has them.
+/// The wanted channels of the part that has them under the best names.
 pub(super) fn decode(
     bytes: &[u8],
     limits: &Limits,
     wanted: Wanted,
     shown: Window,
 ) -> std::result::Result<Raster, Refusal> {
-    let Parts { parts, window, to_rec709 } = read_parts(bytes, limits)?;
-    let mut refused = "no part with pixels".to_string();
-    for part in &parts {
-        let names: Vec<String> = part.channel_data.list.iter().map(|c| c.name.to_string()).collect();
-        let picked = match wanted.pick(&names) {
-            Ok(mut picked) => {
-                picked.dedup();
-                picked
-            }
-            Err(e) => {
-                refused = e;
-                continue;
-            }
-        };
-        let planes: Vec<_> = picked.iter().map(|&i| &part.channel_data.list[i].sample_data).collect();
-        let window = match shown {
-            Window::Display => window,
-            Window::Data => IntegerBounds::new(part.attributes.layer_position, part.size),
-        };
-        let (width, height) = size_of(window);
-        let mut samples = interleaved(part, &planes, window);
-        if let (Wanted::Color | Wanted::Film, 3.., Some(matrix)) = (wanted, planes.len(), &to_rec709) {
-            convert(&mut samples, planes.len(), matrix);
+    let file = File::new(bytes, limits)?;
+    let choices = file.flat_parts().map(|part| (part, choose(wanted, &file.names(part))));
+    let best =
+        choices.min_by_key(|(_, choice)| choice.as_ref().ok().map_or((true, None), |(fit, _)| (false, Some(*fit))));
+    let (part, choice) = best.ok_or("no part with pixels")?;
+    let (_, mut picked) = choice?;
+    picked.dedup();
+    let header = &file.meta.headers[part];
+    let window = match shown {
+        Window::Display => file.window(),
+        Window::Data => IntegerBounds::new(header.own_attributes.layer_position, header.layer_size),
+    };
+    let ((width, height), n) = (size_of(window), picked.len());
+    limits.room(width, height, n)?;
+    let all = file.names(part);
+    let mut names: Vec<String> = picked.iter().map(|&i| all[i].clone()).collect();
+    let mut samples = file.job(part, &picked, window, Order::Interleaved)?.read()?;
+    if matches!(wanted, Wanted::Color | Wanted::Film) && n >= 3 {
+        let space = file.space();
+        if names.starts_with(&LUMINANCE_CHROMA.map(String::from)) {
+            to_rgb(&mut samples, n, &space);
+            names.splice(..3, ["R", "G", "B"].map(String::from));
         }
-        return Ok(Raster {
-            width,
-            height,
-            names: picked.iter().map(|&i| names[i].clone()).collect(),
-            samples: Samples::F32(samples),
-            display_encoded: false,
-            premultiplied: true,
-        });
+        if let Some(matrix) = to_rec709(&space)? {
+            convert(&mut samples, n, &matrix);
+        }
     }
-    Err(Refusal::Broken(refused))
+    Ok(Raster { width, height, names, samples: Samples::F32(samples), display_encoded: false, premultiplied: true })
+}
+
+/// Luminance with its differences where there are those, and what is chosen of other channels elsewhere.
+fn choose(wanted: Wanted, names: &[String]) -> std::result::Result<(Fit, Vec<usize>), String> {
+    let at = |name: &str| names.iter().position(|n| n == name);
+    let chroma = LUMINANCE_CHROMA.into_iter().map(at).collect::<Option<Vec<_>>>();
+    match (wanted, chroma) {
+        (Wanted::Color | Wanted::Film, Some(picked)) => Ok((Fit::Named, picked.into_iter().chain(at("A")).collect())),
+        _ => wanted.choose(names),
+    }
 }
 
 /// The first three of `n` interleaved channels in other primaries; alpha does not mind.
@@ -268,41 +300,10 @@ fn convert(samples: &mut [f32], n: usize, matrix: &ColorMatrix) {
     }
 }
 
-/// Planes of a part side by side, cut or padded with zeros from its data window to the display window.
-fn interleaved(part: &Part, planes: &[&FlatSamples], window: IntegerBounds) -> Vec<f32> {
-    let ((width, height), n) = (size_of(window), planes.len());
-    let mut out = vec![0.0; width * height * n];
-    let shift = |at: i32, origin: i32| i64::from(at) - i64::from(origin);
-    let (left, top) = (
-        shift(part.attributes.layer_position.x(), window.position.x()),
-        shift(part.attributes.layer_position.y(), window.position.y()),
-    );
-    let columns = overlap(left, part.size.x(), width);
-    for (c, plane) in planes.iter().enumerate() {
-        let samples = to_f32(plane);
-        for y in overlap(top, part.size.y(), height) {
-            let row = &samples[(y as i64 - top) as usize * part.size.x()..][..part.size.x()];
-            for x in columns.clone() {
-                out[(y * width + x) * n + c] = row[(x as i64 - left) as usize];
-            }
-        }
-    }
-    out
-}
-
 /// The part of `0..shown` that a run of `length` samples starting at `start` covers.
 pub(super) fn overlap(start: i64, length: usize, shown: usize) -> std::ops::Range<usize> {
     let clip = |v: i64| v.clamp(0, shown as i64) as usize;
     clip(start)..clip(start + length as i64)
-}
-
-/// Halves are converted here: asking the decoder for floats takes five times as long.
-fn to_f32(plane: &FlatSamples) -> Vec<f32> {
-    match plane {
-        FlatSamples::F16(v) => v.to_f32_vec(),
-        FlatSamples::F32(v) => v.clone(),
-        FlatSamples::U32(v) => v.iter().map(|&x| x as f32).collect(),
-    }
 }
 
 /// Floats as halves, rounded to nearest; what is finite stays so, 65504 at most: programs blur and scale what they read,
@@ -422,6 +423,14 @@ mod tests {
         for (v, expected) in rgb.iter().zip([0.18, 0.5, 0.9]) {
             assert!((v - expected).abs() < 1e-4, "{rgb:?}");
         }
+        let third = 1.0 / 3.0;
+        image.attributes.chromaticities = Some(Chromaticities {
+            red: xy(1.0, 0.0),
+            green: xy(0.0, 1.0),
+            blue: xy(0.0, 0.0),
+            white: xy(third, third),
+        });
+        assert!(read(&image).is_ok(), "CIE XYZ");
         image.attributes.chromaticities =
             Some(Chromaticities { red: xy(0.0, 0.0), ..image.attributes.chromaticities.unwrap() });
         image.attributes.chromaticities.as_mut().unwrap().white = xy(0.3, 0.0);

@@ -2,11 +2,14 @@
 
 use super::header::Header;
 use super::limits::{Demand, Limits, at_most};
+use super::orient::Orientation;
+use super::profile::to_rec709;
 use super::raster::{Raster, Refusal, Samples, usual_names};
+use crate::color::RgbSpace;
 use crate::io::Format;
-use image::ImageDecoder;
 use image::codecs::hdr::HdrDecoder;
-use std::io::{Cursor, Read};
+use image::{ImageDecoder, ImageError};
+use std::io::{BufRead, Cursor, Read};
 
 /// The header ends in time: its lines are kept, however many and long they are.
 fn check_length(start: &[u8], limits: &Limits) -> Result<(), Refusal> {
@@ -21,21 +24,80 @@ fn check_length(start: &[u8], limits: &Limits) -> Result<(), Refusal> {
     }
 }
 
-fn open<R: Read>(file: R, file_bytes: u64, limits: &Limits) -> Result<HdrDecoder<R>, Refusal> {
-    let decoder = HdrDecoder::new(file)?;
-    let (width, height) = decoder.dimensions();
-    let (width, height) = (width.into(), height.into());
-    limits.check(Demand { width, height, channels: 3, bytes_per_pixel: 12, file_bytes })?;
-    Ok(decoder)
+/// The first line that the decoder knows; the same is called `#?RGBE` by others.
+const FIRST_LINE: &[u8] = b"#?RADIANCE\n";
+/// Light in the primaries of the display, or in CIE XYZ.
+const RGBE: &[u8] = b"FORMAT=32-bit_rle_rgbe\n";
+const XYZE: &[u8] = b"FORMAT=32-bit_rle_xyze\n";
+/// CIE XYZ as the primaries of light: its white is that of equal energy.
+const XYZ: RgbSpace = RgbSpace { primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0; 2] };
+
+/// A file that the decoder takes for one of rows from the top in its own primaries, and what it really is.
+struct Opened<R: Read> {
+    decoder: HdrDecoder<R>,
+    orientation: Orientation,
+    is_xyz: bool,
 }
 
-pub(super) fn header(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
-    let decoder = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
+fn open(mut file: impl BufRead, file_bytes: u64, limits: &Limits) -> Result<Opened<impl Read>, Refusal> {
+    let line = |file: &mut dyn BufRead| {
+        let mut line = Vec::new();
+        let count = file.read_until(b'\n', &mut line).map_err(ImageError::from)?;
+        if count == 0 { Err(Refusal::from("truncated HDR (no picture)")) } else { Ok(line) }
+    };
+    line(&mut file)?;
+    let (mut head, mut is_xyz) = (FIRST_LINE.to_vec(), false);
+    loop {
+        let next = line(&mut file)?;
+        is_xyz |= next == XYZE;
+        head.extend_from_slice(if next == XYZE { RGBE } else { &next });
+        if next == b"\n" {
+            break;
+        }
+    }
+    let ([width, height], orientation) = resolution(&line(&mut file)?)?;
+    head.extend(format!("-Y {height} +X {width}\n").into_bytes());
+    let decoder = HdrDecoder::new(Cursor::new(head).chain(file))?;
     let (width, height) = decoder.dimensions();
+    limits.check(Demand {
+        width: width.into(),
+        height: height.into(),
+        channels: 3,
+        bytes_per_pixel: 12,
+        file_bytes,
+    })?;
+    Ok(Opened { decoder, orientation, is_xyz })
+}
+
+/// Length and number of the rows that are stored, and how they lie in the picture: the axis and sense of the rows come
+/// first, those of the pixels in a row second; `-Y` goes down.
+fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
+    let text = String::from_utf8_lossy(line);
+    let unknown = || Refusal::Broken(format!("damaged HDR: size {:?}, expected \"-Y 480 +X 640\"", text.trim()));
+    let [rows, height, columns, width] = text.split_whitespace().collect::<Vec<_>>()[..] else { return Err(unknown()) };
+    let orientation = match (rows, columns) {
+        ("-Y", "+X") => 1,
+        ("-Y", "-X") => 2,
+        ("+Y", "-X") => 3,
+        ("+Y", "+X") => 4,
+        ("+X", "-Y") => 5,
+        ("-X", "-Y") => 6,
+        ("-X", "+Y") => 7,
+        ("+X", "+Y") => 8,
+        _ => return Err(unknown()),
+    };
+    let number = |text: &str| text.parse().map_err(|_| unknown());
+    Ok(([number(width)?, number(height)?], Orientation(orientation)))
+}
+
+pub(super) fn header(file: impl BufRead, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
+    let Opened { decoder, orientation, .. } = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
+    let (width, height) = decoder.dimensions();
+    let (width, height) = orientation.size((width as usize, height as usize));
     Ok(Header {
         format: Format::Hdr,
-        width: width as usize,
-        height: height as usize,
+        width,
+        height,
         channels: usual_names(3).unwrap_or_default(),
         bits: 32,
         metadata: decoder.metadata().custom_attributes,
@@ -45,16 +107,57 @@ pub(super) fn header(file: impl Read, file_bytes: u64, limits: &Limits) -> Resul
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     check_length(&bytes[..bytes.len().min(limits.metadata_bytes as usize + 1)], limits)?;
-    let decoder = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    let Opened { decoder, orientation, is_xyz } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
-    let mut data = vec![0_f32; width as usize * height as usize * 3];
+    let (width, height) = (width as usize, height as usize);
+    limits.room(width, height, 3)?;
+    let mut data = vec![0_f32; width * height * 3];
     decoder.read_image(bytemuck::cast_slice_mut(&mut data))?;
-    Ok(Raster {
-        width: width as usize,
-        height: height as usize,
-        names: usual_names(3).unwrap_or_default(),
-        samples: Samples::F32(data),
-        display_encoded: false,
-        premultiplied: false,
-    })
+    if let (true, Some(matrix)) = (is_xyz, to_rec709(&XYZ)?) {
+        data.chunks_exact_mut(3).for_each(|px| px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]])));
+    }
+    let (names, samples) = (usual_names(3).unwrap_or_default(), Samples::F32(data));
+    let raster = Raster { width, height, names, samples, display_encoded: false, premultiplied: false };
+    Ok(raster.upright(orientation))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two rows of three pixels as they are stored, exponents such that 128 is 1.
+    fn read(format: &str, size: &str) -> Raster {
+        let pixels = (0..6_u8).flat_map(|i| [128 + i, 128, 128, 129]);
+        let head = format!("#?RGBE\nFORMAT=32-bit_rle_{format}\n\n{size}\n");
+        decode(&head.into_bytes().into_iter().chain(pixels).collect::<Vec<_>>(), &Limits::default()).unwrap()
+    }
+
+    fn reds(raster: &Raster) -> Vec<i32> {
+        let Samples::F32(v) = &raster.samples else { panic!("not floats") };
+        v.iter().step_by(3).map(|v| (v * 128.0 - 128.0).round() as i32).collect()
+    }
+
+    #[test]
+    fn rows_may_go_any_way() {
+        for (size, shape, expected) in [
+            ("-Y 2 +X 3", (3, 2), [0, 1, 2, 3, 4, 5]),
+            ("-Y 2 -X 3", (3, 2), [2, 1, 0, 5, 4, 3]),
+            ("+Y 2 -X 3", (3, 2), [5, 4, 3, 2, 1, 0]),
+            ("+Y 2 +X 3", (3, 2), [3, 4, 5, 0, 1, 2]),
+            ("+X 2 -Y 3", (2, 3), [0, 3, 1, 4, 2, 5]),
+            ("-X 2 -Y 3", (2, 3), [3, 0, 4, 1, 5, 2]),
+            ("-X 2 +Y 3", (2, 3), [5, 2, 4, 1, 3, 0]),
+            ("+X 2 +Y 3", (2, 3), [2, 5, 1, 4, 0, 3]),
+        ] {
+            let raster = read("rgbe", size);
+            assert_eq!(((raster.width, raster.height), reds(&raster)), (shape, expected.to_vec()), "{size}");
+        }
+        assert!(resolution(b"-Y 2 -Y 3").is_err() && resolution(b"-Y 2 +X").is_err());
+    }
+
+    #[test]
+    fn xyz_of_equal_energy_is_white() {
+        let Samples::F32(v) = read("xyze", "-Y 2 +X 3").samples else { panic!("not floats") };
+        assert!(v[..3].iter().all(|v| (v - 1.0).abs() < 1e-5), "{:?}", &v[..3]);
+    }
 }

@@ -1,4 +1,4 @@
-//! JPEG: 8 bits, display-encoded, no alpha.
+//! JPEG: 8 bits, display-encoded, no alpha. Arithmetic coding and the like are left to OpenImageIO.
 
 use super::header::{Header, Notes, lines_of_notes, notes_of_lines};
 use super::limits::{Demand, Limits, at_most};
@@ -48,10 +48,24 @@ pub(super) fn head(file: &mut impl Read, limits: &Limits) -> Result<Vec<u8>, Ref
         bytes.resize(at + 2 + length, 0);
         file.read_exact(&mut bytes[at + 4..]).map_err(cut)?;
         at_most(bytes.len() as u64, limits.metadata_bytes, "bytes in front of the picture", "metadata_bytes")?;
+        check_kind(marker, bytes.get(at + 4))?;
         if marker == SOS {
             return Ok(bytes);
         }
     }
+}
+
+/// Refuses kinds of JPEG that our decoder does not know, by their frame's marker (ISO/IEC 10918-1, table B.1) and bits.
+fn check_kind(marker: u8, bits: Option<&u8>) -> Result<(), Refusal> {
+    let kind = match (marker, bits) {
+        (0xc0..=0xc2, Some(8)) => return Ok(()),
+        (0xc0..=0xc2, Some(bits)) => format!("{bits} bits a sample, expected 8"),
+        (0xc3, _) => "lossless".into(),
+        (0xc5..=0xc7 | 0xcd..=0xcf, _) => "hierarchical".into(),
+        (0xc9..=0xcb, _) => "arithmetic coding".into(),
+        _ => return Ok(()),
+    };
+    Err(Refusal::Unsupported(format!("unsupported JPEG: {kind}")))
 }
 
 fn open<'a>(bytes: &'a [u8], file_bytes: u64, limits: &Limits) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
@@ -99,6 +113,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
     let names = usual_names(decoder.color_type().channel_count().into()).ok_or("channels of an unknown kind")?;
+    limits.room(width as usize, height as usize, names.len())?;
     let mut data = vec![0; usize::try_from(decoder.total_bytes()).map_err(|_| "size overflows")?];
     decoder.read_image(&mut data)?;
     Ok(Raster {
@@ -195,6 +210,30 @@ mod tests {
         assert!(!segments(thumbnail).any(|s| s.marker == EOI));
         let whole = [thumbnail.as_slice(), b"\xff\xd9"].concat();
         assert!(segments(&whole).any(|s| s.marker == EOI));
+    }
+
+    /// The start of a picture of one pixel, with a frame of any kind.
+    fn frame(marker: u8, bits: u8) -> Result<Vec<u8>, Refusal> {
+        let frame = [marker, 0, 11, bits, 0, 1, 0, 1, 1, 1, 0x11, 0];
+        let file = [b"\xff\xd8\xff".as_slice(), &frame, b"\xff\xda\0\x02"];
+        head(&mut file.concat().as_slice(), &Limits::default())
+    }
+
+    #[test]
+    fn kinds_that_are_not_ours_are_named_and_not_called_damaged() {
+        assert!(frame(0xc0, 8).is_ok() && frame(0xc1, 8).is_ok() && frame(0xc2, 8).is_ok());
+        for (marker, bits, kind) in [
+            (0xc1, 12, "12 bits a sample, expected 8"),
+            (0xc3, 8, "lossless"),
+            (0xc5, 8, "hierarchical"),
+            (0xc9, 8, "arithmetic coding"),
+            (0xca, 8, "arithmetic coding"),
+        ] {
+            match frame(marker, bits) {
+                Err(Refusal::Unsupported(e)) => assert_eq!(e, format!("unsupported JPEG: {kind}")),
+                other => panic!("{marker:x}: {other:?}"),
+            }
+        }
     }
 
     #[test]

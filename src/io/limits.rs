@@ -5,6 +5,7 @@
 
 use crate::{Error, Result};
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 /// Bounds on what a picture file may ask for; a file beyond them is refused before its pixels are touched.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -34,6 +35,8 @@ pub struct Limits {
     pub document_bytes: u64,
     /// Levels that a document is nested, at most 80. Default: 64.
     pub document_depth: u64,
+    /// Share of the machine's memory that a picture may need, at 12 bytes for each pixel and channel, percent. Default: 50.
+    pub memory_percent: u64,
 }
 
 /// A day: who waits longer does not wait for a picture.
@@ -42,6 +45,11 @@ const MOST_SECONDS: u64 = 86_400;
 const DEEPEST: u64 = 80;
 /// Other limits: sums of a few such numbers cannot wrap.
 const HIGHEST: u64 = 1 << 53;
+/// Percent of the memory: who says so means all there is, and more.
+const MOST_PERCENT: u64 = 10_000;
+
+/// What a pixel takes in each channel that is used, at the worst: three floats.
+const BYTES_IN_HAND: u64 = 12;
 
 /// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very well.
 const RATIO_FREE_BYTES: u64 = 64 << 20;
@@ -60,6 +68,7 @@ impl Default for Limits {
             seconds: 10,
             document_bytes: 16 << 20,
             document_depth: 64,
+            memory_percent: 50,
         }
     }
 }
@@ -97,7 +106,7 @@ impl Limits {
     /// # Errors
     /// [`Error::Value`] for a name that no limit has, and for a value that none can have.
     pub fn with(mut self, raise: &Raise) -> Result<Self> {
-        let mut named: [(&str, &mut u64, u64); 11] = [
+        let mut named: [(&str, &mut u64, u64); 12] = [
             ("side", &mut self.side, HIGHEST),
             ("pixels", &mut self.pixels, HIGHEST),
             ("channels", &mut self.channels, HIGHEST),
@@ -109,6 +118,7 @@ impl Limits {
             ("seconds", &mut self.seconds, MOST_SECONDS),
             ("document_bytes", &mut self.document_bytes, HIGHEST),
             ("document_depth", &mut self.document_depth, DEEPEST),
+            ("memory_percent", &mut self.memory_percent, MOST_PERCENT),
         ];
         let Raise { name, value } = raise;
         match named.iter_mut().find(|(known, ..)| known == name) {
@@ -153,6 +163,47 @@ impl Limits {
         }
         affordable(bytes)
     }
+
+    /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where the system does not
+    /// say how much it has, nothing is refused.
+    pub(super) fn room(&self, width: usize, height: usize, channels: usize) -> std::result::Result<(), String> {
+        machine_bytes().map_or(Ok(()), |machine| self.room_in(machine, [width, height, channels].map(|n| n as u64)))
+    }
+
+    fn room_in(&self, machine: u64, [width, height, channels]: [u64; 3]) -> std::result::Result<(), String> {
+        let need = [height, channels, BYTES_IN_HAND].into_iter().fold(width, u64::saturating_mul);
+        let percent = self.memory_percent;
+        if u128::from(need) * 100 <= u128::from(machine) * u128::from(percent) {
+            return Ok(());
+        }
+        let [need, machine] = [need, machine].map(|bytes| bytes >> 20);
+        Err(format!(
+            "{width} x {height} pixels x {channels} channels x {BYTES_IN_HAND} bytes = {need} MiB of memory, over \
+             {percent} % of this machine's {machine} MiB (Limits::memory_percent; --limit memory_percent=N)"
+        ))
+    }
+}
+
+/// The memory of this machine, or of the control group that this process is confined to; none where the system does not
+/// tell. Asked once.
+pub(super) fn machine_bytes() -> Option<u64> {
+    static BYTES: OnceLock<Option<u64>> = OnceLock::new();
+    *BYTES.get_or_init(|| {
+        let told = std::fs::read_to_string("/proc/meminfo").ok()?;
+        let kib: u64 =
+            told.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix(" kB")?.parse().ok())?;
+        Some(control_group_bytes().unwrap_or(u64::MAX).min(kib << 10))
+    })
+}
+
+/// The least that this process's control group (cgroup v2) or one above it allows.
+fn control_group_bytes() -> Option<u64> {
+    let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
+    let own = groups.lines().find_map(|l| l.strip_prefix("0::/"))?;
+    let most = |group: &std::path::Path| -> Option<u64> {
+        std::fs::read_to_string(group.join("memory.max")).ok()?.trim().parse().ok()
+    };
+    std::path::Path::new("/sys/fs/cgroup").join(own).ancestors().filter_map(most).min()
 }
 
 /// One limit: `what` is counted, `name` is the field to raise.
@@ -210,6 +261,20 @@ mod tests {
         for bad in ["side", "side=x", "side=99999999999G", "sides=3", "side=-1", "side=G"] {
             assert!(bad.parse::<Raise>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn a_need_beyond_a_share_of_the_memory_is_refused_with_the_sum() {
+        let gib = 1 << 30;
+        let square = [11_585, 11_585, 3];
+        assert!(Limits::default().room_in(16 * gib, square).is_ok());
+        assert_eq!(
+            Limits::default().room_in(8 * gib, square).unwrap_err(),
+            "11585 x 11585 pixels x 3 channels x 12 bytes = 4607 MiB of memory, over 50 % of this machine's 8192 MiB \
+             (Limits::memory_percent; --limit memory_percent=N)"
+        );
+        assert!(Limits { memory_percent: 60, ..Default::default() }.room_in(8 * gib, square).is_ok());
+        assert!(Limits::default().room_in(8 * gib, [u64::MAX, 2, 2]).is_err());
     }
 
     #[test]

@@ -50,6 +50,8 @@ mod confine;
 mod document;
 mod exif;
 pub mod exr;
+mod exr_blocks;
+mod exr_chroma;
 pub mod exr_parts;
 mod exr_runs;
 #[cfg(feature = "oiio")]
@@ -65,6 +67,7 @@ mod orient;
 mod overrides;
 #[cfg(feature = "oiio")]
 mod patience;
+mod picture;
 mod place;
 mod png;
 mod profile;
@@ -91,6 +94,7 @@ pub use header::Header;
 pub(crate) use jpeg::through_jpeg;
 pub use limits::{Limits, Raise};
 pub use overrides::Override;
+pub use picture::Picture;
 pub(crate) use place::length_inside;
 pub use place::{below, clean_name, inside, refuse_links};
 pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
@@ -104,11 +108,9 @@ pub use write::{Bits, Compression, PngEffort, ToFile, WriteOptions, jpeg_bytes, 
 use crate::{Error, Image, Result};
 use exif::CameraNotes;
 use format::{Opened, Source};
-use limits::affordable;
-use profile::Profile;
 #[cfg(feature = "oiio")]
 use protocol::{Ask, Sample, Shape, Told};
-use raster::{Opaque, Raster, Refusal, Wanted};
+use raster::{Raster, Refusal, Wanted};
 use std::io::{BufRead, Cursor, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -190,42 +192,14 @@ impl ReadOptions {
 /// # Errors
 /// As [`read`].
 pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
-    let (path, limits) = (path.as_ref(), &options.limits);
-    let source = Source::open(path, limits)?;
-    let raster = match caught(|| decode(&source, options, P::WANTED)) {
-        Err(Refusal::Unsupported(what)) => elsewhere(&source, what, options, P::WANTED),
+    Picture::decode(path.as_ref(), options, P::WANTED)?.into_image()
+}
+
+/// Samples by our decoders, or by OpenImageIO where those do not know the kind.
+fn raster_of(source: &Source, options: &ReadOptions, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+    match caught(|| decode(source, options, wanted)) {
+        Err(Refusal::Unsupported(what)) => elsewhere(source, what, options, wanted),
         decoded => decoded,
-    };
-    raster.and_then(|raster| Ok(upright(&raster, &source, limits)?)).map_err(|e| Error::file(path, e))
-}
-
-/// Gives samples their meaning and turns the picture the way the camera was held.
-fn upright<P: FromFile>(raster: &Raster, source: &Source, limits: &Limits) -> std::result::Result<Image<P>, String> {
-    affordable((raster.width as u64).saturating_mul(raster.height as u64).saturating_mul(size_of::<P>() as u64))?;
-    let profile = match P::WANTED {
-        Wanted::Color | Wanted::Film => profile_of(raster, source, limits),
-        Wanted::Coverage | Wanted::Depth => None,
-    };
-    // Endless depth is where nothing is.
-    let wild = if P::WANTED == Wanted::Depth { 0 } else { raster.not_finite() };
-    if wild > 0 {
-        log::warn!("{}: {wild} samples are infinite or no number", source.path.display());
-    }
-    Ok(camera_notes(source).orientation.apply(P::from_raster(&Opaque(raster, profile.as_ref()))?))
-}
-
-/// The colour profile of display codes, where there is one other than sRGB.
-fn profile_of(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profile> {
-    match caught(|| Ok(Profile::of_file(source, limits)?)) {
-        Ok(Some(_)) if !raster.display_encoded => {
-            log::warn!("{}: has a colour profile, but float samples; taken for linear Rec. 709", source.path.display());
-            None
-        }
-        Ok(profile) => profile,
-        Err(e) => {
-            log::warn!("{}: has {e}; taken for sRGB", source.path.display());
-            None
-        }
     }
 }
 
@@ -326,7 +300,8 @@ fn elsewhere(
     options: &ReadOptions,
     wanted: Wanted,
 ) -> std::result::Result<Raster, Refusal> {
-    match told(source, what, options, Ask::Pixels { wanted, window: options.window })? {
+    let told = told(source, what.clone(), options, Ask::Pixels { wanted, window: options.window });
+    match told.map_err(|e| e.after(&what))? {
         Told::Raster(raster) => Ok(oiio::associated(raster, source)),
         Told::Shape(_) => Err("OpenImageIO gave no pixels".into()),
     }
@@ -361,7 +336,7 @@ fn read_by<P: FromFile>(fallback: Fallback, path: &Path, options: &ReadOptions) 
     let source = Source::open(path, &options.limits)?;
     let options = ReadOptions { fallback, ..options.clone() };
     let raster = elsewhere(&source, String::new(), &options, P::WANTED);
-    raster.and_then(|r| Ok(upright(&r, &source, &options.limits)?)).map_err(|e| Error::file(path, e))
+    Picture::of(raster, &source, &options.limits, P::WANTED)?.into_image()
 }
 
 /// Reads a picture through the OpenImageIO worker, even one that the Rust decoders could read: for comparisons.

@@ -88,6 +88,7 @@ pub(super) fn decode(
         (layout.width, layout.height) = (layout.data_width, layout.data_height);
     }
     let picked = distinct(wanted.pick(&layout.channels)?);
+    limits.room(layout.width as usize, layout.height as usize, picked.len())?;
     let count = (layout.data_width * layout.data_height) as usize * layout.channels.len();
     room(count as u64 * u64::from(layout.bytes.unsigned_abs()));
     let samples = match (layout.bytes, layout.half) {

@@ -1,6 +1,7 @@
 //! Turning a picture the way the camera was held (EXIF `Orientation`).
 
-use crate::Image;
+use bytemuck::{Pod, zeroed_vec};
+use rayon::prelude::*;
 
 /// One of the eight values of the EXIF tag `Orientation`; anything else is treated as 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,14 +32,23 @@ impl Orientation {
         }
     }
 
-    /// The picture upright.
-    pub(super) fn apply<P: Copy + Send + Sync>(self, stored: Image<P>) -> Image<P> {
-        if !(2..=8).contains(&self.0) {
-            return stored;
-        }
-        let (width, height) = self.size(stored.size());
-        let (right, bottom) = (stored.width() - 1, stored.height() - 1);
-        Image::from_fn(width, height, |x, y| stored[self.stored(x, y, right, bottom)])
+    /// There is something to turn.
+    pub(super) fn turns(self) -> bool {
+        (2..=8).contains(&self.0)
+    }
+
+    /// The samples of the upright picture, out of those of the stored one, `n` to a pixel.
+    pub(super) fn apply<T: Pod + Send + Sync>(self, stored: &[T], n: usize, size: (usize, usize)) -> Vec<T> {
+        let (width, _) = self.size(size);
+        let (right, bottom) = (size.0 - 1, size.1 - 1);
+        let mut out = zeroed_vec(stored.len());
+        out.par_chunks_exact_mut(width * n).enumerate().for_each(|(y, row)| {
+            for (x, pixel) in row.chunks_exact_mut(n).enumerate() {
+                let (i, j) = self.stored(x, y, right, bottom);
+                pixel.copy_from_slice(&stored[(j * size.0 + i) * n..][..n]);
+            }
+        });
+        out
     }
 }
 
@@ -48,8 +58,10 @@ mod tests {
 
     /// The letters of a 2 x 3 picture as rows, after turning.
     fn turned(orientation: u8) -> Vec<String> {
-        let stored = Image::from_vec(2, 3, "abcdef".chars().collect());
-        Orientation(orientation).apply(stored).rows().map(|r| r.iter().collect()).collect()
+        let turn = Orientation(orientation);
+        let letters = turn.apply(b"abcdef", 1, (2, 3));
+        let (width, _) = turn.size((2, 3));
+        letters.chunks(width).map(|row| String::from_utf8_lossy(row).into_owned()).collect()
     }
 
     /// EXIF 2.3, tag 274: "the 0th row is at the visual (top, bottom, left, right), the 0th column at the visual ...".

@@ -1,9 +1,11 @@
-//! PNG: 8 or 16 bits, display-encoded unless the file says that its gamma is 1, straight alpha.
+//! PNG: 8 or 16 bits, display-encoded as the file says or as sRGB, straight alpha.
 
 use super::header::{Header, Notes, note};
 use super::limits::{Demand, Limits};
+use super::profile::Said;
 use super::raster::{Raster, Refusal, Samples, usual_names};
 use super::write::{Coded, Codes, PngEffort};
+use crate::color::RgbSpace;
 use crate::io::Format;
 use png::{BitDepth, ColorType, Transformations};
 use std::io::{BufRead, Cursor, Seek};
@@ -47,11 +49,31 @@ pub(super) fn header(file: impl BufRead + Seek, file_bytes: u64, limits: &Limits
     })
 }
 
-/// The embedded colour profile; a chunk that names sRGB goes before it (PNG 3rd edition, 4.3).
-pub(super) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
+/// What the file says of its colours, the word that counts (PNG 3rd edition, 4.3): code points, a profile, sRGB, or the
+/// exponent and the primaries. None for sRGB, and where it says nothing.
+pub(super) fn colors(bytes: &[u8], limits: &Limits) -> Option<Said> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
-    if info.srgb.is_some() { None } else { Some(info.icc_profile.as_ref()?.to_vec()) }
+    if let Some(cicp) = info.coding_independent_code_points {
+        return Some(Said::CodePoints(cicp.color_primaries, cicp.transfer_function));
+    }
+    if info.srgb.is_some() {
+        return None;
+    }
+    if let Some(icc) = &info.icc_profile {
+        return Some(Said::Icc(icc.to_vec()));
+    }
+    let exponent = info.gama_chunk.map(|gamma| GAMA_ONE / f64::from(gamma.into_scaled()));
+    let primaries = info.chrm_chunk.map(space);
+    (exponent.is_some() || primaries.is_some()).then_some(Said::Curve { exponent, primaries })
+}
+
+/// `gAMA` of 1: the exponent of encoding times this.
+const GAMA_ONE: f64 = 100_000.0;
+
+fn space(named: png::SourceChromaticities) -> RgbSpace {
+    let xy = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [x, y].map(|v| f64::from(v.into_scaled()) / GAMA_ONE);
+    RgbSpace { primaries: [named.red, named.green, named.blue].map(xy), white: xy(named.white) }
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
@@ -59,9 +81,9 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let (color, depth) = reader.output_color_type();
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     let names = usual_names(color.samples()).ok_or("channels of an unknown kind")?;
+    limits.room(width, height, names.len())?;
     let mut data = vec![0; reader.output_buffer_size().ok_or("size overflows")?];
     reader.next_frame(&mut data)?;
-    let display_encoded = !is_linear(reader.info());
     reader.finish()?;
     let samples = match depth {
         BitDepth::Sixteen => {
@@ -69,12 +91,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
         }
         _ => Samples::U8(data),
     };
-    Ok(Raster { width, height, names, samples, display_encoded, premultiplied: false })
-}
-
-/// The file says itself that its samples are light: gamma 1 and no word of sRGB.
-fn is_linear(info: &png::Info<'_>) -> bool {
-    info.srgb.is_none() && info.gama_chunk.is_some_and(|gamma| gamma.into_scaled() == 100_000)
+    Ok(Raster { width, height, names, samples, display_encoded: true, premultiplied: false })
 }
 
 /// A whole file; the fast compression takes a few milliseconds for 640 x 480.
@@ -121,14 +138,61 @@ fn write(
 
 #[cfg(test)]
 mod tests {
+    use super::super::profile::Profile;
     use super::*;
 
-    #[test]
-    fn a_gamma_of_one_means_linear_samples() {
+    /// Light of a middle grey code, in a file with what `colors` adds to it.
+    fn light(colors: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>)) -> [f32; 3] {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
-        encoder.set_source_gamma(png::ScaledFloat::from_scaled(100_000));
+        colors(&mut encoder);
         encoder.write_header().unwrap().write_image_data(&[128]).unwrap();
-        assert!(!decode(&bytes, &Limits::default()).unwrap().display_encoded);
+        let profile = super::colors(&bytes, &Limits::default()).map_or(Ok(None), Profile::said).unwrap();
+        let code = 128.0 / 255.0;
+        profile.map_or([crate::color::srgb_to_linear(code); 3], |p| p.light([code; 3]))
+    }
+
+    #[test]
+    fn gamma_is_applied_and_that_of_screens_is_srgb() {
+        let code = 128.0_f64 / 255.0;
+        for (gama, exponent) in
+            [(100_000, 1.0), (55_556, 1.8), (50_000, 2.0), (220_000, 1.0 / 2.2), (35_000, 1.0 / 0.35)]
+        {
+            let [r, g, b] = light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama)));
+            let expected = libm::pow(code, exponent) as f32;
+            assert!((r - expected).abs() < 2e-5 && r == g && g == b, "{gama}: {r}, expected {expected}");
+        }
+        for gama in [45_455, 45_454, 45_000] {
+            assert_eq!(light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama))), light(|_| ()));
+        }
+    }
+
+    #[test]
+    fn the_word_of_srgb_goes_before_gamma() {
+        let both = light(|e| {
+            e.set_source_gamma(png::ScaledFloat::from_scaled(100_000));
+            e.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        });
+        assert_eq!(both, light(|_| ()));
+    }
+
+    #[test]
+    fn primaries_are_converted() {
+        let chunk = |at: [f32; 8]| {
+            png::SourceChromaticities::new((at[0], at[1]), (at[2], at[3]), (at[4], at[5]), (at[6], at[7]))
+        };
+        let p3 = chunk([0.3127, 0.329, 0.68, 0.32, 0.265, 0.69, 0.15, 0.06]);
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_source_chromaticities(p3);
+        encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
+        let profile = colors(&bytes, &Limits::default()).map(Profile::said).unwrap().unwrap().unwrap();
+        // Display P3 red in Rec. 709.
+        let red = profile.light([1.0, 0.0, 0.0]);
+        for (v, expected) in red.iter().zip([1.224_94, -0.042_06, -0.019_64]) {
+            assert!((v - expected).abs() < 1e-3, "{red:?}");
+        }
+        let same = chunk([0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06]);
+        assert_eq!(light(|e| e.set_source_chromaticities(same)), light(|_| ()));
     }
 }

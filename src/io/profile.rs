@@ -1,4 +1,4 @@
-//! Colour profiles (ICC) that files carry: what they say their display codes are.
+//! What files say that their display codes are: colour profiles (ICC), and the curve and primaries that a PNG names.
 //!
 //! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of one grey curve are
 //! applied; others are named in a warning and the codes taken for sRGB.
@@ -11,7 +11,7 @@
 use super::format::{Format, Source};
 use super::limits::Limits;
 use super::{jpeg, png, tiff};
-use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_xyz, srgb_to_linear};
+use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, srgb_to_linear};
 use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve};
 use nalgebra::Matrix3;
 
@@ -21,6 +21,23 @@ const D50: [f64; 2] = [0.345_70, 0.358_54];
 const FULL: f32 = 65_535.0;
 /// Curves and matrices that differ by less are sRGB's, written with fewer digits or measured from a table.
 const SAME: f32 = 2e-3;
+
+/// What a file says of its colours.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Said {
+    /// A colour profile.
+    Icc(Vec<u8>),
+    /// Light is the code raised to an exponent, if that is said, in primaries, if those are.
+    Curve { exponent: Option<f64>, primaries: Option<RgbSpace> },
+    /// Primaries and transfer function by their numbers in ITU-T H.273.
+    CodePoints(u8, u8),
+}
+
+/// The exponent of screens: files name it that mean sRGB, in steps of a hundredth and coarser.
+const OF_SCREENS: std::ops::RangeInclusive<f64> = 2.16..=2.24;
+/// H.273: the primaries of Rec. 709 with the curve of sRGB, and without any.
+const CODE_POINTS_SRGB: (u8, u8) = (1, 13);
+const CODE_POINTS_LINEAR: (u8, u8) = (1, 8);
 
 /// How display codes become light, where a file says so itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,10 +53,33 @@ impl Profile {
     /// # Errors
     /// What a profile says that cannot be applied.
     pub(super) fn of_file(source: &Source, limits: &Limits) -> Result<Option<Self>, String> {
-        match embedded(source, limits) {
-            Some(bytes) => Self::parsed(&bytes),
-            None => Ok(None),
+        said(source, limits).map_or(Ok(None), Self::said)
+    }
+
+    /// What a file says, if it is not sRGB.
+    ///
+    /// # Errors
+    /// What is said that cannot be applied.
+    pub(super) fn said(said: Said) -> Result<Option<Self>, String> {
+        match said {
+            Said::Icc(bytes) => Self::parsed(&bytes),
+            Said::Curve { exponent, primaries } => Self::of_curve(exponent, primaries),
+            Said::CodePoints(a, b) if (a, b) == CODE_POINTS_SRGB => Ok(None),
+            Said::CodePoints(a, b) if (a, b) == CODE_POINTS_LINEAR => Self::of_curve(Some(1.0), None),
+            Said::CodePoints(primaries, transfer) => Err(format!("code points {primaries}/{transfer} for its colours")),
         }
+    }
+
+    fn of_curve(exponent: Option<f64>, primaries: Option<RgbSpace>) -> Result<Option<Self>, String> {
+        let exponent = exponent.filter(|e| !OF_SCREENS.contains(e));
+        let matrix = primaries.map_or(Ok(None), |space| to_rec709(&space))?;
+        if exponent.is_none() && matrix.is_none() {
+            return Ok(None);
+        }
+        let light = |x: f64| exponent.map_or_else(|| f64::from(srgb_to_linear(x as f32)), |e| libm::pow(x, e));
+        let curve = tabled(light).ok_or("a gamma that is none")?;
+        let to_rec709 = matrix.unwrap_or_else(|| Matrix3::identity().into());
+        Ok(Some(Self { curves: std::array::from_fn(|_| curve.clone()), to_rec709 }))
     }
 
     fn parsed(bytes: &[u8]) -> Result<Option<Self>, String> {
@@ -91,9 +131,35 @@ const CODES: usize = 1 << 16;
 
 /// Light of every 16-bit code; none for a curve that is not one.
 fn table(curve: &ToneReprCurve) -> Option<Vec<f32>> {
-    let light: Vec<f32> =
-        (0..CODES).map(|code| evaluate(curve, f64::from(code as u16) / f64::from(FULL)) as f32).collect();
+    tabled(|x| evaluate(curve, x))
+}
+
+fn tabled(curve: impl Fn(f64) -> f64) -> Option<Vec<f32>> {
+    let light: Vec<f32> = (0..CODES).map(|code| curve(f64::from(code as u16) / f64::from(FULL)) as f32).collect();
     light.iter().all(|v| v.is_finite()).then_some(light)
+}
+
+/// Chromaticities that differ by less are the same, written with fewer digits.
+const SAME_CHROMATICITY: f64 = 1e-3;
+/// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
+const SMALLEST_GAMUT: f64 = 1e-3;
+
+/// The way to the library's primaries from those that a file names; none where they are the same.
+///
+/// # Errors
+/// For primaries and a white that no colour space has.
+pub(super) fn to_rec709(named: &RgbSpace) -> Result<Option<ColorMatrix>, String> {
+    let pairs = |space: &RgbSpace| space.primaries.into_iter().chain([space.white]).flatten().collect::<Vec<_>>();
+    let [r, g, b] = named.primaries;
+    let area = ((g[0] - r[0]) * (b[1] - r[1]) - (b[0] - r[0]) * (g[1] - r[1])).abs() / 2.0;
+    // Primaries may be no colours that can be seen, as those of XYZ and ACES are.
+    let all_real = pairs(named).iter().all(|v| v.abs() <= 2.0);
+    if !all_real || area < SMALLEST_GAMUT || named.white[1] < SMALLEST_GAMUT {
+        return Err(format!("chromaticities {:?}, expected those of a colour space", pairs(named)));
+    }
+    let ours = RgbSpace::REC709;
+    let same = pairs(named).iter().zip(pairs(&ours)).all(|(v, w)| (v - w).abs() < SAME_CHROMATICITY);
+    Ok((!same).then(|| rgb_from_rgb(&ours, named).into()))
 }
 
 /// ICC.1:2022, 10.6 (tables, or a gamma of 8.8 bits) and 10.18 (functions of one to seven parameters).
@@ -146,12 +212,12 @@ fn interpolated(table: &[u16], x: f64) -> f64 {
     (low + (high - low) * (at - i as f64)) / f64::from(FULL)
 }
 
-/// The profile as the file holds it; formats of linear light have none.
-fn embedded(source: &Source, limits: &Limits) -> Option<Vec<u8>> {
+/// The file's own words; formats of linear light have none.
+fn said(source: &Source, limits: &Limits) -> Option<Said> {
     match source.format {
-        Format::Png => png::profile(&source.bytes, limits),
-        Format::Jpeg => jpeg::profile(&source.bytes),
-        Format::Tiff => tiff::profile(&source.bytes, limits),
+        Format::Png => png::colors(&source.bytes, limits),
+        Format::Jpeg => jpeg::profile(&source.bytes).map(Said::Icc),
+        Format::Tiff => tiff::profile(&source.bytes, limits).map(Said::Icc),
         _ => None,
     }
 }
@@ -159,7 +225,6 @@ fn embedded(source: &Source, limits: &Limits) -> Option<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::color::rgb_from_rgb;
 
     fn parsed(icc: &ColorProfile) -> Option<Profile> {
         Profile::parsed(&icc.encode().unwrap()).unwrap()
@@ -210,6 +275,30 @@ mod tests {
         assert_eq!(at(ToneReprCurve::Parametric(vec![2.0, 1.0, -0.5]), 0.25), 0.0);
         assert_eq!(at(ToneReprCurve::Parametric(vec![2.0, 1.0, 0.0, 0.5, 0.25]), 0.125), 0.0625);
         assert!(table(&ToneReprCurve::Parametric(vec![1.0, 2.0])).is_none());
+    }
+
+    #[test]
+    fn code_points_other_than_those_of_screens_are_named() {
+        assert_eq!(Profile::said(Said::CodePoints(1, 13)), Ok(None));
+        assert_eq!(Profile::said(Said::CodePoints(1, 8)).unwrap().unwrap().light([0.5; 3])[0], 32768.0 / 65535.0);
+        assert_eq!(Profile::said(Said::CodePoints(9, 16)).unwrap_err(), "code points 9/16 for its colours");
+    }
+
+    /// CIE XYZ of equal energy: its middle is the white of Rec. 709.
+    #[test]
+    fn primaries_without_luminance_are_primaries() {
+        let xyz = RgbSpace { primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0; 2] };
+        let matrix = to_rec709(&xyz).unwrap().unwrap();
+        let white = matrix.apply([1.0; 3]);
+        assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-6), "{white:?}");
+        // Y is what Rec. 709 says luminance is, before the white is adapted: green has most of it.
+        let [r, g, b] = matrix.apply([0.0, 1.0, 0.0]);
+        assert!(g > 1.0 && r < 0.0 && b < 0.0, "{r} {g} {b}");
+        assert_eq!(to_rec709(&RgbSpace::REC709), Ok(None));
+        let line = RgbSpace { primaries: [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]], ..xyz };
+        let black = RgbSpace { white: [0.3, 0.0], ..xyz };
+        let endless = RgbSpace { white: [f64::NAN, 0.3], ..xyz };
+        assert!([line, black, endless].iter().all(|space| to_rec709(space).is_err()));
     }
 
     #[test]

@@ -3,11 +3,14 @@
 //! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples are scene-linear, unless
 //! the file says otherwise. A matte or a depth is never display-encoded.
 
+use super::orient::Orientation;
 use super::profile::Profile;
 use crate::color::{decode_srgb8, decode_srgb16, srgb_to_linear};
 use crate::{Coverage, Depth, Film, Image, LinearRgb, PremulRgba, Srgb8, StraightRgba};
+use bytemuck::{Zeroable, zeroed_vec};
 use half::f16;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Samples of a picture, channels interleaved, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +24,20 @@ pub(super) enum Samples {
 impl Samples {
     pub(super) fn are_float(&self) -> bool {
         matches!(self, Self::F16(_) | Self::F32(_))
+    }
+
+    /// Gives the memory of the last samples back.
+    fn shorten(&mut self, count: usize) {
+        fn shorten<T>(samples: &mut Vec<T>, count: usize) {
+            samples.truncate(count);
+            samples.shrink_to_fit();
+        }
+        match self {
+            Self::U8(v) => shorten(v, count),
+            Self::U16(v) => shorten(v, count),
+            Self::F16(v) => shorten(v, count),
+            Self::F32(v) => shorten(v, count),
+        }
     }
 }
 
@@ -59,6 +76,17 @@ impl From<&str> for Refusal {
     }
 }
 
+#[cfg(feature = "oiio")]
+impl Refusal {
+    /// With what another decoder could not read, where it said so: that is the file's own, and why it came here.
+    pub(super) fn after(self, what: &str) -> Self {
+        match self {
+            Self::Broken(why) if what.starts_with("unsupported") => Self::Broken(format!("{what} ({why})")),
+            other => other,
+        }
+    }
+}
+
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -94,25 +122,37 @@ pub enum Wanted {
     Depth,
 }
 
+/// How channels serve a purpose, the best first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Fit {
+    /// By the names that are usual.
+    Named,
+    /// They are those of a layer: `diffuse.R`.
+    Layer,
+    /// There is no other.
+    Alone,
+}
+
+/// Layers that are taken before others: what programs call the finished picture.
+const FINISHED: [&str; 5] = ["combined", "rgba", "rgb", "beauty", "color"];
+
 impl Wanted {
     /// Where the wanted channels stand among `names`: red, green, blue and perhaps alpha, or one.
     pub(super) fn pick(self, names: &[String]) -> Result<Vec<usize>, String> {
+        self.choose(names).map(|(_, picked)| picked)
+    }
+
+    /// As [`pick`](Self::pick), and how well they fit.
+    pub(super) fn choose(self, names: &[String]) -> Result<(Fit, Vec<usize>), String> {
         let at = |name: &str| names.iter().position(|n| n == name);
-        let all = |names: [&str; 3]| names.into_iter().map(at).collect::<Option<Vec<_>>>();
+        let named = |i: usize| (Fit::Named, vec![i]);
         let found = match self {
-            Self::Film => {
-                let through = all(VIEW_TRANSMITTANCE).or_else(|| all(TRANSMITTANCE)).unwrap_or_default();
-                let color = Self::Color.pick(names)?;
-                let alpha_free = if through.is_empty() { color.len() } else { 3 };
-                Some(color.into_iter().take(alpha_free).chain(through).collect())
-            }
-            Self::Color => all(["R", "G", "B"])
-                .or_else(|| at("Y").map(|y| vec![y; 3]))
-                .map(|color| color.into_iter().chain(at("A")).collect()),
-            _ if names.len() == 1 => Some(vec![0]),
+            Self::Film => film(names),
+            Self::Color => color(names),
+            _ if names.len() == 1 => Some(named(0)),
             Self::Coverage if at("A").is_some() && at("Y").is_some() => None,
-            Self::Coverage => at("A").or(at("Y")).map(|i| vec![i]),
-            Self::Depth => at("Z").map(|i| vec![i]),
+            Self::Coverage => at("A").or(at("Y")).map(named),
+            Self::Depth => at("Z").map(named).or_else(|| Some((Fit::Layer, vec![only(names, |n| last(n) == "Z")?]))),
         };
         found.ok_or_else(|| format!("has the channels {}, expected {}", names.join(" "), self.expected()))
     }
@@ -126,22 +166,81 @@ impl Wanted {
     }
 }
 
+/// Colour, with the transmittance in place of alpha where there is one.
+fn film(names: &[String]) -> Option<(Fit, Vec<usize>)> {
+    let at = |name: &str| names.iter().position(|n| n == name);
+    let all = |three: [&str; 3]| three.into_iter().map(at).collect::<Option<Vec<_>>>();
+    let through = all(VIEW_TRANSMITTANCE).or_else(|| all(TRANSMITTANCE)).unwrap_or_default();
+    let (fit, mut picked) = color(names)?;
+    picked.truncate(if through.is_empty() { picked.len() } else { 3 });
+    picked.extend(through);
+    Some((fit, picked))
+}
+
+/// Colour by its usual names, or a layer of that, or the only channel that can be seen.
+fn color(names: &[String]) -> Option<(Fit, Vec<usize>)> {
+    if let Some(picked) = color_of_layer(names, "") {
+        return Some((Fit::Named, picked));
+    }
+    let layers = names.iter().filter_map(|name| Some(&name[..=name.rfind('.')?]));
+    let layers: Vec<(&str, Vec<usize>)> = layers.filter_map(|l| Some((l, color_of_layer(names, l)?))).collect();
+    let is_finished = |layer: &str| FINISHED.contains(&last(layer.trim_end_matches('.')).to_lowercase().as_str());
+    let chosen = layers.iter().find(|(layer, _)| is_finished(layer)).or(layers.first());
+    if let Some((_, picked)) = chosen {
+        return Some((Fit::Layer, picked.clone()));
+    }
+    let seen = only(names, |_| true).or_else(|| only(names, |name| !["A", "Z", "ZBack"].contains(&last(name))))?;
+    let alpha = only(names, |name| last(name) == "A").filter(|&a| a != seen);
+    Some((Fit::Alone, [seen; 3].into_iter().chain(alpha).collect()))
+}
+
+/// `R G B` or `Y` of a layer, with its `A`.
+fn color_of_layer(names: &[String], layer: &str) -> Option<Vec<usize>> {
+    let at = |name: &str| names.iter().position(|n| n.strip_prefix(layer) == Some(name));
+    let all = |three: [&str; 3]| three.into_iter().map(at).collect::<Option<Vec<_>>>();
+    let grey = || at("Y").map(|y| vec![y; 3]);
+    let color = all(["R", "G", "B"]).or_else(|| all(["r", "g", "b"])).or_else(grey)?;
+    Some(color.into_iter().chain(at("A").or(at("a"))).collect())
+}
+
+/// A channel's own name, without its layer's.
+fn last(name: &str) -> &str {
+    name.rsplit('.').next().unwrap_or(name)
+}
+
+/// Where the only one of a kind stands.
+fn only(names: &[String], is: impl Fn(&str) -> bool) -> Option<usize> {
+    let mut found = names.iter().enumerate().filter(|(_, name)| is(name));
+    let (i, _) = found.next()?;
+    found.next().is_none().then_some(i)
+}
+
 /// Channels of a film's measured transmittance: the screen seen through it and in its shadow.
 pub const TRANSMITTANCE: [&str; 3] = ["TR", "TG", "TB"];
 /// Channels of a film's view transmittance: the share of the line of sight that passes.
 pub const VIEW_TRANSMITTANCE: [&str; 3] = ["VR", "VG", "VB"];
 
 /// How a pixel type is made from the samples of a file. Sealed by being private to `io`.
-pub trait FromFile: Copy + Send + Sync + Default + 'static {
+pub trait FromFile: Copy + Send + Sync + Default + Zeroable + 'static {
     #[doc(hidden)]
     const WANTED: Wanted;
+    /// Refuses rows that cannot be such pixels.
     #[doc(hidden)]
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String>;
+    fn check(_: &Opaque<'_>) -> Result<(), String> {
+        Ok(())
+    }
+    /// Makes the pixels of the rows.
+    #[doc(hidden)]
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String>;
 }
 
-/// A [`Raster`] that only `io` can look into, and what its file says of its colours.
+/// Rows of a [`Raster`], which only `io` can look into, and what its file says of its colours.
 #[derive(Debug)]
-pub struct Opaque<'a>(pub(super) &'a Raster, pub(super) Option<&'a Profile>);
+pub struct Opaque<'a> {
+    pub(super) raster: &'a Raster,
+    pub(super) profile: Option<&'a Profile>,
+    pub(super) rows: Range<usize>,
+}
 
 /// Colour with alpha in whichever form the file has it.
 trait Colored: Copy + Send {
@@ -185,61 +284,68 @@ impl Colored for LinearRgb {
 
 impl FromFile for PremulRgba {
     const WANTED: Wanted = Wanted::Color;
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        raster.0.colors(raster.1)
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
+        rows.colors(pixels)
     }
 }
 
 impl FromFile for Film {
     const WANTED: Wanted = Wanted::Film;
     /// Transmittance where float channels have it, else alpha for every channel.
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        let picked = Wanted::Film.pick(&raster.0.names)?;
-        match (&raster.0.samples, &picked[..]) {
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
+        let picked = Wanted::Film.pick(&rows.raster.names)?;
+        match (&rows.raster.samples, &picked[..]) {
             (Samples::F32(v), &[r, g, b, tr, tg, tb]) => {
-                Ok(raster.0.each(v, |px| Film::new([px[r], px[g], px[b]].into(), [px[tr], px[tg], px[tb]].into())))
+                rows.each(v, pixels, |px| Film::new([px[r], px[g], px[b]].into(), [px[tr], px[tg], px[tb]].into()));
             }
-            (Samples::F16(v), &[r, g, b, tr, tg, tb]) => Ok(raster.0.each(v, |px| {
+            (Samples::F16(v), &[r, g, b, tr, tg, tb]) => rows.each(v, pixels, |px| {
                 let three = |at: [usize; 3]| at.map(|i| f32::from(px[i])).into();
                 Film::new(three([r, g, b]), three([tr, tg, tb]))
-            })),
+            }),
             _ => {
-                let rgba: Image<PremulRgba> = raster.0.colors(raster.1)?;
-                Ok(Image::from_vec(rgba.width(), rgba.height(), rgba.pixels().iter().map(|&p| p.into()).collect()))
+                let mut rgba = zeroed_vec::<PremulRgba>(pixels.len());
+                rows.colors(&mut rgba)?;
+                pixels.iter_mut().zip(rgba).for_each(|(film, rgba)| *film = rgba.into());
             }
         }
+        Ok(())
     }
 }
 
 impl FromFile for StraightRgba {
     const WANTED: Wanted = Wanted::Color;
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        raster.0.colors(raster.1)
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
+        rows.colors(pixels)
     }
 }
 
 impl FromFile for LinearRgb {
     const WANTED: Wanted = Wanted::Color;
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        raster.0.refuse_transparency()?;
-        raster.0.colors(raster.1)
+    fn check(rows: &Opaque<'_>) -> Result<(), String> {
+        rows.refuse_transparency()
+    }
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
+        rows.colors(pixels)
     }
 }
 
 impl FromFile for Coverage {
     const WANTED: Wanted = Wanted::Coverage;
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        raster.0.single(Self::WANTED, Coverage)
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
+        rows.single(Self::WANTED, pixels, Coverage)
     }
 }
 
 impl FromFile for Depth {
     const WANTED: Wanted = Wanted::Depth;
-    fn from_raster(raster: &Opaque<'_>) -> Result<Image<Self>, String> {
-        if !raster.0.samples.are_float() {
-            return Err("integer samples, expected a depth in float (metres)".into());
+    fn check(rows: &Opaque<'_>) -> Result<(), String> {
+        match rows.raster.samples.are_float() {
+            true => Ok(()),
+            false => Err("integer samples, expected a depth in float (metres)".into()),
         }
-        raster.0.single(Self::WANTED, Depth)
+    }
+    fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
+        rows.single(Self::WANTED, pixels, Depth)
     }
 }
 
@@ -252,55 +358,158 @@ struct Channels {
 /// What counts as opaque: half floats next to 1 are 0.0005 apart.
 const OPAQUE: f32 = 0.999;
 
-impl Raster {
+impl Opaque<'_> {
     /// A photo must not hide the share of a pixel that is missing.
     fn refuse_transparency(&self) -> Result<(), String> {
-        let Some(a) = self.names.iter().position(|n| n == "A") else { return Ok(()) };
-        let alpha = self.plane(a, Coverage);
-        let clear = alpha.pixels().iter().filter(|c| c.0 < OPAQUE).count();
+        let clear = match Wanted::Color.pick(&self.raster.names)?.get(3) {
+            Some(&a) => self.clear(a),
+            None => 0,
+        };
         if clear == 0 {
             return Ok(());
         }
         Err(format!("{clear} pixels with alpha below 1, expected an opaque picture (put it over a background first)"))
     }
 
-    fn colors<P: Colored>(&self, profile: Option<&Profile>) -> Result<Image<P>, String> {
-        let picked = Wanted::Color.pick(&self.names)?;
+    /// Pixels whose channel `a` says that they are not opaque.
+    fn clear(&self, a: usize) -> usize {
+        match &self.raster.samples {
+            Samples::U8(v) => self.count(v, |px| f32::from(px[a]) / 255.0 < OPAQUE),
+            Samples::U16(v) => self.count(v, |px| f32::from(px[a]) / 65_535.0 < OPAQUE),
+            Samples::F16(v) => self.count(v, |px| f32::from(px[a]) < OPAQUE),
+            Samples::F32(v) => self.count(v, |px| px[a] < OPAQUE),
+        }
+    }
+
+    fn colors<P: Colored>(&self, pixels: &mut [P]) -> Result<(), String> {
+        let picked = Wanted::Color.pick(&self.raster.names)?;
         let at = Channels { color: [picked[0], picked[1], picked[2]], alpha: picked.get(3).copied() };
-        let light = |display: [f32; 3]| profile.map_or_else(|| display.map(srgb_to_linear), |p| p.light(display));
-        Ok(match (&self.samples, profile) {
+        let light = |display: [f32; 3]| self.profile.map_or_else(|| display.map(srgb_to_linear), |p| p.light(display));
+        match (&self.raster.samples, self.profile) {
             (Samples::U8(v), None) => {
-                self.decoded(v, &at, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into(), light)
+                self.decoded(v, pixels, &at, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into(), light);
             }
-            (Samples::U16(v), None) => self.decoded(v, &at, 65_535.0, |codes| codes.map(decode_srgb16), light),
+            (Samples::U16(v), None) => {
+                self.decoded(v, pixels, &at, 65_535.0, |codes| codes.map(decode_srgb16), light);
+            }
             (Samples::U8(v), Some(p)) => {
-                self.decoded(v, &at, 255.0, |c| p.light(c.map(|c| f32::from(c) / 255.0)), light)
+                self.decoded(v, pixels, &at, 255.0, |c| p.light(c.map(|c| f32::from(c) / 255.0)), light);
             }
             (Samples::U16(v), Some(p)) => {
-                self.decoded(v, &at, 65_535.0, |c| p.light(c.map(|c| f32::from(c) / 65_535.0)), light)
+                self.decoded(v, pixels, &at, 65_535.0, |c| p.light(c.map(|c| f32::from(c) / 65_535.0)), light);
             }
-            (Samples::F16(v), _) => self.decoded(v, &at, 1.0, |c| light(c.map(f32::from)), light),
-            (Samples::F32(v), _) => self.decoded(v, &at, 1.0, light, light),
-        })
+            (Samples::F16(v), _) => self.decoded(v, pixels, &at, 1.0, |c| light(c.map(f32::from)), light),
+            (Samples::F32(v), _) => self.decoded(v, pixels, &at, 1.0, light, light),
+        }
+        Ok(())
     }
 
     /// Colours out of samples whose alpha is 1 at `full`; `decode` knows their display codes, `light` display values.
     fn decoded<T: Copy + Sync + Into<f32>, P: Colored>(
         &self,
         samples: &[T],
+        pixels: &mut [P],
         at: &Channels,
         full: f32,
         decode: impl Fn([T; 3]) -> [f32; 3] + Sync + Send,
         light: impl Fn([f32; 3]) -> [f32; 3] + Sync + Send,
-    ) -> Image<P> {
+    ) {
         let a = |px: &[T]| at.alpha.map_or(1.0, |i| px[i].into() / full);
         let plain = |px: &[T]| at.color.map(|i| px[i].into() / full);
-        match (self.display_encoded, self.premultiplied && at.alpha.is_some()) {
-            (true, false) => self.each(samples, |px| P::straight(decode(at.color.map(|i| px[i])), a(px))),
-            (false, false) => self.each(samples, |px| P::straight(plain(px), a(px))),
-            (false, true) => self.each(samples, |px| P::premultiplied(plain(px), a(px))),
-            (true, true) => self.each(samples, |px| P::straight(light(unassociated(plain(px), a(px))), a(px))),
+        match (self.raster.display_encoded, self.raster.premultiplied && at.alpha.is_some()) {
+            (true, false) => self.each(samples, pixels, |px| P::straight(decode(at.color.map(|i| px[i])), a(px))),
+            (false, false) => self.each(samples, pixels, |px| P::straight(plain(px), a(px))),
+            (false, true) => self.each(samples, pixels, |px| P::premultiplied(plain(px), a(px))),
+            (true, true) => {
+                self.each(samples, pixels, |px| P::straight(light(unassociated(plain(px), a(px))), a(px)));
+            }
         }
+    }
+
+    /// One channel as plain numbers, full scale 1.
+    fn single<P: Send>(
+        &self,
+        wanted: Wanted,
+        pixels: &mut [P],
+        make: impl Fn(f32) -> P + Sync + Send,
+    ) -> Result<(), String> {
+        let i = wanted.pick(&self.raster.names)?[0];
+        match &self.raster.samples {
+            Samples::U8(v) => self.each(v, pixels, |px| make(f32::from(px[i]) / 255.0)),
+            Samples::U16(v) => self.each(v, pixels, |px| make(f32::from(px[i]) / 65_535.0)),
+            Samples::F16(v) => self.each(v, pixels, |px| make(px[i].into())),
+            Samples::F32(v) => self.each(v, pixels, |px| make(px[i])),
+        }
+        Ok(())
+    }
+
+    fn each<T: Sync, P: Send>(&self, samples: &[T], pixels: &mut [P], f: impl Fn(&[T]) -> P + Sync + Send) {
+        let pixels = pixels.par_iter_mut().with_min_len(self.raster.width.max(1));
+        pixels.zip(self.stored(samples)).for_each(|(pixel, px)| *pixel = f(px));
+    }
+
+    fn count<T: Sync>(&self, samples: &[T], is: impl Fn(&[T]) -> bool + Sync + Send) -> usize {
+        self.stored(samples).filter(|px| is(px)).count()
+    }
+
+    /// The samples of each pixel of the rows.
+    fn stored<'s, T: Sync>(&self, samples: &'s [T]) -> impl IndexedParallelIterator<Item = &'s [T]> {
+        let row = self.raster.row();
+        samples[self.rows.start * row..self.rows.end * row].par_chunks_exact(self.raster.names.len())
+    }
+}
+
+/// Pixels that are made at a time.
+const BAND: usize = 1 << 20;
+
+impl Raster {
+    /// Samples of a row.
+    fn row(&self) -> usize {
+        self.width * self.names.len()
+    }
+
+    /// The pixels of some rows.
+    pub(super) fn pixels<P: FromFile>(
+        &self,
+        profile: Option<&Profile>,
+        rows: Range<usize>,
+    ) -> Result<Image<P>, String> {
+        let (width, height) = (self.width, rows.len());
+        let mut pixels = zeroed_vec(width * height);
+        P::fill(&Opaque { raster: self, profile, rows }, &mut pixels)?;
+        Ok(Image::from_vec(width, height, pixels))
+    }
+
+    /// All pixels, from the last row up; the samples' memory is given back on the way, so that never much more than one
+    /// of the two is there.
+    pub(super) fn into_image<P: FromFile>(mut self, profile: Option<&Profile>) -> Result<Image<P>, String> {
+        let (width, height, row) = (self.width, self.height, self.row());
+        P::check(&Opaque { raster: &self, profile, rows: 0..height })?;
+        let mut pixels: Vec<P> = zeroed_vec(width * height);
+        let mut rows = height..height;
+        while rows.start > 0 {
+            rows = rows.start.saturating_sub((BAND / width.max(1)).max(1))..rows.start;
+            let part = &mut pixels[rows.start * width..rows.end * width];
+            P::fill(&Opaque { raster: &self, profile, rows: rows.clone() }, part)?;
+            self.samples.shorten(rows.start * row);
+        }
+        Ok(Image::from_vec(width, height, pixels))
+    }
+
+    /// The picture the way the camera was held.
+    pub(super) fn upright(self, orientation: Orientation) -> Self {
+        if !orientation.turns() {
+            return self;
+        }
+        let (stored, n) = ((self.width, self.height), self.names.len());
+        let samples = match &self.samples {
+            Samples::U8(v) => Samples::U8(orientation.apply(v, n, stored)),
+            Samples::U16(v) => Samples::U16(orientation.apply(v, n, stored)),
+            Samples::F16(v) => Samples::F16(orientation.apply(v, n, stored)),
+            Samples::F32(v) => Samples::F32(orientation.apply(v, n, stored)),
+        };
+        let (width, height) = orientation.size(stored);
+        Self { width, height, samples, ..self }
     }
 
     /// Samples that are no number, or endless.
@@ -310,29 +519,6 @@ impl Raster {
             Samples::F32(v) => v.par_iter().filter(|x| !x.is_finite()).count(),
             Samples::U8(_) | Samples::U16(_) => 0,
         }
-    }
-
-    fn single<P: Copy + Send>(
-        &self,
-        wanted: Wanted,
-        make: impl Fn(f32) -> P + Sync + Send,
-    ) -> Result<Image<P>, String> {
-        Ok(self.plane(wanted.pick(&self.names)?[0], make))
-    }
-
-    /// One channel as plain numbers, full scale 1.
-    fn plane<P: Copy + Send>(&self, i: usize, make: impl Fn(f32) -> P + Sync + Send) -> Image<P> {
-        match &self.samples {
-            Samples::U8(v) => self.each(v, |px| make(f32::from(px[i]) / 255.0)),
-            Samples::U16(v) => self.each(v, |px| make(f32::from(px[i]) / 65_535.0)),
-            Samples::F16(v) => self.each(v, |px| make(px[i].into())),
-            Samples::F32(v) => self.each(v, |px| make(px[i])),
-        }
-    }
-
-    fn each<T: Sync, P: Copy + Send>(&self, samples: &[T], f: impl Fn(&[T]) -> P + Sync + Send) -> Image<P> {
-        let pixels = samples.par_chunks_exact(self.names.len()).with_min_len(self.width.max(1)).map(f).collect();
-        Image::from_vec(self.width, self.height, pixels)
     }
 }
 
@@ -363,6 +549,10 @@ mod tests {
         Raster { width: 1, height: 1, names, samples, display_encoded, premultiplied }
     }
 
+    fn pixel<P: FromFile>(raster: Raster) -> Result<P, String> {
+        raster.into_image(None).map(|image: Image<P>| image[(0, 0)])
+    }
+
     #[test]
     fn long_messages_are_cut() {
         assert_eq!(one_line(" a\n b "), "a b");
@@ -372,14 +562,14 @@ mod tests {
     #[test]
     fn alpha_multiplies_linear_light() {
         let half_white = raster(Samples::U8(vec![255, 255, 255, 128]), "R G B A", true, false);
-        let p = PremulRgba::from_raster(&Opaque(&half_white, None)).unwrap()[(0, 0)];
+        let p = pixel::<PremulRgba>(half_white).unwrap();
         assert_eq!(p, PremulRgba::new(128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0));
     }
 
     #[test]
     fn premultiplied_display_codes_are_divided_before_they_are_decoded() {
         let grey = raster(Samples::U8(vec![64, 64, 64, 128]), "R G B A", true, true);
-        let p = PremulRgba::from_raster(&Opaque(&grey, None)).unwrap()[(0, 0)];
+        let p = pixel::<PremulRgba>(grey).unwrap();
         let expected = srgb_to_linear(0.5) * 128.0 / 255.0;
         assert!((p.r - expected).abs() < 1e-6, "{p:?}");
     }
@@ -387,28 +577,77 @@ mod tests {
     #[test]
     fn an_opaque_alpha_is_dropped_and_a_transparent_one_refused() {
         let opaque = raster(Samples::U8(vec![255, 0, 0, 255]), "R G B A", true, false);
-        assert_eq!(LinearRgb::from_raster(&Opaque(&opaque, None)).unwrap()[(0, 0)], LinearRgb::new(1.0, 0.0, 0.0));
+        assert_eq!(pixel::<LinearRgb>(opaque).unwrap(), LinearRgb::new(1.0, 0.0, 0.0));
         let clear = raster(Samples::U8(vec![255, 0, 0, 254]), "R G B A", true, false);
-        assert!(LinearRgb::from_raster(&Opaque(&clear, None)).unwrap_err().contains("alpha"));
+        assert!(pixel::<LinearRgb>(clear).unwrap_err().contains("alpha"));
     }
 
     #[test]
     fn masks_are_never_display_decoded() {
         let mask = raster(Samples::U8(vec![51]), "Y", true, false);
-        assert_eq!(Coverage::from_raster(&Opaque(&mask, None)).unwrap()[(0, 0)], Coverage(0.2));
+        assert_eq!(pixel::<Coverage>(mask).unwrap(), Coverage(0.2));
     }
 
     #[test]
     fn a_mask_of_three_channels_is_refused_with_what_was_expected() {
         let mask = raster(Samples::U8(vec![51; 3]), "R G B", true, false);
-        let e = Coverage::from_raster(&Opaque(&mask, None)).unwrap_err();
+        let e = pixel::<Coverage>(mask).unwrap_err();
         assert_eq!(e, "has the channels R G B, expected one channel, or one named A or Y");
+    }
+
+    fn names(text: &str) -> Vec<String> {
+        text.split(' ').map(String::from).collect()
+    }
+
+    #[test]
+    fn colour_is_found_by_name_by_layer_and_alone() {
+        for (channels, fit, picked) in [
+            ("A B G R", Fit::Named, "R G B A"),
+            ("b g r", Fit::Named, "r g b"),
+            ("A Y diffuse.B diffuse.G diffuse.R", Fit::Named, "Y Y Y A"),
+            ("d.B d.G d.R s.B s.G s.R", Fit::Layer, "d.R d.G d.B"),
+            (
+                "V.Alb.B V.Alb.G V.Alb.R V.Combined.A V.Combined.B V.Combined.G V.Combined.R V.Depth.Z",
+                Fit::Layer,
+                "V.Combined.R V.Combined.G V.Combined.B V.Combined.A",
+            ),
+            ("left.Y left.A", Fit::Layer, "left.Y left.Y left.Y left.A"),
+            ("mask", Fit::Alone, "mask mask mask"),
+            ("A", Fit::Alone, "A A A"),
+            ("R Z", Fit::Alone, "R R R"),
+            ("A R", Fit::Alone, "R R R A"),
+        ] {
+            let names = names(channels);
+            let (found, indices) = Wanted::Color.choose(&names).unwrap();
+            let found = (found, indices.into_iter().map(|i| names[i].as_str()).collect::<Vec<_>>().join(" "));
+            assert_eq!(found, (fit, picked.to_string()), "{channels}");
+        }
+        for none in ["u v", "A Z", "d.R d.G s.B", "N.x N.y N.z"] {
+            assert!(Wanted::Color.pick(&names(none)).is_err(), "{none}");
+        }
+    }
+
+    #[test]
+    fn depth_is_found_in_a_layer() {
+        assert_eq!(Wanted::Depth.pick(&names("V.C.R V.Depth.Z")).unwrap(), [1]);
+        assert!(Wanted::Depth.pick(&names("V.C.R V.Depth.Z V.Mist.Z")).is_err());
+    }
+
+    #[test]
+    fn a_picture_made_in_bands_is_the_same() {
+        let (width, height) = (1 << 10, (2 << 10) + 1);
+        let codes: Vec<u8> = (0..width * height).map(|i| (i * 7 + i / width) as u8).collect();
+        let grey = || Raster { width, height, ..raster(Samples::U8(codes.clone()), "Y", true, false) };
+        let whole: Image<Coverage> = grey().pixels(None, 0..height).unwrap();
+        assert!(grey().into_image::<Coverage>(None).unwrap() == whole);
+        let rows: Image<Coverage> = grey().pixels(None, 5..9).unwrap();
+        assert_eq!(rows.pixels(), &whole.pixels()[5 * width..9 * width]);
     }
 
     #[test]
     fn straight_colour_under_zero_alpha_is_kept() {
         let clear = raster(Samples::F32(vec![0.5, 0.25, 0.125, 0.0]), "R G B A", false, false);
-        let p = StraightRgba::from_raster(&Opaque(&clear, None)).unwrap()[(0, 0)];
+        let p = pixel::<StraightRgba>(clear).unwrap();
         assert_eq!((p.r, p.g, p.b, p.a), (0.5, 0.25, 0.125, 0.0));
     }
 }

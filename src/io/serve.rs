@@ -2,7 +2,7 @@
 
 use super::confine::{Memory, confine};
 use super::format::{Format, Source};
-use super::limits::{Limits, at_most};
+use super::limits::{Limits, at_most, machine_bytes};
 use super::oiio;
 use super::protocol::{Answer, Ask, Question, Ready, receive, send, send_raster};
 use super::raster::Refusal;
@@ -29,6 +29,8 @@ fn answer_all(limits: &Limits, from: &mut impl BufRead, to: &mut impl Write) -> 
     if let Err(e) = oiio::start() {
         return Err(std::io::Error::other(e.to_string()));
     }
+    // Asked while files can be opened.
+    machine_bytes();
     let (memory, missing) = confine(limits);
     send(to, &Ready { petcomp: env!("CARGO_PKG_VERSION").into(), openimageio: oiio::version(), missing })?;
     to.flush()?;

@@ -141,6 +141,11 @@ fn limits_are_the_callers() {
     let e = under(Limits { side: 19, ..Default::default() });
     assert!(e.ends_with("20 pixels along a side, over the limit of 19 (Limits::side; --limit side=N)"), "{e}");
     assert!(under(Limits { file_bytes: 9, ..Default::default() }).contains("Limits::file_bytes"));
+    #[cfg(target_os = "linux")]
+    {
+        let e = under(Limits { memory_percent: 0, ..Default::default() });
+        assert!(e.contains("20 x 14 pixels x 4 channels x 12 bytes = ") && e.contains("Limits::memory_percent"), "{e}");
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod make;
 mod meaning;
 mod processes;
 mod promptness;
+mod rare;
 mod sweep;
 mod valid;
 #[cfg(feature = "oiio")]

@@ -111,16 +111,17 @@ fn named_channels_and_texts_come_back() {
     let folder = Folder::new();
     let path = folder.file("layers.exr");
     let (red, depth) = ([1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [9.0; 6]);
+    let more = ("diffuse.U", red.as_slice());
     let notes = [("petcomp:seed".to_string(), "17".to_string()), ("petcomp:stage".to_string(), "render".to_string())];
-    io::exr::write_channels(&path, (3, 2), &[("diffuse.R", &red), ("Z", &depth)], &notes).unwrap();
+    io::exr::write_channels(&path, (3, 2), &[("diffuse.R", &red), more, ("Z", &depth)], &notes).unwrap();
     let (size, channels) = io::exr::read_channels(&path).unwrap();
     assert_eq!(size, (3, 2));
-    assert_eq!(channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["Z", "diffuse.R"]);
+    assert_eq!(channels.iter().map(|c| c.name.as_str()).collect::<Vec<_>>(), ["Z", "diffuse.R", "diffuse.U"]);
     assert_eq!(channels[1].samples, red);
     assert_eq!(io::read::<Depth>(&path).unwrap()[(0, 0)], Depth(9.0));
     assert_eq!(io::read_header(&path).unwrap().metadata, notes);
     let e = io::read::<LinearRgb>(&path).unwrap_err().to_string();
-    assert!(e.contains("has the channels Z diffuse.R, expected R G B or Y"), "{e}");
+    assert!(e.contains("has the channels Z diffuse.R diffuse.U, expected R G B or Y"), "{e}");
     assert!(io::exr::write_channels(&path, (3, 2), &[("Z", &[1.0])], &[]).is_err());
 }
 

@@ -27,6 +27,30 @@ fn film_scans_are_read_by_the_worker() {
     assert!(e.contains("cut.dpx: OpenImageIO") && !e.contains('\n'), "{e}");
 }
 
+/// A program that takes no chance does not ask a worker that the system leaves loose.
+#[cfg(feature = "cli")]
+#[test]
+fn a_worker_that_is_not_confined_is_refused_where_that_is_asked_for() {
+    let folder = Folder::new();
+    let picture = folder.with("palette.tif", &palette_tiff());
+    let worker = folder.file("worker");
+    let greeting = format!(
+        "#!/bin/sh\necho '{{\"petcomp\":\"{}\",\"openimageio\":\"0\",\"missing\":[\"Landlock: not in this kernel\"]}}'\nexec sleep 9\n",
+        env!("CARGO_PKG_VERSION")
+    );
+    // Written by a process of its own: see `write_program` in `src/io/worker.rs`.
+    let mut shell = std::process::Command::new("/bin/sh");
+    let written =
+        shell.args(["-c", "printf %s \"$1\" >\"$0\" && chmod 755 \"$0\""]).arg(&worker).arg(greeting).status();
+    assert!(written.unwrap().success());
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_petcomp"));
+    program.args(["--oiio", "worker-strict", "diff"]).args([&picture, &picture]).env("PETCOMP_OIIO_WORKER", &worker);
+    let output = program.output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{told}");
+    assert!(told.contains("its worker cannot be confined here (Landlock: not in this kernel)"), "{told}");
+}
+
 /// Loading OpenImageIO costs 0.2 s and 260 libraries at every start.
 #[cfg(target_os = "linux")]
 #[test]

@@ -3,11 +3,12 @@
 use crate::common::Common;
 use crate::print;
 use petcomp::color::linear_to_srgb;
-use petcomp::diff::{Likeness, Thresholds, Verdict, absolute_difference, compare};
-use petcomp::io::Format;
+use petcomp::diff::{Likeness, Rows, RowsBy, Thresholds, Verdict, absolute_difference, compare};
+use petcomp::io::{Format, Picture};
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::ops::Range;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Exit status: 0 match, 1 warning, 2 failure, 3 not comparable, 4 a picture cannot be read.
@@ -84,7 +85,7 @@ pub(crate) fn accept_idiff_spelling(args: impl Iterator<Item = OsString>) -> Vec
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
-    let pictures = stored_values(&args.a).and_then(|a| Ok((a, stored_values(&args.b)?)));
+    let pictures = Picture::read(&args.a).and_then(|a| Ok((a, Picture::read(&args.b)?)));
     let (a, b) = match pictures {
         Ok(pictures) => pictures,
         Err(error) => {
@@ -92,48 +93,50 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
             return Ok(ExitCode::from(Verdict::Unreadable.exit_code()));
         }
     };
-    let report = match has_alpha(&args.a)? || has_alpha(&args.b)? {
-        true => compare(&a, &b, &args.thresholds()),
-        false => compare(&a.map(opaque), &b.map(opaque), &args.thresholds()),
+    let thresholds = args.thresholds();
+    // Pictures without alpha have three channels, over which means are taken.
+    let report = match a.has_alpha() || b.has_alpha() {
+        true => compare(&rows(&a, |v| v), &rows(&b, |v| v), &thresholds),
+        false => compare(&rows(&a, opaque), &rows(&b, opaque), &thresholds),
     };
     let different = report.max_error > 0.0 && report.verdict != Verdict::Incomparable;
     if let Some(path) = args.output.as_ref().filter(|_| different || !args.only_different)
         && report.verdict != Verdict::Incomparable
     {
-        let difference = absolute_difference(&a, &b, args.scale);
-        io::write(path, &difference.map(opaque))?;
+        io::write(path, &absolute_difference(&rows(&a, opaque), &rows(&b, opaque), args.scale))?;
     }
     common.say(format_args!("Comparing \"{}\" and \"{}\"", args.a.display(), args.b.display()));
     print::text(&report);
-    if let Some(likeness) = (!common.quiet()).then(|| likeness(&args.a, &args.b)).flatten() {
+    if let Some(likeness) = (!common.quiet()).then(|| likeness(&a, &b)).flatten() {
         common.say(format_args!("Scene-linear {likeness}"));
     }
     Ok(ExitCode::from(report.verdict.exit_code()))
 }
 
 /// What the two are to the eye, over black: the second is what the first should be.
-fn likeness(a: &Path, b: &Path) -> Option<Likeness> {
-    let [picture, reference] =
-        [a, b].map(|path| io::read::<PremulRgba>(path).map(|image| image.map(PremulRgba::color)));
-    Likeness::of(&picture.ok()?, &reference.ok()?)
-}
-
-/// Pictures without alpha have three channels, over which means are taken.
-fn has_alpha(path: &Path) -> petcomp::Result<bool> {
-    Ok(io::read_header(path)?.channels.iter().any(|name| name == "A"))
+fn likeness(a: &Picture, b: &Picture) -> Option<Likeness> {
+    let light = |picture: &Picture, rows| picture.rows::<PremulRgba>(rows).map(PremulRgba::color);
+    let [a, b] = [a, b].map(|picture| RowsBy { size: picture.size(), make: move |rows| light(picture, rows) });
+    Likeness::of(&a, &b)
 }
 
 fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
     LinearRgb::new(r, g, b)
 }
 
+/// The values of a picture's rows, made into pixels.
+fn rows<P: Copy + Send>(picture: &Picture, pixel: impl Fn([f32; 4]) -> P + Sync) -> impl Rows<P> {
+    RowsBy { size: picture.size(), make: move |rows| stored_values(picture, rows).map(&pixel) }
+}
+
 /// The values as the file stores them, which is what `idiff` compares: codes of integer formats as shares of full scale,
 /// floats as they are.
-fn stored_values(path: &Path) -> petcomp::Result<Image<[f32; 4]>> {
-    if matches!(io::read_header(path)?.format, Format::Exr | Format::Hdr) {
-        return Ok(io::read::<PremulRgba>(path)?.map(|p| [p.r, p.g, p.b, p.a]));
+fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
+    if matches!(picture.format(), Format::Exr | Format::Hdr) {
+        return picture.rows::<PremulRgba>(rows).map(|p| [p.r, p.g, p.b, p.a]);
     }
-    Ok(io::read::<StraightRgba>(path)?.map(|p| [linear_to_srgb(p.r), linear_to_srgb(p.g), linear_to_srgb(p.b), p.a]))
+    let shown = |p: StraightRgba| [linear_to_srgb(p.r), linear_to_srgb(p.g), linear_to_srgb(p.b), p.a];
+    picture.rows::<StraightRgba>(rows).map(shown)
 }
 
 impl Args {

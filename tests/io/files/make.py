@@ -1,5 +1,8 @@
-"""Writes the pictures of this folder: 24 x 16 pixels by Pillow, one kind of file each."""
+"""Writes the pictures of this folder: 24 x 16 pixels by Pillow, libjpeg's cjpeg and imagecodecs, one kind of file each."""
 
+import subprocess
+
+import imagecodecs
 import numpy
 from PIL import Image
 
@@ -32,3 +35,10 @@ grainy.convert("L").save("grey.tif")
 grainy.save("jpeg.tif", compression="jpeg")
 grey = (numpy.arange(W * H).reshape(H, W) * 170 % 65536).astype(numpy.uint16)
 Image.fromarray(grey).save("grey16.png")
+
+smooth.save("smooth.ppm")
+cjpeg = ["cjpeg", "-quality", "95", "-sample", "1x1"]
+subprocess.run([*cjpeg, "-arithmetic", "-outfile", "arithmetic.jpg", "smooth.ppm"], check=True)
+subprocess.run(["rm", "smooth.ppm"], check=True)
+twelve = numpy.asarray(smooth).astype(numpy.uint16) << 4
+open("twelve_bits.jpg", "wb").write(imagecodecs.jpeg8_encode(twelve, bitspersample=12))

@@ -1,0 +1,72 @@
+//! Pictures that are looked at some rows at a time, so that large ones need not be there as pixels.
+
+use crate::image::{Image, Roi};
+use std::ops::Range;
+
+/// Pixels of a band; more rows than this makes of it are only read beside it.
+const BAND: usize = 1 << 18;
+/// Rows of a band at least: what is read beside it should not be more than it.
+const LEAST_ROWS: usize = 64;
+
+/// A picture that makes the pixels of some rows when they are asked for.
+pub trait Rows<P>: Sync {
+    /// Width and height.
+    fn size(&self) -> (usize, usize);
+
+    /// The pixels of these rows.
+    fn rows(&self, rows: Range<usize>) -> Image<P>;
+}
+
+impl<P: Copy + Sync> Rows<P> for Image<P> {
+    fn size(&self) -> (usize, usize) {
+        Image::size(self)
+    }
+
+    fn rows(&self, rows: Range<usize>) -> Image<P> {
+        self.crop(Roi::spanning(0..self.width(), rows))
+    }
+}
+
+/// A picture of given size by a function that makes rows.
+pub struct RowsBy<F> {
+    /// Width and height.
+    pub size: (usize, usize),
+    /// Makes rows.
+    pub make: F,
+}
+
+impl<P, F: Fn(Range<usize>) -> Image<P> + Sync> Rows<P> for RowsBy<F> {
+    fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    fn rows(&self, rows: Range<usize>) -> Image<P> {
+        (self.make)(rows)
+    }
+}
+
+/// The rows of a picture in bands.
+pub(super) fn bands((width, height): (usize, usize)) -> impl Iterator<Item = Range<usize>> {
+    let rows = (BAND / width.max(1)).max(LEAST_ROWS);
+    (0..height).step_by(rows).map(move |start| start..(start + rows).min(height))
+}
+
+/// A band with rows beside it, as far as there are any.
+pub(super) fn grown(band: &Range<usize>, by: usize, height: usize) -> Range<usize> {
+    band.start.saturating_sub(by)..(band.end + by).min(height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_are_the_picture() {
+        for size in [(1, 1), (7, 0), (0, 9), (3000, 5000), (1 << 21, 200)] {
+            let all: Vec<usize> = bands(size).flatten().collect();
+            assert!(all.into_iter().eq(0..size.1), "{size:?}");
+        }
+        assert_eq!(grown(&(2..5), 4, 100), 0..9);
+        assert_eq!(grown(&(90..95), 9, 100), 81..100);
+    }
+}
