@@ -13,6 +13,7 @@ use petcomp::label::{self, Labels};
 use petcomp::matte::key::{KeyOptions, Keying, Screen};
 use petcomp::matte::{CutOutOptions, FilmOptions, SegmentOptions, cut_out, segment};
 use petcomp::render::RenderOptions;
+use petcomp::report::dataset::DatasetReportOptions;
 use petcomp::report::eval::{EvalReportOptions, Metrics, Run};
 use petcomp::scene::{Placement, SettleOptions, cycles};
 use petcomp::{Image, LinearRgb, PremulRgba, Result, Scene, render, report};
@@ -221,7 +222,7 @@ fn label_file(world: &World) {
     let options = SolveOptions::default();
     let Some(solution) = ends(camera::solve(&label, &options).map_err(Into::into)) else { return };
     camera::doctor(&label, &solution, &options);
-    ends(camera::check_distance(&solution));
+    ends(camera::check_distance(&solution.camera));
     let _ = camera::solve_joint(&[label.clone(), label.clone()], &options);
     serde_json::to_string(&CameraFile::new(&label, &solution)).unwrap();
     let photo: Image<LinearRgb> = io::read(world.path("backgrounds/a.png")).unwrap();
@@ -299,7 +300,10 @@ fn segment_options(world: &World) {
 fn dataset_folder(world: &World) {
     let folder = world.path("dataset");
     ends(dataset::contact_sheet_of(&folder, 24, &Default::default()));
-    ends(report::dataset::page(&folder, 4).map(|page| page.document()));
+    ends(
+        report::dataset::page(&folder, &DatasetReportOptions { most: 4, ..Default::default() })
+            .map(|page| page.document()),
+    );
     ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.remarks())));
     ends(Listing::read(&folder).and_then(|all| all.shared(Sharing::Grouped(dataset::Group::Selection), 0.5, 1)));
     if let Some(record) = ends(io::read_json::<dataset::Record>(folder.join("scenes/val/000000.json"))) {
