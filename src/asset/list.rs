@@ -52,15 +52,6 @@ pub struct ListedPhoto {
     /// And its width, metres: then both fix the scale, and contradict an outline of other proportions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
-    /// Or: width and height of the whole screen, metres, all of which is seen.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub screen_size: Option<[f64; 2]>,
-    /// Its corners, from the top left clockwise, pixels. Default: they are found.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub screen_corners: Option<[[f64; 2]; 4]>,
-    /// Or: side of the black square of a printed marker on the screen, metres.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub marker: Option<f64>,
     /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen. Default: `auto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub screen: Option<String>,
@@ -119,6 +110,13 @@ impl List {
 
 impl ListedPhoto {
     fn add(&self, options: &CutOutOptions, at: &Path) -> Result<AddPhoto> {
+        let scale = match (self.px_per_metre, self.length, self.width) {
+            (Some(scale), None, None) => Scale::PxPerMetre(scale),
+            (None, Some(length), None) => Scale::Length(length),
+            (None, Some(length), Some(width)) => Scale::Size([length, width]),
+            (None, None, _) => return Err(Error::value("length", "missing, expected it, or px_per_metre")),
+            (Some(_), _, _) => return Err(Error::value("length", "expected either it or px_per_metre, not both")),
+        };
         let screen = match self.screen.as_deref().unwrap_or("auto").parse()? {
             ScreenSource::Photo(path) => ScreenSource::Photo(at.join(path)),
             told => told,
@@ -126,25 +124,12 @@ impl ListedPhoto {
         Ok(AddPhoto {
             asset: self.asset.clone(),
             class: self.class.clone(),
-            scale: self.scale()?,
+            scale,
             thickness: self.thickness.unwrap_or(DEFAULT_THICKNESS),
             mass: self.mass.unwrap_or(DEFAULT_MASS),
             screen,
             options: options.clone(),
             classes: Vec::new(),
         })
-    }
-
-    /// The one thing that is told of the scale.
-    fn scale(&self) -> Result<Scale> {
-        let sized = self.length.map(|length| self.width.map_or(Scale::Length(length), |w| Scale::Size([length, w])));
-        let screen = self.screen_size.map(|size| Scale::Screen(size, self.screen_corners));
-        let told = [sized, self.px_per_metre.map(Scale::PxPerMetre), screen, self.marker.map(Scale::Marker)];
-        let names = "length, px_per_metre, screen_size or marker";
-        match told.into_iter().flatten().collect::<Vec<_>>()[..] {
-            [scale] => Ok(scale),
-            [] => Err(Error::value("length", format!("missing, expected {names}"))),
-            _ => Err(Error::value("length", format!("one of several scales, expected one of {names}"))),
-        }
     }
 }

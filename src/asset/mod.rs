@@ -13,7 +13,6 @@ mod build;
 mod contact_sheet;
 mod files;
 mod folder;
-mod ground;
 mod library;
 mod list;
 mod manifest;

@@ -53,9 +53,6 @@ pub use label::{
     PixelOrigin,
 };
 pub use locate::locate;
-pub(crate) use marker::any_markers;
-#[cfg(test)]
-pub(crate) use marker::printed;
 pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;

@@ -14,7 +14,6 @@ mod plate;
 mod register;
 mod remark;
 mod screen;
-mod screen_corners;
 mod segment;
 mod triangulate;
 
@@ -31,6 +30,5 @@ pub use outline::Outline;
 pub use plate::{PlateOptions, ScreenPlate};
 pub use remark::Remark;
 pub use screen::screen_color;
-pub use screen_corners::screen_corners;
 pub use segment::{Confidence, SegmentOptions, Segmentation, Step, Threshold, Tone, segment};
 pub use triangulate::{TriangulateOptions, Triangulated, triangulate};

@@ -13,7 +13,6 @@ mod snap;
 mod threshold;
 
 pub use band::Tone;
-pub(super) use cluster::Groups;
 pub use confidence::Confidence;
 pub use threshold::Threshold;
 
