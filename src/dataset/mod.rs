@@ -24,8 +24,6 @@ mod fingerprint;
 mod folder;
 mod formats;
 mod generate;
-#[cfg(feature = "settle")]
-mod hanging;
 mod inputs;
 mod journal;
 mod layers;

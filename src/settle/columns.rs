@@ -5,7 +5,6 @@
 
 use super::level;
 use super::world::{Drop, Fall};
-use crate::error::Result;
 use crate::scene::{Scene, SettleOptions};
 
 /// Objects that fall together, and how that ended.
@@ -15,30 +14,25 @@ struct Column {
 }
 
 /// Lets everything fall; the poses are in the order of the objects that fall.
-///
-/// # Errors
-/// As [`Drop::fall`].
-pub(super) fn fall(drop: &Drop) -> Result<Fall> {
+pub(super) fn fall(drop: &Drop) -> Fall {
     let columns = level::columns(drop.scene, drop.options);
-    let mut columns: Vec<Column> =
-        columns.into_iter().map(|members| Column::of(drop, members)).collect::<Result<_>>()?;
+    let mut columns: Vec<Column> = columns.into_iter().map(|members| Column::of(drop, members)).collect();
     while let Some((i, j)) = first_that_meet(&columns) {
         let mut members = columns.swap_remove(j).members;
         members.append(&mut columns[i].members);
         members.sort_unstable();
-        columns[i] = Column::of(drop, members)?;
+        columns[i] = Column::of(drop, members);
     }
-    Ok(together(columns))
+    together(columns)
 }
 
 impl Column {
-    fn of(drop: &Drop, members: Vec<usize>) -> Result<Self> {
+    fn of(drop: &Drop, members: Vec<usize>) -> Self {
         let closed = match members[..] {
             [i] => alone(drop.scene, drop.options, i),
             _ => None,
         };
-        let fall = closed.map_or_else(|| drop.fall(&members), Ok)?;
-        Ok(Self { fall, members })
+        Self { fall: closed.unwrap_or_else(|| drop.fall(&members)), members }
     }
 }
 
@@ -76,17 +70,11 @@ fn together(columns: Vec<Column>) -> Fall {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::allowance::Allowance;
     use crate::scene::Placement;
     use crate::settle::tests::{dropped, falling};
 
-    fn drop<'a>(
-        scene: &'a Scene,
-        options: &'a SettleOptions,
-        heights: &'a [f64],
-        allowance: &'a Allowance,
-    ) -> Drop<'a> {
-        Drop { scene, options, heights, sample_every: 0, finer: 0, allowance }
+    fn drop<'a>(scene: &'a Scene, options: &'a SettleOptions, heights: &'a [f64]) -> Drop<'a> {
+        Drop { scene, options, heights, sample_every: 0 }
     }
 
     fn heights(scene: &Scene) -> Vec<f64> {
@@ -102,10 +90,9 @@ mod tests {
         let mut scene = falling(&[([-0.6, 0.0], 0.05), ([-0.62, 0.0], 0.1), ([0.6, 0.1], 0.05), ([0.6, 0.12], 0.2)]);
         scene.surface.size = [2.0, 1.0];
         let (options, heights) = (SettleOptions::default(), heights(&scene));
-        let allowance = Allowance::new(options.most_work);
-        let drop = drop(&scene, &options, &heights, &allowance);
-        let of = |members: &[usize]| drop.fall(members).unwrap().poses;
-        assert_eq!(fall(&drop).unwrap().poses, [of(&[0, 1]), of(&[2, 3])].concat());
+        let drop = drop(&scene, &options, &heights);
+        let both = fall(&drop);
+        assert_eq!(both.poses, [drop.fall(&[0, 1]).poses, drop.fall(&[2, 3]).poses].concat());
     }
 
     #[test]
@@ -120,8 +107,7 @@ mod tests {
         }
         let (options, heights) = (SettleOptions::default(), heights(&scene));
         assert_eq!(level::columns(&scene, &options).len(), 2);
-        let allowance = Allowance::new(options.most_work);
-        let drop = drop(&scene, &options, &heights, &allowance);
-        assert_eq!(fall(&drop).unwrap().poses, drop.fall(&(0..8).collect::<Vec<_>>()).unwrap().poses);
+        let drop = drop(&scene, &options, &heights);
+        assert_eq!(fall(&drop).poses, drop.fall(&(0..8).collect::<Vec<_>>()).poses);
     }
 }
