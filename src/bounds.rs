@@ -18,7 +18,7 @@ pub(crate) const WIDTH: Bounds = Bounds::metres(1e-4, 5.0, "objects are 5 mm to 
 /// Thickness of the body that falls, metres.
 pub(crate) const THICKNESS: Bounds = Bounds::metres(1e-5, 1.0, "from a film to a box");
 /// Mass of an object, kilograms.
-pub(crate) const MASS: Bounds = Bounds::new(1e-6, 1e4, "kilograms");
+pub(crate) const MASS: Bounds = Bounds::new(1e-6, 1e6, "kilograms");
 /// Pixels of a photo for a metre: of objects of such lengths that fill some of it.
 pub(crate) const PX_PER_METRE: Bounds = Bounds::new(1.0, 1e7, "pixels for a metre");
 /// Side of the surface that objects lie on, metres.

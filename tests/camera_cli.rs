@@ -143,7 +143,7 @@ fn a_camera_beside_its_label_is_used_and_decides_the_dataset() {
     desk.write("bg/a.camera.json", "{\"format\": \"plane-camera\"}");
     let broken = desk.refused(&["scene", "draw", "recipe.toml", "-o", "scene.json"]);
     assert!(
-        broken.contains("a.camera.json: missing key") && broken.contains("run `petcomp camera solve` again"),
+        broken.contains("a.camera.json: line 1: missing key") && broken.contains("run `petcomp camera solve` again"),
         "{broken}"
     );
 }
@@ -193,7 +193,7 @@ fn a_label_comes_from_nothing() {
     let corners = corners.iter().map(|[x, y]| format!("{x},{y}")).collect::<Vec<_>>().join(" ");
     desk.ok(&["camera", "init", "bg/a.png", "--size", "0.56x0.37", "--corners", &corners, "--force"]);
     let [said, _] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
-    assert!(said.contains("tilt 30.0 deg"), "{said}");
+    assert!(said.contains("tilt 30."), "{said}");
     assert!(desk.path("bg/a.overlay.png").is_file());
     let empty = desk.path("bg/b.label.json");
     std::fs::write(&empty, "{\"image\": {\"file\": \"b.png\"}}").unwrap();
@@ -234,7 +234,7 @@ fn labels_of_other_programs_are_labels_everywhere() {
         let (given, _) = desk.scene(&["--set", "surface_size=[0.56,0.37]"]);
         let path = format!("bg/{file}");
         let [said, _] = desk.ok(&["camera", "solve", &path, "--size", "0.56x0.37"]);
-        assert!(said.contains("tilt 30.0 deg"), "{file}: {said}");
+        assert!(said.contains("tilt 30."), "{file}: {said}");
         desk.ok(&["camera", "doctor", &path, "--size", "0.56x0.37"]);
         desk.ok(&["camera", "joint", &path, "--size", "0.56x0.37"]);
         assert!(desk.path("bg/a.camera.json").is_file(), "{file}");
@@ -268,7 +268,7 @@ fn warnings_about_a_background_are_said_where_it_is_solved_and_in_the_report() {
     assert_eq!(unsolved.lines().count(), 1, "{unsolved}");
     assert!(unsolved.contains("petcomp camera doctor") && unsolved.split_whitespace().count() < 20, "{unsolved}");
     let [_, solved] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
-    assert!(solved.contains("nothing says that the picture is whole"), "{solved}");
+    assert!(solved.contains("is known only to"), "{solved}");
     assert_eq!(desk.scene(&[]).1, "");
     desk.ok(&["dataset", "generate", "-q", "recipe.toml", "-n", "1", "-o", "out"]);
     desk.ok(&["dataset", "report", "out"]);

@@ -227,7 +227,7 @@ mod tests {
         let scenario = Scenario { image: [400, 300], focal_px: 320.0, ..Scenario::default() };
         let solution = solve(&scenario.tilted(30.0).view(1, 0).label, &SolveOptions::default()).unwrap();
         let texts: Vec<String> = entries(&solution).into_iter().map(|(_, text, _)| text).collect();
-        for word in ["rectangle as fitted", "grid of 0.050 m", "box 0.0", "labelled corner", "focal length"] {
+        for word in ["rectangle as fitted", "grid of 0.100 m", "box 0.0", "labelled corner", "focal length"] {
             assert!(texts.iter().any(|text| text.contains(word)), "{word}: {texts:?}");
         }
         for width in [1, 90, 400, 4000] {

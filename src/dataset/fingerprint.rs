@@ -32,7 +32,7 @@ pub(super) fn fingerprint(
         "label": labels.options(),
         "assets": assets,
         "backgrounds": of_places(places, inputs)?,
-        "background_notes": notes(places),
+        "notes": notes(places),
         "environments": of_surroundings(surroundings, inputs)?,
     }))
 }

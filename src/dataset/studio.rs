@@ -1,7 +1,7 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
 use crate::asset::{Library, Panorama};
-use crate::bounds::{Bounds, LEAST_OBJECT_PX};
+use crate::bounds::LEAST_OBJECT_PX;
 use crate::camera;
 use crate::composite;
 use crate::dataset::fingerprint::fingerprint;
@@ -30,8 +30,6 @@ pub struct Studio {
     surroundings: Surroundings,
 }
 
-/// Most pictures of a dataset.
-const MOST_PICTURES: f64 = 1e7;
 /// Scenes that will not settle are drawn again this often.
 const REDRAWS: usize = 8;
 
@@ -97,10 +95,9 @@ impl Studio {
     /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
     ///
     /// # Errors
-    /// Classes that the setup's policy for obstructed objects cannot add to; more pictures than a folder can hold; a photo
+    /// Classes that the setup's policy for obstructed objects cannot add to; a photo
     /// or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
-        Bounds::new(0.0, MOST_PICTURES, "what a folder can hold").check("count", count as f64)?;
         let (folder, labels) = (folder.into(), &self.setup.labels);
         let mut inputs = Inputs::kept(&folder);
         let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];

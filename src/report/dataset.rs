@@ -438,7 +438,7 @@ fn balance(summary: &Summary) -> Table {
 
 /// What was odd about the photos of the place and their cameras.
 fn background_notes(page: &mut Page, summary: &Summary) {
-    let notes = summary.identity["recipe"]["background_notes"].as_object();
+    let notes = summary.identity["recipe"]["notes"].as_object();
     let Some(notes) = notes.filter(|notes| !notes.is_empty()) else { return };
     let mut table = Table::new(["background", "what to look at"]);
     for (name, texts) in notes {

@@ -181,7 +181,8 @@ fn what_a_png_says_of_its_gamma_is_done() {
         (io::read::<LinearRgb>(&path).unwrap()[(0, 0)].g, io::read::<Coverage>(&path).unwrap()[(0, 0)].0)
     };
     let code = 128.0_f32 / 255.0;
-    assert_eq!(light(45_455), (color::srgb_to_linear(code), code));
+    let (srgb, matte) = light(45_455);
+    assert!((srgb - color::srgb_to_linear(code)).abs() < 1e-6 && matte == code, "{srgb} {matte}");
     let ((linear, matte), (mac, _)) = (light(100_000), light(55_556));
     assert_eq!(matte, code, "a matte is never decoded");
     assert!((linear - code).abs() < 1e-6 && (mac - code.powf(1.8)).abs() < 1e-4, "{linear} {mac}");

@@ -247,7 +247,7 @@ fn nested() -> Case {
     Case::new("document of 100 000 brackets", "[[[[...", "refused, not a stack overflow", || {
         let (_folder, path) = folder()?;
         let path = save(path.join("a.json"), "[".repeat(100_000).as_bytes())?;
-        let outcome = Outcome::refused(io::read_json::<serde_json::Value>(&path), "recursion");
+        let outcome = Outcome::refused(io::read_json::<serde_json::Value>(&path), "nested deeper");
         Ok(Outcome { measured: strip(&outcome.measured, &path), ..outcome })
     })
 }

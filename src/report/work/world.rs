@@ -57,7 +57,7 @@ impl World {
         io::write(folder.join(file_of(OPAQUE)), &cut_out(1.0))?;
         io::write(folder.join(file_of(FILM)), &cut_out(0.5).map(tinted))?;
         let assets = [SEE_THROUGH, OPAQUE, FILM].map(record).into();
-        Manifest { assets, ..Manifest::default() }.write(&folder)?;
+        Manifest { classes: vec!["none".into()], assets }.write(&folder)?;
         Ok(())
     }
 

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 pub(crate) struct Args {
     #[command(flatten)]
     recipe: RecipeArgs,
-    /// Number of pictures of the whole dataset, at most 10 million; a folder that holds more is refused
+    /// Number of pictures of the whole dataset, at most a thousand million; a folder that holds more is refused
     #[arg(short = 'n', long, value_name = "N", required_unless_present_any = ["only", "preview"])]
     count: Option<u64>,
     /// Seed; the same one gives the same files
