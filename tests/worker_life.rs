@@ -122,7 +122,11 @@ fn deaths_at_start(count: usize) -> Vec<String> {
     let dead = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for _ in 0..2 * std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| while !done.load(Ordering::Relaxed) {});
+            scope.spawn(|| {
+                while !done.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
+            });
         }
         let starters: Vec<_> = (0..8)
             .map(|_| {

@@ -144,7 +144,11 @@ pub fn check(folder: &Path) -> Result<Checked> {
     let mut same: BTreeMap<(u64, u32), &Path> = BTreeMap::new();
     for ((image, look), &part) in images.iter().zip(&looked).zip(&parts) {
         all.faults.extend(look.faults.iter().cloned());
-        look.rows.iter().filter_map(|(class, _)| Some(*rows.get_mut(*class)? += 1)).for_each(drop);
+        for (class, _) in &look.rows {
+            if let Some(count) = rows.get_mut(*class) {
+                *count += 1;
+            }
+        }
         boxes.extend(look.rows.iter().map(|&(class, sides)| CheckedBox { part, class, sides }));
         // Pictures of an empty place are alike, and rightly so.
         let twin = look.bytes.filter(|_| !look.is_empty).and_then(|bytes| same.insert(bytes, image));

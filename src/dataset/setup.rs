@@ -211,7 +211,7 @@ mod tests {
             for end in [low, high] {
                 assert!(with(&key, end).is_ok(), "{key} = {end}: {:?}", with(&key, end));
             }
-            let beyond = [low - low.abs().max(1e-9).min(1.0), high + (0.01 * high).max(1.0)];
+            let beyond = [low - low.abs().clamp(1e-9, 1.0), high + (0.01 * high).max(1.0)];
             for value in beyond.map(|v| if low.fract() == 0.0 { v.floor() } else { v }) {
                 let e = with(&key, value).map(|_| ()).unwrap_err().to_string();
                 assert!(e.contains(&format!("{key}: ")), "{key} = {value}: {e}");

@@ -99,7 +99,7 @@ impl Channels for [f32; 4] {
 
 /// Compares two pictures channel by channel.
 ///
-/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`]s, or anything else that has [`Rows`].
+/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`](crate::Image)s, or anything else that has [`Rows`].
 ///
 /// # Method
 /// The counts and the verdict of `idiff` 2.4.7: up to `allow_failures` failing pixels the pictures match, whatever

@@ -51,8 +51,7 @@ impl Matches {
             Definition::Yolov5 => yolov5::average_precision,
             Definition::Coco => coco::average_precision,
         };
-        let each: Vec<f64> =
-            self.rankings.par_iter().filter_map(|r| average_precision(r, weights)).map(|ap| mean(ap)).collect();
+        let each: Vec<f64> = self.rankings.par_iter().filter_map(|r| average_precision(r, weights)).map(mean).collect();
         mean(each)
     }
 

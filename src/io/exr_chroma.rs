@@ -71,7 +71,7 @@ impl Sampling {
         let top = top.ok_or("damaged EXR: a block outside the picture")?;
         let rows = top..(top + most).min(height);
         // Bytes of each line that there is, in the order of the file.
-        let present = |y: usize| (0..self.0.len()).filter(move |&c| y % self.0[c][1] == 0);
+        let present = |y: usize| (0..self.0.len()).filter(move |&c| y.is_multiple_of(self.0[c][1]));
         let lines = rows.clone().flat_map(|y| present(y).map(move |c| (c, y)));
         let bytes = |c: usize| width / self.0[c][0] * header.channels.list[c].sample_type.bytes_per_sample();
         let total: usize = lines.clone().map(|(c, _)| bytes(c)).sum();

@@ -241,7 +241,7 @@ impl Grid {
 /// The samples of the picture, strip by strip or tile by tile: the decoder's own way to read all at once leaves columns
 /// black where tiles reach over the border, and knows no planes.
 fn all_chunks(file: &mut Opened<impl Read + Seek>) -> Result<Samples, Refusal> {
-    if file.bits % 8 != 0 {
+    if !file.bits.is_multiple_of(8) {
         return Err(Refusal::Unsupported(format!("unsupported TIFF: {} bits a sample", file.bits)));
     }
     let grid = Grid::of(file)?;

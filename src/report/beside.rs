@@ -263,6 +263,9 @@ fn distances(pairs: &[Pair]) -> Table {
     table
 }
 
+/// A measure's name, and its values.
+type Named = (&'static str, Vec<f64>);
+
 /// One measure of both.
 struct Pair {
     title: &'static str,
@@ -273,7 +276,7 @@ struct Pair {
 
 impl Pair {
     /// None where one of the two has no value.
-    fn of(((title, ours), (_, theirs)): ((&'static str, Vec<f64>), (&'static str, Vec<f64>))) -> Option<Self> {
+    fn of(((title, ours), (_, theirs)): (Named, Named)) -> Option<Self> {
         let some = !ours.is_empty() && !theirs.is_empty();
         some.then(|| Self { title, distance: distance(ours.clone(), theirs.clone()), ours, theirs })
     }
@@ -369,7 +372,9 @@ mod tests {
                 std::fs::create_dir_all(root.path().join(path).parent().unwrap()).unwrap();
             }
             io::write(root.path().join(file), &grey).unwrap();
-            label.map(|(path, text)| std::fs::write(root.path().join(path), text).unwrap());
+            if let Some((path, text)) = label {
+                std::fs::write(root.path().join(path), text).unwrap();
+            }
         }
         let set = Set::read(root.path()).unwrap();
         let boxes: Vec<_> = set.pictures.iter().map(|p| p.boxes.clone()).collect();

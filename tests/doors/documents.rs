@@ -230,7 +230,7 @@ fn label_file(world: &World) {
         camera::overlay(&photo, &solution);
     }
     let map = solution.fit.px_per_metre * solution.fit.px_per_metre * solution.size[0] * solution.size[1];
-    if map.is_nan() || map < 1e5 || map > 1e8 {
+    if !(1e5..=1e8).contains(&map) {
         ends(camera::rectify(&Pyramid::new(photo), &solution.camera, solution.size, solution.fit.px_per_metre));
     }
     ends(Studio::open(world_setup(world)));
