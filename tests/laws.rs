@@ -198,26 +198,32 @@ fn heaped_up(scene: &Scene) -> bool {
     scene.objects.iter().map(height).fold(0.0, f64::max) > thickness + longest
 }
 
-/// Scenes with something in the air, in trays from 1 to 1.5 times the longest card.
-fn hanging_in_tight_trays(scenes: u64) -> usize {
-    let hangs = |k: u64| {
+/// How scenes of 5 to 15 objects end in trays from 1 to 1.5 times the longest card: those with something in the air, and
+/// those that come to no rest, which is told.
+fn ends_in_tight_trays(scenes: u64) -> [usize; 2] {
+    let end = |k: u64| {
         let tray = tight(1.0 + 0.5 * k as f64 / scenes as f64, [1.0, 0.8, 0.68, 0.5][(k % 4) as usize]);
         let before = recipe(Range::new(5.0, 15.0)).scene(7, k, &[tray], &stock()).expect("the stock fits the tray");
-        let rest = settled(before.clone());
-        heaped_up(&rest) || !settle::hanging(&before, &rest, &SettleOptions::default()).expect("a scene").is_empty()
+        let end = settle::settle(before.clone(), &SettleOptions::default()).expect("a scene that can be right");
+        let hangs =
+            |rest: &Scene| !settle::hanging(&before, rest, &SettleOptions::default()).expect("a scene").is_empty();
+        let rested = end.verdict == Verdict::Rested;
+        [usize::from(rested && (heaped_up(&end.scene) || hangs(&end.scene))), usize::from(!rested)]
     };
-    (0..scenes).into_par_iter().filter(|k| hangs(*k)).count()
+    (0..scenes).into_par_iter().map(end).reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
 #[test]
 fn nothing_hangs_in_trays_hardly_larger_than_the_longest_card() {
-    assert_eq!(hanging_in_tight_trays(60), 0);
+    let [hanging, told] = ends_in_tight_trays(60);
+    assert!(hanging == 0 && told <= 2, "{hanging} hang, {told} come to no rest");
 }
 
 #[test]
 #[ignore = "a minute of work; run it when settle changes"]
 fn nothing_hangs_in_two_thousand_tight_trays() {
-    assert_eq!(hanging_in_tight_trays(2_000), 0);
+    let [hanging, told] = ends_in_tight_trays(2_000);
+    assert!(hanging == 0 && told <= 20, "{hanging} hang, {told} come to no rest");
 }
 
 #[test]

@@ -197,6 +197,32 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     }
 }
 
+/// A fall that would take hours ends at the first signal; the picture in hand is made by the run that goes on.
+#[test]
+fn a_signal_stops_a_fall() {
+    let desk = Desk::new();
+    demo(&desk);
+    let slow = ["--set", "scene.settle.step=1e-6", "--set", "scene.settle.most_work=1000000000000000"];
+    let args = ["dataset", "generate", "demo/recipe.toml", "-n", "2", "-j", "2", "-o", "out"];
+    let mut command = desk.command(&[args.as_slice(), &slow].concat());
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let start = Instant::now();
+    while !desk.0.path().join("out/dataset.json").exists() {
+        assert!(start.elapsed() < HANGS, "not begun");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    send("TERM", &child);
+    let (signalled, output) = (Instant::now(), child.wait_with_output().unwrap());
+    println!("ended {:.2} s after the signal", signalled.elapsed().as_secs_f64());
+    assert_eq!(output.status.code(), Some(130), "{}", said(&output));
+    assert!(
+        said(&output).contains("interrupted: 0 of 2 samples are in out; the same command goes on"),
+        "{}",
+        said(&output)
+    );
+}
+
 #[test]
 fn a_reader_that_goes_away_is_no_crash() {
     let desk = Desk::new();
