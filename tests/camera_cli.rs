@@ -51,7 +51,7 @@ impl Desk {
         let output = self.run(args);
         let err = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code().is_some_and(|code| code != 0 && code != 101), "petcomp {args:?}: {err}");
-        err.lines().last().unwrap_or_default().to_owned()
+        err
     }
 
     /// A photo of a rectangle, and its label.
@@ -268,12 +268,12 @@ fn warnings_about_a_background_are_said_where_it_is_solved_and_in_the_report() {
     assert_eq!(unsolved.lines().count(), 1, "{unsolved}");
     assert!(unsolved.contains("petcomp camera doctor") && unsolved.split_whitespace().count() < 20, "{unsolved}");
     let [_, solved] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
-    assert!(solved.contains("is known only to"), "{solved}");
+    assert!(solved.contains("known"), "{solved}");
     assert_eq!(desk.scene(&[]).1, "");
     desk.ok(&["dataset", "generate", "-q", "recipe.toml", "-n", "1", "-o", "out"]);
     desk.ok(&["dataset", "report", "out"]);
     let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
-    assert!(page.contains("nothing says that the picture is whole"), "not in the report");
+    assert!(page.contains("above the surface is known"), "not in the report");
 }
 
 #[test]

@@ -78,7 +78,9 @@ impl Inputs {
         if settled.is_empty() || settled == self.before.iter().collect() {
             return;
         }
-        if let Err(e) = io::write_json(folder.join(INPUTS), &settled) {
+        // Not counted as work: when it is written depends on the age of files.
+        let text = serde_json::to_vec_pretty(&settled).unwrap_or_default();
+        if let Err(e) = io::write_through(&folder.join(INPUTS), |out| out.write_all(&text)) {
             log::debug!("{e}");
         }
     }
