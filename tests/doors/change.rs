@@ -86,7 +86,13 @@ pub(crate) fn document(valid: &Value, chance: &mut Chance, written: impl Fn(&Val
     let mut value = valid.clone();
     let mut words = Vec::new();
     for _ in 0..=chance.below(3) {
-        let all = places(&value);
+        // What is to become such a text already is left alone: changed again it could not be found.
+        let is_free =
+            |at: &String| !value.pointer(at).and_then(Value::as_str).is_some_and(|text| text.starts_with(MARK));
+        let all: Vec<String> = places(&value).into_iter().filter(is_free).collect();
+        if all.is_empty() {
+            break;
+        }
         let place = chance.pick(&all).clone();
         change(&mut value, &place, chance, &mut words);
     }
