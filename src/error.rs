@@ -12,7 +12,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file that cannot be read, understood or written.
-    #[error("{}: {what}", .path.display())]
+    #[error("{}: {what}", named(.path))]
     File {
         /// Which file.
         path: PathBuf,
@@ -20,7 +20,7 @@ pub enum Error {
         what: String,
     },
     /// A value in a document that is well-formed but cannot be right.
-    #[error("{}: {at}: {what}", .path.display())]
+    #[error("{}: {at}: {what}", named(.path))]
     Field {
         /// Which document.
         path: PathBuf,
@@ -102,6 +102,11 @@ fn without_number(said: &str) -> String {
     format!("{before}{first}{}{behind}", letters.as_str())
 }
 
+/// A file as a message names it: on one line, whatever its name holds.
+fn named(path: &Path) -> String {
+    printable(&path.to_string_lossy())
+}
+
 /// Text as it may be shown on a line of a terminal or stand in a document: what would move the cursor, change colours,
 /// begin a line or turn the order of letters around is written out, a line feed as `\\n` and an escape as `\\x1b`.
 pub fn printable(text: &str) -> String {
@@ -127,6 +132,12 @@ fn is_control(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_is_one_line_whatever_a_file_is_called() {
+        assert_eq!(Error::file("a\nb.png", "no such file").to_string(), "a\\nb.png: no such file");
+        assert_eq!(Error::value("n", "0").in_file("a\x1b.toml").to_string(), "a\\x1b.toml: n: 0");
+    }
 
     #[test]
     fn what_a_terminal_would_obey_is_written_out() {

@@ -19,6 +19,8 @@ use std::path::{Path, PathBuf};
 
 /// Bins of a histogram of numbers.
 const BINS: usize = 20;
+/// Bars in a histogram of whole numbers.
+const MOST_BARS: f64 = 100.0;
 
 /// Boxes and masks are shown and hidden without a script: a ticked box decides what its neighbours look like. Words over
 /// the objects are for enlarged pictures; the list of all pictures loads what is seen of it.
@@ -345,8 +347,7 @@ fn drawn(page: &mut Page, summary: &Summary) {
         match summary.range(key) {
             Some(([low, high], _)) if low == high => fixed.push([key.clone(), low.to_string()]),
             Some(([low, high], true)) => {
-                let bins = (high - low) as usize + 1;
-                let mut h = Histogram::of(key, values, [low - 0.5, high + 0.5], bins).uniform();
+                let mut h = Histogram::of(key, values, [low - 0.5, high + 0.5], whole_bars([low, high])).uniform();
                 h.ends = [low.to_string(), high.to_string()];
                 charts.push(h);
             }
@@ -359,6 +360,12 @@ fn drawn(page: &mut Page, summary: &Summary) {
     if !fixed.rows.is_empty() {
         page.table(&fixed);
     }
+}
+
+/// A bar for each whole number, as long as they can be told apart.
+fn whole_bars([low, high]: [f64; 2]) -> usize {
+    let numbers = high - low + 1.0;
+    if numbers <= MOST_BARS { numbers as usize } else { BINS }
 }
 
 fn choices(what: &str, counts: &BTreeMap<String, u64>) -> Histogram {
@@ -477,4 +484,18 @@ fn times(summary: &Summary) -> Table {
         ]);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_have_bars_of_their_own_until_there_are_too_many() {
+        assert_eq!(whole_bars([4.0, 12.0]), 9);
+        assert_eq!(whole_bars([0.0, 99.0]), 100);
+        assert_eq!(whole_bars([0.0, 100.0]), BINS);
+        assert_eq!(whole_bars([0.0, 9007199254740991.0]), BINS);
+        assert_eq!(whole_bars([0.0, f64::INFINITY]), BINS);
+    }
 }
