@@ -21,6 +21,8 @@ const THICK_DASHED: &str = "stroke-width=\"3\" stroke-dasharray=\"7 4\"";
 /// What is seen around a box: so many times its longer side, but at least this share of the picture's.
 const AROUND: f64 = 3.0;
 const LEAST_SHARE: f64 = 0.15;
+/// Boxes that a picture shows beside those that it is about: more would hide it, and make the page grow without end.
+const MOST_OTHERS: usize = 100;
 
 /// All mistakes of a run, one a row.
 pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
@@ -80,8 +82,9 @@ fn put_those(page: &mut Page, name: &str, title: &str, run: &Run, mistakes: &[&M
 fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
     let case = Case::of(run, mistake);
     let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
-    let mut figure = Figure::of(path, *size, case.view(*size)).inspect_err(|error| log::warn!("{error}")).ok()?;
-    figure.drawing = case.drawing(figure.letter(), figure.top(), options);
+    let view = case.view(*size);
+    let mut figure = Figure::of(path, *size, view).inspect_err(|error| log::warn!("{error}")).ok()?;
+    figure.drawing = case.drawing(&view, figure.letter(), figure.top(), options);
     figure.caption = case.caption(options);
     Some(figure)
 }
@@ -121,16 +124,13 @@ impl<'a> Case<'a> {
         BBox { x0, y0, x1: x0 + w, y1: y0 + h }
     }
 
-    fn drawing(&self, letter: f64, top: f64, options: &EvalReportOptions) -> String {
+    fn drawing(&self, view: &BBox, letter: f64, top: f64, options: &EvalReportOptions) -> String {
         let mut svg = String::new();
-        for truth in self.sheet.truth.iter().filter(|t| !self.truth.is_some_and(|own| std::ptr::eq(own, *t))) {
+        for truth in self.other_boxes(view) {
             let color = if truth.crowd { CROWD } else { TRUTH };
             svg += &marked_box(&truth.bbox, "", letter, top, color, THIN);
         }
-        let sure = |f: &&FoundBox| f.confidence > options.confusion.confidence;
-        for found in
-            self.sheet.found.iter().filter(sure).filter(|f| !self.found.is_some_and(|own| std::ptr::eq(own, *f)))
-        {
+        for found in self.other_detections(view, options.confusion.confidence) {
             svg += &marked_box(&found.bbox, "", letter, top, FOUND, DASHED);
         }
         let name = |class: u32| gallery::clipped(&class_name(class, &options.classes), 24);
@@ -147,6 +147,22 @@ impl<'a> Case<'a> {
             svg += &gallery::words([below.x0, below.y0], &words, letter, color);
         }
         svg
+    }
+
+    /// Boxes of the truth in the view that the mistake is not about.
+    fn other_boxes(&self, view: &BBox) -> Vec<&'a TrueBox> {
+        let other = |t: &&TrueBox| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
+        self.sheet.truth.iter().filter(other).filter(|t| t.bbox.overlaps(view)).take(MOST_OTHERS).collect()
+    }
+
+    /// Detections in the view that the mistake is not about, the surest ones.
+    fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a FoundBox> {
+        let other = |f: &&FoundBox| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
+        let sure = self.sheet.found.iter().filter(|f| f.confidence > confidence);
+        let mut seen: Vec<&FoundBox> = sure.filter(other).filter(|f| f.bbox.overlaps(view)).collect();
+        seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        seen.truncate(MOST_OTHERS);
+        seen
     }
 
     fn caption(&self, options: &EvalReportOptions) -> String {
@@ -188,4 +204,26 @@ fn legend() -> String {
         key(CROWD, THIN, "crowd"),
     ];
     format!("<p>{}Click a picture to enlarge it; Escape and the arrow keys work too.</p>\n", keys.concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twenty thousand detections of a crowd made each of 48 pictures two megabytes.
+    #[test]
+    fn a_picture_shows_no_more_than_the_surest_detections_around_a_mistake() {
+        let at = |i: usize| BBox { x0: i as f64, y0: 0.0, x1: i as f64 + 2.0, y1: 2.0 };
+        let found = |i: usize| FoundBox { class: 0, bbox: at(i), confidence: 0.3 + (i % 7) as f64 / 10.0 };
+        let truth = (0..300).map(|i| TrueBox { class: 0, bbox: at(i), area: 4.0, crowd: false }).collect();
+        let sheet = Sheet { image: "a".into(), truth, found: (0..5_000).map(found).collect() };
+        let run = Run { name: "run".into(), sheets: vec![sheet] };
+        let mistake = Mistake { sheet: 0, kind: Kind::FalseAlarm, found: Some(3), truth: None, iou: 0.0 };
+        let case = Case::of(&run, &mistake);
+        let view = BBox { x0: 100.0, y0: 0.0, x1: 1_400.0, y1: 2.0 };
+        let (boxes, detections) = (case.other_boxes(&view), case.other_detections(&view, 0.25));
+        assert_eq!((boxes.len(), detections.len()), (MOST_OTHERS, MOST_OTHERS));
+        assert!(boxes.iter().all(|t| t.bbox.overlaps(&view)));
+        assert!(detections.iter().all(|f| f.bbox.overlaps(&view) && f.confidence > 0.85));
+    }
 }

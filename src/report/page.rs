@@ -13,7 +13,7 @@ pub struct Page {
 /// Looks like a report and not like a web site; wide things scroll inside their own frame.
 const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;color:#222}\
     table{border-collapse:collapse;margin:1em 0;font-size:13px}\
-    th,td{border:1px solid #ccc;padding:2px 8px;text-align:left;max-width:32em;overflow-wrap:anywhere}\
+    th,td{border:1px solid #ccc;padding:2px 8px;text-align:left;min-width:3.5em;max-width:32em;overflow-wrap:anywhere}\
     th{background:#f2f2f2;overflow-wrap:normal}h1,h2,p{overflow-wrap:anywhere}\
     figure{margin:1em 0;overflow-x:auto}figcaption{color:#555;font-size:13px;overflow-wrap:anywhere}\
     img,svg{max-width:100%}";
