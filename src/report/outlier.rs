@@ -40,8 +40,13 @@ pub(super) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
         worst.resize(worst.len().max(feature.values.len()), None);
         for (row, value) in feature.values.iter().enumerate() {
             let deviations = (value - middle).abs() / scale;
-            if deviations > FAR && worst[row].as_ref().is_none_or(|known| deviations > known.deviations) {
-                let why = format!("{} {}, as a rule {}", feature.name, short(*value), short(middle));
+            // What a reader cannot tell apart is not unlike.
+            let (shown, usual) = (short(*value), short(middle));
+            if shown != usual
+                && deviations > FAR
+                && worst[row].as_ref().is_none_or(|known| deviations > known.deviations)
+            {
+                let why = format!("{} {shown}, as a rule {usual}", feature.name);
                 worst[row] = Some(Outlier { row, deviations, why });
             }
         }
@@ -90,6 +95,13 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].row, found[0].why.as_str()), (5, "objects 40, as a rule 8"));
         assert!(outliers(&[]).is_empty() && outliers(&[Feature { name: "", values: vec![] }]).is_empty());
+    }
+
+    #[test]
+    fn what_reads_the_same_is_not_unlike() {
+        let mut values = vec![100.0; 99];
+        values.push(99.999);
+        assert_eq!(outliers(&[Feature { name: "seen, %", values }]), []);
     }
 
     #[test]
