@@ -69,11 +69,16 @@ fn open(mut file: impl BufRead, file_bytes: u64, limits: &Limits) -> Result<Open
     Ok(Opened { decoder, orientation, is_xyz })
 }
 
+/// Characters of a line that are told where it is no size.
+const LONGEST_SHOWN: usize = 40;
+
 /// Length and number of the rows that are stored, and how they lie in the picture: the axis and sense of the rows come
 /// first, those of the pixels in a row second; `-Y` goes down.
 fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
     let text = String::from_utf8_lossy(line);
-    let unknown = || Refusal::Broken(format!("damaged HDR: size {:?}, expected \"-Y 480 +X 640\"", text.trim()));
+    // Where the line does not end, all of the pixels would be in the message.
+    let shown: String = text.trim().chars().take(LONGEST_SHOWN).collect();
+    let unknown = || Refusal::Broken(format!("damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""));
     let [rows, height, columns, width] = text.split_whitespace().collect::<Vec<_>>()[..] else { return Err(unknown()) };
     let orientation = match (rows, columns) {
         ("-Y", "+X") => 1,
@@ -135,6 +140,13 @@ mod tests {
     fn reds(raster: &Raster) -> Vec<i32> {
         let Samples::F32(v) = &raster.samples else { panic!("not floats") };
         v.iter().step_by(3).map(|v| (v * 128.0 - 128.0).round() as i32).collect()
+    }
+
+    #[test]
+    fn a_size_without_an_end_is_told_in_part() {
+        let file = [b"#?RGBE\n\n-Y 30 +X 40".as_slice(), &[1; 4_000], b"\n"].concat();
+        let Err(Refusal::Broken(what)) = decode(&file, &Limits::default()) else { panic!("read") };
+        assert!(what.starts_with("damaged HDR: size \"-Y 30 +X 40") && what.len() < 300, "{what}");
     }
 
     #[test]
