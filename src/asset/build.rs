@@ -118,7 +118,7 @@ fn list_in(path: &Path) -> Result<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Library, MANIFEST};
+    use super::super::{Library, MANIFEST, PhotoRecord, contact_sheet};
     use super::*;
     use crate::image::Image;
     use crate::io;
@@ -271,6 +271,29 @@ mod tests {
         let built = build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap();
         assert_eq!((built.photos, built.refused.len()), (1, 1));
         assert!(built.refused[0].contains("two.png"), "{:?}", built.refused);
+    }
+
+    #[test]
+    fn a_guess_on_a_grey_board_is_told_kept_and_shown() {
+        let folder = folder_with(TWO);
+        let board = slab().map(|p| if p.g > p.r { LinearRgb::grey(0.3) } else { LinearRgb::new(0.25, 0.2, 0.2) });
+        io::write(folder.path().join("two.png"), &board).unwrap();
+        let out = folder.path().join("out");
+        let built = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
+        assert!(built.doubtful.iter().any(|d| d.contains("two.exr") && d.contains("too grey")), "{:?}", built.doubtful);
+        let library = Library::open(&out).unwrap();
+        let [one, two] = [0, 1].map(|i| &library.assets[0].photos[i].record);
+        assert!(two.doubts.iter().any(|doubt| doubt.contains("guessed")), "{:?}", two.doubts);
+        assert!(one.color_confidence > Some(0.7) && two.color_confidence < Some(0.6), "{one:?} {two:?}");
+        let plain = built_sheet_height(&library, |record| record.doubts.clear());
+        assert!(plain < built_sheet_height(&library, |_| ()));
+    }
+
+    /// Height of the contact sheet when something is done to all records: a line of text makes it higher.
+    fn built_sheet_height(library: &Library, change: fn(&mut PhotoRecord)) -> usize {
+        let mut library = library.clone();
+        library.assets.iter_mut().flat_map(|asset| &mut asset.photos).for_each(|photo| change(&mut photo.record));
+        contact_sheet(&library).height()
     }
 
     #[test]

@@ -33,7 +33,7 @@ const BACKGROUNDS: [Background; 4] = [
     |_, _| GREEN,
 ];
 
-/// Every cut-out over a checkerboard, black, white and green, with its size, its confidence and why it is in doubt.
+/// Every cut-out over a checkerboard, black, white and green, with its size, how sure outline and colour are and why it is in doubt.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
     let photos: Vec<&Photo> = library.assets.iter().flat_map(|asset| &asset.photos).collect();
     let strips: Vec<Image<Srgb8>> = photos.par_iter().map(|photo| strip(photo)).collect();
@@ -61,10 +61,11 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
     let width = BACKGROUNDS.len() * (SIDE + GAP);
     let [length, across] = record.object_m.map(|m| 1e3 * m);
     let title = format!(
-        "{}  {length:.1} x {across:.1} mm (+- {:.1})  confidence {:.2}",
+        "{}  {length:.1} x {across:.1} mm (+- {:.1})  sure of outline {:.2}{}",
         record.file,
         1e3 * record.error_m,
-        record.confidence
+        record.outline_confidence,
+        record.color_confidence.map(|sure| format!(", of colour {sure:.2}")).unwrap_or_default()
     );
     let told = std::iter::once((&title, INK)).chain(record.doubts.iter().map(|doubt| (doubt, WARNING)));
     let lines: Vec<(String, Srgb8)> = told

@@ -9,7 +9,7 @@ use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
 use crate::bounds::{MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH, number};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::matte::{CutOut, CutOutOptions, Remark, cut_out_on};
+use crate::matte::{ColorDoubts, CutOut, CutOutOptions, Remark, cut_out_on};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
@@ -190,7 +190,8 @@ fn record(cut: &CutOut, add: &AddPhoto, file: String, photo: &Path) -> PhotoReco
         matte: cut.method,
         residue: f64::from(cut.residue),
         unevenness: f64::from(cut.unevenness),
-        confidence: cut.segmentation.confidence.value(),
+        outline_confidence: cut.segmentation.confidence.value(),
+        color_confidence: cut.doubts.map(ColorDoubts::confidence),
         doubts: doubts.collect(),
         truncated: cut.segmentation.touches.contains(&true),
         outline_px: cut.hull.iter().map(files::rounded).collect(),

@@ -67,8 +67,11 @@ pub struct PhotoRecord {
     #[serde(default)]
     pub unevenness: f64,
     /// How far the outline can be believed, 0 to 1; 1 where a person has looked.
-    #[serde(default = "certain")]
-    pub confidence: f64,
+    #[serde(default = "certain", alias = "confidence")]
+    pub outline_confidence: f64,
+    /// How far colour and transmittance can be believed, 0 to 1; missing where nobody has asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color_confidence: Option<f64>,
     /// Why a person should look at this cut-out; empty where nothing is odd.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub doubts: Vec<String>,
@@ -210,7 +213,9 @@ impl PhotoRecord {
         self.size_m.into_iter().try_for_each(|side| CARD.check("size_m", side))?;
         OBJECT.check("object_m[0]", self.object_m[0])?;
         WIDTH.check("object_m[1]", self.object_m[1])?;
-        Bounds::new(0.0, 1.0, "a share").check("confidence", self.confidence)?;
+        let share = Bounds::new(0.0, 1.0, "a share");
+        share.check("outline_confidence", self.outline_confidence)?;
+        self.color_confidence.map_or(Ok(()), |told| share.check("color_confidence", told))?;
         if self.outline_px.len() < 3 {
             let what = format!("{} points, expected at least 3", self.outline_px.len());
             return Err(Error::value("outline_px", what));
@@ -283,7 +288,8 @@ pub(super) mod tests {
             matte: MatteMethod::Physical,
             residue: 0.01,
             unevenness: 0.1,
-            confidence: 0.9,
+            outline_confidence: 0.9,
+            color_confidence: Some(0.8),
             doubts: Vec::new(),
             truncated: false,
             outline_px: vec![[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]],
@@ -308,6 +314,23 @@ pub(super) mod tests {
         let back = Manifest::read(folder.path()).unwrap();
         assert_eq!(back, manifest);
         assert_eq!(back.assets.iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+    }
+
+    #[test]
+    fn the_confidence_of_older_manifests_is_that_of_the_outline() {
+        let folder = tempfile::tempdir().unwrap();
+        two().write(folder.path()).unwrap();
+        let path = folder.path().join(MANIFEST);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("outline_confidence = 0.9\ncolor_confidence = 0.8\n"), "{text}");
+        let older = text.replace("outline_confidence = 0.9\ncolor_confidence = 0.8\n", "confidence = 0.7\n");
+        std::fs::write(&path, older).unwrap();
+        let read = Manifest::read(folder.path()).unwrap();
+        let photos: Vec<_> = read.assets.iter().flat_map(|asset| &asset.photos).collect();
+        assert!(photos.iter().all(|p| (p.outline_confidence, p.color_confidence) == (0.7, None)), "{photos:?}");
+        std::fs::write(&path, text.replace("color_confidence = 0.8", "color_confidence = 1.5")).unwrap();
+        let told = Manifest::read(folder.path()).unwrap_err().to_string();
+        assert!(told.contains("assets[0].photos[0].color_confidence: 1.5, expected 0 to 1"), "{told}");
     }
 
     #[test]

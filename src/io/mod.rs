@@ -119,8 +119,8 @@ use std::sync::OnceLock;
 /// Reads a picture as the pixels asked for, with the default [`ReadOptions`].
 ///
 /// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is dropped. `PremulRgba` and
-/// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or its `A`, or its
-/// `Y`; `Depth` the only one, or `Z`, in float.
+/// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or `R`, `G` and `B` where
+/// they are equal and no alpha below 1 is beside them, or `A`; `Depth` the only one, or `Z`, in float.
 ///
 /// # Errors
 /// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the

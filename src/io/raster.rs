@@ -116,7 +116,7 @@ pub enum Wanted {
     Color,
     /// As `Color`, with the transmittance `VR VG VB` or else `TR TG TB` where one is there.
     Film,
-    /// The only channel, or `A`, or `Y`.
+    /// The only channel, or the three equal ones of a grey picture, or `A`.
     Coverage,
     /// The only channel, or `Z`.
     Depth,
@@ -150,8 +150,9 @@ impl Wanted {
             Self::Film => film(names),
             Self::Color => color(names),
             _ if names.len() == 1 => Some(named(0)),
-            Self::Coverage if at("A").is_some() && at("Y").is_some() => None,
-            Self::Coverage => at("A").or(at("Y")).map(named),
+            Self::Coverage => {
+                color_of_layer(names, "").map(|picked| (Fit::Named, picked)).or_else(|| at("A").map(named))
+            }
             Self::Depth => at("Z").map(named).or_else(|| Some((Fit::Layer, vec![only(names, |n| last(n) == "Z")?]))),
         };
         found.ok_or_else(|| format!("has the channels {}, expected {}", names.join(" "), self.expected()))
@@ -160,7 +161,7 @@ impl Wanted {
     fn expected(self) -> &'static str {
         match self {
             Self::Color | Self::Film => "R G B or Y, with or without A",
-            Self::Coverage => "one channel, or one named A or Y",
+            Self::Coverage => "one channel, three equal ones R G B, or one named A or Y",
             Self::Depth => "one channel, or one named Z",
         }
     }
@@ -228,6 +229,11 @@ pub trait FromFile: Copy + Send + Sync + Default + Zeroable + 'static {
     #[doc(hidden)]
     fn check(_: &Opaque<'_>) -> Result<(), String> {
         Ok(())
+    }
+    /// The channel that they are made from, where only the values of all rows tell which of several it is.
+    #[doc(hidden)]
+    fn channel(_: &Opaque<'_>) -> Result<Option<usize>, String> {
+        Ok(None)
     }
     /// Makes the pixels of the rows.
     #[doc(hidden)]
@@ -331,6 +337,9 @@ impl FromFile for LinearRgb {
 
 impl FromFile for Coverage {
     const WANTED: Wanted = Wanted::Coverage;
+    fn channel(rows: &Opaque<'_>) -> Result<Option<usize>, String> {
+        rows.matte().map(Some)
+    }
     fn fill(rows: &Opaque<'_>, pixels: &mut [Self]) -> Result<(), String> {
         rows.single(Self::WANTED, pixels, Coverage)
     }
@@ -358,6 +367,9 @@ struct Channels {
 /// What counts as opaque: half floats next to 1 are 0.0005 apart.
 const OPAQUE: f32 = 0.999;
 
+/// How far the three channels of a grey may lie apart: conversions of colour round by an 8-bit code.
+const EQUAL: f32 = 1.01 / 255.0;
+
 impl Opaque<'_> {
     /// A photo must not hide the share of a pixel that is missing.
     fn refuse_transparency(&self) -> Result<(), String> {
@@ -373,11 +385,36 @@ impl Opaque<'_> {
 
     /// Pixels whose channel `a` says that they are not opaque.
     fn clear(&self, a: usize) -> usize {
+        self.count_values(|value| value(a) < OPAQUE)
+    }
+
+    /// Where the matte stands. Programs that know no grey write it into `R`, `G` and `B`, with an alpha of 1 or without;
+    /// where both could be meant, alpha is.
+    fn matte(&self) -> Result<usize, String> {
+        let names = &self.raster.names;
+        let picked = Wanted::Coverage.pick(names)?;
+        let &[r, g, b, ref alpha @ ..] = &picked[..] else { return Ok(picked[0]) };
+        let differ = |value: &dyn Fn(usize) -> f32| {
+            let [r, g, b] = [r, g, b].map(value);
+            r.max(g).max(b) - r.min(g).min(b) > EQUAL
+        };
+        let coloured = self.count_values(differ);
+        match alpha.first() {
+            None if coloured == 0 => Ok(r),
+            None => Err(format!("{coloured} coloured pixels, expected {}", Wanted::Coverage.expected())),
+            Some(&a) if coloured == 0 && self.clear(a) == 0 => Ok(r),
+            Some(&a) if r != g => Ok(a),
+            Some(_) => Err(format!("has the channels {}, expected {}", names.join(" "), Wanted::Coverage.expected())),
+        }
+    }
+
+    /// Pixels of whose channels, full scale 1, something is true.
+    fn count_values(&self, is: impl Fn(&dyn Fn(usize) -> f32) -> bool + Sync + Send) -> usize {
         match &self.raster.samples {
-            Samples::U8(v) => self.count(v, |px| f32::from(px[a]) / 255.0 < OPAQUE),
-            Samples::U16(v) => self.count(v, |px| f32::from(px[a]) / 65_535.0 < OPAQUE),
-            Samples::F16(v) => self.count(v, |px| f32::from(px[a]) < OPAQUE),
-            Samples::F32(v) => self.count(v, |px| px[a] < OPAQUE),
+            Samples::U8(v) => self.count(v, |px| is(&|i| f32::from(px[i]) / 255.0)),
+            Samples::U16(v) => self.count(v, |px| is(&|i| f32::from(px[i]) / 65_535.0)),
+            Samples::F16(v) => self.count(v, |px| is(&|i| px[i].into())),
+            Samples::F32(v) => self.count(v, |px| is(&|i| px[i])),
         }
     }
 
@@ -483,8 +520,13 @@ impl Raster {
     /// All pixels, from the last row up; the samples' memory is given back on the way, so that never much more than one
     /// of the two is there.
     pub(super) fn into_image<P: FromFile>(mut self, profile: Option<&Profile>) -> Result<Image<P>, String> {
-        let (width, height, row) = (self.width, self.height, self.row());
-        P::check(&Opaque { raster: &self, profile, rows: 0..height })?;
+        let (width, height) = (self.width, self.height);
+        let whole = Opaque { raster: &self, profile, rows: 0..height };
+        P::check(&whole)?;
+        if let Some(channel) = P::channel(&whole)? {
+            self = self.narrowed(channel);
+        }
+        let row = self.row();
         let mut pixels: Vec<P> = zeroed_vec(width * height);
         let mut rows = height..height;
         while rows.start > 0 {
@@ -494,6 +536,24 @@ impl Raster {
             self.samples.shorten(rows.start * row);
         }
         Ok(Image::from_vec(width, height, pixels))
+    }
+
+    /// The picture of one of its channels.
+    fn narrowed(self, channel: usize) -> Self {
+        let count = self.names.len();
+        if count == 1 {
+            return self;
+        }
+        fn every<T: Copy>(samples: &[T], count: usize, channel: usize) -> Vec<T> {
+            samples.chunks_exact(count).map(|px| px[channel]).collect()
+        }
+        let samples = match &self.samples {
+            Samples::U8(v) => Samples::U8(every(v, count, channel)),
+            Samples::U16(v) => Samples::U16(every(v, count, channel)),
+            Samples::F16(v) => Samples::F16(every(v, count, channel)),
+            Samples::F32(v) => Samples::F32(every(v, count, channel)),
+        };
+        Self { names: vec![self.names[channel].clone()], samples, ..self }
     }
 
     /// The picture the way the camera was held.
@@ -589,10 +649,23 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_of_three_channels_is_refused_with_what_was_expected() {
-        let mask = raster(Samples::U8(vec![51; 3]), "R G B", true, false);
-        let e = pixel::<Coverage>(mask).unwrap_err();
-        assert_eq!(e, "has the channels R G B, expected one channel, or one named A or Y");
+    fn a_grey_picture_of_three_channels_is_a_matte_with_an_alpha_of_one_and_without() {
+        let matte = |codes: &[u8], names: &str| {
+            let pixels = codes.len() / names.split(' ').count();
+            let matte = Raster { width: pixels, ..raster(Samples::U8(codes.to_vec()), names, true, false) };
+            matte.into_image(None).map(|image: Image<Coverage>| image.pixels().iter().map(|c| c.0).collect::<Vec<_>>())
+        };
+        let (full, none) = (1.0, 0.0);
+        assert_eq!(matte(&[51, 51, 51, 0, 0, 0], "R G B").unwrap(), [0.2, none]);
+        assert_eq!(matte(&[51, 51, 51, 255, 0, 0, 0, 255], "R G B A").unwrap(), [0.2, none]);
+        assert_eq!(matte(&[51, 255, 0, 255], "Y A").unwrap(), [0.2, none]);
+        // An alpha that says something is the matte.
+        assert_eq!(matte(&[51, 51, 51, 255, 0, 0, 0, 0], "R G B A").unwrap(), [full, none]);
+        assert_eq!(matte(&[51, 0, 0, 255], "R G B A").unwrap(), [full]);
+        let expected = "expected one channel, three equal ones R G B, or one named A or Y";
+        let coloured = matte(&[51, 51, 51, 51, 0, 51], "R G B").unwrap_err();
+        assert_eq!(coloured, format!("1 coloured pixels, {expected}"));
+        assert_eq!(matte(&[51, 128], "Y A").unwrap_err(), format!("has the channels Y A, {expected}"));
     }
 
     fn names(text: &str) -> Vec<String> {

@@ -1,11 +1,11 @@
 //! Cut-out: segmentation, screen plate and matte in one go, trimmed to the object.
 
-use super::film::{FilmMatte, FilmOptions, PartOf, film_of_part};
+use super::film::{ColorDoubts, FilmMatte, FilmOptions, PartOf, film_of_part};
 use super::key::{KeyOptions, Keying, Screen};
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
 use super::remark::Remark;
-use super::screen::{is_keyable, screen_color, screen_pixels};
+use super::screen::{screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
 use crate::bounds::Bounds;
 use crate::error::{Error, Result};
@@ -31,7 +31,7 @@ pub struct CutOutOptions {
     /// Colour of an evenly lit screen, scene-linear; nothing = fitted to the photo. Default: nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub screen: Option<LinearRgb>,
-    /// Where the matte comes from; nothing = physical where the screen has a colour. Default: nothing.
+    /// Where the matte comes from; nothing = physical. Default: nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<MatteMethod>,
     /// What a matte is cut to. Default: `tight`.
@@ -62,10 +62,12 @@ impl Default for CutOutOptions {
 }
 
 /// Where a matte comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatteMethod {
     /// From reflected light and transmittance, solved for in every pixel: see-through plastic keeps its own light only.
+    /// Guessed on a screen without a hue, and that is said.
+    #[default]
     Physical,
     /// From the screen's colour, as Blender's Keying node does: see-through plastic is see-through.
     Key,
@@ -119,6 +121,8 @@ pub struct CutOut {
     pub method: MatteMethod,
     /// Mean matte on the screen outside the object, where it should be 0.
     pub residue: f32,
+    /// What makes its colours and its transmittance wrong; of the physical matte only.
+    pub doubts: Option<ColorDoubts>,
     /// What a person should know, of the segmentation, the screen and the matte.
     pub remarks: Vec<Remark>,
     /// Where the object was found in the photo.
@@ -153,7 +157,7 @@ fn clipped_screen(photo: &Image<LinearRgb>, found: &Segmentation, method: MatteM
 
 /// Cuts the one object out of a photo on a uniform screen or board.
 ///
-/// `photo` is scene-linear. A screen too grey to be keyed gives a matte from the outline, and a [`Remark`].
+/// `photo` is scene-linear. On a screen too grey to be keyed what is see-through is guessed, and a [`Remark`] says so.
 ///
 /// # Errors
 /// Those of [`segment`] and of [`ScreenPlate::fit`]; [`Error::Value`] (`key.clip_black`, `soften_px`, ..) for an option
@@ -174,7 +178,7 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
     let plate = plate(photo, empty, &segmentation, opts)?;
     watch.lap("plate");
     let screen = plate.color();
-    let method = opts.method.unwrap_or_else(|| method_for(screen));
+    let method = opts.method.unwrap_or_default();
     let whole = match opts.within {
         Within::Tight => &segmentation.tight,
         Within::Hull => &segmentation.mask,
@@ -200,11 +204,7 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
     let moved = |p: Point2<f64>| Point2::from((p - corner) * scale);
     let mut remarks = segmentation.remarks.clone();
     remarks.extend(matted.remarks);
-    match method {
-        MatteMethod::Outline if opts.method.is_none() => remarks.push(Remark::GreyScreen(screen)),
-        _ if matted.residue > RESIDUE => remarks.push(Remark::Residue(matted.residue)),
-        _ => {}
-    }
+    remarks.extend((matted.residue > RESIDUE).then_some(Remark::Residue(matted.residue)));
     remarks.extend(clipped_screen(photo, &segmentation, method, opts.film.clipped));
     let film = reduced(matted.film.crop(trim), scale);
     let transmittance = reduced(matted.transmittance.crop(trim), scale);
@@ -223,6 +223,7 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
         unevenness: plate.unevenness,
         method,
         residue: matted.residue,
+        doubts: matted.doubts,
         remarks,
         segmentation,
     })
@@ -274,16 +275,13 @@ fn plate(
     }
 }
 
-fn method_for(screen: LinearRgb) -> MatteMethod {
-    if is_keyable(screen) { MatteMethod::Physical } else { MatteMethod::Outline }
-}
-
 /// What a method makes of the part of the photo around the object.
 struct Matted {
     film: Image<Film>,
     transmittance: Image<LinearRgb>,
     uncertainty: Image<Coverage>,
     residue: f32,
+    doubts: Option<ColorDoubts>,
     remarks: Vec<Remark>,
 }
 
@@ -296,9 +294,9 @@ impl Matted {
         opts: &CutOutOptions,
     ) -> Result<Self> {
         let solved = film_of_part(photo, plate, cut, known, &opts.film).map_err(|e| e.within("film"))?;
-        let FilmMatte { film, transmittance, uncertainty, remarks, .. } = solved;
+        let FilmMatte { film, transmittance, uncertainty, doubts, remarks, .. } = solved;
         // Film is empty outside the cut.
-        Ok(Self { film, transmittance, uncertainty, residue: 0.0, remarks })
+        Ok(Self { film, transmittance, uncertainty, residue: 0.0, doubts: Some(doubts), remarks })
     }
 
     fn keyed(
@@ -321,6 +319,7 @@ impl Matted {
             transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
             uncertainty: Image::new(image.width(), image.height()),
             residue,
+            doubts: None,
             remarks: Vec::new(),
         }
     }
@@ -385,13 +384,14 @@ mod tests {
     }
 
     #[test]
-    fn a_white_board_gives_an_opaque_object() {
+    fn a_white_board_leaves_paint_opaque_and_is_a_doubt() {
         let cut = cut_out(&slab(LinearRgb::new(0.6, 0.62, 0.7)), &CutOutOptions::default()).unwrap();
-        assert_eq!(cut.method, MatteMethod::Outline);
+        assert_eq!(cut.method, MatteMethod::Physical);
         let image = cut.to_rgba();
         let centre = image[(image.width() / 2, image.height() / 2)];
-        assert!((centre.a - 1.0).abs() < 1e-5 && (centre.r - 0.5).abs() < 1e-5);
+        assert!((centre.a - 1.0).abs() < 1e-3 && (centre.r - 0.5).abs() < 1e-3, "{centre:?}");
         assert_eq!(image[(0, 0)].a, 0.0);
+        assert!(cut.remarks.iter().any(|r| matches!(r, Remark::GreyScreen(_)) && r.is_doubt()), "{:?}", cut.remarks);
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
+mod doubts;
 mod planes;
 mod solve;
 pub(super) mod tint;
+
 mod view;
 
+pub use doubts::ColorDoubts;
 pub use planes::film_planes;
 pub(super) use view::view;
 
@@ -57,6 +60,8 @@ pub struct FilmMatte {
     pub uncertainty: Image<Coverage>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
+    /// What makes its colours wrong.
+    pub doubts: ColorDoubts,
     /// What a person should know.
     pub remarks: Vec<Remark>,
 }
@@ -71,8 +76,8 @@ impl FilmMatte {
 /// Solves `photo = F + T * plate` for the reflected light F and the transmittance T of one object.
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
-/// garbage matte). A screen without a colour tells nothing of T: then the object is taken for opaque, and a [`Remark`]
-/// says so.
+/// garbage matte). A screen with little colour tells little of T: then what may be plastic by its light is guessed to be
+/// that, and a [`Remark`] says so.
 ///
 /// # Method
 /// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the plastic is clear or has
@@ -132,24 +137,31 @@ pub(super) fn film_of_part(
         let (x, y) = (i % photo.width(), i / photo.width());
         return Err(Error::Photo { what: format!("pixel ({x}, {y}) is not a finite number") });
     }
-    if !is_keyable(screen) {
-        return Ok(opaque(photo, inside, screen));
-    }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);
-    let flat = opts.flat.map_or_else(|| tint::fit(&calm, plate, inside, key).flat, Into::into);
+    let grey = (!is_keyable(screen)).then_some(Remark::GreyScreen(screen));
+    let (flat, tint) = match (opts.flat, &grey) {
+        (Some(flat), _) => (flat.into(), 0.0),
+        (None, Some(_)) => tint::fit(&calm, plate, inside, key, 1.0),
+        (None, None) => tint::fit(&calm, plate, inside, key, tint::DARKEST),
+    };
     watch.lap("tint");
     let solver = Solver::new(key, flat, plate.residual, opts);
+    let factor = if grey.is_some() { Solver::guess } else { Solver::solve };
     let mut factors = calm.zip3_map(&plate.image, inside, |pixel, screen, inside| {
-        if inside.0 > 0.0 { solver.solve(pixel.into(), screen.into()) } else { Factor::default() }
+        if inside.0 > 0.0 { factor(&solver, pixel.into(), screen.into()) } else { Factor::default() }
     });
     watch.lap("factors");
-    let painted = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
+    let most = flat.into_iter().fold(0.0, f32::max);
+    let guessed = doubts::guessed(&factors, inside, opts.thickness_spread, most);
+    let screen_hue = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
+    let keyed_away = doubts::keyed_away(&factors, inside, flat[key], longer_side);
     watch.lap("paint");
     let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
     watch.lap("glints");
-    let remarks = painted.into_iter().chain(clipped).collect();
-    let matte = composed(photo, plate, inside, &factors, flat.into(), remarks);
+    let doubts = ColorDoubts { keyed_away, screen_hue, clipped, guessed, tint };
+    let remarks = grey.into_iter().chain(doubts.remarks()).collect();
+    let matte = FilmMatte { doubts, remarks, ..composed(photo, plate, inside, &factors, flat.into()) };
     watch.lap("compose");
     watch.log("film");
     Ok(matte)
@@ -195,7 +207,6 @@ fn composed(
     inside: &Image<Coverage>,
     factors: &Image<Factor>,
     flat: LinearRgb,
-    remarks: Vec<Remark>,
 ) -> FilmMatte {
     let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
     let transmittance = plastic.zip_map(inside, covered);
@@ -204,7 +215,7 @@ fn composed(
     let film = reflected.zip3_map(&seen, inside, |f, v, c| Film::new(f.scale(c.0), covered(v, c)));
     let most = flat.r.max(flat.g).max(flat.b);
     let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
-    FilmMatte { film, transmittance, uncertainty, flat, remarks }
+    FilmMatte { film, transmittance, uncertainty, flat, doubts: ColorDoubts::default(), remarks: Vec::new() }
 }
 
 /// A transmittance that holds for the covered share of a pixel only.
@@ -215,17 +226,6 @@ pub(super) fn covered(t: LinearRgb, Coverage(c): Coverage) -> LinearRgb {
 /// Light that is left when some is taken away; not less than none.
 pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
     LinearRgb::new((light.r - taken.r).max(0.0), (light.g - taken.g).max(0.0), (light.b - taken.b).max(0.0))
-}
-
-/// The object as its outline has it, nothing see-through, and known not to be known.
-fn opaque(photo: &Image<LinearRgb>, inside: &Image<Coverage>, screen: LinearRgb) -> FilmMatte {
-    FilmMatte {
-        film: photo.zip_map(inside, |p, m| p.opaque().masked(m).into()),
-        transmittance: inside.map(|c| LinearRgb::grey(1.0 - c.0)),
-        uncertainty: inside.clone(),
-        flat: LinearRgb::grey(tint::CLEAR),
-        remarks: vec![Remark::GreyScreen(screen)],
-    }
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ pub use chroma_key::{ChromaKeyOptions, chroma_key};
 pub use color_spill::{Channel, ColorSpillOptions, SpillLimit, color_spill};
 pub use cut_out::{CutOut, CutOutOptions, MatteMethod, Within, cut_out, cut_out_on};
 pub use difference_key::{DifferenceKeyOptions, difference_key};
-pub use film::{FilmMatte, FilmOptions, film, film_planes};
+pub use film::{ColorDoubts, FilmMatte, FilmOptions, film, film_planes};
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
 pub use key_color::{KeyAverage, KeyColor, key_color};
 pub use keying_screen::{ScreenPoint, keying_screen};

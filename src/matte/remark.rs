@@ -1,5 +1,6 @@
 //! What is odd about a photo without making it useless.
 
+use super::film::ColorDoubts;
 use crate::pixel::LinearRgb;
 
 /// Something a person should know of a cut-out; it stands nevertheless.
@@ -22,7 +23,7 @@ pub enum Remark {
     Truncated(Vec<&'static str>),
     /// The background has no colour to key.
     #[error(
-        "the background ({:.2}, {:.2}, {:.2}) is too grey to be keyed: the matte is the object's outline, nothing is see-through",
+        "the background ({:.2}, {:.2}, {:.2}) is too grey to tell what is see-through: guessed, as plastic has it",
         .0.r, .0.g, .0.b
     )]
     GreyScreen(LinearRgb),
@@ -73,6 +74,17 @@ pub enum Remark {
         100.0 * .0
     )]
     ScreenHue(f32),
+    /// This share of the object looks like bare screen, where plastic is.
+    #[error(
+        "{:.1} % of the object looks like bare screen: keyed away, but it may be paint of the screen's hue; photograph it on another screen colour to be sure",
+        100.0 * .0
+    )]
+    KeyedAway(f32),
+    /// Tints that explain the photo as well let through so much more or less.
+    #[error(
+        "the plastic may have the screen's hue: its tint is told to +- {0:.2} only; photograph it on another screen colour"
+    )]
+    TintUnsure(f32),
     /// This share of the object is clipped: brighter than the camera can tell.
     #[error("{:.1} % of the object is clipped: its transmittance there is that of its surroundings", 100.0 * .0)]
     Clipped(f32),
@@ -89,11 +101,15 @@ pub enum Remark {
     Undetermined(&'static str),
 }
 
-/// Share of the object in the screen's hue from which a person should look. Caps and labels (a fifth of a bottle) are taken
-/// for opaque, which they are; where more has the hue, it is the plastic itself, and the screen the wrong one.
-const LEAST_HUE_SHARE: f32 = 0.25;
-
 impl Remark {
+    /// It is about the colour and the transmittance of what is inside the outline, and says nothing of the outline.
+    pub fn is_about_color(&self) -> bool {
+        matches!(
+            self,
+            Self::GreyScreen(_) | Self::ScreenHue(_) | Self::KeyedAway(_) | Self::TintUnsure(_) | Self::Clipped(_)
+        )
+    }
+
     /// A person should look at the cut-out: it may be wrong. Otherwise it is merely less than it could be.
     pub fn is_doubt(&self) -> bool {
         match self {
@@ -110,9 +126,12 @@ impl Remark {
             | Self::Hollow
             | Self::Specks(_)
             | Self::Narrow(_)
-            | Self::ClippedScreen(_) => true,
-            Self::ScreenHue(share) => *share > LEAST_HUE_SHARE,
-            Self::GreyScreen(_) | Self::Clipped(_) | Self::Moved { .. } | Self::Undetermined(_) => false,
+            | Self::ClippedScreen(_)
+            | Self::GreyScreen(_) => true,
+            Self::KeyedAway(share) => *share > ColorDoubts::LOOK.keyed_away,
+            Self::ScreenHue(share) => *share > ColorDoubts::LOOK.screen_hue,
+            Self::TintUnsure(off) => *off > ColorDoubts::LOOK.tint,
+            Self::Clipped(_) | Self::Moved { .. } | Self::Undetermined(_) => false,
         }
     }
 }

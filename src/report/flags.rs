@@ -111,7 +111,9 @@ impl Trial {
             }
             Ok(cut) => cut,
         };
-        let doubts: Vec<String> = cut.remarks.iter().filter(|r| r.is_doubt()).map(Remark::to_string).collect();
+        // What is judged is the outline.
+        let of_outline = cut.remarks.iter().filter(|r| r.is_doubt() && !r.is_about_color());
+        let doubts: Vec<String> = of_outline.map(Remark::to_string).collect();
         let [iou, box_px] = self.errors(&cut);
         // Pixels of a reduced search are that much larger.
         let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);

@@ -19,7 +19,7 @@ pub(crate) enum Command {
     },
     /// Cut out photos of one object
     Add(Add),
-    /// Show what an asset folder holds
+    /// Show what an asset folder holds: name, class, size, how sure outline and colour are (0 to 1), file
     List {
         /// Asset folder
         folder: PathBuf,
@@ -171,9 +171,10 @@ fn list(folder: &Path) -> anyhow::Result<()> {
     for asset in Manifest::read(folder)?.assets {
         for photo in &asset.photos {
             let [length, width] = photo.object_m.map(|m| m * 1e3);
-            let (name, class, sure) = (&asset.name, &asset.class, photo.confidence);
+            let (name, class, sure) = (&asset.name, &asset.class, photo.outline_confidence);
+            let color = photo.color_confidence.map_or_else(|| "   -".into(), |color| format!("{color:.2}"));
             let size = format!("{length:4.0} x {width:3.0} mm (+- {:.1})", photo.error_m * 1e3);
-            print::line(format_args!("{name:12} {class:10} {size}  {sure:.2}  {}", photo.file));
+            print::line(format_args!("{name:12} {class:10} {size}  {sure:.2}  {color}  {}", photo.file));
         }
     }
     Ok(())

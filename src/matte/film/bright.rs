@@ -4,7 +4,6 @@ use super::solve::Factor;
 use super::tint::WHOLE;
 use crate::filter;
 use crate::image::Image;
-use crate::matte::remark::Remark;
 use crate::pixel::{Coverage, LinearRgb};
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
@@ -13,17 +12,21 @@ use std::ops::RangeInclusive;
 const PAINTED: f32 = 1.65;
 /// Rim of the object where a pixel may be that bright, as a share of the longer side: bare screen shines in.
 const RIM: f64 = 0.01;
+
+/// Width of that rim in a photo of so many pixels.
+pub(super) fn rim_px(longer_side: usize) -> f64 {
+    (RIM * longer_side as f64).max(2.0)
+}
+
 /// Blur of the paint's mask, standard deviation in pixels, and the shares of it between which a pixel turns opaque.
 const BLUR_PX: f32 = 2.0;
 const TURNS: [f32; 2] = [0.4, 0.7];
-/// Share of the object below which nothing is said.
-const WORTH_SAYING: f32 = 0.002;
 
 /// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest channel, it may be.
 const SCREEN: f32 = 0.06;
 
 /// Makes opaque what is painted: in the screen's hue, or in colours that the plastic has not. Bare screen that a wide mask
-/// lets in is not paint.
+/// lets in is not paint. Gives the share of the object that has the screen's hue.
 ///
 /// `longer_side` is that of the whole photo, pixels.
 pub(super) fn make_opaque(
@@ -32,14 +35,13 @@ pub(super) fn make_opaque(
     plate: &Image<LinearRgb>,
     inside: &Image<Coverage>,
     longer_side: usize,
-) -> Option<Remark> {
+) -> f32 {
     let bright = factors.zip3_map(photo, plate, |f, p, k| f.raw > PAINTED && !is_screen(p.into(), k.into()));
     let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
     if !painted.pixels().iter().any(|p| *p) {
-        return None;
+        return 0.0;
     }
-    let rim_px = (RIM * longer_side as f64).max(2.0);
-    let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px);
+    let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px(longer_side));
     let painted = painted.zip_map(&interior, |p, i| Coverage(f32::from(u8::from(p && i))));
     let painted = filter::gaussian_blur(&painted, BLUR_PX);
     let paint = painted.map(|p| ((p.0 - TURNS[0]) / (TURNS[1] - TURNS[0])).clamp(0.0, 1.0));
@@ -48,8 +50,7 @@ pub(super) fn make_opaque(
         factor.sigma = factor.sigma.max(*paint);
     }
     let of_hue = paint.pixels().iter().zip(bright.pixels()).map(|(paint, bright)| *bright && *paint > 0.5);
-    let share = share(of_hue, inside);
-    (share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
+    share(of_hue, inside)
 }
 
 /// A pixel is the screen in some shade.
@@ -70,13 +71,13 @@ const FILL_PX: f32 = 3.0;
 const ENOUGH: f32 = 0.05;
 
 /// Gives pixels under glints the factor of their surroundings, as far as they are hidden: clipped ones wholly, others
-/// only more of it, since what reflects much is taken for paint by itself.
+/// only more of it, since what reflects much is taken for paint by itself. Gives the share of the object that is clipped.
 pub(super) fn fill_glints(
     factors: &mut Image<Factor>,
     photo: &Image<LinearRgb>,
     inside: &Image<Coverage>,
     clipped_at: f32,
-) -> Option<Remark> {
+) -> f32 {
     let clipped = photo.zip_map(inside, |p, c| c.0 > 0.0 && p.r.max(p.g).max(p.b) >= clipped_at);
     let hidden = factors.zip_map(&clipped, |f, clipped| if clipped { 1.0 } else { hides(f.reflected) });
     // Weight and weighted factor ride in one picture: one blur for both.
@@ -93,8 +94,7 @@ pub(super) fn fill_glints(
             }
         }
     });
-    let share = share(clipped.pixels().iter().copied(), inside);
-    (share > CLIPPED_WORTH_SAYING).then_some(Remark::Clipped(share))
+    share(clipped.pixels().iter().copied(), inside)
 }
 
 fn fill(factor: &mut Factor, hidden: f32, around: f32) {
@@ -110,11 +110,9 @@ fn hides(reflected: f32) -> f32 {
 
 /// Standard deviation of a factor that is only its surroundings': that of plastic around its median.
 const FILLED_SIGMA: f32 = 0.35;
-/// Share of the object that may be clipped without a word: glints.
-const CLIPPED_WORTH_SAYING: f32 = 0.03;
 
 /// The share of the object that a set of pixels has.
-fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
+pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object: f64 = inside.pixels().iter().map(|c| f64::from(c.0)).sum();
     let chosen: f64 = set.zip(inside.pixels()).filter(|(set, _)| *set).map(|(_, c)| f64::from(c.0)).sum();
     if object > 0.0 { (chosen / object) as f32 } else { 0.0 }

@@ -35,6 +35,8 @@ pub(super) struct Solver {
 
 /// Tints must differ by so much of the largest to tell glint from scattered light.
 const TELLING: f32 = 0.25;
+/// Light of the key channel over the others' that tells nothing, however many pixels have it; its square is a number still.
+const LEAST_GAIN: f32 = 1e-12;
 /// Coded pictures are no finer than this.
 const FINEST: f32 = 0.004;
 /// Clear plastic reflects neutrally: this much of the error of the key channel's reflection is due to the tint.
@@ -65,16 +67,30 @@ impl Solver {
         }
     }
 
+    /// The factor on a screen with a hue.
     pub(super) fn solve(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
+        self.drawn(pixel, screen, |reflected, _| self.expected(pixel, reflected))
+    }
+
+    /// The factor on a screen that has too little hue to tell much: that of flat plastic unless more light is left than
+    /// plastic throws back. The deviation is that of something of which it is not known whether it is plastic.
+    pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
+        let left = |through: [f32; 3]| (0..3).map(|c| pixel[c] - through[c]).fold(0.0, f32::max);
+        let factor = self.drawn(pixel, screen, |_, through| plastic(left(through)));
+        Factor { raw: factor.value, sigma: factor.sigma / self.spread, ..factor }
+    }
+
+    /// What the photo says, drawn to what is expected from the reflected light, or from the screen behind flat plastic.
+    fn drawn(&self, pixel: [f32; 3], screen: [f32; 3], expected: impl Fn(f32, [f32; 3]) -> f32) -> Factor {
         let mixed = |of: [f32; 3]| self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]];
         let through: [f32; 3] = std::array::from_fn(|c| self.flat[c] * screen[c]);
         let reflected = mixed(pixel).max(0.0);
-        let gain = (through[self.key] - mixed(through)).max(f32::MIN_POSITIVE);
+        let gain = (through[self.key] - mixed(through)).max(LEAST_GAIN);
         let raw = (pixel[self.key] - mixed(pixel)) / gain;
         let reflection = self.reflection_error * reflected;
         let variance = (reflection * reflection + self.noise * self.noise) / (gain * gain);
         let prior = self.spread * self.spread;
-        let drawn = (raw * prior + self.expected(pixel, reflected) * variance) / (prior + variance);
+        let drawn = (raw * prior + expected(reflected, through) * variance) / (prior + variance);
         // Nothing reflects less than no light: no channel shows more screen than light.
         let bound = (0..3).map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE)).fold(f32::MAX, f32::min);
         let most = 1.0 / self.flat.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
@@ -99,8 +115,13 @@ impl Solver {
     /// The factor of a pixel of which nothing but its brightness is known: plastic, or paint.
     fn expected(&self, pixel: [f32; 3], reflected: f32) -> f32 {
         let brightest = pixel[self.others[0]].max(pixel[self.others[1]]).max(reflected);
-        ((PAINT[1] - brightest) / (PAINT[1] - PAINT[0])).clamp(0.0, 1.0)
+        plastic(brightest)
     }
+}
+
+/// The factor of what reflects so much light: plastic, or paint.
+fn plastic(brightest: f32) -> f32 {
+    ((PAINT[1] - brightest) / (PAINT[1] - PAINT[0])).clamp(0.0, 1.0)
 }
 
 /// The shares of two channels' light that make up the third's, for light of which a part is neutral and the rest has the

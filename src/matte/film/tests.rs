@@ -1,5 +1,7 @@
 use super::*;
 use crate::matte::plate::PlateOptions;
+use crate::matte::{KeyOptions, Keying, Screen, screen_color};
+use crate::pixel::PremulRgba;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -225,11 +227,24 @@ fn dyed_plastic_is_seen_through_under_a_glint_as_beside_it() {
 }
 
 #[test]
-fn on_a_grey_screen_the_object_is_opaque_and_said() {
-    let found = World { screen: LinearRgb::grey(0.3), ..World::default() }.solved();
-    assert!(matches!(found.remarks[..], [Remark::GreyScreen(_)]));
-    assert_eq!(found.film[(50, 60)].opacity, LinearRgb::WHITE);
-    assert_eq!(found.uncertainty[(50, 60)], Coverage(1.0));
+fn on_a_board_without_a_hue_film_is_guessed_and_said_and_better_than_a_slab_or_the_keyer() {
+    for board in [0.15, 0.3, 0.7].map(LinearRgb::grey).into_iter().chain([LinearRgb::new(0.7, 0.62, 0.55)]) {
+        let world = World { screen: board, ..World::default() };
+        let (photo, found) = (world.photo(), world.solved());
+        assert!(matches!(found.remarks[..], [Remark::GreyScreen(_)]), "{:?}", found.remarks);
+        assert!(found.uncertainty[(50, 60)].0 > 0.1 && found.doubts.confidence() < 0.7, "{:?}", found.doubts);
+        let cut = |cutout: Image<PremulRgba>| {
+            let film: Image<Film> = cutout.zip_map(&inside(), |p, m| p.masked(m).into());
+            FilmMatte { transmittance: film.map(|f| f.opacity.map(|o| 1.0 - o)), film, ..found.clone() }
+        };
+        let key = Screen::Color(screen_color(&photo, &inside()).unwrap());
+        let paper = cut(Keying::new(&photo, key).run(&KeyOptions::default()).unwrap().cutout);
+        let slab = cut(photo.map(LinearRgb::opaque));
+        let [guess, paper, slab] = [&found, &paper, &slab].map(|of| world.error(of, |_| true));
+        assert!(guess < 0.75 * paper && guess < 0.75 * slab, "{board:?}: {guess}, keyer {paper}, slab {slab}");
+        // Paint no brighter than the board through plastic is taken for plastic.
+        assert!(board.r > 0.5 || world.error(&found, is_label) < 0.1, "{board:?}");
+    }
 }
 
 #[test]
@@ -243,6 +258,32 @@ fn awkward_input_is_named_not_a_panic() {
     let strange = Image::filled(20, 20, LinearRgb::new(f32::NAN, 0.5, 0.5));
     let refused = film(&strange, &plate, &Image::filled(20, 20, Coverage(1.0)), &FilmOptions::default()).unwrap_err();
     assert!(refused.to_string().contains("pixel (0, 0) is not a finite number"));
+}
+
+#[test]
+fn a_label_of_the_screens_colour_is_keyed_away_and_that_is_said() {
+    for screen in [GREEN, BLUE] {
+        let plain = World { screen, uneven: 0.0, ..World::default() };
+        let painted = World { label: screen, ..World { screen, uneven: 0.0, ..World::default() } };
+        let [plain, painted] = [plain.solved(), painted.solved()];
+        let keyed = |found: &FilmMatte| found.remarks.iter().any(|r| matches!(r, Remark::KeyedAway(_)) && r.is_doubt());
+        assert!(keyed(&painted) && !keyed(&plain), "{:?} {:?}", painted.remarks, plain.remarks);
+        assert!(!painted.remarks.iter().any(|r| matches!(r, Remark::ScreenHue(_))), "{:?}", painted.remarks);
+        let sure = [plain.doubts.confidence(), painted.doubts.confidence()];
+        assert!(sure[0] > 0.7 && sure[1] < 0.2, "{sure:?}");
+    }
+}
+
+#[test]
+fn plastic_of_the_screens_hue_has_an_unsure_tint() {
+    let blue = LinearRgb::new(0.17, 0.38, 0.54);
+    let doubted = |screen| {
+        let found = World { flat: blue, screen, ..World::default() }.solved();
+        (found.remarks.iter().any(|r| matches!(r, Remark::TintUnsure(_)) && r.is_doubt()), found.doubts)
+    };
+    let [on_green, on_blue] = [GREEN, BLUE].map(doubted);
+    assert!(on_blue.0 && !on_green.0, "{on_green:?} {on_blue:?}");
+    assert!(on_blue.1.confidence() < 0.5 * on_green.1.confidence(), "{on_green:?} {on_blue:?}");
 }
 
 mod world;

@@ -6,11 +6,11 @@ use crate::pixel::{Coverage, LinearRgb};
 
 /// Plastic where it lies flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Tint {
+struct Tint {
     /// Its transmittance as measured: two walls looked through, and lit through.
-    pub(super) flat: [f32; 3],
+    flat: [f32; 3],
     /// Median misfit of the pixels it was told from, in standard deviations squared.
-    pub(super) misfit: f32,
+    misfit: f32,
 }
 
 /// Transmittance of two clear walls of PET, looked through and lit through: 8 surfaces that reflect 5 to 10 % each.
@@ -24,7 +24,7 @@ const AMOUNTS: [f32; 3] = [0.3, 5.0, 0.1];
 /// Least transmittance of the screen's channel; plastic that passes less cannot be told from opaque.
 const LEAST: f32 = 0.005;
 /// Share of the object that reflects least, and tells its tint.
-const DARKEST: f64 = 0.25;
+pub(super) const DARKEST: f64 = 0.25;
 /// Pixels that are asked for the share above, and of them for the tint.
 const ASKED: [usize; 2] = [20_000, 400];
 /// Noise of a pixel: least, and as a share of its value.
@@ -43,16 +43,30 @@ pub(super) fn body(flat: [f32; 3]) -> [f32; 3] {
     flat.map(|t| libm::powf(t / CLEAR, BODY))
 }
 
-/// The tint that explains the darkest pixels best.
+/// The tint that explains the darkest pixels best, and how far those that explain them as well differ from it in some channel.
 ///
-/// Each hypothesis, clear or a dye of some amount, is held against every asked pixel: how far it is from
+/// `asked` is the share of the object that is asked, the darkest first: all of it where a screen has no hue, since what is
+/// dark there may as well be paint. Each hypothesis, clear or a dye of some amount, is held against every asked pixel: how far it is from
 /// `u * flat * screen + f * body` with the best thickness factor u and reflection f that are not negative. The lowest median wins.
-pub(super) fn fit(photo: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Image<Coverage>, key: usize) -> Tint {
-    let pixels = darkest(photo, plate, inside, key);
+pub(super) fn fit(
+    photo: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Image<Coverage>,
+    key: usize,
+    asked: f64,
+) -> ([f32; 3], f32) {
+    let pixels = darkest(photo, plate, inside, key, asked);
     let clear = judged([CLEAR; 3], &pixels, 0.0);
     let tints = dyed().filter(|flat| flat[key] >= LEAST).map(|flat| judged(flat, &pixels, DYED));
-    tints.fold(clear, |best, tint| if tint.misfit < best.misfit { tint } else { best })
+    let tints: Vec<Tint> = std::iter::once(clear).chain(tints).collect();
+    let best = tints.iter().fold(clear, |best, tint| if tint.misfit < best.misfit { *tint } else { best });
+    let alike = tints.iter().filter(|tint| tint.misfit <= best.misfit + ALIKE);
+    let differs = |tint: &Tint| (0..3).map(|c| (tint.flat[c] - best.flat[c]).abs()).fold(0.0, f32::max);
+    (best.flat, alike.map(differs).fold(0.0, f32::max))
 }
+
+/// Misfit by which tints are as good as each other.
+const ALIKE: f32 = 0.1;
 
 /// Transmittance of flat plastic with each dye in each amount.
 pub(in crate::matte) fn dyed() -> impl Iterator<Item = [f32; 3]> {
@@ -65,7 +79,13 @@ pub(in crate::matte) fn dyed() -> impl Iterator<Item = [f32; 3]> {
 type Pair = ([f32; 3], [f32; 3]);
 
 /// The asked pixels: wholly inside, and darkest in the channels that the screen has little of.
-fn darkest(photo: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Image<Coverage>, key: usize) -> Vec<Pair> {
+fn darkest(
+    photo: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Image<Coverage>,
+    key: usize,
+    share: f64,
+) -> Vec<Pair> {
     let whole: Vec<usize> = (0..photo.pixels().len()).filter(|&i| inside.pixels()[i].0 >= WHOLE).collect();
     let step = (whole.len() / ASKED[0]).max(1);
     let others = |i: usize| {
@@ -74,7 +94,7 @@ fn darkest(photo: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Image<Coverag
     };
     let mut asked: Vec<(f32, usize)> = whole.into_iter().step_by(step).map(|i| (others(i), i)).collect();
     asked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    asked.truncate((asked.len() as f64 * DARKEST).ceil() as usize);
+    asked.truncate((asked.len() as f64 * share).ceil() as usize);
     let step = (asked.len() / ASKED[1]).max(1);
     let pair = |(_, i): (f32, usize)| (photo.pixels()[i].into(), plate.image.pixels()[i].into());
     asked.into_iter().step_by(step).map(pair).collect()
@@ -136,7 +156,7 @@ mod tests {
 
     fn found(flat: [f32; 3], screen: LinearRgb, key: usize) -> [f32; 3] {
         let plate = ScreenPlate::even(screen, (60, 40));
-        fit(&photo(flat, screen), &plate, &Image::filled(60, 40, Coverage(1.0)), key).flat
+        fit(&photo(flat, screen), &plate, &Image::filled(60, 40, Coverage(1.0)), key, DARKEST).0
     }
 
     #[test]

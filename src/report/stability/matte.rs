@@ -5,8 +5,8 @@ use super::{Case, Outcome, keyer};
 use crate::error::Result;
 use crate::image::Image;
 use crate::matte::{
-    CutOut, CutOutOptions, FilmMatte, FilmOptions, MatteMethod, PlateOptions, Remark, ScreenPlate, TriangulateOptions,
-    Triangulated, film, triangulate,
+    CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, Remark, ScreenPlate, TriangulateOptions, Triangulated,
+    film, triangulate,
 };
 use crate::pixel::{Coverage, LinearRgb};
 use crate::report::matte::{GOOD_BOX_PX, GOOD_IOU};
@@ -98,15 +98,11 @@ fn cut_outs() -> Vec<Case> {
 }
 
 fn opaque_on_grey(take: Take) -> Case {
-    Case::new(
-        "grey screen tells nothing of film",
-        "the same photo",
-        "an opaque object: the method is the outline",
-        move || {
-            let method = take.cut()?.0.method;
-            Ok(Outcome::new(format!("{method:?}"), method == MatteMethod::Outline))
-        },
-    )
+    Case::new("grey screen tells nothing of film", "the same photo", "a guess, and that is a doubt", move || {
+        let doubts: Vec<String> =
+            take.cut()?.0.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect();
+        Ok(Outcome::new(doubts.join("; "), doubts.iter().any(|doubt| doubt.contains("too grey"))))
+    })
 }
 
 fn refusals() -> Vec<Case> {

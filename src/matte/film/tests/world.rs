@@ -61,6 +61,22 @@ impl Truth {
         keyed.cutout.zip_map(&self.mask, |p, m| p.masked(m).into())
     }
 
+    /// The same screen as a board of some other paint.
+    fn board(&self, paint: LinearRgb) -> Image<LinearRgb> {
+        let most = self.k.pixels().iter().map(|p| p.r.max(p.g).max(p.b)).fold(0.0, f32::max);
+        self.k.map(|p| paint.scale(p.r.max(p.g).max(p.b) / most))
+    }
+
+    /// Mean error of alpha over the object.
+    fn alpha_error(&self, film: &Image<Film>) -> f64 {
+        let pairs = film.pixels().iter().zip(self.v.pixels()).zip(self.mask.pixels());
+        let errors = pairs
+            .filter(|(_, c)| c.0 > 0.02)
+            .map(|((f, v), _)| f64::from((f.to_rgba().a - (1.0 - (v.r + v.g + v.b) / 3.0)).abs()));
+        let (sum, count) = errors.fold((0.0, 0_u64), |(sum, count), e| (sum + e, count + 1));
+        sum / count.max(1) as f64
+    }
+
     /// The same screen in the other colour.
     fn other_screen(&self) -> Image<LinearRgb> {
         let other = if strongest_channel(self.k[(0, 0)]) == 1 { BLUE } else { GREEN };
@@ -92,16 +108,71 @@ fn plate_error(plate: &ScreenPlate, truth: &Truth) -> f64 {
     differs.iter().sum::<f64>() / differs.len() as f64
 }
 
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> =
+        entries.filter_map(|e| e.unwrap().file_name().to_str()?.strip_suffix("_fg.exr").map(String::from)).collect();
+    names.sort();
+    names
+}
+
+/// Paints of boards that tell nothing of film, scene-linear as seen.
+const BOARDS: [[f32; 3]; 6] = [[0.02; 3], [0.15; 3], [0.4; 3], [0.75; 3], [0.7, 0.62, 0.5], [0.3, 0.38, 0.32]];
+
+#[test]
+#[ignore = "needs a folder of rendered photos, and minutes"]
+fn errors_on_grey_boards() {
+    let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
+    let folder = Path::new(&folder);
+    let mut worse = Vec::new();
+    for paint in BOARDS.map(LinearRgb::from) {
+        let mut rows = Vec::new();
+        for name in names_in(folder) {
+            let truth = read(folder, &name);
+            let photo = truth.simulated(&truth.board(paint), 5);
+            let plate = ScreenPlate::fit(&photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+            let found = film(&photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
+            let opaque: Image<Film> = photo.zip_map(&truth.mask, |p, m| p.opaque().masked(m).into());
+            let paper = truth.paper(&photo);
+            let both = |film: &Image<Film>| [truth.alpha_error(film), truth.error(film, &truth.v)];
+            let row = [both(&opaque), both(&paper), both(&found.film)];
+            if row[2][0] > row[1][0] || row[2][1] > row[1][1] {
+                worse.push(format!("{name} on {paint:?}: {row:.4?}"));
+            }
+            rows.push(row.concat());
+        }
+        let mean = |c: usize| rows.iter().map(|r| r[c]).sum::<f64>() / rows.len() as f64;
+        let told: Vec<f64> = (0..6).map(mean).collect();
+        println!("{paint:?}: alpha and light of opaque, paper, guess: {told:.4?}");
+    }
+    println!("worse than the paper:\n{}", worse.join("\n"));
+    assert!(worse.is_empty());
+}
+
+#[test]
+#[ignore = "needs a folder of rendered photos, and minutes"]
+fn doubts_follow_errors() {
+    let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
+    let folder = Path::new(&folder);
+    for name in names_in(folder) {
+        let truth = read(folder, &name);
+        let other = truth.simulated(&truth.other_screen(), 3);
+        for (screen, photo) in [("own", &truth.photo), ("other", &other)] {
+            let plate = ScreenPlate::fit(photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+            let found = film(photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
+            let (lit, shaded) = (truth.error(&found.film, &truth.v), truth.error(&found.shaded(), &truth.t));
+            let hue = strongest_channel(plate.color());
+            println!("{name} {screen} {hue} {lit:.4} {shaded:.4} {:?} {:?}", found.flat, found.doubts);
+        }
+    }
+}
+
 #[test]
 #[ignore = "needs a folder of rendered photos, and minutes"]
 fn errors_on_rendered_photos() {
     let folder = std::env::var("PETCOMP_WORLD").expect("PETCOMP_WORLD names a folder");
     let folder = Path::new(&folder);
-    let mut names: Vec<String> = std::fs::read_dir(folder)
-        .unwrap()
-        .filter_map(|e| e.unwrap().file_name().to_str()?.strip_suffix("_fg.exr").map(String::from))
-        .collect();
-    names.sort();
+    let names = names_in(folder);
     let mut rows = Vec::new();
     for name in &names {
         let truth = read(folder, name);
