@@ -19,8 +19,9 @@ const HEIGHT_SIGMA: f64 = 0.25;
 const INSET: f64 = 0.02;
 /// A marker has a white margin, at most as wide as so many of its cells of eight.
 const MARGIN: f64 = 2.0 / 8.0;
-/// Less probable fits are those of another rectangle.
+/// Less probable fits are those of another rectangle, and worth a look.
 const IMPOSSIBLE: f64 = 1e-6;
+const IMPROBABLE: f64 = 0.01;
 /// Sides that may be exchanged are worth a look where that makes lengths other ones by this share.
 const NOTEWORTHY: f64 = 0.01;
 /// A camera looks less steeply at a screen than this, as the sine of the angle, or its photo is not for measuring.
@@ -47,6 +48,8 @@ struct Ground {
     height_sigma: f64,
     /// By how much lengths would differ if the sides were exchanged, which the photo does not tell; as a share.
     exchanged: f64,
+    /// The corners are hardly those of a rectangle of this size.
+    is_odd: bool,
 }
 
 impl Ground {
@@ -72,6 +75,7 @@ impl Ground {
             corner_sigma: reference.sigma_px / (around / 4.0),
             height_sigma: best.sigma.center[(2, 2)].max(0.0).sqrt() / best.camera.center().z,
             exchanged: exchanged.abs(),
+            is_odd: best.fit.p_value.is_some_and(|p| p < IMPROBABLE),
         })
     }
 
@@ -189,11 +193,14 @@ impl OnScreen {
 
     /// Why a person should look at a size that is told by this.
     pub(super) fn doubt(&self) -> Option<String> {
-        let exchanged = self.view.as_ref().map_or(0.0, |view| view.ground.exchanged);
-        (exchanged > NOTEWORTHY).then(|| {
-            let percent = 100.0 * exchanged;
+        let ground = &self.view.as_ref()?.ground;
+        let ([w, h], percent) = (ground.size, 100.0 * ground.exchanged);
+        let odd = || format!("the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?");
+        let turned = || {
             format!("which side of the screen is the longer one cannot be seen: lengths may be {percent:.0} % other")
-        })
+        };
+        let is_turned = ground.exchanged > NOTEWORTHY;
+        ground.is_odd.then(odd).or_else(|| is_turned.then(turned))
     }
 }
 
@@ -379,6 +386,18 @@ mod tests {
     }
 
     #[test]
+    fn a_screen_of_other_proportions_is_doubted() {
+        let camera = camera(0.3, 1000.0);
+        let doubt = |size| {
+            let told = Reference { size, ..reference(&camera, SCREEN, 0.2) };
+            let ground = Ground::of(&told, camera.image, &Header::default()).unwrap();
+            OnScreen { photo: Image::new(0, 0), view: Some(View::of_screen(ground, 0.0)) }.doubt()
+        };
+        assert_eq!(doubt(SCREEN), None);
+        assert!(doubt([0.5, 0.5]).unwrap().ends_with("0.500 x 0.500 m; are width and height right?"));
+    }
+
+    #[test]
     fn a_turned_screen_is_measured_by_its_other_side() {
         let camera = camera(0.2, 1000.0);
         let turned = |size| Reference { size, ..reference(&camera, [0.3, 0.4], 0.3) };
@@ -392,7 +411,13 @@ mod tests {
         assert!(view.ground.exchanged == 0.0);
         let nearly = Reference { size: [0.41, 0.4], ..reference(&camera, [0.41, 0.4], 2.0) };
         let ground = Ground::of(&nearly, camera.image, &Header::default()).unwrap();
-        assert!(ground.exchanged > 0.0 && ground.sigma(Point3::origin()) > ground.exchanged);
+        assert!(
+            ground.exchanged > NOTEWORTHY && ground.sigma(Point3::origin()) > ground.exchanged,
+            "{}",
+            ground.exchanged
+        );
+        let seen = OnScreen { photo: Image::new(0, 0), view: Some(View::of_screen(ground, 0.0)) };
+        assert!(seen.doubt().unwrap().starts_with("which side of the screen is the longer one cannot be seen"));
     }
 
     /// Metres of the screen in the photos below, and of the red slab on it.
