@@ -109,6 +109,48 @@ impl Homography {
     }
 }
 
+/// A straight line in a picture: the points `p` with `normal . p = offset`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub(crate) normal: Vector2<f64>,
+    pub(crate) offset: f64,
+}
+
+/// Lines that meet at a smaller angle than this, radians, meet nowhere.
+const LEAST_ANGLE: f64 = 0.05;
+
+impl Line {
+    /// The line with the least squared distances from some points; none through fewer than two.
+    pub(crate) fn through(points: &[Point2<f64>]) -> Option<Self> {
+        if points.len() < 2 {
+            return None;
+        }
+        let mean = points.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / points.len() as f64;
+        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        for p in points {
+            let d = p.coords - mean;
+            (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
+        }
+        let angle = libm::atan2(2.0 * xy, xx - yy) / 2.0;
+        let normal = Vector2::new(-libm::sin(angle), libm::cos(angle));
+        Some(Self { normal, offset: normal.dot(&mean) })
+    }
+
+    /// Signed distance of a point, along the normal.
+    pub(crate) fn distance(&self, p: Point2<f64>) -> f64 {
+        self.normal.dot(&p.coords) - self.offset
+    }
+
+    /// Where two lines meet; none for lines that are nearly parallel.
+    pub(crate) fn meeting(&self, other: &Self) -> Option<Point2<f64>> {
+        let det = self.normal.perp(&other.normal);
+        let x = self.offset * other.normal.y - other.offset * self.normal.y;
+        let y = self.normal.x * other.offset - other.normal.x * self.offset;
+        let p = Point2::new(x / det, y / det);
+        (det.abs() > LEAST_ANGLE && p.coords.iter().all(|v| v.is_finite())).then_some(p)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -190,7 +190,10 @@ mod tests {
         let declared = |classes: &str| format!("classes = {classes}\n{TWO}");
         assert!(said(&declared("[\"cup\"]")).contains("photos[0].class: \"cap\", expected one of cup"));
         assert!(said(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice"));
-        assert!(said(&TWO.replace("length = 0.3", "")).contains("photos[0].length: missing, expected it, or px"));
+        assert!(
+            said(&TWO.replace("length = 0.3", ""))
+                .contains("photos[0].length: missing, expected length, px_per_metre, screen_size or marker_size")
+        );
         assert!(said(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1"));
         assert!(said(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
         assert!(said(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));

@@ -1,12 +1,13 @@
 //! Putting photos into an asset folder.
 
 use super::files;
+use super::ground::OnScreen;
 use super::library::Photo;
 use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_class, check_name};
 use super::measure::Measured;
 use super::screen_source::ScreenSource;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
-use crate::bounds::{MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH, number};
+use crate::bounds::{MASS, OBJECT, PX_PER_METRE, SURFACE, THICKNESS, WIDTH, number};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::{ColorDoubts, CutOut, CutOutOptions, Remark, cut_out_on};
@@ -44,6 +45,12 @@ pub enum Scale {
     Length(f64),
     /// Length and width of the object, longest first, metres.
     Size([f64; 2]),
+    /// Width and height of the whole screen, metres, with its corners where they are known (from the top left, clockwise,
+    /// pixels); else they are found. The object's scale is that at half its thickness above the screen.
+    Screen([f64; 2], Option<[[f64; 2]; 4]>),
+    /// Side of the black square of a printed marker that lies on the screen (AprilTag tag36h11 or ArUco DICT_4X4_50),
+    /// metres.
+    Marker(f64),
 }
 
 impl AddPhoto {
@@ -80,6 +87,8 @@ impl AddPhoto {
                     return Err(Error::value("width", format!("{width}, expected at most the length of {length}")));
                 }
             }
+            Scale::Screen(size, _) => size.into_iter().try_for_each(|side| SURFACE.check("screen_size", side))?,
+            Scale::Marker(side) => OBJECT.check("marker_size", side)?,
         }
         THICKNESS.check("thickness", self.thickness)?;
         MASS.check("mass", self.mass)
@@ -88,14 +97,21 @@ impl AddPhoto {
     /// The scale makes a thing of the object that can be photographed on a screen.
     fn check_length(&self, record: &PhotoRecord) -> Result<()> {
         let length = record.object_m[0];
-        let Scale::PxPerMetre(scale) = self.scale else { return Ok(()) };
+        let (at, told, pixels_for) = match self.scale {
+            Scale::Length(_) | Scale::Size(_) => return Ok(()),
+            Scale::PxPerMetre(scale) => ("px_per_metre", number(scale), "pixels for "),
+            Scale::Screen([w, h], _) => ("screen_size", format!("{} x {}", number(w), number(h)), "in "),
+            Scale::Marker(side) => ("marker_size", number(side), "in "),
+        };
         if OBJECT.contains(length) {
             return Ok(());
         }
-        let question = OBJECT.unit_meant(length).map_or(String::new(), |unit| format!("; is it pixels for a {unit}?"));
+        let unit = |unit| if pixels_for == "in " { format!("{unit}s") } else { format!("a {unit}") };
+        let question =
+            OBJECT.unit_meant(length).map_or(String::new(), |meant| format!("; is it {pixels_for}{}?", unit(meant)));
         let (source, length) = (&record.source, number((1e4 * length).round() / 1e4));
-        let what = format!("{scale}, makes what is in {source} {length} m long, expected {OBJECT}{question}");
-        Err(Error::value("px_per_metre", what))
+        let what = format!("{told}, makes what is in {source} {length} m long, expected {OBJECT}{question}");
+        Err(Error::value(at, what))
     }
 }
 
@@ -139,20 +155,17 @@ pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
 /// Cuts the object out of a photo and writes cut-out, outline and thumbnail.
 pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<Photo> {
     let mut watch = Stopwatch::start();
-    let picture = io::read(photo)?;
+    let on_screen = on_screen(photo, add).map_err(|e| named(e, photo))?;
+    let empty = add.screen.empty()?.map(|empty| on_screen.same_view(empty)).transpose()?;
     watch.lap("read");
-    let empty = add.screen.empty()?;
     let options = CutOutOptions { screen: add.screen.color().or(add.options.screen), ..add.options.clone() };
-    let cut = cut_out_on(&picture, empty.as_ref(), &options).map_err(|e| match e {
-        Error::Photo { what } => Error::Photo { what: format!("{}: {what}", photo.display()) },
-        other => other,
-    })?;
+    let cut = cut_out_on(&on_screen.photo, empty.as_ref(), &options).map_err(|e| named(e, photo))?;
     watch.lap("cut out");
     for remark in &cut.remarks {
         let level = if matches!(remark, Remark::ScreenHue(_)) { log::Level::Warn } else { log::Level::Info };
         log::log!(level, "{}: {remark}", photo.display());
     }
-    let record = record(&cut, add, cut_out_file(photo, add), photo);
+    let record = record(&cut, add, &on_screen, photo);
     add.check_length(&record)?;
     watch.lap("measure");
     io::create_folder(folder.join(&add.asset))?;
@@ -160,6 +173,23 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
     watch.lap("write");
     watch.log(photo.display());
     Ok(Photo::new(cut.film, record))
+}
+
+/// The photo, seen from straight above where something in it tells of the screen's plane.
+fn on_screen(photo: &Path, add: &AddPhoto) -> Result<OnScreen> {
+    let (picture, height) = (io::read(photo)?, add.thickness / 2.0);
+    match add.scale {
+        Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => Ok(OnScreen::whole(picture)),
+        Scale::Screen(size, corners) => OnScreen::by_corners(picture, size, corners, height, &io::read_header(photo)?),
+        Scale::Marker(side) => OnScreen::by_marker(picture, side, height, &io::read_header(photo)?),
+    }
+}
+
+fn named(error: Error, photo: &Path) -> Error {
+    match error {
+        Error::Photo { what } => Error::Photo { what: format!("{}: {what}", photo.display()) },
+        other => other,
+    }
 }
 
 /// Where the cut-out of a photo goes.
@@ -174,10 +204,17 @@ fn stem(photo: &Path) -> String {
     stem.chars().map(plain).collect()
 }
 
-fn record(cut: &CutOut, add: &AddPhoto, file: String, photo: &Path) -> PhotoRecord {
-    let measured = Measured::of(cut, add.scale);
+fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> PhotoRecord {
+    let measured = Measured::of(cut, add, on_screen);
+    let file = cut_out_file(photo, add);
     let (w, h) = cut.film.size();
-    let doubts = cut.remarks.iter().filter(|r| r.is_doubt()).map(Remark::to_string).chain(measured.doubt);
+    let doubts = cut
+        .remarks
+        .iter()
+        .filter(|r| r.is_doubt())
+        .map(Remark::to_string)
+        .chain(measured.doubt)
+        .chain(on_screen.doubt());
     PhotoRecord {
         file,
         source: photo.file_name().unwrap_or_default().to_string_lossy().into_owned(),

@@ -17,7 +17,8 @@ use std::path::Path;
 /// file = "IMG_0001.jpg"       # relative to the list
 /// asset = "bottle_01"
 /// class = "cap"
-/// length = 0.265              # metres by a tape measure, and width where it is known; or: px_per_metre = 1966.7
+/// length = 0.265              # metres by a tape measure, and width where it is known
+/// # or: px_per_metre = 1966.7, screen_size = [0.60, 0.40], marker_size = 0.05
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -52,6 +53,15 @@ pub struct ListedPhoto {
     /// And its width, metres: then both fix the scale, and contradict an outline of other proportions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub width: Option<f64>,
+    /// Or: width and height of the whole screen, metres, all of which is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screen_size: Option<[f64; 2]>,
+    /// Its corners, from the top left clockwise, pixels. Default: they are found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screen_corners: Option<[[f64; 2]; 4]>,
+    /// Or: side of the black square of a printed marker on the screen, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marker_size: Option<f64>,
     /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen. Default: `auto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub screen: Option<String>,
@@ -110,13 +120,6 @@ impl List {
 
 impl ListedPhoto {
     fn add(&self, options: &CutOutOptions, at: &Path) -> Result<AddPhoto> {
-        let scale = match (self.px_per_metre, self.length, self.width) {
-            (Some(scale), None, None) => Scale::PxPerMetre(scale),
-            (None, Some(length), None) => Scale::Length(length),
-            (None, Some(length), Some(width)) => Scale::Size([length, width]),
-            (None, None, _) => return Err(Error::value("length", "missing, expected it, or px_per_metre")),
-            (Some(_), _, _) => return Err(Error::value("length", "expected either it or px_per_metre, not both")),
-        };
         let screen = match self.screen.as_deref().unwrap_or("auto").parse()? {
             ScreenSource::Photo(path) => ScreenSource::Photo(at.join(path)),
             told => told,
@@ -124,12 +127,56 @@ impl ListedPhoto {
         Ok(AddPhoto {
             asset: self.asset.clone(),
             class: self.class.clone(),
-            scale,
+            scale: self.scale()?,
             thickness: self.thickness.unwrap_or(DEFAULT_THICKNESS),
             mass: self.mass.unwrap_or(DEFAULT_MASS),
             screen,
             options: options.clone(),
             classes: Vec::new(),
         })
+    }
+
+    /// The one thing that is told of the scale.
+    fn scale(&self) -> Result<Scale> {
+        if self.screen_corners.is_some() && self.screen_size.is_none() {
+            return Err(Error::value("screen_size", "missing, expected it beside screen_corners"));
+        }
+        if self.width.is_some() && self.length.is_none() {
+            return Err(Error::value("length", "missing, expected it beside width"));
+        }
+        let sized = self.length.map(|length| self.width.map_or(Scale::Length(length), |w| Scale::Size([length, w])));
+        let screen = self.screen_size.map(|size| Scale::Screen(size, self.screen_corners));
+        let told = [sized, self.px_per_metre.map(Scale::PxPerMetre), screen, self.marker_size.map(Scale::Marker)];
+        let names = "length, px_per_metre, screen_size or marker_size";
+        match told.into_iter().flatten().collect::<Vec<_>>()[..] {
+            [scale] => Ok(scale),
+            [] => Err(Error::value("length", format!("missing, expected {names}"))),
+            _ => Err(Error::value("length", format!("one of several scales, expected one of {names}"))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scale(line: &str) -> std::result::Result<Scale, String> {
+        let text = format!("[[photos]]\nfile = \"a.png\"\nasset = \"a\"\nclass = \"c\"\n{line}");
+        let list: List = toml::from_str(&text).map_err(|e| e.to_string())?;
+        list.photos[0].scale().map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn one_thing_tells_the_scale() {
+        assert_eq!(scale("screen_size = [0.6, 0.4]"), Ok(Scale::Screen([0.6, 0.4], None)));
+        assert_eq!(scale("marker_size = 0.05"), Ok(Scale::Marker(0.05)));
+        let corners = [[1.0, 1.0], [9.0, 1.0], [9.0, 6.0], [1.0, 6.0]];
+        let told = scale(&format!("screen_size = [0.6, 0.4]\nscreen_corners = {corners:?}"));
+        assert_eq!(told, Ok(Scale::Screen([0.6, 0.4], Some(corners))));
+        let missing = "length: missing, expected length, px_per_metre, screen_size or marker_size";
+        assert_eq!(scale("").unwrap_err(), missing);
+        assert!(scale("length = 0.2\nmarker_size = 0.05").unwrap_err().contains("expected one of length"));
+        let alone = scale(&format!("length = 0.2\nscreen_corners = {corners:?}")).unwrap_err();
+        assert_eq!(alone, "screen_size: missing, expected it beside screen_corners");
     }
 }

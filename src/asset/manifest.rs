@@ -51,7 +51,7 @@ pub struct PhotoRecord {
     pub size_m: [f64; 2],
     /// Length and width of the object's tight outline, however it is turned, metres.
     pub object_m: [f64; 2],
-    /// Standard error of these, metres: of the outline, not of the scale.
+    /// Standard error of these, metres: of the outline, and of the scale where a screen or marker tells it.
     #[serde(default)]
     pub error_m: f64,
     /// Length and width of its convex hull, metres; 0 where nobody has measured them.

@@ -1,7 +1,9 @@
 //! How large an object is, with the error of that.
 
-use super::folder::Scale;
+use super::folder::{AddPhoto, Scale};
+use super::ground::OnScreen;
 use super::size::oriented_size;
+use crate::geom::{Point2, Vector2};
 use crate::matte::CutOut;
 
 /// Size of an object from its outline and a scale.
@@ -26,11 +28,13 @@ const SIDE_ERROR_PX: f64 = 0.5;
 const PROPORTION_SLACK: f64 = 0.05;
 
 impl Measured {
-    pub(super) fn of(cut: &CutOut, scale: Scale) -> Self {
+    pub(super) fn of(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen) -> Self {
         let tight = oriented_size(&cut.outline.hull());
         let hull = oriented_size(&cut.hull);
-        let px_per_metre = match scale {
+        let [of_ground, sigma] = on_screen.scale(middle(cut)).unwrap_or([1.0, 0.0]);
+        let px_per_metre = match add.scale {
             Scale::PxPerMetre(scale) => scale * cut.scale,
+            Scale::Screen(..) | Scale::Marker(_) => of_ground * cut.scale,
             Scale::Length(length) => tight[0] / length,
             // Least squares over both sides.
             Scale::Size([l, w]) => (tight[0] * l + tight[1] * w) / (l * l + w * w),
@@ -43,10 +47,17 @@ impl Measured {
             px_per_metre,
             object_m: tight.map(metres),
             hull_m: hull.map(metres),
-            error_m: metres(error_px),
-            doubt: doubt(tight, error_px, scale),
+            error_m: libm::hypot(metres(error_px), sigma * metres(tight[0])),
+            doubt: doubt(tight, error_px, add.scale),
         }
     }
+}
+
+/// The middle of the object's hull in pixels of the photo.
+fn middle(cut: &CutOut) -> Point2<f64> {
+    let count = cut.hull.len().max(1) as f64;
+    let middle = cut.hull.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords / count);
+    Point2::from(middle / cut.scale + Vector2::new(cut.roi.x as f64, cut.roi.y as f64))
 }
 
 fn doubt(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<String> {

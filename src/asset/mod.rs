@@ -13,6 +13,7 @@ mod build;
 mod contact_sheet;
 mod files;
 mod folder;
+mod ground;
 mod library;
 mod list;
 mod manifest;

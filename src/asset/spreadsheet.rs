@@ -15,7 +15,9 @@ pub(super) struct Row {
 
 /// Columns that hold words, and those that hold numbers.
 const WORDS: [&str; 4] = ["file", "asset", "class", "screen"];
-const NUMBERS: [&str; 5] = ["px_per_metre", "length", "width", "thickness", "mass"];
+const NUMBERS: [&str; 6] = ["px_per_metre", "length", "width", "thickness", "mass", "marker_size"];
+/// A column that holds two numbers with an x between them.
+const SIZE: &str = "screen_size";
 /// What else a column may be called.
 const ALIASES: [(&str, &str); 2] = [("px_per_meter", "px_per_metre"), ("photo", "file")];
 /// What may separate cells; of equally many the first.
@@ -70,7 +72,7 @@ fn separator(header: &str) -> u8 {
 fn column(header: &str) -> Result<&'static str> {
     let plain = header.to_lowercase().replace([' ', '-'], "_");
     let named = ALIASES.iter().find(|(alias, _)| *alias == plain).map_or(plain.as_str(), |(_, name)| name);
-    let known: Vec<&'static str> = WORDS.iter().chain(&NUMBERS).copied().collect();
+    let known: Vec<&'static str> = WORDS.iter().chain(&NUMBERS).chain(&[SIZE]).copied().collect();
     known.iter().find(|name| **name == named).copied().ok_or_else(|| {
         Error::value("line 1", format!("unknown column \"{header}\", {}", io::suggestion(named, &known)))
     })
@@ -89,12 +91,21 @@ fn value(column: &str, cell: &str, separator: u8) -> Result<toml::Value> {
     if WORDS.contains(&column) {
         return Ok(cell.into());
     }
+    if column == SIZE {
+        let sides = cell.split(['x', 'X']).map(|side| value(NUMBERS[0], side.trim(), separator));
+        let sides: Option<Vec<toml::Value>> = sides.map(Result::ok).collect();
+        let sides = sides.filter(|sides| sides.len() == 2);
+        return sides.map(toml::Value::from).ok_or_else(|| wrong(column, cell, "a size such as 0.60x0.40"));
+    }
     // Between commas a comma in a number may as well separate thousands.
     let decimal_comma = separator != b',' && !cell.contains('.') && cell.matches(',').count() == 1;
     let number = if decimal_comma { cell.replace(',', ".") } else { cell.to_owned() };
     let found = number.parse::<f64>().ok().filter(|number| number.is_finite());
-    let expected = || Error::value(column, format!("\"{cell}\", expected a number such as 0.265"));
-    found.map(toml::Value::from).ok_or_else(expected)
+    found.map(toml::Value::from).ok_or_else(|| wrong(column, cell, "a number such as 0.265"))
+}
+
+fn wrong(column: &str, cell: &str, expected: &str) -> Error {
+    Error::value(column, format!("\"{cell}\", expected {expected}"))
 }
 
 fn broken(error: &csv::Error) -> Error {
@@ -134,6 +145,14 @@ mod tests {
         for header in ["px_per_meter", "PX_PER_METRE", "px per metre", "Px-Per-Meter"] {
             assert_eq!(table(format!("{header}\n2000\n").as_bytes()).unwrap(), ["2: px_per_metre = 2000.0, "]);
         }
+    }
+
+    #[test]
+    fn a_size_is_two_numbers() {
+        let rows = table("file;screen_size\na;0,60x0,40\n".as_bytes()).unwrap();
+        assert_eq!(rows, ["2: file = \"a\", screen_size = [0.6, 0.4], "]);
+        let told = table("screen size\n0.6\n".as_bytes()).unwrap_err();
+        assert_eq!(told, "line 2: screen_size: \"0.6\", expected a size such as 0.60x0.40");
     }
 
     #[test]

@@ -53,13 +53,17 @@ pub use label::{
     PixelOrigin,
 };
 pub use locate::locate;
+pub(crate) use marker::any_markers;
+#[cfg(test)]
+pub(crate) use marker::printed;
 pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
-pub(crate) use read::labels_in;
 pub use read::{Labelled, check_distance, check_size, photo_of, read_label, read_labels, with_photo};
+pub(crate) use read::{labels_in, learn};
 pub use rectify::{project_picture, rectify, warp};
+pub(crate) use search::TELLING;
 pub use solution::{Fit, FocalFinding, Sigma, Solution};
 pub use solve::solve;
 pub use stored::{Sighting, sightings, together};

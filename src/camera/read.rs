@@ -217,6 +217,12 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
         let what = format!("{tw} x {th} pixels, but {} has {w} x {h}", photo.display());
         return Err(Error::value("image", what).in_file(path));
     }
+    learn(&mut label, &header);
+    Ok(label)
+}
+
+/// Takes over what the photo's file says of its camera and the label does not.
+pub(crate) fn learn(label: &mut Label, header: &io::Header) {
     if header.cropped || header.whole {
         label.image.cropped.get_or_insert(header.cropped);
     }
@@ -226,7 +232,6 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
             label.camera.focal_sigma.get_or_insert(ZOOMED_SIGMA);
         }
     }
-    Ok(label)
 }
 
 /// Sides that a surface with objects on it can have; a label may be in centimetres by mistake.

@@ -14,6 +14,7 @@ mod plate;
 mod register;
 mod remark;
 mod screen;
+mod screen_corners;
 mod segment;
 mod triangulate;
 
@@ -30,5 +31,7 @@ pub use outline::Outline;
 pub use plate::{PlateOptions, ScreenPlate};
 pub use remark::Remark;
 pub use screen::screen_color;
+pub(crate) use screen_corners::from_top_left;
+pub use screen_corners::{ScreenCorners, screen_corners};
 pub use segment::{Confidence, SegmentOptions, Segmentation, Step, Threshold, Tone, segment};
 pub use triangulate::{TriangulateOptions, Triangulated, triangulate};

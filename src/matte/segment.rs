@@ -13,6 +13,7 @@ mod snap;
 mod threshold;
 
 pub use band::Tone;
+pub(super) use cluster::Groups;
 pub use confidence::Confidence;
 pub use threshold::Threshold;
 

@@ -11,7 +11,7 @@ pub(crate) enum Command {
     /// Cut out all photos of a list
     Build {
         /// List (TOML or CSV), or a folder with photos.toml or photos.csv: file, asset, class and length (metres, by a tape
-        /// measure) or px_per_metre
+        /// measure), px_per_metre, screen_size (0.60x0.40 in CSV) or marker_size
         list: PathBuf,
         /// Asset folder
         #[arg(short, long, value_name = "FOLDER")]
@@ -62,18 +62,63 @@ pub(crate) struct Add {
     /// What it was photographed on: auto, a colour R,G,B (scene-linear), or a photo of the empty screen
     #[arg(long, value_name = "SCREEN", default_value = "auto")]
     screen: ScreenSource,
-    /// Length of the object's longest side, metres, 0.005 to 5: what a tape measure says
-    #[arg(long, value_name = "METRES", required_unless_present_any = ["scale", "size"])]
-    length: Option<f64>,
-    /// Or: scale of the photos at half the object's height, pixels per metre
-    #[arg(long, value_name = "PX_PER_M", conflicts_with = "length")]
-    scale: Option<f64>,
-    /// Or: width and height of the object, metres
-    #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2, conflicts_with_all = ["scale", "length"])]
-    size: Option<Vec<f64>>,
+    #[command(flatten)]
+    scale: ScaleArgs,
+    /// Corners of the screen for --screen-size, from the top left clockwise, pixels; by default they are found
+    #[arg(long, value_name = "X,Y X,Y X,Y X,Y", value_parser = corners, requires = "screen_size")]
+    screen_corners: Option<[[f64; 2]; 4]>,
+    /// Thickness of the object as it lies, metres: with --screen-size or --marker-size its size is that at half its height
+    #[arg(long, value_name = "METRES", default_value_t = asset::DEFAULT_THICKNESS)]
+    thickness: f64,
     /// draft, normal or reference: how finely the object is searched and kept
     #[arg(long, default_value_t)]
     quality: Quality,
+}
+
+/// What tells how large the object is; one of these.
+#[derive(clap::Args)]
+#[group(required = true, multiple = false)]
+struct ScaleArgs {
+    /// Length of the object's longest side, metres, 0.005 to 5: what a tape measure says
+    #[arg(long, value_name = "METRES")]
+    length: Option<f64>,
+    /// Or: width and height of the object, metres
+    #[arg(long, value_name = "W,H", value_delimiter = ',', num_args = 2)]
+    size: Option<Vec<f64>>,
+    /// Or: scale of the photos at half the object's height, pixels per metre
+    #[arg(long, value_name = "PX_PER_M")]
+    scale: Option<f64>,
+    /// Or: width and height of the whole screen, metres: it lies on something of another colour, and all four corners are
+    /// seen
+    #[arg(long, value_name = "WxH", value_parser = crate::camera::dimensions)]
+    screen_size: Option<[f64; 2]>,
+    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11 or ArUco DICT_4X4_50)
+    #[arg(long, value_name = "METRES")]
+    marker_size: Option<f64>,
+}
+
+impl ScaleArgs {
+    /// What is told; `corners` are those of the screen.
+    fn scale(&self, corners: Option<[[f64; 2]; 4]>) -> Scale {
+        match (self.scale, self.size.as_deref(), self.screen_size, self.marker_size) {
+            (Some(px_per_metre), ..) => Scale::PxPerMetre(px_per_metre),
+            (None, Some(&[w, h]), ..) => Scale::Size([w.max(h), w.min(h)]),
+            (None, _, Some(size), _) => Scale::Screen(size, corners),
+            (None, _, None, Some(side)) => Scale::Marker(side),
+            (None, _, None, None) => Scale::Length(self.length.unwrap_or_default()),
+        }
+    }
+}
+
+/// Four places from `X,Y X,Y X,Y X,Y`.
+fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
+    let wrong = || format!("\"{text}\", expected four corners as in \"12,8 630,10 628,470 14,466\"");
+    let place = |pair: &str| {
+        let (x, y) = pair.split_once(',')?;
+        Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
+    };
+    let places: Option<Vec<[f64; 2]>> = text.split_whitespace().map(place).collect();
+    places.ok_or_else(wrong)?.try_into().map_err(|_| wrong())
 }
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
@@ -128,14 +173,11 @@ fn sheet(folder: &Path, added: &[Photo], common: &Common) -> anyhow::Result<()> 
 }
 
 fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
-    let scale = match (args.scale, args.length, args.size.as_deref()) {
-        (Some(px_per_metre), ..) => Scale::PxPerMetre(px_per_metre),
-        (None, _, Some(&[w, h])) => Scale::Size([w.max(h), w.min(h)]),
-        (None, length, _) => Scale::Length(length.unwrap_or_default()),
-    };
+    let scale = args.scale.scale(args.screen_corners);
     let first = args.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default();
     let name = args.name.clone().unwrap_or_else(|| first.to_string_lossy().into_owned());
-    let add = AddPhoto { screen: args.screen.clone(), ..AddPhoto::new(name, &args.class, scale) };
+    let add =
+        AddPhoto { screen: args.screen.clone(), thickness: args.thickness, ..AddPhoto::new(name, &args.class, scale) };
     let add = AddPhoto { options: args.quality.cut_out(add.options), classes: args.classes.clone(), ..add };
     let mut added = Vec::new();
     for photo in &args.photos {

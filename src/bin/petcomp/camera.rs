@@ -393,7 +393,7 @@ fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
     places.and_then(|places| places.try_into().ok()).ok_or_else(wrong)
 }
 
-fn dimensions(text: &str) -> Result<[f64; 2], String> {
+pub(crate) fn dimensions(text: &str) -> Result<[f64; 2], String> {
     let side = |part: &str| part.trim().parse::<f64>().ok().filter(|side| side.is_finite() && *side > 0.0);
     let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([side(w)?, side(h)?]));
     sides.ok_or_else(|| format!("\"{text}\", expected WIDTHxHEIGHT in metres as in 0.6x0.4"))

@@ -2,7 +2,7 @@
 
 use super::dictionary::CELLS;
 use crate::camera::rectangle::square_from_corners;
-use crate::geom::{Point2, Vector2};
+use crate::geom::{Line, Point2, Vector2};
 use crate::image::Image;
 
 /// Stretches along each side, and the part of it near its corners that is not looked at.
@@ -23,13 +23,6 @@ const FEWEST_EDGES: usize = 6;
 /// Probes farther than this from the fitted line do not belong to it, pixels.
 const OFF_LINE_PX: f64 = 0.7;
 
-/// A straight line: the points `p` with `normal . p = offset`.
-#[derive(Clone, Copy)]
-struct Line {
-    normal: Vector2<f64>,
-    offset: f64,
-}
-
 /// The corners where the fitted sides of a dark quadrangle meet; none where a side shows no edge.
 pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
     let mut corners = *rough;
@@ -40,7 +33,7 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
             *line = side(light, &corners, i)?;
         }
         for i in 0..4 {
-            corners[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
+            corners[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
         }
     }
     Some(corners)
@@ -64,7 +57,7 @@ pub(super) fn without_growth(
     });
     let mut grown = *corners;
     for i in 0..4 {
-        grown[i] = meeting(&lines[(i + 3) % 4], &lines[i])?;
+        grown[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
     }
     Some(grown)
 }
@@ -128,10 +121,10 @@ fn side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<
     };
     let mut points: Vec<_> = (0..PROBES).filter_map(probe).collect();
     for _ in 0..2 {
-        let line = fitted(&points)?;
-        points.retain(|p| (line.normal.dot(&p.coords) - line.offset).abs() < OFF_LINE_PX);
+        let line = Line::through(&points)?;
+        points.retain(|p| line.distance(*p).abs() < OFF_LINE_PX);
     }
-    if points.len() < PROBES / 2 { None } else { fitted(&points) }
+    if points.len() < PROBES / 2 { None } else { Line::through(&points) }
 }
 
 /// Where the light rises along a direction: the centre of gravity of its slope, which blur does not move.
@@ -159,28 +152,4 @@ fn bilinear(light: &Image<f32>, x: f64, y: f64) -> f32 {
     let (u, v) = ((x - i) as f32, (y - j) as f32);
     let at = |di: isize, dj: isize| light.nearest(i as isize + di, j as isize + dj);
     (at(0, 0) * (1.0 - u) + at(1, 0) * u) * (1.0 - v) + (at(0, 1) * (1.0 - u) + at(1, 1) * u) * v
-}
-
-/// The line with the least squared distances; none through fewer than two points.
-fn fitted(points: &[Point2<f64>]) -> Option<Line> {
-    if points.len() < 2 {
-        return None;
-    }
-    let mean = points.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / points.len() as f64;
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for p in points {
-        let d = p.coords - mean;
-        (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
-    }
-    let angle = libm::atan2(2.0 * xy, xx - yy) / 2.0;
-    let normal = Vector2::new(-libm::sin(angle), libm::cos(angle));
-    Some(Line { normal, offset: normal.dot(&mean) })
-}
-
-fn meeting(a: &Line, b: &Line) -> Option<Point2<f64>> {
-    let det = a.normal.perp(&b.normal);
-    let x = a.offset * b.normal.y - b.offset * a.normal.y;
-    let y = a.normal.x * b.offset - b.normal.x * a.offset;
-    let p = Point2::new(x / det, y / det);
-    (det.abs() > 0.05 && p.coords.iter().all(|v| v.is_finite())).then_some(p)
 }

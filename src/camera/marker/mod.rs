@@ -52,6 +52,18 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     found
 }
 
+/// The markers of every family that is known, of which nothing but their size is told; and the noise of their corners.
+pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> (Vec<Marker>, f64) {
+    #[cfg(feature = "markers")]
+    {
+        let tags = april::find(photo, super::label::Artwork::Apriltag);
+        if !tags.is_empty() {
+            return (tags, april::CORNER_SIGMA_PX);
+        }
+    }
+    (find_markers(photo), CORNER_SIGMA_PX)
+}
+
 /// The label with the corners of its markers, found in its photo, as points of known place.
 ///
 /// Where the corners fit the map only when every marker is turned by the same angle, they are turned, with a message in
@@ -129,13 +141,16 @@ fn turns_that_fit(turned: impl Fn(usize) -> Label) -> usize {
 }
 
 #[cfg(test)]
+pub(crate) use tests::printed;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
     use crate::filter::Pyramid;
 
     /// Marker `id` as printed, with a margin of one cell, `cell` pixels to the cell.
-    fn printed(id: u32, cell: usize) -> Image<LinearRgb> {
+    pub(crate) fn printed(id: u32, cell: usize) -> Image<LinearRgb> {
         let grey = |x: usize, y: usize| if dictionary::is_white(id, x / cell, y / cell) { 0.8 } else { 0.04 };
         Image::from_fn(8 * cell, 8 * cell, |x, y| LinearRgb { r: grey(x, y), g: grey(x, y), b: grey(x, y) })
     }

@@ -4,7 +4,7 @@ use crate::image::Image;
 use std::ops::Range;
 
 /// The connected groups (8 neighbours) of a set, in the order of their first pixel, row by row.
-pub(super) struct Groups {
+pub(in super::super) struct Groups {
     size: (usize, usize),
     /// The set as runs of pixels, row by row.
     runs: Vec<Run>,
@@ -22,7 +22,7 @@ struct Run {
 
 impl Groups {
     /// Finds the groups: runs that touch the same run, corners included, are of one.
-    pub(super) fn of(set: &Image<bool>) -> Self {
+    pub(in super::super) fn of(set: &Image<bool>) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         let (mut above, mut here) = (0, 0);
         for (row, pixels) in set.rows().enumerate() {
@@ -44,7 +44,7 @@ impl Groups {
     }
 
     /// How many pixels of `members` are in each group.
-    pub(super) fn sizes(&self, members: &Image<bool>) -> Vec<usize> {
+    pub(in super::super) fn sizes(&self, members: &Image<bool>) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
             sizes[run.group] += members.row(run.row)[run.columns.clone()].iter().filter(|p| **p).count();
@@ -53,7 +53,7 @@ impl Groups {
     }
 
     /// The pixels of the groups for which a claim, by index from 0, holds.
-    pub(super) fn only(&self, holds: impl Fn(usize) -> bool) -> Image<bool> {
+    pub(in super::super) fn only(&self, holds: impl Fn(usize) -> bool) -> Image<bool> {
         let mut only = Image::new(self.size.0, self.size.1);
         for run in self.runs.iter().filter(|run| holds(run.group)) {
             only.row_mut(run.row)[run.columns.clone()].fill(true);
