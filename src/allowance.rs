@@ -55,6 +55,11 @@ impl<'a> Allowance<'a> {
         Err(self.spent())
     }
 
+    /// How much was taken.
+    pub fn taken(&self) -> u64 {
+        self.most - self.left.get()
+    }
+
     /// Whether nothing is left.
     pub(crate) fn is_spent(&self) -> bool {
         self.left.get() == 0
@@ -78,7 +83,8 @@ mod tests {
     #[test]
     fn work_is_taken_until_none_is_left() {
         let allowance = Allowance::new(10);
-        assert!(allowance.take(4).is_ok() && allowance.take(6).is_ok() && allowance.is_spent());
+        assert!(allowance.take(4).is_ok() && allowance.taken() == 4);
+        assert!(allowance.take(6).is_ok() && allowance.is_spent());
         let told = allowance.take(1).unwrap_err().to_string();
         assert!(told.starts_with("settle: no rest within the work of one picture, 10 "), "{told}");
     }

@@ -4,7 +4,7 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use petcomp::Scene;
 use petcomp::scene::{Background, CameraSource, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface};
-use petcomp::settle::{self, Verdict};
+use petcomp::settle::{self, Allowance, Verdict};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
@@ -224,6 +224,21 @@ fn nothing_hangs_in_trays_hardly_larger_than_the_longest_card() {
 fn nothing_hangs_in_two_thousand_tight_trays() {
     let [hanging, told] = ends_in_tight_trays(2_000);
     assert!(hanging == 0 && told <= 20, "{hanging} hang, {told} come to no rest");
+}
+
+#[test]
+fn ordinary_heaps_take_a_small_share_of_the_work_of_a_picture() {
+    let options = SettleOptions::default();
+    let share = |objects: f64, k: u64| {
+        let allowance = Allowance::new(options.most_work);
+        let fall = settle::settle_within(scene(Range::fixed(objects), 5, k), &options, 0, &allowance);
+        assert_eq!(fall.expect("there is work left").0.verdict, Verdict::Rested);
+        allowance.taken() as f64 / options.most_work as f64
+    };
+    for k in 0..4 {
+        assert!(share(30.0, k) < 0.01, "scene {k}: {}", share(30.0, k));
+    }
+    assert!(share(100.0, 0) < 0.1, "{}", share(100.0, 0));
 }
 
 #[test]

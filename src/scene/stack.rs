@@ -249,12 +249,13 @@ mod tests {
     #[test]
     fn a_card_as_long_as_the_room_starts_level_and_along_it() {
         for k in 0..20 {
-            let objects = stacked(k, &Start::default(), cards(3, [0.4, 0.05])).unwrap();
+            // So wide that it does not fit along the diagonal, which a narrow one does.
+            let objects = stacked(k, &Start::default(), cards(3, [0.4, 0.28])).unwrap();
             objects.iter().for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
             objects.iter().flat_map(corners).for_each(|c| assert!(c.x.abs() <= 0.2 + 1e-12, "scene {k}: {c}"));
         }
         let one_way = Start { yaw_deg: Range::fixed(30.0), ..Start::default() };
-        assert!(stacked(0, &one_way, cards(1, [0.4, 0.05])).is_err());
-        assert!(one_way.has_room([0.4, 0.3], [0.35, 0.05]) && !one_way.has_room([0.4, 0.3], [0.4, 0.05]));
+        assert!(stacked(0, &one_way, cards(1, [0.4, 0.28])).is_err());
+        assert!(one_way.has_room([0.4, 0.3], [0.4, 0.05]) && !one_way.has_room([0.4, 0.3], [0.4, 0.28]));
     }
 }

@@ -5,6 +5,8 @@
 
 use super::overlap::{Solid, depth, past_walls};
 use super::{rectangle, solids};
+use crate::allowance::Allowance;
+use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
 use crate::scene::{Object, Placement, Scene, SettleOptions, level};
 
@@ -44,20 +46,24 @@ fn reach_each_other(a: &Solid, b: &Solid) -> bool {
 ///
 /// Cards that already are at rest count as the upright boxes around them. A card that reaches through a wall is moved in.
 ///
-/// The poses of the objects that fall, in their order.
-pub(super) fn flat(scene: &Scene, options: &SettleOptions) -> Vec<Pose> {
+/// The poses of the objects that fall, in their order. Work is each object and each that it is laid on or beside.
+///
+/// # Errors
+/// [`Allowance::take`].
+pub(super) fn flat(scene: &Scene, options: &SettleOptions, allowance: &Allowance) -> Result<Vec<Pose>> {
     let mut bodies = leveled(scene, options);
     let mut lying: Vec<Solid> = bodies.iter().filter(|solid| !solid.falls).map(upright_box).collect();
     let mut order: Vec<usize> = (0..bodies.len()).filter(|&i| bodies[i].falls).collect();
     order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
     for i in order {
+        allowance.take(1 + lying.len() as u64)?;
         let solid = moved_in(&bodies[i], scene.surface.size);
         let below = lying.iter().filter(|other| footprints_meet(&solid, other));
         let bottom = below.map(|other| other.center().z + other.half.z).fold(0.0, f64::max);
         bodies[i].world_from_body = rested_on(&solid, bottom);
         lying.push(bodies[i].clone());
     }
-    bodies.iter().filter(|solid| solid.falls).map(|solid| solid.world_from_body).collect()
+    Ok(bodies.iter().filter(|solid| solid.falls).map(|solid| solid.world_from_body).collect())
 }
 
 /// The bodies, those that fall turned level where they start.
@@ -146,7 +152,10 @@ mod tests {
     fn flat_cards_are_level_and_only_touch() {
         for k in 0..20 {
             let (scene, options) = (dropped(k, 15), SettleOptions::default());
-            let lying = solids(&scene, &options, &flat(&scene, &options));
+            // 15 objects and 105 pairs.
+            let allowance = Allowance::new(120);
+            let lying = solids(&scene, &options, &flat(&scene, &options, &allowance).unwrap());
+            assert!(allowance.is_spent());
             assert!(deepest(&lying, &touching(&lying, 0.0), scene.surface.size) < 1e-12);
             for (i, solid) in lying.iter().enumerate() {
                 assert!(((solid.world_from_body * Vector3::z()).z.abs() - 1.0).abs() < 1e-12);

@@ -132,12 +132,15 @@ pub fn settle_within(
         let drop = Drop { scene: &scene, options, heights: &heights, sample_every: every, finer, allowance };
         let Fall { poses, rests, seconds, energy_rise, samples, .. } = match options.mode {
             SettleMode::Fall => columns::fall(&drop)?,
-            SettleMode::Flat => Fall { poses: level::flat(&scene, options), rests: true, ..Fall::default() },
+            SettleMode::Flat => {
+                Fall { poses: level::flat(&scene, options, allowance)?, rests: true, ..Fall::default() }
+            }
         };
         let end = with_poses(scene.clone(), &poses);
         let (verdict, overlap) = judge(&scene, &end, options, rests, energy_rise);
         let last = verdict == Verdict::Rested || seconds == 0.0 || rejected.len() + 1 >= options.attempts as usize;
         if last {
+            log::debug!("settle: {verdict:?} at try {}, {} of work", rejected.len() + 1, allowance.taken());
             let scene = if verdict == Verdict::Rested { end } else { scene };
             return Ok((Settled { scene, verdict, rejected, seconds, overlap, energy_rise }, samples));
         }
@@ -498,22 +501,30 @@ mod tests {
         assert_eq!(end.unwrap_err().to_string(), "interrupted: while objects fell");
     }
 
-    /// Counted as if the time limit or the step asked for it, not made.
+    /// The longest that is within bounds.
+    fn endless() -> SettleOptions {
+        let slow = SettleOptions { step: 1e-4, time_limit: 600.0, attempts: 100, ..SettleOptions::default() };
+        SettleOptions { iterations: 100, ccd: 100, ..slow }
+    }
+
+    /// Counted as if all of it lay where it lands.
     #[test]
     fn settings_without_an_end_are_refused_before_a_step_is_made() {
-        let usual = SettleOptions::default();
-        let endless = [
-            SettleOptions { step: 1e-300, ..usual },
-            SettleOptions { step: 1e-12, time_limit: 1e300, ..usual },
-            SettleOptions { iterations: u32::MAX, ..usual },
-            SettleOptions { most_work: 100, ..usual },
-        ];
-        for options in endless {
-            let (told, work) =
-                crate::work::counted(|| settle(dropped(0, 5), &options).unwrap_err().to_string()).unwrap();
+        let little = SettleOptions { most_work: 1000, ..SettleOptions::default() };
+        for options in [endless(), little] {
+            let told = || settle(dropped(0, 100), &options).unwrap_err().to_string();
+            let (told, work) = crate::work::counted(told).unwrap();
             assert!(told.starts_with("settle: no rest within the work of one picture, "), "{told}");
             assert_eq!(work[crate::work::Kind::PhysicsSteps], 0);
         }
+    }
+
+    #[test]
+    fn settings_without_an_end_end_with_the_work_of_one_picture() {
+        let told = || settle(dropped(0, 5), &endless()).unwrap_err().to_string();
+        let (told, work) = crate::work::counted(told).unwrap();
+        assert!(told.starts_with("settle: no rest within the work of one picture, 100000000 "), "{told}");
+        assert!((1..10_000).contains(&work[crate::work::Kind::PhysicsSteps]), "{work:?}");
     }
 
     #[test]

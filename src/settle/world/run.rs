@@ -52,13 +52,12 @@ impl Run<'_> {
         let steps = (time_limit / dt).ceil() as usize;
         let (mut stillness, mut energy, mut fall) = (Stillness::default(), Energy::of(&self), Fall::default());
         fall.swept = [[f64::INFINITY, -f64::INFINITY]; 2];
-        let mut taken = 0;
         self.sample(&mut fall, 0);
         for step in 1..=steps {
             self.allowance.take(self.work_of_step())?;
             // Nothing is active before the first step.
             self.world.step();
-            taken = step;
+            work::add(Kind::PhysicsSteps, 1);
             let now = step as f64 * dt;
             let kinetic = energy.follow(&self);
             self.sweep(&mut fall.swept);
@@ -70,7 +69,6 @@ impl Run<'_> {
                 break;
             }
         }
-        work::add(Kind::PhysicsSteps, taken as u64);
         fall.energy_rise = energy.rise();
         fall.poses = self.moving().map(|body| self.units.to_scene(body.position())).collect();
         Ok(fall)
