@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
+mod allowance;
 pub mod asset;
 mod bounds;
 pub mod camera;
@@ -30,6 +31,7 @@ mod stopwatch;
 pub mod train;
 pub mod work;
 
+pub use allowance::Allowance;
 pub use camera::Camera;
 pub use error::{Error, Result, printable};
 pub use image::{Image, Roi};

@@ -6,10 +6,10 @@ use petcomp::dataset::{
     SheetOptions, Sidecar, Split, SplitOrder, Studio, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
     mend, merge,
 };
-use petcomp::geom::{Point2, Pose, Vector2};
+use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
 use petcomp::render::DeepImage;
-use petcomp::scene::{CameraSource, Exposure, Surface};
+use petcomp::scene::{CameraSource, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io, report};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -409,6 +409,44 @@ fn a_check_finds_every_fault_and_its_place() {
     ] {
         assert!(found.contains(expected), "no `{expected}` in\n{found}");
     }
+}
+
+/// A card that fell, one that fell on it, and one that its sidecar file has so far up.
+fn with_a_card_up_at(k: u64, height: f64) -> Sample {
+    let card = |placement| Object {
+        asset: "bottle".into(),
+        photo: 0,
+        back: None,
+        size: [0.2, 0.08],
+        thickness: 0.005,
+        outline: vec![],
+        mass: 0.03,
+        placement,
+        grade: Grade::default(),
+    };
+    let mut sample = sample(k).unwrap();
+    let falls =
+        |i: usize| card(Placement::Drop { above: [0.0; 2], height: i as f64, rotation: UnitQuaternion::identity() });
+    sample.drawn.objects = (1..4).map(falls).collect();
+    let lies = |z: f64| card(Placement::At(Pose::translation(0.0, 0.0, z)));
+    sample.scene.objects = [0.0027, 0.0081, height].map(lies).into();
+    sample
+}
+
+#[test]
+fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
+    let found = |recipe: &str| {
+        let dir = tempfile::tempdir().unwrap();
+        let plan = Plan { recipe: serde_json::from_str(recipe).unwrap(), ..plan(dir.path(), 2) };
+        let height = |k: u64| if k == 0 { 0.0135 } else { 0.27 };
+        generate(&plan, |k| Ok(with_a_card_up_at(k, height(k))), &|_| {}, &AtomicBool::new(false)).unwrap();
+        let found = faults(dir.path()).into_iter().filter(|fault| fault.contains("nothing holds"));
+        found.collect::<Vec<_>>()
+    };
+    let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again";
+    assert_eq!(found("{}"), [expected]);
+    // Nothing falls in a recipe that lays its objects.
+    assert!(found(r#"{ "scene": { "settle": { "mode": "flat" } } }"#).is_empty());
 }
 
 #[test]

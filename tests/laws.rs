@@ -4,7 +4,7 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use petcomp::Scene;
 use petcomp::scene::{Background, CameraSource, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface};
-use petcomp::settle::{self, Verdict};
+use petcomp::settle::{self, Allowance, Verdict};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
@@ -179,6 +179,79 @@ fn nothing_at_rest_lies_in_another() {
             }
         }
     }
+}
+
+/// A tray whose sides are so many times the longest card of the stock, and that times `narrow`.
+fn tight(times: f64, narrow: f64) -> Background {
+    let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
+    Background { size: [longest * times, longest * times * narrow], ..tray() }
+}
+
+/// Objects higher up than a heap of them can be.
+fn heaped_up(scene: &Scene) -> bool {
+    let thickness: f64 = scene.objects.iter().map(|object| object.thickness.max(0.01 * object.size[0])).sum();
+    let longest = scene.objects.iter().map(|object| object.size[0]).fold(0.0, f64::max);
+    let height = |object: &Object| match object.placement {
+        Placement::At(pose) => pose.translation.z,
+        Placement::Drop { .. } => f64::INFINITY,
+    };
+    scene.objects.iter().map(height).fold(0.0, f64::max) > thickness + longest
+}
+
+/// How scenes of 5 to 15 objects end in trays from 1 to 1.5 times the longest card: those with something in the air, and
+/// those that come to no rest, which is told.
+fn ends_in_tight_trays(scenes: u64) -> [usize; 2] {
+    let end = |k: u64| {
+        let tray = tight(1.0 + 0.5 * k as f64 / scenes as f64, [1.0, 0.8, 0.68, 0.5][(k % 4) as usize]);
+        let before = recipe(Range::new(5.0, 15.0)).scene(7, k, &[tray], &stock()).expect("the stock fits the tray");
+        let end = settle::settle(before.clone(), &SettleOptions::default()).expect("a scene that can be right");
+        let hangs =
+            |rest: &Scene| !settle::hanging(&before, rest, &SettleOptions::default()).expect("a scene").is_empty();
+        let rested = end.verdict == Verdict::Rested;
+        [usize::from(rested && (heaped_up(&end.scene) || hangs(&end.scene))), usize::from(!rested)]
+    };
+    (0..scenes).into_par_iter().map(end).reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]])
+}
+
+#[test]
+fn nothing_hangs_in_trays_hardly_larger_than_the_longest_card() {
+    let [hanging, told] = ends_in_tight_trays(60);
+    assert!(hanging == 0 && told <= 2, "{hanging} hang, {told} come to no rest");
+}
+
+#[test]
+#[ignore = "a minute of work; run it when settle changes"]
+fn nothing_hangs_in_two_thousand_tight_trays() {
+    let [hanging, told] = ends_in_tight_trays(2_000);
+    assert!(hanging == 0 && told <= 20, "{hanging} hang, {told} come to no rest");
+}
+
+#[test]
+fn ordinary_heaps_take_a_small_share_of_the_work_of_a_picture() {
+    let options = SettleOptions::default();
+    let share = |objects: f64, k: u64| {
+        let allowance = Allowance::new(options.most_work);
+        let fall = settle::settle_within(scene(Range::fixed(objects), 5, k), &options, 0, &allowance);
+        assert_eq!(fall.expect("there is work left").0.verdict, Verdict::Rested);
+        allowance.taken() as f64 / options.most_work as f64
+    };
+    for k in 0..4 {
+        assert!(share(30.0, k) < 0.01, "scene {k}: {}", share(30.0, k));
+    }
+    assert!(share(100.0, 0) < 0.1, "{}", share(100.0, 0));
+}
+
+#[test]
+fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
+    let trays = [tray(), Background { name: "box".into(), ..tight(0.99, 0.5) }];
+    let told = recipe(Range::fixed(5.0)).check_room(&trays, &stock()).unwrap_err().to_string();
+    assert_eq!(
+        told,
+        "objects: \"b19\", 0.308 x 0.066 m, does not fit between the walls of \"box\", 0.305 x 0.152 m: expected a \
+         smaller object (scene.scale) or a larger surface"
+    );
+    assert!(recipe(Range::fixed(5.0)).check_room(&[tight(1.0, 0.5)], &stock()).is_ok());
+    assert!(recipe(Range::fixed(0.0)).check_room(&trays, &stock()).is_ok());
 }
 
 /// `cargo test --release --test laws -- --ignored --nocapture` (some minutes of all cores).

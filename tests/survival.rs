@@ -201,18 +201,34 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     }
 }
 
+/// Pictures that take minutes: heaps of 250 at the shortest steps, and room for such work.
+const LONG_FALL: [&str; 8] = [
+    "--set",
+    "scene.objects=[250,250]",
+    "--set",
+    "scene.scale=0.4",
+    "--set",
+    "scene.settle.step=0.0001",
+    "--set",
+    "scene.settle.most_work=1000000000000",
+];
+
 /// A run whose first picture takes minutes, once it listens to signals.
 fn long_run(desk: &Desk, folder: &str) -> Child {
-    let heap = ["--set", "scene.objects=[250,250]", "--set", "scene.scale=0.4", "--set", "scene.settle.step=0.0001"];
     let args = ["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-j", "1", "-o", folder];
-    let mut command = desk.command(&[&args[..], &heap].concat());
+    let mut command = desk.command(&[&args[..], &LONG_FALL].concat());
     let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    await_lock(desk, folder);
+    child
+}
+
+/// Waits until a dataset is begun.
+fn await_lock(desk: &Desk, folder: &str) {
     let (start, lock) = (Instant::now(), desk.0.path().join(folder).join("index.jsonl"));
     while !lock.exists() {
         assert!(start.elapsed() < HANGS, "did not begin");
         std::thread::sleep(Duration::from_millis(20));
     }
-    child
 }
 
 /// Several times what it takes, 8 s after one signal and none after two.
@@ -258,6 +274,23 @@ fn a_number_that_is_too_great_is_refused_at_once() {
     }
     assert!(!desk.0.path().join("out").exists());
     assert_eq!(run(&["--only", "999999999"]).0, Some(0));
+}
+
+/// A fall ends between two steps: the picture in hand is left to the run that goes on, and what is told is what is there.
+#[test]
+fn a_signal_stops_a_fall() {
+    let desk = Desk::new();
+    demo(&desk);
+    let args = ["dataset", "generate", "demo/recipe.toml", "-n", "2", "-j", "2", "-o", "out"];
+    let mut command = desk.command(&[&args[..], &LONG_FALL].concat());
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    await_lock(&desk, "out");
+    std::thread::sleep(Duration::from_millis(500));
+    send("TERM", &child);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", said(&output));
+    let expected = "interrupted: 0 of 2 samples are in out; the same command goes on";
+    assert!(said(&output).contains(expected), "{}", said(&output));
 }
 
 #[test]

@@ -121,6 +121,7 @@ impl Checked {
 /// * every image has a label file and every label file an image;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), a whole class number below `nc`, shares in
 ///   0..1, sides above 0, and no twin in the same file;
+/// * where sidecar files tell how objects lie, something holds each of them up ([`hanging`](crate::settle::hanging));
 /// * where there is a journal, the files it names have the sizes and checksums that it says, and it names every image.
 ///
 /// # Errors
@@ -159,6 +160,8 @@ pub fn check(folder: &Path) -> Result<Checked> {
     all.leaks(&images, &looked, &parts);
     all.orphans(&images, &yaml);
     all.journal(&images);
+    #[cfg(feature = "settle")]
+    all.faults.extend(super::hanging::hanging(folder));
     all.faults.sort();
     Ok(Checked { faults: all.faults, images: images.len(), rows, boxes, classes: yaml.names().to_vec() })
 }
@@ -264,11 +267,11 @@ impl Findings<'_> {
     }
 }
 
-fn fault(path: impl AsRef<Path>, line: Option<usize>, what: impl Into<String>) -> Fault {
+pub(super) fn fault(path: impl AsRef<Path>, line: Option<usize>, what: impl Into<String>) -> Fault {
     Fault { path: path.as_ref().into(), line, what: what.into() }
 }
 
-fn short(folder: &Path, e: &Error) -> String {
+pub(super) fn short(folder: &Path, e: &Error) -> String {
     let said = e.to_string();
     match e {
         Error::File { what, .. } => what.clone(),
@@ -277,7 +280,7 @@ fn short(folder: &Path, e: &Error) -> String {
 }
 
 /// Files of a folder below the dataset's, in order of name; none where it cannot be listed.
-fn list(folder: &Path, below: &str) -> Vec<PathBuf> {
+pub(super) fn list(folder: &Path, below: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder.join(below)) else { return Vec::new() };
     let files = entries.flatten().filter(|e| e.path().is_file()).map(|e| Path::new(below).join(e.file_name()));
     let mut files: Vec<_> = files.collect();

@@ -24,6 +24,8 @@ mod fingerprint;
 mod folder;
 mod formats;
 mod generate;
+#[cfg(feature = "settle")]
+mod hanging;
 mod inputs;
 mod journal;
 mod layers;

@@ -135,6 +135,8 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
                     io::sync(&self.plan.folder);
                 }
             }
+            // Not this sample's fault: it is made by the run that goes on.
+            Err(Error::Interrupted { .. }) if self.stop.load(Ordering::Relaxed) => {}
             Err(e) if books.failure.as_ref().is_none_or(|(first, _)| k < *first) => books.failure = Some((k, e)),
             Err(_) => {}
         }

@@ -1,5 +1,6 @@
 //! The pipeline: recipe and number in, labelled picture out.
 
+use crate::allowance::Allowance;
 use crate::asset::{Library, Panorama};
 use crate::bounds::LEAST_OBJECT_PX;
 use crate::camera;
@@ -18,6 +19,7 @@ use crate::render::{self, DeepImage};
 use crate::scene::{Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, stock};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Everything that pictures are made from, opened once: assets, labelled photos, options.
 #[derive(Debug)]
@@ -28,7 +30,12 @@ pub struct Studio {
     backgrounds: Vec<Background>,
     stock: Vec<Choice>,
     surroundings: Surroundings,
+    /// Turns true when no picture is to be finished any more.
+    stop: &'static AtomicBool,
 }
+
+/// Nobody stops a studio by itself.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Scenes that will not settle are drawn again this often.
 const REDRAWS: usize = 8;
@@ -79,7 +86,12 @@ impl Studio {
         let backgrounds = places.iter().map(|place| place.background.clone()).collect();
         let stock = stock(&library);
         let surroundings = Surroundings::of(&setup);
-        Ok(Self { setup, library, places, backgrounds, stock, surroundings })
+        Ok(Self { setup, library, places, backgrounds, stock, surroundings, stop: &NEVER })
+    }
+
+    /// The same, whose falls end with [`Error::Interrupted`] once a flag is true.
+    pub fn stopped_by(self, stop: &'static AtomicBool) -> Self {
+        Self { stop, ..self }
     }
 
     /// What it was opened from.
@@ -95,9 +107,10 @@ impl Studio {
     /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
     ///
     /// # Errors
-    /// Classes that the setup's policy for obstructed objects cannot add to; a photo
-    /// or an environment map that cannot be read.
+    /// Classes that the setup's policy for obstructed objects cannot add to; an asset that fits between the walls of some
+    /// background in no direction; a photo or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
+        self.setup.scene.check_room(&self.backgrounds, &self.stock).map_err(|e| e.within("scene"))?;
         let (folder, labels) = (folder.into(), &self.setup.labels);
         let mut inputs = Inputs::kept(&folder);
         let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
@@ -138,12 +151,13 @@ impl Studio {
     /// Files that cannot be read; objects that would not come to rest in any of several scenes.
     pub fn sample(&self, seed: u64, k: u64) -> Result<Sample> {
         let mut rejected = Vec::new();
+        let allowance = self.allowance();
         loop {
             let scene_seed = redraw_seed(seed, k, rejected.len());
             let (scene, draws) = self.explain(scene_seed, k)?;
-            match self.take(scene) {
+            match self.take_within(scene, &allowance) {
                 Ok(sample) => return Ok(Sample { rejected, draws, scene_seed, ..sample }),
-                Err(Error::Unsettled { what }) if rejected.len() < REDRAWS => {
+                Err(Error::Unsettled { what }) if rejected.len() < REDRAWS && !allowance.is_spent() => {
                     log::info!("scene {k} is drawn again: {what}");
                     rejected.push(what);
                 }
@@ -157,8 +171,12 @@ impl Studio {
     /// # Errors
     /// As the stages: no camera, no rest, a name that is not in the folders.
     pub fn take(&self, scene: Scene) -> Result<Sample> {
+        self.take_within(scene, &self.allowance())
+    }
+
+    fn take_within(&self, scene: Scene, allowance: &Allowance) -> Result<Sample> {
         let drawn = scene.clone();
-        let (resolved, settle) = timed(|| self.resolve(scene));
+        let (resolved, settle) = timed(|| self.resolve_within(scene, allowance));
         let (scene, shot) = resolved?;
         let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
         let (labels, label) = timed(|| label::label(&deep, &shot, &self.setup.labels.options()));
@@ -190,8 +208,17 @@ impl Studio {
     /// # Errors
     /// As [`take`](Self::take).
     pub fn resolve(&self, scene: Scene) -> Result<(Scene, Shot)> {
+        self.resolve_within(scene, &self.allowance())
+    }
+
+    /// What one picture may take.
+    fn allowance(&self) -> Allowance<'static> {
+        Allowance::new(self.setup.scene.settle.most_work).stopped_by(self.stop)
+    }
+
+    fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
         let plate = self.plate(&scene.plate)?;
-        let mut scene = self.rest(camera::locate(scene)?)?;
+        let mut scene = self.rest(camera::locate(scene)?, allowance)?;
         if let Some(plate) = &plate {
             scene = light::match_plate(scene, plate);
         }
@@ -200,12 +227,12 @@ impl Studio {
     }
 
     #[cfg(feature = "settle")]
-    fn rest(&self, scene: Scene) -> Result<Scene> {
-        crate::settle::settle(scene, &self.setup.scene.settle)?.into_scene()
+    fn rest(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
+        crate::settle::settle_within(scene, &self.setup.scene.settle, 0, allowance)?.0.into_scene()
     }
 
     #[cfg(not(feature = "settle"))]
-    fn rest(&self, scene: Scene) -> Result<Scene> {
+    fn rest(&self, scene: Scene, _allowance: &Allowance) -> Result<Scene> {
         Ok(scene)
     }
 

@@ -16,6 +16,7 @@ mod surface;
 pub use ambient::ambient_directions;
 pub use area::{LightFrame, frame, irradiance, radiance};
 pub use expose::{expose, match_plate, plate_white};
+pub(crate) use nodes::nodes_above;
 pub use nodes::{Node, gauss_legendre, nodes};
 pub use noise::{match_noise, plate_noise};
 pub use polygon::polygon_irradiance;

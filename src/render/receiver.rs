@@ -61,7 +61,7 @@ impl Studio<'_> {
     /// What lights a sheet on the side of the eye; none where it is seen edge-on. The normal is that of every lattice.
     fn lamps(&self, sheet: &Sheet) -> Option<Lamps> {
         let seen = Seen::of(sheet, &self.fine.view)?;
-        Some(Lamps::of(self.shot, &self.options, &seen.normal))
+        Some(Lamps::of(self.shot, &self.options, &sheet.center, &seen.normal))
     }
 
     /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.

@@ -451,7 +451,8 @@ mod tests {
             let view = View::of(&shot.camera);
             let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
             let seen = Seen::of(&casters.surface, &view).unwrap();
-            let Lamps { faces, sky } = Lamps::of(&shot, &RenderOptions::default(), &seen.normal);
+            let Lamps { faces, sky } =
+                Lamps::of(&shot, &RenderOptions::default(), &casters.surface.center, &seen.normal);
             let area = (0..view.height, 0..view.width);
             let (mut edges, mut all) = (0, 0);
             // Fine and coarse levels of the texture.
@@ -481,7 +482,7 @@ mod tests {
         let view = View::of(&shot.camera);
         let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
         let seen = Seen::of(&casters.surface, &view).unwrap();
-        let lamps = Lamps::of(&shot, &RenderOptions::default(), &seen.normal).faces;
+        let lamps = Lamps::of(&shot, &RenderOptions::default(), &casters.surface.center, &seen.normal).faces;
         let blockers = |area: Area| {
             let beams = casters.beams((&seen, &area), &view, &lamps[0], None, 1e-3);
             beams.iter().map(|beam| beam.blockers.len()).sum::<usize>()

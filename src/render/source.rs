@@ -55,9 +55,10 @@ pub(super) struct Lamps {
 }
 
 impl Lamps {
-    /// What lights a receiver with this unit normal.
-    pub(super) fn of(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Self {
-        let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
+    /// What lights a receiver with this unit normal, in the plane through `point`.
+    pub(super) fn of(shot: &Shot, options: &RenderOptions, point: &Vector3<f64>, normal: &Vector3<f64>) -> Self {
+        let above = |l: &AreaLight| light::nodes_above(l, options.light_samples, (*point).into(), normal);
+        let faces = shot.lights.iter().map(|l| face(l, above(l))).collect();
         let ambient = ambient(shot.ambient, options.ambient_samples, normal);
         let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
         let map = shining.flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
@@ -66,7 +67,7 @@ impl Lamps {
 
     /// The same for a quadrature without cleverness: the map in even rectangles.
     pub(super) fn plain(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
-        let faces = shot.lights.iter().map(|l| face(l, options.light_samples)).collect();
+        let faces = shot.lights.iter().map(|l| face(l, light::nodes(l, options.light_samples))).collect();
         let ambient = ambient(shot.ambient, options.ambient_samples, normal);
         let map =
             shot.environment.iter().flat_map(|map| pieces(light::sky_cells(map, options.ambient_samples, normal)));
@@ -87,14 +88,14 @@ impl Lamps {
     }
 }
 
-fn face(light: &AreaLight, per_side: usize) -> Lamp {
+fn face(light: &AreaLight, nodes: Vec<light::Node>) -> Lamp {
     let normal = light::frame(light).normal;
     let source = |n: light::Node| Source {
         at: n.point.to_homogeneous(),
         width: n.area.sqrt(),
         kind: Kind::Face { normal, area: n.area },
     };
-    Lamp { radiance: light::radiance(light), sources: light::nodes(light, per_side).into_iter().map(source).collect() }
+    Lamp { radiance: light::radiance(light), sources: nodes.into_iter().map(source).collect() }
 }
 
 fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {

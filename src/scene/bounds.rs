@@ -39,6 +39,7 @@ pub(super) const STEP: Bounds =
 pub(super) const TIME_LIMIT: Bounds = Bounds::new(0.01, 600.0, "seconds; heaps rest within a few");
 pub(super) const ATTEMPTS: Bounds = Bounds::new(1.0, 100.0, "what fails so often will not rest");
 pub(super) const ITERATIONS: Bounds = Bounds::new(1.0, 100.0, "contacts are exact with fewer");
+pub(super) const WORK: Bounds = Bounds::new(1.0, 1e12, "objects and pairs, summed over time steps");
 pub(super) const CCD: Bounds = Bounds::new(0.0, 100.0, "stops within a step");
 pub(super) const THINNEST: Bounds = Bounds::new(1e-4, 1.0, "a share of the longer side");
 pub(super) const OVERLAP: Bounds = Bounds::new(1e-6, 1.0, "a share of the longer side");

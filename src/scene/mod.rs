@@ -27,9 +27,9 @@ mod variation;
 pub use draw::{Distribution, DrawLog, Drawn, Draws};
 pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
-#[cfg(feature = "settle")]
-pub(crate) use fall::half_extent;
 pub use fall::{SettleMode, SettleOptions};
+#[cfg(feature = "settle")]
+pub(crate) use fall::{half_extent, level};
 pub use finish::{Finish, FinishRanges, Noise, white_balance};
 pub use light::{AreaLight, Cast, Exposure, LightShape};
 pub use limit::Limit;
@@ -104,7 +104,8 @@ impl Scene {
 pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
-    /// Coefficient of friction of everything that touches here, the cards among themselves too. Default: 0.5.
+    /// Coefficient of friction of everything that touches here, the cards among themselves too; the walls over the edges,
+    /// which nobody sees, are smooth. Default: 0.5.
     #[serde(default = "Surface::usual_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.

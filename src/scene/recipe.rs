@@ -9,7 +9,7 @@ use crate::scene::bounds::{
     SCALE, SHARE, TURN,
 };
 use crate::scene::check::{check_cast, check_count, check_image};
-use crate::scene::stack::{Column, Start};
+use crate::scene::stack::{Column, Start, too_large};
 use crate::scene::{
     AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, FinishRanges, Grade, LightShape,
     Limit, Object, Range, Scene, SettleOptions, Source, Surface,
@@ -280,7 +280,8 @@ impl Recipe {
             friction: self.friction.draw(&draws, "friction"),
             restitution: self.restitution.draw(&draws, "restitution"),
         };
-        Column { surface, start: &self.start, options: &self.settle, draws: &draws }.stack(&mut objects)?;
+        let (start, options, place) = (&self.start, &self.settle, background.name.as_str());
+        Column { place, surface, start, options, draws: &draws }.stack(&mut objects)?;
         let lights: Vec<AreaLight> =
             self.lights.iter().enumerate().map(|(i, light)| light.draw(&draws, &format!("lights[{i}]"))).collect();
         let scene = Scene {
@@ -298,6 +299,27 @@ impl Recipe {
         };
         scene.check()?;
         Ok(scene)
+    }
+
+    /// Fails on the first asset that at its largest fits between the walls of some background in no direction: a scene with
+    /// both would be refused, however late it comes.
+    pub fn check_room(&self, backgrounds: &[Background], stock: &[Choice]) -> Result<()> {
+        let recipe = self.narrowed();
+        if recipe.objects.max < 1.0 {
+            return Ok(());
+        }
+        for background in recipe.viewpoints.of(backgrounds) {
+            let photos =
+                stock.iter().flat_map(|choice| recipe.photos.of(&choice.photo_sizes).iter().map(move |s| (choice, s)));
+            for (choice, size) in photos {
+                let largest = size.map(|side| side * recipe.scale.max);
+                if !recipe.start.has_room(background.size, largest) {
+                    let what = too_large(&choice.asset, largest, &background.name, background.size);
+                    return Err(Error::value("objects", what));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Fails on the first value that cannot be right.

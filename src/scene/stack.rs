@@ -3,13 +3,15 @@
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
 use crate::scene::bounds::{ACROSS, GAP, TILT, TURN};
-use crate::scene::fall::half_extent;
+use crate::scene::fall::{half_extent, level};
 use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 
 /// Times that a card which does not fit between the walls is turned anew.
 const TURNS: u32 = 64;
+/// What a card may be longer than the way between walls, as a share: rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// How objects start: each over the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +62,8 @@ impl Start {
 
 /// The column over a surface that objects are stacked in.
 pub(super) struct Column<'a> {
+    /// Name of the place, for messages.
+    pub(super) place: &'a str,
     pub(super) surface: Surface,
     pub(super) start: &'a Start,
     pub(super) options: &'a SettleOptions,
@@ -71,35 +75,39 @@ impl Column<'_> {
     ///
     /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents as they are turned.
     /// # Errors
-    /// An object that fits between the walls in none of the directions drawn for it.
+    /// An object that fits between the walls in no direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
         let mut top = 0.0;
         for (i, object) in objects.iter_mut().enumerate() {
             let path = format!("objects[{i}].start");
-            let (rotation, extent) =
-                self.fitting_rotation(object, &path).ok_or_else(|| too_large(i, object, self.surface))?;
+            let half = self.options.half_body(object);
+            let fitting = self.fitting_rotation(&half, &path);
+            let rotation = fitting.ok_or_else(|| {
+                Error::value(
+                    format!("objects[{i}].size"),
+                    too_large(&object.asset, object.size, self.place, self.surface.size),
+                )
+            })?;
+            let extent = half_extent(&rotation, &half);
             let x = self.start.x.draw(self.draws, &format!("{path}.x"));
             let y = self.start.y.draw(self.draws, &format!("{path}.y"));
-            let above = [x * self.free(0, extent.x), y * self.free(1, extent.y)];
+            let [free_x, free_y] = free(self.surface.size, &extent);
             let height = top + self.start.gap.draw(self.draws, &format!("{path}.gap")) + extent.z;
             top = height + extent.z;
-            object.placement = Placement::Drop { above, height, rotation };
+            object.placement = Placement::Drop { above: [x * free_x, y * free_y], height, rotation };
         }
         Ok(())
     }
 
-    /// How far from the middle an object of this half extent may be.
-    fn free(&self, axis: usize, extent: f64) -> f64 {
-        self.surface.size[axis] / 2.0 - extent
-    }
-
-    /// The first turn drawn that fits between the walls, and the half extent of the body turned so.
-    fn fitting_rotation(&self, object: &Object, path: &str) -> Option<(UnitQuaternion<f64>, Vector3<f64>)> {
-        let turned = |turn| {
-            let rotation = self.rotation(path, turn);
-            (rotation, half_extent(&rotation, &self.options.half_body(object)))
-        };
-        (0..TURNS).map(turned).find(|(_, extent)| self.free(0, extent.x) >= 0.0 && self.free(1, extent.y) >= 0.0)
+    /// The first turn drawn with which the body fits between the walls, tilted as it starts and level as it may end: what
+    /// starts across a room that is too narrow for it never lies down there. Where none does, one that fits level.
+    fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
+        let mut drawn = (0..TURNS).map(|turn| self.rotation(path, turn));
+        let fits = |rotation: &UnitQuaternion<f64>| fits(self.surface.size, half, rotation);
+        drawn.find(|rotation| fits(rotation) && fits(&level(rotation))).or_else(|| {
+            let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
+            (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
+        })
     }
 
     /// First a turn about the vertical, the `turn`-th drawn for this object, then the tilt.
@@ -113,11 +121,39 @@ impl Column<'_> {
     }
 }
 
-fn too_large(i: usize, object: &Object, surface: Surface) -> Error {
-    let (card, room) = (object.size, surface.size);
-    let what =
-        format!("{:.3} x {:.3} m does not fit between walls of {:.3} x {:.3} m", card[0], card[1], room[0], room[1]);
-    Error::value(format!("objects[{i}].size"), what)
+impl Start {
+    /// Whether a card of this size, as thick as it may be, fits between walls in some direction that it may start in.
+    pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
+        self.level_turns(surface, &(Vector3::new(w, h, 0.0) / 2.0)).next().is_some()
+    }
+
+    /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the range.
+    fn level_turns(&self, surface: [f64; 2], half: &Vector3<f64>) -> impl Iterator<Item = UnitQuaternion<f64>> {
+        let Range { min, max } = self.yaw_deg;
+        let whole = (0..360).map(move |i| min.ceil() + f64::from(i)).take_while(move |degrees| *degrees < max);
+        let turn = |degrees: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());
+        [min, max].into_iter().chain(whole).map(turn).filter(move |rotation| fits(surface, half, rotation))
+    }
+}
+
+/// How far from the middle an object of this half extent may be, in both directions.
+fn free(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
+    [0, 1].map(|axis| surface[axis] / 2.0 - extent[axis])
+}
+
+/// Whether a body turned so fits between the walls.
+fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
+    let free = free(surface, &half_extent(rotation, half));
+    free.iter().zip(surface).all(|(free, side)| *free >= -ROUNDING * side)
+}
+
+/// What is wrong with a card that fits nowhere.
+pub(super) fn too_large(asset: &str, card: [f64; 2], place: &str, room: [f64; 2]) -> String {
+    format!(
+        "\"{asset}\", {:.3} x {:.3} m, does not fit between the walls of \"{place}\", {:.3} x {:.3} m: expected a smaller \
+         object (scene.scale) or a larger surface",
+        card[0], card[1], room[0], room[1]
+    )
 }
 
 #[cfg(test)]
@@ -143,7 +179,7 @@ mod tests {
 
     fn stacked(k: u64, start: &Start, mut objects: Vec<Object>) -> Result<Vec<Object>> {
         let (surface, options) = (Surface::new([0.4, 0.3]), SettleOptions::default());
-        Column { surface, start, options: &options, draws: &Draws::new(3, k) }.stack(&mut objects)?;
+        Column { place: "tray", surface, start, options: &options, draws: &Draws::new(3, k) }.stack(&mut objects)?;
         Ok(objects)
     }
 
@@ -189,6 +225,37 @@ mod tests {
     #[test]
     fn a_card_that_fits_no_way_is_told() {
         let told = stacked(0, &Start::default(), cards(2, [0.5, 0.31])).unwrap_err().to_string();
-        assert_eq!(told, "objects[0].size: 0.500 x 0.310 m does not fit between walls of 0.400 x 0.300 m");
+        let expected = "objects[0].size: \"b0\", 0.500 x 0.310 m, does not fit between the walls of \"tray\", 0.400 x 0.300 m: \
+                        expected a smaller object (scene.scale) or a larger surface";
+        assert_eq!(told, expected);
+    }
+
+    /// Half extents of the level body, turned as it would lie down.
+    fn lying(object: &Object) -> Vector3<f64> {
+        let Placement::Drop { rotation, .. } = object.placement else { panic!("not dropped") };
+        half_extent(&level(&rotation), &SettleOptions::default().half_body(object))
+    }
+
+    #[test]
+    fn a_card_longer_than_the_room_is_wide_does_not_start_across_it() {
+        for k in 0..200 {
+            for object in stacked(k, &Start::default(), cards(5, [0.31, 0.1])).unwrap() {
+                let half = lying(&object);
+                assert!(half.x <= 0.2 + 1e-12 && half.y <= 0.15 + 1e-12, "scene {k}: {half}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_card_as_long_as_the_room_starts_level_and_along_it() {
+        for k in 0..20 {
+            // So wide that it does not fit along the diagonal, which a narrow one does.
+            let objects = stacked(k, &Start::default(), cards(3, [0.4, 0.28])).unwrap();
+            objects.iter().for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
+            objects.iter().flat_map(corners).for_each(|c| assert!(c.x.abs() <= 0.2 + 1e-12, "scene {k}: {c}"));
+        }
+        let one_way = Start { yaw_deg: Range::fixed(30.0), ..Start::default() };
+        assert!(stacked(0, &one_way, cards(1, [0.4, 0.28])).is_err());
+        assert!(one_way.has_room([0.4, 0.3], [0.4, 0.05]) && !one_way.has_room([0.4, 0.3], [0.4, 0.28]));
     }
 }

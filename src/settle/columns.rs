@@ -5,6 +5,7 @@
 
 use super::level;
 use super::world::{Drop, Fall};
+use crate::error::Result;
 use crate::scene::{Scene, SettleOptions};
 
 /// Objects that fall together, and how that ended.
@@ -14,25 +15,30 @@ struct Column {
 }
 
 /// Lets everything fall; the poses are in the order of the objects that fall.
-pub(super) fn fall(drop: &Drop) -> Fall {
+///
+/// # Errors
+/// As [`Drop::fall`].
+pub(super) fn fall(drop: &Drop) -> Result<Fall> {
     let columns = level::columns(drop.scene, drop.options);
-    let mut columns: Vec<Column> = columns.into_iter().map(|members| Column::of(drop, members)).collect();
+    let mut columns: Vec<Column> =
+        columns.into_iter().map(|members| Column::of(drop, members)).collect::<Result<_>>()?;
     while let Some((i, j)) = first_that_meet(&columns) {
         let mut members = columns.swap_remove(j).members;
         members.append(&mut columns[i].members);
         members.sort_unstable();
-        columns[i] = Column::of(drop, members);
+        columns[i] = Column::of(drop, members)?;
     }
-    together(columns)
+    Ok(together(columns))
 }
 
 impl Column {
-    fn of(drop: &Drop, members: Vec<usize>) -> Self {
+    fn of(drop: &Drop, members: Vec<usize>) -> Result<Self> {
         let closed = match members[..] {
             [i] => alone(drop.scene, drop.options, i),
             _ => None,
         };
-        Self { fall: closed.unwrap_or_else(|| drop.fall(&members)), members }
+        let fall = closed.map_or_else(|| drop.fall(&members), Ok)?;
+        Ok(Self { fall, members })
     }
 }
 
@@ -70,11 +76,17 @@ fn together(columns: Vec<Column>) -> Fall {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::allowance::Allowance;
     use crate::scene::Placement;
     use crate::settle::tests::{dropped, falling};
 
-    fn drop<'a>(scene: &'a Scene, options: &'a SettleOptions, heights: &'a [f64]) -> Drop<'a> {
-        Drop { scene, options, heights, sample_every: 0 }
+    fn drop<'a>(
+        scene: &'a Scene,
+        options: &'a SettleOptions,
+        heights: &'a [f64],
+        allowance: &'a Allowance,
+    ) -> Drop<'a> {
+        Drop { scene, options, heights, sample_every: 0, finer: 0, allowance }
     }
 
     fn heights(scene: &Scene) -> Vec<f64> {
@@ -90,9 +102,10 @@ mod tests {
         let mut scene = falling(&[([-0.6, 0.0], 0.05), ([-0.62, 0.0], 0.1), ([0.6, 0.1], 0.05), ([0.6, 0.12], 0.2)]);
         scene.surface.size = [2.0, 1.0];
         let (options, heights) = (SettleOptions::default(), heights(&scene));
-        let drop = drop(&scene, &options, &heights);
-        let both = fall(&drop);
-        assert_eq!(both.poses, [drop.fall(&[0, 1]).poses, drop.fall(&[2, 3]).poses].concat());
+        let allowance = Allowance::new(options.most_work);
+        let drop = drop(&scene, &options, &heights, &allowance);
+        let of = |members: &[usize]| drop.fall(members).unwrap().poses;
+        assert_eq!(fall(&drop).unwrap().poses, [of(&[0, 1]), of(&[2, 3])].concat());
     }
 
     #[test]
@@ -107,7 +120,8 @@ mod tests {
         }
         let (options, heights) = (SettleOptions::default(), heights(&scene));
         assert_eq!(level::columns(&scene, &options).len(), 2);
-        let drop = drop(&scene, &options, &heights);
-        assert_eq!(fall(&drop).poses, drop.fall(&(0..8).collect::<Vec<_>>()).poses);
+        let allowance = Allowance::new(options.most_work);
+        let drop = drop(&scene, &options, &heights, &allowance);
+        assert_eq!(fall(&drop).unwrap().poses, drop.fall(&(0..8).collect::<Vec<_>>()).unwrap().poses);
     }
 }

@@ -5,9 +5,10 @@
 
 use super::overlap::{Solid, depth, past_walls};
 use super::{rectangle, solids};
+use crate::allowance::Allowance;
+use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
-use crate::scene::{Object, Placement, Scene, SettleOptions};
-use nalgebra::{Quaternion, Vector3};
+use crate::scene::{Object, Placement, Scene, SettleOptions, level};
 
 /// Where a card comes to rest that falls alone onto the bare surface, clear of the walls and of all that already lies
 /// there; none if it may touch anything.
@@ -45,20 +46,24 @@ fn reach_each_other(a: &Solid, b: &Solid) -> bool {
 ///
 /// Cards that already are at rest count as the upright boxes around them. A card that reaches through a wall is moved in.
 ///
-/// The poses of the objects that fall, in their order.
-pub(super) fn flat(scene: &Scene, options: &SettleOptions) -> Vec<Pose> {
+/// The poses of the objects that fall, in their order. Work is each object and each that it is laid on or beside.
+///
+/// # Errors
+/// [`Allowance::take`].
+pub(super) fn flat(scene: &Scene, options: &SettleOptions, allowance: &Allowance) -> Result<Vec<Pose>> {
     let mut bodies = leveled(scene, options);
     let mut lying: Vec<Solid> = bodies.iter().filter(|solid| !solid.falls).map(upright_box).collect();
     let mut order: Vec<usize> = (0..bodies.len()).filter(|&i| bodies[i].falls).collect();
     order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
     for i in order {
+        allowance.take(1 + lying.len() as u64)?;
         let solid = moved_in(&bodies[i], scene.surface.size);
         let below = lying.iter().filter(|other| footprints_meet(&solid, other));
         let bottom = below.map(|other| other.center().z + other.half.z).fold(0.0, f64::max);
         bodies[i].world_from_body = rested_on(&solid, bottom);
         lying.push(bodies[i].clone());
     }
-    bodies.iter().filter(|solid| solid.falls).map(|solid| solid.world_from_body).collect()
+    Ok(bodies.iter().filter(|solid| solid.falls).map(|solid| solid.world_from_body).collect())
 }
 
 /// The bodies, those that fall turned level where they start.
@@ -70,19 +75,6 @@ fn leveled(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
         }
     };
     solids(scene, options, &scene.objects.iter().map(pose).collect::<Vec<_>>())
-}
-
-/// The nearest rotation that leaves a card level, on the side it already is nearer to.
-///
-/// # Method
-/// Every rotation is a turn about the vertical followed by a tilt about a horizontal axis; the quaternion of the turn is
-/// the part (w, z) of the whole, normalised. A card that faces down is first turned over about its own `x`.
-fn level(rotation: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    let over = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
-    let faces_up = (rotation * Vector3::z()).z >= 0.0;
-    let upright = if faces_up { *rotation } else { rotation * over };
-    let turn = UnitQuaternion::from_quaternion(Quaternion::new(upright.w, 0.0, 0.0, upright.k));
-    if faces_up { turn } else { turn * over }
 }
 
 /// The pose with its underside at this height; that of a card at rest as it is.
@@ -124,19 +116,9 @@ fn footprints_meet(a: &Solid, b: &Solid) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geom::Vector3;
+    use crate::settle::overlap::{deepest, touching};
     use crate::settle::tests::{dropped, falling};
-
-    #[test]
-    fn leveling_turns_the_normal_up_or_down_and_is_the_least_turn() {
-        let seen = |angles: [f64; 3]| {
-            let tilted = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
-            let (normal, flat) = (tilted * Vector3::z(), level(&tilted));
-            let expected = Vector3::z() * normal.z.signum();
-            assert!((flat * Vector3::z() - expected).norm() < 1e-12);
-            assert!((flat.angle_to(&tilted) - normal.angle(&expected)).abs() < 1e-7);
-        };
-        [[0.2, 0.1, 1.0], [3.0, 0.1, -2.0], [1.5, 0.0, 0.3], [-2.5, 0.4, 3.0]].into_iter().for_each(seen);
-    }
 
     #[test]
     fn a_card_alone_rests_level_where_it_fell() {
@@ -170,8 +152,11 @@ mod tests {
     fn flat_cards_are_level_and_only_touch() {
         for k in 0..20 {
             let (scene, options) = (dropped(k, 15), SettleOptions::default());
-            let lying = solids(&scene, &options, &flat(&scene, &options));
-            assert!(crate::settle::overlap::deepest(&lying, scene.surface.size) < 1e-12);
+            // 15 objects and 105 pairs.
+            let allowance = Allowance::new(120);
+            let lying = solids(&scene, &options, &flat(&scene, &options, &allowance).unwrap());
+            assert!(allowance.is_spent());
+            assert!(deepest(&lying, &touching(&lying, 0.0), scene.surface.size) < 1e-12);
             for (i, solid) in lying.iter().enumerate() {
                 assert!(((solid.world_from_body * Vector3::z()).z.abs() - 1.0).abs() < 1e-12);
                 let bottom = solid.center().z - solid.half.z;

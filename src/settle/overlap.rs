@@ -21,9 +21,16 @@ impl Solid {
         self.world_from_body.translation.vector
     }
 
-    fn axes(&self) -> [Vector3<f64>; 3] {
+    pub(super) fn axes(&self) -> [Vector3<f64>; 3] {
         let r = self.world_from_body.rotation.to_rotation_matrix();
         [0, 1, 2].map(|i| r.matrix().column(i).into())
+    }
+
+    /// All corners, in the world.
+    pub(super) fn corners(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let [x, y, z] = self.axes();
+        let of = move |&[a, b]: &[f64; 2]| self.center() + x * a + y * b;
+        self.outline.iter().flat_map(move |corner| [of(corner) + z * self.half.z, of(corner) - z * self.half.z])
     }
 
     /// Half lengths of the upright box around the box of its card.
@@ -64,14 +71,33 @@ pub(super) fn outside(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
     ids.map(|(i, _)| i + 1).collect()
 }
 
+/// Two bodies that are near to each other, one of which was dropped.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Touch {
+    /// Their indices, the higher one first.
+    pub(super) pair: [usize; 2],
+    /// How far they are apart, metres; negative where they overlap.
+    pub(super) gap: f64,
+    /// Unit vector from the first to the second that the gap is measured along.
+    pub(super) towards: Vector3<f64>,
+}
+
+/// All pairs of bodies that are apart by less than `reach`, metres.
+pub(super) fn touching(solids: &[Solid], reach: f64) -> Vec<Touch> {
+    let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
+    let pairs = pairs.filter(|[i, j]| solids[*i].falls || solids[*j].falls);
+    let touch = |pair: [usize; 2]| {
+        gap(&solids[pair[0]], &solids[pair[1]], reach).map(|(gap, towards)| Touch { pair, gap, towards })
+    };
+    pairs.filter_map(touch).collect()
+}
+
 /// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over the surface's edges,
 /// metres; 0 when nothing overlaps.
-pub(super) fn deepest(solids: &[Solid], surface: [f64; 2]) -> f64 {
+pub(super) fn deepest(solids: &[Solid], touching: &[Touch], surface: [f64; 2]) -> f64 {
     let falling = solids.iter().filter(|s| s.falls);
     let edges = falling.map(|s| depth_in_room(s, surface)).fold(0.0, f64::max);
-    let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
-    let pairs = pairs.filter(|&(i, j)| solids[i].falls || solids[j].falls);
-    pairs.map(|(i, j)| depth(&solids[i], &solids[j])).fold(edges, f64::max)
+    touching.iter().map(|touch| -touch.gap).fold(edges, f64::max)
 }
 
 /// How far a body reaches through the floor or a wall, whichever is most; 0 inside.
@@ -92,17 +118,23 @@ pub(super) fn past_walls(solid: &Solid, surface: [f64; 2]) -> [f64; 2] {
 }
 
 /// Shortest way to move one body out of another, metres; 0 when they are apart.
+pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
+    gap(a, b, 0.0).map_or(0.0, |(gap, _)| -gap)
+}
+
+/// How far two bodies are apart, metres, negative where they overlap, and the unit direction from the first to the second
+/// that this is measured along; none where they are apart by `reach` or more.
 ///
 /// # Method
 /// Separating axes: two convex bodies are apart if and only if their shadows are, on one of these directions: the faces'
-/// normals and the cross products of their edges ([Gottschalk, Lin and Manocha 1996]; 15 for two boxes). The least
-/// overlap of shadows is the depth.
+/// normals and the cross products of their edges ([Gottschalk, Lin and Manocha 1996]; 15 for two boxes). The greatest
+/// gap between shadows is that of the bodies: the depth of an overlap, and a lower bound of a distance.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
-pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
+pub(super) fn gap(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
     let apart = b.center() - a.center();
-    if apart.norm() >= a.half.norm() + b.half.norm() {
-        return 0.0;
+    if apart.norm() >= a.half.norm() + b.half.norm() + reach {
+        return None;
     }
     let (of_a, of_b) = (a.axes(), b.axes());
     let (mut edges_a, mut edges_b) = (a.edges(&of_a), b.edges(&of_b));
@@ -113,15 +145,18 @@ pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
     edges_b.push(of_b[2]);
     let pairs = edges_a.iter().flat_map(|e| edges_b.iter().map(move |f| e.cross(f)));
     let directions = faces.iter().copied().chain(pairs.filter_map(|d| d.try_normalize(PARALLEL)));
-    let mut least = f64::INFINITY;
+    let mut widest = (f64::NEG_INFINITY, Vector3::z());
     for direction in directions {
         let ([low_a, high_a], [low_b, high_b]) = (a.shadow(&of_a, &direction), b.shadow(&of_b, &direction));
-        least = least.min(high_a - low_b).min(high_b - low_a);
-        if least <= 0.0 {
-            return 0.0;
+        let (ahead, behind) = (low_b - high_a, low_a - high_b);
+        if ahead.max(behind) > widest.0 {
+            widest = if ahead > behind { (ahead, direction) } else { (behind, -direction) };
+        }
+        if widest.0 >= reach {
+            return None;
         }
     }
-    least
+    Some(widest)
 }
 
 #[cfg(test)]
@@ -221,15 +256,15 @@ mod tests {
         let behind = |x: f64, y: f64| -((x - 0.01) / 0.2 + (y - 0.01) / 0.08) / (1.0_f64 / 0.2).hypot(1.0 / 0.08);
         assert!((depth(&triangle(0.0), &post(0.01, 0.009)) - behind(0.01, 0.009)).abs() < 1e-12);
         // Through the left wall by 0.05, with its vertical side.
-        assert!((deepest(&[triangle(-0.15)], [0.4, 0.3]) - 0.05).abs() < 1e-12);
+        assert!((deepest(&[triangle(-0.15)], &[], [0.4, 0.3]) - 0.05).abs() < 1e-12);
     }
 
     #[test]
     fn floor_and_walls_count() {
         let half = [0.1, 0.04, 0.003];
-        assert!((deepest(&[solid(0.0, 0.0, 0.002, [0.0; 3], half)], [0.4, 0.3]) - 0.001).abs() < 1e-15);
-        assert!((deepest(&[solid(0.11, 0.0, 0.1, [0.0; 3], half)], [0.4, 0.3]) - 0.01).abs() < 1e-15);
-        assert_eq!(deepest(&[solid(0.1, 0.0, 0.003, [0.0; 3], half)], [0.4, 0.3]), 0.0);
+        assert!((deepest(&[solid(0.0, 0.0, 0.002, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.001).abs() < 1e-15);
+        assert!((deepest(&[solid(0.11, 0.0, 0.1, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.01).abs() < 1e-15);
+        assert_eq!(deepest(&[solid(0.1, 0.0, 0.003, [0.0; 3], half)], &[], [0.4, 0.3]), 0.0);
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub(super) fn make_opaque(
 }
 
 /// A pixel is the screen in some shade.
-fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
+pub(super) fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
     let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
     let strongest = screen.into_iter().fold(0.0, f32::max);

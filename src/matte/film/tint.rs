@@ -1,5 +1,6 @@
 //! The plastic of a photo: which dye, and how much of it, told from the pixels that reflect least.
 
+use super::bright::is_screen;
 use crate::image::Image;
 use crate::matte::plate::ScreenPlate;
 use crate::pixel::{Coverage, LinearRgb};
@@ -27,6 +28,9 @@ const LEAST: f32 = 0.005;
 pub(super) const DARKEST: f64 = 0.25;
 /// Pixels that are asked for the share above, and of them for the tint.
 const ASKED: [usize; 2] = [20_000, 400];
+/// Share of the screen's strongest channel from which on, in the screen's shade, a pixel is bare screen: plastic passes
+/// three quarters at most.
+const BARE: f32 = 0.9;
 /// Noise of a pixel: least, and as a share of its value.
 const NOISE: [f32; 2] = [0.004, 0.05];
 /// Misfit beyond which a pixel is something else than plastic.
@@ -78,7 +82,7 @@ pub(in crate::matte) fn dyed() -> impl Iterator<Item = [f32; 3]> {
 /// A pixel of the photo and of the screen behind it.
 type Pair = ([f32; 3], [f32; 3]);
 
-/// The asked pixels: wholly inside, and darkest in the channels that the screen has little of.
+/// The asked pixels: wholly inside, no bare screen, and darkest in the channels that the screen has little of.
 fn darkest(
     photo: &Image<LinearRgb>,
     plate: &ScreenPlate,
@@ -86,7 +90,12 @@ fn darkest(
     key: usize,
     share: f64,
 ) -> Vec<Pair> {
-    let whole: Vec<usize> = (0..photo.pixels().len()).filter(|&i| inside.pixels()[i].0 >= WHOLE).collect();
+    let is_bare = |i: usize| {
+        let (pixel, screen): Pair = (photo.pixels()[i].into(), plate.image.pixels()[i].into());
+        pixel[key] >= BARE * screen[key] && is_screen(pixel, screen)
+    };
+    let is_whole = |i: usize| inside.pixels()[i].0 >= WHOLE && !is_bare(i);
+    let whole: Vec<usize> = (0..photo.pixels().len()).filter(|&i| is_whole(i)).collect();
     let step = (whole.len() / ASKED[0]).max(1);
     let others = |i: usize| {
         let p: [f32; 3] = photo.pixels()[i].into();
@@ -173,5 +182,17 @@ mod tests {
             let told = found(flat, screen, key);
             assert!((0..3).all(|c| (told[c] - flat[c]).abs() < 0.06), "{told:?} for {flat:?}");
         }
+    }
+
+    #[test]
+    fn bare_screen_under_a_wide_mask_has_no_dye() {
+        let (key, all) = (1, Image::filled(60, 40, Coverage(1.0)));
+        let plate = ScreenPlate::even(GREEN, (60, 40));
+        assert_eq!(fit(&plate.image, &plate, &all, key, DARKEST).0, [CLEAR; 3]);
+        // Half of the mask is a brown bottle: the other half says nothing of it.
+        let (bottle, flat) = (photo([0.17, 0.05, 0.015], GREEN), [0.17, 0.05, 0.015]);
+        let half = Image::from_fn(60, 40, |x, y| if x < 30 { bottle[(x, y)] } else { GREEN });
+        let told = fit(&half, &plate, &all, key, DARKEST).0;
+        assert!((0..3).all(|c| (told[c] - flat[c]).abs() < 0.06), "{told:?}");
     }
 }

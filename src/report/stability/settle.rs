@@ -102,6 +102,7 @@ fn told(end: &Settled, typical: f64) -> String {
         Verdict::Escaped(ids) => format!("{} escaped", ids.len()),
         Verdict::Penetrating(_) => "sinks in".into(),
         Verdict::Exploded(_) => "gains energy".into(),
+        Verdict::Hanging(ids) => format!("{} hang in the air", ids.len()),
     };
     let [overlap, rise] = [end.overlap / typical, end.energy_rise].map(|share| share * 100.0);
     let tries = end.rejected.len() + 1;

@@ -8,7 +8,8 @@
 
 use super::units::Units;
 use super::{CARD, Fall, MASS};
-use crate::scene::SettleOptions;
+use crate::allowance::Allowance;
+use crate::error::Result;
 use crate::settle::trace::Sample;
 use crate::work::{self, Kind};
 use rapier3d::prelude::{PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle};
@@ -30,24 +31,34 @@ pub(super) struct Run<'a> {
     /// Of the objects that fall, in the order of `bodies`.
     pub(super) ids: Vec<usize>,
     pub(super) units: Units,
-    pub(super) options: &'a SettleOptions,
+    pub(super) pace: Pace,
+    /// Work of a step, for each body and pair.
+    pub(super) effort: u64,
+    pub(super) allowance: &'a Allowance<'a>,
+}
+
+/// Times of a fall, seconds in the world.
+pub(super) struct Pace {
+    pub(super) step: f64,
+    pub(super) time_limit: f64,
     /// Steps between samples; none where it is 0.
     pub(super) sample_every: usize,
 }
 
 impl Run<'_> {
     /// Steps until everything rests or the time is over.
-    pub(super) fn until_rest(mut self) -> Fall {
-        let steps = (self.options.time_limit / self.options.step).ceil() as usize;
+    pub(super) fn until_rest(mut self) -> Result<Fall> {
+        let Pace { step: dt, time_limit, .. } = self.pace;
+        let steps = (time_limit / dt).ceil() as usize;
         let (mut stillness, mut energy, mut fall) = (Stillness::default(), Energy::of(&self), Fall::default());
         fall.swept = [[f64::INFINITY, -f64::INFINITY]; 2];
-        let mut taken = 0;
         self.sample(&mut fall, 0);
         for step in 1..=steps {
+            self.allowance.take(self.work_of_step())?;
             // Nothing is active before the first step.
             self.world.step();
-            taken = step;
-            let now = step as f64 * self.options.step;
+            work::add(Kind::PhysicsSteps, 1);
+            let now = step as f64 * dt;
             let kinetic = energy.follow(&self);
             self.sweep(&mut fall.swept);
             self.sample(&mut fall, step);
@@ -58,10 +69,13 @@ impl Run<'_> {
                 break;
             }
         }
-        work::add(Kind::PhysicsSteps, taken as u64);
         fall.energy_rise = energy.rise();
         fall.poses = self.moving().map(|body| self.units.to_scene(body.position())).collect();
-        fall
+        Ok(fall)
+    }
+
+    fn work_of_step(&self) -> u64 {
+        (self.bodies.len() + self.world.narrow_phase.contact_graph().raw_graph().raw_edges().len()) as u64 * self.effort
     }
 
     fn moving(&self) -> impl Iterator<Item = &RigidBody> {
@@ -85,10 +99,11 @@ impl Run<'_> {
     }
 
     fn sample(&self, fall: &mut Fall, step: usize) {
-        if self.sample_every == 0 || !step.is_multiple_of(self.sample_every) {
+        let Pace { step: dt, sample_every, .. } = self.pace;
+        if sample_every == 0 || !step.is_multiple_of(sample_every) {
             return;
         }
-        let seconds = step as f64 * self.options.step / self.units.time;
+        let seconds = step as f64 * dt / self.units.time;
         let (per_length, per_time) = (1.0 / self.units.length, self.units.time);
         fall.samples.extend(self.ids.iter().zip(self.moving()).map(|(&object, body)| Sample {
             seconds,

@@ -101,7 +101,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         let (good, bad) = dataset::mend(&folder)?;
         print::line(format_args!("{}: {good} images are as they were written, {bad} are made again", folder.display()));
     }
-    let studio = Studio::open(setup)?;
+    let studio = Studio::open(setup)?.stopped_by(interruption());
     let plan = Plan { numbers, ..studio.plan(count, args.seed, &folder)? };
     let report = make(&studio, &plan, &args.consent, common)?;
     tell(&report);
@@ -130,7 +130,7 @@ pub(crate) fn ablate(args: &Ablate, common: &Common) -> anyhow::Result<()> {
         setup.write(&recipe)?;
         print::line(recipe.display());
         if args.count > 0 {
-            let studio = Studio::open(Setup::read(&recipe, &[])?)?;
+            let studio = Studio::open(Setup::read(&recipe, &[])?)?.stopped_by(interruption());
             let plan = studio.plan(args.count, args.seed, folder.join("dataset"))?;
             tell(&make(&studio, &plan, &args.consent, common)?);
         }

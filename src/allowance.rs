@@ -1,0 +1,106 @@
+//! How much work a picture may take, and who may stop it.
+
+use crate::error::{Error, Result};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Nobody stops it.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+/// What is left of the work that one picture may take, and a flag that ends it.
+///
+/// Work is counted, not timed: whether a picture is refused must not depend on the machine.
+#[derive(Debug)]
+pub struct Allowance<'a> {
+    most: u64,
+    left: Cell<u64>,
+    stop: &'a AtomicBool,
+}
+
+impl Allowance<'static> {
+    /// So much work.
+    pub fn new(most: u64) -> Self {
+        Self { most, left: Cell::new(most), stop: &NEVER }
+    }
+}
+
+impl<'a> Allowance<'a> {
+    /// The same, ended by a flag that turns true.
+    pub fn stopped_by(self, stop: &'a AtomicBool) -> Self {
+        Self { stop, ..self }
+    }
+
+    /// Takes some work from what is left.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] once the flag is true; [`Error::Unsettled`] where less is left.
+    pub(crate) fn take(&self, work: u64) -> Result<()> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted { what: "while objects fell".into() });
+        }
+        let left = self.left.get().checked_sub(work);
+        self.left.set(left.unwrap_or(0));
+        left.map(|_| ()).ok_or_else(|| self.spent())
+    }
+
+    /// Fails where more work is sure to come than is left.
+    ///
+    /// # Errors
+    /// [`Error::Unsettled`], and nothing is left.
+    pub(crate) fn check(&self, work: f64) -> Result<()> {
+        if work <= self.left.get() as f64 {
+            return Ok(());
+        }
+        self.left.set(0);
+        Err(self.spent())
+    }
+
+    /// How much was taken.
+    pub fn taken(&self) -> u64 {
+        self.most - self.left.get()
+    }
+
+    /// Whether nothing is left.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.left.get() == 0
+    }
+
+    /// The error of a picture that takes too much.
+    pub(crate) fn spent(&self) -> Error {
+        let what = format!(
+            "no rest within the work of one picture, {} (settle.most_work): expected fewer objects, a larger surface or \
+             longer steps",
+            self.most
+        );
+        Error::Unsettled { what }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_taken_until_none_is_left() {
+        let allowance = Allowance::new(10);
+        assert!(allowance.take(4).is_ok() && allowance.taken() == 4);
+        assert!(allowance.take(6).is_ok() && allowance.is_spent());
+        let told = allowance.take(1).unwrap_err().to_string();
+        assert!(told.starts_with("settle: no rest within the work of one picture, 10 "), "{told}");
+    }
+
+    #[test]
+    fn more_than_is_left_leaves_nothing() {
+        let allowance = Allowance::new(10);
+        assert!(allowance.take(u64::MAX).is_err() && allowance.is_spent());
+    }
+
+    #[test]
+    fn a_flag_ends_it_whatever_is_left() {
+        let stop = AtomicBool::new(false);
+        let allowance = Allowance::new(10).stopped_by(&stop);
+        assert!(allowance.take(1).is_ok());
+        stop.store(true, Ordering::Relaxed);
+        assert!(matches!(allowance.take(1), Err(Error::Interrupted { .. })));
+    }
+}

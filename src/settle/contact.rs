@@ -1,0 +1,231 @@
+//! Where bodies at rest push on each other, on the floor and on the walls.
+
+use super::overlap::{Solid, Touch};
+use crate::geom::Vector3;
+use nalgebra::Vector2;
+
+/// A point where a body is pushed.
+#[derive(Clone, Debug)]
+pub(super) struct Contact {
+    /// The body, as its index.
+    pub(super) body: usize,
+    /// The body that pushes back; none where it is the floor or a wall.
+    pub(super) by: Option<usize>,
+    /// Where.
+    pub(super) point: Vector3<f64>,
+    /// Unit vector that it is pushed along.
+    pub(super) normal: Vector3<f64>,
+    /// Nothing slides along it for free: anything but a wall.
+    pub(super) rough: bool,
+}
+
+/// All contacts of bodies that fell: with the room, and of the pairs that touch; what is nearer than `reach` (metres) does.
+pub(super) fn contacts(solids: &[Solid], touching: &[Touch], surface: [f64; 2], reach: f64) -> Vec<Contact> {
+    let fell = (0..solids.len()).filter(|&i| solids[i].falls);
+    let with_room = fell.flat_map(|i| with_room(i, &solids[i], surface, reach));
+    with_room.chain(touching.iter().flat_map(|touch| of_pair(solids, touch, reach))).collect()
+}
+
+/// Contacts with the floor and the walls.
+fn with_room(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> Vec<Contact> {
+    let [x, y] = surface.map(|side| side / 2.0);
+    let planes =
+        [(Vector3::z(), 0.0), (Vector3::x(), -x), (-Vector3::x(), -x), (Vector3::y(), -y), (-Vector3::y(), -y)];
+    let at = |(normal, plane): (Vector3<f64>, f64)| {
+        let touching = solid.corners().filter(move |corner| corner.dot(&normal) - plane < reach);
+        touching.map(move |point| Contact { body, by: None, point, normal, rough: normal.z > 0.0 })
+    };
+    planes.into_iter().flat_map(at).collect()
+}
+
+/// Contacts of two bodies: the corners of what their faces, edges or corners that are turned to each other share.
+fn of_pair(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
+    let Touch { pair: [i, j], towards, .. } = *touch;
+    let (a, b) = (&solids[i], &solids[j]);
+    let (u, v) = across(&towards);
+    let [near_a, near_b] = [(a, towards), (b, -towards)].map(|(solid, towards)| nearest(solid, &towards, reach));
+    let height = (near_a.height - near_b.height) / 2.0;
+    let [ring_a, ring_b] =
+        [near_a, near_b].map(|near| hull(near.corners.iter().map(|p| [p.dot(&u), p.dot(&v)].into())));
+    let shared = shared(&ring_a, &ring_b, reach);
+    let point = |p: Vector2<f64>| u * p.x + v * p.y + towards * height;
+    let contact = |p| Contact { body: i, by: Some(j), point: point(p), normal: -towards, rough: true };
+    shared.into_iter().map(contact).collect()
+}
+
+/// Two unit vectors across another one.
+pub(super) fn across(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let helper = if direction.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let u = helper.cross(direction).normalize();
+    (u, direction.cross(&u))
+}
+
+/// What of a body lies farthest in a direction.
+struct Nearest {
+    /// How far that is.
+    height: f64,
+    corners: Vec<Vector3<f64>>,
+}
+
+/// The corners that lie farthest in a direction, to `reach`.
+fn nearest(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Nearest {
+    let height = solid.corners().map(|corner| corner.dot(towards)).fold(f64::NEG_INFINITY, f64::max);
+    Nearest { height, corners: solid.corners().filter(|corner| corner.dot(towards) > height - reach).collect() }
+}
+
+/// Twice the area of a triangle, above 0 where it turns left.
+fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
+    (b - a).perp(&(c - a))
+}
+
+/// The convex hull of some points, counter-clockwise; two points or one where they have no area.
+///
+/// # Method
+/// Andrew 1979: the lower and the upper chain of the points in order of x.
+fn hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
+    let mut points: Vec<Vector2<f64>> = points.collect();
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    points.dedup();
+    if points.len() < 3 {
+        return points;
+    }
+    let chain = |points: &mut dyn Iterator<Item = &Vector2<f64>>| {
+        let mut chain: Vec<Vector2<f64>> = Vec::new();
+        for p in points {
+            while chain.len() > 1 && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], p) <= 0.0 {
+                chain.pop();
+            }
+            chain.push(*p);
+        }
+        chain.pop();
+        chain
+    };
+    let lower = chain(&mut points.iter());
+    [lower, chain(&mut points.iter().rev())].concat()
+}
+
+/// Corners of what two convex rings share, each widened by `reach`.
+fn shared(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vector2<f64>> {
+    let of_a = a.iter().filter(|p| is_near(p, b, reach));
+    let of_b = b.iter().filter(|p| is_near(p, a, reach));
+    let crossings = sides(a).flat_map(|s| sides(b).filter_map(move |t| crossing(s, t)));
+    of_a.chain(of_b).copied().chain(crossings).collect()
+}
+
+/// The sides of a ring; one of two points, none of one.
+fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
+    let count = if ring.len() < 3 { ring.len().saturating_sub(1) } else { ring.len() };
+    (0..count).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
+}
+
+/// Whether a point lies in a ring, or outside by `reach` at most.
+fn is_near(p: &Vector2<f64>, ring: &[Vector2<f64>], reach: f64) -> bool {
+    let inside = ring.len() > 2 && sides(ring).all(|[a, b]| turn(&a, &b, p) >= 0.0);
+    let beside = |[a, b]: [Vector2<f64>; 2]| {
+        let along = (b - a).dot(&(p - a)) / (b - a).norm_squared();
+        (a + (b - a) * along.clamp(0.0, 1.0) - p).norm() <= reach
+    };
+    inside || sides(ring).any(beside) || ring.iter().any(|corner| (corner - p).norm() <= reach)
+}
+
+/// Where two sides cross.
+fn crossing([a, b]: [Vector2<f64>; 2], [c, d]: [Vector2<f64>; 2]) -> Option<Vector2<f64>> {
+    let (from, to) = (turn(&c, &d, &a), turn(&c, &d, &b));
+    let (first, second) = (turn(&a, &b, &c), turn(&a, &b, &d));
+    (from * to < 0.0 && first * second < 0.0).then(|| a + (b - a) * (from / (from - to)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Pose, UnitQuaternion};
+    use crate::settle::overlap::touching;
+    use crate::settle::rectangle;
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+    const ROOM: [f64; 2] = [1.0, 1.0];
+    const REACH: f64 = 0.001;
+
+    fn plate(at: [f64; 3], angles: [f64; 3]) -> Solid {
+        let rotation = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
+        let half = Vector3::new(0.1, 0.04, 0.0025);
+        let outline = rectangle(half.x, half.y);
+        Solid { world_from_body: Pose::from_parts(at.into(), rotation), half, outline, falls: true }
+    }
+
+    fn all(solids: &[Solid]) -> Vec<Contact> {
+        contacts(solids, &touching(solids, REACH), ROOM, REACH)
+    }
+
+    /// Contacts of two plates with each other, the second over the first.
+    fn between(lower: Solid, upper: Solid) -> Vec<Contact> {
+        all(&[lower, upper]).into_iter().filter(|contact| contact.by.is_some()).collect()
+    }
+
+    /// Least and greatest x and y of contacts.
+    fn spread(contacts: &[Contact]) -> [[f64; 2]; 2] {
+        [0, 1].map(|axis| {
+            let along = contacts.iter().map(|contact| contact.point[axis]);
+            along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| [l.min(v), h.max(v)])
+        })
+    }
+
+    fn is_near(found: [[f64; 2]; 2], expected: [[f64; 2]; 2]) -> bool {
+        found.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-9)
+    }
+
+    #[test]
+    fn a_plate_on_the_floor_touches_it_with_four_corners() {
+        let found = all(&[plate([0.0, 0.0, 0.0027], [0.0; 3])]);
+        assert!(found.len() == 4 && found.iter().all(|c| c.normal == Vector3::z() && c.rough && c.by.is_none()));
+        let beside = all(&[plate([0.4, 0.0, 0.1], [0.0; 3])]);
+        assert!(beside.len() == 4 && beside.iter().all(|c| c.normal == -Vector3::x() && !c.rough));
+    }
+
+    #[test]
+    fn plates_across_each_other_share_the_square_in_the_middle() {
+        let crossed = between(plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, 0.0054], [0.0, 0.0, FRAC_PI_2]));
+        assert!(is_near(spread(&crossed), [[-0.04, 0.04]; 2]), "{crossed:?}");
+        // The second is pushed up, by the first.
+        assert!(crossed.iter().all(|c| c.body == 1 && c.by == Some(0) && (c.normal - Vector3::z()).norm() < 1e-9));
+        assert!(crossed.iter().all(|c| (c.point.z - 0.0027).abs() < 1e-9));
+    }
+
+    #[test]
+    fn an_edge_on_a_face_touches_along_a_line() {
+        let upright = plate([0.0, 0.01, 0.0427], [FRAC_PI_2, 0.0, 0.0]);
+        assert!(is_near(spread(&between(plate([0.0; 3], [0.0; 3]), upright)), [[-0.1, 0.1], [0.0075, 0.0125]]));
+        let height = 0.04 * libm::sin(FRAC_PI_4) + 0.0025 * libm::cos(FRAC_PI_4) + 0.0027;
+        let tilted = between(plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, height], [FRAC_PI_4, 0.0, 0.0]));
+        let [x, y] = spread(&tilted);
+        assert!(is_near([x, [0.0; 2]], [[-0.1, 0.1], [0.0; 2]]) && (y[1] - y[0]).abs() < 1e-9, "{tilted:?}");
+    }
+
+    #[test]
+    fn crossed_edges_touch_in_one_point() {
+        // Edge along x, under an edge along y.
+        let top = 0.04 * libm::sin(FRAC_PI_4) + 0.0025 * libm::cos(FRAC_PI_4);
+        let lower = plate([0.0; 3], [FRAC_PI_4, 0.0, 0.0]);
+        let upper = plate([0.0, 0.0, 2.0 * top + 0.0004], [FRAC_PI_4, 0.0, FRAC_PI_2]);
+        let found = between(lower, upper);
+        let [x, y] = spread(&found);
+        assert!(!found.is_empty() && x[1] - x[0] < 1e-9 && y[1] - y[0] < 1e-9, "{found:?}");
+        assert!(found.iter().all(|c| (c.point.z - top - 0.0002).abs() < 1e-9 && (c.normal.z - 1.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn what_is_farther_than_the_reach_does_not_touch() {
+        assert!(between(plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, 0.0061], [0.0; 3])).is_empty());
+        let [a, b] =
+            [plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, 0.0054], [0.0; 3])].map(|p| Solid { falls: false, ..p });
+        assert!(all(&[a, b]).is_empty());
+    }
+
+    #[test]
+    fn a_hull_goes_round_once_and_leaves_out_what_is_inside() {
+        let of = |points: &[[f64; 2]]| hull(points.iter().map(|&p| p.into())).len();
+        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5], [0.5, 0.0]]), 4);
+        assert_eq!((of(&[[0.0, 0.0], [1.0, 1.0]]), of(&[[0.0, 0.0]]), of(&[])), (2, 1, 0));
+        assert_eq!(of(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]), 2);
+    }
+}
