@@ -1,6 +1,6 @@
 //! The plane of the screen in a photo, by what lies in it: the screen's own four corners, or a printed marker.
 
-use crate::camera::{self, Camera, Label, Solution, TELLING, any_markers, rectify};
+use crate::camera::{self, Camera, Label, Marker, Solution, TELLING, any_markers, rectify};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::geom::{Point2, Point3, Pose, UnitQuaternion, Vector3};
@@ -162,12 +162,13 @@ impl OnScreen {
 
     /// The photo without its markers, whose black squares have sides of so many metres; the largest tells the plane.
     pub(super) fn by_marker(photo: Image<LinearRgb>, side: f64, height: f64, header: &Header) -> Result<Self> {
-        let (markers, sigma_px) = any_markers(&photo);
+        let markers = any_markers(&photo);
         let area = |corners: &[Point2<f64>; 4]| (corners[2] - corners[0]).perp(&(corners[3] - corners[1])).abs();
         let largest = markers.iter().max_by(|a, b| area(&a.corners_px).total_cmp(&area(&b.corners_px)));
         let none = || unfit("no marker (AprilTag tag36h11, ArUco DICT_4X4_50) was found on it");
-        let corners_px = from_top_left(largest.ok_or_else(none)?.corners_px);
-        let ground = Ground::of(&Reference { size: [side; 2], corners_px, sigma_px }, size_of(&photo), header)?;
+        let Marker { corners_px, sigma_px, .. } = *largest.ok_or_else(none)?;
+        let reference = Reference { size: [side; 2], corners_px: from_top_left(corners_px), sigma_px };
+        let ground = Ground::of(&reference, size_of(&photo), header)?;
         let view = View::of_photo(ground, height)?;
         let mut free = photo;
         for marker in &markers {

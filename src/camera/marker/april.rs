@@ -50,7 +50,11 @@ fn marker(tag: &Detection, artwork: Artwork) -> Option<Marker> {
         Artwork::Opencv => [1, 0, 3, 2],
     };
     let corners = tag.corners();
-    Some(Marker { id: u32::try_from(tag.id()).ok()?, corners_px: order.map(|i| Point2::from(corners[i])) })
+    Some(Marker {
+        id: u32::try_from(tag.id()).ok()?,
+        corners_px: order.map(|i| Point2::from(corners[i])),
+        sigma_px: CORNER_SIGMA_PX,
+    })
 }
 
 #[cfg(test)]

@@ -13,6 +13,9 @@ const FORGIVEN: u32 = 1;
 /// White has to be this many times brighter than black.
 const CONTRAST: f32 = 1.6;
 
+/// From here on a white cell counts as too bright for the sensor, scene-linear.
+const OVEREXPOSED: f32 = 0.95;
+
 /// `DICT_4X4_50` of OpenCV 5.0 (`getPredefinedDictionary`, `getBitsFromByteList`): row by row from the top left, the
 /// highest bit first, 1 is white.
 const DICT_4X4_50: [u16; 50] = [
@@ -38,6 +41,8 @@ pub(super) struct Reading {
     pub(super) turns: usize,
     /// Which cells are white, row by row from the first corner.
     pub(super) white: [[bool; CELLS]; CELLS],
+    /// White is as bright as the picture's format can say.
+    pub(super) is_overexposed: bool,
 }
 
 /// The marker between four corners (clockwise).
@@ -65,7 +70,7 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Rea
         }
     }
     let (id, turns) = if bright < CONTRAST * dark { None } else { lookup(code) }?;
-    Some(Reading { id, turns, white })
+    Some(Reading { id, turns, white, is_overexposed: bright >= OVEREXPOSED })
 }
 
 /// The mean of nine samples inside a cell.

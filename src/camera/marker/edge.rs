@@ -20,65 +20,111 @@ const INNER_REACH_CELLS: f64 = 0.45;
 /// White that has grown by more, pixels, is another fault; fewer edges than these do not tell.
 const MOST_GROWTH_PX: f64 = 1.0;
 const FEWEST_EDGES: usize = 6;
+/// So often the sides are fitted anew at most; corners that move by less stay.
+const MOST_ROUNDS: usize = 6;
+const SETTLED_PX: f64 = 0.01;
+/// Noise of a corner of a marker that is seen as sharp as can be, pixels.
+const LEAST_SIGMA_PX: f64 = 0.03;
+/// Errors of the outline beside those of the cells' edges, which are told by fewer pixels: on rendered views of 0 to 59
+/// degrees, sharp and blurred, it is 0.4 to 0.8.
+const SIDE_SHARE: f64 = 0.5;
 /// Probes farther than this from the fitted line do not belong to it, pixels.
 const OFF_LINE_PX: f64 = 0.7;
+
+/// Corners of a dark square, and how well they are known.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corners {
+    pub(super) px: [Point2<f64>; 4],
+    /// Standard deviation of a coordinate, pixels.
+    pub(super) sigma_px: f64,
+}
 
 /// The corners where the fitted sides of a dark quadrangle meet; none where a side shows no edge.
 pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
     let mut corners = *rough;
-    // The second time the probes stand where the sides are.
-    for _ in 0..2 {
+    // From the second time on the probes stand where the sides are.
+    for _ in 0..MOST_ROUNDS {
         let mut lines = [Line { normal: Vector2::zeros(), offset: 0.0 }; 4];
         for (i, line) in lines.iter_mut().enumerate() {
             *line = side(light, &corners, i)?;
         }
+        let before = corners;
         for i in 0..4 {
             corners[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
+        }
+        if (0..4).all(|i| (corners[i] - before[i]).norm() < SETTLED_PX) {
+            break;
         }
     }
     Some(corners)
 }
 
-/// The corners of a marker in a picture whose white has grown over its black: too bright for the sensor, a pixel that is
-/// half white is as white as one that is all white, and every edge moves into the dark.
+/// The corners of a marker by what its cells tell of them.
 ///
-/// The cells tell by how much: each edge between them that rises along an axis has moved back, each that falls, forward,
-/// while the grid they should lie on has shrunk with the outline. Least squares over all edges of the pattern.
-pub(super) fn without_growth(
+/// In a picture that is too bright for the sensor white has grown over black: a pixel that is half white is as white as one
+/// that is all white, and every edge moves into the dark. The cells tell by how much: each edge between them that rises
+/// along an axis has moved back, each that falls, forward, while the grid they should lie on has shrunk with the outline.
+/// Least squares over all edges of the pattern. How far they are off after that is how far the outline can be believed:
+/// blur moves both where cells are narrow.
+pub(super) fn by_cells(
     light: &Image<f32>,
     corners: &[Point2<f64>; 4],
     white: &[[bool; CELLS]; CELLS],
-) -> Option<[Point2<f64>; 4]> {
-    let growth = growth(light, corners, white);
+    is_overexposed: bool,
+) -> Option<Corners> {
+    let cells = Cells::of(light, corners, white);
+    let growth = if is_overexposed { cells.growth() } else { 0.0 };
     let lines = [0, 1, 2, 3].map(|i| {
         let along = corners[(i + 1) % 4] - corners[i];
         let normal = Vector2::new(along.y, -along.x).normalize();
         Line { normal, offset: normal.dot(&corners[i].coords) + growth }
     });
-    let mut grown = *corners;
+    let mut px = *corners;
     for i in 0..4 {
-        grown[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
+        px[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
     }
-    Some(grown)
+    let off = cells.off(growth);
+    // Lines that meet at an acute angle meet far away when one is off.
+    let spread = (0..4).map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2)).sum::<f64>() / 4.0;
+    Some(Corners { px, sigma_px: libm::hypot(LEAST_SIGMA_PX, SIDE_SHARE * off * spread.sqrt()) })
 }
 
-/// How far white has grown over black, pixels; 0 where too few edges tell.
-fn growth(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &[[bool; CELLS]; CELLS]) -> f64 {
-    let photo_from_square = square_from_corners(corners);
-    let place = |edge: &InnerEdge, along: f64| {
-        let (along, across) = (along / CELLS as f64, (edge.across as f64 + 0.5) / CELLS as f64);
-        photo_from_square.map(if edge.upright { Point2::new(across, along) } else { Point2::new(along, across) })
-    };
-    let (mut xy, mut xx, mut count) = (0.0, 0.0, 0);
-    for edge in inner_edges(white) {
-        let along = edge.along as f64;
-        let (foot, step) = (place(&edge, along), place(&edge, along + 0.5) - place(&edge, along - 0.5));
-        let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
-        let Some(moved) = crossing(light, foot, step.normalize() * edge.rising, reach) else { continue };
-        let x = 2.0 * along / CELLS as f64 - edge.rising - 1.0;
-        (xy, xx, count) = (xy + x * moved * edge.rising, xx + x * x, count + 1);
+/// How far the edges between the cells of a marker are from where its corners put them.
+struct Cells {
+    /// For each edge by how much a growth of white by a pixel would move it, and by how much it is moved, both towards
+    /// where it rises along its axis, pixels.
+    moved: Vec<[f64; 2]>,
+}
+
+impl Cells {
+    fn of(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &[[bool; CELLS]; CELLS]) -> Self {
+        let photo_from_square = square_from_corners(corners);
+        let place = |edge: &InnerEdge, along: f64| {
+            let (along, across) = (along / CELLS as f64, (edge.across as f64 + 0.5) / CELLS as f64);
+            photo_from_square.map(if edge.upright { Point2::new(across, along) } else { Point2::new(along, across) })
+        };
+        let moved = |edge: &InnerEdge| {
+            let along = edge.along as f64;
+            let (foot, step) = (place(edge, along), place(edge, along + 0.5) - place(edge, along - 0.5));
+            let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
+            let moved = crossing(light, foot, step.normalize() * edge.rising, reach)?;
+            Some([2.0 * along / CELLS as f64 - edge.rising - 1.0, moved * edge.rising])
+        };
+        Self { moved: inner_edges(white).iter().filter_map(moved).collect() }
     }
-    if count < FEWEST_EDGES { 0.0 } else { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) }
+
+    /// How far white has grown over black, pixels; 0 where too few edges tell.
+    fn growth(&self) -> f64 {
+        let (xy, xx) = self.moved.iter().fold((0.0, 0.0), |(xy, xx), [x, y]| (xy + x * y, xx + x * x));
+        if self.moved.len() < FEWEST_EDGES { 0.0 } else { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) }
+    }
+
+    /// Root mean square distance of the edges from their places when white has grown so far, pixels; of too few edges a
+    /// pixel.
+    fn off(&self, growth: f64) -> f64 {
+        let squares = self.moved.iter().map(|[x, y]| (y - growth * x) * (y - growth * x));
+        if self.moved.len() < FEWEST_EDGES { 1.0 } else { (squares.sum::<f64>() / self.moved.len() as f64).sqrt() }
+    }
 }
 
 /// An edge between a black and a white cell.

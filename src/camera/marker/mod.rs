@@ -4,7 +4,8 @@
 //! # Method
 //! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each side is then fitted as a
 //! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. Their edges
-//! tell how far an overexposed white has grown over the black, and the corners are moved back by that. The bits are looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
+//! tell how far an overexposed white has grown over the black, and the corners are moved back by that; they also tell how
+//! far the outline can be believed, which from a steep side and out of focus is less than from above. The bits are looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
 
 #[cfg(feature = "markers")]
 mod april;
@@ -22,8 +23,9 @@ use crate::pixel::LinearRgb;
 
 /// The family of markers that is always found.
 pub const FAMILY: &str = "DICT_4X4_50";
-/// Noise of a marker's corner, pixels: root mean square on the sample background with markers.
-const CORNER_SIGMA_PX: f64 = 0.15;
+/// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no marker by itself tells.
+/// Root mean square on the sample background with markers.
+const LEAST_SIGMA_PX: f64 = 0.15;
 /// Markers that fit less well than this are tried in the other directions, too.
 const IMPROBABLE: f64 = 1e-4;
 
@@ -34,6 +36,8 @@ pub struct Marker {
     pub id: u32,
     /// Corners of its black square as printed: top left, top right, bottom right, bottom left, pixels.
     pub corners_px: [Point2<f64>; 4],
+    /// Standard deviation of their coordinates, pixels.
+    pub sigma_px: f64,
 }
 
 /// All markers of [`FAMILY`] in a scene-linear photo, in order of number and then of place.
@@ -43,25 +47,26 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
         .into_iter()
         .filter_map(|rough| {
             let fine = edge::refined(&light, &rough)?;
-            let dictionary::Reading { id, turns, white } = dictionary::read(&light, &fine)?;
-            let corners = edge::without_growth(&light, &fine, &white)?;
-            Some(Marker { id, corners_px: [0, 1, 2, 3].map(|i| corners[(i + turns) % 4]) })
+            let dictionary::Reading { id, turns, white, is_overexposed } = dictionary::read(&light, &fine)?;
+            let edge::Corners { px, sigma_px } = edge::by_cells(&light, &fine, &white, is_overexposed)?;
+            Some(Marker { id, corners_px: [0, 1, 2, 3].map(|i| px[(i + turns) % 4]), sigma_px })
         })
         .collect();
     found.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners_px[0].x.total_cmp(&b.corners_px[0].x)));
     found
 }
 
-/// The markers of every family that is known, of which nothing but their size is told; and the noise of their corners.
-pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> (Vec<Marker>, f64) {
+/// The markers of every family that is known, of which nothing but their size is told.
+pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     #[cfg(feature = "markers")]
     {
         let tags = april::find(photo, super::label::Artwork::Apriltag);
         if !tags.is_empty() {
-            return (tags, april::CORNER_SIGMA_PX);
+            return tags;
         }
     }
-    (find_markers(photo), CORNER_SIGMA_PX)
+    let floored = |marker: Marker| Marker { sigma_px: marker.sigma_px.max(LEAST_SIGMA_PX), ..marker };
+    find_markers(photo).into_iter().map(floored).collect()
 }
 
 /// The label with the corners of its markers, found in its photo, as points of known place.
@@ -76,12 +81,12 @@ pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
     let Some(map) = &label.markers else {
         return Err(Error::value("markers", "missing, expected family, size_m and map"));
     };
-    let (mut found, sigma_px) = find_family(map, photo)?;
+    let (mut found, least_px) = find_family(map, photo)?;
     found.retain(|marker| map.map.contains_key(&marker.id));
     if found.is_empty() {
         return Err(Error::value("markers", "none of them was found in the photo"));
     }
-    let turned = |turns| with_points(&label, map, &found, sigma_px, turns);
+    let turned = |turns| with_points(&label, map, &found, least_px, turns);
     let turns = turns_that_fit(turned);
     if turns > 0 {
         let degrees = 90 * turns;
@@ -92,10 +97,10 @@ pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
     Ok(turned(turns))
 }
 
-/// The markers of a map's family, and the noise of their corners.
+/// The markers of a map's family, and the least noise that is stated of their corners.
 fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>, f64)> {
     match map.family.as_str() {
-        FAMILY => Ok((find_markers(photo), CORNER_SIGMA_PX)),
+        FAMILY => Ok((find_markers(photo), LEAST_SIGMA_PX)),
         #[cfg(feature = "markers")]
         april::FAMILY => Ok((april::find(photo, map.artwork), april::CORNER_SIGMA_PX)),
         #[cfg(not(feature = "markers"))]
@@ -107,7 +112,7 @@ fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>
 }
 
 /// The label with the corners of some markers as points, each marker turned by so many right angles.
-fn with_points(label: &Label, map: &MarkerMap, found: &[Marker], sigma_px: f64, turns: usize) -> Label {
+fn with_points(label: &Label, map: &MarkerMap, found: &[Marker], least_px: f64, turns: usize) -> Label {
     let mut label = label.clone();
     let half = map.size_m / 2.0;
     let offset = if label.pixel_origin == PixelOrigin::Center { 0.5 } else { 0.0 };
@@ -118,7 +123,7 @@ fn with_points(label: &Label, map: &MarkerMap, found: &[Marker], sigma_px: f64, 
             label.points.push(LabelPoint {
                 xyz_m: [x, y, *z],
                 px: [px.x - offset, px.y - offset],
-                sigma_px: Some(sigma_px),
+                sigma_px: Some(marker.sigma_px.max(least_px)),
                 note: Some(format!("marker {}", marker.id)),
             });
         }
@@ -172,6 +177,68 @@ mod tests {
                 let (truth, _) = camera.project([x, y, 0.0].into()).unwrap();
                 let error = (found[0].corners_px[i] - truth).norm();
                 assert!(error < 0.15, "{id} at {tilt}, corner {i}: {error}");
+            }
+        }
+    }
+
+    /// A photo of one marker on a grey table, and its camera.
+    fn photo(id: u32, tilt: f64, fill: f64, k: u64) -> (Image<LinearRgb>, crate::Camera) {
+        let scenario = Scenario { image: [320, 240], focal_px: 300.0, size: [0.4, 0.4], fill, ..Scenario::default() };
+        let camera = scenario.tilted(tilt).view(11, k).camera;
+        let sheet = Pyramid::new(printed(id, 16));
+        let seen = super::super::project_picture(&sheet, &camera, [0.4, 0.4]);
+        let alpha = Pyramid::new(Image::filled(128, 128, crate::Coverage(1.0)));
+        let alpha = super::super::project_picture(&alpha, &camera, [0.4, 0.4]);
+        let seen = seen.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
+        (seen, camera)
+    }
+
+    /// Normal noise, as the sum of twelve uniform numbers.
+    fn noisy(photo: &Image<LinearRgb>, sigma: f32) -> Image<LinearRgb> {
+        let width = photo.width();
+        let uniform = |i: usize| {
+            let seed = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            ((seed ^ (seed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f32 / 16_777_216.0
+        };
+        Image::from_fn(width, photo.height(), |x, y| {
+            let noise = (0..12).map(|i| uniform(12 * (y * width + x) + i)).sum::<f32>() - 6.0;
+            photo[(x, y)].add_scaled_grey(sigma * noise)
+        })
+    }
+
+    /// Distances of a found marker's corners from the truth, in those that its standard deviation makes expect.
+    fn ratios(found: &Marker, camera: &crate::Camera) -> [f64; 4] {
+        let places = [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]];
+        let expected = found.sigma_px * (std::f64::consts::PI / 2.0).sqrt();
+        [0, 1, 2, 3].map(|i| {
+            let [x, y] = places[i];
+            (found.corners_px[i] - camera.project([x, y, 0.0].into()).unwrap().0).norm() / expected
+        })
+    }
+
+    #[test]
+    fn corners_are_as_sure_as_they_say_from_any_side_sharp_or_blurred() {
+        for tilt in [0.0, 45.0, 59.0] {
+            let mut all = [const { Vec::new() }; 3];
+            for (k, fill) in (0..8).zip([0.9, 0.3].into_iter().cycle()) {
+                let (sharp, camera) = photo(k as u32 * 6, tilt, fill, k);
+                for (blur, all) in [0.0, 0.7, 1.2].into_iter().zip(&mut all) {
+                    let photo = if blur > 0.0 { crate::filter::gaussian_blur(&sharp, blur) } else { sharp.clone() };
+                    all.extend(find_markers(&noisy(&photo, 0.01)).iter().flat_map(|found| ratios(found, &camera)));
+                }
+            }
+            for (blur, all) in ["sharp", "soft", "blurred"].into_iter().zip(&all) {
+                let mean = all.iter().sum::<f64>() / all.len() as f64;
+                let most = all.iter().copied().fold(0.0, f64::max);
+                println!(
+                    "{tilt} degrees, {blur}: {} corners, errors {mean:.2} times as large as stated, at most {most:.2}",
+                    all.len()
+                );
+                assert!(
+                    all.len() >= 20 && (0.5..1.5).contains(&mean),
+                    "{tilt} degrees, {blur}: {mean} of {}",
+                    all.len()
+                );
             }
         }
     }
