@@ -17,8 +17,8 @@ const TAPE_SIGMA: f64 = 0.003;
 const HEIGHT_SIGMA: f64 = 0.25;
 /// What is drawn in from the border of the screen, as a share of its sides: edges and worn corners.
 const INSET: f64 = 0.02;
-/// A marker has a white margin, at most as wide as so many of its cells of eight.
-const MARGIN: f64 = 2.0 / 8.0;
+/// A marker has a white margin, at most as wide as this share of its black square.
+const MARGIN: f64 = 0.35;
 /// Less probable fits are those of another rectangle, and worth a look.
 const IMPOSSIBLE: f64 = 1e-6;
 const IMPROBABLE: f64 = 0.01;

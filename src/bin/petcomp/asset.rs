@@ -18,7 +18,7 @@ pub(crate) enum Command {
         output: PathBuf,
     },
     /// Cut out photos of one object
-    Add(Add),
+    Add(Box<Add>),
     /// Show what an asset folder holds: name, class, size, how sure outline and colour are (0 to 1), file
     List {
         /// Asset folder
@@ -92,7 +92,8 @@ struct ScaleArgs {
     /// seen
     #[arg(long, value_name = "WxH", value_parser = crate::camera::dimensions)]
     screen_size: Option<[f64; 2]>,
-    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11 or ArUco DICT_4X4_50)
+    /// Or: side of the black square of a printed marker on the screen, metres (AprilTag tag36h11 or ArUco DICT_4X4_50); cut
+    /// its paper to a white margin of at most a third of that
     #[arg(long, value_name = "METRES")]
     marker_size: Option<f64>,
 }
