@@ -95,7 +95,8 @@ pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
 }
 
 fn refused(what: impl std::fmt::Display) -> Error {
-    let instead = "photograph all of it on something of another colour, or measure the object's length with a tape";
+    let instead = "photograph all of it on something of another colour, give its corners (`asset add --screen-corners`), \
+                   or measure the object's length with a tape";
     Error::Photo { what: format!("the corners of the screen cannot be found: {what}; {instead}") }
 }
 
