@@ -142,7 +142,8 @@ pub(super) fn film_of_part(
     let grey = (!is_keyable(screen)).then_some(Remark::GreyScreen(screen));
     let (flat, tint) = match (opts.flat, &grey) {
         (Some(flat), _) => (flat.into(), 0.0),
-        (None, Some(_)) => tint::fit(&calm, plate, inside, key, 1.0),
+        // That the tint may be another is part of the guess.
+        (None, Some(_)) => (tint::fit(&calm, plate, inside, key, 1.0).0, 0.0),
         (None, None) => tint::fit(&calm, plate, inside, key, tint::DARKEST),
     };
     watch.lap("tint");

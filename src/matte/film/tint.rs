@@ -175,6 +175,19 @@ mod tests {
     }
 
     #[test]
+    fn the_tint_of_plastic_of_the_screens_hue_is_unsure_and_known_to_be() {
+        let unsure = |flat: [f32; 3], screen, key| {
+            let plate = ScreenPlate::even(screen, (60, 40));
+            fit(&photo(flat, screen), &plate, &Image::filled(60, 40, Coverage(1.0)), key, DARKEST).1
+        };
+        for green in [[0.05, 0.3, 0.09], [0.03, 0.27, 0.06]] {
+            let [on_green, on_blue] = [unsure(green, GREEN, 1), unsure(green, BLUE, 2)];
+            assert!(on_green > 0.08 && on_blue < 0.03, "{on_green} {on_blue}");
+        }
+        assert!(unsure([CLEAR; 3], GREEN, 1) < 0.03 && unsure([CLEAR; 3], BLUE, 2) < 0.03);
+    }
+
+    #[test]
     fn dyes_are_told_apart_where_they_are_not_the_screens() {
         for (flat, screen, key) in
             [([0.17, 0.38, 0.54], GREEN, 1), ([0.05, 0.3, 0.09], BLUE, 2), ([0.17, 0.05, 0.015], GREEN, 1)]
