@@ -145,8 +145,10 @@ pub fn settle_within(
             return Ok((Settled { scene, verdict, rejected, seconds, overlap, energy_rise }, samples));
         }
         log::debug!("settle: try {} ended badly: {verdict:?}", rejected.len() + 1);
-        // What has sunk in needs stiffer contacts, which shorter steps bear.
-        finer = (finer + u32::from(overlap.is_finite() && overlap > most_overlap(&scene, options))).min(FINEST);
+        // What has sunk in needs stiffer contacts, which shorter steps bear; what has gained energy met too hard in one step,
+        // and would again from most heights.
+        let sank = overlap.is_finite() && overlap > most_overlap(&scene, options);
+        finer = (finer + u32::from(sank || matches!(verdict, Verdict::Exploded(_)))).min(FINEST);
         rejected.push(verdict);
     }
 }
