@@ -14,7 +14,7 @@ use super::pinhole::distorted;
 use super::problem::corner_points;
 use super::search::TELLING;
 use super::solution::Sigma;
-use super::uncertainty::heights;
+use super::uncertainty::{heights, variance};
 use super::warning::Warning;
 use crate::geom::{Point2, Vector2};
 
@@ -75,7 +75,7 @@ impl Solution {
     fn height_apart_px(&self, other: &Self) -> f64 {
         let height = self.sigma.reference_height;
         let pairs = heights(self.size, height).zip(heights(other.size, height));
-        let squares: Vec<f64> = pairs.map(|(a, b)| (other.sees(b) - self.sees(a)).norm_squared()).collect();
+        let squares: Vec<f64> = pairs.map(|(a, b)| variance((other.sees(b) - self.sees(a)).norm_squared())).collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 

@@ -92,7 +92,7 @@ impl Uncertainty {
     /// Root mean square error, pixels, of points over the rectangle at a height of `height` metres.
     pub(crate) fn height_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
         let traces = heights(problem.size, height)
-            .map(|point| self.seen(problem, state, point.coords).map_or(f64::INFINITY, |c| c.trace()));
+            .map(|point| self.seen(problem, state, point.coords).map_or(f64::INFINITY, |c| variance(c.trace())));
         (traces.sum::<f64>() / (GRID * GRID) as f64).sqrt()
     }
 
@@ -101,6 +101,11 @@ impl Uncertainty {
         let variance = self.covariance[(PRINCIPAL, PRINCIPAL)] + self.covariance[(PRINCIPAL + 1, PRINCIPAL + 1)];
         problem.frame.unit_px * (variance / 2.0).sqrt()
     }
+}
+
+/// A variance as rounding has left it: nothing is surer than sure, and what is no number is not known at all.
+pub(crate) fn variance(value: f64) -> f64 {
+    if value.is_nan() { f64::INFINITY } else { value.max(0.0) }
 }
 
 /// Points of a grid over a rectangle, metres, at a height.
