@@ -1,4 +1,5 @@
 //! How much work a picture may take, and who may stop it.
+#![cfg_attr(not(feature = "settle"), allow(dead_code, reason = "only falls take work"))]
 
 use crate::error::{Error, Result};
 use std::cell::Cell;
