@@ -97,18 +97,18 @@ impl AddPhoto {
     /// The scale makes a thing of the object that can be photographed on a screen.
     fn check_length(&self, record: &PhotoRecord) -> Result<()> {
         let length = record.object_m[0];
-        let (at, told, pixels_for) = match self.scale {
-            Scale::Length(_) | Scale::Size(_) => return Ok(()),
-            Scale::PxPerMetre(scale) => ("px_per_metre", number(scale), "pixels for "),
-            Scale::Screen([w, h], _) => ("screen_size", format!("{} x {}", number(w), number(h)), "in "),
-            Scale::Marker(side) => ("marker_size", number(side), "in "),
-        };
         if OBJECT.contains(length) {
             return Ok(());
         }
-        let unit = |unit| if pixels_for == "in " { format!("{unit}s") } else { format!("a {unit}") };
-        let question =
-            OBJECT.unit_meant(length).map_or(String::new(), |meant| format!("; is it {pixels_for}{}?", unit(meant)));
+        let pixels_for = || OBJECT.unit_meant(length).map(|unit| format!("; is it pixels for a {unit}?"));
+        let (at, told, question) = match self.scale {
+            Scale::Length(_) | Scale::Size(_) => return Ok(()),
+            Scale::PxPerMetre(scale) => ("px_per_metre", number(scale), pixels_for().unwrap_or_default()),
+            Scale::Screen([w, h], _) => {
+                ("screen_size", format!("{} x {}", number(w), number(h)), OBJECT.question(length))
+            }
+            Scale::Marker(side) => ("marker_size", number(side), OBJECT.question(length)),
+        };
         let (source, length) = (&record.source, number((1e4 * length).round() / 1e4));
         let what = format!("{told}, makes what is in {source} {length} m long, expected {OBJECT}{question}");
         Err(Error::value(at, what))

@@ -5,7 +5,6 @@ mod doubts;
 mod planes;
 mod solve;
 pub(super) mod tint;
-
 mod view;
 
 pub use doubts::ColorDoubts;
