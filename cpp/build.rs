@@ -15,7 +15,10 @@ fn shim() {
     for file in ["cpp/oiio_shim.h", "cpp/oiio_shim.cpp", "src/io/ffi.rs"] {
         println!("cargo:rerun-if-changed={file}");
     }
-    let oiio = pkg_config::Config::new().atleast_version(OLDEST).cargo_metadata(false).probe("OpenImageIO");
+    let oiio = pkg_config::Config::new()
+        .atleast_version(OLDEST)
+        .cargo_metadata(false)
+        .probe("OpenImageIO");
     let oiio = oiio.unwrap_or_else(|_| {
         println!(
             "cargo:error=the feature `oiio` needs OpenImageIO {OLDEST} or newer, a C++ compiler and pkg-config: \

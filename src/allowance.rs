@@ -1,5 +1,8 @@
 //! How much work a picture may take, and who may stop it.
-#![cfg_attr(not(feature = "settle"), allow(dead_code, reason = "only falls take work"))]
+#![cfg_attr(
+    not(feature = "settle"),
+    allow(dead_code, reason = "only falls take work")
+)]
 
 use crate::error::{Error, Result};
 use std::cell::Cell;
@@ -21,7 +24,11 @@ pub struct Allowance<'a> {
 impl Allowance<'static> {
     /// So much work.
     pub fn new(most: u64) -> Self {
-        Self { most, left: Cell::new(most), stop: &NEVER }
+        Self {
+            most,
+            left: Cell::new(most),
+            stop: &NEVER,
+        }
     }
 }
 
@@ -37,7 +44,9 @@ impl<'a> Allowance<'a> {
     /// [`Error::Interrupted`] once the flag is true; [`Error::Unsettled`] where less is left.
     pub(crate) fn take(&self, work: u64) -> Result<()> {
         if self.stop.load(Ordering::Relaxed) {
-            return Err(Error::Interrupted { what: "while objects fell".into() });
+            return Err(Error::Interrupted {
+                what: "while objects fell".into(),
+            });
         }
         let left = self.left.get().checked_sub(work);
         self.left.set(left.unwrap_or(0));
@@ -87,7 +96,10 @@ mod tests {
         assert!(allowance.take(4).is_ok() && allowance.taken() == 4);
         assert!(allowance.take(6).is_ok() && allowance.is_spent());
         let told = allowance.take(1).unwrap_err().to_string();
-        assert!(told.starts_with("settle: no rest within the work of one picture, 10 "), "{told}");
+        assert!(
+            told.starts_with("settle: no rest within the work of one picture, 10 "),
+            "{told}"
+        );
     }
 
     #[test]

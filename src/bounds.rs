@@ -41,12 +41,22 @@ const RATHER_MILLIMETRES: f64 = 100.0;
 impl Bounds {
     /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is the quantity's own.
     pub(crate) const fn new(lowest: f64, highest: f64, why: &'static str) -> Self {
-        Self { lowest, highest, unit: "", why }
+        Self {
+            lowest,
+            highest,
+            unit: "",
+            why,
+        }
     }
 
     /// Lengths, metres: a value that would do in millimetres or centimetres is asked about.
     pub(crate) const fn metres(lowest: f64, highest: f64, why: &'static str) -> Self {
-        Self { lowest, highest, unit: " m", why }
+        Self {
+            lowest,
+            highest,
+            unit: " m",
+            why,
+        }
     }
 
     /// The number is one of them; NaN is not.
@@ -60,7 +70,10 @@ impl Bounds {
         if self.contains(value) {
             return Ok(());
         }
-        Err(Error::value(at, format!("{}, expected {self}{}", number(value), self.question(value))))
+        Err(Error::value(
+            at,
+            format!("{}, expected {self}{}", number(value), self.question(value)),
+        ))
     }
 
     /// Asks about the unit where another one would make sense of a length.
@@ -74,25 +87,44 @@ impl Bounds {
     /// The unit in which a value that is too large for metres would be within bounds.
     pub(crate) fn unit_meant(&self, value: f64) -> Option<&'static str> {
         let [millimetres, centimetres] = SMALLER_UNITS;
-        let first = if value >= RATHER_MILLIMETRES { millimetres } else { centimetres };
+        let first = if value >= RATHER_MILLIMETRES {
+            millimetres
+        } else {
+            centimetres
+        };
         let order = [first, millimetres, centimetres];
-        let meant = order.into_iter().find(|(in_a_metre, _)| self.contains(value / in_a_metre));
+        let meant = order
+            .into_iter()
+            .find(|(in_a_metre, _)| self.contains(value / in_a_metre));
         meant.filter(|_| value > self.highest).map(|(_, unit)| unit)
     }
 }
 
 impl std::fmt::Display for Bounds {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { lowest, highest, unit, why } = *self;
+        let Self {
+            lowest,
+            highest,
+            unit,
+            why,
+        } = *self;
         write!(f, "{} to {}{unit}", number(lowest), number(highest))?;
-        if why.is_empty() { Ok(()) } else { write!(f, " ({why})") }
+        if why.is_empty() {
+            Ok(())
+        } else {
+            write!(f, " ({why})")
+        }
     }
 }
 
 /// A number without hundreds of zeros.
 pub(crate) fn number(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
-    if plain { value.to_string() } else { format!("{value:e}") }
+    if plain {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
 }
 
 #[cfg(test)]
@@ -100,7 +132,9 @@ mod tests {
     use super::*;
 
     fn told(bounds: Bounds, value: f64) -> String {
-        bounds.check("x", value).map_or_else(|e| e.to_string(), |()| "fine".into())
+        bounds
+            .check("x", value)
+            .map_or_else(|e| e.to_string(), |()| "fine".into())
     }
 
     #[test]
@@ -108,17 +142,32 @@ mod tests {
         let bounds = Bounds::new(1.0, 16.0, "a reason");
         assert_eq!([1.0, 16.0].map(|v| told(bounds, v)), ["fine"; 2]);
         assert_eq!(told(bounds, 0.0), "x: 0, expected 1 to 16 (a reason)");
-        assert_eq!(told(bounds, f64::NAN), "x: NaN, expected 1 to 16 (a reason)");
-        assert_eq!(told(Bounds::new(1e-5, 1e9, ""), 1e-300), "x: 1e-300, expected 1e-5 to 1e9");
+        assert_eq!(
+            told(bounds, f64::NAN),
+            "x: NaN, expected 1 to 16 (a reason)"
+        );
+        assert_eq!(
+            told(Bounds::new(1e-5, 1e9, ""), 1e-300),
+            "x: 1e-300, expected 1e-5 to 1e9"
+        );
     }
 
     #[test]
     fn a_length_in_another_unit_is_asked_about() {
         let object = Bounds::metres(0.005, 5.0, "");
-        assert_eq!(told(object, 229.0), "x: 229, expected 0.005 to 5 m; is it in millimetres?");
-        assert_eq!(told(object, 22.9), "x: 22.9, expected 0.005 to 5 m; is it in centimetres?");
+        assert_eq!(
+            told(object, 229.0),
+            "x: 229, expected 0.005 to 5 m; is it in millimetres?"
+        );
+        assert_eq!(
+            told(object, 22.9),
+            "x: 22.9, expected 0.005 to 5 m; is it in centimetres?"
+        );
         assert_eq!(told(object, 1e308), "x: 1e308, expected 0.005 to 5 m");
         assert_eq!(told(object, 0.001), "x: 0.001, expected 0.005 to 5 m");
-        assert_eq!(told(Bounds::new(0.0, 5.0, ""), 229.0), "x: 229, expected 0 to 5");
+        assert_eq!(
+            told(Bounds::new(0.0, 5.0, ""), 229.0),
+            "x: 229, expected 0 to 5"
+        );
     }
 }

@@ -63,18 +63,27 @@ pub enum Error {
 impl Error {
     /// A [`Error::File`] from anything that says what is wrong; the system's numbers of errors are left out.
     pub fn file(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
-        Self::File { path: path.as_ref().into(), what: without_number(&what.to_string()) }
+        Self::File {
+            path: path.as_ref().into(),
+            what: without_number(&what.to_string()),
+        }
     }
 
     /// A [`Error::Value`] at a field path.
     pub fn value(at: impl Into<String>, what: impl std::fmt::Display) -> Self {
-        Self::Value { at: at.into(), what: what.to_string() }
+        Self::Value {
+            at: at.into(),
+            what: what.to_string(),
+        }
     }
 
     /// The same error, its field path told from one level further out: `count` within `scene` is `scene.count`.
     pub fn within(self, outer: &str) -> Self {
         match self {
-            Self::Value { at, what } => Self::Value { at: format!("{outer}.{at}"), what },
+            Self::Value { at, what } => Self::Value {
+                at: format!("{outer}.{at}"),
+                what,
+            },
             other => other,
         }
     }
@@ -84,7 +93,10 @@ impl Error {
         let path = path.as_ref().to_path_buf();
         match self {
             Self::Value { at, what } => Self::Field { path, at, what },
-            Self::Photo { .. } | Self::Camera(_) => Self::File { path, what: self.to_string() },
+            Self::Photo { .. } | Self::Camera(_) => Self::File {
+                path,
+                what: self.to_string(),
+            },
             other => other,
         }
     }
@@ -92,13 +104,18 @@ impl Error {
 
 /// What the system says of an error without its number, in our spelling: `no such file or directory`.
 fn without_number(said: &str) -> String {
-    let Some((front, rest)) = said.split_once(" (os error ") else { return said.into() };
+    let Some((front, rest)) = said.split_once(" (os error ") else {
+        return said.into();
+    };
     let behind = rest.split_once(')').map_or("", |(_, behind)| behind);
     // The system's own words are the last of the message, and the only ones that begin with a capital.
     let start = front.rfind(": ").map_or(0, |colon| colon + 2);
     let (before, words) = front.split_at(start);
     let mut letters = words.chars();
-    let first = letters.next().map(|c| c.to_lowercase().to_string()).unwrap_or_default();
+    let first = letters
+        .next()
+        .map(|c| c.to_lowercase().to_string())
+        .unwrap_or_default();
     format!("{before}{first}{}{behind}", letters.as_str())
 }
 
@@ -126,7 +143,8 @@ pub fn printable(text: &str) -> String {
 /// Control characters, separators of lines and paragraphs, and marks of direction (Unicode Bidirectional Algorithm,
 /// "explicit directional embeddings, overrides and isolates").
 fn is_control(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    c.is_control()
+        || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]
@@ -135,13 +153,22 @@ mod tests {
 
     #[test]
     fn a_message_is_one_line_whatever_a_file_is_called() {
-        assert_eq!(Error::file("a\nb.png", "no such file").to_string(), "a\\nb.png: no such file");
-        assert_eq!(Error::value("n", "0").in_file("a\x1b.toml").to_string(), "a\\x1b.toml: n: 0");
+        assert_eq!(
+            Error::file("a\nb.png", "no such file").to_string(),
+            "a\\nb.png: no such file"
+        );
+        assert_eq!(
+            Error::value("n", "0").in_file("a\x1b.toml").to_string(),
+            "a\\x1b.toml: n: 0"
+        );
     }
 
     #[test]
     fn what_a_terminal_would_obey_is_written_out() {
-        assert_eq!(printable("a\u{1b}[31m\nb\r\t\u{9b}\u{7f}"), "a\\x1b[31m\\nb\\r\\t\\x9b\\x7f");
+        assert_eq!(
+            printable("a\u{1b}[31m\nb\r\t\u{9b}\u{7f}"),
+            "a\\x1b[31m\\nb\\r\\t\\x9b\\x7f"
+        );
         assert_eq!(printable("exe\u{202e}gpj"), "exe\\x202egpj");
         assert_eq!(printable("größe 3 \\ µm"), "größe 3 \\ µm");
     }
@@ -149,15 +176,30 @@ mod tests {
     #[test]
     fn the_systems_numbers_are_left_out() {
         let of = |e: std::io::Error| Error::file("x", e).to_string();
-        assert_eq!(of(std::io::Error::from_raw_os_error(2)), "x: no such file or directory");
-        let nested = format!("cannot start: {}; try again", std::io::Error::from_raw_os_error(13));
-        assert_eq!(Error::file("x", nested).to_string(), "x: cannot start: permission denied; try again");
-        assert_eq!(Error::file("x", "Exif: Bad (3)").to_string(), "x: Exif: Bad (3)");
+        assert_eq!(
+            of(std::io::Error::from_raw_os_error(2)),
+            "x: no such file or directory"
+        );
+        let nested = format!(
+            "cannot start: {}; try again",
+            std::io::Error::from_raw_os_error(13)
+        );
+        assert_eq!(
+            Error::file("x", nested).to_string(),
+            "x: cannot start: permission denied; try again"
+        );
+        assert_eq!(
+            Error::file("x", "Exif: Bad (3)").to_string(),
+            "x: Exif: Bad (3)"
+        );
     }
 
     #[test]
     fn a_message_names_file_field_and_value() {
         let e = Error::value("count", "0 objects, expected at least 1").in_file("recipe.toml");
-        assert_eq!(e.to_string(), "recipe.toml: count: 0 objects, expected at least 1");
+        assert_eq!(
+            e.to_string(),
+            "recipe.toml: count: 0 objects, expected at least 1"
+        );
     }
 }

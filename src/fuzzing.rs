@@ -4,7 +4,9 @@ use crate::{camera, dataset, eval, io};
 
 /// A label file, solved where it can be read.
 pub fn label(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
     if let Ok(label) = io::parse_json::<camera::Label>(text) {
         let _ = camera::solve(&label, &camera::SolveOptions::default());
     }
@@ -12,7 +14,9 @@ pub fn label(bytes: &[u8]) {
 
 /// A recipe, checked where it can be read.
 pub fn recipe(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
     if let Ok(setup) = io::parse_toml::<dataset::Setup>(text) {
         let _ = setup.scene.check();
     }
@@ -36,7 +40,9 @@ pub fn header(bytes: &[u8]) {
 
 /// A `data.yaml`.
 pub fn data_yaml(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
     let (yaml, _) = dataset::DataYaml::read(text);
     let _ = (yaml.classes(), yaml.root(std::path::Path::new("a")));
 }
@@ -46,7 +52,9 @@ pub const BETWEEN: &str = "\n===\n";
 
 /// A file of YOLO labels and one of detections, scored where they can be read.
 pub fn yolo_labels(bytes: &[u8]) {
-    let Some((truth, found)) = two(bytes) else { return };
+    let Some((truth, found)) = two(bytes) else {
+        return;
+    };
     if let Ok(sheet) = eval::yolo_sheet(truth, found, [640, 480]) {
         score(&[sheet]);
     }
@@ -54,7 +62,9 @@ pub fn yolo_labels(bytes: &[u8]) {
 
 /// COCO documents of truth and detections, scored where they can be read.
 pub fn coco(bytes: &[u8]) {
-    let Some((truth, found)) = two(bytes) else { return };
+    let Some((truth, found)) = two(bytes) else {
+        return;
+    };
     if let Ok(sheets) = eval::coco_sheets(truth, found) {
         score(&sheets);
     }
@@ -68,12 +78,24 @@ fn two(bytes: &[u8]) -> Option<(&str, &str)> {
 fn score(sheets: &[eval::Sheet]) {
     let options = eval::ConfusionOptions::default();
     let all = eval::coco(sheets, &[]);
-    let scores = [all.scores.map(), eval::bootstrap(sheets, eval::Definition::Yolov5, 2, 0).value];
-    assert!(scores.iter().all(|score| (0.0..=1.0).contains(score)), "{scores:?}");
+    let scores = [
+        all.scores.map(),
+        eval::bootstrap(sheets, eval::Definition::Yolov5, 2, 0).value,
+    ];
+    assert!(
+        scores.iter().all(|score| (0.0..=1.0).contains(score)),
+        "{scores:?}"
+    );
     let confusion = eval::Confusion::new(sheets, &options);
     let shown: Vec<u32> = confusion.worst().into_iter().take(50).collect();
-    let charts =
-        [eval::confusion_picture(&confusion, &[], &shown), eval::f1_picture(&eval::curves(sheets), &[], &shown)];
-    assert!(charts.iter().all(|svg| svg.len() < 200_000 && !svg.contains("NaN")));
+    let charts = [
+        eval::confusion_picture(&confusion, &[], &shown),
+        eval::f1_picture(&eval::curves(sheets), &[], &shown),
+    ];
+    assert!(
+        charts
+            .iter()
+            .all(|svg| svg.len() < 200_000 && !svg.contains("NaN"))
+    );
     let _ = eval::mistakes(sheets, &options);
 }

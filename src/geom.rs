@@ -45,7 +45,10 @@ pub struct Plane {
 impl Plane {
     /// The labelled surface, `z = 0`.
     pub fn surface() -> Self {
-        Self { normal: Vector3::z(), offset: 0.0 }
+        Self {
+            normal: Vector3::z(),
+            offset: 0.0,
+        }
     }
 
     /// Ray parameter where `ray` meets the plane in front of its origin; none for a parallel ray or a plane behind.
@@ -79,7 +82,10 @@ impl Quad {
     /// The plane it lies in, normal along the card's `+z`.
     pub fn plane(&self) -> Plane {
         let normal = self.world_from_card.rotation * Vector3::z();
-        Plane { normal, offset: normal.dot(&self.world_from_card.translation.vector) }
+        Plane {
+            normal,
+            offset: normal.dot(&self.world_from_card.translation.vector),
+        }
     }
 
     /// Ray parameter and texture coordinates of the hit; none where the ray misses.
@@ -125,7 +131,10 @@ impl Line {
         if points.len() < 2 {
             return None;
         }
-        let mean = points.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / points.len() as f64;
+        let mean = points
+            .iter()
+            .fold(Vector2::zeros(), |sum, p| sum + p.coords)
+            / points.len() as f64;
         let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
         for p in points {
             let d = p.coords - mean;
@@ -133,7 +142,10 @@ impl Line {
         }
         let angle = libm::atan2(2.0 * xy, xx - yy) / 2.0;
         let normal = Vector2::new(-libm::sin(angle), libm::cos(angle));
-        Some(Self { normal, offset: normal.dot(&mean) })
+        Some(Self {
+            normal,
+            offset: normal.dot(&mean),
+        })
     }
 
     /// Signed distance of a point, along the normal.
@@ -157,12 +169,18 @@ mod tests {
 
     fn tilted() -> Quad {
         let rotation = UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1);
-        Quad { world_from_card: Pose::from_parts(Vector3::new(0.1, 0.2, 0.3).into(), rotation), size: [0.25, 0.1] }
+        Quad {
+            world_from_card: Pose::from_parts(Vector3::new(0.1, 0.2, 0.3).into(), rotation),
+            size: [0.25, 0.1],
+        }
     }
 
     #[test]
     fn texture_row_zero_is_at_plus_y() {
-        let quad = Quad { world_from_card: Pose::identity(), size: [2.0, 4.0] };
+        let quad = Quad {
+            world_from_card: Pose::identity(),
+            size: [2.0, 4.0],
+        };
         assert_eq!(quad.corners()[0], Point3::new(-1.0, 2.0, 0.0));
         assert_eq!(quad.corners()[2], Point3::new(1.0, -2.0, 0.0));
     }
@@ -171,20 +189,28 @@ mod tests {
     fn a_ray_aimed_at_a_texture_coordinate_hits_it() {
         let quad = tilted();
         let eye = Point3::new(-0.4, 0.1, 2.0);
-        let ray = Ray { origin: eye, direction: quad.point(0.3, 0.8) - eye };
+        let ray = Ray {
+            origin: eye,
+            direction: quad.point(0.3, 0.8) - eye,
+        };
         let (t, uv) = quad.intersect(&ray).expect("aimed at the inside");
         assert!((t - 1.0).abs() < 1e-12 && (uv - Point2::new(0.3, 0.8)).norm() < 1e-12);
     }
 
     #[test]
     fn a_parallel_ray_misses() {
-        let ray = Ray { origin: Point3::new(0.0, 0.0, 1.0), direction: Vector3::x() };
+        let ray = Ray {
+            origin: Point3::new(0.0, 0.0, 1.0),
+            direction: Vector3::x(),
+        };
         assert_eq!(Plane::surface().intersect(&ray), None);
     }
 
     #[test]
     fn a_homography_and_its_inverse_cancel() {
-        let h = Homography(nalgebra::Matrix3::new(1.0, 0.2, 3.0, -0.1, 0.9, 5.0, 1e-3, 2e-3, 1.0));
+        let h = Homography(nalgebra::Matrix3::new(
+            1.0, 0.2, 3.0, -0.1, 0.9, 5.0, 1e-3, 2e-3, 1.0,
+        ));
         let p = Point2::new(7.0, -2.0);
         let back = h.inverse().expect("regular").map(h.map(p));
         assert!((back - p).norm() < 1e-12);

@@ -29,7 +29,12 @@ pub struct Roi {
 impl Roi {
     /// The rectangle from the columns and rows it spans, both half open; empty where they are reversed.
     pub fn spanning(xs: std::ops::Range<usize>, ys: std::ops::Range<usize>) -> Self {
-        Self { x: xs.start, y: ys.start, width: xs.len(), height: ys.len() }
+        Self {
+            x: xs.start,
+            y: ys.start,
+            width: xs.len(),
+            height: ys.len(),
+        }
     }
 
     /// Grown by `by` pixels on every side, kept inside a picture of `width` x `height`.
@@ -61,7 +66,11 @@ impl<P: Copy> Image<P> {
     /// An image of one value.
     pub fn filled(width: usize, height: usize, pixel: P) -> Self {
         let len = width.checked_mul(height).expect("image area overflows");
-        Self { width, height, pixels: vec![pixel; len] }
+        Self {
+            width,
+            height,
+            pixels: vec![pixel; len],
+        }
     }
 
     /// An image over pixels that are already in memory, row by row.
@@ -69,8 +78,16 @@ impl<P: Copy> Image<P> {
     /// # Panics
     /// When `pixels.len() != width * height`.
     pub fn from_vec(width: usize, height: usize, pixels: Vec<P>) -> Self {
-        assert_eq!(pixels.len(), width * height, "pixel count does not match {width} x {height}");
-        Self { width, height, pixels }
+        assert_eq!(
+            pixels.len(),
+            width * height,
+            "pixel count does not match {width} x {height}"
+        );
+        Self {
+            width,
+            height,
+            pixels,
+        }
     }
 
     /// An image computed pixel by pixel from `(x, y)`, rows in parallel.
@@ -78,8 +95,15 @@ impl<P: Copy> Image<P> {
     where
         P: Send + Sync,
     {
-        let pixels = (0..width * height).into_par_iter().with_min_len(width.max(1)).map(|i| f(i % width, i / width));
-        Self { width, height, pixels: pixels.collect() }
+        let pixels = (0..width * height)
+            .into_par_iter()
+            .with_min_len(width.max(1))
+            .map(|i| f(i % width, i / width));
+        Self {
+            width,
+            height,
+            pixels: pixels.collect(),
+        }
     }
 
     /// Number of columns.
@@ -158,21 +182,42 @@ impl<P: Copy> Image<P> {
     where
         P: Sync,
     {
-        let pixels = self.pixels.par_iter().with_min_len(self.width.max(1)).map(|&p| f(p)).collect();
-        Image { width: self.width, height: self.height, pixels }
+        let pixels = self
+            .pixels
+            .par_iter()
+            .with_min_len(self.width.max(1))
+            .map(|&p| f(p))
+            .collect();
+        Image {
+            width: self.width,
+            height: self.height,
+            pixels,
+        }
     }
 
     /// A picture of the same size from two, pixel by pixel, rows in parallel.
     ///
     /// # Panics
     /// When the sizes differ.
-    pub fn zip_map<Q: Copy + Sync, R: Copy + Send>(&self, other: &Image<Q>, f: impl Fn(P, Q) -> R + Sync) -> Image<R>
+    pub fn zip_map<Q: Copy + Sync, R: Copy + Send>(
+        &self,
+        other: &Image<Q>,
+        f: impl Fn(P, Q) -> R + Sync,
+    ) -> Image<R>
     where
         P: Sync,
     {
         assert_eq!(self.size(), other.size(), "images of different size");
-        let pairs = self.pixels.par_iter().with_min_len(self.width.max(1)).zip(other.pixels.par_iter());
-        Image { width: self.width, height: self.height, pixels: pairs.map(|(&p, &q)| f(p, q)).collect() }
+        let pairs = self
+            .pixels
+            .par_iter()
+            .with_min_len(self.width.max(1))
+            .zip(other.pixels.par_iter());
+        Image {
+            width: self.width,
+            height: self.height,
+            pixels: pairs.map(|(&p, &q)| f(p, q)).collect(),
+        }
     }
 
     /// A picture of the same size from three, pixel by pixel, rows in parallel.
@@ -188,10 +233,19 @@ impl<P: Copy> Image<P> {
     where
         P: Sync,
     {
-        assert!(self.size() == second.size() && self.size() == third.size(), "images of different size");
+        assert!(
+            self.size() == second.size() && self.size() == third.size(),
+            "images of different size"
+        );
         let firsts = self.pixels.par_iter().with_min_len(self.width.max(1));
-        let all = firsts.zip(second.pixels.par_iter()).zip(third.pixels.par_iter());
-        Image { width: self.width, height: self.height, pixels: all.map(|((&p, &q), &r)| f(p, q, r)).collect() }
+        let all = firsts
+            .zip(second.pixels.par_iter())
+            .zip(third.pixels.par_iter());
+        Image {
+            width: self.width,
+            height: self.height,
+            pixels: all.map(|((&p, &q), &r)| f(p, q, r)).collect(),
+        }
     }
 
     /// A copy of a part.
@@ -203,7 +257,11 @@ impl<P: Copy> Image<P> {
         for y in roi.y..roi.y + roi.height {
             pixels.extend_from_slice(&self.row(y)[roi.x..roi.x + roi.width]);
         }
-        Self { width: roi.width, height: roi.height, pixels }
+        Self {
+            width: roi.width,
+            height: roi.height,
+            pixels,
+        }
     }
 
     /// The nearest pixel inside the picture.
@@ -237,7 +295,13 @@ impl<P> std::ops::IndexMut<(usize, usize)> for Image<P> {
 
 impl<P> std::fmt::Debug for Image<P> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Image<{}>({} x {})", std::any::type_name::<P>(), self.width, self.height)
+        write!(
+            f,
+            "Image<{}>({} x {})",
+            std::any::type_name::<P>(),
+            self.width,
+            self.height
+        )
     }
 }
 
@@ -248,13 +312,25 @@ mod tests {
     #[test]
     fn rows_lie_from_the_top() {
         let img = Image::from_fn(3, 2, |x, y| 10 * y + x);
-        assert_eq!(img.rows().collect::<Vec<_>>(), [&[0, 1, 2][..], &[10, 11, 12]]);
+        assert_eq!(
+            img.rows().collect::<Vec<_>>(),
+            [&[0, 1, 2][..], &[10, 11, 12]]
+        );
     }
 
     #[test]
     fn crop_takes_the_named_pixels() {
         let img = Image::from_fn(4, 4, |x, y| 10 * y + x);
-        assert_eq!(img.crop(Roi { x: 1, y: 2, width: 2, height: 2 }).pixels(), [21, 22, 31, 32]);
+        assert_eq!(
+            img.crop(Roi {
+                x: 1,
+                y: 2,
+                width: 2,
+                height: 2
+            })
+            .pixels(),
+            [21, 22, 31, 32]
+        );
     }
 
     #[test]
@@ -265,7 +341,20 @@ mod tests {
 
     #[test]
     fn a_region_grows_only_inside() {
-        let roi = Roi { x: 1, y: 5, width: 3, height: 3 };
-        assert_eq!(roi.grown(2, 10, 9), Roi { x: 0, y: 3, width: 6, height: 6 });
+        let roi = Roi {
+            x: 1,
+            y: 5,
+            width: 3,
+            height: 3,
+        };
+        assert_eq!(
+            roi.grown(2, 10, 9),
+            Roi {
+                x: 0,
+                y: 3,
+                width: 6,
+                height: 6
+            }
+        );
     }
 }

@@ -35,6 +35,8 @@ pub use allowance::Allowance;
 pub use camera::Camera;
 pub use error::{Error, Result, printable};
 pub use image::{Image, Roi};
-pub use pixel::{Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba};
+pub use pixel::{
+    Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
+};
 pub use quality::Quality;
 pub use scene::{Scene, Shot};

@@ -25,7 +25,9 @@ use bytemuck::{Pod, Zeroable};
 
 /// Opaque scene-linear colour, Rec. 709 primaries.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, serde::Serialize, serde::Deserialize,
+)]
 #[serde(from = "[f32; 3]", into = "[f32; 3]")]
 pub struct LinearRgb {
     /// Red.
@@ -145,21 +147,33 @@ pub trait Mix: Copy + Default + Send + Sync {
 impl Mix for LinearRgb {
     #[inline(always)]
     fn add_scaled(self, w: f32, o: Self) -> Self {
-        Self { r: self.r + w * o.r, g: self.g + w * o.g, b: self.b + w * o.b }
+        Self {
+            r: self.r + w * o.r,
+            g: self.g + w * o.g,
+            b: self.b + w * o.b,
+        }
     }
 }
 
 impl Mix for PremulRgba {
     #[inline(always)]
     fn add_scaled(self, w: f32, o: Self) -> Self {
-        Self { r: self.r + w * o.r, g: self.g + w * o.g, b: self.b + w * o.b, a: self.a + w * o.a }
+        Self {
+            r: self.r + w * o.r,
+            g: self.g + w * o.g,
+            b: self.b + w * o.b,
+            a: self.a + w * o.a,
+        }
     }
 }
 
 impl Mix for Film {
     #[inline(always)]
     fn add_scaled(self, w: f32, o: Self) -> Self {
-        Self { color: self.color.add_scaled(w, o.color), opacity: self.opacity.add_scaled(w, o.opacity) }
+        Self {
+            color: self.color.add_scaled(w, o.color),
+            opacity: self.opacity.add_scaled(w, o.opacity),
+        }
     }
 }
 
@@ -215,7 +229,12 @@ impl LinearRgb {
     /// The colour as a fully covering pixel.
     #[inline(always)]
     pub fn opaque(self) -> PremulRgba {
-        PremulRgba { r: self.r, g: self.g, b: self.b, a: 1.0 }
+        PremulRgba {
+            r: self.r,
+            g: self.g,
+            b: self.b,
+            a: 1.0,
+        }
     }
 }
 
@@ -250,7 +269,12 @@ impl From<LinearRgb> for [f32; 3] {
 
 impl PremulRgba {
     /// Nothing at all.
-    pub const TRANSPARENT: Self = Self { r: 0.0, g: 0.0, b: 0.0, a: 0.0 };
+    pub const TRANSPARENT: Self = Self {
+        r: 0.0,
+        g: 0.0,
+        b: 0.0,
+        a: 0.0,
+    };
 
     /// A pixel from colour that is already multiplied by `a`.
     #[inline(always)]
@@ -268,7 +292,12 @@ impl PremulRgba {
     #[inline(always)]
     pub fn to_straight(self) -> StraightRgba {
         let k = if self.a > 0.0 { 1.0 / self.a } else { 0.0 };
-        StraightRgba { r: self.r * k, g: self.g * k, b: self.b * k, a: self.a }
+        StraightRgba {
+            r: self.r * k,
+            g: self.g * k,
+            b: self.b * k,
+            a: self.a,
+        }
     }
 
     /// Every channel is finite and alpha is between 0 and 1: what a texture may hold.
@@ -288,7 +317,12 @@ impl StraightRgba {
     /// Colour times alpha.
     #[inline(always)]
     pub fn to_premul(self) -> PremulRgba {
-        PremulRgba { r: self.r * self.a, g: self.g * self.a, b: self.b * self.a, a: self.a }
+        PremulRgba {
+            r: self.r * self.a,
+            g: self.g * self.a,
+            b: self.b * self.a,
+            a: self.a,
+        }
     }
 }
 
@@ -296,7 +330,10 @@ impl Film {
     /// A film from the light it adds and the share of what is behind that passes, per channel.
     #[inline(always)]
     pub fn new(color: LinearRgb, transmittance: LinearRgb) -> Self {
-        Self { color, opacity: transmittance.map(|t| 1.0 - t) }
+        Self {
+            color,
+            opacity: transmittance.map(|t| 1.0 - t),
+        }
     }
 
     /// The share of what is behind that passes, per channel.
@@ -315,7 +352,11 @@ impl Film {
     #[inline(always)]
     pub fn to_rgba(self) -> PremulRgba {
         let LinearRgb { r, g, b } = self.opacity;
-        let a = if r == g && g == b { r } else { (r + g + b) / 3.0 };
+        let a = if r == g && g == b {
+            r
+        } else {
+            (r + g + b) / 3.0
+        };
         PremulRgba::new(self.color.r, self.color.g, self.color.b, a)
     }
 
@@ -328,7 +369,10 @@ impl Film {
     /// Every channel is finite and every opacity between 0 and 1: what a texture may hold.
     #[inline(always)]
     pub fn is_sound(self) -> bool {
-        self.color.is_finite() && <[f32; 3]>::from(self.opacity).iter().all(|o| (0.0..=1.0).contains(o))
+        self.color.is_finite()
+            && <[f32; 3]>::from(self.opacity)
+                .iter()
+                .all(|o| (0.0..=1.0).contains(o))
     }
 }
 
@@ -336,7 +380,10 @@ impl From<PremulRgba> for Film {
     /// Grey film: every channel loses alpha.
     #[inline(always)]
     fn from(p: PremulRgba) -> Self {
-        Self { color: p.color(), opacity: LinearRgb::grey(p.a) }
+        Self {
+            color: p.color(),
+            opacity: LinearRgb::grey(p.a),
+        }
     }
 }
 
@@ -352,7 +399,10 @@ mod tests {
 
     #[test]
     fn transparent_pixels_become_straight_without_nan() {
-        assert_eq!(PremulRgba::TRANSPARENT.to_straight(), StraightRgba::default());
+        assert_eq!(
+            PremulRgba::TRANSPARENT.to_straight(),
+            StraightRgba::default()
+        );
     }
 
     #[test]
@@ -365,7 +415,10 @@ mod tests {
     #[test]
     fn film_tints_what_is_behind() {
         let film = Film::new(LinearRgb::grey(0.125), LinearRgb::new(0.5, 1.0, 0.25));
-        assert_eq!(film.over_color(LinearRgb::WHITE), LinearRgb::new(0.625, 1.125, 0.375));
+        assert_eq!(
+            film.over_color(LinearRgb::WHITE),
+            LinearRgb::new(0.625, 1.125, 0.375)
+        );
         assert!(!film.is_grey() && film.is_sound());
     }
 

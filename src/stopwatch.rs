@@ -11,7 +11,10 @@ pub(crate) struct Stopwatch {
 
 impl Stopwatch {
     pub(crate) fn start() -> Self {
-        Self { stages: Vec::new(), last: Instant::now() }
+        Self {
+            stages: Vec::new(),
+            last: Instant::now(),
+        }
     }
 
     /// A stage is over; the next one begins.
@@ -29,11 +32,21 @@ impl Stopwatch {
 
 impl fmt::Display for Stopwatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let whole = self.stages.iter().map(|(_, took)| *took).sum::<Duration>().as_secs_f64();
+        let whole = self
+            .stages
+            .iter()
+            .map(|(_, took)| *took)
+            .sum::<Duration>()
+            .as_secs_f64();
         write!(f, "{:.1} ms", 1e3 * whole)?;
         for (i, (stage, took)) in self.stages.iter().enumerate() {
             let (mark, seconds) = (if i == 0 { ':' } else { ',' }, took.as_secs_f64());
-            write!(f, "{mark} {stage} {:.1} ({:.0} %)", 1e3 * seconds, 100.0 * seconds / whole.max(f64::MIN_POSITIVE))?;
+            write!(
+                f,
+                "{mark} {stage} {:.1} ({:.0} %)",
+                1e3 * seconds,
+                100.0 * seconds / whole.max(f64::MIN_POSITIVE)
+            )?;
         }
         Ok(())
     }
@@ -45,10 +58,26 @@ mod tests {
 
     #[test]
     fn stages_are_told_with_their_shares() {
-        let stages = vec![("read", Duration::from_millis(30)), ("write", Duration::from_millis(90))];
-        let watch = Stopwatch { stages, last: Instant::now() };
-        assert_eq!(watch.to_string(), "120.0 ms: read 30.0 (25 %), write 90.0 (75 %)");
-        assert_eq!(Stopwatch { stages: vec![], ..watch }.to_string(), "0.0 ms");
+        let stages = vec![
+            ("read", Duration::from_millis(30)),
+            ("write", Duration::from_millis(90)),
+        ];
+        let watch = Stopwatch {
+            stages,
+            last: Instant::now(),
+        };
+        assert_eq!(
+            watch.to_string(),
+            "120.0 ms: read 30.0 (25 %), write 90.0 (75 %)"
+        );
+        assert_eq!(
+            Stopwatch {
+                stages: vec![],
+                ..watch
+            }
+            .to_string(),
+            "0.0 ms"
+        );
     }
 
     #[test]
@@ -57,6 +86,8 @@ mod tests {
         std::thread::sleep(Duration::from_millis(2));
         watch.lap("slept");
         watch.lap("woke");
-        assert!(watch.stages[0].1 >= Duration::from_millis(2) && watch.stages[1].1 < watch.stages[0].1);
+        assert!(
+            watch.stages[0].1 >= Duration::from_millis(2) && watch.stages[1].1 < watch.stages[0].1
+        );
     }
 }

@@ -139,7 +139,10 @@ pub(crate) fn pool(threads: usize) -> std::io::Result<rayon::ThreadPool> {
 
 fn pool_for(listener: Option<Arc<Tally>>, threads: usize) -> std::io::Result<rayon::ThreadPool> {
     let listens = move |_| LISTENER.set(listener.clone());
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).start_handler(listens).build();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .start_handler(listens)
+        .build();
     pool.map_err(std::io::Error::other)
 }
 
@@ -188,13 +191,24 @@ mod tests {
     #[test]
     fn every_thread_of_a_job_is_heard() {
         let (done, work) = counted(|| job(1000)).unwrap();
-        assert_eq!((done, work[Kind::Filters], work[Kind::Masks]), (1000, 2000, 0));
+        assert_eq!(
+            (done, work[Kind::Filters], work[Kind::Masks]),
+            (1000, 2000, 0)
+        );
     }
 
     #[test]
     fn jobs_side_by_side_are_not_mixed() {
-        let works: Vec<_> = (0..8_u64).into_par_iter().map(|k| counted(|| job(10 * k)).unwrap().1).collect();
-        assert!(works.iter().zip(0..).all(|(work, k)| work[Kind::Filters] == 20 * k));
+        let works: Vec<_> = (0..8_u64)
+            .into_par_iter()
+            .map(|k| counted(|| job(10 * k)).unwrap().1)
+            .collect();
+        assert!(
+            works
+                .iter()
+                .zip(0..)
+                .all(|(work, k)| work[Kind::Filters] == 20 * k)
+        );
     }
 
     #[test]
@@ -222,7 +236,15 @@ mod tests {
 
     #[test]
     fn kinds_lie_where_their_list_says() {
-        assert!(Kind::ALL.iter().enumerate().all(|(i, kind)| *kind as usize == i));
-        assert_eq!((Kind::Masks.name(), Kind::Masks.meaning()), ("masks", "Masks drawn for labels, two an object"));
+        assert!(
+            Kind::ALL
+                .iter()
+                .enumerate()
+                .all(|(i, kind)| *kind as usize == i)
+        );
+        assert_eq!(
+            (Kind::Masks.name(), Kind::Masks.meaning()),
+            ("masks", "Masks drawn for labels, two an object")
+        );
     }
 }

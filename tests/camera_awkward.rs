@@ -3,11 +3,16 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 use petcomp::camera::simulate::{Scenario, View};
-use petcomp::camera::{self, FocalSource, Label, Priors, Solution, SolveError, SolveOptions, Warning};
+use petcomp::camera::{
+    self, FocalSource, Label, Priors, Solution, SolveError, SolveOptions, Warning,
+};
 use proptest::prelude::*;
 
 fn ideal() -> SolveOptions {
-    SolveOptions { priors: Priors::ideal().with_free_focal(), ..Default::default() }
+    SolveOptions {
+        priors: Priors::ideal().with_free_focal(),
+        ..Default::default()
+    }
 }
 
 fn solve(label: &Label) -> Solution {
@@ -46,14 +51,21 @@ fn assert_sound(solution: &Solution) {
     assert!(numbers.iter().all(|v| v.is_finite()), "{solution:?}");
     assert!(camera.center().z > 0.0, "below the surface");
     let sigma = &solution.sigma;
-    assert!(!sigma.ln_focal.is_nan() && !sigma.tilt.is_nan() && !sigma.height_px.is_nan(), "{sigma:?}");
+    assert!(
+        !sigma.ln_focal.is_nan() && !sigma.tilt.is_nan() && !sigma.height_px.is_nan(),
+        "{sigma:?}"
+    );
     assert!(!sigma.center.iter().any(|v| v.is_nan()), "{sigma:?}");
 }
 
 #[test]
 fn from_above_with_a_known_focal_length_the_normal_is_known_as_usual() {
     for exif in [false, true] {
-        let mut view = Scenario { corner_sigma_px: 1.0, ..Scenario::default() }.view(1, 0);
+        let mut view = Scenario {
+            corner_sigma_px: 1.0,
+            ..Scenario::default()
+        }
+        .view(1, 0);
         view.label.camera.focal_px = (!exif).then_some(3200.0);
         view.label.camera.focal_35mm = exif.then_some(3200.0 / 5000.0 * 36f64.hypot(24.0));
         let solution = solve(&view.label);
@@ -65,7 +77,12 @@ fn from_above_with_a_known_focal_length_the_normal_is_known_as_usual() {
 #[test]
 fn the_estimate_moves_smoothly_from_belief_to_picture() {
     let focal = |tilt: f64| {
-        let view = Scenario { azimuth: Some(0.5), ..Scenario::default() }.tilted(tilt).view(12, 5);
+        let view = Scenario {
+            azimuth: Some(0.5),
+            ..Scenario::default()
+        }
+        .tilted(tilt)
+        .view(12, 5);
         let solution = solve(&view.label);
         (solution.camera.focal_px.x, solution.focal.share)
     };
@@ -85,8 +102,14 @@ fn lengths_may_be_missing_but_not_both() {
     assert_eq!(one.size[1], 0.4, "the given side stays exact");
     assert!((one.size[0] - 0.6).abs() < 0.02);
     view.label.surface.height_m = None;
-    assert_eq!(camera::solve(&view.label, &SolveOptions::default()).unwrap_err(), SolveError::NoScale);
-    let unit = SolveOptions { unit_scale: true, ..Default::default() };
+    assert_eq!(
+        camera::solve(&view.label, &SolveOptions::default()).unwrap_err(),
+        SolveError::NoScale
+    );
+    let unit = SolveOptions {
+        unit_scale: true,
+        ..Default::default()
+    };
     let relative = camera::solve(&view.label, &unit).unwrap();
     assert_eq!(relative.size[0], 1.0);
 }
@@ -122,8 +145,14 @@ fn every_order_of_the_corners_is_one_camera() {
             (surface.width_m, surface.height_m) = (surface.height_m, surface.width_m);
         }
         let found = solve(&label);
-        assert!((found.camera.focal_px.x / reference.camera.focal_px.x - 1.0).abs() < 1e-6, "{order:?}");
-        assert!((found.camera.center().z / reference.camera.center().z - 1.0).abs() < 1e-6, "{order:?}");
+        assert!(
+            (found.camera.focal_px.x / reference.camera.focal_px.x - 1.0).abs() < 1e-6,
+            "{order:?}"
+        );
+        assert!(
+            (found.camera.center().z / reference.camera.center().z - 1.0).abs() < 1e-6,
+            "{order:?}"
+        );
     }
 }
 
@@ -144,7 +173,10 @@ fn pixels_times_seven_change_pixels_only() {
     let view = Scenario::realistic().tilted(25.0).view(1, 6);
     let mut large = view.label.clone();
     (large.image.width, large.image.height) = (28_000, 21_000);
-    large.surface.corners_px = large.surface.corners_px.map(|c| c.map(|p| p.map(|v| 7.0 * v)));
+    large.surface.corners_px = large
+        .surface
+        .corners_px
+        .map(|c| c.map(|p| p.map(|v| 7.0 * v)));
     large.surface.corner_sigma_px = Some(7.0);
     let (a, b) = (solve(&view.label), solve(&large));
     assert!((7.0 * a.camera.focal_px.x / b.camera.focal_px.x - 1.0).abs() < 1e-9);
@@ -155,13 +187,24 @@ fn pixels_times_seven_change_pixels_only() {
 #[test]
 fn small_rectangles_are_ambiguous_and_say_so() {
     let ambiguous = |fill: f64| {
-        let scenario = Scenario { fill, corner_sigma_px: 1.0, ..Scenario::default() }.tilted(30.0);
+        let scenario = Scenario {
+            fill,
+            corner_sigma_px: 1.0,
+            ..Scenario::default()
+        }
+        .tilted(30.0);
         let hits = (0..200).filter(|&k| {
             let mut label = scenario.view(13, k).label;
             (label.camera.focal_px, label.camera.focal_fixed) = (Some(3200.0), true);
-            let options = SolveOptions { priors: Priors::ideal(), ..Default::default() };
+            let options = SolveOptions {
+                priors: Priors::ideal(),
+                ..Default::default()
+            };
             let solution = camera::solve(&label, &options).unwrap();
-            solution.warnings.iter().any(|w| matches!(w, Warning::PoseAmbiguous { .. }))
+            solution
+                .warnings
+                .iter()
+                .any(|w| matches!(w, Warning::PoseAmbiguous { .. }))
         });
         hits.count() as f64 / 200.0
     };
@@ -172,10 +215,20 @@ fn small_rectangles_are_ambiguous_and_say_so() {
 
 #[test]
 fn wrong_dimensions_are_inconsistent() {
-    let mut view = Scenario { corner_sigma_px: 1.0, ..Scenario::default() }.tilted(40.0).view(1, 7);
+    let mut view = Scenario {
+        corner_sigma_px: 1.0,
+        ..Scenario::default()
+    }
+    .tilted(40.0)
+    .view(1, 7);
     view.label.surface.width_m = Some(0.8);
     let solution = solve(&view.label);
-    assert!(solution.warnings.iter().any(|w| matches!(w, Warning::Inconsistent { severe: true, .. })));
+    assert!(
+        solution
+            .warnings
+            .iter()
+            .any(|w| matches!(w, Warning::Inconsistent { severe: true, .. }))
+    );
 }
 
 #[test]
@@ -201,25 +254,45 @@ fn hints_of_height_and_of_points_above_the_surface_give_the_focal_length() {
         for [x, y] in [[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]] {
             let rim = [x * view.size[0], y * view.size[1], 0.1];
             let straight = view.camera.project(rim.into()).unwrap().0 - view.camera.principal_px;
-            let seen = view.camera.principal_px + straight * (1.0 + view.kappa * (straight / 2500.0).norm_squared());
+            let seen = view.camera.principal_px
+                + straight * (1.0 + view.kappa * (straight / 2500.0).norm_squared());
             let (xyz_m, px) = ([x * w, y * h, 0.1], [seen.x, seen.y]);
-            view.label.points.push(camera::LabelPoint { xyz_m, px, sigma_px: Some(1.0), note: None });
+            view.label.points.push(camera::LabelPoint {
+                xyz_m,
+                px,
+                sigma_px: Some(1.0),
+                note: None,
+            });
         }
     });
     // Section 10: 26 %, 2.0 %, 1.2 % (95 %).
     println!("{none} {height} {rim}");
-    assert!(none > 0.2 && height < 0.02 * 1.3 && rim < 0.012 * 1.3, "{none} {height} {rim}");
+    assert!(
+        none > 0.2 && height < 0.02 * 1.3 && rim < 0.012 * 1.3,
+        "{none} {height} {rim}"
+    );
 }
 
 #[test]
 fn a_stated_distortion_is_undone() {
     for kappa in [-0.02, 0.02] {
-        let mut view = exact(&Scenario { kappa, ..Scenario::default() }.tilted(30.0), 8);
+        let mut view = exact(
+            &Scenario {
+                kappa,
+                ..Scenario::default()
+            }
+            .tilted(30.0),
+            8,
+        );
         let k1 = view.kappa * view.camera.focal_px.x.powi(2) / 2500f64.powi(2);
         (view.label.camera.k1, view.label.camera.focal_px) = (Some(k1), Some(3200.0));
         view.label.camera.focal_fixed = true;
         let solution = camera::solve(&view.label, &ideal()).unwrap();
-        assert!(solution.rms_px < 1e-6 && (solution.kappa - view.kappa).abs() < 1e-12, "{}", solution.rms_px);
+        assert!(
+            solution.rms_px < 1e-6 && (solution.kappa - view.kappa).abs() < 1e-12,
+            "{}",
+            solution.rms_px
+        );
         assert!((solution.camera.center() - view.camera.center()).norm() < 1e-9);
     }
 }
@@ -227,11 +300,22 @@ fn a_stated_distortion_is_undone() {
 #[test]
 fn a_stated_distortion_is_understood_at_the_focal_length_found() {
     for kappa in [-0.02, 0.02] {
-        let mut view = exact(&Scenario { kappa, ..Scenario::default() }.tilted(40.0), 8);
+        let mut view = exact(
+            &Scenario {
+                kappa,
+                ..Scenario::default()
+            }
+            .tilted(40.0),
+            8,
+        );
         // The usual lens that is believed first is 25 % longer.
         view.label.camera.k1 = Some(view.kappa * view.camera.focal_px.x.powi(2) / 2500f64.powi(2));
         let solution = camera::solve(&view.label, &ideal()).unwrap();
-        assert!(solution.rms_px < 1e-6 && (solution.kappa - view.kappa).abs() < 1e-8, "{}", solution.kappa);
+        assert!(
+            solution.rms_px < 1e-6 && (solution.kappa - view.kappa).abs() < 1e-8,
+            "{}",
+            solution.kappa
+        );
         assert!(focal_error(&view, &solution) < 1e-7);
     }
 }
@@ -243,16 +327,30 @@ fn a_known_crop_is_as_good_as_the_whole_picture() {
     let whole = solve(&view.label);
     let mut part = view.label.clone();
     (part.image.width, part.image.height, part.image.cropped) = (3500, 2300, Some(true));
-    part.surface.corners_px = part.surface.corners_px.map(|c| c.map(|[x, y]| [x - 150.0, y - 400.0]));
+    part.surface.corners_px = part
+        .surface
+        .corners_px
+        .map(|c| c.map(|[x, y]| [x - 150.0, y - 400.0]));
     let unknown = solve(&part);
-    part.image.crop = Some(camera::Crop { offset_px: [150.0, 400.0], width: 4000, height: 3000 });
+    part.image.crop = Some(camera::Crop {
+        offset_px: [150.0, 400.0],
+        width: 4000,
+        height: 3000,
+    });
     let known = solve(&part);
     assert!((known.camera.focal_px.x / whole.camera.focal_px.x - 1.0).abs() < 1e-6);
     assert!((known.camera.center() - whole.camera.center()).norm() < 1e-6);
     assert!((known.sigma.ln_focal / whole.sigma.ln_focal - 1.0).abs() < 1e-4);
     assert!(unknown.sigma.ln_focal > 1.5 * whole.sigma.ln_focal);
-    part.image.crop = Some(camera::Crop { offset_px: [0.0, 0.0], width: 0, height: 3000 });
-    assert_eq!(camera::solve(&part, &SolveOptions::default()).unwrap_err(), SolveError::BadImage([0, 3000]));
+    part.image.crop = Some(camera::Crop {
+        offset_px: [0.0, 0.0],
+        width: 0,
+        height: 3000,
+    });
+    assert_eq!(
+        camera::solve(&part, &SolveOptions::default()).unwrap_err(),
+        SolveError::BadImage([0, 3000])
+    );
 }
 
 proptest! {

@@ -12,7 +12,12 @@ const CODES: [u16; 4] = [0xb532, 0x0f9a, 0x332d, 0x9946];
 /// A board of two sides in metres with markers of 40 mm in its corners, each on white paper of one cell more.
 const BOARD: [f64; 2] = [0.56, 0.37];
 const SIDE: f64 = 0.04;
-const CENTERS: [[f64; 2]; 4] = [[-0.244, 0.149], [0.244, 0.149], [0.244, -0.149], [-0.244, -0.149]];
+const CENTERS: [[f64; 2]; 4] = [
+    [-0.244, 0.149],
+    [0.244, 0.149],
+    [0.244, -0.149],
+    [-0.244, -0.149],
+];
 /// Resolution of the board's picture, pixels per metre: every edge of it lies between two of its pixels.
 const PRINT: f64 = 3000.0;
 
@@ -35,15 +40,27 @@ fn board_light(x: f64, y: f64) -> f32 {
 static PRINTED: LazyLock<Pyramid<PremulRgba>> = LazyLock::new(|| {
     let [w, h] = BOARD.map(|side| (side * PRINT).round() as usize);
     Pyramid::new(Image::from_fn(w, h, |x, y| {
-        let light = board_light((x as f64 + 0.5) / PRINT - BOARD[0] / 2.0, BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT);
-        PremulRgba { r: light, g: light, b: light, a: 1.0 }
+        let light = board_light(
+            (x as f64 + 0.5) / PRINT - BOARD[0] / 2.0,
+            BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT,
+        );
+        PremulRgba {
+            r: light,
+            g: light,
+            b: light,
+            a: 1.0,
+        }
     }))
 });
 
 /// A photo of the board on a dark table.
 fn photo(camera: &Camera) -> Image<LinearRgb> {
     let seen = project_picture(&PRINTED, camera, BOARD);
-    seen.map(|p| LinearRgb { r: p.r + 0.1 * (1.0 - p.a), g: p.g + 0.1 * (1.0 - p.a), b: p.b + 0.1 * (1.0 - p.a) })
+    seen.map(|p| LinearRgb {
+        r: p.r + 0.1 * (1.0 - p.a),
+        g: p.g + 0.1 * (1.0 - p.a),
+        b: p.b + 0.1 * (1.0 - p.a),
+    })
 }
 
 /// A mean over five by five pixels, the nearer ones counting more: a lens that is a little out of focus.
@@ -53,8 +70,15 @@ fn blurred(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
     let pass = |from: &Image<LinearRgb>, [dx, dy]: [isize; 2]| {
         Image::from_fn(w, h, |x, y| {
             let at = |i: isize| from.nearest(x as isize + i * dx, y as isize + i * dy).r;
-            let light = (-2..=2).zip(WEIGHTS).map(|(i, weight)| weight * at(i)).sum();
-            LinearRgb { r: light, g: light, b: light }
+            let light = (-2..=2)
+                .zip(WEIGHTS)
+                .map(|(i, weight)| weight * at(i))
+                .sum();
+            LinearRgb {
+                r: light,
+                g: light,
+                b: light,
+            }
         })
     };
     pass(&pass(photo, [1, 0]), [0, 1])
@@ -70,8 +94,14 @@ fn found(photo: &Image<LinearRgb>, camera: &Camera) -> (Vec<u32>, Vec<[f64; 2]>)
         let half = SIDE / 2.0;
         let printed = [[-half, half], [half, half], [half, -half], [-half, -half]];
         for ([dx, dy], px) in printed.into_iter().zip(marker.corners_px) {
-            let truth: Point2<f64> = camera.project(Point3::new(x + dx, y + dy, 0.0)).expect("in front").0;
-            errors.push([(px - truth).norm(), marker.sigma_px * std::f64::consts::FRAC_PI_2.sqrt()]);
+            let truth: Point2<f64> = camera
+                .project(Point3::new(x + dx, y + dy, 0.0))
+                .expect("in front")
+                .0;
+            errors.push([
+                (px - truth).norm(),
+                marker.sigma_px * std::f64::consts::FRAC_PI_2.sqrt(),
+            ]);
         }
     }
     (markers.iter().map(|m| m.id).collect(), errors)
@@ -84,17 +114,31 @@ fn markers_are_found_in_steep_views_and_say_how_well() {
         for tilt in [45.0, 59.0, 65.0] {
             for k in 0..2 {
                 let focal_px = 1.07 * f64::from(image[0]);
-                let scenario = Scenario { image, focal_px, size: BOARD, fill: 0.8, ..Scenario::default() };
+                let scenario = Scenario {
+                    image,
+                    focal_px,
+                    size: BOARD,
+                    fill: 0.8,
+                    ..Scenario::default()
+                };
                 let camera = scenario.tilted(tilt).view(6, k).camera;
                 let sharp = photo(&camera);
                 for (name, picture) in [("sharp", &sharp), ("soft", &blurred(&sharp))] {
                     let (ids, errors) = found(picture, &camera);
                     let worst = errors.iter().map(|[error, _]| *error).fold(0.0, f64::max);
-                    let expected = errors.iter().map(|[_, expected]| *expected).fold(0.0, f64::max);
-                    println!("{image:?} {tilt} degrees, view {k}, {name}: {ids:?} to {worst:.2} px of {expected:.2}");
+                    let expected = errors
+                        .iter()
+                        .map(|[_, expected]| *expected)
+                        .fold(0.0, f64::max);
+                    println!(
+                        "{image:?} {tilt} degrees, view {k}, {name}: {ids:?} to {worst:.2} px of {expected:.2}"
+                    );
                     ratios.extend(errors.iter().map(|[error, expected]| error / expected));
                     let least = if name == "sharp" && tilt < 60.0 { 4 } else { 2 };
-                    assert!(ids.len() >= least, "{image:?} {tilt} degrees, view {k}, {name}: {ids:?}");
+                    assert!(
+                        ids.len() >= least,
+                        "{image:?} {tilt} degrees, view {k}, {name}: {ids:?}"
+                    );
                 }
             }
         }

@@ -25,7 +25,11 @@ impl Desk {
 
     fn run(&self, args: &[&str]) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
-        command.args(args).current_dir(self.0.path()).output().expect("the program starts")
+        command
+            .args(args)
+            .current_dir(self.0.path())
+            .output()
+            .expect("the program starts")
     }
 
     /// Runs what must succeed and returns what it printed.
@@ -42,10 +46,20 @@ impl Desk {
         let output = self.run(args);
         let err = text(&output.stderr);
         assert!(!output.status.success(), "petcomp {args:?} succeeded");
-        assert!(output.status.code().is_some_and(|code| code != 101), "petcomp {args:?} panicked: {err}");
-        let errors: Vec<&str> = err.lines().filter(|line| line.starts_with("error: ")).collect();
+        assert!(
+            output.status.code().is_some_and(|code| code != 101),
+            "petcomp {args:?} panicked: {err}"
+        );
+        let errors: Vec<&str> = err
+            .lines()
+            .filter(|line| line.starts_with("error: "))
+            .collect();
         assert_eq!(errors.len(), 1, "petcomp {args:?} said:\n{err}");
-        assert_eq!(self.files(), before, "petcomp {args:?} left something behind");
+        assert_eq!(
+            self.files(),
+            before,
+            "petcomp {args:?} left something behind"
+        );
         errors[0].to_owned()
     }
 
@@ -93,17 +107,30 @@ const SQUARE: &str = "[[100, 100], [500, 110], [510, 400], [90, 390]]";
 fn every_subcommand_explains_itself() {
     let desk = Desk::new();
     let help = desk.ok(&["--help"]);
-    for stage in ["demo", "matte", "asset", "camera", "scene", "settle", "render", "label", "dataset", "diff", "doctor"]
-    {
+    for stage in [
+        "demo", "matte", "asset", "camera", "scene", "settle", "render", "label", "dataset",
+        "diff", "doctor",
+    ] {
         assert!(help.contains(stage), "--help does not name {stage}");
-        assert!(desk.ok(&[stage, "--help"]).len() > 100, "{stage} --help says little");
+        assert!(
+            desk.ok(&[stage, "--help"]).len() > 100,
+            "{stage} --help says little"
+        );
     }
 }
 
 #[test]
 fn the_program_does_not_load_openimageio() {
-    let Ok(ldd) = Command::new("ldd").arg(env!("CARGO_BIN_EXE_petcomp")).output() else { return };
-    assert!(!text(&ldd.stdout).contains("OpenImageIO"), "petcomp links OpenImageIO");
+    let Ok(ldd) = Command::new("ldd")
+        .arg(env!("CARGO_BIN_EXE_petcomp"))
+        .output()
+    else {
+        return;
+    };
+    assert!(
+        !text(&ldd.stdout).contains("OpenImageIO"),
+        "petcomp links OpenImageIO"
+    );
 }
 
 #[test]
@@ -114,22 +141,42 @@ fn doctor_finds_nothing_wrong() {
 #[test]
 fn global_options_are_explained_once() {
     let desk = Desk::new();
-    assert!(desk.ok(&["--help"]).contains("Global options:\n  -j, --threads <N>"));
+    assert!(
+        desk.ok(&["--help"])
+            .contains("Global options:\n  -j, --threads <N>")
+    );
     let help = desk.ok(&["dataset", "generate", "--help"]);
     let last = help.lines().last().unwrap_or_default();
-    assert!(last.starts_with("Global options (see `petcomp --help`): -j, -q"), "{help}");
+    assert!(
+        last.starts_with("Global options (see `petcomp --help`): -j, -q"),
+        "{help}"
+    );
     assert!(!help.contains("--oiio <"), "{help}");
     // Hidden in the help, they are taken as before.
-    desk.ok(&["dataset", "init", "recipe.toml", "-q", "--oiio", "off", "-j", "1"]);
+    desk.ok(&[
+        "dataset",
+        "init",
+        "recipe.toml",
+        "-q",
+        "--oiio",
+        "off",
+        "-j",
+        "1",
+    ]);
 }
 
 #[test]
 fn a_check_fails_on_what_needs_a_look_where_that_is_asked_for() {
     let desk = Desk::new();
     let photo = sample("bottles/b0006_0.png");
-    desk.ok(&["asset", "add", &photo, "--class", "none", "--length", "0.2", "-o", "assets"]);
+    desk.ok(&[
+        "asset", "add", &photo, "--class", "none", "--length", "0.2", "-o", "assets",
+    ]);
     let said = desk.ok(&["asset", "check", "assets"]);
-    assert!(said.contains("look at "), "the sample has the screen's hue: {said}");
+    assert!(
+        said.contains("look at "),
+        "the sample has the screen's hue: {said}"
+    );
     let strict = desk.run(&["asset", "check", "assets", "--strict"]);
     assert_eq!(strict.status.code(), Some(1), "{}", text(&strict.stderr));
 }
@@ -139,14 +186,32 @@ fn a_check_fails_on_what_needs_a_look_where_that_is_asked_for() {
 #[test]
 fn a_progress_bar_begins_at_nothing() {
     let desk = Desk::new();
-    let job = format!("stty cols 80; {} asset build list.csv -o assets", env!("CARGO_BIN_EXE_petcomp"));
-    desk.write("list.csv", format!("file,asset,class,length\n{},a,none,0.2\n", sample("bottles/b0006_0.png")));
+    let job = format!(
+        "stty cols 80; {} asset build list.csv -o assets",
+        env!("CARGO_BIN_EXE_petcomp")
+    );
+    desk.write(
+        "list.csv",
+        format!(
+            "file,asset,class,length\n{},a,none,0.2\n",
+            sample("bottles/b0006_0.png")
+        ),
+    );
     let mut command = Command::new("script");
-    let output =
-        command.args(["-qec", &job, "/dev/null"]).current_dir(desk.0.path()).output().expect("Debian has script");
+    let output = command
+        .args(["-qec", &job, "/dev/null"])
+        .current_dir(desk.0.path())
+        .output()
+        .expect("Debian has script");
     let shown = text(&output.stdout);
-    let first = shown.split(['\r', '\n']).find(|line| line.contains("cut-outs")).unwrap_or_default();
-    assert!(first.contains("0/1") && !first.contains('█'), "{first:?} of {shown}");
+    let first = shown
+        .split(['\r', '\n'])
+        .find(|line| line.contains("cut-outs"))
+        .unwrap_or_default();
+    assert!(
+        first.contains("0/1") && !first.contains('█'),
+        "{first:?} of {shown}"
+    );
 }
 
 #[test]
@@ -160,7 +225,10 @@ fn text_named_png_is_not_a_picture() {
     let desk = Desk::new();
     desk.write("note.png", "this is a note");
     let error = desk.refused(&["matte", "cut", "note.png", "-o", "out.exr"]);
-    assert!(error.contains("note.png") && error.contains("expected"), "{error}");
+    assert!(
+        error.contains("note.png") && error.contains("expected"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -185,15 +253,24 @@ fn a_picture_without_pixels_is_refused() {
 #[test]
 fn a_label_with_three_corners_is_refused() {
     let desk = Desk::new();
-    desk.write("a.label.json", label("[[100, 100], [500, 110], [510, 400]]"));
+    desk.write(
+        "a.label.json",
+        label("[[100, 100], [500, 110], [510, 400]]"),
+    );
     let error = desk.refused(&["camera", "solve", "a.label.json"]);
-    assert!(error.contains("a.label.json") && error.contains("corners_px"), "{error}");
+    assert!(
+        error.contains("a.label.json") && error.contains("corners_px"),
+        "{error}"
+    );
 }
 
 #[test]
 fn corners_that_are_not_convex_are_refused() {
     let desk = Desk::new();
-    desk.write("a.label.json", label("[[100, 100], [500, 110], [200, 150], [90, 390]]"));
+    desk.write(
+        "a.label.json",
+        label("[[100, 100], [500, 110], [200, 150], [90, 390]]"),
+    );
     let error = desk.refused(&["camera", "solve", "a.label.json"]);
     assert!(error.contains("not convex"), "{error}");
 }
@@ -201,10 +278,16 @@ fn corners_that_are_not_convex_are_refused() {
 #[test]
 fn crossed_corners_are_put_in_order_and_said() {
     let desk = Desk::new();
-    desk.write("a.label.json", label("[[100, 100], [510, 400], [500, 110], [90, 390]]"));
+    desk.write(
+        "a.label.json",
+        label("[[100, 100], [510, 400], [500, 110], [90, 390]]"),
+    );
     let output = desk.run(&["camera", "solve", "a.label.json"]);
     let said = text(&output.stdout) + &text(&output.stderr);
-    assert!(output.status.success() && said.contains("sorted clockwise"), "{said}");
+    assert!(
+        output.status.success() && said.contains("sorted clockwise"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -212,7 +295,10 @@ fn an_unknown_key_is_met_with_the_one_that_was_meant() {
     let desk = Desk::new();
     desk.write("recipe.toml", "[scene]\nobjcts = [1, 2]\n");
     let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
-    assert!(error.contains("recipe.toml: scene: unknown key \"objcts\", did you mean \"objects\"?"), "{error}");
+    assert!(
+        error.contains("recipe.toml: scene: unknown key \"objcts\", did you mean \"objects\"?"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -237,14 +323,32 @@ fn diff_speaks_like_idiff() {
     let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));
     assert_eq!(desk.run(&["diff", &a, &a]).status.code(), Some(0));
     assert_eq!(desk.run(&["diff", &a, &b]).status.code(), Some(3));
-    assert_eq!(desk.run(&["diff", "-fail", "0.1", &a, "nowhere.png"]).status.code(), Some(4));
+    assert_eq!(
+        desk.run(&["diff", "-fail", "0.1", &a, "nowhere.png"])
+            .status
+            .code(),
+        Some(4)
+    );
 }
 
 #[test]
 fn the_demo_makes_the_same_files_at_any_thread_count() {
     let desk = Desk::new();
     let demo = |threads: &str, folder: &str| {
-        let args = ["demo", "--samples", &sample(""), "-n", "4", "--seed", "0", "-q", "-j", threads, "-o", folder];
+        let args = [
+            "demo",
+            "--samples",
+            &sample(""),
+            "-n",
+            "4",
+            "--seed",
+            "0",
+            "-q",
+            "-j",
+            threads,
+            "-o",
+            folder,
+        ];
         desk.ok(&args);
         let root = desk.path(folder);
         let mut files = Vec::new();
@@ -253,7 +357,10 @@ fn the_demo_makes_the_same_files_at_any_thread_count() {
         files.retain(|f| !f.ends_with(".runs.jsonl") && !f.ends_with(".inputs.json"));
         files.sort();
         let named = |f: &PathBuf| f.strip_prefix(&root).expect("below the root").to_owned();
-        files.iter().map(|f| (named(f), std::fs::read(f).expect("a file"))).collect::<Vec<_>>()
+        files
+            .iter()
+            .map(|f| (named(f), std::fs::read(f).expect("a file")))
+            .collect::<Vec<_>>()
     };
     let (one, four) = (demo("1", "one"), demo("4", "four"));
     assert!(one.len() > 20, "the demo wrote only {} files", one.len());
@@ -267,73 +374,232 @@ fn the_demo_makes_the_same_files_at_any_thread_count() {
 #[test]
 fn a_scene_goes_through_the_stages_one_by_one() {
     let desk = Desk::new();
-    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
-    desk.ok(&["scene", "draw", "demo/recipe.toml", "-k", "3", "--seed", "5", "-o", "scene.toml"]);
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
+    desk.ok(&[
+        "scene",
+        "draw",
+        "demo/recipe.toml",
+        "-k",
+        "3",
+        "--seed",
+        "5",
+        "-o",
+        "scene.toml",
+    ]);
     desk.ok(&["scene", "check", "scene.toml"]);
-    desk.ok(&["settle", "scene.toml", "-o", "rest.json", "--trace", "fall.csv", "--preview", "rest.png"]);
-    assert!(std::fs::read_to_string(desk.path("fall.csv")).is_ok_and(|csv| csv.starts_with("seconds,object,x,y,z,")));
+    desk.ok(&[
+        "settle",
+        "scene.toml",
+        "-o",
+        "rest.json",
+        "--trace",
+        "fall.csv",
+        "--preview",
+        "rest.png",
+    ]);
+    assert!(
+        std::fs::read_to_string(desk.path("fall.csv"))
+            .is_ok_and(|csv| csv.starts_with("seconds,object,x,y,z,"))
+    );
     assert!(desk.path("rest.png").exists());
     desk.ok(&["render", "rest.json", "demo/recipe.toml", "-o", "frame.exr"]);
-    desk.ok(&["render", "scene.toml", "demo/recipe.toml", "-o", "again.exr"]);
+    desk.ok(&[
+        "render",
+        "scene.toml",
+        "demo/recipe.toml",
+        "-o",
+        "again.exr",
+    ]);
     desk.ok(&["diff", "frame.exr", "again.exr"]);
-    desk.ok(&["label", "rest.json", "demo/recipe.toml", "-o", "labels.json", "--overlay", "overlay.png"]);
+    desk.ok(&[
+        "label",
+        "rest.json",
+        "demo/recipe.toml",
+        "-o",
+        "labels.json",
+        "--overlay",
+        "overlay.png",
+    ]);
     assert!(desk.path("overlay.png").exists());
 
     // Borders of the masks, with every corner and with fewer.
     let corners = |tolerance: &str| -> usize {
         let set = format!("labels.simplify={tolerance}");
-        let args = ["label", "rest.json", "demo/recipe.toml", "-o", "again.json", "--polygons", "borders.json"];
+        let args = [
+            "label",
+            "rest.json",
+            "demo/recipe.toml",
+            "-o",
+            "again.json",
+            "--polygons",
+            "borders.json",
+        ];
         desk.ok(&[&args[..], &["--set", &set]].concat());
-        let borders: Vec<petcomp::label::Border> = petcomp::io::read_json(desk.path("borders.json")).unwrap();
-        borders.iter().flat_map(|border| &border.amodal).map(Vec::len).sum()
+        let borders: Vec<petcomp::label::Border> =
+            petcomp::io::read_json(desk.path("borders.json")).unwrap();
+        borders
+            .iter()
+            .flat_map(|border| &border.amodal)
+            .map(Vec::len)
+            .sum()
     };
     let [all, few] = ["0", "2"].map(corners);
     assert!(few >= 3 && all > 4 * few, "{all} {few}");
-    let refused =
-        desk.refused(&["label", "rest.json", "demo/recipe.toml", "-o", "no.json", "--set", "labels.simplify=-1"]);
-    assert!(refused.contains("labels.simplify: -1, expected 0 to 1000 (pixels)"), "{refused}");
+    let refused = desk.refused(&[
+        "label",
+        "rest.json",
+        "demo/recipe.toml",
+        "-o",
+        "no.json",
+        "--set",
+        "labels.simplify=-1",
+    ]);
+    assert!(
+        refused.contains("labels.simplify: -1, expected 0 to 1000 (pixels)"),
+        "{refused}"
+    );
 
     // The same picture in parts, at another quality, and for Blender.
-    let parts = ["render", "rest.json", "demo/recipe.toml", "-o", "parts.exr", "--quality", "draft"];
-    desk.ok(&[&parts[..], &["--aov", "beauty,id,depth,cryptomatte,layers", "--preview", "look.png"]].concat());
+    let parts = [
+        "render",
+        "rest.json",
+        "demo/recipe.toml",
+        "-o",
+        "parts.exr",
+        "--quality",
+        "draft",
+    ];
+    desk.ok(&[
+        &parts[..],
+        &[
+            "--aov",
+            "beauty,id,depth,cryptomatte,layers",
+            "--preview",
+            "look.png",
+        ],
+    ]
+    .concat());
     assert!(desk.path("look.png").exists());
     let told = text(&desk.run(&["diff", "frame.exr", "parts.exr"]).stdout);
-    assert!(told.contains("SSIM = 0.9") && told.contains("FLIP = 0.0"), "{told}");
-    assert!(text(&desk.run(&[&parts[..], &["--aov", "normals"]].concat()).stderr).contains("expected some of beauty"));
-    desk.ok(&["scene", "export", "rest.json", "demo/recipe.toml", "--to", "cycles", "blender"]);
     assert!(
-        ["scene.json", "plate.exr", "card_1.exr", "scene_reference.py"]
-            .iter()
-            .all(|f| desk.path("blender").join(f).exists())
+        told.contains("SSIM = 0.9") && told.contains("FLIP = 0.0"),
+        "{told}"
+    );
+    assert!(
+        text(
+            &desk
+                .run(&[&parts[..], &["--aov", "normals"]].concat())
+                .stderr
+        )
+        .contains("expected some of beauty")
+    );
+    desk.ok(&[
+        "scene",
+        "export",
+        "rest.json",
+        "demo/recipe.toml",
+        "--to",
+        "cycles",
+        "blender",
+    ]);
+    assert!(
+        [
+            "scene.json",
+            "plate.exr",
+            "card_1.exr",
+            "scene_reference.py"
+        ]
+        .iter()
+        .all(|f| desk.path("blender").join(f).exists())
     );
 }
 
 #[test]
 fn an_environment_map_lies_beside_its_recipe() {
     let desk = Desk::new();
-    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
     let sky = petcomp::Image::filled(8, 4, petcomp::LinearRgb::new(0.2, 0.4, 0.9));
     petcomp::io::write(desk.path("demo/sky.exr"), &sky).unwrap();
     let set = ["--set", "scene.environment.files=[\"sky.exr\"]"];
-    desk.ok(&[&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-o", "out"][..], &set].concat());
+    desk.ok(&[
+        &[
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "1",
+            "-o",
+            "out",
+        ][..],
+        &set,
+    ]
+    .concat());
     // Its content decides the pictures, so another one is another dataset.
     petcomp::io::write(desk.path("demo/sky.exr"), &sky.map(|p| p.scale(2.0))).unwrap();
-    let again = desk.run(&[&["dataset", "generate", "demo/recipe.toml", "-n", "2", "-o", "out"][..], &set].concat());
+    let again = desk.run(
+        &[
+            &[
+                "dataset",
+                "generate",
+                "demo/recipe.toml",
+                "-n",
+                "2",
+                "-o",
+                "out",
+            ][..],
+            &set,
+        ]
+        .concat(),
+    );
     let told = text(&again.stderr);
     assert!(
-        told.contains("out/dataset.json: recipe.environments[sky.exr].content: the dataset was begun with"),
+        told.contains(
+            "out/dataset.json: recipe.environments[sky.exr].content: the dataset was begun with"
+        ),
         "{told}"
     );
     // A scene file names it as the recipe does, and no file of elsewhere.
-    desk.ok(&[&["scene", "draw", "demo/recipe.toml", "-o", "scene.toml"][..], &set].concat());
-    let render = ["render", "scene.toml", "demo/recipe.toml", "-o", "frame.png"];
+    desk.ok(&[
+        &["scene", "draw", "demo/recipe.toml", "-o", "scene.toml"][..],
+        &set,
+    ]
+    .concat());
+    let render = [
+        "render",
+        "scene.toml",
+        "demo/recipe.toml",
+        "-o",
+        "frame.png",
+    ];
     desk.ok(&[&render[..], &set].concat());
     desk.ok(&render);
-    let scene = std::fs::read_to_string(desk.path("scene.toml")).unwrap().replace("sky.exr", "../sky.exr");
+    let scene = std::fs::read_to_string(desk.path("scene.toml"))
+        .unwrap()
+        .replace("sky.exr", "../sky.exr");
     desk.write("scene.toml", scene);
     let refused = desk.refused(&render);
     assert!(
-        refused.contains("scene.toml: environment.file: \"../sky.exr\", expected one that the recipe lists"),
+        refused.contains(
+            "scene.toml: environment.file: \"../sky.exr\", expected one that the recipe lists"
+        ),
         "{refused}"
     );
 }
@@ -341,20 +607,63 @@ fn an_environment_map_lies_beside_its_recipe() {
 #[test]
 fn a_summary_tells_what_is_there_and_is_a_result() {
     let desk = Desk::new();
-    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
     let made = |folder: &str, set: &str| {
-        let few = ["--set", "scene.objects=6", "--set", "scene.image=[160,120]", "--set", set];
-        let call = ["-q", "dataset", "generate", "demo/recipe.toml", "-n", "3", "--seed", "2", "-o", folder];
+        let few = [
+            "--set",
+            "scene.objects=6",
+            "--set",
+            "scene.image=[160,120]",
+            "--set",
+            set,
+        ];
+        let call = [
+            "-q",
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "3",
+            "--seed",
+            "2",
+            "-o",
+            folder,
+        ];
         desk.ok(&[&call[..], &few].concat())
     };
     let told = made("keep", "labels.obstructed=\"keep\"");
-    assert!(told.contains("objects      18, 18 labelled, ") && !told.contains(" 0 obstructed"), "{told}");
-    assert!(told.contains(" obstructed (labelled like the others)\n") && told.ends_with("keep/data.yaml\n"), "{told}");
+    assert!(
+        told.contains("objects      18, 18 labelled, ") && !told.contains(" 0 obstructed"),
+        "{told}"
+    );
+    assert!(
+        told.contains(" obstructed (labelled like the others)\n")
+            && told.ends_with("keep/data.yaml\n"),
+        "{told}"
+    );
     let told = made("drop", "labels.obstructed=\"drop\"");
     assert!(told.contains(" obstructed (without a label)\n"), "{told}");
     let told = made("coco", "labels.formats=[\"coco\"]");
-    let places: Vec<&str> = told.lines().filter(|line| line.starts_with("coco/")).collect();
-    assert_eq!(places, ["coco/annotations/instances_train.json", "coco/annotations/instances_val.json"]);
+    let places: Vec<&str> = told
+        .lines()
+        .filter(|line| line.starts_with("coco/"))
+        .collect();
+    assert_eq!(
+        places,
+        [
+            "coco/annotations/instances_train.json",
+            "coco/annotations/instances_val.json"
+        ]
+    );
     assert!(places.iter().all(|place| desk.path(place).is_file()));
 }
 
@@ -363,23 +672,59 @@ fn one_camera_solve_says_what_it_found() {
     let desk = Desk::new();
     desk.write("a.label.json", label(SQUARE));
     let said = desk.ok(&["camera", "solve", "a.label.json"]);
-    assert!(said.contains("tilt") && desk.path("a.camera.json").exists(), "{said}");
+    assert!(
+        said.contains("tilt") && desk.path("a.camera.json").exists(),
+        "{said}"
+    );
 }
 
 #[test]
 fn one_word_says_how_finely_every_stage_works() {
     let desk = Desk::new();
-    desk.ok(&["demo", "--samples", &sample(""), "-n", "1", "-q", "-o", "demo"]);
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
     let made = |quality: &[&str], folder: &str| {
-        let call = ["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-o", folder];
+        let call = [
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "1",
+            "-q",
+            "-o",
+            folder,
+        ];
         desk.ok(&[&call[..], quality].concat());
         let at = |part: &str| desk.path(folder).join(format!("images/{part}/000000.png"));
-        std::fs::read(at("train")).or_else(|_| std::fs::read(at("val"))).expect("a picture")
+        std::fs::read(at("train"))
+            .or_else(|_| std::fs::read(at("val")))
+            .expect("a picture")
     };
     let usual = made(&[], "usual");
-    assert!(usual == made(&["--quality", "normal"], "normal"), "normal is what there is without a word");
+    assert!(
+        usual == made(&["--quality", "normal"], "normal"),
+        "normal is what there is without a word"
+    );
     assert!(usual != made(&["--quality", "draft"], "draft"));
-    let told = desk.refused(&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-o", "x", "--quality", "fast"]);
+    let told = desk.refused(&[
+        "dataset",
+        "generate",
+        "demo/recipe.toml",
+        "-n",
+        "1",
+        "-o",
+        "x",
+        "--quality",
+        "fast",
+    ]);
     assert!(told.contains("draft, normal, reference"), "{told}");
 }
 
@@ -387,16 +732,39 @@ fn one_word_says_how_finely_every_stage_works() {
 fn everything_measured_is_one_page_with_its_data() {
     let desk = Desk::new();
     let golden = format!("{}/golden/render", env!("CARGO_MANIFEST_DIR"));
-    desk.ok(&["report", "all", "--quick", "-q", "-o", "all", "--golden", &golden, "--date", "a Saturday"]);
+    desk.ok(&[
+        "report",
+        "all",
+        "--quick",
+        "-q",
+        "-o",
+        "all",
+        "--golden",
+        &golden,
+        "--date",
+        "a Saturday",
+    ]);
     let read = |name: &str| std::fs::read_to_string(desk.path("all").join(name)).expect(name);
     let (html, markdown) = (read("report.html"), read("report.md"));
     assert!(html.contains("a Saturday") && html.contains("<svg") && !html.contains("NaN"));
-    assert!(!html.contains("src=") && !html.contains("<link"), "the page needs no other file");
-    for stage in ["color", "matte", "camera", "settle", "shadow", "render", "label", "encode"] {
-        assert!(html.contains(&format!("{stage}: ")) && markdown.contains(&format!("| {stage}: ")), "{stage}");
+    assert!(
+        !html.contains("src=") && !html.contains("<link"),
+        "the page needs no other file"
+    );
+    for stage in [
+        "color", "matte", "camera", "settle", "shadow", "render", "label", "encode",
+    ] {
+        assert!(
+            html.contains(&format!("{stage}: ")) && markdown.contains(&format!("| {stage}: ")),
+            "{stage}"
+        );
     }
     assert!(markdown.contains("| normal (the default) |") && read("quality.csv").contains("1/480"));
-    assert!(read("render_piles.csv").lines().any(|line| line.contains("fast") && line.contains("normal")));
+    assert!(
+        read("render_piles.csv")
+            .lines()
+            .any(|line| line.contains("fast") && line.contains("normal"))
+    );
 }
 
 #[test]
@@ -408,9 +776,23 @@ fn a_report_is_a_table_and_plots() {
     assert_eq!(csv.lines().count(), 2 * 4 * 10 * 8 + 1);
     let fields = |line: &str| line.split(',').count();
     assert!(csv.lines().all(|line| fields(line) == 11), "{csv}");
-    for plot in ["tilt_ideal", "tilt_realistic", "height_ideal", "height_realistic", "time_ideal", "time_realistic"] {
-        let svg = std::fs::read_to_string(desk.path(&format!("found/camera_{plot}.svg"))).expect("a plot");
-        assert!(svg.starts_with("<svg") && svg.contains("<circle") && !svg.contains("NaN"), "{plot}");
+    for plot in [
+        "tilt_ideal",
+        "tilt_realistic",
+        "height_ideal",
+        "height_realistic",
+        "time_ideal",
+        "time_realistic",
+    ] {
+        let svg = std::fs::read_to_string(desk.path(&format!("found/camera_{plot}.svg")))
+            .expect("a plot");
+        assert!(
+            svg.starts_with("<svg") && svg.contains("<circle") && !svg.contains("NaN"),
+            "{plot}"
+        );
     }
-    assert!(desk.refused(&["report", "camera", "--views", "0"]).contains("0 is not in 1..=100000"));
+    assert!(
+        desk.refused(&["report", "camera", "--views", "0"])
+            .contains("0 is not in 1..=100000")
+    );
 }

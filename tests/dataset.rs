@@ -2,9 +2,9 @@
 
 use petcomp::camera::Camera;
 use petcomp::dataset::{
-    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report, Sample, Setup, Shard,
-    SheetOptions, Sidecar, Split, SplitOrder, Studio, Times, Writer, Yolo, YoloTask, check, contact_sheet_of, generate,
-    mend, merge,
+    LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report,
+    Sample, Setup, Shard, SheetOptions, Sidecar, Split, SplitOrder, Studio, Times, Writer, Yolo,
+    YoloTask, check, contact_sheet_of, generate, mend, merge,
 };
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
@@ -41,7 +41,12 @@ fn scene(k: u64) -> Scene {
 
 /// An object of 12 x 9 pixels at a place, under `covered_by`.
 fn object(id: u32, class: u32, [x, y]: [f64; 2], covered_by: &[u32]) -> ObjectLabel {
-    let b = BBox { x0: x, y0: y, x1: x + 12.0, y1: y + 9.0 };
+    let b = BBox {
+        x0: x,
+        y0: y,
+        x1: x + 12.0,
+        y1: y + 9.0,
+    };
     let corners = [[b.x0, b.y0], [b.x1, b.y0], [b.x1, b.y1], [b.x0, b.y1]];
     ObjectLabel {
         id: ObjectId(id),
@@ -64,13 +69,22 @@ fn mask(b: &BBox) -> Mask {
 
 /// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the first.
 fn sample(k: u64) -> Result<Sample> {
-    let value = |x: usize, y: usize| ((x as u64 * 31 + y as u64 * 17 + k * 7919) % 97) as f32 / 97.0;
-    let frame = Image::from_fn(IMAGE[0] as usize, IMAGE[1] as usize, |x, y| LinearRgb::grey(value(x, y)).opaque());
+    let value =
+        |x: usize, y: usize| ((x as u64 * 31 + y as u64 * 17 + k * 7919) % 97) as f32 / 97.0;
+    let frame = Image::from_fn(IMAGE[0] as usize, IMAGE[1] as usize, |x, y| {
+        LinearRgb::grey(value(x, y)).opaque()
+    });
     let place = |i: u64| [(5 * i + k % 30) as f64, (10 * i) as f64];
     let under = |i: u64| if i == 1 { &[1][..] } else { &[] };
     let objects = (0..k % 4).map(|i| object(i as u32 + 1, (k + i) as u32 % 3, place(i), under(i)));
-    let labels = Labels { image: IMAGE, objects: objects.collect() };
-    let drawn = Scene { exposure: Exposure::MatchPlate { gain_ev: 0.1 }, ..scene(k) };
+    let labels = Labels {
+        image: IMAGE,
+        objects: objects.collect(),
+    };
+    let drawn = Scene {
+        exposure: Exposure::MatchPlate { gain_ev: 0.1 },
+        ..scene(k)
+    };
     let rejected = vec!["two bodies overlap".to_owned(); (k % 3) as usize];
     let nothing = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
     let deep = DeepImage::from_pixels(nothing, vec![vec![]; frame.pixels().len()]);
@@ -97,7 +111,11 @@ fn plan(folder: &Path, count: u64) -> Plan {
         classes: ["cap_label", "cap", "label"].map(String::from).to_vec(),
         split: Split::default(),
         obstructed: Obstructed::Drop,
-        writers: vec![Box::new(Pictures::default()), Box::new(Yolo::default()), Box::new(Sidecar)],
+        writers: vec![
+            Box::new(Pictures::default()),
+            Box::new(Yolo::default()),
+            Box::new(Sidecar),
+        ],
         inputs: Default::default(),
     }
 }
@@ -119,7 +137,11 @@ fn make(plan: &Plan) -> Result<Report> {
 }
 
 fn threads<T: Send>(n: usize, f: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap().install(f)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(n)
+        .build()
+        .unwrap()
+        .install(f)
 }
 
 /// Every file below a folder and its bytes, but for the lock and the notes of how long runs took.
@@ -128,11 +150,16 @@ fn bytes(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut folders = vec![folder.to_path_buf()];
     while let Some(dir) = folders.pop() {
         for entry in std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()) {
-            let hidden = entry.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+            let hidden = entry
+                .file_name()
+                .is_some_and(|name| name.to_string_lossy().starts_with('.'));
             if entry.is_dir() {
                 folders.push(entry);
             } else if !hidden {
-                files.insert(entry.strip_prefix(folder).unwrap().into(), std::fs::read(&entry).unwrap());
+                files.insert(
+                    entry.strip_prefix(folder).unwrap().into(),
+                    std::fs::read(&entry).unwrap(),
+                );
             }
         }
     }
@@ -144,22 +171,44 @@ fn text(folder: &Path, name: &str) -> String {
 }
 
 fn faults(folder: &Path) -> Vec<String> {
-    check(folder).unwrap().faults.iter().map(ToString::to_string).collect()
+    check(folder)
+        .unwrap()
+        .faults
+        .iter()
+        .map(ToString::to_string)
+        .collect()
 }
 
 #[test]
 fn a_dataset_has_the_files_that_trainers_read() {
     let dir = tempfile::tempdir().unwrap();
     let report = make(&plan(dir.path(), 12)).unwrap();
-    assert_eq!(text(dir.path(), "labels/train/000001.txt"), "1 0.109375 0.093750 0.187500 0.187500\n");
+    assert_eq!(
+        text(dir.path(), "labels/train/000001.txt"),
+        "1 0.109375 0.093750 0.187500 0.187500\n"
+    );
     assert_eq!(text(dir.path(), "labels/train/000004.txt"), "");
     assert!(text(dir.path(), "data.yaml").ends_with(
         "train: images/train\nval: images/val\nnc: 3\nnames:\n  0: \"cap_label\"\n  1: \"cap\"\n  2: \"label\"\n"
     ));
-    assert!(dir.path().join("images/val/000005.png").is_file() && dir.path().join("labels/val/000005.txt").is_file());
+    assert!(
+        dir.path().join("images/val/000005.png").is_file()
+            && dir.path().join("labels/val/000005.txt").is_file()
+    );
     assert_eq!(faults(dir.path()), [""; 0]);
-    assert_eq!((report.images, report.val, report.made, report.objects), (12, 3, 12, 18));
-    assert_eq!((report.labelled, report.dropped(), report.obstructed, report.retries), (12, 6, 6, 12));
+    assert_eq!(
+        (report.images, report.val, report.made, report.objects),
+        (12, 3, 12, 18)
+    );
+    assert_eq!(
+        (
+            report.labelled,
+            report.dropped(),
+            report.obstructed,
+            report.retries
+        ),
+        (12, 6, 6, 12)
+    );
     assert_eq!(report.for_trainers, [Path::new("data.yaml")]);
     assert_eq!(check(dir.path()).unwrap().rows.iter().sum::<usize>(), 12);
     assert_eq!(report.classes.iter().map(|c| c.labelled).sum::<u64>(), 12);
@@ -179,8 +228,14 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
     make(&full_plan(whole.path(), 30)).unwrap();
     let stop = AtomicBool::new(false);
     let after_some = |p: Progress| stop.store(p.made >= 7, Ordering::Relaxed);
-    let e = threads(3, || generate(&full_plan(broken.path(), 30), sample, &after_some, &stop)).unwrap_err();
-    assert!(matches!(e, Error::Interrupted { .. }) && e.to_string().contains("of 30 samples are in"), "{e}");
+    let e = threads(3, || {
+        generate(&full_plan(broken.path(), 30), sample, &after_some, &stop)
+    })
+    .unwrap_err();
+    assert!(
+        matches!(e, Error::Interrupted { .. }) && e.to_string().contains("of 30 samples are in"),
+        "{e}"
+    );
 
     // What a kill may leave: a torn line, half a file, a temporary file, a file whose line never came.
     let journal = broken.path().join("index.jsonl");
@@ -197,9 +252,24 @@ fn a_stopped_run_goes_on_to_the_same_bytes() {
         made.fetch_add(1, Ordering::Relaxed);
         sample(k)
     };
-    let report = generate(&full_plan(broken.path(), 30), counted, &|_| {}, &AtomicBool::new(false)).unwrap();
-    assert_eq!((report.made, made.into_inner()), (30 - finished as u64 + 2, 30 - finished as u64 + 2));
-    assert_eq!(report, Report { made: report.made, ..make(&full_plan(whole.path(), 30)).unwrap() });
+    let report = generate(
+        &full_plan(broken.path(), 30),
+        counted,
+        &|_| {},
+        &AtomicBool::new(false),
+    )
+    .unwrap();
+    assert_eq!(
+        (report.made, made.into_inner()),
+        (30 - finished as u64 + 2, 30 - finished as u64 + 2)
+    );
+    assert_eq!(
+        report,
+        Report {
+            made: report.made,
+            ..make(&full_plan(whole.path(), 30)).unwrap()
+        }
+    );
     assert_eq!(bytes(whole.path()), bytes(broken.path()));
 }
 
@@ -209,7 +279,13 @@ fn a_finished_dataset_is_left_alone() {
     make(&plan(dir.path(), 5)).unwrap();
     let before = bytes(dir.path());
     let never = |_| -> Result<Sample> { panic!("nothing is missing") };
-    let report = generate(&plan(dir.path(), 5), never, &|_| {}, &AtomicBool::new(false)).unwrap();
+    let report = generate(
+        &plan(dir.path(), 5),
+        never,
+        &|_| {},
+        &AtomicBool::new(false),
+    )
+    .unwrap();
     assert_eq!((report.images, report.made), (5, 0));
     assert_eq!(before, bytes(dir.path()));
 }
@@ -234,13 +310,28 @@ fn another_plan_in_the_same_folder_is_refused_by_name() {
         make(&plan).unwrap_err().to_string()
     };
     let seed = refused(&|p| p.seed = 8);
-    assert!(seed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"), "{seed}");
+    assert!(
+        seed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"),
+        "{seed}"
+    );
     let recipe = refused(&|p| p.recipe["objects"]["count"][1] = 20.into());
-    assert!(recipe.contains("recipe.objects.count[1]: the dataset was begun with 30, this run has 20"), "{recipe}");
-    assert!(refused(&|p| p.recipe["light"] = true.into()).contains("recipe.light: the dataset was begun with null"));
+    assert!(
+        recipe.contains("recipe.objects.count[1]: the dataset was begun with 30, this run has 20"),
+        "{recipe}"
+    );
+    assert!(
+        refused(&|p| p.recipe["light"] = true.into())
+            .contains("recipe.light: the dataset was begun with null")
+    );
     assert!(refused(&|p| p.obstructed = Obstructed::Keep).contains("obstructed"));
     assert!(refused(&|p| p.writers = vec![Box::new(Yolo::default())]).contains("writers"));
-    assert!(refused(&|p| p.split = Split { val_percent: 20, order: SplitOrder::Consecutive }).contains("split.order"));
+    assert!(
+        refused(&|p| p.split = Split {
+            val_percent: 20,
+            order: SplitOrder::Consecutive
+        })
+        .contains("split.order")
+    );
     assert_eq!(before, bytes(dir.path()));
 }
 
@@ -249,13 +340,18 @@ fn folders_that_are_something_else_are_refused_and_left_alone() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("photo.png");
     std::fs::write(&file, b"mine").unwrap();
-    for (folder, what) in
-        [(file.clone(), "is a file"), (file.join("out"), "is a file"), (dir.path().into(), "is not empty")]
-    {
+    for (folder, what) in [
+        (file.clone(), "is a file"),
+        (file.join("out"), "is a file"),
+        (dir.path().into(), "is not empty"),
+    ] {
         let e = make(&plan(&folder, 3)).unwrap_err().to_string();
         assert!(e.contains(what), "{e}");
     }
-    assert_eq!(bytes(dir.path()), BTreeMap::from([("photo.png".into(), b"mine".to_vec())]));
+    assert_eq!(
+        bytes(dir.path()),
+        BTreeMap::from([("photo.png".into(), b"mine".to_vec())])
+    );
 }
 
 #[test]
@@ -265,14 +361,34 @@ fn one_run_at_a_time_writes_a_folder() {
         let e = make(&plan(dir.path(), 1)).unwrap_err().to_string();
         assert!(e.contains("another run is writing"), "{e}");
     };
-    generate(&plan(dir.path(), 1), sample, &second, &AtomicBool::new(false)).unwrap();
+    generate(
+        &plan(dir.path(), 1),
+        sample,
+        &second,
+        &AtomicBool::new(false),
+    )
+    .unwrap();
 }
 
 #[test]
 fn a_failing_sample_ends_the_run_and_keeps_the_others() {
     let dir = tempfile::tempdir().unwrap();
-    let fails = |k| if k == 6 { Err(Error::value("objects", "would not settle")) } else { sample(k) };
-    let e = threads(1, || generate(&plan(dir.path(), 20), fails, &|_| {}, &AtomicBool::new(false))).unwrap_err();
+    let fails = |k| {
+        if k == 6 {
+            Err(Error::value("objects", "would not settle"))
+        } else {
+            sample(k)
+        }
+    };
+    let e = threads(1, || {
+        generate(
+            &plan(dir.path(), 20),
+            fails,
+            &|_| {},
+            &AtomicBool::new(false),
+        )
+    })
+    .unwrap_err();
     assert_eq!(e.to_string(), "objects: would not settle");
     assert_eq!(text(dir.path(), "index.jsonl").lines().count(), 6);
     assert_eq!(make(&plan(dir.path(), 20)).unwrap().made, 14);
@@ -288,16 +404,24 @@ fn what_a_writer_cannot_hold_is_an_error() {
                 s
             })
         };
-        generate(&plan(dir.path(), 1), made, &|_| {}, &AtomicBool::new(false)).unwrap_err().to_string()
+        generate(&plan(dir.path(), 1), made, &|_| {}, &AtomicBool::new(false))
+            .unwrap_err()
+            .to_string()
     };
     let odd = run(&|s| s.labels.objects = vec![object(1, 3, [0.0; 2], &[])]);
     assert_eq!(odd, "labels.objects[0].class: 3, but there are 3 classes");
     assert!(run(&|s| s.labels.image = [63, 48]).starts_with("labels.image: 63 x 48"));
     let small = run(&|s| {
         s.frame = Image::new(9, 40);
-        s.labels = Labels { image: [9, 40], objects: vec![] };
+        s.labels = Labels {
+            image: [9, 40],
+            objects: vec![],
+        };
     });
-    assert_eq!(small, "image: 9 x 40 pixels, expected at least 10 a side for YOLO");
+    assert_eq!(
+        small,
+        "image: 9 x 40 pixels, expected at least 10 a side for YOLO"
+    );
 }
 
 #[test]
@@ -307,12 +431,18 @@ fn obstructed_objects_are_kept_on_request_and_twins_written_once() {
     plan.obstructed = Obstructed::Keep;
     let twins = |_| {
         let mut s = sample(0)?;
-        s.labels.objects =
-            vec![object(1, 0, [0.0, 0.0], &[]), object(2, 0, [0.0, 0.0], &[1]), object(3, 0, [52.0, 39.0], &[])];
+        s.labels.objects = vec![
+            object(1, 0, [0.0, 0.0], &[]),
+            object(2, 0, [0.0, 0.0], &[1]),
+            object(3, 0, [52.0, 39.0], &[]),
+        ];
         Ok(s)
     };
     let report = generate(&plan, twins, &|_| {}, &AtomicBool::new(false)).unwrap();
-    assert_eq!((report.objects, report.labelled, report.obstructed), (3, 3, 1));
+    assert_eq!(
+        (report.objects, report.labelled, report.obstructed),
+        (3, 3, 1)
+    );
     let rows = "0 0.093750 0.093750 0.187500 0.187500\n0 0.906250 0.906250 0.187500 0.187500\n";
     assert_eq!(text(dir.path(), "labels/val/000000.txt"), rows);
 }
@@ -322,15 +452,25 @@ fn objects_in_a_circle_are_counted_and_none_of_them_is_on_top() {
     let dir = tempfile::tempdir().unwrap();
     let circle = |k| {
         let mut s = sample(k)?;
-        s.labels.objects =
-            [(1, 3), (2, 1), (3, 2)].map(|(id, over)| object(id, 0, [6.0 * id as f64; 2], &[over])).into();
+        s.labels.objects = [(1, 3), (2, 1), (3, 2)]
+            .map(|(id, over)| object(id, 0, [6.0 * id as f64; 2], &[over]))
+            .into();
         s.labels.objects.push(object(4, 1, [40.0; 2], &[]));
         Ok(s)
     };
-    let report = generate(&plan(dir.path(), 2), circle, &|_| {}, &AtomicBool::new(false)).unwrap();
+    let report = generate(
+        &plan(dir.path(), 2),
+        circle,
+        &|_| {},
+        &AtomicBool::new(false),
+    )
+    .unwrap();
     assert_eq!((report.knotted, report.objects, report.labelled), (6, 8, 2));
     let record: Record = io::read_json(dir.path().join("scenes/train/000001.json")).unwrap();
-    assert_eq!((record.knotted, record.topmost), ([1, 2, 3].map(ObjectId).to_vec(), vec![ObjectId(4)]));
+    assert_eq!(
+        (record.knotted, record.topmost),
+        ([1, 2, 3].map(ObjectId).to_vec(), vec![ObjectId(4)])
+    );
 }
 
 #[test]
@@ -338,8 +478,15 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let mut plan = plan(dir.path(), 8);
     plan.writers = vec![
-        Box::new(Pictures { format: PictureFormat::Jpg, exr: true, ..Pictures::default() }),
-        Box::new(Yolo { task: YoloTask::Segment, ..Yolo::default() }),
+        Box::new(Pictures {
+            format: PictureFormat::Jpg,
+            exr: true,
+            ..Pictures::default()
+        }),
+        Box::new(Yolo {
+            task: YoloTask::Segment,
+            ..Yolo::default()
+        }),
     ];
     make(&plan).unwrap();
     let row = "1 0.015625 0.000000 0.203125 0.000000 0.203125 0.187500 0.015625 0.187500\n";
@@ -348,13 +495,28 @@ fn segments_hold_borders_and_jpegs_are_accepted() {
         points.sort();
         points
     };
-    assert_eq!(sorted(&text(dir.path(), "labels/train/000001.txt")), sorted(row));
+    assert_eq!(
+        sorted(&text(dir.path(), "labels/train/000001.txt")),
+        sorted(row)
+    );
     assert_eq!(faults(dir.path()), [""; 0]);
     // A rectangle has no corner to spare.
     let simplified = tempfile::tempdir().unwrap();
-    let yolo = Yolo { task: YoloTask::Segment, simplify: 2.0, ..Yolo::default() };
-    make(&Plan { folder: simplified.path().into(), writers: vec![Box::new(yolo)], ..plan }).unwrap();
-    assert_eq!(sorted(&text(simplified.path(), "labels/train/000001.txt")), sorted(row));
+    let yolo = Yolo {
+        task: YoloTask::Segment,
+        simplify: 2.0,
+        ..Yolo::default()
+    };
+    make(&Plan {
+        folder: simplified.path().into(),
+        writers: vec![Box::new(yolo)],
+        ..plan
+    })
+    .unwrap();
+    assert_eq!(
+        sorted(&text(simplified.path(), "labels/train/000001.txt")),
+        sorted(row)
+    );
     let exr: Image<PremulRgba> = io::read(dir.path().join("exr/train/000001.exr")).unwrap();
     assert_eq!(exr.size(), (64, 48));
 }
@@ -365,8 +527,14 @@ fn a_sidecar_reads_back_bit_by_bit() {
     make(&plan(dir.path(), 4)).unwrap();
     let record: Record = io::read_json(dir.path().join("scenes/train/000003.json")).unwrap();
     let made = sample(3).unwrap();
-    assert_eq!((record.scene, record.labels, record.drawn), (made.scene, made.labels, made.drawn));
-    assert_eq!((record.seed, record.index, record.labelled), (7, 3, vec![ObjectId(1), ObjectId(3)]));
+    assert_eq!(
+        (record.scene, record.labels, record.drawn),
+        (made.scene, made.labels, made.drawn)
+    );
+    assert_eq!(
+        (record.seed, record.index, record.labelled),
+        (7, 3, vec![ObjectId(1), ObjectId(3)])
+    );
 }
 
 #[test]
@@ -375,18 +543,36 @@ fn a_check_finds_every_fault_and_its_place() {
     make(&plan(dir.path(), 12)).unwrap();
     let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
     let row = "0 0.5 0.5 0.1 0.1";
-    write("labels/train/000001.txt", &format!("{row}\n0 0.5 0.5 0.1\n3 0.5 0.5 0.1 0.1\n{row}\n"));
+    write(
+        "labels/train/000001.txt",
+        &format!("{row}\n0 0.5 0.5 0.1\n3 0.5 0.5 0.1 0.1\n{row}\n"),
+    );
     write(
         "labels/train/000002.txt",
         "0 0.5 1.1 0.1 0.1\n0 0.5 0.5 0 0.1\n0.5 0.5 0.5 0.1 0.1\n0 a 0.5 0.1 0.1\n-1 0 0 1 1\n",
     );
-    write("labels/train/000003.txt", &format!("{row}\n0 0.1 0.1 0.2 0.2 0.3 0.3\n"));
+    write(
+        "labels/train/000003.txt",
+        &format!("{row}\n0 0.1 0.1 0.2 0.2 0.3 0.3\n"),
+    );
     write("labels/train/000099.txt", "");
     std::fs::remove_file(dir.path().join("labels/train/000004.txt")).unwrap();
     let whole = std::fs::read(dir.path().join("images/val/000005.png")).unwrap();
-    std::fs::write(dir.path().join("images/val/000005.png"), &whole[..whole.len() / 2]).unwrap();
-    std::fs::copy(dir.path().join("images/train/000006.png"), dir.path().join("images/val/000010.png")).unwrap();
-    io::write(dir.path().join("images/train/000007.png"), &Image::<LinearRgb>::new(9, 30)).unwrap();
+    std::fs::write(
+        dir.path().join("images/val/000005.png"),
+        &whole[..whole.len() / 2],
+    )
+    .unwrap();
+    std::fs::copy(
+        dir.path().join("images/train/000006.png"),
+        dir.path().join("images/val/000010.png"),
+    )
+    .unwrap();
+    io::write(
+        dir.path().join("images/train/000007.png"),
+        &Image::<LinearRgb>::new(9, 30),
+    )
+    .unwrap();
 
     let found = faults(dir.path()).join("\n");
     for expected in [
@@ -425,8 +611,13 @@ fn with_a_card_up_at(k: u64, height: f64) -> Sample {
         grade: Grade::default(),
     };
     let mut sample = sample(k).unwrap();
-    let falls =
-        |i: usize| card(Placement::Drop { above: [0.0; 2], height: i as f64, rotation: UnitQuaternion::identity() });
+    let falls = |i: usize| {
+        card(Placement::Drop {
+            above: [0.0; 2],
+            height: i as f64,
+            rotation: UnitQuaternion::identity(),
+        })
+    };
     sample.drawn.objects = (1..4).map(falls).collect();
     let lies = |z: f64| card(Placement::At(Pose::translation(0.0, 0.0, z)));
     sample.scene.objects = [0.0027, 0.0081, height].map(lies).into();
@@ -437,10 +628,21 @@ fn with_a_card_up_at(k: u64, height: f64) -> Sample {
 fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
     let found = |recipe: &str| {
         let dir = tempfile::tempdir().unwrap();
-        let plan = Plan { recipe: serde_json::from_str(recipe).unwrap(), ..plan(dir.path(), 2) };
+        let plan = Plan {
+            recipe: serde_json::from_str(recipe).unwrap(),
+            ..plan(dir.path(), 2)
+        };
         let height = |k: u64| if k == 0 { 0.0135 } else { 0.27 };
-        generate(&plan, |k| Ok(with_a_card_up_at(k, height(k))), &|_| {}, &AtomicBool::new(false)).unwrap();
-        let found = faults(dir.path()).into_iter().filter(|fault| fault.contains("nothing holds"));
+        generate(
+            &plan,
+            |k| Ok(with_a_card_up_at(k, height(k))),
+            &|_| {},
+            &AtomicBool::new(false),
+        )
+        .unwrap();
+        let found = faults(dir.path())
+            .into_iter()
+            .filter(|fault| fault.contains("nothing holds"));
         found.collect::<Vec<_>>()
     };
     let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again";
@@ -452,7 +654,11 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
 #[test]
 fn an_empty_folder_fails_the_check() {
     let dir = tempfile::tempdir().unwrap();
-    assert!(faults(dir.path())[0].starts_with("data.yaml: "), "{:?}", faults(dir.path()));
+    assert!(
+        faults(dir.path())[0].starts_with("data.yaml: "),
+        "{:?}",
+        faults(dir.path())
+    );
     assert!(check(&dir.path().join("none")).is_err());
 }
 
@@ -460,12 +666,20 @@ fn an_empty_folder_fails_the_check() {
 fn a_contact_sheet_shows_the_pictures_asked_for() {
     let dir = tempfile::tempdir().unwrap();
     make(&plan(dir.path(), 12)).unwrap();
-    let options = SheetOptions { title: "twelve".into(), columns: 3, ..SheetOptions::default() };
+    let options = SheetOptions {
+        title: "twelve".into(),
+        columns: 3,
+        ..SheetOptions::default()
+    };
     let six = contact_sheet_of(dir.path(), 6, &options).unwrap();
     let all = contact_sheet_of(dir.path(), 100, &options).unwrap();
     assert_eq!(six.width(), all.width());
     assert_eq!(all.height() - six.height(), 2 * (48 + 4 + 16 + 16));
-    let orange = petcomp::Srgb8 { r: 0xE6, g: 0x9F, b: 0x00 };
+    let orange = petcomp::Srgb8 {
+        r: 0xE6,
+        g: 0x9F,
+        b: 0x00,
+    };
     assert!(all.pixels().contains(&orange));
     assert!(contact_sheet_of(&dir.path().join("images"), 6, &options).is_err());
 }
@@ -480,14 +694,22 @@ fn a_writer_of_one_s_own_takes_part() {
         fn begin(&self, _: &Path, _: &[String]) -> Result<()> {
             Ok(())
         }
-        fn write(&self, folder: &Path, entry: &petcomp::dataset::Entry<'_>) -> Result<Vec<PathBuf>> {
+        fn write(
+            &self,
+            folder: &Path,
+            entry: &petcomp::dataset::Entry<'_>,
+        ) -> Result<Vec<PathBuf>> {
             let path = PathBuf::from(format!("{}.txt", entry.k));
             io::write_text(folder.join(&path), &entry.labelled.len().to_string())?;
             Ok(vec![path])
         }
     }
     let dir = tempfile::tempdir().unwrap();
-    make(&Plan { writers: vec![Box::new(Count)], ..plan(dir.path(), 4) }).unwrap();
+    make(&Plan {
+        writers: vec![Box::new(Count)],
+        ..plan(dir.path(), 4)
+    })
+    .unwrap();
     assert_eq!(text(dir.path(), "3.txt"), "2");
 }
 
@@ -496,22 +718,50 @@ fn trainers_are_shown_files_that_are_there() {
     let shown = |formats: &str| {
         let dir = tempfile::tempdir().unwrap();
         let labels: LabelSetup = toml::from_str(formats).unwrap();
-        let report = make(&Plan { writers: labels.writers(&Pictures::default()), ..plan(dir.path(), 6) }).unwrap();
-        assert!(report.for_trainers.iter().all(|file| dir.path().join(file).exists()));
-        report.for_trainers.iter().map(|file| file.display().to_string()).collect::<Vec<_>>()
+        let report = make(&Plan {
+            writers: labels.writers(&Pictures::default()),
+            ..plan(dir.path(), 6)
+        })
+        .unwrap();
+        assert!(
+            report
+                .for_trainers
+                .iter()
+                .all(|file| dir.path().join(file).exists())
+        );
+        report
+            .for_trainers
+            .iter()
+            .map(|file| file.display().to_string())
+            .collect::<Vec<_>>()
     };
-    let coco = ["annotations/instances_train.json", "annotations/instances_val.json"];
+    let coco = [
+        "annotations/instances_train.json",
+        "annotations/instances_val.json",
+    ];
     assert_eq!(shown("formats = ['coco']"), coco);
-    assert_eq!(shown("formats = ['voc', 'yolo']"), ["data.yaml", "voc/train.txt", "voc/val.txt"]);
-    assert_eq!(shown("formats = ['webdataset']"), ["webdataset/train-000000.tar", "webdataset/val-000000.tar"]);
+    assert_eq!(
+        shown("formats = ['voc', 'yolo']"),
+        ["data.yaml", "voc/train.txt", "voc/val.txt"]
+    );
+    assert_eq!(
+        shown("formats = ['webdataset']"),
+        ["webdataset/train-000000.tar", "webdataset/val-000000.tar"]
+    );
     assert_eq!(shown("formats = ['layers']"), [""; 0]);
     // What joins many samples comes when the shards are merged.
     let dir = tempfile::tempdir().unwrap();
-    assert_eq!(make(&shard(dir.path(), 6, 1, 2)).unwrap().for_trainers, [Path::new("data.yaml")]);
+    assert_eq!(
+        make(&shard(dir.path(), 6, 1, 2)).unwrap().for_trainers,
+        [Path::new("data.yaml")]
+    );
 }
 
 fn shard(folder: &Path, count: u64, index: u64, of: u64) -> Plan {
-    Plan { numbers: Numbers::Shard(Shard::new(index, of).unwrap()), ..full_plan(folder, count) }
+    Plan {
+        numbers: Numbers::Shard(Shard::new(index, of).unwrap()),
+        ..full_plan(folder, count)
+    }
 }
 
 /// Shards of 20 samples in every format, made in an order of their own.
@@ -544,7 +794,11 @@ fn merged_shards_are_the_bytes_of_one_run() {
 fn shards_that_do_not_make_a_whole_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let folders = shards(dir.path());
-    let refused = |folders: &[PathBuf]| joined(folders, &dir.path().join("merged")).unwrap_err().to_string();
+    let refused = |folders: &[PathBuf]| {
+        joined(folders, &dir.path().join("merged"))
+            .unwrap_err()
+            .to_string()
+    };
     assert_eq!(refused(&folders[..2]), "shards: shard 3/3 is missing");
     assert_eq!(refused(&[]), "shards: none, expected their folders");
     let twice = [folders.clone(), vec![folders[0].clone()]].concat();
@@ -555,13 +809,28 @@ fn shards_that_do_not_make_a_whole_are_refused() {
     assert!(refused(&[whole]).ends_with("is a whole dataset, expected a shard"));
 
     let other = dir.path().join("other");
-    make(&Plan { seed: 8, ..shard(&other, 20, 3, 3) }).unwrap();
+    make(&Plan {
+        seed: 8,
+        ..shard(&other, 20, 3, 3)
+    })
+    .unwrap();
     let mixed = refused(&[folders[0].clone(), folders[1].clone(), other]);
-    assert!(mixed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"), "{mixed}");
+    assert!(
+        mixed.ends_with("dataset.json: seed: the dataset was begun with 7, this run has 8"),
+        "{mixed}"
+    );
 
     let journal = folders[1].join("index.jsonl");
     let lines = std::fs::read_to_string(&journal).unwrap();
-    std::fs::write(&journal, lines.lines().skip(1).map(|line| format!("{line}\n")).collect::<String>()).unwrap();
+    std::fs::write(
+        &journal,
+        lines
+            .lines()
+            .skip(1)
+            .map(|line| format!("{line}\n"))
+            .collect::<String>(),
+    )
+    .unwrap();
     assert!(refused(&folders).contains("shard-2: sample 1 is missing: finish this shard first"));
     std::fs::write(&journal, lines).unwrap();
 
@@ -573,8 +842,10 @@ fn shards_that_do_not_make_a_whole_are_refused() {
 
 /// Changes the first line of a folder's journal, and gives it the checksum of its new bytes if it is to pass for whole.
 fn edit_journal(folder: &Path, from: &str, to: &str, pass: bool) {
-    let (first, rest) =
-        text(folder, "index.jsonl").split_once('\n').map(|(a, b)| (a.to_owned(), b.to_owned())).unwrap();
+    let (first, rest) = text(folder, "index.jsonl")
+        .split_once('\n')
+        .map(|(a, b)| (a.to_owned(), b.to_owned()))
+        .unwrap();
     assert!(first.contains(from), "no {from} in {first}");
     let mut edited = first.replacen(from, to, 1);
     if pass {
@@ -596,7 +867,10 @@ fn a_merge_reads_and_writes_nothing_outside_its_folders() {
         let more = format!(r#""files":[{{"path":"{path}","bytes":5,"crc32":{crc32}}},"#);
         edit_journal(&folders[0], "\"files\":[", &more, true);
         let refused = joined(&folders, &out).unwrap_err().to_string();
-        assert!(refused.contains("shard-1/index.jsonl: line 1: file: "), "{path}: {refused}");
+        assert!(
+            refused.contains("shard-1/index.jsonl: line 1: file: "),
+            "{path}: {refused}"
+        );
         std::fs::write(folders[0].join("index.jsonl"), line).unwrap();
     }
     assert!(!dir.path().join("deep").exists());
@@ -611,25 +885,50 @@ fn a_merge_reads_regular_files_of_the_shard_alone() {
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(dir.path().join("secret"), &whole).unwrap();
     let link = |to: &Path| std::os::unix::fs::symlink(to, &file).unwrap();
-    let pipe = || assert!(std::process::Command::new("mkfifo").arg(&file).status().unwrap().success());
+    let pipe = || {
+        assert!(
+            std::process::Command::new("mkfifo")
+                .arg(&file)
+                .status()
+                .unwrap()
+                .success()
+        )
+    };
     let cases: [(&dyn Fn(), &str); 3] = [
-        (&|| link(&dir.path().join("secret")), "000003.txt: is a link out of"),
-        (&|| link(Path::new("/dev/zero")), "000003.txt: is a link out of"),
+        (
+            &|| link(&dir.path().join("secret")),
+            "000003.txt: is a link out of",
+        ),
+        (
+            &|| link(Path::new("/dev/zero")),
+            "000003.txt: is a link out of",
+        ),
         (&pipe, "000003.txt: not a regular file"),
     ];
     for (spoil, why) in cases {
         std::fs::remove_file(&file).unwrap();
         spoil();
-        let refused = joined(&folders, &dir.path().join("out")).unwrap_err().to_string();
+        let refused = joined(&folders, &dir.path().join("out"))
+            .unwrap_err()
+            .to_string();
         assert!(refused.contains(why), "{refused}");
     }
     std::fs::remove_file(folders[1].join("index.jsonl")).unwrap();
-    let pipe = std::process::Command::new("mkfifo").arg(folders[1].join("index.jsonl")).status();
+    let pipe = std::process::Command::new("mkfifo")
+        .arg(folders[1].join("index.jsonl"))
+        .status();
     assert!(pipe.unwrap().success());
     assert!(
-        joined(&folders, &dir.path().join("out")).unwrap_err().to_string().contains("index.jsonl: not a regular file")
+        joined(&folders, &dir.path().join("out"))
+            .unwrap_err()
+            .to_string()
+            .contains("index.jsonl: not a regular file")
     );
-    assert!(faults(&folders[1]).join("\n").contains("index.jsonl: not a regular file"));
+    assert!(
+        faults(&folders[1])
+            .join("\n")
+            .contains("index.jsonl: not a regular file")
+    );
 }
 
 #[test]
@@ -645,13 +944,22 @@ fn edited_lines_are_refused_by_a_merge_and_made_again_by_a_run() {
     ];
     for (from, to) in edits {
         edit_journal(&folders[1], from, to, false);
-        let refused = joined(&folders, &dir.path().join("out")).unwrap_err().to_string();
-        assert!(refused.contains("shard-2/index.jsonl: line 1: ") && refused.ends_with("--resume"), "{refused}");
+        let refused = joined(&folders, &dir.path().join("out"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            refused.contains("shard-2/index.jsonl: line 1: ") && refused.ends_with("--resume"),
+            "{refused}"
+        );
         assert_eq!(mend(&folders[1]).unwrap(), (6, 1), "{from}");
         assert_eq!(make(&shard(&folders[1], 20, 2, 3)).unwrap().made, 1);
         assert_eq!(before, bytes(&folders[1]));
         edit_journal(&folders[1], from, to, false);
-        assert_eq!(make(&shard(&folders[1], 20, 2, 3)).unwrap().made, 1, "without being looked through");
+        assert_eq!(
+            make(&shard(&folders[1], 20, 2, 3)).unwrap().made,
+            1,
+            "without being looked through"
+        );
         assert_eq!(before, bytes(&folders[1]));
     }
 }
@@ -670,13 +978,29 @@ fn numbers_that_no_dataset_has_are_refused() {
         std::fs::write(&path, before).unwrap();
         refused
     };
-    assert!(says("\"of\": 3", "\"of\": 0").ends_with("dataset.json: shard: 1/0, expected at least one shard"));
+    assert!(
+        says("\"of\": 3", "\"of\": 0")
+            .ends_with("dataset.json: shard: 1/0, expected at least one shard")
+    );
     assert!(says("\"index\": 1", "\"index\": 0").contains("shard: 0/3, expected"));
-    assert!(says("\"count\": 20", "\"count\": 18446744073709551615").contains("count: 18446744073709551615 samples"));
+    assert!(
+        says("\"count\": 20", "\"count\": 18446744073709551615")
+            .contains("count: 18446744073709551615 samples")
+    );
     edit_journal(&folders[0], "\"k\":0", "\"k\":1", true);
-    assert!(joined(&folders, &out).unwrap_err().to_string().contains("line 1: sample 1 is none of shard 1/3 of 20"));
-    let e = make(&plan(&out, 1_000_000_000_000)).unwrap_err().to_string();
-    assert_eq!(e, "count: 1000000000000 samples, expected at most 1000000000");
+    assert!(
+        joined(&folders, &out)
+            .unwrap_err()
+            .to_string()
+            .contains("line 1: sample 1 is none of shard 1/3 of 20")
+    );
+    let e = make(&plan(&out, 1_000_000_000_000))
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        e,
+        "count: 1000000000000 samples, expected at most 1000000000"
+    );
     assert!(!out.exists());
 }
 
@@ -684,10 +1008,18 @@ fn numbers_that_no_dataset_has_are_refused() {
 fn one_sample_of_a_great_many_is_made_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let last = 999_999_999;
-    let one = Plan { numbers: Numbers::One(last), ..plan(dir.path(), last + 1) };
+    let one = Plan {
+        numbers: Numbers::One(last),
+        ..plan(dir.path(), last + 1)
+    };
     assert_eq!(make(&one).unwrap().made, 1);
     let shard = dir.path().join("shard");
-    assert_eq!(make(&self::shard(&shard, last + 1, 5, 500_000_000)).unwrap().made, 2);
+    assert_eq!(
+        make(&self::shard(&shard, last + 1, 5, 500_000_000))
+            .unwrap()
+            .made,
+        2
+    );
 }
 
 #[test]
@@ -696,10 +1028,16 @@ fn fewer_than_there_are_is_refused_and_nothing_is_lost() {
     make(&full_plan(dir.path(), 12)).unwrap();
     let before = bytes(dir.path());
     let refused = make(&full_plan(dir.path(), 5)).unwrap_err().to_string();
-    assert!(refused.contains("has image 11, but only 5 are asked for: ask for at least 12"), "{refused}");
+    assert!(
+        refused.contains("has image 11, but only 5 are asked for: ask for at least 12"),
+        "{refused}"
+    );
     assert_eq!(before, bytes(dir.path()));
     // One of them is made again, and the lists of all of them stay.
-    let one = Plan { numbers: Numbers::One(3), ..full_plan(dir.path(), 4) };
+    let one = Plan {
+        numbers: Numbers::One(3),
+        ..full_plan(dir.path(), 4)
+    };
     assert_eq!(make(&one).unwrap().images, 12);
     assert_eq!(before, bytes(dir.path()));
 }
@@ -711,15 +1049,26 @@ fn a_dataset_of_an_older_program_is_read_and_not_continued() {
     let older = text(dir.path(), "dataset.json").replace("  \"format\": 2,\n", "");
     std::fs::write(dir.path().join("dataset.json"), older).unwrap();
     let unsealed = |line: &str| format!("{}}}\n", line.rsplit_once(",\"crc32\":").unwrap().0);
-    let lines: String = text(dir.path(), "index.jsonl").lines().map(unsealed).collect();
-    std::fs::write(dir.path().join("index.jsonl"), lines.replace("\"obstructed\":0,", "")).unwrap();
+    let lines: String = text(dir.path(), "index.jsonl")
+        .lines()
+        .map(unsealed)
+        .collect();
+    std::fs::write(
+        dir.path().join("index.jsonl"),
+        lines.replace("\"obstructed\":0,", ""),
+    )
+    .unwrap();
     let before = bytes(dir.path());
     assert_eq!(faults(dir.path()), [""; 0]);
     assert!(contact_sheet_of(dir.path(), 3, &SheetOptions::default()).is_ok());
-    for refused in [make(&plan(dir.path(), 12)).map(|_| ()), mend(dir.path()).map(|_| ())] {
+    for refused in [
+        make(&plan(dir.path(), 12)).map(|_| ()),
+        mend(dir.path()).map(|_| ()),
+    ] {
         let said = refused.unwrap_err().to_string();
         assert!(
-            said.contains("dataset.json: was begun by an older petcomp") && said.ends_with("begin a new folder"),
+            said.contains("dataset.json: was begun by an older petcomp")
+                && said.ends_with("begin a new folder"),
             "{said}"
         );
     }
@@ -740,7 +1089,10 @@ fn links_in_place_of_its_own_files_are_refused_by_name() {
         make(&plan(&other, 2)).unwrap();
         std::fs::copy(other.join("dataset.json"), out.join("dataset.json")).unwrap();
         let refused = make(&plan(&out, 2)).unwrap_err().to_string();
-        assert!(refused.contains(&format!("{name}: is a link or no regular file")), "{refused}");
+        assert!(
+            refused.contains(&format!("{name}: is a link or no regular file")),
+            "{refused}"
+        );
         assert_eq!(std::fs::read_to_string(&victim).unwrap(), "mine");
     }
     // The notes of how long runs took are no part of the dataset: without them the run goes on.
@@ -765,7 +1117,10 @@ fn one_sample_is_made_again_alone_and_the_others_are_left() {
         made.lock().unwrap().push(k);
         sample(k)
     };
-    let one = Plan { numbers: Numbers::One(7), ..plan(dir.path(), 12) };
+    let one = Plan {
+        numbers: Numbers::One(7),
+        ..plan(dir.path(), 12)
+    };
     generate(&one, counted, &|_| {}, &AtomicBool::new(false)).unwrap();
     assert_eq!(made.into_inner().unwrap(), [7]);
     assert_eq!(before, bytes(dir.path()));
@@ -783,7 +1138,12 @@ fn what_was_damaged_at_its_size_is_found_and_made_again() {
     assert_eq!(mend(dir.path()).unwrap(), (599, 1));
     assert_eq!(make(&plan(dir.path(), 600)).unwrap().made, 1);
     assert_eq!(before, bytes(dir.path()));
-    assert!(mend(&dir.path().join("images")).unwrap_err().to_string().contains("begun before"));
+    assert!(
+        mend(&dir.path().join("images"))
+            .unwrap_err()
+            .to_string()
+            .contains("begun before")
+    );
 }
 
 #[test]
@@ -794,7 +1154,10 @@ fn an_image_that_looks_like_a_trained_one_is_a_leak() {
     let brighter = train.map(|p| p.scale(1.01));
     io::write(dir.path().join("images/val/000005.png"), &brighter).unwrap();
     let found = faults(dir.path()).join("\n");
-    assert!(found.contains("images/val/000005.png: leak: differs from images/train/000006.png"), "{found}");
+    assert!(
+        found.contains("images/val/000005.png: leak: differs from images/train/000006.png"),
+        "{found}"
+    );
 }
 
 #[test]
@@ -805,7 +1168,14 @@ fn the_classes_balance_and_box_sizes_are_counted() {
     let table = checked.balance();
     assert_eq!(table.rows.len(), 3);
     assert_eq!(table.rows[0][4], "18.8 / 18.8 / 18.8 %");
-    assert!(checked.remarks().iter().all(|remark| remark.starts_with("class ")), "{:?}", checked.remarks());
+    assert!(
+        checked
+            .remarks()
+            .iter()
+            .all(|remark| remark.starts_with("class ")),
+        "{:?}",
+        checked.remarks()
+    );
 }
 
 /// The page as a browser sees it after a script has clicked: the text of the document's title.
@@ -816,7 +1186,12 @@ fn browse(page: &str, script: &str) -> Option<String> {
     std::fs::write(&file, page).unwrap();
     let mut command = std::process::Command::new("chromium");
     command.args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"]);
-    command.arg(format!("--user-data-dir={}", dir.path().join("profile").display())).arg(&file);
+    command
+        .arg(format!(
+            "--user-data-dir={}",
+            dir.path().join("profile").display()
+        ))
+        .arg(&file);
     let output = command.output().ok()?;
     let dom = String::from_utf8_lossy(&output.stdout).into_owned();
     let title = dom.split("<title>").nth(1)?.split("</title>").next()?;
@@ -827,11 +1202,19 @@ fn browse(page: &str, script: &str) -> Option<String> {
 fn a_browser_shows_the_report_and_its_switches_work() {
     let dir = tempfile::tempdir().unwrap();
     make(&plan(dir.path(), 12)).unwrap();
-    let page =
-        report::dataset::page(dir.path(), &report::dataset::DatasetReportOptions { most: 6, ..Default::default() })
-            .unwrap()
-            .document();
-    assert!(!page.contains("http://") || page.matches("http://").count() == page.matches("http://www.w3.org").count());
+    let page = report::dataset::page(
+        dir.path(),
+        &report::dataset::DatasetReportOptions {
+            most: 6,
+            ..Default::default()
+        },
+    )
+    .unwrap()
+    .document();
+    assert!(
+        !page.contains("http://")
+            || page.matches("http://").count() == page.matches("http://www.w3.org").count()
+    );
     let script = "const shown = id => getComputedStyle(document.querySelector('.' + id)).display != 'none';\
         const before = [shown('boxes'), shown('masks')];\
         document.getElementById('boxes').click(); document.getElementById('masks').click();\
@@ -858,9 +1241,19 @@ fn write_world(folder: &Path) {
         .replace('\n', " ")
     };
     let asset = |name: &str| {
-        format!("[[assets]]\nname = \"{name}\"\nclass = \"cap\"\nthickness = 0.01\nmass = 0.02\n{}\n", photo(name))
+        format!(
+            "[[assets]]\nname = \"{name}\"\nclass = \"cap\"\nthickness = 0.01\nmass = 0.02\n{}\n",
+            photo(name)
+        )
     };
-    write("assets/assets.toml", format!("classes = [\"cap\", \"label\", \"none\"]\n{}{}", asset("a"), asset("b")));
+    write(
+        "assets/assets.toml",
+        format!(
+            "classes = [\"cap\", \"label\", \"none\"]\n{}{}",
+            asset("a"),
+            asset("b")
+        ),
+    );
     for name in ["a", "b"] {
         let cut_out = Image::filled(40, 20, PremulRgba::new(0.25, 0.5, 0.125, 0.75));
         io::write(folder.join(format!("assets/{name}.exr")), &cut_out).unwrap();
@@ -869,8 +1262,16 @@ fn write_world(folder: &Path) {
         "camera": {"focal_px": 80}, "surface": {"id": "tray", "width_m": 0.6, "height_m": 0.4,
         "corners_px": [[10, 10], [50, 11], [51, 40], [9, 39]]}}"#;
     write("photos/tray.label.json", label.into());
-    io::write(folder.join("photos/tray.tif"), &Image::filled(64, 48, LinearRgb::grey(0.25))).unwrap();
-    io::write(folder.join("sky.exr"), &Image::filled(4, 2, LinearRgb::WHITE)).unwrap();
+    io::write(
+        folder.join("photos/tray.tif"),
+        &Image::filled(64, 48, LinearRgb::grey(0.25)),
+    )
+    .unwrap();
+    io::write(
+        folder.join("sky.exr"),
+        &Image::filled(4, 2, LinearRgb::WHITE),
+    )
+    .unwrap();
     let recipe = "backgrounds = 'photos'\n[scene]\nimage = [64, 48]\nenvironment = { files = ['sky.exr'] }\n";
     write("recipe.toml", recipe.into());
 }
@@ -904,8 +1305,10 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
         io::write(world.join("assets").join(name), &cut_out).unwrap();
     };
     let repaint_tray = || {
-        let (mut photo, length) =
-            (Image::filled(64, 48, LinearRgb::grey(0.25)), std::fs::metadata(&tray).unwrap().len());
+        let (mut photo, length) = (
+            Image::filled(64, 48, LinearRgb::grey(0.25)),
+            std::fs::metadata(&tray).unwrap().len(),
+        );
         photo.pixels_mut()[0].g = 0.5;
         io::write(&tray, &photo).unwrap();
         assert_eq!(std::fs::metadata(&tray).unwrap().len(), length);
@@ -924,32 +1327,75 @@ fn whatever_decides_a_picture_or_a_label_is_compared_before_a_dataset_goes_on() 
             &in_manifest("mass = 0.02", "mass = 0.03"),
             "assets[a].mass: the dataset was begun with 0.02, this run has 0.03",
         ),
-        (&in_manifest("thickness = 0.01", "thickness = 0.02"), "assets[a].thickness: "),
-        (&in_manifest("px_per_metre = 100.0", "px_per_metre = 100.5"), "assets[a].photos[a.exr].px_per_metre: "),
-        (&in_manifest("[[1.0, 1.0]", "[[2.0, 1.0]"), "assets[a].photos[a.exr].outline_px: "),
+        (
+            &in_manifest("thickness = 0.01", "thickness = 0.02"),
+            "assets[a].thickness: ",
+        ),
+        (
+            &in_manifest("px_per_metre = 100.0", "px_per_metre = 100.5"),
+            "assets[a].photos[a.exr].px_per_metre: ",
+        ),
+        (
+            &in_manifest("[[1.0, 1.0]", "[[2.0, 1.0]"),
+            "assets[a].photos[a.exr].outline_px: ",
+        ),
         (
             &in_manifest("name = \"b\"", "name = \"c\""),
             r#"assets[1]: the dataset was begun with "b", this run has "c""#,
         ),
-        (&in_manifest("classes = [\"cap\"", "classes = [\"top\", \"cap\""), "classes[0]: "),
-        (&|| repaint("b.exr", 0.5), "assets[b].photos[b.exr].pixels: the dataset was begun with \"crc32 "),
-        (&repaint_tray, "backgrounds[tray].photo: the dataset was begun with \"crc32 "),
-        (&change("photos/tray.label.json", "[9, 39]", "[9, 38]"), "backgrounds[tray].camera: "),
-        (&change("photos/tray.label.json", "0.6", "0.7"), "backgrounds[tray].camera: "),
+        (
+            &in_manifest("classes = [\"cap\"", "classes = [\"top\", \"cap\""),
+            "classes[0]: ",
+        ),
+        (
+            &|| repaint("b.exr", 0.5),
+            "assets[b].photos[b.exr].pixels: the dataset was begun with \"crc32 ",
+        ),
+        (
+            &repaint_tray,
+            "backgrounds[tray].photo: the dataset was begun with \"crc32 ",
+        ),
+        (
+            &change("photos/tray.label.json", "[9, 39]", "[9, 38]"),
+            "backgrounds[tray].camera: ",
+        ),
+        (
+            &change("photos/tray.label.json", "0.6", "0.7"),
+            "backgrounds[tray].camera: ",
+        ),
     ];
     let before = bytes(&out);
-    let inputs = [&manifest, &tray, &world.join("assets/b.exr"), &world.join("photos/tray.label.json")];
+    let inputs = [
+        &manifest,
+        &tray,
+        &world.join("assets/b.exr"),
+        &world.join("photos/tray.label.json"),
+    ];
     for (change, said) in changes {
         let kept = inputs.map(|path| std::fs::read(path).unwrap());
         change();
         let refused = run(4).unwrap_err().to_string();
         assert!(refused.contains(said), "expected {said}: {refused}");
-        inputs.iter().zip(kept).for_each(|(path, bytes)| std::fs::write(path, bytes).unwrap());
+        inputs
+            .iter()
+            .zip(kept)
+            .for_each(|(path, bytes)| std::fs::write(path, bytes).unwrap());
     }
-    io::write(world.join("sky.exr"), &Image::filled(4, 2, LinearRgb::grey(0.5))).unwrap();
+    io::write(
+        world.join("sky.exr"),
+        &Image::filled(4, 2, LinearRgb::grey(0.5)),
+    )
+    .unwrap();
     let refused = run(4).unwrap_err().to_string();
-    assert!(refused.contains("environments[sky.exr].content: "), "{refused}");
-    io::write(world.join("sky.exr"), &Image::filled(4, 2, LinearRgb::WHITE)).unwrap();
+    assert!(
+        refused.contains("environments[sky.exr].content: "),
+        "{refused}"
+    );
+    io::write(
+        world.join("sky.exr"),
+        &Image::filled(4, 2, LinearRgb::WHITE),
+    )
+    .unwrap();
     assert_eq!(before, bytes(&out));
     assert_eq!(run(4).unwrap().made, 1, "everything is as it was");
 }
@@ -964,12 +1410,17 @@ fn a_photo_that_a_label_or_a_manifest_names_is_one_of_its_folder() {
         let (place, away) = (world.join(file), dir.path().join("away"));
         std::fs::rename(&place, &away).unwrap();
         std::os::unix::fs::symlink(&away, &place).unwrap();
-        let said = Studio::open(Setup::read(world.join("recipe.toml"), &[]).unwrap()).unwrap_err().to_string();
+        let said = Studio::open(Setup::read(world.join("recipe.toml"), &[]).unwrap())
+            .unwrap_err()
+            .to_string();
         std::fs::rename(&away, &place).unwrap();
         said
     };
     for file in ["photos/tray.tif", "assets/b.exr"] {
         let said = refused(file);
-        assert!(said.contains(file) && said.contains("is a link out of"), "{said}");
+        assert!(
+            said.contains(file) && said.contains("is a link out of"),
+            "{said}"
+        );
     }
 }

@@ -5,7 +5,9 @@
 
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
-use petcomp::dataset::{LabelSetup, Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, generate};
+use petcomp::dataset::{
+    LabelSetup, Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, generate,
+};
 use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
@@ -36,7 +38,11 @@ fn ring(size: usize, light: LinearRgb) -> Image<PremulRgba> {
     let middle = 0.5 * size as f32;
     Image::from_fn(size, size, |x, y| {
         let radius = (x as f32 + 0.5 - middle).hypot(y as f32 + 0.5 - middle) / middle;
-        let a = if (0.3..0.9).contains(&radius) { 0.8 } else { 0.0 };
+        let a = if (0.3..0.9).contains(&radius) {
+            0.8
+        } else {
+            0.0
+        };
         PremulRgba::new(a * light.r, a * light.g, a * light.b, a)
     })
 }
@@ -48,9 +54,14 @@ fn card(id: u32, center: [f64; 3], turn: f64, size: [f64; 2]) -> Card {
     Card {
         id: ObjectId(id),
         class: id % 2,
-        quad: Quad { world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation), size },
+        quad: Quad {
+            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+            size,
+        },
         texture: Texture::Rgba(Arc::new(Pyramid::new(ring(64, light)))),
-        outline_uv: corners.map(|a| Point2::new(0.5 + 0.45 * a.cos(), 0.5 + 0.45 * a.sin())).collect(),
+        outline_uv: corners
+            .map(|a| Point2::new(0.5 + 0.45 * a.cos(), 0.5 + 0.45 * a.sin()))
+            .collect(),
         grade: Grade::default(),
         back: None,
     }
@@ -65,8 +76,15 @@ fn shot(k: u64) -> Shot {
         card(3, [0.4, -0.2 + shift, 0.03], -0.5, [0.3, 0.2]),
     ];
     let empty = Shot::new(camera()).with_ambient(LinearRgb::grey(1.0));
-    let plate = Arc::new(Image::filled(96, 72, LinearRgb::new(0.3, 0.2, 0.1 + 0.01 * k as f32)));
-    cards.into_iter().take((k % 4) as usize).fold(empty.with_plate(plate), Shot::with_card)
+    let plate = Arc::new(Image::filled(
+        96,
+        72,
+        LinearRgb::new(0.3, 0.2, 0.1 + 0.01 * k as f32),
+    ));
+    cards
+        .into_iter()
+        .take((k % 4) as usize)
+        .fold(empty.with_plate(plate), Shot::with_card)
 }
 
 fn sample(k: u64) -> Result<Sample> {
@@ -129,15 +147,30 @@ fn made(labels: &str) -> tempfile::TempDir {
 /// Runs a check of `tests/formats.py`; says so where Python or the package is missing.
 fn python(check: &str, package: &str, folder: &Path) {
     let python = std::env::var_os("PETCOMP_PYTHON").unwrap_or_else(|| "python3".into());
-    let has = Command::new(&python).args(["-c", &format!("import {package}")]).output();
+    let has = Command::new(&python)
+        .args(["-c", &format!("import {package}")])
+        .output();
     if !has.is_ok_and(|out| out.status.success()) {
-        eprintln!("skipped: {} has no {package}; `make formats` fetches it", python.display());
+        eprintln!(
+            "skipped: {} has no {package}; `make formats` fetches it",
+            python.display()
+        );
         return;
     }
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/formats.py");
-    let out = Command::new(&python).arg(script).arg(check).arg(folder).output().unwrap();
+    let out = Command::new(&python)
+        .arg(script)
+        .arg(check)
+        .arg(folder)
+        .output()
+        .unwrap();
     let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    assert!(out.status.success(), "{}{}", said(&out.stdout), said(&out.stderr));
+    assert!(
+        out.status.success(),
+        "{}{}",
+        said(&out.stdout),
+        said(&out.stderr)
+    );
     eprintln!("{}", said(&out.stdout));
 }
 
@@ -145,7 +178,12 @@ fn python(check: &str, package: &str, folder: &Path) {
 fn tell_pixels(folder: &Path) {
     let pixels = |k: u64| {
         let objects = sample(k).unwrap().labels.objects;
-        objects.into_iter().map(move |o| (format!("{k}/{}", o.id.0), o.amodal_mask.pixels().collect::<Vec<_>>()))
+        objects.into_iter().map(move |o| {
+            (
+                format!("{k}/{}", o.id.0),
+                o.amodal_mask.pixels().collect::<Vec<_>>(),
+            )
+        })
     };
     let all: BTreeMap<_, _> = (0..12).flat_map(pixels).collect();
     io::write_json(folder.join("pixels.json"), &all).unwrap();
@@ -154,7 +192,9 @@ fn tell_pixels(folder: &Path) {
 #[test]
 fn pycocotools_reads_run_lengths_and_polygons() {
     for masks in ["rle", "polygon"] {
-        let dir = made(&format!("obstructed = \"ignore\"\nformats = [\"coco\"]\ncoco = {{ masks = \"{masks}\" }}"));
+        let dir = made(&format!(
+            "obstructed = \"ignore\"\nformats = [\"coco\"]\ncoco = {{ masks = \"{masks}\" }}"
+        ));
         tell_pixels(dir.path());
         python("coco", "pycocotools", dir.path());
     }
@@ -163,7 +203,9 @@ fn pycocotools_reads_run_lengths_and_polygons() {
 #[test]
 fn ultralytics_takes_boxes_and_segments() {
     for (task, obstructed) in [("detect", "drop"), ("segment", "class")] {
-        let dir = made(&format!("obstructed = \"{obstructed}\"\nyolo = {{ task = \"{task}\" }}"));
+        let dir = made(&format!(
+            "obstructed = \"{obstructed}\"\nyolo = {{ task = \"{task}\" }}"
+        ));
         python(task, "ultralytics.data.utils", dir.path());
     }
 }
@@ -183,15 +225,24 @@ fn a_voc_document_tells_class_box_and_flags() {
     let below = &text[text.find("<object>").unwrap()..text.find("</object>").unwrap()];
     let b = objects[0].amodal_box;
     assert!(
-        below.contains(&format!("<xmin>{}</xmin>", b.x0 + 1.0)) && below.contains(&format!("<ymax>{}</ymax>", b.y1))
+        below.contains(&format!("<xmin>{}</xmin>", b.x0 + 1.0))
+            && below.contains(&format!("<ymax>{}</ymax>", b.y1))
     );
-    for expected in
-        ["<name>none</name>", "<difficult>1</difficult>", "<occluded>1</occluded>", "<truncated>0</truncated>"]
-    {
+    for expected in [
+        "<name>none</name>",
+        "<difficult>1</difficult>",
+        "<occluded>1</occluded>",
+        "<truncated>0</truncated>",
+    ] {
         assert!(below.contains(expected), "no {expected} in {below}");
     }
-    assert!(text.contains("<name>cap &#38; label</name>") && text.contains("<truncated>1</truncated>"));
-    assert_eq!(std::fs::read_to_string(dir.path().join("voc/val.txt")).unwrap(), "000000\n000005\n000010\n");
+    assert!(
+        text.contains("<name>cap &#38; label</name>") && text.contains("<truncated>1</truncated>")
+    );
+    assert_eq!(
+        std::fs::read_to_string(dir.path().join("voc/val.txt")).unwrap(),
+        "000000\n000005\n000010\n"
+    );
 }
 
 #[test]
@@ -200,12 +251,19 @@ fn an_archive_holds_the_files_of_its_samples_in_order() {
     let names = |archive: &str| {
         let file = std::fs::File::open(dir.path().join("webdataset").join(archive)).unwrap();
         let mut tar = tar::Archive::new(file);
-        let paths = tar.entries().unwrap().map(|entry| entry.unwrap().path().unwrap().into_owned());
+        let paths = tar
+            .entries()
+            .unwrap()
+            .map(|entry| entry.unwrap().path().unwrap().into_owned());
         paths.collect::<Vec<PathBuf>>()
     };
-    let expected = [5, 10].map(|k| ["png", "json", "txt", "coco.json"].map(|e| PathBuf::from(format!("{k:06}.{e}"))));
+    let expected = [5, 10]
+        .map(|k| ["png", "json", "txt", "coco.json"].map(|e| PathBuf::from(format!("{k:06}.{e}"))));
     assert_eq!(names("val-000000.tar")[4..], expected.concat());
-    assert_eq!([0, 1, 2].map(|i| names(&format!("train-{i:06}.tar")).len()), [16, 16, 4]);
+    assert_eq!(
+        [0, 1, 2].map(|i| names(&format!("train-{i:06}.tar")).len()),
+        [16, 16, 4]
+    );
     assert!(!dir.path().join("webdataset/train-000003.tar").exists());
 }
 
@@ -219,14 +277,27 @@ fn webdataset_reads_archives() {
 fn layers_add_up_to_the_picture_and_ids_to_what_is_seen() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let ((w, h), channels) = read_channels(dir.path().join("layers/train/000003.exr")).unwrap();
-    let plane = |name: &str| &channels.iter().find(|c| c.name == name).unwrap_or_else(|| panic!("no {name}")).samples;
+    let plane = |name: &str| {
+        &channels
+            .iter()
+            .find(|c| c.name == name)
+            .unwrap_or_else(|| panic!("no {name}"))
+            .samples
+    };
     assert_eq!([w as u32, h as u32], IMAGE);
     let plate = 0.3;
     for i in 0..w * h {
-        let sum = |channel: &str| (1..4).map(|id| plane(&format!("object{id:03}.{channel}"))[i]).sum::<f32>();
+        let sum = |channel: &str| {
+            (1..4)
+                .map(|id| plane(&format!("object{id:03}.{channel}"))[i])
+                .sum::<f32>()
+        };
         let behind = plate * plane("shadow.R")[i] * (1.0 - sum("A"));
         assert!((plane("R")[i] - sum("R") - behind).abs() < 1e-5);
-        let coverage: f32 = ["00.G", "00.A", "01.G"].map(|c| plane(&format!("CryptoObject{c}"))[i]).iter().sum();
+        let coverage: f32 = ["00.G", "00.A", "01.G"]
+            .map(|c| plane(&format!("CryptoObject{c}"))[i])
+            .iter()
+            .sum();
         assert!((coverage - sum("A")).abs() < 1e-6);
         let is_seen = plane("Z")[i].is_finite();
         assert!(is_seen == (1..4).any(|id| plane(&format!("object{id:03}.A"))[i] > 0.1));
@@ -239,10 +310,21 @@ fn a_mask_is_what_the_layer_of_its_object_shows() {
     let dir = made("formats = [\"layers\"]\nlayers = { cards = true }");
     let (_, channels) = read_channels(dir.path().join("layers/train/000007.exr")).unwrap();
     for object in sample(7).unwrap().labels.objects {
-        let plane = |layer: &str| channels.iter().find(|p| p.name == format!("{layer}{:03}.A", object.id.0)).unwrap();
-        for (layer, mask) in [("amodal", &object.amodal_mask), ("object", &object.visible_mask)] {
+        let plane = |layer: &str| {
+            channels
+                .iter()
+                .find(|p| p.name == format!("{layer}{:03}.A", object.id.0))
+                .unwrap()
+        };
+        for (layer, mask) in [
+            ("amodal", &object.amodal_mask),
+            ("object", &object.visible_mask),
+        ] {
             let alpha = |x: u32, y: u32| plane(layer).samples[(y * IMAGE[0] + x) as usize];
-            assert_eq!(*mask, petcomp::label::Mask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1));
+            assert_eq!(
+                *mask,
+                petcomp::label::Mask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1)
+            );
         }
         assert!(object.visible_mask.pixels().count() <= object.amodal_mask.pixels().count());
         assert!(object.depth.near <= object.depth.mean && object.depth.mean <= object.depth.far);
@@ -255,8 +337,15 @@ fn a_box_is_that_of_the_object_rendered_alone() {
         let shot = shot(k);
         let together = sample(k).unwrap().labels;
         for card in &shot.cards {
-            let alone = Shot { cards: vec![card.clone()], ..shot.clone() };
-            let alone = label(&render::cast(&alone, &Default::default()), &alone, &LabelOptions::default());
+            let alone = Shot {
+                cards: vec![card.clone()],
+                ..shot.clone()
+            };
+            let alone = label(
+                &render::cast(&alone, &Default::default()),
+                &alone,
+                &LabelOptions::default(),
+            );
             let object = together.objects.iter().find(|o| o.id == card.id).unwrap();
             let (a, b) = (object.amodal_box, alone.objects[0].visible_box);
             let off = [a.x0 - b.x0, a.y0 - b.y0, a.x1 - b.x1, a.y1 - b.y1].map(f64::abs);
@@ -270,7 +359,10 @@ fn a_box_is_that_of_the_object_rendered_alone() {
 fn an_obstructed_class_is_the_last_and_has_the_obstructed() {
     let dir = made("obstructed = \"class\"");
     let yaml = std::fs::read_to_string(dir.path().join("data.yaml")).unwrap();
-    assert!(yaml.contains("nc: 3") && yaml.ends_with("  2: \"obstructed\"\n"), "{yaml}");
+    assert!(
+        yaml.contains("nc: 3") && yaml.ends_with("  2: \"obstructed\"\n"),
+        "{yaml}"
+    );
     let rows = std::fs::read_to_string(dir.path().join("labels/train/000003.txt")).unwrap();
     let first: Vec<_> = rows.lines().map(|row| &row[..1]).collect();
     assert_eq!(first, ["2", "0", "1"]);

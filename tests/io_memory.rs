@@ -21,8 +21,13 @@ static ALONE: Mutex<()> = Mutex::new(());
 /// A line of `/proc/self/status`, bytes.
 fn status(name: &str) -> Option<usize> {
     let text = fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find_map(|l| l.strip_prefix(name)?.strip_prefix(':').map(str::trim))?;
-    line.strip_suffix(" kB")?.parse().ok().map(|kib: usize| kib * 1024)
+    let line = text
+        .lines()
+        .find_map(|l| l.strip_prefix(name)?.strip_prefix(':').map(str::trim))?;
+    line.strip_suffix(" kB")?
+        .parse()
+        .ok()
+        .map(|kib: usize| kib * 1024)
 }
 
 /// What a call needs at its worst beyond what was there before it, bytes a pixel; none where the system does not tell.
@@ -38,7 +43,10 @@ fn assert_at_most(most: f64, what: &str, taken: Option<f64>) {
     match taken {
         Some(taken) => {
             println!("{what}: {taken:.2} bytes a pixel");
-            assert!(taken <= most, "{what}: {taken:.2} bytes a pixel, expected {most} at most");
+            assert!(
+                taken <= most,
+                "{what}: {taken:.2} bytes a pixel, expected {most} at most"
+            );
         }
         None => eprintln!("skipped: /proc/self does not tell the peak of memory here"),
     }
@@ -79,8 +87,14 @@ fn two_pictures_are_compared_in_the_memory_of_one_channel() {
     let taken = bytes_a_pixel(|| {
         let [a, b] = [(); 2].map(|()| Picture::read(&path).unwrap());
         let light = |p: &Picture, rows| p.rows::<PremulRgba>(rows).map(PremulRgba::color);
-        let [a, b] = [&a, &b].map(|p| RowsBy { size: p.size(), make: move |rows| light(p, rows) });
-        assert_eq!(compare::<LinearRgb>(&a, &b, &Thresholds::default()).verdict, Verdict::Match);
+        let [a, b] = [&a, &b].map(|p| RowsBy {
+            size: p.size(),
+            make: move |rows| light(p, rows),
+        });
+        assert_eq!(
+            compare::<LinearRgb>(&a, &b, &Thresholds::default()).verdict,
+            Verdict::Match
+        );
     });
     assert_at_most(BYTES as f64, "compared", taken);
 }
@@ -90,15 +104,25 @@ fn two_pictures_are_compared_in_the_memory_of_one_channel() {
 fn likeness_takes_memory_for_bands_alone() {
     let _alone = ALONE.lock().unwrap_or_else(|e| e.into_inner());
     let wide = |height: usize| {
-        let make = |rows: std::ops::Range<usize>| petcomp::Image::filled(1 << 11, rows.len(), LinearRgb::grey(0.5));
-        let picture = RowsBy { size: (1 << 11, height), make };
+        let make = |rows: std::ops::Range<usize>| {
+            petcomp::Image::filled(1 << 11, rows.len(), LinearRgb::grey(0.5))
+        };
+        let picture = RowsBy {
+            size: (1 << 11, height),
+            make,
+        };
         bytes_a_pixel(move || Likeness::of(&picture, &picture).unwrap())
     };
     // Once before: threads and tables are there then.
     wide(128);
-    let (Some(one), Some(four)) = (wide(256), wide(1024)) else { return };
+    let (Some(one), Some(four)) = (wide(256), wide(1024)) else {
+        return;
+    };
     println!("a band and more: {one:.2}, four times as much: {four:.2}");
-    assert!(four < 1.5 * one.max(1.0), "{four} bytes for each of {PIXELS}, {one} for a quarter of the rows");
+    assert!(
+        four < 1.5 * one.max(1.0),
+        "{four} bytes for each of {PIXELS}, {one} for a quarter of the rows"
+    );
 }
 
 /// Thirteen channels that nobody asked for are not kept.
@@ -109,7 +133,9 @@ fn of_an_exr_only_the_channels_that_are_used_take_memory() {
     let path = folder.path().join("a.exr");
     let plane = vec![0.5_f32; PIXELS / 4];
     let others = (0..13).map(|i| format!("other.{i}")).collect::<Vec<_>>();
-    let names = ["R", "G", "B"].into_iter().chain(others.iter().map(String::as_str));
+    let names = ["R", "G", "B"]
+        .into_iter()
+        .chain(others.iter().map(String::as_str));
     let channels: Vec<(&str, &[f32])> = names.map(|name| (name, plane.as_slice())).collect();
     io::exr::write_half_channels(&path, (SIDE / 2, SIDE / 2), &channels, &[]).unwrap();
     let taken = bytes_a_pixel(|| io::read::<LinearRgb>(&path).unwrap()).map(|bytes| bytes * 4.0);

@@ -3,7 +3,9 @@
 use geo::Contains;
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
-use petcomp::label::{AmodalBox, BBox, DepthRange, LabelOptions, Labels, ObjectLabel, knotted, label};
+use petcomp::label::{
+    AmodalBox, BBox, DepthRange, LabelOptions, Labels, ObjectLabel, knotted, label,
+};
 use petcomp::render::{DeepImage, DeepSample};
 use petcomp::scene::{Card, Grade};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
@@ -31,7 +33,10 @@ fn card(id: u32, center: [f64; 3], angles: [f64; 3], size: [f64; 2], outline: &[
     Card {
         id: ObjectId(id),
         class: id % 4,
-        quad: petcomp::geom::Quad { world_from_card, size },
+        quad: petcomp::geom::Quad {
+            world_from_card,
+            size,
+        },
         texture: Image::filled(2, 2, PremulRgba::new(0.5, 0.5, 0.5, 1.0)).into(),
         back: None,
         outline_uv: outline.iter().map(|&[u, v]| Point2::new(u, v)).collect(),
@@ -59,17 +64,32 @@ fn pixel(shot: &Shot, outlines: &[geo::Polygon<f64>], x: f64, y: f64) -> Vec<Dee
     let mut samples: Vec<DeepSample> = Vec::new();
     for i in 0..RAYS * RAYS {
         let offset = |k: usize| (k as f64 + 0.5) / RAYS as f64;
-        let ray = shot.camera.ray(Point2::new(x + offset(i % RAYS), y + offset(i / RAYS)));
-        let hits = shot.cards.iter().zip(outlines).filter_map(|(card, outline)| {
-            let (t, uv) = card.quad.intersect(&ray)?;
-            outline.contains(&geo::Point::new(uv.x, uv.y)).then_some((t, card.id))
-        });
+        let ray = shot
+            .camera
+            .ray(Point2::new(x + offset(i % RAYS), y + offset(i / RAYS)));
+        let hits = shot
+            .cards
+            .iter()
+            .zip(outlines)
+            .filter_map(|(card, outline)| {
+                let (t, uv) = card.quad.intersect(&ray)?;
+                outline
+                    .contains(&geo::Point::new(uv.x, uv.y))
+                    .then_some((t, card.id))
+            });
         let mut hits: Vec<_> = hits.collect();
         hits.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (order, &(t, object)) in hits.iter().enumerate() {
-            let k = samples.iter().position(|s| s.object == object).unwrap_or(samples.len());
+            let k = samples
+                .iter()
+                .position(|s| s.object == object)
+                .unwrap_or(samples.len());
             if k == samples.len() {
-                samples.push(DeepSample { object, depth: Depth(t as f32), ..DeepSample::default() });
+                samples.push(DeepSample {
+                    object,
+                    depth: Depth(t as f32),
+                    ..DeepSample::default()
+                });
             }
             samples[k].alpha += share;
             samples[k].visible += if order == 0 { share } else { 0.0 };
@@ -92,35 +112,68 @@ fn any_card(id: u32) -> impl Strategy<Value = Card> {
     let place = prop::array::uniform3(-0.4..0.4_f64);
     let angles = prop::array::uniform3(-1.2..1.2_f64);
     let size = prop::array::uniform2(0.05..0.4_f64);
-    (place, angles, size, 3_usize..9)
-        .prop_map(move |([x, y, z], angles, size, corners)| card(id, [x, y, z + 0.2], angles, size, &round(corners)))
+    (place, angles, size, 3_usize..9).prop_map(move |([x, y, z], angles, size, corners)| {
+        card(id, [x, y, z + 0.2], angles, size, &round(corners))
+    })
 }
 
 /// A tilted card that is too small to reach into the heights of the others.
 fn apart(id: u32) -> impl Strategy<Value = Card> {
     let place = (-0.2..0.2_f64, -0.2..0.2_f64);
-    (place, prop::array::uniform3(-1.2..1.2_f64), prop::array::uniform2(0.05..0.15_f64), 3_usize..9)
-        .prop_map(move |((x, y), angles, size, n)| card(id, [x, y, 0.22 * f64::from(id - 1)], angles, size, &round(n)))
+    (
+        place,
+        prop::array::uniform3(-1.2..1.2_f64),
+        prop::array::uniform2(0.05..0.15_f64),
+        3_usize..9,
+    )
+        .prop_map(move |((x, y), angles, size, n)| {
+            card(
+                id,
+                [x, y, 0.22 * f64::from(id - 1)],
+                angles,
+                size,
+                &round(n),
+            )
+        })
 }
 
 /// A regular polygon that fills the card's texture.
 fn round(corners: usize) -> Vec<[f64; 2]> {
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / corners as f64;
-    (0..corners).map(|i| [0.5 + 0.5 * angle(i).cos(), 0.5 + 0.5 * angle(i).sin()]).collect()
+    (0..corners)
+        .map(|i| [0.5 + 0.5 * angle(i).cos(), 0.5 + 0.5 * angle(i).sin()])
+        .collect()
 }
 
 /// A card that lies flat at height `z`.
 fn flat_card(id: u32) -> impl Strategy<Value = Card> {
     let place = prop::array::uniform2(-0.4..0.4_f64);
-    (place, -3.2..3.2_f64, prop::array::uniform2(0.05..0.3_f64), 3_usize..9).prop_map(move |([x, y], turn, size, n)| {
-        card(id, [x, y, 0.01 * f64::from(id)], [0.0, 0.0, turn], size, &round(n))
-    })
+    (
+        place,
+        -3.2..3.2_f64,
+        prop::array::uniform2(0.05..0.3_f64),
+        3_usize..9,
+    )
+        .prop_map(move |([x, y], turn, size, n)| {
+            card(
+                id,
+                [x, y, 0.01 * f64::from(id)],
+                [0.0, 0.0, turn],
+                size,
+                &round(n),
+            )
+        })
 }
 
 fn area(rings: &[Vec<Point2<f64>>]) -> f64 {
     let ring = |r: &Vec<Point2<f64>>| {
         let next = r.iter().cycle().skip(1);
-        0.5 * r.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>().abs()
+        0.5 * r
+            .iter()
+            .zip(next)
+            .map(|(a, b)| a.x * b.y - b.x * a.y)
+            .sum::<f64>()
+            .abs()
     };
     rings.iter().map(ring).sum()
 }
@@ -137,7 +190,10 @@ fn missed(object: &ObjectLabel) -> f64 {
 }
 
 fn off(a: &BBox, b: &BBox) -> f64 {
-    [a.x0 - b.x0, a.y0 - b.y0, a.x1 - b.x1, a.y1 - b.y1].into_iter().map(f64::abs).fold(0.0, f64::max)
+    [a.x0 - b.x0, a.y0 - b.y0, a.x1 - b.x1, a.y1 - b.y1]
+        .into_iter()
+        .map(f64::abs)
+        .fold(0.0, f64::max)
 }
 
 /// Coverage of an object and the box around every pixel of which it covers more than `least`.
@@ -150,7 +206,10 @@ fn raster(deep: &DeepImage, id: u32, least: f32) -> (f64, BBox) {
             if s.alpha <= least {
                 continue;
             }
-            dots.extend([Point2::new(x as f64, y as f64), Point2::new(x as f64 + 1.0, y as f64 + 1.0)]);
+            dots.extend([
+                Point2::new(x as f64, y as f64),
+                Point2::new(x as f64 + 1.0, y as f64 + 1.0),
+            ]);
         }
     }
     (sum, BBox::around(dots))
@@ -250,18 +309,31 @@ fn three_cards_that_lie_over_each_other_in_a_circle_are_a_knot() {
         let spin = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
         let along = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.3);
         let mut flap = card(id, [0.0; 3], [0.0; 3], [0.5, 0.06], &WHOLE);
-        flap.quad.world_from_card = Pose::from_parts((spin * Vector3::new(0.0, 0.1, 0.1)).into(), spin * along);
+        flap.quad.world_from_card =
+            Pose::from_parts((spin * Vector3::new(0.0, 0.1, 0.1)).into(), spin * along);
         flap
     };
     let found = labels(&shot([1, 2, 3].map(flap)), &LabelOptions::default());
     assert_eq!(found.objects.len(), 3);
-    assert!(found.objects.iter().all(|o| o.covered_by.len() == 1), "{:?}", found.objects);
+    assert!(
+        found.objects.iter().all(|o| o.covered_by.len() == 1),
+        "{:?}",
+        found.objects
+    );
     assert_eq!(knotted(&found.objects), [1, 2, 3].map(ObjectId));
 }
 
 #[test]
 fn a_stack_is_no_knot() {
-    let stack = [1, 2, 3].map(|id| card(id, [0.0, 0.0, 0.1 * f64::from(id)], [0.0; 3], [0.2; 2], &WHOLE));
+    let stack = [1, 2, 3].map(|id| {
+        card(
+            id,
+            [0.0, 0.0, 0.1 * f64::from(id)],
+            [0.0; 3],
+            [0.2; 2],
+            &WHOLE,
+        )
+    });
     let found = labels(&shot(stack), &LabelOptions::default());
     assert_eq!(found.objects[0].covered_by, [ObjectId(2), ObjectId(3)]);
     assert!(found.objects[2].is_topmost() && knotted(&found.objects).is_empty());
@@ -288,10 +360,24 @@ fn masks_and_depth_are_those_of_the_card() {
     let (side, edge) = (20.0 / 0.9, 48.0);
     assert!((below.amodal_mask.area() as f64 - side * side).abs() < 4.0 * side);
     assert_eq!(above.amodal_mask, above.visible_mask);
-    assert!(below.visible_mask.pixels().all(|(x, _)| f64::from(x) <= edge));
-    assert!((below.visible_pixel_fraction - 0.5).abs() < 0.05 && (below.visible_fraction - 0.5).abs() < 0.02);
+    assert!(
+        below
+            .visible_mask
+            .pixels()
+            .all(|(x, _)| f64::from(x) <= edge)
+    );
+    assert!(
+        (below.visible_pixel_fraction - 0.5).abs() < 0.05
+            && (below.visible_fraction - 0.5).abs() < 0.02
+    );
     let DepthRange { near, mean, far } = below.depth;
-    assert!([near, mean, far].iter().all(|depth| (depth - 0.9).abs() < 1e-6), "{:?}", below.depth);
+    assert!(
+        [near, mean, far]
+            .iter()
+            .all(|depth| (depth - 0.9).abs() < 1e-6),
+        "{:?}",
+        below.depth
+    );
 }
 
 #[test]
@@ -304,7 +390,8 @@ fn cards_at_the_same_depth_are_ordered_by_id() {
 
 #[test]
 fn cards_that_only_touch_do_not_overlap() {
-    let beside = [(1, -0.05), (2, 0.05)].map(|(id, x)| card(id, [x, 0.0, 0.1], [0.0; 3], [0.1; 2], &WHOLE));
+    let beside =
+        [(1, -0.05), (2, 0.05)].map(|(id, x)| card(id, [x, 0.0, 0.1], [0.0; 3], [0.1; 2], &WHOLE));
     let found = labels(&shot(beside), &LabelOptions::default());
     assert!(found.objects.iter().all(|o| o.is_topmost()));
 }
@@ -315,7 +402,14 @@ fn a_card_that_reaches_behind_the_camera_is_clipped_to_the_picture() {
     let strip = card(1, [0.6, 0.0, 0.7], [0.0, -0.9, 0.0], [2.0, 0.1], &WHOLE);
     let scene = shot([strip]);
     let deep = cast(&scene);
-    let found = label(&deep, &scene, &LabelOptions { amodal: AmodalBox::Outline, ..LabelOptions::default() });
+    let found = label(
+        &deep,
+        &scene,
+        &LabelOptions {
+            amodal: AmodalBox::Outline,
+            ..LabelOptions::default()
+        },
+    );
     let (counted, around) = raster(&deep, 1, 0.0);
     assert!(counted > 100.0, "the strip crosses the picture");
     assert!(off(&found.objects[0].amodal_box, &around) <= 1.0);
@@ -325,7 +419,10 @@ fn a_card_that_reaches_behind_the_camera_is_clipped_to_the_picture() {
 #[test]
 fn an_outline_that_crosses_itself_keeps_both_loops() {
     let bow_tie = [[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
-    let found = labels(&shot([card(1, [0.0; 3], [0.0; 3], [0.4; 2], &bow_tie)]), &LabelOptions::default());
+    let found = labels(
+        &shot([card(1, [0.0; 3], [0.0; 3], [0.4; 2], &bow_tie)]),
+        &LabelOptions::default(),
+    );
     // Two triangles of a quarter of the 40 x 40 pixel card each.
     assert_eq!(found.objects[0].outline_px.len(), 2);
     assert!((area(&found.objects[0].outline_px) - 800.0).abs() < 0.1);
@@ -333,7 +430,16 @@ fn an_outline_that_crosses_itself_keeps_both_loops() {
 
 #[test]
 fn an_outline_cut_apart_by_the_picture_s_edge_keeps_its_parts() {
-    let comb = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.8, 1.0], [0.8, 0.2], [0.2, 0.2], [0.2, 1.0], [0.0, 1.0]];
+    let comb = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [0.8, 1.0],
+        [0.8, 0.2],
+        [0.2, 0.2],
+        [0.2, 1.0],
+        [0.0, 1.0],
+    ];
     let scene = shot([card(1, [0.0, 0.4, 0.0], [0.0; 3], [0.4; 2], &comb)]);
     let deep = cast(&scene);
     let found = label(&deep, &scene, &LabelOptions::default());
@@ -344,13 +450,39 @@ fn an_outline_cut_apart_by_the_picture_s_edge_keeps_its_parts() {
 #[test]
 fn film_seen_through_film_counts_as_seen() {
     let image = Image::filled(IMAGE[0] as usize, IMAGE[1] as usize, LinearRgb::WHITE);
-    let front = DeepSample { object: ObjectId(1), alpha: 0.4, visible: 0.4, ..DeepSample::default() };
-    let back = DeepSample { object: ObjectId(2), alpha: 0.5, visible: 0.3, ..DeepSample::default() };
-    let deep =
-        DeepImage::from_pixels(image, (0..96 * 72).map(|i| if i == 96 + 2 { vec![front, back] } else { vec![] }));
+    let front = DeepSample {
+        object: ObjectId(1),
+        alpha: 0.4,
+        visible: 0.4,
+        ..DeepSample::default()
+    };
+    let back = DeepSample {
+        object: ObjectId(2),
+        alpha: 0.5,
+        visible: 0.3,
+        ..DeepSample::default()
+    };
+    let deep = DeepImage::from_pixels(
+        image,
+        (0..96 * 72).map(|i| {
+            if i == 96 + 2 {
+                vec![front, back]
+            } else {
+                vec![]
+            }
+        }),
+    );
     let scene = shot([2, 1].map(|id| card(id, [0.0; 3], [0.0; 3], [0.1; 2], &WHOLE)));
     let found = label(&deep, &scene, &LabelOptions::default());
     assert!((found.objects[1].visible_fraction - 0.6).abs() < 1e-6);
-    assert_eq!(found.objects[1].visible_box, BBox { x0: 2.0, y0: 1.0, x1: 3.0, y1: 2.0 });
+    assert_eq!(
+        found.objects[1].visible_box,
+        BBox {
+            x0: 2.0,
+            y0: 1.0,
+            x1: 3.0,
+            y1: 2.0
+        }
+    );
     assert_eq!(found.objects[1].visible_pixel_fraction, 1.0);
 }

@@ -3,7 +3,9 @@
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use petcomp::Scene;
-use petcomp::scene::{Background, CameraSource, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface};
+use petcomp::scene::{
+    Background, CameraSource, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface,
+};
 use petcomp::settle::{self, Allowance, Verdict};
 use proptest::prelude::*;
 use rayon::prelude::*;
@@ -26,7 +28,10 @@ fn stock() -> Vec<Choice> {
         let step = i as f64 / 19.0;
         Choice {
             asset: format!("b{i}"),
-            photo_sizes: vec![[0.16 + 0.12 * step, 0.1 - 0.04 * step], [0.15 + 0.12 * step, 0.1 - 0.04 * step]],
+            photo_sizes: vec![
+                [0.16 + 0.12 * step, 0.1 - 0.04 * step],
+                [0.15 + 0.12 * step, 0.1 - 0.04 * step],
+            ],
             photo_outlines: vec![],
             thickness: 0.004 + 0.016 * step,
             mass: 0.02 + 0.02 * step,
@@ -36,11 +41,16 @@ fn stock() -> Vec<Choice> {
 }
 
 fn recipe(objects: Range) -> Recipe {
-    Recipe { objects, ..Recipe::default() }
+    Recipe {
+        objects,
+        ..Recipe::default()
+    }
 }
 
 fn scene(objects: Range, seed: u64, k: u64) -> Scene {
-    recipe(objects).scene(seed, k, &[tray()], &stock()).expect("the stock fits the tray")
+    recipe(objects)
+        .scene(seed, k, &[tray()], &stock())
+        .expect("the stock fits the tray")
 }
 
 fn settled(scene: Scene) -> Scene {
@@ -94,29 +104,49 @@ fn of_a_thousand_scenes_none_but_one_fails_to_come_to_rest() {
 #[test]
 fn a_scene_does_not_depend_on_the_others() {
     let in_order: Vec<Scene> = (0..40).map(|k| scene(Range::new(1.0, 9.0), 5, k)).collect();
-    let backwards: Vec<Scene> = (0..40).rev().map(|k| scene(Range::new(1.0, 9.0), 5, k)).collect();
+    let backwards: Vec<Scene> = (0..40)
+        .rev()
+        .map(|k| scene(Range::new(1.0, 9.0), 5, k))
+        .collect();
     assert!(in_order.iter().eq(backwards.iter().rev()));
-    let together: Vec<Scene> = (0..40).into_par_iter().map(|k| scene(Range::new(1.0, 9.0), 5, k)).collect();
+    let together: Vec<Scene> = (0..40)
+        .into_par_iter()
+        .map(|k| scene(Range::new(1.0, 9.0), 5, k))
+        .collect();
     assert_eq!(in_order, together);
 }
 
 /// FNV-1a over the bits of every pose.
 fn hash(scenes: &[Scene]) -> u64 {
-    let poses = scenes.iter().flat_map(|scene| &scene.objects).flat_map(|object| {
-        let Placement::At(pose) = object.placement else { panic!("{} still falls", object.asset) };
-        let (t, q) = (pose.translation.vector, pose.rotation.coords);
-        [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
-    });
+    let poses = scenes
+        .iter()
+        .flat_map(|scene| &scene.objects)
+        .flat_map(|object| {
+            let Placement::At(pose) = object.placement else {
+                panic!("{} still falls", object.asset)
+            };
+            let (t, q) = (pose.translation.vector, pose.rotation.coords);
+            [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+        });
     let bytes = poses.flat_map(|x| x.to_bits().to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 #[test]
 fn cards_come_to_rest_at_the_same_bits_at_any_thread_count() {
     let run = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let all: Vec<Scene> =
-            pool.install(|| (0..12).into_par_iter().map(|k| settled(scene(Range::fixed(9.0), 1, k))).collect());
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let all: Vec<Scene> = pool.install(|| {
+            (0..12)
+                .into_par_iter()
+                .map(|k| settled(scene(Range::fixed(9.0), 1, k)))
+                .collect()
+        });
         hash(&all)
     };
     let once = run(1);
@@ -140,14 +170,21 @@ fn pile() -> Scene {
         },
         grade: Default::default(),
     };
-    Scene { objects: (0..8).map(card).collect(), surface: Surface::new([0.5, 0.4]), ..scene(Range::fixed(0.0), 0, 0) }
+    Scene {
+        objects: (0..8).map(card).collect(),
+        surface: Surface::new([0.5, 0.4]),
+        ..scene(Range::fixed(0.0), 0, 0)
+    }
 }
 
 /// The bits seen on the first machine (x86-64, release). A new release of the engine or new settings in `settle` change
 /// them, knowingly; a machine, build or thread count must not.
 #[test]
 fn the_same_pile_ends_at_the_same_bits_everywhere() {
-    assert_eq!(format!("{:016x}", hash(&[settled(pile())])), "07d1c71dd5025806");
+    assert_eq!(
+        format!("{:016x}", hash(&[settled(pile())])),
+        "07d1c71dd5025806"
+    );
 }
 
 /// Points on a body: a grid of about 5 mm over its six faces.
@@ -174,10 +211,14 @@ fn skin(object: &Object) -> Vec<Vector3<f64>> {
 
 /// How deep any point of `a`'s skin lies in `b`: by points, so that it shares no code with the verdict.
 fn sampled_depth(a: &Object, b: &Object) -> f64 {
-    let (Placement::At(at_a), Placement::At(at_b)) = (a.placement, b.placement) else { panic!("still falling") };
+    let (Placement::At(at_a), Placement::At(at_b)) = (a.placement, b.placement) else {
+        panic!("still falling")
+    };
     let half = SettleOptions::default().half_body(b);
     let depth = |p: Vector3<f64>| {
-        let local = at_b.inverse_transform_point(&(at_a * Point3::from(p))).coords;
+        let local = at_b
+            .inverse_transform_point(&(at_a * Point3::from(p)))
+            .coords;
         (half - local.abs()).min()
     };
     skin(a).into_iter().map(depth).fold(0.0, f64::max)
@@ -188,9 +229,20 @@ fn nothing_at_rest_lies_in_another() {
     for k in 0..6 {
         let scene = settled(scene(Range::fixed(12.0), 2, k));
         for (i, a) in scene.objects.iter().enumerate() {
-            for b in scene.objects.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, b)| b) {
+            for b in scene
+                .objects
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| *j != i)
+                .map(|(_, b)| b)
+            {
                 let depth = sampled_depth(a, b);
-                assert!(depth < 0.0005, "scene {k}: {} lies {depth} m deep in {}", a.asset, b.asset);
+                assert!(
+                    depth < 0.0005,
+                    "scene {k}: {} lies {depth} m deep in {}",
+                    a.asset,
+                    b.asset
+                );
             }
         }
     }
@@ -199,13 +251,24 @@ fn nothing_at_rest_lies_in_another() {
 /// A tray whose sides are so many times the longest card of the stock, and that times `narrow`.
 fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
-    Background { size: [longest * times, longest * times * narrow], ..tray() }
+    Background {
+        size: [longest * times, longest * times * narrow],
+        ..tray()
+    }
 }
 
 /// Objects higher up than a heap of them can be.
 fn heaped_up(scene: &Scene) -> bool {
-    let thickness: f64 = scene.objects.iter().map(|object| object.thickness.max(0.01 * object.size[0])).sum();
-    let longest = scene.objects.iter().map(|object| object.size[0]).fold(0.0, f64::max);
+    let thickness: f64 = scene
+        .objects
+        .iter()
+        .map(|object| object.thickness.max(0.01 * object.size[0]))
+        .sum();
+    let longest = scene
+        .objects
+        .iter()
+        .map(|object| object.size[0])
+        .fold(0.0, f64::max);
     let height = |object: &Object| match object.placement {
         Placement::At(pose) => pose.translation.z,
         Placement::Drop { .. } => f64::INFINITY,
@@ -217,28 +280,49 @@ fn heaped_up(scene: &Scene) -> bool {
 /// those that come to no rest, which is told.
 fn ends_in_tight_trays(scenes: u64) -> [usize; 2] {
     let end = |k: u64| {
-        let tray = tight(1.0 + 0.5 * k as f64 / scenes as f64, [1.0, 0.8, 0.68, 0.5][(k % 4) as usize]);
-        let before = recipe(Range::new(5.0, 15.0)).scene(7, k, &[tray], &stock()).expect("the stock fits the tray");
-        let end = settle::settle(before.clone(), &SettleOptions::default()).expect("a scene that can be right");
-        let hangs =
-            |rest: &Scene| !settle::hanging(&before, rest, &SettleOptions::default()).expect("a scene").is_empty();
+        let tray = tight(
+            1.0 + 0.5 * k as f64 / scenes as f64,
+            [1.0, 0.8, 0.68, 0.5][(k % 4) as usize],
+        );
+        let before = recipe(Range::new(5.0, 15.0))
+            .scene(7, k, &[tray], &stock())
+            .expect("the stock fits the tray");
+        let end = settle::settle(before.clone(), &SettleOptions::default())
+            .expect("a scene that can be right");
+        let hangs = |rest: &Scene| {
+            !settle::hanging(&before, rest, &SettleOptions::default())
+                .expect("a scene")
+                .is_empty()
+        };
         let rested = end.verdict == Verdict::Rested;
-        [usize::from(rested && (heaped_up(&end.scene) || hangs(&end.scene))), usize::from(!rested)]
+        [
+            usize::from(rested && (heaped_up(&end.scene) || hangs(&end.scene))),
+            usize::from(!rested),
+        ]
     };
-    (0..scenes).into_par_iter().map(end).reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]])
+    (0..scenes)
+        .into_par_iter()
+        .map(end)
+        .reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
 #[test]
 fn nothing_hangs_in_trays_hardly_larger_than_the_longest_card() {
     let [hanging, told] = ends_in_tight_trays(60);
-    assert!(hanging == 0 && told <= 2, "{hanging} hang, {told} come to no rest");
+    assert!(
+        hanging == 0 && told <= 2,
+        "{hanging} hang, {told} come to no rest"
+    );
 }
 
 #[test]
 #[ignore = "a minute of work; run it when settle changes"]
 fn nothing_hangs_in_two_thousand_tight_trays() {
     let [hanging, told] = ends_in_tight_trays(2_000);
-    assert!(hanging == 0 && told <= 20, "{hanging} hang, {told} come to no rest");
+    assert!(
+        hanging == 0 && told <= 20,
+        "{hanging} hang, {told} come to no rest"
+    );
 }
 
 #[test]
@@ -246,7 +330,8 @@ fn ordinary_heaps_take_a_small_share_of_the_work_of_a_picture() {
     let options = SettleOptions::default();
     let share = |objects: f64, k: u64| {
         let allowance = Allowance::new(options.most_work);
-        let fall = settle::settle_within(scene(Range::fixed(objects), 5, k), &options, 0, &allowance);
+        let fall =
+            settle::settle_within(scene(Range::fixed(objects), 5, k), &options, 0, &allowance);
         assert_eq!(fall.expect("there is work left").0.verdict, Verdict::Rested);
         allowance.taken() as f64 / options.most_work as f64
     };
@@ -258,15 +343,32 @@ fn ordinary_heaps_take_a_small_share_of_the_work_of_a_picture() {
 
 #[test]
 fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
-    let trays = [tray(), Background { name: "box".into(), ..tight(0.99, 0.5) }];
-    let told = recipe(Range::fixed(5.0)).check_room(&trays, &stock()).unwrap_err().to_string();
+    let trays = [
+        tray(),
+        Background {
+            name: "box".into(),
+            ..tight(0.99, 0.5)
+        },
+    ];
+    let told = recipe(Range::fixed(5.0))
+        .check_room(&trays, &stock())
+        .unwrap_err()
+        .to_string();
     assert_eq!(
         told,
         "objects: \"b19\", 0.308 x 0.066 m, does not fit between the walls of \"box\", 0.305 x 0.152 m: expected a \
          smaller object (scene.scale) or a larger surface"
     );
-    assert!(recipe(Range::fixed(5.0)).check_room(&[tight(1.0, 0.5)], &stock()).is_ok());
-    assert!(recipe(Range::fixed(0.0)).check_room(&trays, &stock()).is_ok());
+    assert!(
+        recipe(Range::fixed(5.0))
+            .check_room(&[tight(1.0, 0.5)], &stock())
+            .is_ok()
+    );
+    assert!(
+        recipe(Range::fixed(0.0))
+            .check_room(&trays, &stock())
+            .is_ok()
+    );
 }
 
 /// `cargo test --release --test laws -- --ignored --nocapture` (some minutes of all cores).
@@ -278,7 +380,12 @@ fn of_ten_thousand_drops_none_escapes() {
         .into_par_iter()
         .map(|k| {
             let end = settle::settle(scene(Range::new(5.0, 30.0), 3, k), &options).unwrap();
-            (end.verdict, end.rejected, end.overlap, end.scene.objects.len())
+            (
+                end.verdict,
+                end.rejected,
+                end.overlap,
+                end.scene.objects.len(),
+            )
         })
         .collect();
     let mut overlaps: Vec<f64> = all.iter().map(|end| end.2).collect();
@@ -287,11 +394,25 @@ fn of_ten_thousand_drops_none_escapes() {
     let cards: usize = all.iter().map(|end| end.3).sum();
     println!("{} drops of {cards} cards: {bad} without rest", all.len());
     for tries in 1..=options.attempts {
-        println!("{tries} tries: {}", all.iter().filter(|end| end.1.len() + 1 == tries as usize).count());
+        println!(
+            "{tries} tries: {}",
+            all.iter()
+                .filter(|end| end.1.len() + 1 == tries as usize)
+                .count()
+        );
     }
-    all.iter().flat_map(|end| &end.1).for_each(|verdict| println!("rejected: {verdict:?}"));
-    println!("overlap: 99 % below {:.3} mm, worst {:.3} mm", overlaps[9900] * 1e3, overlaps[9999] * 1e3);
-    let escapes = all.iter().flat_map(|end| end.1.iter().chain([&end.0])).filter(|v| matches!(v, Verdict::Escaped(_)));
+    all.iter()
+        .flat_map(|end| &end.1)
+        .for_each(|verdict| println!("rejected: {verdict:?}"));
+    println!(
+        "overlap: 99 % below {:.3} mm, worst {:.3} mm",
+        overlaps[9900] * 1e3,
+        overlaps[9999] * 1e3
+    );
+    let escapes = all
+        .iter()
+        .flat_map(|end| end.1.iter().chain([&end.0]))
+        .filter(|v| matches!(v, Verdict::Escaped(_)));
     assert_eq!(escapes.count(), 0);
     // 3 of 10,000 gain more than 1 % of their energy in a step at each of eight tries: told, and drawn again by a dataset.
     assert!(bad <= 10, "{bad}");

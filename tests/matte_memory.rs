@@ -12,8 +12,13 @@ const CHANNEL: usize = WIDTH * HEIGHT * 4;
 /// A line of `/proc/self/status`, bytes.
 fn status(name: &str) -> Option<usize> {
     let text = fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find_map(|l| l.strip_prefix(name)?.strip_prefix(':').map(str::trim))?;
-    line.strip_suffix(" kB")?.parse().ok().map(|kib: usize| kib * 1024)
+    let line = text
+        .lines()
+        .find_map(|l| l.strip_prefix(name)?.strip_prefix(':').map(str::trim))?;
+    line.strip_suffix(" kB")?
+        .parse()
+        .ok()
+        .map(|kib: usize| kib * 1024)
 }
 
 /// What a call needs at its worst beyond what was there before it; none where the system does not tell.
@@ -27,19 +32,41 @@ fn peak_growth<T>(call: impl FnOnce() -> T) -> Option<usize> {
 
 #[test]
 fn a_frame_takes_its_output_and_two_channels_at_most() {
-    let pixel = |x: usize, y: usize| PremulRgba::new(0.3, 0.2 + ((x * 31 + y * 17) % 97) as f32 * 0.005, 0.25, 1.0);
+    let pixel = |x: usize, y: usize| {
+        PremulRgba::new(
+            0.3,
+            0.2 + ((x * 31 + y * 17) % 97) as f32 * 0.005,
+            0.25,
+            1.0,
+        )
+    };
     let photo = Image::from_fn(WIDTH, HEIGHT, pixel);
     let job = Keying::new(&photo, Screen::Color(LinearRgb::new(0.1, 0.75, 0.2)));
     let opts = KeyOptions::default();
-    let grown = (peak_growth(|| job.run(&opts).unwrap()), peak_growth(|| job.matte(&opts).unwrap()));
+    let grown = (
+        peak_growth(|| job.run(&opts).unwrap()),
+        peak_growth(|| job.matte(&opts).unwrap()),
+    );
     let (Some(both), Some(alone)) = grown else {
         eprintln!("skipped: /proc/self does not tell the peak of memory here");
         return;
     };
-    println!("beyond its input: {:.2} channels; the matte alone: {:.2}", channels(both), channels(alone));
+    println!(
+        "beyond its input: {:.2} channels; the matte alone: {:.2}",
+        channels(both),
+        channels(alone)
+    );
     // The meter sees what is there in any case: five channels of output, or one.
-    assert!((5 * CHANNEL..=(5 + 2) * CHANNEL).contains(&both), "{} channels", channels(both));
-    assert!((CHANNEL..=(1 + 2) * CHANNEL).contains(&alone), "{} channels", channels(alone));
+    assert!(
+        (5 * CHANNEL..=(5 + 2) * CHANNEL).contains(&both),
+        "{} channels",
+        channels(both)
+    );
+    assert!(
+        (CHANNEL..=(1 + 2) * CHANNEL).contains(&alone),
+        "{} channels",
+        channels(alone)
+    );
 }
 
 fn channels(bytes: usize) -> f64 {

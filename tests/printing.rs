@@ -26,7 +26,10 @@ impl Desk {
 
     fn command<S: AsRef<OsStr>>(&self, args: &[S]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
-        command.args(args).current_dir(self.0.path()).stdin(Stdio::null());
+        command
+            .args(args)
+            .current_dir(self.0.path())
+            .stdin(Stdio::null());
         command
     }
 
@@ -46,12 +49,25 @@ impl Desk {
         let desk = Self::new();
         let grey = |light| petcomp::Image::filled(32, 24, petcomp::LinearRgb::grey(light));
         for (part, light) in [("train", 0.2), ("val", 0.8)] {
-            desk.write(format!("set/labels/{part}/{part}.txt"), "0 0.5 0.5 0.4 0.4\n1 0.2 0.2 0.1 0.1\n");
+            desk.write(
+                format!("set/labels/{part}/{part}.txt"),
+                "0 0.5 0.5 0.4 0.4\n1 0.2 0.2 0.1 0.1\n",
+            );
             std::fs::create_dir_all(desk.path(format!("set/images/{part}"))).unwrap();
-            petcomp::io::write(desk.path(format!("set/images/{part}/{part}.png")), &grey(light)).unwrap();
+            petcomp::io::write(
+                desk.path(format!("set/images/{part}/{part}.png")),
+                &grey(light),
+            )
+            .unwrap();
         }
-        desk.write("set/data.yaml", "train: images/train\nval: images/val\nnc: 2\nnames: [cap, none]\n");
-        desk.write("found/val.txt", "0 0.5 0.5 0.4 0.4 0.9\n1 0.7 0.7 0.1 0.1 0.6\n");
+        desk.write(
+            "set/data.yaml",
+            "train: images/train\nval: images/val\nnc: 2\nnames: [cap, none]\n",
+        );
+        desk.write(
+            "found/val.txt",
+            "0 0.5 0.5 0.4 0.4 0.9\n1 0.7 0.7 0.1 0.1 0.6\n",
+        );
         petcomp::io::write(desk.path("a.png"), &grey(0.5)).unwrap();
         desk
     }
@@ -64,7 +80,10 @@ fn text(bytes: &[u8]) -> String {
 /// Neither colour, cursor nor another line than those that end with one.
 fn assert_tame(output: &Output) {
     for shown in [text(&output.stdout), text(&output.stderr)] {
-        assert!(!shown.contains(|c: char| c.is_control() && c != '\n'), "{shown:?}");
+        assert!(
+            !shown.contains(|c: char| c.is_control() && c != '\n'),
+            "{shown:?}"
+        );
     }
 }
 
@@ -75,8 +94,18 @@ fn an_argument_that_is_not_utf8_is_a_file_name() {
     let missing = desk.run(&[OsStr::new("diff"), &odd, OsStr::new("a.png")]);
     assert_eq!(missing.status.code(), Some(4), "{}", text(&missing.stderr));
     std::fs::copy(desk.path("a.png"), desk.path(&odd)).unwrap();
-    assert_eq!(desk.run(&[OsStr::new("diff"), &odd, OsStr::new("a.png")]).status.code(), Some(0));
-    let refused = desk.run(&[OsStr::new("asset"), OsStr::new("add"), OsStr::new("--class"), &odd]);
+    assert_eq!(
+        desk.run(&[OsStr::new("diff"), &odd, OsStr::new("a.png")])
+            .status
+            .code(),
+        Some(0)
+    );
+    let refused = desk.run(&[
+        OsStr::new("asset"),
+        OsStr::new("add"),
+        OsStr::new("--class"),
+        &odd,
+    ]);
     assert_eq!(refused.status.code(), Some(2), "{}", text(&refused.stderr));
 }
 
@@ -97,15 +126,25 @@ fn a_full_disk_is_one_line_and_a_reader_that_leaves_is_none() {
     ];
     for args in commands {
         let (status, said) = desk.printed_into(args, "/dev/full");
-        assert_eq!(said, "error: standard output: no space left on device\n", "{args:?}");
+        assert_eq!(
+            said, "error: standard output: no space left on device\n",
+            "{args:?}"
+        );
         assert_eq!(status, Some(4), "{args:?}");
         let _ = std::fs::remove_file(desk.path("recipe.toml"));
     }
     let mut gone = desk.command(&["eval", "found", "set/labels/val"]);
-    let mut child = gone.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = gone
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
-    assert_eq!((output.status.code(), text(&output.stderr)), (Some(141), String::new()));
+    assert_eq!(
+        (output.status.code(), text(&output.stderr)),
+        (Some(141), String::new())
+    );
 }
 
 #[test]
@@ -124,7 +163,10 @@ fn names_cannot_steer_a_terminal() {
         })
         .to_string(),
     );
-    desk.write("found.json", r#"[{"image_id": 1, "category_id": 1, "bbox": [20, 1, 9, 9], "score": 0.9}]"#);
+    desk.write(
+        "found.json",
+        r#"[{"image_id": 1, "category_id": 1, "bbox": [20, 1, 9, 9], "score": 0.9}]"#,
+    );
     let commands: [&[&str]; 6] = [
         &["matte", "cut", evil, "-o", "x.exr"],
         &["diff", evil, "a.png"],
@@ -137,22 +179,37 @@ fn names_cannot_steer_a_terminal() {
         let output = desk.run(args);
         assert_tame(&output);
         let said = text(&output.stderr) + &text(&output.stdout);
-        assert!(said.contains(escaped) || args[0] == evil, "{args:?} said {said}");
-        assert!(!said.lines().any(|line| line.starts_with("error: forged")) || args[0] == evil, "{said}");
+        assert!(
+            said.contains(escaped) || args[0] == evil,
+            "{args:?} said {said}"
+        );
+        assert!(
+            !said.lines().any(|line| line.starts_with("error: forged")) || args[0] == evil,
+            "{said}"
+        );
     }
     assert_tame(&desk.run(&["dataset", "check", "evil.yaml"]));
     for file in ["eval.html", "confusion.svg", "f1.svg"] {
         let page = std::fs::read_to_string(desk.path("page").join(file)).unwrap();
-        assert!(!page.contains(|c: char| c.is_control() && c != '\n'), "{file}");
+        assert!(
+            !page.contains(|c: char| c.is_control() && c != '\n'),
+            "{file}"
+        );
     }
 }
 
 #[test]
 fn words_are_ours_and_not_those_of_rust_or_the_system() {
     let desk = Desk::with_labels();
-    desk.write("number.json", r#"{"format": "plane-label", "version": "one"}"#);
+    desk.write(
+        "number.json",
+        r#"{"format": "plane-label", "version": "one"}"#,
+    );
     desk.write("recipe.toml", "assets = 3\nscene = 4\n");
-    desk.write("count.toml", "assets = \"a\"\n[scene]\nobjects = \"many\"\n");
+    desk.write(
+        "count.toml",
+        "assets = \"a\"\n[scene]\nobjects = \"many\"\n",
+    );
     desk.write("truth.json", r#"{"images": [{"id": "a"}]}"#);
     desk.write("list.json", "[3]");
     let commands: [&[&str]; 11] = [
@@ -175,7 +232,10 @@ fn words_are_ours_and_not_those_of_rust_or_the_system() {
             !output.status.success() && said.starts_with("error: ") && said.lines().count() == 1,
             "{args:?}: {said}"
         );
-        for foreign in ["os error", "Os {", "Some(", "None", "u32", "u64", "usize", "f64", "i64", "struct ", "::"] {
+        for foreign in [
+            "os error", "Os {", "Some(", "None", "u32", "u64", "usize", "f64", "i64", "struct ",
+            "::",
+        ] {
             assert!(!said.contains(foreign), "{args:?}: {said}");
         }
     }
@@ -190,7 +250,10 @@ fn quiet_leaves_the_answer() {
         text(&output.stdout)
     };
     let scores = said(&["eval", "found", "set/labels/val", "-o", "scores"]);
-    assert!(scores.contains("| mAP@0.5 |") && scores.contains("| cap |"), "{scores}");
+    assert!(
+        scores.contains("| mAP@0.5 |") && scores.contains("| cap |"),
+        "{scores}"
+    );
     assert!(!scores.contains("look at"), "{scores}");
     assert!(said(&["diff", "a.png", "a.png"]).contains("PASS"));
     assert!(said(&["dataset", "check", "set"]).contains("set: 2 images, 4 labels, no fault"));

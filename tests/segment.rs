@@ -29,16 +29,33 @@ fn polygon(points: impl Iterator<Item = (f64, f64)>) -> Polygon {
 fn hulls_of_sample_bottles_agree_with_the_renderer() {
     let truth: Truth = io::read_json(samples().join("truth.json")).unwrap();
     assert_eq!(truth.photos.len(), 12);
-    for Outline { file, bbox_px, hull_px } in truth.photos {
+    for Outline {
+        file,
+        bbox_px,
+        hull_px,
+    } in truth.photos
+    {
         let photo: Image<LinearRgb> = io::read(samples().join(&file)).unwrap();
         let found = matte::segment(&photo, &matte::SegmentOptions::default()).unwrap();
         let hull = polygon(found.hull.iter().map(|p| (p.x, p.y)));
         let bounds = hull.bounding_rect().unwrap();
-        let sides = [bounds.min().x, bounds.min().y, bounds.max().x, bounds.max().y];
-        let worst = sides.iter().zip(bbox_px).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let sides = [
+            bounds.min().x,
+            bounds.min().y,
+            bounds.max().x,
+            bounds.max().y,
+        ];
+        let worst = sides
+            .iter()
+            .zip(bbox_px)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
         let known = polygon(hull_px.iter().map(|p| (p[0], p[1])));
         let iou = hull.intersection(&known).unsigned_area() / hull.union(&known).unsigned_area();
-        assert!(worst <= 2.0 && iou >= 0.97, "{file}: box off by {worst:.2} px, IoU {iou:.4}");
+        assert!(
+            worst <= 2.0 && iou >= 0.97,
+            "{file}: box off by {worst:.2} px, IoU {iou:.4}"
+        );
     }
 }
 

@@ -35,7 +35,11 @@ impl Desk {
     /// The program in a shell that may map so many KiB of memory, and take ten seconds of a processor.
     fn run_within(&self, kib: u64, args: &str) -> Output {
         let script = format!("ulimit -v {kib}; ulimit -t 10; exec {PETCOMP} {args}");
-        Command::new("sh").args(["-c", &script]).current_dir(self.0.path()).output().unwrap()
+        Command::new("sh")
+            .args(["-c", &script])
+            .current_dir(self.0.path())
+            .output()
+            .unwrap()
     }
 }
 
@@ -44,7 +48,10 @@ fn said(output: &Output) -> String {
 }
 
 fn samples() -> String {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/samples").to_string_lossy().into_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/samples")
+        .to_string_lossy()
+        .into_owned()
 }
 
 const LABEL: &str = r#"{"format": "plane-label", "version": 1, "image": {"file": "none.jpg", "width": 640, "height": 480},
@@ -57,17 +64,36 @@ fn a_broken_file_among_good_ones_is_named_and_the_rest_done() {
         desk.write(&format!("{name}.label.json"), LABEL);
     }
     desk.write("b.label.json", "{");
-    assert!(Command::new("mkfifo").arg(desk.0.path().join("d.label.json")).status().unwrap().success());
-    let files = ["a.label.json", "b.label.json", "c.label.json", "d.label.json", "e.label.json"];
+    assert!(
+        Command::new("mkfifo")
+            .arg(desk.0.path().join("d.label.json"))
+            .status()
+            .unwrap()
+            .success()
+    );
+    let files = [
+        "a.label.json",
+        "b.label.json",
+        "c.label.json",
+        "d.label.json",
+        "e.label.json",
+    ];
     let output = desk.run(&[&["camera", "solve"], files.as_slice()].concat());
     let said = said(&output);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(
-        said.contains("failed: b.label.json: line 1") && said.contains("d.label.json: not a regular file"),
+        said.contains("failed: b.label.json: line 1")
+            && said.contains("d.label.json: not a regular file"),
         "{said}"
     );
-    assert!(said.contains("error: 3 of 5 files could not be used; the rest is done"), "{said}");
-    assert!(desk.0.path().join("a.camera.json").exists() && desk.0.path().join("c.camera.json").exists());
+    assert!(
+        said.contains("error: 3 of 5 files could not be used; the rest is done"),
+        "{said}"
+    );
+    assert!(
+        desk.0.path().join("a.camera.json").exists()
+            && desk.0.path().join("c.camera.json").exists()
+    );
 }
 
 #[test]
@@ -76,7 +102,10 @@ fn a_label_that_points_outside_is_refused() {
     for outside in ["../a.jpg", "/etc/passwd"] {
         desk.write("a.label.json", LABEL.replace("none.jpg", outside));
         let said = said(&desk.run(&["camera", "solve", "a.label.json"]));
-        assert!(said.contains("a.label.json: image.file:") && said.contains("expected a path below"), "{said}");
+        assert!(
+            said.contains("a.label.json: image.file:") && said.contains("expected a path below"),
+            "{said}"
+        );
     }
 }
 
@@ -85,7 +114,11 @@ fn plain_png(width: u32, height: u32) -> Vec<u8> {
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width, height);
     encoder.set_compression(png::Compression::Fast);
-    encoder.write_header().unwrap().write_image_data(&vec![100; width as usize * height as usize]).unwrap();
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(&vec![100; width as usize * height as usize])
+        .unwrap();
     out
 }
 
@@ -97,7 +130,10 @@ fn a_picture_larger_than_memory_is_refused_and_not_attempted() {
     let output = desk.run_within(1_000_000, "-j 1 matte cut large.png -o cut.exr");
     let text = said(&output);
     assert!(output.status.signal().is_none(), "{text}");
-    assert!(text.contains("large.png: needs 926 MiB of memory, more than the system gives"), "{text}");
+    assert!(
+        text.contains("large.png: needs 926 MiB of memory, more than the system gives"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -116,7 +152,9 @@ fn little_memory_is_enough_or_said() {
             }
         }
     }
-    println!("of five sizes of memory from 128 MiB to 2 GiB, {worked} were enough and {told} were said not to be");
+    println!(
+        "of five sizes of memory from 128 MiB to 2 GiB, {worked} were enough and {told} were said not to be"
+    );
     assert!(worked >= 3);
 }
 
@@ -149,7 +187,16 @@ fn wait_for_a_sample(folder: &Path) {
 
 /// A recipe and what it needs.
 fn demo(desk: &Desk) {
-    let output = desk.run(&["demo", "--samples", &samples(), "-n", "1", "-q", "-o", "demo"]);
+    let output = desk.run(&[
+        "demo",
+        "--samples",
+        &samples(),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
     assert!(output.status.success(), "{}", said(&output));
 }
 
@@ -157,23 +204,59 @@ fn demo(desk: &Desk) {
 fn twenty_runs_on_one_folder_make_one_dataset() {
     let desk = Desk::new();
     demo(&desk);
-    let args = ["dataset", "generate", "demo/recipe.toml", "-n", "4", "--seed", "1", "-q", "-j", "1", "-o", "out"];
-    let start = || desk.command(&args).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let args = [
+        "dataset",
+        "generate",
+        "demo/recipe.toml",
+        "-n",
+        "4",
+        "--seed",
+        "1",
+        "-q",
+        "-j",
+        "1",
+        "-o",
+        "out",
+    ];
+    let start = || {
+        desk.command(&args)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
     let runs: Vec<Child> = (0..20).map(|_| start()).collect();
-    let outcomes: Vec<Output> = runs.into_iter().map(|run| run.wait_with_output().unwrap()).collect();
+    let outcomes: Vec<Output> = runs
+        .into_iter()
+        .map(|run| run.wait_with_output().unwrap())
+        .collect();
     let done = outcomes.iter().filter(|o| o.status.success()).count();
     for outcome in outcomes.iter().filter(|o| !o.status.success()) {
-        assert!(said(outcome).contains("another run is writing this dataset"), "{}", said(outcome));
+        assert!(
+            said(outcome).contains("another run is writing this dataset"),
+            "{}",
+            said(outcome)
+        );
     }
     assert!(done >= 1);
-    println!("20 runs: {done} did it or found it done, {} left it to another", 20 - done);
+    println!(
+        "20 runs: {done} did it or found it done, {} left it to another",
+        20 - done
+    );
     assert!(desk.run(&["dataset", "check", "out"]).status.success());
 }
 
 /// By the shell's own `kill`: the program of that name is not on every machine.
 fn send(signal: &str, child: &std::process::Child) {
     let line = format!("kill -s {signal} {}", child.id());
-    assert!(Command::new("sh").args(["-c", &line]).status().unwrap().success(), "{line}");
+    assert!(
+        Command::new("sh")
+            .args(["-c", &line])
+            .status()
+            .unwrap()
+            .success(),
+        "{line}"
+    );
 }
 
 #[test]
@@ -182,8 +265,23 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
     demo(&desk);
     for signal in ["INT", "TERM"] {
         let run = |count: &str| {
-            let args = ["dataset", "generate", "demo/recipe.toml", "-n", count, "-q", "-j", "2", "-o", signal];
-            desk.command(&args).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+            let args = [
+                "dataset",
+                "generate",
+                "demo/recipe.toml",
+                "-n",
+                count,
+                "-q",
+                "-j",
+                "2",
+                "-o",
+                signal,
+            ];
+            desk.command(&args)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .unwrap()
         };
         let child = run("100000");
         wait_for_a_sample(&desk.0.path().join(signal));
@@ -193,9 +291,15 @@ fn a_signal_stops_between_pictures_and_the_same_command_goes_on() {
         std::thread::sleep(Duration::from_millis(700));
         send("KILL", &killed);
         assert_eq!(ends(killed).signal(), Some(9));
-        let lines = std::fs::read_to_string(desk.0.path().join(signal).join("index.jsonl")).unwrap();
-        let last =
-            lines.lines().filter_map(|line| line.strip_prefix("{\"k\":")?.split(',').next()?.parse::<u64>().ok());
+        let lines =
+            std::fs::read_to_string(desk.0.path().join(signal).join("index.jsonl")).unwrap();
+        let last = lines.lines().filter_map(|line| {
+            line.strip_prefix("{\"k\":")?
+                .split(',')
+                .next()?
+                .parse::<u64>()
+                .ok()
+        });
         let count = (last.max().unwrap() + 1).to_string();
         assert_eq!(ends(run(&count)).code(), Some(0), "after {signal} and KILL");
     }
@@ -215,16 +319,34 @@ const LONG_FALL: [&str; 8] = [
 
 /// A run whose first picture takes minutes, once it listens to signals.
 fn long_run(desk: &Desk, folder: &str) -> Child {
-    let args = ["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-j", "1", "-o", folder];
+    let args = [
+        "dataset",
+        "generate",
+        "demo/recipe.toml",
+        "-n",
+        "1",
+        "-q",
+        "-j",
+        "1",
+        "-o",
+        folder,
+    ];
     let mut command = desk.command(&[&args[..], &LONG_FALL].concat());
-    let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let child = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
     await_lock(desk, folder);
     child
 }
 
 /// Waits until a dataset is begun.
 fn await_lock(desk: &Desk, folder: &str) {
-    let (start, lock) = (Instant::now(), desk.0.path().join(folder).join("index.jsonl"));
+    let (start, lock) = (
+        Instant::now(),
+        desk.0.path().join(folder).join("index.jsonl"),
+    );
     while !lock.exists() {
         assert!(start.elapsed() < HANGS, "did not begin");
         std::thread::sleep(Duration::from_millis(20));
@@ -248,9 +370,22 @@ fn one_signal_ends_a_long_picture_soon_and_two_at_once() {
         }
         let start = Instant::now();
         assert_eq!(ends(child).code(), Some(130), "{signals} signals");
-        assert!(start.elapsed() < limit, "{signals} signals: {:?}", start.elapsed());
+        assert!(
+            start.elapsed() < limit,
+            "{signals} signals: {:?}",
+            start.elapsed()
+        );
         // The folder goes on: with the recipe that it was begun with.
-        let said = said(&desk.run(&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-o", &folder]));
+        let said = said(&desk.run(&[
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "1",
+            "-q",
+            "-o",
+            &folder,
+        ]));
         assert!(said.contains("recipe.scene.objects"), "{said}");
     }
 }
@@ -260,8 +395,17 @@ fn a_number_that_is_too_great_is_refused_at_once() {
     let desk = Desk::new();
     demo(&desk);
     let run = |args: &[&str]| {
-        let all = [&["dataset", "generate", "demo/recipe.toml", "-q", "-o", "out"], args].concat();
-        let child = desk.command(&all).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let all = [
+            &["dataset", "generate", "demo/recipe.toml", "-q", "-o", "out"],
+            args,
+        ]
+        .concat();
+        let child = desk
+            .command(&all)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
         let output = child.wait_with_output().unwrap();
         (output.status.code(), said(&output))
     };
@@ -269,7 +413,10 @@ fn a_number_that_is_too_great_is_refused_at_once() {
         for flag in ["-n", "--only", "--preview"] {
             let (code, said) = run(&[flag, number]);
             assert_eq!(code, Some(3), "{flag} {number}: {said}");
-            assert!(said.contains("samples, expected at most 1000000000"), "{flag} {number}: {said}");
+            assert!(
+                said.contains("samples, expected at most 1000000000"),
+                "{flag} {number}: {said}"
+            );
         }
     }
     assert!(!desk.0.path().join("out").exists());
@@ -281,9 +428,23 @@ fn a_number_that_is_too_great_is_refused_at_once() {
 fn a_signal_stops_a_fall() {
     let desk = Desk::new();
     demo(&desk);
-    let args = ["dataset", "generate", "demo/recipe.toml", "-n", "2", "-j", "2", "-o", "out"];
+    let args = [
+        "dataset",
+        "generate",
+        "demo/recipe.toml",
+        "-n",
+        "2",
+        "-j",
+        "2",
+        "-o",
+        "out",
+    ];
     let mut command = desk.command(&[&args[..], &LONG_FALL].concat());
-    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let child = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
     await_lock(&desk, "out");
     std::thread::sleep(Duration::from_millis(500));
     send("TERM", &child);
@@ -298,8 +459,16 @@ fn a_reader_that_goes_away_is_no_crash() {
     let desk = Desk::new();
     for args in ["--help", "doctor", "dataset --help"] {
         let script = format!("{PETCOMP} {args} | true");
-        let output = Command::new("sh").args(["-c", &script]).current_dir(desk.0.path()).output().unwrap();
-        assert!(!said(&output).contains("panicked"), "{args}: {}", said(&output));
+        let output = Command::new("sh")
+            .args(["-c", &script])
+            .current_dir(desk.0.path())
+            .output()
+            .unwrap();
+        assert!(
+            !said(&output).contains("panicked"),
+            "{args}: {}",
+            said(&output)
+        );
     }
 }
 
@@ -307,12 +476,28 @@ fn a_reader_that_goes_away_is_no_crash() {
 fn an_output_folder_with_a_link_inside_is_refused() {
     let desk = Desk::new();
     demo(&desk);
-    let (inside, outside) = (desk.0.path().join("out/images"), tempfile::tempdir().unwrap());
+    let (inside, outside) = (
+        desk.0.path().join("out/images"),
+        tempfile::tempdir().unwrap(),
+    );
     std::fs::create_dir_all(inside.parent().unwrap()).unwrap();
     desk.write("out/dataset.json", "{}");
     std::os::unix::fs::symlink(outside.path(), &inside).unwrap();
-    let output = desk.run(&["dataset", "generate", "demo/recipe.toml", "-n", "1", "-q", "-o", "out"]);
-    assert!(said(&output).contains("out/images: is a link to a folder"), "{}", said(&output));
+    let output = desk.run(&[
+        "dataset",
+        "generate",
+        "demo/recipe.toml",
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "out",
+    ]);
+    assert!(
+        said(&output).contains("out/images: is a link to a folder"),
+        "{}",
+        said(&output)
+    );
     assert_eq!(std::fs::read_dir(outside.path()).unwrap().count(), 0);
 }
 
@@ -321,8 +506,14 @@ const HELPS: u32 = 50;
 
 /// What a shell says (`times`) that so many runs of the program took, whatever else the machine did meanwhile.
 fn processor_seconds_of_children(runs: u32, args: &str) -> f64 {
-    let script = format!("i=0; while [ $i -lt {runs} ]; do {PETCOMP} {args} >&2 || exit 1; i=$((i+1)); done; times");
-    let output = Command::new("sh").args(["-c", &script]).stderr(Stdio::null()).output().unwrap();
+    let script = format!(
+        "i=0; while [ $i -lt {runs} ]; do {PETCOMP} {args} >&2 || exit 1; i=$((i+1)); done; times"
+    );
+    let output = Command::new("sh")
+        .args(["-c", &script])
+        .stderr(Stdio::null())
+        .output()
+        .unwrap();
     assert!(output.status.success());
     // Two lines, the shell's own and that of its children, both `0m0.010000s 0m0.020000s` for user and system.
     let text = String::from_utf8(output.stdout).unwrap();
@@ -330,7 +521,12 @@ fn processor_seconds_of_children(runs: u32, args: &str) -> f64 {
         let (minutes, seconds) = time.strip_suffix('s')?.split_once('m')?;
         Some(60.0 * minutes.parse::<f64>().ok()? + seconds.parse::<f64>().ok()?)
     };
-    text.lines().nth(1).unwrap().split_whitespace().map(|time| seconds(time).unwrap()).sum()
+    text.lines()
+        .nth(1)
+        .unwrap()
+        .split_whitespace()
+        .map(|time| seconds(time).unwrap())
+        .sum()
 }
 
 /// Loading OpenImageIO would cost 0.2 s and 130 MB.
@@ -339,8 +535,13 @@ fn help_is_quick_and_small() {
     let each = processor_seconds_of_children(HELPS, "--help") / f64::from(HELPS);
     println!("--help: {:.1} ms of a processor", 1e3 * each);
     assert!(each < 0.02, "{each} s");
-    let measured = Command::new("/usr/bin/time").args(["-f", "%M", PETCOMP, "--help"]).output();
+    let measured = Command::new("/usr/bin/time")
+        .args(["-f", "%M", PETCOMP, "--help"])
+        .output();
     let Ok(output) = measured else { return };
-    let kib: u64 = String::from_utf8_lossy(&output.stderr).trim().parse().unwrap();
+    let kib: u64 = String::from_utf8_lossy(&output.stderr)
+        .trim()
+        .parse()
+        .unwrap();
     assert!(kib < 20 << 10, "{kib} KiB");
 }

@@ -7,7 +7,13 @@ use std::process::{Command, Output};
 fn python(script: &str) -> Option<Output> {
     let kit = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/train/kit");
     let program = std::env::var("PETCOMP_PYTHON").unwrap_or_else(|_| "python3".into());
-    let run = |text: &str| Command::new(&program).arg("-c").arg(text).env("PYTHONPATH", &kit).output();
+    let run = |text: &str| {
+        Command::new(&program)
+            .arg("-c")
+            .arg(text)
+            .env("PYTHONPATH", &kit)
+            .output()
+    };
     let there = run("import torch").is_ok_and(|out| out.status.success());
     if !there {
         eprintln!("skipped: {program} has no PyTorch (set PETCOMP_PYTHON to one that has)");
@@ -39,5 +45,9 @@ for (batch,) in loader:
     assert torch.allclose(scale.grad, factor * batch.mean())
 ";
     let Some(out) = python(script) else { return };
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
 }

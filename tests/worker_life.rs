@@ -33,27 +33,45 @@ fn a_worker_may_open_nothing_and_start_nothing() {
     let folder = Folder::new();
     folder.with("palette.tif", &palette_tiff());
     read(&folder).unwrap();
-    let Some(&pid) = workers().first() else { panic!("no worker") };
+    let Some(&pid) = workers().first() else {
+        panic!("no worker")
+    };
     let limits = std::fs::read_to_string(format!("/proc/{pid}/limits")).unwrap();
     let limit = |name: &str| -> Vec<String> {
         let line = limits.lines().find(|l| l.starts_with(name)).unwrap();
-        line[name.len()..].split_whitespace().map(String::from).collect()
+        line[name.len()..]
+            .split_whitespace()
+            .map(String::from)
+            .collect()
     };
     assert_eq!(limit("Max file size")[..2], ["0", "0"]);
     assert_eq!(limit("Max core file size")[..2], ["0", "0"]);
     assert_eq!(limit("Max open files")[1], "64");
     assert_eq!(limit("Max cpu time")[1], "600");
     let space: u64 = limit("Max address space")[0].parse().unwrap();
-    assert!(space < 2 << 30, "{space} bytes of address space for a file of 2 KB");
+    assert!(
+        space < 2 << 30,
+        "{space} bytes of address space for a file of 2 KB"
+    );
     let status = status(pid);
-    let line = |name: &str| status.lines().find_map(|l| l.strip_prefix(name)).map(str::trim);
+    let line = |name: &str| {
+        status
+            .lines()
+            .find_map(|l| l.strip_prefix(name))
+            .map(str::trim)
+    };
     assert_eq!(line("NoNewPrivs:"), Some("1"));
     // 2: a filter. A kernel without one is warned of, and then nothing can be said here.
     if std::path::Path::new("/proc/sys/kernel/seccomp").exists() {
-        let threads = std::fs::read_dir(format!("/proc/{pid}/task")).unwrap().flatten();
+        let threads = std::fs::read_dir(format!("/proc/{pid}/task"))
+            .unwrap()
+            .flatten();
         for thread in threads {
             let status = std::fs::read_to_string(thread.path().join("status")).unwrap();
-            assert!(status.contains("Seccomp:\t2\n"), "a thread without a filter: {status}");
+            assert!(
+                status.contains("Seccomp:\t2\n"),
+                "a thread without a filter: {status}"
+            );
         }
     }
 }
@@ -68,7 +86,10 @@ fn a_worker_is_used_again() {
     for _ in 0..20 {
         read(&folder).unwrap();
     }
-    assert!(before.iter().any(|pid| workers().contains(pid)), "every worker was replaced");
+    assert!(
+        before.iter().any(|pid| workers().contains(pid)),
+        "every worker was replaced"
+    );
 }
 
 /// Four readers, and somebody who kills a worker every few milliseconds: pictures are right, or the signal is named.
@@ -85,7 +106,9 @@ fn killed_workers_spoil_no_picture() {
             while !done.load(Ordering::Relaxed) {
                 if let Some(pid) = workers().last() {
                     // It may be gone already.
-                    let _ = Command::new("sh").args(["-c", &format!("kill -9 {pid}")]).output();
+                    let _ = Command::new("sh")
+                        .args(["-c", &format!("kill -9 {pid}")])
+                        .output();
                     *killed.lock().unwrap() += 1;
                 }
                 std::thread::sleep(Duration::from_millis(40));
@@ -110,9 +133,16 @@ fn killed_workers_spoil_no_picture() {
         done.store(true, Ordering::Relaxed);
         assert!(outcomes.iter().all(Result::is_ok));
     });
-    println!("{} workers killed, {} of 160 readings refused", killed.lock().unwrap(), refused.lock().unwrap());
+    println!(
+        "{} workers killed, {} of 160 readings refused",
+        killed.lock().unwrap(),
+        refused.lock().unwrap()
+    );
     assert!(read(&folder).is_ok(), "nothing works any more");
-    assert!(workers().len() <= 8, "more workers than readers ever asked at once");
+    assert!(
+        workers().len() <= 8,
+        "more workers than readers ever asked at once"
+    );
 }
 
 /// Starts so many workers, eight at a time, while every core has other work, and tells how those ended that gave no
@@ -147,10 +177,16 @@ fn deaths_at_start(count: usize) -> Vec<String> {
 /// A worker's own start, without the parent that would try again.
 fn death_at_start() -> Option<String> {
     let mut worker = Command::new(env!("CARGO_BIN_EXE_petcomp-oiio-worker"));
-    worker.arg("{}").stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
+    worker
+        .arg("{}")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
     let mut child = worker.spawn().unwrap();
     let mut greeting = String::new();
-    BufReader::new(child.stdout.take().unwrap()).read_line(&mut greeting).unwrap();
+    BufReader::new(child.stdout.take().unwrap())
+        .read_line(&mut greeting)
+        .unwrap();
     // Nobody asks any more.
     drop(child.stdin.take());
     let status = child.wait().unwrap();
@@ -183,7 +219,15 @@ fn a_worker_reads_files_it_could_not_open() {
     let path = folder.with("private/\u{1F5BC} picture", &palette_tiff());
     assert!(io::read::<LinearRgb>(&path).is_ok());
     let header = io::read_header(&path).unwrap();
-    assert_eq!((header.width, header.height, header.bits, header.channels.len()), (2, 1, 8, 3));
+    assert_eq!(
+        (
+            header.width,
+            header.height,
+            header.bits,
+            header.channels.len()
+        ),
+        (2, 1, 8, 3)
+    );
     let told = io::read_in_worker::<LinearRgb>(&path, &ReadOptions::default()).unwrap();
     assert_eq!(told.size(), (2, 1));
 }

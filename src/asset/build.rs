@@ -54,7 +54,8 @@ pub fn build(
     let done = AtomicUsize::new(0);
     progress(0, count);
     let work = list.photos.par_iter().zip(&adds).map(|(photo, add)| {
-        let record = write_photo(folder, &as_written(at.join(&photo.file)), add).map(|photo| photo.record);
+        let record =
+            write_photo(folder, &as_written(at.join(&photo.file)), add).map(|photo| photo.record);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
         record
     });
@@ -69,7 +70,9 @@ pub fn build(
             other => other.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?,
         };
         if !record.doubts.is_empty() {
-            built.doubtful.push(format!("{}: {}", record.file, record.doubts.join("; ")));
+            built
+                .doubtful
+                .push(format!("{}: {}", record.file, record.doubts.join("; ")));
         }
         built.lengths.push([record.object_m[0], record.error_m]);
         let inserted = manifest.insert(asset_of(add, record));
@@ -77,7 +80,10 @@ pub fn build(
         built.photos += 1;
     }
     if built.photos == 0 {
-        return Err(Error::file(path, format!("no photo gave a cut-out: {}", built.refused.join("; "))));
+        return Err(Error::file(
+            path,
+            format!("no photo gave a cut-out: {}", built.refused.join("; ")),
+        ));
     }
     manifest.write(folder)?;
     built.assets = manifest.assets.len();
@@ -91,8 +97,15 @@ fn as_written(path: PathBuf) -> PathBuf {
     if path.exists() {
         return path;
     }
-    let entries = path.parent().and_then(|folder| std::fs::read_dir(folder).ok()).into_iter().flatten().flatten();
-    let mut alike = entries.map(|entry| entry.path()).filter(|other| plain_name(other) == plain_name(&path));
+    let entries = path
+        .parent()
+        .and_then(|folder| std::fs::read_dir(folder).ok())
+        .into_iter()
+        .flatten()
+        .flatten();
+    let mut alike = entries
+        .map(|entry| entry.path())
+        .filter(|other| plain_name(other) == plain_name(&path));
     match (alike.next(), alike.next()) {
         (Some(only), None) => only,
         _ => path,
@@ -101,9 +114,15 @@ fn as_written(path: PathBuf) -> PathBuf {
 
 /// A file's name in small letters, with the short endings of pictures.
 fn plain_name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
     let ending = [(".jpeg", ".jpg"), (".tiff", ".tif")];
-    let long = ending.iter().find_map(|(long, short)| Some(format!("{}{short}", name.strip_suffix(long)?)));
+    let long = ending
+        .iter()
+        .find_map(|(long, short)| Some(format!("{}{short}", name.strip_suffix(long)?)));
     long.unwrap_or(name)
 }
 
@@ -112,8 +131,19 @@ fn list_in(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         return Ok(path.into());
     }
-    let inside = LISTS.iter().map(|name| path.join(name)).find(|list| list.exists());
-    inside.ok_or_else(|| Error::file(path, format!("expected {} in it, a list of the photos", LISTS.join(" or "))))
+    let inside = LISTS
+        .iter()
+        .map(|name| path.join(name))
+        .find(|list| list.exists());
+    inside.ok_or_else(|| {
+        Error::file(
+            path,
+            format!(
+                "expected {} in it, a list of the photos",
+                LISTS.join(" or ")
+            ),
+        )
+    })
 }
 
 #[cfg(test)]
@@ -128,7 +158,11 @@ mod tests {
     fn slab() -> Image<LinearRgb> {
         Image::from_fn(120, 80, |x, y| {
             let inside = (30..90).contains(&x) && (25..55).contains(&y);
-            if inside { LinearRgb::new(0.6, 0.05, 0.05) } else { LinearRgb::new(0.04, 0.4, 0.08) }
+            if inside {
+                LinearRgb::new(0.6, 0.05, 0.05)
+            } else {
+                LinearRgb::new(0.04, 0.4, 0.08)
+            }
         })
     }
 
@@ -143,7 +177,11 @@ mod tests {
 
     fn built(list: &str) -> Result<Library> {
         let folder = folder_with(list);
-        build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ())?;
+        build(
+            folder.path().join("photos.toml"),
+            folder.path().join("out"),
+            &|_, _| (),
+        )?;
         Library::open(folder.path().join("out"))
     }
 
@@ -153,14 +191,21 @@ mod tests {
     #[test]
     fn a_folder_without_a_list_is_told_what_is_expected_in_it() {
         let folder = tempfile::tempdir().unwrap();
-        let error = build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap_err().to_string();
-        assert!(error.contains("expected photos.toml or photos.csv in it"), "{error}");
+        let error = build(folder.path(), folder.path().join("out"), &|_, _| ())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("expected photos.toml or photos.csv in it"),
+            "{error}"
+        );
     }
 
     #[test]
     fn a_list_becomes_a_library_of_the_right_size() {
         let library = built(TWO).unwrap();
-        let [asset] = &library.assets[..] else { panic!("one asset") };
+        let [asset] = &library.assets[..] else {
+            panic!("one asset")
+        };
         assert_eq!((asset.class, asset.photos.len()), (0, 2));
         // An edge is told to a pixel, so a length to two: 60 px are 0.3 m to within 1 in 30.
         assert!((asset.photos[0].record.px_per_metre / 200.0 - 1.0).abs() < 1.0 / 30.0);
@@ -173,7 +218,12 @@ mod tests {
     fn building_twice_changes_nothing() {
         let folder = folder_with(TWO);
         let manifest = || {
-            build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap();
+            build(
+                folder.path().join("photos.toml"),
+                folder.path().join("out"),
+                &|_, _| (),
+            )
+            .unwrap();
             std::fs::read(folder.path().join("out").join(MANIFEST)).unwrap()
         };
         assert_eq!(manifest(), manifest());
@@ -183,18 +233,28 @@ mod tests {
     fn mistakes_in_a_list_are_named_before_any_work() {
         let said = |list: &str| {
             let folder = folder_with(list);
-            let error = build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap_err();
+            let error = build(
+                folder.path().join("photos.toml"),
+                folder.path().join("out"),
+                &|_, _| (),
+            )
+            .unwrap_err();
             assert!(!folder.path().join("out").exists());
             error.to_string()
         };
         let declared = |classes: &str| format!("classes = {classes}\n{TWO}");
-        assert!(said(&declared("[\"cup\"]")).contains("photos[0].class: \"cap\", expected one of cup"));
-        assert!(said(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice"));
         assert!(
-            said(&TWO.replace("length = 0.3", ""))
-                .contains("photos[0].length: missing, expected length, px_per_metre, screen_size or marker_size")
+            said(&declared("[\"cup\"]")).contains("photos[0].class: \"cap\", expected one of cup")
         );
-        assert!(said(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1"));
+        assert!(
+            said(&declared("[\"cap\", \"cap\"]")).contains("classes[1]: \"cap\" is there twice")
+        );
+        assert!(said(&TWO.replace("length = 0.3", "")).contains(
+            "photos[0].length: missing, expected length, px_per_metre, screen_size or marker_size"
+        ));
+        assert!(
+            said(&TWO.replace("length = 0.3", "length = -1.0")).contains("photos[0].length: -1")
+        );
         assert!(said(&TWO.replace("two.png", "one.png")).contains("photos[1].file"));
         assert!(said(&TWO.replace("\"a\"", "\"../a\"")).contains("photos[0].asset"));
         assert!(said("photos = []\n").contains("photos: empty"));
@@ -205,65 +265,139 @@ mod tests {
         let folder = folder_with(TWO);
         let csv = "file,asset,class,px_per_metre,length,width\none.png,a,cap,,0.3,\ntwo.png,a,cap,100,,\n";
         std::fs::write(folder.path().join("photos.csv"), csv).unwrap();
-        let [toml, csv] = ["photos.toml", "photos.csv"].map(|name| List::read(folder.path().join(name)).unwrap());
+        let [toml, csv] =
+            ["photos.toml", "photos.csv"].map(|name| List::read(folder.path().join(name)).unwrap());
         assert_eq!(toml, csv);
         std::fs::remove_file(folder.path().join("photos.toml")).unwrap();
-        assert_eq!(build(folder.path(), folder.path().join("out"), &|_, _| ()).unwrap().photos, 2);
+        assert_eq!(
+            build(folder.path(), folder.path().join("out"), &|_, _| ())
+                .unwrap()
+                .photos,
+            2
+        );
         std::fs::write(folder.path().join("photos.csv"), "file,asset\none.png,a\n").unwrap();
-        let told = List::read(folder.path().join("photos.csv")).unwrap_err().to_string();
-        assert!(told.ends_with("photos.csv: line 2: missing key \"class\""), "{told}");
+        let told = List::read(folder.path().join("photos.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.ends_with("photos.csv: line 2: missing key \"class\""),
+            "{told}"
+        );
     }
 
     #[test]
     fn classes_are_declared_or_come_in_the_order_of_the_list() {
-        let three = TWO.replacen("\"a\"", "\"b\"", 1).replacen("\"cap\"", "\"see-through bag\"", 1);
+        let three = TWO
+            .replacen("\"a\"", "\"b\"", 1)
+            .replacen("\"cap\"", "\"see-through bag\"", 1);
         let folder = folder_with(&three);
         let list = folder.path().join("photos.toml");
-        let classes = |out: &str| build(&list, folder.path().join(out), &|_, _| ()).map(|built| built.classes);
+        let classes = |out: &str| {
+            build(&list, folder.path().join(out), &|_, _| ()).map(|built| built.classes)
+        };
         assert_eq!(classes("met").unwrap(), ["see-through bag", "cap"]);
         let declared = format!("classes = [\"cap\", \"jar\", \"see-through bag\"]\n{three}");
         std::fs::write(&list, declared).unwrap();
-        assert_eq!(classes("declared").unwrap(), ["cap", "jar", "see-through bag"]);
-        assert!(classes("met").unwrap_err().to_string().contains("expected to begin with those that the folder has"));
+        assert_eq!(
+            classes("declared").unwrap(),
+            ["cap", "jar", "see-through bag"]
+        );
+        assert!(
+            classes("met")
+                .unwrap_err()
+                .to_string()
+                .contains("expected to begin with those that the folder has")
+        );
     }
 
     #[test]
     fn sizes_in_another_unit_are_asked_about_where_they_are_given() {
         let told = |from: &str, to: &str| built(&TWO.replace(from, to)).unwrap_err().to_string();
         let length = told("length = 0.3", "length = 229");
-        let expected = "expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
-        assert!(length.ends_with(&format!("photos.toml: photos[0].length: 229, {expected}")), "{length}");
+        let expected =
+            "expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
+        assert!(
+            length.ends_with(&format!("photos.toml: photos[0].length: 229, {expected}")),
+            "{length}"
+        );
         assert!(told("length = 0.3", "length = 22.9").ends_with("is it in centimetres?"));
         let scale = told("px_per_metre = 100.0", "px_per_metre = 1e308");
-        assert!(scale.ends_with("photos[1].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"), "{scale}");
+        assert!(
+            scale
+                .ends_with("photos[1].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"),
+            "{scale}"
+        );
         let scale = told("px_per_metre = 100.0", "px_per_metre = 2.0");
-        assert!(scale.contains("photos.toml: photos[1].px_per_metre: 2, makes what is in two.png 30"), "{scale}");
-        assert!(scale.ends_with("; is it pixels for a centimetre?"), "{scale}");
-        assert!(told("length = 0.3", "length = 0.3\nthickness = 5").contains("photos[0].thickness: 5, expected"));
-        assert!(told("length = 0.3", "length = 0.3\nmass = 1e300").contains("photos[0].mass: 1e300, expected"));
+        assert!(
+            scale.contains("photos.toml: photos[1].px_per_metre: 2, makes what is in two.png 30"),
+            "{scale}"
+        );
+        assert!(
+            scale.ends_with("; is it pixels for a centimetre?"),
+            "{scale}"
+        );
+        assert!(
+            told("length = 0.3", "length = 0.3\nthickness = 5")
+                .contains("photos[0].thickness: 5, expected")
+        );
+        assert!(
+            told("length = 0.3", "length = 0.3\nmass = 1e300")
+                .contains("photos[0].mass: 1e300, expected")
+        );
     }
 
     #[test]
     fn a_photo_is_found_by_its_name_in_capitals_and_by_either_spelling_of_jpeg() {
         let folder = folder_with(&TWO.replace("one.png", "ONE.PNG"));
         let list = folder.path().join("photos.toml");
-        assert_eq!(build(&list, folder.path().join("out"), &|_, _| ()).unwrap().photos, 2);
+        assert_eq!(
+            build(&list, folder.path().join("out"), &|_, _| ())
+                .unwrap()
+                .photos,
+            2
+        );
         for (there, asked) in [("a.jpeg", "a.jpg"), ("B.JPG", "b.jpeg"), ("c.jpg", "c.jpg")] {
             std::fs::write(folder.path().join(there), "").unwrap();
-            assert_eq!(as_written(folder.path().join(asked)), folder.path().join(there));
+            assert_eq!(
+                as_written(folder.path().join(asked)),
+                folder.path().join(there)
+            );
         }
         // Two that might be meant are none.
         std::fs::write(folder.path().join("A.jpeg"), "").unwrap();
-        assert_eq!(as_written(folder.path().join("a.jpg")), folder.path().join("a.jpg"));
+        assert_eq!(
+            as_written(folder.path().join("a.jpg")),
+            folder.path().join("a.jpg")
+        );
     }
 
     #[test]
     fn names_of_any_language_name_assets_and_files() {
-        let folder = folder_with(&TWO.replace("\"a\"", "\"Flasche_gr\u{fc}n\"").replace("one.png", "\u{fc}.png"));
-        std::fs::rename(folder.path().join("one.png"), folder.path().join("\u{fc}.png")).unwrap();
-        build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap();
-        assert!(folder.path().join("out/Flasche_gr\u{fc}n/\u{fc}.exr").exists());
-        assert_eq!(Library::open(folder.path().join("out")).unwrap().assets[0].name, "Flasche_gr\u{fc}n");
+        let folder = folder_with(
+            &TWO.replace("\"a\"", "\"Flasche_gr\u{fc}n\"")
+                .replace("one.png", "\u{fc}.png"),
+        );
+        std::fs::rename(
+            folder.path().join("one.png"),
+            folder.path().join("\u{fc}.png"),
+        )
+        .unwrap();
+        build(
+            folder.path().join("photos.toml"),
+            folder.path().join("out"),
+            &|_, _| (),
+        )
+        .unwrap();
+        assert!(
+            folder
+                .path()
+                .join("out/Flasche_gr\u{fc}n/\u{fc}.exr")
+                .exists()
+        );
+        assert_eq!(
+            Library::open(folder.path().join("out")).unwrap().assets[0].name,
+            "Flasche_gr\u{fc}n"
+        );
     }
 
     #[test]
@@ -271,7 +405,12 @@ mod tests {
         let folder = folder_with(TWO);
         let empty = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
         io::write(folder.path().join("two.png"), &empty).unwrap();
-        let built = build(folder.path().join("photos.toml"), folder.path().join("out"), &|_, _| ()).unwrap();
+        let built = build(
+            folder.path().join("photos.toml"),
+            folder.path().join("out"),
+            &|_, _| (),
+        )
+        .unwrap();
         assert_eq!((built.photos, built.refused.len()), (1, 1));
         assert!(built.refused[0].contains("two.png"), "{:?}", built.refused);
     }
@@ -279,15 +418,35 @@ mod tests {
     #[test]
     fn a_guess_on_a_grey_board_is_told_kept_and_shown() {
         let folder = folder_with(TWO);
-        let board = slab().map(|p| if p.g > p.r { LinearRgb::grey(0.3) } else { LinearRgb::new(0.25, 0.2, 0.2) });
+        let board = slab().map(|p| {
+            if p.g > p.r {
+                LinearRgb::grey(0.3)
+            } else {
+                LinearRgb::new(0.25, 0.2, 0.2)
+            }
+        });
         io::write(folder.path().join("two.png"), &board).unwrap();
         let out = folder.path().join("out");
         let built = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
-        assert!(built.doubtful.iter().any(|d| d.contains("two.exr") && d.contains("too grey")), "{:?}", built.doubtful);
+        assert!(
+            built
+                .doubtful
+                .iter()
+                .any(|d| d.contains("two.exr") && d.contains("too grey")),
+            "{:?}",
+            built.doubtful
+        );
         let library = Library::open(&out).unwrap();
         let [one, two] = [0, 1].map(|i| &library.assets[0].photos[i].record);
-        assert!(two.doubts.iter().any(|doubt| doubt.contains("guessed")), "{:?}", two.doubts);
-        assert!(one.color_confidence > Some(0.6) && two.color_confidence < Some(0.55), "{one:?} {two:?}");
+        assert!(
+            two.doubts.iter().any(|doubt| doubt.contains("guessed")),
+            "{:?}",
+            two.doubts
+        );
+        assert!(
+            one.color_confidence > Some(0.6) && two.color_confidence < Some(0.55),
+            "{one:?} {two:?}"
+        );
         let plain = built_sheet_height(&library, |record| record.doubts.clear());
         assert!(plain < built_sheet_height(&library, |_| ()));
     }
@@ -295,7 +454,11 @@ mod tests {
     /// Height of the contact sheet when something is done to all records: a line of text makes it higher.
     fn built_sheet_height(library: &Library, change: fn(&mut PhotoRecord)) -> usize {
         let mut library = library.clone();
-        library.assets.iter_mut().flat_map(|asset| &mut asset.photos).for_each(|photo| change(&mut photo.record));
+        library
+            .assets
+            .iter_mut()
+            .flat_map(|asset| &mut asset.photos)
+            .for_each(|photo| change(&mut photo.record));
         contact_sheet(&library).height()
     }
 
@@ -303,8 +466,13 @@ mod tests {
     fn a_told_size_that_contradicts_the_outline_is_doubted() {
         let is_doubted = |width: &str| {
             let list = TWO.replace("length = 0.3", &format!("length = 0.3\nwidth = {width}"));
-            let doubts = built(&list).unwrap().assets[0].photos[0].record.doubts.clone();
-            doubts.iter().any(|doubt| doubt.contains("times as long as wide"))
+            let doubts = built(&list).unwrap().assets[0].photos[0]
+                .record
+                .doubts
+                .clone();
+            doubts
+                .iter()
+                .any(|doubt| doubt.contains("times as long as wide"))
         };
         assert!(!is_doubted("0.15") && is_doubted("0.25"));
     }

@@ -35,13 +35,24 @@ const BACKGROUNDS: [Background; 4] = [
 
 /// Every cut-out over a checkerboard, black, white and green, with its size, how sure outline and colour are and why it is in doubt.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
-    let photos: Vec<&Photo> = library.assets.iter().flat_map(|asset| &asset.photos).collect();
+    let photos: Vec<&Photo> = library
+        .assets
+        .iter()
+        .flat_map(|asset| &asset.photos)
+        .collect();
     let strips: Vec<Image<Srgb8>> = photos.par_iter().map(|photo| strip(photo)).collect();
     let rows = strips.chunks(COLUMNS);
     let cell = [BACKGROUNDS.len() * (SIDE + GAP) + 2 * GAP, 0];
-    let heights: Vec<usize> = rows.clone().map(|row| row.iter().map(Image::height).max().unwrap_or(0) + GAP).collect();
+    let heights: Vec<usize> = rows
+        .clone()
+        .map(|row| row.iter().map(Image::height).max().unwrap_or(0) + GAP)
+        .collect();
     let columns = COLUMNS.min(strips.len().max(1));
-    let mut sheet = Image::filled(columns * cell[0] + GAP, heights.iter().sum::<usize>() + GAP, PAPER);
+    let mut sheet = Image::filled(
+        columns * cell[0] + GAP,
+        heights.iter().sum::<usize>() + GAP,
+        PAPER,
+    );
     let mut top = GAP;
     for (row, height) in rows.zip(heights) {
         for (i, strip) in row.iter().enumerate() {
@@ -65,20 +76,38 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
         record.file,
         1e3 * record.error_m,
         record.outline_confidence,
-        record.color_confidence.map(|sure| format!(", of colour {sure:.2}")).unwrap_or_default()
+        record
+            .color_confidence
+            .map(|sure| format!(", of colour {sure:.2}"))
+            .unwrap_or_default()
     );
-    let told = std::iter::once((&title, INK)).chain(record.doubts.iter().map(|doubt| (doubt, WARNING)));
+    let told =
+        std::iter::once((&title, INK)).chain(record.doubts.iter().map(|doubt| (doubt, WARNING)));
     let lines: Vec<(String, Srgb8)> = told
-        .flat_map(|(text, ink)| draw::wrapped(text, width, TextSize::Small).into_iter().map(move |line| (line, ink)))
+        .flat_map(|(text, ink)| {
+            draw::wrapped(text, width, TextSize::Small)
+                .into_iter()
+                .map(move |line| (line, ink))
+        })
         .collect();
     let text_height = lines.len() * line_height + GAP / 2;
     let mut canvas = Image::filled(width, text_height + h, PAPER);
     for (i, (line, ink)) in lines.iter().enumerate() {
-        draw::text(&mut canvas, [0, (i * line_height) as isize], line, *ink, TextSize::Small);
+        draw::text(
+            &mut canvas,
+            [0, (i * line_height) as isize],
+            line,
+            *ink,
+            TextSize::Small,
+        );
     }
     for (i, background) in BACKGROUNDS.iter().enumerate() {
         let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over_color(background(x, y)));
-        draw::paste(&mut canvas, [i * (SIDE + GAP), text_height], &to_srgb8(&over));
+        draw::paste(
+            &mut canvas,
+            [i * (SIDE + GAP), text_height],
+            &to_srgb8(&over),
+        );
     }
     canvas
 }
@@ -109,9 +138,23 @@ mod tests {
         let mut record = photo("a.exr");
         record.doubts = doubts.iter().map(|d| (*d).into()).collect();
         let texture = Image::filled(480, 240, PremulRgba::TRANSPARENT).into();
-        let one = Photo { size: [0.4, 0.2], texture, outline_uv: Arc::new([]), record };
-        let asset = Asset { name: "a".into(), class: 0, thickness: 0.01, mass: 0.02, photos: vec![one; count] };
-        Library { classes: vec!["cap".into()], assets: vec![asset] }
+        let one = Photo {
+            size: [0.4, 0.2],
+            texture,
+            outline_uv: Arc::new([]),
+            record,
+        };
+        let asset = Asset {
+            name: "a".into(),
+            class: 0,
+            thickness: 0.01,
+            mass: 0.02,
+            photos: vec![one; count],
+        };
+        Library {
+            classes: vec!["cap".into()],
+            assets: vec![asset],
+        }
     }
 
     #[test]
@@ -119,15 +162,21 @@ mod tests {
         let sheet = contact_sheet(&library(&[], 1));
         let y = sheet.height() - 3 * GAP;
         let at = |i: usize| sheet[(GAP + i * (SIDE + GAP) + 2, y)];
-        assert_eq!([at(1), at(2)], [draw::rgb(0, 0, 0), draw::rgb(255, 255, 255)]);
+        assert_eq!(
+            [at(1), at(2)],
+            [draw::rgb(0, 0, 0), draw::rgb(255, 255, 255)]
+        );
         assert!(at(3).g > 150 && at(3).r < 80 && at(0).r == at(0).g);
     }
 
     #[test]
     fn doubts_are_written_and_make_room() {
-        let heights =
-            [&[][..], &["two objects"], &["two objects", "blurred"]].map(|d| contact_sheet(&library(d, 1)).height());
+        let heights = [&[][..], &["two objects"], &["two objects", "blurred"]]
+            .map(|d| contact_sheet(&library(d, 1)).height());
         assert!(heights[0] < heights[1] && heights[1] < heights[2]);
-        assert!(contact_sheet(&library(&[], 3)).height() > heights[0] && contact_sheet(&library(&[], 0)).height() > 0);
+        assert!(
+            contact_sheet(&library(&[], 3)).height() > heights[0]
+                && contact_sheet(&library(&[], 0)).height() > 0
+        );
     }
 }

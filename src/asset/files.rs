@@ -29,9 +29,15 @@ const CHANNELS: [&str; 10] = ["R", "G", "B", "A", "TR", "TG", "TB", "VR", "VG", 
 /// object's own shadow included, and `VR VG VB` that of the line of sight alone.
 pub(super) fn write(path: &Path, cut: &CutOut) -> Result<()> {
     let mut watch = Stopwatch::start();
-    let plane = |value: fn(&crate::Film) -> f32| cut.film.pixels().iter().map(value).collect::<Vec<f32>>();
-    let through =
-        |value: fn(&crate::LinearRgb) -> f32| cut.transmittance.pixels().iter().map(value).collect::<Vec<f32>>();
+    let plane =
+        |value: fn(&crate::Film) -> f32| cut.film.pixels().iter().map(value).collect::<Vec<f32>>();
+    let through = |value: fn(&crate::LinearRgb) -> f32| {
+        cut.transmittance
+            .pixels()
+            .iter()
+            .map(value)
+            .collect::<Vec<f32>>()
+    };
     let planes = [
         plane(|f| f.color.r),
         plane(|f| f.color.g),
@@ -45,13 +51,23 @@ pub(super) fn write(path: &Path, cut: &CutOut) -> Result<()> {
         plane(|f| f.transmittance().b),
     ];
     watch.lap("planes");
-    let channels: Vec<(&str, &[f32])> = CHANNELS.into_iter().zip(planes.iter().map(Vec::as_slice)).collect();
+    let channels: Vec<(&str, &[f32])> = CHANNELS
+        .into_iter()
+        .zip(planes.iter().map(Vec::as_slice))
+        .collect();
     io::exr::write_half_channels(path, cut.film.size(), &channels, &[])?;
     watch.lap("film");
     io::write(path.with_extension("png"), &thumbnail(&cut.to_rgba()))?;
     watch.lap("thumbnail");
-    let rings = cut.outline.rings.iter().map(|ring| ring.iter().map(rounded).collect());
-    let outline = OutlineFile { hull_px: cut.hull.iter().map(rounded).collect(), rings_px: rings.collect() };
+    let rings = cut
+        .outline
+        .rings
+        .iter()
+        .map(|ring| ring.iter().map(rounded).collect());
+    let outline = OutlineFile {
+        hull_px: cut.hull.iter().map(rounded).collect(),
+        rings_px: rings.collect(),
+    };
     io::write_json(path.with_extension("outline.json"), &outline)?;
     watch.lap("outline");
     watch.log("write");

@@ -84,10 +84,15 @@ impl AddPhoto {
                 OBJECT.check("length", length)?;
                 WIDTH.check("width", width)?;
                 if width > length {
-                    return Err(Error::value("width", format!("{width}, expected at most the length of {length}")));
+                    return Err(Error::value(
+                        "width",
+                        format!("{width}, expected at most the length of {length}"),
+                    ));
                 }
             }
-            Scale::Screen(size, _) => size.into_iter().try_for_each(|side| SURFACE.check("screen_size", side))?,
+            Scale::Screen(size, _) => size
+                .into_iter()
+                .try_for_each(|side| SURFACE.check("screen_size", side))?,
             Scale::Marker(side) => OBJECT.check("marker_size", side)?,
         }
         THICKNESS.check("thickness", self.thickness)?;
@@ -100,17 +105,29 @@ impl AddPhoto {
         if OBJECT.contains(length) {
             return Ok(());
         }
-        let pixels_for = || OBJECT.unit_meant(length).map(|unit| format!("; is it pixels for a {unit}?"));
+        let pixels_for = || {
+            OBJECT
+                .unit_meant(length)
+                .map(|unit| format!("; is it pixels for a {unit}?"))
+        };
         let (at, told, question) = match self.scale {
             Scale::Length(_) | Scale::Size(_) => return Ok(()),
-            Scale::PxPerMetre(scale) => ("px_per_metre", number(scale), pixels_for().unwrap_or_default()),
-            Scale::Screen([w, h], _) => {
-                ("screen_size", format!("{} x {}", number(w), number(h)), OBJECT.question(length))
-            }
+            Scale::PxPerMetre(scale) => (
+                "px_per_metre",
+                number(scale),
+                pixels_for().unwrap_or_default(),
+            ),
+            Scale::Screen([w, h], _) => (
+                "screen_size",
+                format!("{} x {}", number(w), number(h)),
+                OBJECT.question(length),
+            ),
             Scale::Marker(side) => ("marker_size", number(side), OBJECT.question(length)),
         };
         let (source, length) = (&record.source, number((1e4 * length).round() / 1e4));
-        let what = format!("{told}, makes what is in {source} {length} m long, expected {OBJECT}{question}");
+        let what = format!(
+            "{told}, makes what is in {source} {length} m long, expected {OBJECT}{question}"
+        );
         Err(Error::value(at, what))
     }
 }
@@ -123,7 +140,11 @@ impl AddPhoto {
 /// # Errors
 /// [`Error::Value`] for a wrong name, class or size; those of reading the photo and of [`cut_out`](crate::matte::cut_out), naming the photo;
 /// those of writing.
-pub fn add_photo(folder: impl AsRef<Path>, photo: impl AsRef<Path>, add: &AddPhoto) -> Result<Photo> {
+pub fn add_photo(
+    folder: impl AsRef<Path>,
+    photo: impl AsRef<Path>,
+    add: &AddPhoto,
+) -> Result<Photo> {
     let folder = folder.as_ref();
     let mut manifest = read_or_new(folder)?;
     manifest.learn(&add.classes, std::iter::once(add.class.as_str()))?;
@@ -156,13 +177,25 @@ pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
 pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<Photo> {
     let mut watch = Stopwatch::start();
     let on_screen = on_screen(photo, add).map_err(|e| named(e, photo))?;
-    let empty = add.screen.empty()?.map(|empty| on_screen.same_view(empty)).transpose()?;
+    let empty = add
+        .screen
+        .empty()?
+        .map(|empty| on_screen.same_view(empty))
+        .transpose()?;
     watch.lap("read");
-    let options = CutOutOptions { screen: add.screen.color().or(add.options.screen), ..add.options.clone() };
-    let cut = cut_out_on(&on_screen.photo, empty.as_ref(), &options).map_err(|e| named(e, photo))?;
+    let options = CutOutOptions {
+        screen: add.screen.color().or(add.options.screen),
+        ..add.options.clone()
+    };
+    let cut =
+        cut_out_on(&on_screen.photo, empty.as_ref(), &options).map_err(|e| named(e, photo))?;
     watch.lap("cut out");
     for remark in &cut.remarks {
-        let level = if matches!(remark, Remark::ScreenHue(_)) { log::Level::Warn } else { log::Level::Info };
+        let level = if matches!(remark, Remark::ScreenHue(_)) {
+            log::Level::Warn
+        } else {
+            log::Level::Info
+        };
         log::log!(level, "{}: {remark}", photo.display());
     }
     let record = record(&cut, add, &on_screen, photo);
@@ -180,14 +213,18 @@ fn on_screen(photo: &Path, add: &AddPhoto) -> Result<OnScreen> {
     let (picture, height) = (io::read(photo)?, add.thickness / 2.0);
     match add.scale {
         Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => Ok(OnScreen::whole(picture)),
-        Scale::Screen(size, corners) => OnScreen::by_corners(picture, size, corners, height, &io::read_header(photo)?),
+        Scale::Screen(size, corners) => {
+            OnScreen::by_corners(picture, size, corners, height, &io::read_header(photo)?)
+        }
         Scale::Marker(side) => OnScreen::by_marker(picture, side, height, &io::read_header(photo)?),
     }
 }
 
 fn named(error: Error, photo: &Path) -> Error {
     match error {
-        Error::Photo { what } => Error::Photo { what: format!("{}: {what}", photo.display()) },
+        Error::Photo { what } => Error::Photo {
+            what: format!("{}: {what}", photo.display()),
+        },
         other => other,
     }
 }
@@ -200,7 +237,13 @@ pub(super) fn cut_out_file(photo: &Path, add: &AddPhoto) -> String {
 /// The photo's name without ending, safe as a name anywhere.
 fn stem(photo: &Path) -> String {
     let stem = photo.file_stem().unwrap_or_default().to_string_lossy();
-    let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
+    let plain = |c: char| {
+        if c.is_alphanumeric() || c == '-' {
+            c
+        } else {
+            '_'
+        }
+    };
     stem.chars().map(plain).collect()
 }
 
@@ -217,7 +260,11 @@ fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> P
         .chain(on_screen.doubt());
     PhotoRecord {
         file,
-        source: photo.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        source: photo
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
         px_per_metre: measured.px_per_metre,
         size_m: [w as f64, h as f64].map(|px| px / measured.px_per_metre),
         object_m: measured.object_m,

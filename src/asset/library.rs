@@ -79,17 +79,28 @@ impl Library {
     fn load(folder: &Path, wanted: impl Fn(&str) -> bool, added: &[Photo]) -> Result<Self> {
         let mut manifest = Manifest::read(folder)?;
         manifest.assets.retain(|asset| wanted(&asset.name));
-        let photos: Vec<(usize, usize)> = manifest.assets.iter().enumerate().flat_map(places).collect();
+        let photos: Vec<(usize, usize)> = manifest
+            .assets
+            .iter()
+            .enumerate()
+            .flat_map(places)
+            .collect();
         let load = |&(i, j): &(usize, usize)| {
             let record = &manifest.assets[i].photos[j];
             let known = added.iter().find(|photo| photo.record == *record).cloned();
-            known.map_or_else(|| load(folder, record, &format!("assets[{i}].photos[{j}]")), Ok)
+            known.map_or_else(
+                || load(folder, record, &format!("assets[{i}].photos[{j}]")),
+                Ok,
+            )
         };
         let loaded: Vec<Result<Photo>> = photos.par_iter().map(load).collect();
         let mut loaded = loaded.into_iter();
         let mut assets = Vec::with_capacity(manifest.assets.len());
         for record in &manifest.assets {
-            let photos = loaded.by_ref().take(record.photos.len()).collect::<Result<_>>()?;
+            let photos = loaded
+                .by_ref()
+                .take(record.photos.len())
+                .collect::<Result<_>>()?;
             assets.push(Asset {
                 name: record.name.clone(),
                 class: manifest.class(&record.class)?,
@@ -98,7 +109,10 @@ impl Library {
                 photos,
             });
         }
-        Ok(Self { classes: manifest.classes, assets })
+        Ok(Self {
+            classes: manifest.classes,
+            assets,
+        })
     }
 
     /// The asset of a name.
@@ -115,13 +129,19 @@ fn places((i, asset): (usize, &AssetRecord)) -> impl Iterator<Item = (usize, usi
 const SLACK_PX: f64 = 0.5;
 
 fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
-    let path = io::inside(folder, &record.file).map_err(|e| e.within(at).in_file(folder.join(MANIFEST)))?;
+    let path = io::inside(folder, &record.file)
+        .map_err(|e| e.within(at).in_file(folder.join(MANIFEST)))?;
     let image: Image<Film> = io::read(&path)?;
     let (w, h) = (image.width() as f64, image.height() as f64);
     let told = record.size_m.map(|side| side * record.px_per_metre);
     if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
-        let what = format!("{:.1} x {:.1} pixels, but {} has {w} x {h}", told[0], told[1], record.file);
-        return Err(Error::value("size_m", what).within(at).in_file(folder.join(MANIFEST)));
+        let what = format!(
+            "{:.1} x {:.1} pixels, but {} has {w} x {h}",
+            told[0], told[1], record.file
+        );
+        return Err(Error::value("size_m", what)
+            .within(at)
+            .in_file(folder.join(MANIFEST)));
     }
     if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
         let (x, y) = (i % image.width(), i / image.width());
@@ -141,7 +161,11 @@ impl Photo {
         Self {
             size: record.size_m,
             texture: image.into(),
-            outline_uv: record.outline_px.iter().map(|&[x, y]| Point2::new(x / w, y / h)).collect(),
+            outline_uv: record
+                .outline_px
+                .iter()
+                .map(|&[x, y]| Point2::new(x / w, y / h))
+                .collect(),
             record,
         }
     }
@@ -156,9 +180,20 @@ mod tests {
     fn folder_with(picture: Option<(usize, usize)>) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let photos = vec![photo("a.exr")];
-        let record = AssetRecord { name: "a".into(), class: "label".into(), thickness: 0.01, mass: 0.02, photos };
+        let record = AssetRecord {
+            name: "a".into(),
+            class: "label".into(),
+            thickness: 0.01,
+            mass: 0.02,
+            photos,
+        };
         let classes = ["cap_label", "cap", "label"].map(String::from).into();
-        Manifest { classes, assets: vec![record] }.write(folder.path()).unwrap();
+        Manifest {
+            classes,
+            assets: vec![record],
+        }
+        .write(folder.path())
+        .unwrap();
         if let Some((w, h)) = picture {
             let image = Image::filled(w, h, PremulRgba::new(0.25, 0.5, 0.125, 0.75));
             io::write(folder.path().join("a.exr"), &image).unwrap();
@@ -172,33 +207,60 @@ mod tests {
         let library = Library::open(folder.path()).unwrap();
         let asset = library.find("a").unwrap();
         assert_eq!((asset.class, asset.photos.len()), (2, 1));
-        assert_eq!(asset.photos[0].texture.texel(3, 3), PremulRgba::new(0.25, 0.5, 0.125, 0.75).into());
-        assert_eq!(asset.photos[0].outline_uv[0], Point2::new(1.0 / 40.0, 1.0 / 20.0));
+        assert_eq!(
+            asset.photos[0].texture.texel(3, 3),
+            PremulRgba::new(0.25, 0.5, 0.125, 0.75).into()
+        );
+        assert_eq!(
+            asset.photos[0].outline_uv[0],
+            Point2::new(1.0 / 40.0, 1.0 / 20.0)
+        );
     }
 
     #[test]
     fn photos_in_memory_are_not_read() {
         let folder = folder_with(None);
-        let record = Manifest::read(folder.path()).unwrap().assets.remove(0).photos.remove(0);
+        let record = Manifest::read(folder.path())
+            .unwrap()
+            .assets
+            .remove(0)
+            .photos
+            .remove(0);
         let film = Image::filled(40, 20, Film::from(PremulRgba::new(0.25, 0.5, 0.125, 0.75)));
-        let library = Library::open_with(folder.path(), &[Photo::new(film, record.clone())]).unwrap();
+        let library =
+            Library::open_with(folder.path(), &[Photo::new(film, record.clone())]).unwrap();
         assert_eq!(library.assets[0].photos[0].texture.size(), (40, 20));
-        let other = PhotoRecord { file: "b.exr".into(), ..record };
+        let other = PhotoRecord {
+            file: "b.exr".into(),
+            ..record
+        };
         let stranger = Photo::new(Image::filled(40, 20, Film::default()), other);
         assert!(Library::open_with(folder.path(), &[stranger]).is_err());
     }
 
     #[test]
     fn a_missing_or_wrong_cut_out_is_named() {
-        let said = Library::open(folder_with(None).path()).unwrap_err().to_string();
+        let said = Library::open(folder_with(None).path())
+            .unwrap_err()
+            .to_string();
         assert!(said.contains("a.exr"), "{said}");
-        let said = Library::open(folder_with(Some((40, 22))).path()).unwrap_err().to_string();
-        assert!(said.contains("assets[0].photos[0].size_m") && said.contains("40 x 22"), "{said}");
+        let said = Library::open(folder_with(Some((40, 22))).path())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.contains("assets[0].photos[0].size_m") && said.contains("40 x 22"),
+            "{said}"
+        );
     }
 
     #[test]
     fn a_folder_without_a_manifest_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(Library::open(folder.path()).unwrap_err().to_string().contains(MANIFEST));
+        assert!(
+            Library::open(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains(MANIFEST)
+        );
     }
 }

@@ -45,7 +45,11 @@ pub struct ListedPhoto {
     /// Name of its class.
     pub class: String,
     /// Pixels of the photo for a metre, at half the object's height.
-    #[serde(default, alias = "px_per_meter", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        alias = "px_per_meter",
+        skip_serializing_if = "Option::is_none"
+    )]
     pub px_per_metre: Option<f64>,
     /// Or: length of the object along its longest side, metres, 0.005 to 5.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -80,24 +84,37 @@ impl List {
     /// [`Error::File`] for a file that cannot be read or understood, with its line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+        if !path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("csv"))
+        {
             return io::read_toml(path);
         }
         let rows = spreadsheet::rows(&io::read_bytes(path)?).map_err(|e| e.in_file(path))?;
-        let photo = |row: spreadsheet::Row| io::from_table(row.cells).map_err(|e| spreadsheet::in_line(e, row.line));
+        let photo = |row: spreadsheet::Row| {
+            io::from_table(row.cells).map_err(|e| spreadsheet::in_line(e, row.line))
+        };
         let photos: Result<Vec<ListedPhoto>> = rows.into_iter().map(photo).collect();
-        Ok(Self { photos: photos.map_err(|e| e.in_file(path))?, ..Self::default() })
+        Ok(Self {
+            photos: photos.map_err(|e| e.in_file(path))?,
+            ..Self::default()
+        })
     }
 
     /// The photos with all that is known of them, checked against the folder's manifest.
     pub(super) fn adds(&self, manifest: &mut Manifest, at: &Path) -> Result<Vec<AddPhoto>> {
         self.cut_out.check().map_err(|e| e.within("cut_out"))?;
-        manifest.learn(&self.classes, self.photos.iter().map(|photo| photo.class.as_str()))?;
+        manifest.learn(
+            &self.classes,
+            self.photos.iter().map(|photo| photo.class.as_str()),
+        )?;
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
         let adds = self.photos.iter().enumerate().map(|(i, photo)| {
-            let add = photo.add(&self.cut_out, at).and_then(|add| add.check(manifest).map(|()| add));
+            let add = photo
+                .add(&self.cut_out, at)
+                .and_then(|add| add.check(manifest).map(|()| add));
             add.map_err(|e| e.within(&format!("photos[{i}]")))
         });
         let adds: Vec<AddPhoto> = adds.collect::<Result<_>>()?;
@@ -110,7 +127,10 @@ impl List {
         let mut seen = std::collections::BTreeMap::new();
         for (i, (photo, add)) in self.photos.iter().zip(adds).enumerate() {
             if let Some(first) = seen.insert(cut_out_file(Path::new(&photo.file), add), i) {
-                let what = format!("\"{}\", would become the same cut-out as photos[{first}]", photo.file);
+                let what = format!(
+                    "\"{}\", would become the same cut-out as photos[{first}]",
+                    photo.file
+                );
                 return Err(Error::value(format!("photos[{i}].file"), what));
             }
         }
@@ -139,19 +159,35 @@ impl ListedPhoto {
     /// The one thing that is told of the scale.
     fn scale(&self) -> Result<Scale> {
         if self.screen_corners.is_some() && self.screen_size.is_none() {
-            return Err(Error::value("screen_size", "missing, expected it beside screen_corners"));
+            return Err(Error::value(
+                "screen_size",
+                "missing, expected it beside screen_corners",
+            ));
         }
         if self.width.is_some() && self.length.is_none() {
             return Err(Error::value("length", "missing, expected it beside width"));
         }
-        let sized = self.length.map(|length| self.width.map_or(Scale::Length(length), |w| Scale::Size([length, w])));
-        let screen = self.screen_size.map(|size| Scale::Screen(size, self.screen_corners));
-        let told = [sized, self.px_per_metre.map(Scale::PxPerMetre), screen, self.marker_size.map(Scale::Marker)];
+        let sized = self.length.map(|length| {
+            self.width
+                .map_or(Scale::Length(length), |w| Scale::Size([length, w]))
+        });
+        let screen = self
+            .screen_size
+            .map(|size| Scale::Screen(size, self.screen_corners));
+        let told = [
+            sized,
+            self.px_per_metre.map(Scale::PxPerMetre),
+            screen,
+            self.marker_size.map(Scale::Marker),
+        ];
         let names = "length, px_per_metre, screen_size or marker_size";
         match told.into_iter().flatten().collect::<Vec<_>>()[..] {
             [scale] => Ok(scale),
             [] => Err(Error::value("length", format!("missing, expected {names}"))),
-            _ => Err(Error::value("length", format!("one of several scales, expected one of {names}"))),
+            _ => Err(Error::value(
+                "length",
+                format!("one of several scales, expected one of {names}"),
+            )),
         }
     }
 }
@@ -168,15 +204,27 @@ mod tests {
 
     #[test]
     fn one_thing_tells_the_scale() {
-        assert_eq!(scale("screen_size = [0.6, 0.4]"), Ok(Scale::Screen([0.6, 0.4], None)));
+        assert_eq!(
+            scale("screen_size = [0.6, 0.4]"),
+            Ok(Scale::Screen([0.6, 0.4], None))
+        );
         assert_eq!(scale("marker_size = 0.05"), Ok(Scale::Marker(0.05)));
         let corners = [[1.0, 1.0], [9.0, 1.0], [9.0, 6.0], [1.0, 6.0]];
-        let told = scale(&format!("screen_size = [0.6, 0.4]\nscreen_corners = {corners:?}"));
+        let told = scale(&format!(
+            "screen_size = [0.6, 0.4]\nscreen_corners = {corners:?}"
+        ));
         assert_eq!(told, Ok(Scale::Screen([0.6, 0.4], Some(corners))));
         let missing = "length: missing, expected length, px_per_metre, screen_size or marker_size";
         assert_eq!(scale("").unwrap_err(), missing);
-        assert!(scale("length = 0.2\nmarker_size = 0.05").unwrap_err().contains("expected one of length"));
+        assert!(
+            scale("length = 0.2\nmarker_size = 0.05")
+                .unwrap_err()
+                .contains("expected one of length")
+        );
         let alone = scale(&format!("length = 0.2\nscreen_corners = {corners:?}")).unwrap_err();
-        assert_eq!(alone, "screen_size: missing, expected it beside screen_corners");
+        assert_eq!(
+            alone,
+            "screen_size: missing, expected it beside screen_corners"
+        );
     }
 }

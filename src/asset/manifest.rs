@@ -95,7 +95,11 @@ impl Manifest {
         let path = folder.as_ref().join(MANIFEST);
         let mut manifest: Self = io::read_toml(&path)?;
         if manifest.classes.is_empty() {
-            let met: Vec<String> = manifest.assets.iter().map(|asset| asset.class.clone()).collect();
+            let met: Vec<String> = manifest
+                .assets
+                .iter()
+                .map(|asset| asset.class.clone())
+                .collect();
             manifest.learn(&[], met.iter().map(String::as_str))?;
         }
         manifest.check().map_err(|e| e.in_file(&path))?;
@@ -121,12 +125,19 @@ impl Manifest {
     /// # Errors
     /// [`Error::Value`] (`class`) when the asset is known as something else.
     pub fn insert(&mut self, asset: AssetRecord) -> Result<()> {
-        let Some(known) = self.assets.iter_mut().find(|known| known.name == asset.name) else {
+        let Some(known) = self
+            .assets
+            .iter_mut()
+            .find(|known| known.name == asset.name)
+        else {
             self.assets.push(asset);
             return Ok(());
         };
         if known.class != asset.class {
-            let what = format!("\"{}\", but asset \"{}\" is \"{}\"", asset.class, asset.name, known.class);
+            let what = format!(
+                "\"{}\", but asset \"{}\" is \"{}\"",
+                asset.class, asset.name, known.class
+            );
             return Err(Error::value("class", what));
         }
         (known.thickness, known.mass) = (asset.thickness, asset.mass);
@@ -142,12 +153,17 @@ impl Manifest {
     ///
     /// # Errors
     /// [`Error::Value`] (`classes`) for declared ones that do not begin with those that are there.
-    pub(super) fn learn<'a>(&mut self, declared: &[String], met: impl Iterator<Item = &'a str>) -> Result<()> {
+    pub(super) fn learn<'a>(
+        &mut self,
+        declared: &[String],
+        met: impl Iterator<Item = &'a str>,
+    ) -> Result<()> {
         if !declared.is_empty() {
             unique("classes", declared.iter().map(String::as_str))?;
             if !declared.starts_with(&self.classes) {
                 let (told, known) = (declared.join(", "), self.classes.join(", "));
-                let what = format!("{told}; expected to begin with those that the folder has: {known}");
+                let what =
+                    format!("{told}; expected to begin with those that the folder has: {known}");
                 return Err(Error::value("classes", what));
             }
             self.classes = declared.to_vec();
@@ -167,9 +183,12 @@ impl Manifest {
     /// [`Error::Value`] (`class`) with the name that was probably meant.
     pub fn class(&self, name: &str) -> Result<u32> {
         let place = self.classes.iter().position(|class| class == name);
-        place
-            .and_then(|i| u32::try_from(i).ok())
-            .ok_or_else(|| Error::value("class", format!("\"{name}\", expected one of {}", self.classes.join(", "))))
+        place.and_then(|i| u32::try_from(i).ok()).ok_or_else(|| {
+            Error::value(
+                "class",
+                format!("\"{name}\", expected one of {}", self.classes.join(", ")),
+            )
+        })
     }
 
     fn check(&self) -> Result<()> {
@@ -180,7 +199,10 @@ impl Manifest {
         for (i, class) in self.classes.iter().enumerate() {
             check_class(class).map_err(|e| e.within(&format!("classes[{i}]")))?;
         }
-        unique("assets", self.assets.iter().map(|asset| asset.name.as_str()))?;
+        unique(
+            "assets",
+            self.assets.iter().map(|asset| asset.name.as_str()),
+        )?;
         for (i, asset) in self.assets.iter().enumerate() {
             let inside = |e: Error| e.within(&format!("assets[{i}]"));
             asset.check().map_err(inside)?;
@@ -198,9 +220,14 @@ impl AssetRecord {
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
-        unique("photos", self.photos.iter().map(|photo| photo.file.as_str()))?;
+        unique(
+            "photos",
+            self.photos.iter().map(|photo| photo.file.as_str()),
+        )?;
         for (i, photo) in self.photos.iter().enumerate() {
-            photo.check().map_err(|e| e.within(&format!("photos[{i}]")))?;
+            photo
+                .check()
+                .map_err(|e| e.within(&format!("photos[{i}]")))?;
         }
         Ok(())
     }
@@ -210,18 +237,22 @@ impl PhotoRecord {
     fn check(&self) -> Result<()> {
         io::below("", &self.file)?;
         PX_PER_METRE.check("px_per_metre", self.px_per_metre)?;
-        self.size_m.into_iter().try_for_each(|side| CARD.check("size_m", side))?;
+        self.size_m
+            .into_iter()
+            .try_for_each(|side| CARD.check("size_m", side))?;
         OBJECT.check("object_m[0]", self.object_m[0])?;
         WIDTH.check("object_m[1]", self.object_m[1])?;
         let share = Bounds::new(0.0, 1.0, "a share");
         share.check("outline_confidence", self.outline_confidence)?;
-        self.color_confidence.map_or(Ok(()), |told| share.check("color_confidence", told))?;
+        self.color_confidence
+            .map_or(Ok(()), |told| share.check("color_confidence", told))?;
         if self.outline_px.len() < 3 {
             let what = format!("{} points, expected at least 3", self.outline_px.len());
             return Err(Error::value("outline_px", what));
         }
         let [w, h] = self.size_m.map(|side| side * self.px_per_metre);
-        let outside = |&[x, y]: &[f64; 2]| !((-1.0..=w + 1.0).contains(&x) && (-1.0..=h + 1.0).contains(&y));
+        let outside =
+            |&[x, y]: &[f64; 2]| !((-1.0..=w + 1.0).contains(&x) && (-1.0..=h + 1.0).contains(&y));
         match self.outline_px.iter().position(outside) {
             Some(i) => {
                 let [x, y] = self.outline_px[i];
@@ -239,10 +270,17 @@ const CARD: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m long");
 /// A name that is safe as the name of a file: letters and digits of any language.
 pub(super) fn check_name(name: &str) -> Result<()> {
     let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
-    if !name.is_empty() && name.len() <= LONGEST_NAME && name.chars().all(plain) && !name.starts_with('.') {
+    if !name.is_empty()
+        && name.len() <= LONGEST_NAME
+        && name.chars().all(plain)
+        && !name.starts_with('.')
+    {
         return Ok(());
     }
-    Err(Error::value("name", format!("\"{}\", expected letters, digits, _ and -", shown(name))))
+    Err(Error::value(
+        "name",
+        format!("\"{}\", expected letters, digits, _ and -", shown(name)),
+    ))
 }
 
 /// File systems allow 255 bytes with what is put behind.
@@ -250,22 +288,32 @@ const LONGEST_NAME: usize = 120;
 
 /// A name that stands on a line of its own in every format of labels.
 pub(super) fn check_class(name: &str) -> Result<()> {
-    if !name.trim().is_empty() && name.len() <= LONGEST_NAME && !name.chars().any(char::is_control) {
+    if !name.trim().is_empty() && name.len() <= LONGEST_NAME && !name.chars().any(char::is_control)
+    {
         return Ok(());
     }
-    Err(Error::value("class", format!("\"{}\", expected a name on one line", shown(name))))
+    Err(Error::value(
+        "class",
+        format!("\"{}\", expected a name on one line", shown(name)),
+    ))
 }
 
 /// The beginning of a name, on one line.
 fn shown(name: &str) -> String {
-    name.chars().take(LONGEST_NAME).flat_map(char::escape_debug).collect()
+    name.chars()
+        .take(LONGEST_NAME)
+        .flat_map(char::escape_debug)
+        .collect()
 }
 
 fn unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
     let mut seen = std::collections::BTreeSet::new();
     for (i, name) in names.enumerate() {
         if !seen.insert(name) {
-            return Err(Error::value(format!("{at}[{i}]"), format!("\"{name}\" is there twice")));
+            return Err(Error::value(
+                format!("{at}[{i}]"),
+                format!("\"{name}\" is there twice"),
+            ));
         }
     }
     Ok(())
@@ -298,12 +346,21 @@ pub(super) mod tests {
 
     fn asset(name: &str, class: &str) -> AssetRecord {
         let photos = vec![photo(&format!("{name}/1.exr"))];
-        AssetRecord { name: name.into(), class: class.into(), thickness: 0.005, mass: 0.02, photos }
+        AssetRecord {
+            name: name.into(),
+            class: class.into(),
+            thickness: 0.005,
+            mass: 0.02,
+            photos,
+        }
     }
 
     fn two() -> Manifest {
         let classes = ["cap", "label", "none"].map(String::from).into();
-        Manifest { classes, assets: vec![asset("b", "cap"), asset("a", "none")] }
+        Manifest {
+            classes,
+            assets: vec![asset("b", "cap"), asset("a", "none")],
+        }
     }
 
     #[test]
@@ -313,7 +370,13 @@ pub(super) mod tests {
         manifest.write(folder.path()).unwrap();
         let back = Manifest::read(folder.path()).unwrap();
         assert_eq!(back, manifest);
-        assert_eq!(back.assets.iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
+        assert_eq!(
+            back.assets
+                .iter()
+                .map(|a| a.name.as_str())
+                .collect::<Vec<_>>(),
+            ["a", "b"]
+        );
     }
 
     #[test]
@@ -322,30 +385,75 @@ pub(super) mod tests {
         two().write(folder.path()).unwrap();
         let path = folder.path().join(MANIFEST);
         let text = std::fs::read_to_string(&path).unwrap();
-        assert!(text.contains("outline_confidence = 0.9\ncolor_confidence = 0.8\n"), "{text}");
-        let older = text.replace("outline_confidence = 0.9\ncolor_confidence = 0.8\n", "confidence = 0.7\n");
+        assert!(
+            text.contains("outline_confidence = 0.9\ncolor_confidence = 0.8\n"),
+            "{text}"
+        );
+        let older = text.replace(
+            "outline_confidence = 0.9\ncolor_confidence = 0.8\n",
+            "confidence = 0.7\n",
+        );
         std::fs::write(&path, older).unwrap();
         let read = Manifest::read(folder.path()).unwrap();
         let photos: Vec<_> = read.assets.iter().flat_map(|asset| &asset.photos).collect();
-        assert!(photos.iter().all(|p| (p.outline_confidence, p.color_confidence) == (0.7, None)), "{photos:?}");
-        std::fs::write(&path, text.replace("color_confidence = 0.8", "color_confidence = 1.5")).unwrap();
+        assert!(
+            photos
+                .iter()
+                .all(|p| (p.outline_confidence, p.color_confidence) == (0.7, None)),
+            "{photos:?}"
+        );
+        std::fs::write(
+            &path,
+            text.replace("color_confidence = 0.8", "color_confidence = 1.5"),
+        )
+        .unwrap();
         let told = Manifest::read(folder.path()).unwrap_err().to_string();
-        assert!(told.contains("assets[0].photos[0].color_confidence: 1.5, expected 0 to 1"), "{told}");
+        assert!(
+            told.contains("assets[0].photos[0].color_confidence: 1.5, expected 0 to 1"),
+            "{told}"
+        );
     }
 
     #[test]
     fn classes_are_those_declared_or_those_met_and_keep_their_numbers() {
         let learned = |known: &[&str], declared: &[&str], met: &[&str]| {
-            let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-            let mut manifest = Manifest { classes: own(known), ..Manifest::default() };
-            manifest.learn(&own(declared), met.iter().copied()).map(|()| manifest.classes).map_err(|e| e.to_string())
+            let own = |names: &[&str]| {
+                names
+                    .iter()
+                    .map(|name| (*name).to_owned())
+                    .collect::<Vec<_>>()
+            };
+            let mut manifest = Manifest {
+                classes: own(known),
+                ..Manifest::default()
+            };
+            manifest
+                .learn(&own(declared), met.iter().copied())
+                .map(|()| manifest.classes)
+                .map_err(|e| e.to_string())
         };
-        assert_eq!(learned(&[], &[], &["can", "bag", "can"]).unwrap(), ["can", "bag"]);
-        assert_eq!(learned(&["bag"], &[], &["can", "bag"]).unwrap(), ["bag", "can"]);
-        assert_eq!(learned(&["bag"], &["bag", "can", "jar"], &["can"]).unwrap(), ["bag", "can", "jar"]);
+        assert_eq!(
+            learned(&[], &[], &["can", "bag", "can"]).unwrap(),
+            ["can", "bag"]
+        );
+        assert_eq!(
+            learned(&["bag"], &[], &["can", "bag"]).unwrap(),
+            ["bag", "can"]
+        );
+        assert_eq!(
+            learned(&["bag"], &["bag", "can", "jar"], &["can"]).unwrap(),
+            ["bag", "can", "jar"]
+        );
         let told = learned(&["bag"], &["can", "bag"], &[]).unwrap_err();
-        assert_eq!(told, "classes: can, bag; expected to begin with those that the folder has: bag");
-        assert!(learned(&[], &["can", "can"], &[]).unwrap_err().contains("is there twice"));
+        assert_eq!(
+            told,
+            "classes: can, bag; expected to begin with those that the folder has: bag"
+        );
+        assert!(
+            learned(&[], &["can", "can"], &[])
+                .unwrap_err()
+                .contains("is there twice")
+        );
     }
 
     #[test]
@@ -358,7 +466,12 @@ pub(super) mod tests {
         }
         assert!(check_class("see-through bottle").is_ok());
         for class in ["", " ", "a\nb", "\u{1b}[31m"] {
-            assert!(check_class(class).unwrap_err().to_string().contains("expected a name on one line"));
+            assert!(
+                check_class(class)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("expected a name on one line")
+            );
         }
     }
 
@@ -370,17 +483,36 @@ pub(super) mod tests {
             manifest.check().unwrap_err().to_string()
         };
         let said = message(|m| m.assets[1].class = "cpa".into());
-        assert_eq!(said, "assets[1].class: \"cpa\", expected one of cap, label, none");
-        assert_eq!(message(|m| m.assets[1].name = "b".into()), "assets[1]: \"b\" is there twice");
+        assert_eq!(
+            said,
+            "assets[1].class: \"cpa\", expected one of cap, label, none"
+        );
+        assert_eq!(
+            message(|m| m.assets[1].name = "b".into()),
+            "assets[1]: \"b\" is there twice"
+        );
         let said = message(|m| m.assets[0].photos[0].px_per_metre = f64::NAN);
-        assert_eq!(said, "assets[0].photos[0].px_per_metre: NaN, expected 1 to 1e7 (pixels for a metre)");
+        assert_eq!(
+            said,
+            "assets[0].photos[0].px_per_metre: NaN, expected 1 to 1e7 (pixels for a metre)"
+        );
         let said = message(|m| m.assets[0].photos[0].px_per_metre = 1e308);
-        assert_eq!(said, "assets[0].photos[0].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)");
+        assert_eq!(
+            said,
+            "assets[0].photos[0].px_per_metre: 1e308, expected 1 to 1e7 (pixels for a metre)"
+        );
         let said = message(|m| m.assets[0].photos[0].object_m[0] = 229.0);
-        let expected = "229, expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
+        let expected =
+            "229, expected 0.005 to 5 m (objects are 5 mm to 5 m long); is it in millimetres?";
         assert_eq!(said, format!("assets[0].photos[0].object_m[0]: {expected}"));
-        assert!(message(|m| m.assets[0].photos[0].file = "../x.exr".into()).contains("expected a path below"));
-        assert!(message(|m| m.assets[0].photos[0].outline_px[2] = [50.0, 2.0]).contains("outline_px[2]"));
+        assert!(
+            message(|m| m.assets[0].photos[0].file = "../x.exr".into())
+                .contains("expected a path below")
+        );
+        assert!(
+            message(|m| m.assets[0].photos[0].outline_px[2] = [50.0, 2.0])
+                .contains("outline_px[2]")
+        );
         assert!(message(|m| m.assets[0].photos.clear()).starts_with("assets[0].photos: empty"));
     }
 

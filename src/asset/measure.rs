@@ -56,12 +56,17 @@ impl Measured {
 /// The middle of the object's hull in pixels of the photo.
 fn middle(cut: &CutOut) -> Point2<f64> {
     let count = cut.hull.len().max(1) as f64;
-    let middle = cut.hull.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords / count);
+    let middle = cut
+        .hull
+        .iter()
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords / count);
     Point2::from(middle / cut.scale + Vector2::new(cut.roi.x as f64, cut.roi.y as f64))
 }
 
 fn doubt(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<String> {
-    let Scale::Size([length, width]) = scale else { return None };
+    let Scale::Size([length, width]) = scale else {
+        return None;
+    };
     let (told, seen) = (width / length, tight[1] / tight[0]);
     let slack = PROPORTION_SLACK + error_px / tight[1];
     ((told / seen - 1.0).abs() > slack).then(|| {

@@ -39,7 +39,9 @@ pub struct Piece {
 impl Moments {
     /// Unit vector to the middle of the light; none where there is no light, or as much from everywhere.
     pub fn direction(&self) -> Option<Vector3<f64>> {
-        self.luminous().try_normalize(1e-9 * self.light).filter(|_| self.light > 0.0)
+        self.luminous()
+            .try_normalize(1e-9 * self.light)
+            .filter(|_| self.light > 0.0)
     }
 
     /// Irradiance on a receiver that sees all of it; 0 in channels that come from behind on the whole.
@@ -53,7 +55,11 @@ impl Moments {
     /// Light of angular variance s^2 (sum of both axes) has a mean direction of length `1 - s^2 / 2`; a square of side b
     /// has `s^2 = b^2 / 6`.
     pub fn width(&self) -> f64 {
-        let length = if self.light > 0.0 { self.luminous().norm() / self.light } else { 1.0 };
+        let length = if self.light > 0.0 {
+            self.luminous().norm() / self.light
+        } else {
+            1.0
+        };
         (12.0 * (1.0 - length).max(0.0)).sqrt()
     }
 
@@ -72,7 +78,11 @@ impl Moments {
     fn of(radiance: LinearRgb, direction: &Vector3<f64>, solid_angle: f64) -> Self {
         let flux = <[f32; 3]>::from(radiance).map(|v| direction * (f64::from(v) * solid_angle));
         let light = f64::from(radiance.luminance()) * solid_angle;
-        Self { flux, light, weight: light * (direction.z.max(0.0) + FROM_ANYWHERE) }
+        Self {
+            flux,
+            light,
+            weight: light * (direction.z.max(0.0) + FROM_ANYWHERE),
+        }
     }
 
     /// What a shadow gets wrong that takes all this light to come from one direction: as an edge that is off by the
@@ -97,7 +107,10 @@ pub(super) struct Sums {
 
 impl Sums {
     pub(super) fn of(panorama: &Panorama) -> Self {
-        let rows: Vec<Vec<Moments>> = (0..GRID[1]).into_par_iter().map(|j| row(panorama, j)).collect();
+        let rows: Vec<Vec<Moments>> = (0..GRID[1])
+            .into_par_iter()
+            .map(|j| row(panorama, j))
+            .collect();
         let stride = GRID[0] + 1;
         let mut corners = vec![Moments::default(); stride * (GRID[1] + 1)];
         for (j, row) in rows.iter().enumerate() {
@@ -107,7 +120,12 @@ impl Sums {
                 corners[(j + 1) * stride + i + 1] = corners[j * stride + i + 1].plus(&sum, 1.0);
             }
         }
-        let mut sums = Self { corners, cells: coarse(&rows), pieces: Vec::new(), cuts: Vec::new() };
+        let mut sums = Self {
+            corners,
+            cells: coarse(&rows),
+            pieces: Vec::new(),
+            cuts: Vec::new(),
+        };
         sums.cut();
         sums
     }
@@ -116,14 +134,23 @@ impl Sums {
         let at = |i: usize, j: usize| &self.corners[j * (GRID[0] + 1) + i];
         let [x0, x1] = columns;
         let [y0, y1] = rows;
-        let moments = at(x1, y1).plus(at(x0, y1), -1.0).plus(at(x1, y0), -1.0).plus(at(x0, y0), 1.0);
-        Piece { columns, rows, moments }
+        let moments = at(x1, y1)
+            .plus(at(x0, y1), -1.0)
+            .plus(at(x1, y0), -1.0)
+            .plus(at(x0, y0), 1.0);
+        Piece {
+            columns,
+            rows,
+            moments,
+        }
     }
 
     /// Cuts the piece with the largest error where that leaves the least, again and again.
     fn cut(&mut self) {
         let half = GRID[1] / 2;
-        self.pieces = [[0, half], [half, GRID[1]]].map(|rows| self.piece([0, GRID[0]], rows)).to_vec();
+        self.pieces = [[0, half], [half, GRID[1]]]
+            .map(|rows| self.piece([0, GRID[0]], rows))
+            .to_vec();
         let mut open = vec![true; 2];
         while self.cuts.len() + 2 < MOST_PIECES {
             let candidates = (0..self.pieces.len()).filter(|&k| open[k]);
@@ -131,9 +158,13 @@ impl Sums {
                 let error = |k: usize| self.pieces[k].moments.error();
                 error(a).total_cmp(&error(b)).then(b.cmp(&a))
             });
-            let Some(worst) = worst.filter(|&k| self.pieces[k].moments.error() > 0.0) else { return };
+            let Some(worst) = worst.filter(|&k| self.pieces[k].moments.error() > 0.0) else {
+                return;
+            };
             open[worst] = false;
-            let Some(halves) = self.halves(&self.pieces[worst]) else { continue };
+            let Some(halves) = self.halves(&self.pieces[worst]) else {
+                continue;
+            };
             self.cuts.push(worst);
             self.pieces.extend(halves);
             open.extend([true; 2]);
@@ -143,10 +174,22 @@ impl Sums {
     /// The cut across either axis that leaves the least error; none for a single cell.
     fn halves(&self, piece: &Piece) -> Option<[Piece; 2]> {
         let ([x0, x1], [y0, y1]) = (piece.columns, piece.rows);
-        let across = (x0 + 1..x1).map(|x| [self.piece([x0, x], piece.rows), self.piece([x, x1], piece.rows)]);
-        let along = (y0 + 1..y1).map(|y| [self.piece(piece.columns, [y0, y]), self.piece(piece.columns, [y, y1])]);
+        let across = (x0 + 1..x1).map(|x| {
+            [
+                self.piece([x0, x], piece.rows),
+                self.piece([x, x1], piece.rows),
+            ]
+        });
+        let along = (y0 + 1..y1).map(|y| {
+            [
+                self.piece(piece.columns, [y0, y]),
+                self.piece(piece.columns, [y, y1]),
+            ]
+        });
         let left = |halves: &[Piece; 2]| halves.iter().map(|p| p.moments.error()).sum::<f64>();
-        across.chain(along).min_by(|a, b| left(a).total_cmp(&left(b)))
+        across
+            .chain(along)
+            .min_by(|a, b| left(a).total_cmp(&left(b)))
     }
 
     /// At most `count` pieces, together the whole panorama.
@@ -154,7 +197,11 @@ impl Sums {
         let cuts = &self.cuts[..self.cuts.len().min(count.saturating_sub(2))];
         let mut whole = vec![true; 2 + 2 * cuts.len()];
         cuts.iter().for_each(|&k| whole[k] = false);
-        self.pieces.iter().zip(whole).filter_map(|(piece, whole)| whole.then_some(*piece)).collect()
+        self.pieces
+            .iter()
+            .zip(whole)
+            .filter_map(|(piece, whole)| whole.then_some(*piece))
+            .collect()
     }
 
     /// The panorama in even rectangles, `per_side` rows of twice as many.
@@ -163,8 +210,13 @@ impl Sums {
         let columns = 2 * rows;
         let cut = |k: usize, n: usize, all: usize| k * all / n;
         let span = |k: usize, n: usize, all: usize| [cut(k, n, all), cut(k + 1, n, all)];
-        let row = |j: usize| (0..columns).map(move |i| (span(i, columns, GRID[0]), span(j, rows, GRID[1])));
-        (0..rows).flat_map(row).map(|(x, y)| self.piece(x, y)).collect()
+        let row = |j: usize| {
+            (0..columns).map(move |i| (span(i, columns, GRID[0]), span(j, rows, GRID[1])))
+        };
+        (0..rows)
+            .flat_map(row)
+            .map(|(x, y)| self.piece(x, y))
+            .collect()
     }
 
     /// Irradiance on a receiver, nothing in the way.
@@ -189,8 +241,14 @@ fn row(panorama: &Panorama, j: usize) -> Vec<Moments> {
         let solid_angle = band * TAU / (GRID[0] * across) as f64;
         for (i, cell) in cells.iter_mut().enumerate() {
             for s in 0..across {
-                let uv = [(i as f64 + (s as f64 + 0.5) / across as f64) / GRID[0] as f64, v(t as f64 + 0.5)];
-                *cell = cell.plus(&Moments::of(panorama.at(uv), &uv_to_direction(uv), solid_angle), 1.0);
+                let uv = [
+                    (i as f64 + (s as f64 + 0.5) / across as f64) / GRID[0] as f64,
+                    v(t as f64 + 0.5),
+                ];
+                *cell = cell.plus(
+                    &Moments::of(panorama.at(uv), &uv_to_direction(uv), solid_angle),
+                    1.0,
+                );
             }
         }
     }
@@ -236,7 +294,10 @@ mod tests {
     fn an_even_sky_gives_pi_times_its_radiance() {
         for normal in [Vector3::z(), Vector3::new(0.48, -0.64, 0.6), -Vector3::x()] {
             let e = constant().irradiance(&normal);
-            assert!((e[0] / PI - 1.0).abs() < 2e-3 && (e[1] / e[0] - 2.0).abs() < 1e-9, "{normal:?}: {e:?}");
+            assert!(
+                (e[0] / PI - 1.0).abs() < 2e-3 && (e[1] / e[0] - 2.0).abs() < 1e-9,
+                "{normal:?}: {e:?}"
+            );
         }
     }
 
@@ -246,7 +307,10 @@ mod tests {
             let whole = sum(&panorama.pieces(2));
             for count in [2, 3, 16, 100, 5000] {
                 let pieces = panorama.pieces(count);
-                assert!(pieces.len() <= count && (sum(&pieces) / whole - 1.0).abs() < 1e-9, "{count}");
+                assert!(
+                    pieces.len() <= count && (sum(&pieces) / whole - 1.0).abs() < 1e-9,
+                    "{count}"
+                );
             }
             assert!((sum(&panorama.even(20)) / whole - 1.0).abs() < 1e-9);
         }
@@ -257,22 +321,43 @@ mod tests {
         let panorama = sunny();
         let sun = uv_to_direction([300.5 / 1024.0, 131.5 / 512.0]);
         let pieces = panorama.pieces(16);
-        let brightest = pieces.iter().max_by(|a, b| a.moments.light.total_cmp(&b.moments.light)).unwrap();
-        let off = brightest.moments.direction().unwrap().angle(&sun).to_degrees();
-        assert!(off < 0.1 && brightest.moments.width() < 0.05, "{off} degrees off, {brightest:?}");
+        let brightest = pieces
+            .iter()
+            .max_by(|a, b| a.moments.light.total_cmp(&b.moments.light))
+            .unwrap();
+        let off = brightest
+            .moments
+            .direction()
+            .unwrap()
+            .angle(&sun)
+            .to_degrees();
+        assert!(
+            off < 0.1 && brightest.moments.width() < 0.05,
+            "{off} degrees off, {brightest:?}"
+        );
     }
 
     #[test]
     fn more_pieces_are_smaller() {
         let panorama = constant();
-        let widest = |count| panorama.pieces(count).iter().map(|p| p.moments.width()).fold(0.0, f64::max);
+        let widest = |count| {
+            panorama
+                .pieces(count)
+                .iter()
+                .map(|p| p.moments.width())
+                .fold(0.0, f64::max)
+        };
         assert!(widest(16) > widest(64) && widest(64) > widest(256));
     }
 
     #[test]
     fn darkness_has_pieces_without_direction() {
         let dark = Panorama::new(Image::filled(4, 2, LinearRgb::BLACK)).unwrap();
-        assert!(dark.pieces(16).iter().all(|p| p.moments.direction().is_none()));
+        assert!(
+            dark.pieces(16)
+                .iter()
+                .all(|p| p.moments.direction().is_none())
+        );
         assert_eq!(dark.irradiance(&Vector3::z()), [0.0; 3]);
     }
 }

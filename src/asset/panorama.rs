@@ -27,16 +27,24 @@ impl Panorama {
     /// [`Error::Value`] for a picture without pixels, or with a value that is negative, NaN or infinite.
     pub fn new(image: Image<LinearRgb>) -> Result<Self> {
         if image.is_empty() {
-            return Err(Error::value("environment", "0 pixels, expected at least one"));
+            return Err(Error::value(
+                "environment",
+                "0 pixels, expected at least one",
+            ));
         }
         let is_light = |c: &LinearRgb| c.is_finite() && c.r >= 0.0 && c.g >= 0.0 && c.b >= 0.0;
         if let Some(i) = image.pixels().iter().position(|c| !is_light(c)) {
             let (x, y) = (i % image.width(), i / image.width());
-            let what =
-                format!("{:?} at ({x}, {y}), expected numbers of at least 0", <[f32; 3]>::from(image.pixels()[i]));
+            let what = format!(
+                "{:?} at ({x}, {y}), expected numbers of at least 0",
+                <[f32; 3]>::from(image.pixels()[i])
+            );
             return Err(Error::value("environment", what));
         }
-        Ok(Self { image, sums: OnceLock::new() })
+        Ok(Self {
+            image,
+            sums: OnceLock::new(),
+        })
     }
 
     /// Reads a panorama from a file, an HDR or EXR as a rule.
@@ -68,7 +76,10 @@ impl Panorama {
         let y = (v * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
         let (left, top) = (x.floor(), y.floor());
         let column = |i: f64| i.rem_euclid(width as f64) as usize % width;
-        let (columns, rows) = ([column(left), column(left + 1.0)], [top as usize, (top as usize + 1).min(height - 1)]);
+        let (columns, rows) = (
+            [column(left), column(left + 1.0)],
+            [top as usize, (top as usize + 1).min(height - 1)],
+        );
         let (s, t) = ((x - left) as f32, (y - top) as f32);
         let corner = |i: usize, j: usize| self.image[(columns[i], rows[j])];
         LinearRgb::BLACK
@@ -130,10 +141,17 @@ mod tests {
 
     #[test]
     fn the_axes_lie_where_the_definition_says() {
-        let table = [(Vector3::x(), [0.5, 0.5]), (Vector3::y(), [0.25, 0.5]), (-Vector3::y(), [0.75, 0.5])];
+        let table = [
+            (Vector3::x(), [0.5, 0.5]),
+            (Vector3::y(), [0.25, 0.5]),
+            (-Vector3::y(), [0.75, 0.5]),
+        ];
         for (direction, [u, v]) in table {
             let found = direction_to_uv(&direction);
-            assert!((found[0] - u).abs() < 1e-12 && (found[1] - v).abs() < 1e-12, "{direction:?}: {found:?}");
+            assert!(
+                (found[0] - u).abs() < 1e-12 && (found[1] - v).abs() < 1e-12,
+                "{direction:?}: {found:?}"
+            );
         }
         assert_eq!(direction_to_uv(&Vector3::z())[1], 0.0);
         assert!((direction_to_uv(&-Vector3::z())[1] - 1.0).abs() < 1e-12);
@@ -154,8 +172,14 @@ mod tests {
         let panorama = Panorama::new(image).unwrap();
         let at = |u: f64, v: f64| panorama.radiance(&uv_to_direction([u, v])).g;
         assert!((at(2.5 / 8.0, 1.5 / 4.0) - 12.0).abs() < 1e-4);
-        assert!((at(0.0, 1.5 / 4.0) - 13.5).abs() < 1e-4, "half of texel 7, half of texel 0");
-        assert!((panorama.radiance(&Vector3::z()).g - at(0.5, 1e-9)).abs() < 1e-3, "the pole belongs to row 0");
+        assert!(
+            (at(0.0, 1.5 / 4.0) - 13.5).abs() < 1e-4,
+            "half of texel 7, half of texel 0"
+        );
+        assert!(
+            (panorama.radiance(&Vector3::z()).g - at(0.5, 1e-9)).abs() < 1e-3,
+            "the pole belongs to row 0"
+        );
     }
 
     #[test]
@@ -164,7 +188,12 @@ mod tests {
         for bad in [f32::NAN, f32::INFINITY, -1.0] {
             let mut image = Image::filled(4, 2, LinearRgb::WHITE);
             image.pixels_mut()[5].g = bad;
-            assert!(Panorama::new(image).unwrap_err().to_string().contains("(1, 1)"));
+            assert!(
+                Panorama::new(image)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("(1, 1)")
+            );
         }
     }
 

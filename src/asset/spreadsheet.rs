@@ -15,7 +15,14 @@ pub(super) struct Row {
 
 /// Columns that hold words, and those that hold numbers.
 const WORDS: [&str; 4] = ["file", "asset", "class", "screen"];
-const NUMBERS: [&str; 6] = ["px_per_metre", "length", "width", "thickness", "mass", "marker_size"];
+const NUMBERS: [&str; 6] = [
+    "px_per_metre",
+    "length",
+    "width",
+    "thickness",
+    "mass",
+    "marker_size",
+];
 /// A column that holds two numbers with an x between them.
 const SIZE: &str = "screen_size";
 /// What else a column may be called.
@@ -32,14 +39,26 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<Row>> {
     let text = decoded(bytes)?.replace("\r\n", "\n");
     let text = text.trim_start_matches('\u{feff}');
     let separator = separator(text.lines().next().unwrap_or_default());
-    let mut reader = csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).from_reader(text.as_bytes());
-    let columns = reader.headers().map_err(|e| broken(&e))?.iter().map(column).collect::<Result<Vec<_>>>()?;
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(separator)
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let columns = reader
+        .headers()
+        .map_err(|e| broken(&e))?
+        .iter()
+        .map(column)
+        .collect::<Result<Vec<_>>>()?;
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| broken(&e))?;
         let line = record.position().map_or(0, csv::Position::line);
         let mut cells = toml::Table::new();
-        for (name, cell) in columns.iter().zip(&record).filter(|(_, cell)| !cell.is_empty()) {
+        for (name, cell) in columns
+            .iter()
+            .zip(&record)
+            .filter(|(_, cell)| !cell.is_empty())
+        {
             let value = value(name, cell, separator).map_err(|e| in_line(e, line))?;
             cells.insert((*name).into(), value);
         }
@@ -55,9 +74,14 @@ fn decoded(bytes: &[u8]) -> Result<String> {
     if let Ok(text) = std::str::from_utf8(bytes) {
         return Ok(text.to_owned());
     }
-    let unknown = bytes.iter().any(|byte| (0x80..0xa0).contains(byte) || *byte == 0);
+    let unknown = bytes
+        .iter()
+        .any(|byte| (0x80..0xa0).contains(byte) || *byte == 0);
     match unknown {
-        true => Err(Error::value("document", "neither UTF-8 nor Windows-1252, expected a CSV file in UTF-8")),
+        true => Err(Error::value(
+            "document",
+            "neither UTF-8 nor Windows-1252, expected a CSV file in UTF-8",
+        )),
         // Above the control codes that code is Latin-1, whose bytes are the first characters of Unicode.
         false => Ok(bytes.iter().copied().map(char::from).collect()),
     }
@@ -65,17 +89,39 @@ fn decoded(bytes: &[u8]) -> Result<String> {
 
 fn separator(header: &str) -> u8 {
     let count = |separator: &u8| header.bytes().filter(|byte| byte == separator).count();
-    SEPARATORS.into_iter().rev().max_by_key(count).unwrap_or(b',')
+    SEPARATORS
+        .into_iter()
+        .rev()
+        .max_by_key(count)
+        .unwrap_or(b',')
 }
 
 /// The name of a column, however it is written.
 fn column(header: &str) -> Result<&'static str> {
     let plain = header.to_lowercase().replace([' ', '-'], "_");
-    let named = ALIASES.iter().find(|(alias, _)| *alias == plain).map_or(plain.as_str(), |(_, name)| name);
-    let known: Vec<&'static str> = WORDS.iter().chain(&NUMBERS).chain(&[SIZE]).copied().collect();
-    known.iter().find(|name| **name == named).copied().ok_or_else(|| {
-        Error::value("line 1", format!("unknown column \"{header}\", {}", io::suggestion(named, &known)))
-    })
+    let named = ALIASES
+        .iter()
+        .find(|(alias, _)| *alias == plain)
+        .map_or(plain.as_str(), |(_, name)| name);
+    let known: Vec<&'static str> = WORDS
+        .iter()
+        .chain(&NUMBERS)
+        .chain(&[SIZE])
+        .copied()
+        .collect();
+    known
+        .iter()
+        .find(|name| **name == named)
+        .copied()
+        .ok_or_else(|| {
+            Error::value(
+                "line 1",
+                format!(
+                    "unknown column \"{header}\", {}",
+                    io::suggestion(named, &known)
+                ),
+            )
+        })
 }
 
 /// The same error, told of a line of the file.
@@ -92,16 +138,29 @@ fn value(column: &str, cell: &str, separator: u8) -> Result<toml::Value> {
         return Ok(cell.into());
     }
     if column == SIZE {
-        let sides = cell.split(['x', 'X']).map(|side| value(NUMBERS[0], side.trim(), separator));
+        let sides = cell
+            .split(['x', 'X'])
+            .map(|side| value(NUMBERS[0], side.trim(), separator));
         let sides: Option<Vec<toml::Value>> = sides.map(Result::ok).collect();
         let sides = sides.filter(|sides| sides.len() == 2);
-        return sides.map(toml::Value::from).ok_or_else(|| wrong(column, cell, "a size such as 0.60x0.40"));
+        return sides
+            .map(toml::Value::from)
+            .ok_or_else(|| wrong(column, cell, "a size such as 0.60x0.40"));
     }
     // Between commas a comma in a number may as well separate thousands.
     let decimal_comma = separator != b',' && !cell.contains('.') && cell.matches(',').count() == 1;
-    let number = if decimal_comma { cell.replace(',', ".") } else { cell.to_owned() };
-    let found = number.parse::<f64>().ok().filter(|number| number.is_finite());
-    found.map(toml::Value::from).ok_or_else(|| wrong(column, cell, "a number such as 0.265"))
+    let number = if decimal_comma {
+        cell.replace(',', ".")
+    } else {
+        cell.to_owned()
+    };
+    let found = number
+        .parse::<f64>()
+        .ok()
+        .filter(|number| number.is_finite());
+    found
+        .map(toml::Value::from)
+        .ok_or_else(|| wrong(column, cell, "a number such as 0.265"))
 }
 
 fn wrong(column: &str, cell: &str, expected: &str) -> Error {
@@ -109,9 +168,13 @@ fn wrong(column: &str, cell: &str, expected: &str) -> Error {
 }
 
 fn broken(error: &csv::Error) -> Error {
-    let line = error.position().map_or_else(|| "document".to_owned(), |at| format!("line {}", at.line()));
+    let line = error
+        .position()
+        .map_or_else(|| "document".to_owned(), |at| format!("line {}", at.line()));
     let what = match error.kind() {
-        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => format!("{len} cells, expected {expected_len}"),
+        csv::ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => format!("{len} cells, expected {expected_len}"),
         _ => error.to_string(),
     };
     Error::value(line, what)
@@ -123,7 +186,10 @@ mod tests {
 
     fn table(bytes: &[u8]) -> std::result::Result<Vec<String>, String> {
         let rows = rows(bytes).map_err(|e| e.to_string())?;
-        Ok(rows.into_iter().map(|row| format!("{}: {}", row.line, row.cells).replace('\n', ", ")).collect())
+        Ok(rows
+            .into_iter()
+            .map(|row| format!("{}: {}", row.line, row.cells).replace('\n', ", "))
+            .collect())
     }
 
     const ROW: &str = "2: asset = \"b\", file = \"a.jpg\", length = 0.265, ";
@@ -142,8 +208,16 @@ mod tests {
 
     #[test]
     fn a_scale_may_be_spelled_in_american_and_in_capitals() {
-        for header in ["px_per_meter", "PX_PER_METRE", "px per metre", "Px-Per-Meter"] {
-            assert_eq!(table(format!("{header}\n2000\n").as_bytes()).unwrap(), ["2: px_per_metre = 2000.0, "]);
+        for header in [
+            "px_per_meter",
+            "PX_PER_METRE",
+            "px per metre",
+            "Px-Per-Meter",
+        ] {
+            assert_eq!(
+                table(format!("{header}\n2000\n").as_bytes()).unwrap(),
+                ["2: px_per_metre = 2000.0, "]
+            );
         }
     }
 
@@ -152,7 +226,10 @@ mod tests {
         let rows = table("file;screen_size\na;0,60x0,40\n".as_bytes()).unwrap();
         assert_eq!(rows, ["2: file = \"a\", screen_size = [0.6, 0.4], "]);
         let told = table("screen size\n0.6\n".as_bytes()).unwrap_err();
-        assert_eq!(told, "line 2: screen_size: \"0.6\", expected a size such as 0.60x0.40");
+        assert_eq!(
+            told,
+            "line 2: screen_size: \"0.6\", expected a size such as 0.60x0.40"
+        );
     }
 
     #[test]
@@ -160,18 +237,36 @@ mod tests {
         let umlaut = ["2: file = \"gr\u{fc}n.jpg\", "];
         assert_eq!(table(b"file\ngr\xfcn.jpg\n").unwrap(), umlaut);
         assert_eq!(table("file\ngr\u{fc}n.jpg\n".as_bytes()).unwrap(), umlaut);
-        assert!(table(b"file\ngr\x81n.jpg\n").unwrap_err().contains("expected a CSV file in UTF-8"));
-        assert!(table(b"\xff\xfef\0i\0l\0e\0").unwrap_err().contains("expected a CSV file in UTF-8"));
+        assert!(
+            table(b"file\ngr\x81n.jpg\n")
+                .unwrap_err()
+                .contains("expected a CSV file in UTF-8")
+        );
+        assert!(
+            table(b"\xff\xfef\0i\0l\0e\0")
+                .unwrap_err()
+                .contains("expected a CSV file in UTF-8")
+        );
     }
 
     #[test]
     fn mistakes_name_line_and_column() {
         let told = |text: &str| table(text.as_bytes()).unwrap_err();
-        assert_eq!(told("file,lenght\n"), "line 1: unknown column \"lenght\", did you mean \"length\"?");
-        assert_eq!(told("file,mass\na,b\n"), "line 2: mass: \"b\", expected a number such as 0.265");
+        assert_eq!(
+            told("file,lenght\n"),
+            "line 1: unknown column \"lenght\", did you mean \"length\"?"
+        );
+        assert_eq!(
+            told("file,mass\na,b\n"),
+            "line 2: mass: \"b\", expected a number such as 0.265"
+        );
         // An English thousand, or a decimal comma?
-        assert!(told("file,px_per_metre\na,\"1,966\"\n").starts_with("line 2: px_per_metre: \"1,966\""));
-        assert!(told("file;px_per_metre\na;1.966,7\n").starts_with("line 2: px_per_metre: \"1.966,7\""));
+        assert!(
+            told("file,px_per_metre\na,\"1,966\"\n").starts_with("line 2: px_per_metre: \"1,966\"")
+        );
+        assert!(
+            told("file;px_per_metre\na;1.966,7\n").starts_with("line 2: px_per_metre: \"1.966,7\"")
+        );
         assert!(told("length\nnan\n").starts_with("line 2: length: \"nan\""));
         assert_eq!(told("file,asset\na,b\nc\n"), "line 3: 1 cells, expected 2");
     }

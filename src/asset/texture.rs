@@ -96,8 +96,12 @@ mod tests {
 
     #[test]
     fn film_without_tint_becomes_a_cut_out_of_the_same_bits() {
-        let rgba = Image::from_fn(3, 2, |x, y| PremulRgba::new(0.1, 0.03 * x as f32, 0.1 * y as f32, 0.3));
-        let Texture::Rgba(pyramid) = Texture::from(rgba.map(Film::from)) else { panic!("took grey for tint") };
+        let rgba = Image::from_fn(3, 2, |x, y| {
+            PremulRgba::new(0.1, 0.03 * x as f32, 0.1 * y as f32, 0.3)
+        });
+        let Texture::Rgba(pyramid) = Texture::from(rgba.map(Film::from)) else {
+            panic!("took grey for tint")
+        };
         assert_eq!(pyramid.base(), &rgba);
     }
 
@@ -112,7 +116,8 @@ mod tests {
 
     #[test]
     fn checksums_tell_pictures_apart() {
-        let of = |v: f32| Texture::from(Image::filled(2, 2, PremulRgba::new(v, v, v, 1.0))).checksum();
+        let of =
+            |v: f32| Texture::from(Image::filled(2, 2, PremulRgba::new(v, v, v, 1.0))).checksum();
         assert_eq!(of(0.5), of(0.5));
         assert_ne!(of(0.5), of(0.25));
     }

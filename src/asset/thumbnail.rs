@@ -16,7 +16,11 @@ pub(super) fn thumbnail(cutout: &Image<PremulRgba>) -> Image<LinearRgb> {
     let (w, h) = cutout.size();
     let longest = w.max(h).max(1);
     let side = |len: usize| (len * SIDE).div_ceil(longest);
-    let small = if longest > SIDE { filter::resize(cutout, side(w), side(h)) } else { cutout.clone() };
+    let small = if longest > SIDE {
+        filter::resize(cutout, side(w), side(h))
+    } else {
+        cutout.clone()
+    };
     Image::from_fn(small.width(), small.height(), |x, y| {
         let square = LinearRgb::grey(GREYS[(x / SQUARE + y / SQUARE) % 2]);
         small[(x, y)].over(square.opaque()).color()

@@ -20,7 +20,11 @@ impl Belief {
 
     /// One over the variance: what it adds to the information on its unknown.
     pub(crate) fn information(&self) -> f64 {
-        if self.is_fact() { 0.0 } else { 1.0 / (self.sigma * self.sigma) }
+        if self.is_fact() {
+            0.0
+        } else {
+            1.0 / (self.sigma * self.sigma)
+        }
     }
 }
 
@@ -66,7 +70,12 @@ impl Beliefs {
 
     /// Adds to the normal equations: information, and half the slope of the cost. Returns the cost, the sum of the squared
     /// distances from what is believed.
-    pub(crate) fn add_to(&self, state: &State, information: &mut Square, slope: &mut Unknowns) -> f64 {
+    pub(crate) fn add_to(
+        &self,
+        state: &State,
+        information: &mut Square,
+        slope: &mut Unknowns,
+    ) -> f64 {
         let mut cost = 0.0;
         for (i, belief) in self.each() {
             let off = state.value(i) - belief.mean;
@@ -79,7 +88,9 @@ impl Beliefs {
 
     /// The sum of the squared distances from what is believed.
     pub(crate) fn cost(&self, state: &State) -> f64 {
-        let off = |(i, b): &(usize, Belief)| (state.value(*i) - b.mean) * (state.value(*i) - b.mean) * b.information();
+        let off = |(i, b): &(usize, Belief)| {
+            (state.value(*i) - b.mean) * (state.value(*i) - b.mean) * b.information()
+        };
         self.each().iter().map(off).sum()
     }
 }

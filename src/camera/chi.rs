@@ -28,7 +28,15 @@ mod tests {
     #[test]
     fn textbook_quantiles_come_out() {
         // NIST/SEMATECH e-Handbook, table 1.3.6.7.4: upper 1 % points.
-        for (dof, x) in [(1, 6.635), (2, 9.210), (3, 11.345), (4, 13.277), (5, 15.086), (10, 23.209), (100, 135.807)] {
+        for (dof, x) in [
+            (1, 6.635),
+            (2, 9.210),
+            (3, 11.345),
+            (4, 13.277),
+            (5, 15.086),
+            (10, 23.209),
+            (100, 135.807),
+        ] {
             let p = exceeds(x, dof).unwrap();
             assert!((p - 0.01).abs() < 1e-5, "{dof}: {p}");
         }

@@ -50,7 +50,12 @@ pub(crate) fn check(
 /// corner `i` is proportional to the depth of corner `i`.
 pub(crate) fn triangle_areas(c: &[Vector2<f64>; 4]) -> [f64; 4] {
     let twice = |i: usize, j: usize, k: usize| (c[j] - c[i]).perp(&(c[k] - c[i]));
-    [twice(1, 2, 3), twice(0, 2, 3), twice(0, 1, 3), twice(0, 1, 2)]
+    [
+        twice(1, 2, 3),
+        twice(0, 2, 3),
+        twice(0, 1, 3),
+        twice(0, 1, 2),
+    ]
 }
 
 fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
@@ -59,7 +64,12 @@ fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError>
         for second in first + 1..4 {
             let distance_px = (c[first] - c[second]).norm();
             if distance_px < limit_px {
-                return Err(SolveError::Coincident { first, second, distance_px, limit_px });
+                return Err(SolveError::Coincident {
+                    first,
+                    second,
+                    distance_px,
+                    limit_px,
+                });
             }
         }
     }
@@ -101,7 +111,11 @@ fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
             return Err(SolveError::NotConvex);
         }
         if height_px < limit_px || area <= 0.0 {
-            return Err(SolveError::Collinear { corner: (left_out + 2) % 4, distance_px: height_px.abs(), limit_px });
+            return Err(SolveError::Collinear {
+                corner: (left_out + 2) % 4,
+                distance_px: height_px.abs(),
+                limit_px,
+            });
         }
     }
     Ok(())
@@ -116,7 +130,10 @@ fn far_outside(c: &[Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Wa
     let diagonal = size.norm();
     let c = *c;
     (0..4).filter_map(move |corner| {
-        let inside = Vector2::new(c[corner].x.clamp(0.0, size.x), c[corner].y.clamp(0.0, size.y));
+        let inside = Vector2::new(
+            c[corner].x.clamp(0.0, size.x),
+            c[corner].y.clamp(0.0, size.y),
+        );
         ((c[corner].coords - inside).norm() > diagonal).then_some(Warning::Outside { corner })
     })
 }
@@ -169,21 +186,44 @@ mod tests {
     fn a_corner_within_noise_of_a_side_is_collinear() {
         for y in [255.0, 256.0, 254.2] {
             let flat = [[100.0, 110.0], [600.0, 90.0], [350.0, y], [100.0, 420.0]];
-            assert!(matches!(run(flat), Err(SolveError::Collinear { corner: 2, .. })), "{y}: {:?}", run(flat));
+            assert!(
+                matches!(run(flat), Err(SolveError::Collinear { corner: 2, .. })),
+                "{y}: {:?}",
+                run(flat)
+            );
         }
     }
 
     #[test]
     fn two_corners_at_one_place_are_coincident() {
         let twice = [QUAD[0], [101.0, 110.5], QUAD[2], QUAD[3]];
-        assert!(matches!(run(twice), Err(SolveError::Coincident { first: 0, second: 1, .. })));
+        assert!(matches!(
+            run(twice),
+            Err(SolveError::Coincident {
+                first: 0,
+                second: 1,
+                ..
+            })
+        ));
     }
 
     #[test]
     fn small_and_far_quads_are_taken_with_a_warning() {
-        let small = run([[100.0, 100.0], [140.0, 100.0], [140.0, 130.0], [100.0, 130.0]]).unwrap();
+        let small = run([
+            [100.0, 100.0],
+            [140.0, 100.0],
+            [140.0, 130.0],
+            [100.0, 130.0],
+        ])
+        .unwrap();
         assert_eq!(small.warnings, [Warning::SmallQuad { longest_px: 40.0 }]);
         let far = run([QUAD[0], [1600.0, 90.0], [1620.0, 410.0], QUAD[3]]).unwrap();
-        assert_eq!(far.warnings, [Warning::Outside { corner: 1 }, Warning::Outside { corner: 2 }]);
+        assert_eq!(
+            far.warnings,
+            [
+                Warning::Outside { corner: 1 },
+                Warning::Outside { corner: 2 }
+            ]
+        );
     }
 }

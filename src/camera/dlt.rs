@@ -27,18 +27,39 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
     }
     let eigen = square.symmetric_eigen();
     let smallest = eigen.eigenvalues.imin();
-    let second = (0..9).filter(|&i| i != smallest).map(|i| eigen.eigenvalues[i]).fold(f64::MAX, f64::min);
+    let second = (0..9)
+        .filter(|&i| i != smallest)
+        .map(|i| eigen.eigenvalues[i])
+        .fold(f64::MAX, f64::min);
     let h = eigen.eigenvectors.column(smallest);
     let map = to.try_inverse()? * Matrix3::from_fn(|i, j| h[3 * i + j]) * from;
-    (second > 1e-9 * pairs.len() as f64 && map.iter().all(|v| v.is_finite())).then_some(Homography(map))
+    (second > 1e-9 * pairs.len() as f64 && map.iter().all(|v| v.is_finite()))
+        .then_some(Homography(map))
 }
 
 fn normalisation(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matrix3<f64>> {
     let count = points.clone().count() as f64;
-    let mean = points.clone().fold(Vector2::zeros(), |sum, p| sum + p.coords) / count;
-    let spread = (points.map(|p| (p.coords - mean).norm_squared()).sum::<f64>() / count).sqrt();
+    let mean = points
+        .clone()
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords)
+        / count;
+    let spread = (points
+        .map(|p| (p.coords - mean).norm_squared())
+        .sum::<f64>()
+        / count)
+        .sqrt();
     let scale = std::f64::consts::SQRT_2 / spread;
-    let matrix = Matrix3::new(scale, 0.0, -scale * mean.x, 0.0, scale, -scale * mean.y, 0.0, 0.0, 1.0);
+    let matrix = Matrix3::new(
+        scale,
+        0.0,
+        -scale * mean.x,
+        0.0,
+        scale,
+        -scale * mean.y,
+        0.0,
+        0.0,
+        1.0,
+    );
     scale.is_finite().then_some(matrix)
 }
 
@@ -48,11 +69,23 @@ mod tests {
 
     #[test]
     fn exact_points_give_the_map_and_a_line_gives_none() {
-        let truth = Homography(Matrix3::new(900.0, 40.0, 600.0, -30.0, -850.0, 400.0, 0.1, 0.2, 1.0));
+        let truth = Homography(Matrix3::new(
+            900.0, 40.0, 600.0, -30.0, -850.0, 400.0, 0.1, 0.2, 1.0,
+        ));
         let at = |x: f64, y: f64| (Point2::new(x, y), truth.map(Point2::new(x, y)));
-        let found = homography(&[at(0.0, 0.0), at(0.5, 0.1), at(0.4, 0.6), at(-0.1, 0.5), at(0.2, 0.9)]).unwrap();
+        let found = homography(&[
+            at(0.0, 0.0),
+            at(0.5, 0.1),
+            at(0.4, 0.6),
+            at(-0.1, 0.5),
+            at(0.2, 0.9),
+        ])
+        .unwrap();
         let p = Point2::new(-0.3, 0.25);
         assert!((found.map(p) - truth.map(p)).norm() < 1e-8);
-        assert_eq!(homography(&[at(0.0, 0.0), at(0.1, 0.1), at(0.2, 0.2), at(0.3, 0.3)]), None);
+        assert_eq!(
+            homography(&[at(0.0, 0.0), at(0.1, 0.1), at(0.2, 0.2), at(0.3, 0.3)]),
+            None
+        );
     }
 }

@@ -16,14 +16,25 @@ const WORTH_IT: f64 = 0.8;
 /// What a person should know of a solution, a few lines of plain words.
 pub fn doctor(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
     let mut text = String::new();
-    let misfit = solution.misfit().map(|error| format!("This camera is worth nothing: {error}."));
-    let lines =
-        [view(solution), focal(solution), framing(label, solution, options), surface(solution), above(solution)];
+    let misfit = solution
+        .misfit()
+        .map(|error| format!("This camera is worth nothing: {error}."));
+    let lines = [
+        view(solution),
+        focal(solution),
+        framing(label, solution, options),
+        surface(solution),
+        above(solution),
+    ];
     for line in misfit.into_iter().chain(lines) {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{line}");
     }
-    for warning in solution.warnings.iter().filter(|w| !matches!(w, Warning::FramingUnknown { .. })) {
+    for warning in solution
+        .warnings
+        .iter()
+        .filter(|w| !matches!(w, Warning::FramingUnknown { .. }))
+    {
         let _ = writeln!(text, "Beware: {warning}.");
     }
     if let Some(advice) = advice(label, solution, options) {
@@ -50,7 +61,9 @@ fn focal(solution: &Solution) -> String {
     let known = match solution.focal_source {
         FocalSource::Measured => "the corners themselves tell it",
         FocalSource::Mixed => "partly from the corners, partly from what was known before",
-        FocalSource::Prior => "only from what was known before: seen from so nearly above, the corners do not tell it",
+        FocalSource::Prior => {
+            "only from what was known before: seen from so nearly above, the corners do not tell it"
+        }
         FocalSource::Fixed => "as given",
         FocalSource::Unbounded => "a bound, not a value: nothing tells it",
     };
@@ -66,8 +79,12 @@ fn framing(label: &Label, solution: &Solution, options: &SolveOptions) -> String
     let [x, y] = [camera.principal_px.x, camera.principal_px.y];
     let known = format!("Its principal point is at ({x:.0}, {y:.0}) px (+- {sigma_px:.0})");
     match solution.framing {
-        Framing::Whole => format!("{known}: the picture is whole, or it is known of which part it is."),
-        Framing::Cropped => format!("{known}, found with the rest: the picture is a part of a larger one."),
+        Framing::Whole => {
+            format!("{known}: the picture is whole, or it is known of which part it is.")
+        }
+        Framing::Cropped => {
+            format!("{known}, found with the rest: the picture is a part of a larger one.")
+        }
         Framing::Unknown => {
             let (now, whole) = (100.0 * solution.sigma.ln_focal, if_whole(label, options));
             let gain = whole.map_or(String::new(), |percent| {
@@ -85,7 +102,9 @@ fn framing(label: &Label, solution: &Solution, options: &SolveOptions) -> String
 fn if_whole(label: &Label, options: &SolveOptions) -> Option<f64> {
     let mut whole = label.clone();
     whole.image.cropped = Some(false);
-    let solution = solve(&whole, options).ok().filter(|s| s.misfit().is_none())?;
+    let solution = solve(&whole, options)
+        .ok()
+        .filter(|s| s.misfit().is_none())?;
     Some(100.0 * solution.sigma.ln_focal)
 }
 
@@ -143,7 +162,10 @@ mod tests {
     #[test]
     fn from_above_the_advice_is_to_measure_the_height() {
         let text = say(0.5);
-        assert!(text.contains("the corners do not tell it") && text.contains("Measure the height"), "{text}");
+        assert!(
+            text.contains("the corners do not tell it") && text.contains("Measure the height"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -156,7 +178,8 @@ mod tests {
         };
         let unknown = say(None);
         assert!(
-            unknown.contains("\"cropped\": false under \"image\"") && unknown.contains(" % instead of "),
+            unknown.contains("\"cropped\": false under \"image\"")
+                && unknown.contains(" % instead of "),
             "{unknown}"
         );
         assert!(say(Some(false)).contains("the picture is whole"));
@@ -170,12 +193,18 @@ mod tests {
         (surface.width_m, surface.height_m) = (surface.height_m, surface.width_m);
         let options = SolveOptions::default();
         let text = doctor(&label, &solve(&label, &options).unwrap(), &options);
-        assert!(text.starts_with("This camera is worth nothing: ") && text.contains("exchange width_m"), "{text}");
+        assert!(
+            text.starts_with("This camera is worth nothing: ") && text.contains("exchange width_m"),
+            "{text}"
+        );
     }
 
     #[test]
     fn from_the_side_there_is_no_advice() {
         let text = say(45.0);
-        assert!(text.contains("the corners themselves tell it") && !text.contains("Measure"), "{text}");
+        assert!(
+            text.contains("the corners themselves tell it") && !text.contains("Measure"),
+            "{text}"
+        );
     }
 }

@@ -10,7 +10,9 @@ pub enum SolveError {
     #[error("{0} is not finite")]
     NonFinite(&'static str),
     /// A number is of no label that a person would write.
-    #[error("{at}: {value:e}, expected no more than {most:e}, and no less than its inverse where it is positive")]
+    #[error(
+        "{at}: {value:e}, expected no more than {most:e}, and no less than its inverse where it is positive"
+    )]
     OutOfRange {
         /// Which value.
         at: &'static str,
@@ -32,7 +34,9 @@ pub enum SolveError {
     #[error("surface: missing corners_px (or four points on the surface), and width_m or height_m")]
     Empty,
     /// There are no corners.
-    #[error("surface: corners_px is missing or not filled in, and there are no four points on the surface instead")]
+    #[error(
+        "surface: corners_px is missing or not filled in, and there are no four points on the surface instead"
+    )]
     NoCorners,
     /// A value that must be positive is not.
     #[error("{at}: {value}, expected a positive number")]

@@ -84,7 +84,11 @@ impl BlenderCamera {
     }
 
     fn sensor(&self) -> f64 {
-        if self.sensor_fit == SensorFit::Vertical { self.sensor_height } else { self.sensor_width }
+        if self.sensor_fit == SensorFit::Vertical {
+            self.sensor_height
+        } else {
+            self.sensor_width
+        }
     }
 }
 
@@ -122,12 +126,20 @@ impl Camera {
         let [w, h] = image.map(f64::from);
         let view = blender.view([w, h]);
         let fx = blender.lens / blender.sensor() * view;
-        let principal_px =
-            Point2::new(w / 2.0 - blender.shift_x * view, h / 2.0 + blender.shift_y * view / blender.pixel_aspect);
+        let principal_px = Point2::new(
+            w / 2.0 - blender.shift_x * view,
+            h / 2.0 + blender.shift_y * view / blender.pixel_aspect,
+        );
         let m = &blender.matrix_world;
         let rotation = blender_flip() * Matrix3::from_fn(|i, j| m[i][j]).transpose();
         let center = Vector3::new(m[0][3], m[1][3], m[2][3]);
-        Self::posed(image, Vector2::new(fx, fx / blender.pixel_aspect), principal_px, rotation, -(rotation * center))
+        Self::posed(
+            image,
+            Vector2::new(fx, fx / blender.pixel_aspect),
+            principal_px,
+            rotation,
+            -(rotation * center),
+        )
     }
 
     /// The camera in OpenCV's terms.
@@ -136,7 +148,11 @@ impl Camera {
         k[(0, 2)] -= 0.5;
         k[(1, 2)] -= 0.5;
         let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)]));
-        OpencvCamera { k: rows(k), r: rows(self.rotation()), t: self.camera_from_world.translation.vector.into() }
+        OpencvCamera {
+            k: rows(k),
+            r: rows(self.rotation()),
+            t: self.camera_from_world.translation.vector.into(),
+        }
     }
 
     /// The camera that OpenCV means, for a picture of this size.
@@ -144,13 +160,23 @@ impl Camera {
         let k = &opencv.k;
         let principal_px = Point2::new(k[0][2] + 0.5, k[1][2] + 0.5);
         let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
-        Self::posed(image, Vector2::new(k[0][0], k[1][1]), principal_px, rotation, opencv.t.into())
+        Self::posed(
+            image,
+            Vector2::new(k[0][0], k[1][1]),
+            principal_px,
+            rotation,
+            opencv.t.into(),
+        )
     }
 
     /// Lines of Python that make the camera in Blender.
     pub fn to_blender_script(&self) -> String {
         let blender = self.to_blender();
-        let rows: Vec<String> = blender.matrix_world.iter().map(|row| format!("{row:?}")).collect();
+        let rows: Vec<String> = blender
+            .matrix_world
+            .iter()
+            .map(|row| format!("{row:?}"))
+            .collect();
         format!(
             "import bpy\n\
              from mathutils import Matrix\n\n\
@@ -180,7 +206,10 @@ impl Camera {
     }
 
     fn rotation(&self) -> Matrix3<f64> {
-        self.camera_from_world.rotation.to_rotation_matrix().into_inner()
+        self.camera_from_world
+            .rotation
+            .to_rotation_matrix()
+            .into_inner()
     }
 
     fn posed(
@@ -190,8 +219,14 @@ impl Camera {
         rotation: Matrix3<f64>,
         t: Vector3<f64>,
     ) -> Self {
-        let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        Self { image, focal_px, principal_px, camera_from_world: Pose::from_parts(t.into(), rotation) }
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Self {
+            image,
+            focal_px,
+            principal_px,
+            camera_from_world: Pose::from_parts(t.into(), rotation),
+        }
     }
 }
 
@@ -203,9 +238,18 @@ impl ColmapModel {
             let (id, [w, h]) = (i + 1, camera.image);
             let (f, c) = (camera.focal_px, camera.principal_px);
             // Writing to a string cannot fail.
-            let _ = writeln!(model.cameras, "{id} PINHOLE {w} {h} {:?} {:?} {:?} {:?}", f.x, f.y, c.x, c.y);
-            let (q, t) = (camera.camera_from_world.rotation, camera.camera_from_world.translation.vector);
-            let pose = [q.w, q.i, q.j, q.k, t.x, t.y, t.z].map(|v| format!("{v:?}")).join(" ");
+            let _ = writeln!(
+                model.cameras,
+                "{id} PINHOLE {w} {h} {:?} {:?} {:?} {:?}",
+                f.x, f.y, c.x, c.y
+            );
+            let (q, t) = (
+                camera.camera_from_world.rotation,
+                camera.camera_from_world.translation.vector,
+            );
+            let pose = [q.w, q.i, q.j, q.k, t.x, t.y, t.z]
+                .map(|v| format!("{v:?}"))
+                .join(" ");
             let _ = writeln!(model.images, "{id} {pose} {id} {name}\n");
         }
         model
@@ -238,7 +282,8 @@ mod tests {
 
     fn difference(a: &Camera, b: &Camera) -> f64 {
         let pose = (a.rotation() - b.rotation()).norm()
-            + (a.camera_from_world.translation.vector - b.camera_from_world.translation.vector).norm();
+            + (a.camera_from_world.translation.vector - b.camera_from_world.translation.vector)
+                .norm();
         let lens = (a.focal_px - b.focal_px).norm() + (a.principal_px - b.principal_px).norm();
         pose + lens / a.focal_px.x
     }
@@ -247,7 +292,11 @@ mod tests {
     fn blender_round_trips() {
         for camera in cameras() {
             let back = Camera::from_blender(&camera.to_blender(), camera.image);
-            assert!(difference(&camera, &back) < 1e-12, "{}", difference(&camera, &back));
+            assert!(
+                difference(&camera, &back) < 1e-12,
+                "{}",
+                difference(&camera, &back)
+            );
         }
     }
 
@@ -264,15 +313,28 @@ mod tests {
     fn colmap_names_every_picture() {
         let cameras = cameras();
         let model = ColmapModel::new([("a.png", &cameras[0]), ("b.png", &cameras[1])]);
-        assert!(model.cameras.starts_with("1 PINHOLE 640 480 700.0 700.0 311.0 250.5\n2 PINHOLE 480 640"));
+        assert!(
+            model
+                .cameras
+                .starts_with("1 PINHOLE 640 480 700.0 700.0 311.0 250.5\n2 PINHOLE 480 640")
+        );
         assert_eq!(model.images.lines().count(), 4);
-        assert!(model.images.lines().nth(2).is_some_and(|line| line.ends_with(" 2 b.png")));
+        assert!(
+            model
+                .images
+                .lines()
+                .nth(2)
+                .is_some_and(|line| line.ends_with(" 2 b.png"))
+        );
     }
 
     #[test]
     fn the_script_says_what_the_values_are() {
         let script = cameras()[0].to_blender_script();
         assert!(script.contains("resolution_x, scene.render.resolution_y = 640, 480"));
-        assert!(script.contains(&format!("camera.lens, camera.shift_x, camera.shift_y = {:?}", 700.0 * 36.0 / 640.0)));
+        assert!(script.contains(&format!(
+            "camera.lens, camera.shift_x, camera.shift_y = {:?}",
+            700.0 * 36.0 / 640.0
+        )));
     }
 }

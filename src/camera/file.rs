@@ -99,7 +99,10 @@ pub struct FoundCamera {
 /// Intrinsics in our pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+#[allow(
+    missing_docs,
+    reason = "the fields of Solution, in the words of the file format"
+)]
 pub struct Model {
     pub f_px: f64,
     pub principal_point_px: [f64; 2],
@@ -109,7 +112,10 @@ pub struct Model {
 /// Sides of the rectangle as fitted, metres.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+#[allow(
+    missing_docs,
+    reason = "the fields of Solution, in the words of the file format"
+)]
 pub struct FittedSurface {
     pub width_m: f64,
     pub height_m: f64,
@@ -118,7 +124,10 @@ pub struct FittedSurface {
 /// What was believed of the focal length: pixels, and relative standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+#[allow(
+    missing_docs,
+    reason = "the fields of Solution, in the words of the file format"
+)]
 pub struct FocalPrior {
     pub px: f64,
     pub sigma: Option<f64>,
@@ -127,7 +136,10 @@ pub struct FocalPrior {
 /// Standard deviations; `null` where nothing is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+#[allow(
+    missing_docs,
+    reason = "the fields of Solution, in the words of the file format"
+)]
 pub struct SigmaRecord {
     pub ln_f: Option<f64>,
     pub tilt_deg: Option<f64>,
@@ -144,7 +156,10 @@ pub struct SigmaRecord {
 /// How well the label fits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[allow(missing_docs, reason = "the fields of Solution, in the words of the file format")]
+#[allow(
+    missing_docs,
+    reason = "the fields of Solution, in the words of the file format"
+)]
 pub struct FitRecord {
     pub chi2: f64,
     pub dof: usize,
@@ -195,11 +210,19 @@ impl CameraFile {
         let own = [self.image.width, self.image.height];
         if own != image || image.contains(&0) {
             let ([w, h], [a, b]) = (own, image);
-            return Err(Error::value("image", format!("{w} x {h} pixels, expected {a} x {b}")));
+            return Err(Error::value(
+                "image",
+                format!("{w} x {h} pixels, expected {a} x {b}"),
+            ));
         }
         positive("model.f_px", model.f_px)?;
-        model.principal_point_px.iter().try_for_each(|v| bounded("model.principal_point_px", *v))?;
-        self.size().iter().try_for_each(|v| positive("surface", *v))?;
+        model
+            .principal_point_px
+            .iter()
+            .try_for_each(|v| bounded("model.principal_point_px", *v))?;
+        self.size()
+            .iter()
+            .try_for_each(|v| positive("surface", *v))?;
         opencv.t.iter().try_for_each(|v| bounded("opencv.t", *v))?;
         let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
         let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
@@ -207,7 +230,11 @@ impl CameraFile {
             return Err(Error::value("opencv.R", "no rotation"));
         }
         let height = self.camera().center().z;
-        if height > 0.0 { Ok(()) } else { Err(Error::value("opencv.t", "the camera is below the surface")) }
+        if height > 0.0 {
+            Ok(())
+        } else {
+            Err(Error::value("opencv.t", "the camera is below the surface"))
+        }
     }
 }
 
@@ -218,19 +245,37 @@ const LARGEST: f64 = 1e9;
 
 fn bounded(at: &str, value: f64) -> Result<()> {
     let fits = value.abs() <= LARGEST;
-    if fits { Ok(()) } else { Err(Error::value(at, format!("{value:e}, expected at most {LARGEST:e}"))) }
+    if fits {
+        Ok(())
+    } else {
+        Err(Error::value(
+            at,
+            format!("{value:e}, expected at most {LARGEST:e}"),
+        ))
+    }
 }
 
 fn positive(at: &str, value: f64) -> Result<()> {
     let fits = (1.0 / LARGEST..=LARGEST).contains(&value);
-    if fits { Ok(()) } else { Err(Error::value(at, format!("{value:e}, expected a positive number"))) }
+    if fits {
+        Ok(())
+    } else {
+        Err(Error::value(
+            at,
+            format!("{value:e}, expected a positive number"),
+        ))
+    }
 }
 
 impl SolvedFrom {
     /// Of a label alone.
     pub fn new(label: &Label) -> Self {
         let size_m = [label.surface.width_m, label.surface.height_m];
-        Self { label_crc32: checksum(label), size_m, together: BTreeMap::new() }
+        Self {
+            label_crc32: checksum(label),
+            size_m,
+            together: BTreeMap::new(),
+        }
     }
 }
 
@@ -254,7 +299,10 @@ impl FoundCamera {
             center_m: camera.center().into(),
             tilt_deg: camera.tilt().to_degrees(),
             blender: camera.to_blender(),
-            surface: FittedSurface { width_m: solution.size[0], height_m: solution.size[1] },
+            surface: FittedSurface {
+                width_m: solution.size[0],
+                height_m: solution.size[1],
+            },
             homography: [0, 1, 2].map(|i| [0, 1, 2].map(|j| homography[(i, j)])),
             sigma: SigmaRecord::new(solution),
             fit: FitRecord::new(solution),
@@ -262,9 +310,15 @@ impl FoundCamera {
             focal_source: solution.focal_source,
             data_share: solution.focal.share,
             focal_from_data: solution.focal.from_data_px,
-            focal_prior: FocalPrior { px: solution.focal.prior_px, sigma: finite(solution.focal.prior_sigma) },
+            focal_prior: FocalPrior {
+                px: solution.focal.prior_px,
+                sigma: finite(solution.focal.prior_sigma),
+            },
             warnings: solution.warnings.clone(),
-            alternative: solution.alternative.as_deref().map(|other| Box::new(Self::new(other))),
+            alternative: solution
+                .alternative
+                .as_deref()
+                .map(|other| Box::new(Self::new(other))),
         }
     }
 }
@@ -318,14 +372,24 @@ mod tests {
         for (k, tilt) in [0.0, 3.0, 20.0, 60.0].into_iter().enumerate() {
             let view = Scenario::realistic().tilted(tilt).view(21, k as u64);
             for priors in [Priors::default(), Priors::ideal().with_free_focal()] {
-                let solution = solve(&view.label, &SolveOptions { priors, ..Default::default() }).unwrap();
+                let solution = solve(
+                    &view.label,
+                    &SolveOptions {
+                        priors,
+                        ..Default::default()
+                    },
+                )
+                .unwrap();
                 let file = CameraFile::new(&view.label, &solution);
                 let text = serde_json::to_string_pretty(&file).unwrap();
                 let back: CameraFile = serde_json::from_str(&text).unwrap();
                 assert_eq!(serde_json::to_string_pretty(&back).unwrap(), text);
                 assert_eq!(back, file);
                 let p = crate::geom::Point3::new(0.1, 0.1, 0.05);
-                let (a, b) = (back.camera().project(p).unwrap().0, solution.camera.project(p).unwrap().0);
+                let (a, b) = (
+                    back.camera().project(p).unwrap().0,
+                    solution.camera.project(p).unwrap().0,
+                );
                 assert!((a - b).norm() < 1e-9);
             }
         }

@@ -72,22 +72,41 @@ pub(crate) fn usual_px(image: [u32; 2]) -> f64 {
 pub(crate) fn belief(label: &Label, framing: Framing, priors: &Priors) -> (Belief, Witness) {
     let (camera, image) = (&label.camera, label.taken_size());
     let equivalent = camera.focal_35mm.map(|mm| focal_from_equivalent(mm, image));
-    let believable =
-        equivalent.filter(|f| framing != Framing::Cropped && POSSIBLE_FOCAL.contains(&(f / longer_side(image))));
+    let believable = equivalent.filter(|f| {
+        framing != Framing::Cropped && POSSIBLE_FOCAL.contains(&(f / longer_side(image)))
+    });
     let (focal_px, usual_sigma, witness) = match (camera.focal_px, believable) {
         (Some(px), _) => (px, STATED_SIGMA, Witness::Person),
         (None, Some(px)) => (px, EQUIVALENT_SIGMA, Witness::Exif),
         (None, None) => return (usual(image, priors), Witness::Usual),
     };
-    let sigma = if camera.focal_fixed { 0.0 } else { camera.focal_sigma.unwrap_or(usual_sigma) };
-    let cropped_perhaps = framing == Framing::Unknown && witness == Witness::Exif && !camera.focal_fixed;
-    let sigma = if cropped_perhaps { libm::hypot(sigma, CROP_SIGMA) } else { sigma };
-    (Belief { mean: libm::log(focal_px), sigma }, witness)
+    let sigma = if camera.focal_fixed {
+        0.0
+    } else {
+        camera.focal_sigma.unwrap_or(usual_sigma)
+    };
+    let cropped_perhaps =
+        framing == Framing::Unknown && witness == Witness::Exif && !camera.focal_fixed;
+    let sigma = if cropped_perhaps {
+        libm::hypot(sigma, CROP_SIGMA)
+    } else {
+        sigma
+    };
+    (
+        Belief {
+            mean: libm::log(focal_px),
+            sigma,
+        },
+        witness,
+    )
 }
 
 /// What to believe where nobody says anything.
 fn usual(image: [u32; 2], priors: &Priors) -> Belief {
-    Belief { mean: libm::log(usual_px(image)), sigma: priors.focal_sigma }
+    Belief {
+        mean: libm::log(usual_px(image)),
+        sigma: priors.focal_sigma,
+    }
 }
 
 fn longer_side(image: [u32; 2]) -> f64 {
@@ -118,9 +137,11 @@ mod tests {
 
     #[test]
     fn an_impossible_or_cropped_equivalent_is_dropped() {
-        for (label, framing) in
-            [(label(2.0), Framing::Whole), (label(1e4), Framing::Whole), (label(26.0), Framing::Cropped)]
-        {
+        for (label, framing) in [
+            (label(2.0), Framing::Whole),
+            (label(1e4), Framing::Whole),
+            (label(26.0), Framing::Cropped),
+        ] {
             let (belief, witness) = believed(&label, framing);
             assert_eq!((witness, belief.sigma), (Witness::Usual, 0.35));
         }
@@ -131,6 +152,9 @@ mod tests {
         let mut both = label(26.0);
         both.camera.focal_px = Some(3000.0);
         let (belief, witness) = believed(&both, Framing::Whole);
-        assert_eq!((witness, belief.sigma, libm::exp(belief.mean).round()), (Witness::Person, 0.01, 3000.0));
+        assert_eq!(
+            (witness, belief.sigma, libm::exp(belief.mean).round()),
+            (Witness::Person, 0.01, 3000.0)
+        );
     }
 }

@@ -31,13 +31,18 @@ impl Solution {
         self.sigma = self.sigma_with(loose, apart);
         (self.focal.share, self.focal.from_data_px) = (loose.focal.share, loose.focal.from_data_px);
         (self.focal_source, self.framing) = (loose.focal_source, Framing::Unknown);
-        self.warnings.retain(|w| !matches!(w, Warning::HeightUncertain { .. }));
+        self.warnings
+            .retain(|w| !matches!(w, Warning::HeightUncertain { .. }));
         let limit_px = self.height_limit_px(options);
         if sure_px > limit_px {
             self.warnings.extend(self.height_warning(options));
         } else if self.sigma.height_px > limit_px {
             let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
-            self.warnings.push(Warning::FramingUnknown { height, sigma_px, whole_px: sure_px });
+            self.warnings.push(Warning::FramingUnknown {
+                height,
+                sigma_px,
+                whole_px: sure_px,
+            });
         }
         self
     }
@@ -46,7 +51,10 @@ impl Solution {
     pub(crate) fn off_center(mut self, whole: Option<Self>) -> Self {
         let [w, h] = self.camera.image.map(f64::from);
         let off = self.camera.principal_px - Point2::new(w / 2.0, h / 2.0);
-        self.warnings.push(Warning::OffCenter { off_px: off.norm(), sigma_px: self.sigma.principal_px });
+        self.warnings.push(Warning::OffCenter {
+            off_px: off.norm(),
+            sigma_px: self.sigma.principal_px,
+        });
         self.alternative = self.alternative.or(whole.map(Box::new));
         self
     }
@@ -56,11 +64,15 @@ impl Solution {
         let moved = other.center() - camera.center();
         let middle = other.principal_px - camera.principal_px;
         let corners = [0, 1, 2, 3].map(|i| {
-            let off = loose.sees(corner_points(loose.size)[i]) - self.sees(corner_points(self.size)[i]);
+            let off =
+                loose.sees(corner_points(loose.size)[i]) - self.sees(corner_points(self.size)[i]);
             sigma.corners_px[i] + off * off.transpose()
         });
         Sigma {
-            ln_focal: libm::hypot(sigma.ln_focal, libm::log(other.focal_px.x / camera.focal_px.x)),
+            ln_focal: libm::hypot(
+                sigma.ln_focal,
+                libm::log(other.focal_px.x / camera.focal_px.x),
+            ),
             tilt: libm::hypot(sigma.tilt, other.tilt() - camera.tilt()),
             center: sigma.center + moved * moved.transpose(),
             corners_px: corners,
@@ -75,7 +87,9 @@ impl Solution {
     fn height_apart_px(&self, other: &Self) -> f64 {
         let height = self.sigma.reference_height;
         let pairs = heights(self.size, height).zip(heights(other.size, height));
-        let squares: Vec<f64> = pairs.map(|(a, b)| variance((other.sees(b) - self.sees(a)).norm_squared())).collect();
+        let squares: Vec<f64> = pairs
+            .map(|(a, b)| variance((other.sees(b) - self.sees(a)).norm_squared()))
+            .collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 
@@ -95,7 +109,10 @@ mod tests {
     }
 
     fn said(solution: &Solution, kind: &str) -> bool {
-        solution.warnings.iter().any(|w| serde_json::to_value(w).unwrap()["kind"] == kind)
+        solution
+            .warnings
+            .iter()
+            .any(|w| serde_json::to_value(w).unwrap()["kind"] == kind)
     }
 
     #[test]
@@ -105,21 +122,37 @@ mod tests {
         unknown.image.cropped = None;
         let (sure, hedged) = (solved(&whole), solved(&unknown));
         assert_eq!(sure.camera, hedged.camera);
-        assert_eq!((sure.framing, hedged.framing), (Framing::Whole, Framing::Unknown));
-        assert!(hedged.sigma.ln_focal > 3.0 * sure.sigma.ln_focal, "{:?}", hedged.sigma.ln_focal);
+        assert_eq!(
+            (sure.framing, hedged.framing),
+            (Framing::Whole, Framing::Unknown)
+        );
+        assert!(
+            hedged.sigma.ln_focal > 3.0 * sure.sigma.ln_focal,
+            "{:?}",
+            hedged.sigma.ln_focal
+        );
         assert!(hedged.sigma.principal_px > 10.0 * sure.sigma.principal_px);
         assert!(said(&hedged, "framing_unknown") && !said(&sure, "framing_unknown"));
     }
 
     #[test]
     fn corners_of_a_cropped_picture_are_noticed() {
-        let scenario = Scenario { off_center: 0.23, corner_sigma_px: 0.5, ..Scenario::default() }.tilted(40.0);
+        let scenario = Scenario {
+            off_center: 0.23,
+            corner_sigma_px: 0.5,
+            ..Scenario::default()
+        }
+        .tilted(40.0);
         let view = scenario.view(1, 3);
         let solution = solved(&view.label);
         assert!(said(&solution, "off_center"), "{:?}", solution.warnings);
         let error = libm::log(solution.camera.focal_px.x / view.camera.focal_px.x).abs();
         assert!(error < 3.0 * solution.sigma.ln_focal, "{error}");
-        assert!(solution.alternative.is_some_and(|whole| whole.camera.principal_px.x - 2000.0 < 200.0));
+        assert!(
+            solution
+                .alternative
+                .is_some_and(|whole| whole.camera.principal_px.x - 2000.0 < 200.0)
+        );
     }
 
     #[test]

@@ -16,20 +16,39 @@ pub(super) const ZOOMED_SIGMA: f64 = 0.25;
 /// A file that is no picture; a photo that does not lie in or below the label's folder.
 pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Label> {
     let header = io::read_header(photo)?;
-    let mut label = Label::new([header.width as u32, header.height as u32], [[0.0; 2]; 4], [1.0; 2]);
+    let mut label = Label::new(
+        [header.width as u32, header.height as u32],
+        [[0.0; 2]; 4],
+        [1.0; 2],
+    );
     label.image.file = file_below(photo, path)?;
     label.image.cropped = (header.cropped || header.whole).then_some(header.cropped);
-    label.surface = LabelSurface { id: "surface".into(), ..LabelSurface::default() };
+    label.surface = LabelSurface {
+        id: "surface".into(),
+        ..LabelSurface::default()
+    };
     if let Some(like) = like {
-        label.surface = LabelSurface { corners_px: None, source: None, ..like.surface.clone() };
+        label.surface = LabelSurface {
+            corners_px: None,
+            source: None,
+            ..like.surface.clone()
+        };
         (label.camera.id, label.markers) = (like.camera.id.clone(), like.markers.clone());
         if like.image_size() == label.image_size() {
-            label.camera = super::LabelCamera { height_m: None, height_sigma_m: None, ..like.camera.clone() };
+            label.camera = super::LabelCamera {
+                height_m: None,
+                height_sigma_m: None,
+                ..like.camera.clone()
+            };
         }
     }
     if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
         label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
-        label.camera.focal_sigma = label.camera.focal_35mm.filter(|_| header.digital_zoom).map(|_| ZOOMED_SIGMA);
+        label.camera.focal_sigma = label
+            .camera
+            .focal_35mm
+            .filter(|_| header.digital_zoom)
+            .map(|_| ZOOMED_SIGMA);
     }
     Ok(label)
 }
@@ -37,10 +56,16 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
 /// The photo as a label at `path` names it.
 fn file_below(photo: &Path, path: &Path) -> Result<String> {
     let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-    let folder = absolute(path)?.parent().map(Path::to_path_buf).unwrap_or_default();
+    let folder = absolute(path)?
+        .parent()
+        .map(Path::to_path_buf)
+        .unwrap_or_default();
     let relative = io::relative(&absolute(photo)?, &folder);
     if io::below("", &relative).is_err() {
-        return Err(Error::file(path, format!("does not lie beside {} nor above it", photo.display())));
+        return Err(Error::file(
+            path,
+            format!("does not lie beside {} nor above it", photo.display()),
+        ));
     }
     Ok(relative.to_string_lossy().replace('\\', "/"))
 }
@@ -72,8 +97,11 @@ pub fn commented(label: &Label) -> Result<String> {
     if label.framing() == Framing::Unknown {
         todo.push("image: add \"cropped\": false if nothing was cut off the picture, true if something was");
     }
-    let text =
-        serde_json::to_string_pretty(&Commented { todo, label: &shown }).map_err(|e| Error::value("label", e))?;
+    let text = serde_json::to_string_pretty(&Commented {
+        todo,
+        label: &shown,
+    })
+    .map_err(|e| Error::value("label", e))?;
     Ok(folded(&text) + "\n")
 }
 
@@ -92,7 +120,10 @@ fn folded(text: &str) -> String {
                 lines.push(format!("{}{part}", open.trim_end()));
                 list = None;
             }
-            Some(open) if part.trim_end_matches(',').parse::<f64>().is_ok() || part.starts_with("null") => {
+            Some(open)
+                if part.trim_end_matches(',').parse::<f64>().is_ok()
+                    || part.starts_with("null") =>
+            {
                 *open += part;
                 *open += if part.ends_with(',') { " " } else { "" };
             }
@@ -119,12 +150,18 @@ mod tests {
         let mut label = init_label(&photo, &path, None).unwrap();
         (label.surface.width_m, label.surface.height_m) = (Some(0.56), Some(0.37));
         let text = commented(&label).unwrap();
-        assert!(text.contains("[null, null],\n") && text.contains("\"cropped\\\": false if nothing"), "{text}");
+        assert!(
+            text.contains("[null, null],\n") && text.contains("\"cropped\\\": false if nothing"),
+            "{text}"
+        );
         io::write_text(&path, &text).unwrap();
         assert_eq!(crate::camera::read_label(&path).unwrap(), label);
         let filled = text.replace("[null, null]", "[1, 2]");
         io::write_text(&path, &filled).unwrap();
-        assert_eq!(crate::camera::read_label(&path).unwrap().surface.corners_px, Some([[1.0, 2.0]; 4]));
+        assert_eq!(
+            crate::camera::read_label(&path).unwrap().surface.corners_px,
+            Some([[1.0, 2.0]; 4])
+        );
     }
 
     #[test]
@@ -136,18 +173,35 @@ mod tests {
         (like.surface.id, like.camera.id) = ("tray".into(), Some("phone".into()));
         (like.camera.focal_px, like.camera.height_m) = (Some(80.0), Some(1.0));
         let label = init_label(&photo, &folder.path().join("a.label.json"), Some(&like)).unwrap();
-        assert_eq!((label.surface.id.as_str(), label.surface.width_m), ("tray", Some(0.6)));
-        assert_eq!((label.surface.corners_px, label.camera.height_m), (None, None));
-        assert_eq!((label.camera.id.as_deref(), label.camera.focal_px), (Some("phone"), Some(80.0)));
+        assert_eq!(
+            (label.surface.id.as_str(), label.surface.width_m),
+            ("tray", Some(0.6))
+        );
+        assert_eq!(
+            (label.surface.corners_px, label.camera.height_m),
+            (None, None)
+        );
+        assert_eq!(
+            (label.camera.id.as_deref(), label.camera.focal_px),
+            (Some("phone"), Some(80.0))
+        );
     }
 
     #[test]
     fn a_label_lies_beside_its_photo_or_above_it() {
         let at = |path: &str| file_below(Path::new("/photos/a/b.jpg"), Path::new(path));
         assert_eq!(
-            (at("/photos/a/b.label.json").unwrap(), at("/photos/x.json").unwrap()),
+            (
+                at("/photos/a/b.label.json").unwrap(),
+                at("/photos/x.json").unwrap()
+            ),
             ("b.jpg".into(), "a/b.jpg".into())
         );
-        assert!(at("/labels/b.label.json").unwrap_err().to_string().contains("does not lie beside"));
+        assert!(
+            at("/labels/b.label.json")
+                .unwrap_err()
+                .to_string()
+                .contains("does not lie beside")
+        );
     }
 }

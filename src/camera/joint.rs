@@ -47,16 +47,26 @@ pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, So
     if let Some(other) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
         return Err(SolveError::DifferentPictures { photo: other });
     }
-    let mut photos: Vec<_> = labels.iter().map(|label| super::solve(label, options)).collect();
+    let mut photos: Vec<_> = labels
+        .iter()
+        .map(|label| super::solve(label, options))
+        .collect();
     if let Some(Err(error)) = photos.first().filter(|_| photos.iter().all(Result::is_err)) {
         return Err(error.clone());
     }
     let misfits = photos.iter().enumerate().filter_map(|(photo, solution)| {
         let solution = solution.as_ref().ok().filter(|s| s.misfit().is_some())?;
-        Some(Warning::OutlierPhoto { photo, chi2: solution.fit.chi2 })
+        Some(Warning::OutlierPhoto {
+            photo,
+            chi2: solution.fit.chi2,
+        })
     });
     let mut warnings: Vec<Warning> = misfits.collect();
-    let together = Together { labels, alone: &photos, options };
+    let together = Together {
+        labels,
+        alone: &photos,
+        options,
+    };
     if let Some(agreed) = together.whole_or_cropped()? {
         for (solution, photo) in agreed.solutions.into_iter().zip(agreed.used) {
             photos[photo] = Ok(solution);
@@ -86,13 +96,22 @@ impl Together<'_> {
     /// The camera of whole pictures, or where nobody says that they are whole and the corners deny it, of cropped ones.
     fn whole_or_cropped(&self) -> Result<Option<Agreed>, SolveError> {
         let whole = self.agreed(Framing::Whole)?;
-        let unknown = self.labels.iter().any(|label| label.framing() == Framing::Unknown);
+        let unknown = self
+            .labels
+            .iter()
+            .any(|label| label.framing() == Framing::Unknown);
         if !unknown || !self.options.priors.cropping_matters() {
             return Ok(whole);
         }
-        let (Some(whole), Some(mut loose)) = (whole, self.agreed(Framing::Unknown)?) else { return Ok(None) };
+        let (Some(whole), Some(mut loose)) = (whole, self.agreed(Framing::Unknown)?) else {
+            return Ok(None);
+        };
         if loose.used.len() > whole.used.len() || is_off_center(whole.cost, loose.cost) {
-            loose.solutions = loose.solutions.into_iter().map(|s| s.off_center(None)).collect();
+            loose.solutions = loose
+                .solutions
+                .into_iter()
+                .map(|s| s.off_center(None))
+                .collect();
             return Ok(Some(loose));
         }
         Ok(Some(whole.hedged(&loose, self.options)))
@@ -110,10 +129,19 @@ impl Together<'_> {
             let arrow = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
             let worst = (0..used.len()).max_by(|&a, &b| arrow.chi2[a].total_cmp(&arrow.chi2[b]));
             match worst.filter(|&w| arrow.chi2[w] > OUTLIER && warnings.len() < spare) {
-                Some(w) => warnings.push(Warning::OutlierPhoto { photo: used.remove(w), chi2: arrow.chi2[w] }),
+                Some(w) => warnings.push(Warning::OutlierPhoto {
+                    photo: used.remove(w),
+                    chi2: arrow.chi2[w],
+                }),
                 None => {
                     let solutions = bundle.solutions(&arrow, self.options);
-                    return Ok(Some(Agreed { used, states: arrow.states, solutions, cost: arrow.cost, warnings }));
+                    return Ok(Some(Agreed {
+                        used,
+                        states: arrow.states,
+                        solutions,
+                        cost: arrow.cost,
+                        warnings,
+                    }));
                 }
             }
         }
@@ -125,11 +153,17 @@ impl Agreed {
     /// Whole pictures with the error that they have if they are cropped.
     fn hedged(mut self, loose: &Self, options: &SolveOptions) -> Self {
         let unsure = |(i, solution): (usize, Solution)| {
-            let Some(other) = loose.used.iter().position(|photo| *photo == self.used[i]) else { return solution };
+            let Some(other) = loose.used.iter().position(|photo| *photo == self.used[i]) else {
+                return solution;
+            };
             let apart = self.states[i].step_to(&loose.states[other]);
             solution.hedged(&loose.solutions[other], &apart, options)
         };
-        self.solutions = std::mem::take(&mut self.solutions).into_iter().enumerate().map(unsure).collect();
+        self.solutions = std::mem::take(&mut self.solutions)
+            .into_iter()
+            .enumerate()
+            .map(unsure)
+            .collect();
         self
     }
 }
@@ -185,7 +219,12 @@ struct Arrow {
 }
 
 impl Bundle {
-    fn new(labels: &[Label], used: &[usize], unknown: Framing, options: &SolveOptions) -> Result<Self, SolveError> {
+    fn new(
+        labels: &[Label],
+        used: &[usize],
+        unknown: Framing,
+        options: &SolveOptions,
+    ) -> Result<Self, SolveError> {
         let problem = |&i: &usize| {
             let framing = Some(labels[i].framing()).filter(|&known| known != Framing::Unknown);
             Problem::new(&labels[i], framing.unwrap_or(unknown), options)
@@ -195,7 +234,9 @@ impl Bundle {
         let mut surface = Vec::new();
         for (&i, problem) in used.iter().zip(&problems) {
             let name = (labels[i].surface.id.as_str(), problem.size);
-            let known = surfaces.iter().position(|s| *s == name && !name.0.is_empty());
+            let known = surfaces
+                .iter()
+                .position(|s| *s == name && !name.0.is_empty());
             surface.push(known.unwrap_or_else(|| {
                 surfaces.push(name);
                 surfaces.len() - 1
@@ -205,7 +246,12 @@ impl Bundle {
             let sigma = |p: &Problem| p.evidence.beliefs.ln_focal.sigma;
             sigma(a).total_cmp(&sigma(b))
         };
-        let first = problems.iter().min_by(surest).ok_or(SolveError::NoCorners)?.evidence.beliefs;
+        let first = problems
+            .iter()
+            .min_by(surest)
+            .ok_or(SolveError::NoCorners)?
+            .evidence
+            .beliefs;
         let at_zero = |sigma| Belief { mean: 0.0, sigma };
         let principal = at_zero(first.principal_sigma);
         let mut shared = vec![first.ln_focal, principal, principal, first.kappa];
@@ -214,7 +260,12 @@ impl Bundle {
             shared.push(at_zero(problems[shown].evidence.beliefs.stretch_sigma));
         }
         let evidence = problems.iter().map(|p| unbiased(&p.evidence)).collect();
-        Ok(Self { problems, evidence, surface, shared })
+        Ok(Self {
+            problems,
+            evidence,
+            surface,
+            shared,
+        })
     }
 
     /// The lower of the minima from the photos' own focal lengths and from what is believed.
@@ -241,8 +292,15 @@ impl Bundle {
         let pose = |problem: &Problem| {
             let mut problem = problem.clone();
             let beliefs = &mut problem.evidence.beliefs;
-            beliefs.ln_focal = Belief { mean: ln_focal, sigma: 0.0 };
-            (beliefs.principal_sigma, beliefs.stretch_sigma, beliefs.kappa.sigma) = (0.0, 0.0, 0.0);
+            beliefs.ln_focal = Belief {
+                mean: ln_focal,
+                sigma: 0.0,
+            };
+            (
+                beliefs.principal_sigma,
+                beliefs.stretch_sigma,
+                beliefs.kappa.sigma,
+            ) = (0.0, 0.0, 0.0);
             Some(problem.search()?.best.state)
         };
         self.problems.iter().map(pose).collect()
@@ -251,7 +309,13 @@ impl Bundle {
     /// The column of the shared system for each unknown of a photo from [`LN_FOCAL`] on.
     fn columns(&self, photo: usize) -> [(usize, usize); 5] {
         let [f, x, y, k] = LENS;
-        [(f, 0), (x, 1), (y, 2), (k, 3), (STRETCH, LENS.len() + self.surface[photo])]
+        [
+            (f, 0),
+            (x, 1),
+            (y, 2),
+            (k, 3),
+            (STRETCH, LENS.len() + self.surface[photo]),
+        ]
     }
 
     fn values(&self, states: &[State]) -> DVector<f64> {
@@ -266,19 +330,31 @@ impl Bundle {
 
     /// The cost around the states to second order; none where a point would be behind its camera.
     fn arrow(&self, states: Vec<State>) -> Option<Arrow> {
-        let normals = self.evidence.iter().zip(&states).map(|(e, s)| e.normal(s)).collect::<Option<Vec<_>>>()?;
+        let normals = self
+            .evidence
+            .iter()
+            .zip(&states)
+            .map(|(e, s)| e.normal(s))
+            .collect::<Option<Vec<_>>>()?;
         let chi2: Vec<f64> = normals.iter().map(|n| n.cost).collect();
         let values = self.values(&states);
         let off = |(b, v): (&Belief, &f64)| (v - b.mean) * (v - b.mean) * b.information();
         let beliefs: f64 = self.shared.iter().zip(values.iter()).map(off).sum();
-        Some(Arrow { cost: chi2.iter().sum::<f64>() + beliefs, states, chi2, normals })
+        Some(Arrow {
+            cost: chi2.iter().sum::<f64>() + beliefs,
+            states,
+            chi2,
+            normals,
+        })
     }
 
     fn refine(&self, states: Vec<State>) -> Option<Arrow> {
         let mut arrow = self.arrow(states)?;
         let mut damping = 1e-3;
         for _ in 0..MOST_STEPS {
-            let next = self.step(&arrow, damping).and_then(|states| self.arrow(states));
+            let next = self
+                .step(&arrow, damping)
+                .and_then(|states| self.arrow(states));
             match next.filter(|next| next.cost < arrow.cost) {
                 Some(next) => {
                     let fall = (arrow.cost - next.cost) / arrow.cost;
@@ -298,7 +374,11 @@ impl Bundle {
     }
 
     /// The shared system after every pose has been eliminated, and its right side.
-    fn reduced(&self, arrow: &Arrow, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>, Vec<Photo>)> {
+    fn reduced(
+        &self,
+        arrow: &Arrow,
+        damping: f64,
+    ) -> Option<(DMatrix<f64>, DVector<f64>, Vec<Photo>)> {
         let count = self.shared.len();
         let (mut system, mut right) = (DMatrix::zeros(count, count), DVector::zeros(count));
         let values = self.values(&arrow.states);
@@ -306,7 +386,9 @@ impl Bundle {
             system[(i, i)] += belief.information();
             right[i] -= (values[i] - belief.mean) * belief.information();
         }
-        let photos: Vec<Photo> = (0..arrow.normals.len()).map(|p| self.photo(arrow, p)).collect();
+        let photos: Vec<Photo> = (0..arrow.normals.len())
+            .map(|p| self.photo(arrow, p))
+            .collect();
         for photo in &photos {
             system += &photo.own;
             right += &photo.own_right;
@@ -340,7 +422,10 @@ impl Bundle {
             own_right: DVector::zeros(count),
         };
         for (unknown, column) in self.columns(index) {
-            photo.coupling.set_column(column, &normal.information.fixed_view::<POSE, 1>(0, unknown));
+            photo.coupling.set_column(
+                column,
+                &normal.information.fixed_view::<POSE, 1>(0, unknown),
+            );
             photo.own_right[column] -= normal.slope[unknown];
             for (other, other_column) in self.columns(index) {
                 photo.own[(column, other_column)] += normal.information[(unknown, other)];
@@ -358,7 +443,8 @@ impl Bundle {
         let stepped = |(index, photo): (usize, &Photo)| {
             let pose = photo.damped(damping)? * (photo.pose_right - &photo.coupling * &shared);
             let mut step = Unknowns::zeros();
-            step.fixed_rows_mut::<POSE>(0).copy_from(&(pose / pose.amax().max(1.0)));
+            step.fixed_rows_mut::<POSE>(0)
+                .copy_from(&(pose / pose.amax().max(1.0)));
             for (unknown, column) in self.columns(index) {
                 step[unknown] = shared[column];
             }
@@ -370,17 +456,26 @@ impl Bundle {
     /// Every photo's solution, with the covariance that the others give it.
     fn solutions(&self, arrow: &Arrow, options: &SolveOptions) -> Vec<Solution> {
         let reduced = self.reduced(arrow, 0.0);
-        let inverse =
-            reduced.and_then(|(system, _, photos)| Some((self.without_facts(system.cholesky()?.inverse()), photos)));
+        let inverse = reduced.and_then(|(system, _, photos)| {
+            Some((self.without_facts(system.cholesky()?.inverse()), photos))
+        });
         let solution = |(index, problem): (usize, &Problem)| {
             let state = arrow.states[index];
             let normal = &arrow.normals[index];
-            let minimum =
-                Minimum { state, cost: arrow.chi2[index], information: normal.information, steps: MOST_STEPS };
+            let minimum = Minimum {
+                state,
+                cost: arrow.chi2[index],
+                information: normal.information,
+                steps: MOST_STEPS,
+            };
             let mut uncertainty = Uncertainty::new(&minimum, self.shared[0]);
             if let Some((shared, photos)) = &inverse {
                 self.fill_covariance(&mut uncertainty, shared, &photos[index], index);
-                let information = if shared[(0, 0)] > 0.0 { 1.0 / shared[(0, 0)] } else { 0.0 };
+                let information = if shared[(0, 0)] > 0.0 {
+                    1.0 / shared[(0, 0)]
+                } else {
+                    0.0
+                };
                 uncertainty.focal = focal_share(state.ln_focal, information, self.shared[0]);
             }
             let mut believing = problem.clone();
@@ -399,14 +494,24 @@ impl Bundle {
         covariance
     }
 
-    fn fill_covariance(&self, uncertainty: &mut Uncertainty, shared: &DMatrix<f64>, photo: &Photo, index: usize) {
-        let Some(inverse) = photo.damped(0.0) else { return };
+    fn fill_covariance(
+        &self,
+        uncertainty: &mut Uncertainty,
+        shared: &DMatrix<f64>,
+        photo: &Photo,
+        index: usize,
+    ) {
+        let Some(inverse) = photo.damped(0.0) else {
+            return;
+        };
         let response = -(inverse * &photo.coupling);
         let cross = &response * shared;
         let pose = inverse + &cross * response.transpose();
         let covariance = &mut uncertainty.covariance;
         covariance.fill(0.0);
-        covariance.fixed_view_mut::<POSE, POSE>(0, 0).copy_from(&pose);
+        covariance
+            .fixed_view_mut::<POSE, POSE>(0, 0)
+            .copy_from(&pose);
         let columns = self.columns(index);
         for (unknown, column) in columns {
             for row in 0..POSE {
@@ -443,7 +548,10 @@ impl Photo {
 
 /// What a photo shows, without beliefs on what is shared.
 fn unbiased(evidence: &Evidence) -> Evidence {
-    let nothing = Belief { mean: 0.0, sigma: f64::INFINITY };
+    let nothing = Belief {
+        mean: 0.0,
+        sigma: f64::INFINITY,
+    };
     let beliefs = Beliefs {
         ln_focal: nothing,
         stretch_sigma: f64::INFINITY,
@@ -451,7 +559,10 @@ fn unbiased(evidence: &Evidence) -> Evidence {
         kappa: nothing,
         ln_height: evidence.beliefs.ln_height,
     };
-    Evidence { beliefs, ..evidence.clone() }
+    Evidence {
+        beliefs,
+        ..evidence.clone()
+    }
 }
 
 const _: () = assert!(POSE + LENS.len() + 1 == UNKNOWNS);
@@ -481,7 +592,11 @@ mod tests {
         for s in &solved {
             assert_eq!(s.camera.focal_px, solved[0].camera.focal_px);
             assert_eq!(s.size, solved[0].size);
-            assert!((s.camera.focal_px.x / focal).ln().abs() < 4.0 * s.sigma.ln_focal, "{:?}", s.camera.focal_px);
+            assert!(
+                (s.camera.focal_px.x / focal).ln().abs() < 4.0 * s.sigma.ln_focal,
+                "{:?}",
+                s.camera.focal_px
+            );
         }
     }
 
@@ -489,8 +604,10 @@ mod tests {
     fn one_photo_alone_is_solved_as_alone() {
         let (labels, _) = labels(2, 1, [20.0, 20.0]);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
-        let (a, b) =
-            (joint.photos[0].as_ref().unwrap(), super::super::solve(&labels[0], &SolveOptions::default()).unwrap());
+        let (a, b) = (
+            joint.photos[0].as_ref().unwrap(),
+            super::super::solve(&labels[0], &SolveOptions::default()).unwrap(),
+        );
         assert!((a.camera.focal_px.x / b.camera.focal_px.x - 1.0).abs() < 1e-6);
         assert!((a.sigma.ln_focal / b.sigma.ln_focal - 1.0).abs() < 1e-4);
         assert!((a.sigma.height_px / b.sigma.height_px - 1.0).abs() < 1e-3);
@@ -502,8 +619,15 @@ mod tests {
         labels[2].surface.corners_px.as_mut().unwrap()[1][0] += 120.0;
         labels[5].surface.corners_px = Some([[0.0; 2]; 4]);
         let joint = solve_joint(&labels, &SolveOptions::default()).unwrap();
-        assert!(matches!(joint.warnings[..], [Warning::OutlierPhoto { photo: 2, .. }]), "{:?}", joint.warnings);
-        assert!(matches!(joint.photos[5], Err(SolveError::Coincident { .. })));
+        assert!(
+            matches!(joint.warnings[..], [Warning::OutlierPhoto { photo: 2, .. }]),
+            "{:?}",
+            joint.warnings
+        );
+        assert!(matches!(
+            joint.photos[5],
+            Err(SolveError::Coincident { .. })
+        ));
     }
 
     #[test]
@@ -523,7 +647,8 @@ mod tests {
         let together = solve_joint(&labels, &SolveOptions::default()).unwrap();
         let mut reduced = labels.clone();
         for label in &mut reduced[3..] {
-            (label.image.width, label.image.height) = (label.image.width / 4, label.image.height / 4);
+            (label.image.width, label.image.height) =
+                (label.image.width / 4, label.image.height / 4);
             let surface = &mut label.surface;
             surface.corners_px = surface.corners_px.map(|c| c.map(|p| p.map(|v| v / 4.0)));
             surface.corner_sigma_px = surface.corner_sigma_px.map(|s| s / 4.0);
@@ -533,7 +658,10 @@ mod tests {
         for (i, (a, b)) in together.photos.iter().zip(&scaled.photos).enumerate() {
             let (a, b) = (a.as_ref().unwrap(), b.as_ref().unwrap());
             let scale = if i < 3 { 1.0 } else { 4.0 };
-            assert!((scale * b.camera.focal_px.x / a.camera.focal_px.x - 1.0).abs() < 1e-6, "{i}");
+            assert!(
+                (scale * b.camera.focal_px.x / a.camera.focal_px.x - 1.0).abs() < 1e-6,
+                "{i}"
+            );
             assert!((b.camera.center() - a.camera.center()).norm() < 1e-6, "{i}");
         }
     }

@@ -210,7 +210,11 @@ impl Label {
         Self {
             format: LabelFormat::PlaneLabel,
             version: 1,
-            image: LabelImage { width, height, ..Default::default() },
+            image: LabelImage {
+                width,
+                height,
+                ..Default::default()
+            },
             pixel_origin: PixelOrigin::Corner,
             surface: LabelSurface {
                 width_m: Some(size[0]),
@@ -231,7 +235,9 @@ impl Label {
 
     /// Width and height of the picture that the camera took, pixels.
     pub(crate) fn taken_size(&self) -> [u32; 2] {
-        self.image.crop.map_or(self.image_size(), |crop| [crop.width, crop.height])
+        self.image
+            .crop
+            .map_or(self.image_size(), |crop| [crop.width, crop.height])
     }
 
     /// The centre of the picture that the camera took, in this one's pixels.
@@ -243,7 +249,8 @@ impl Label {
     /// Which part of the picture that the camera took this one is.
     pub fn framing(&self) -> Framing {
         let (image, camera) = (&self.image, &self.camera);
-        let stated = camera.principal_point_px.is_some() || camera.principal_point_sigma_px.is_some();
+        let stated =
+            camera.principal_point_px.is_some() || camera.principal_point_sigma_px.is_some();
         match image.cropped {
             _ if image.crop.is_some() => Framing::Whole,
             Some(true) => Framing::Cropped,
@@ -273,7 +280,11 @@ impl<'de> Deserialize<'de> for Label {
         Self::deserialize(tracked).map_err(|e| {
             let (what, at) = (e.to_string(), track.path().to_string());
             // A message on a key names it; the reader of the file adds what was probably meant.
-            D::Error::custom(if what.contains(" field `") { what } else { format!("{at}: {what}") })
+            D::Error::custom(if what.contains(" field `") {
+                what
+            } else {
+                format!("{at}: {what}")
+            })
         })
     }
 }
@@ -289,7 +300,10 @@ fn without_empty_corners(mut value: Value) -> Value {
     let surface = value.get_mut("surface").and_then(Value::as_object_mut);
     if let Some(surface) = surface {
         let corners = surface.get("corners_px").and_then(Value::as_array);
-        let numbers = corners.into_iter().flatten().flat_map(|corner| corner.as_array().map_or(&[][..], Vec::as_slice));
+        let numbers = corners
+            .into_iter()
+            .flatten()
+            .flat_map(|corner| corner.as_array().map_or(&[][..], Vec::as_slice));
         let mut numbers = numbers.peekable();
         if numbers.peek().is_some() && numbers.all(Value::is_null) {
             surface.remove("corners_px");
@@ -299,13 +313,23 @@ fn without_empty_corners(mut value: Value) -> Value {
 }
 
 /// Keys that every label has, as pointers.
-const NEEDED: [&str; 6] = ["/format", "/version", "/image/file", "/image/width", "/image/height", "/surface/id"];
+const NEEDED: [&str; 6] = [
+    "/format",
+    "/version",
+    "/image/file",
+    "/image/width",
+    "/image/height",
+    "/surface/id",
+];
 
 /// All keys that a label lacks, where it lacks any that every one has.
 fn missing_keys(value: &Value) -> Option<String> {
     let is_missing = |key: &str| value.pointer(key).is_none_or(Value::is_null);
-    let mut missing: Vec<String> =
-        NEEDED.into_iter().filter(|key| is_missing(key)).map(|key| key[1..].replace('/', ".")).collect();
+    let mut missing: Vec<String> = NEEDED
+        .into_iter()
+        .filter(|key| is_missing(key))
+        .map(|key| key[1..].replace('/', "."))
+        .collect();
     if missing.is_empty() || !value.is_object() {
         return None;
     }
@@ -316,7 +340,10 @@ fn missing_keys(value: &Value) -> Option<String> {
         missing.push("surface.width_m (or surface.height_m)".into());
     }
     let key = if missing.len() == 1 { "key" } else { "keys" };
-    Some(format!("missing {key} {}; `petcomp camera init PHOTO --size WxH` writes them", missing.join(", ")))
+    Some(format!(
+        "missing {key} {}; `petcomp camera init PHOTO --size WxH` writes them",
+        missing.join(", ")
+    ))
 }
 
 fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
@@ -383,23 +410,44 @@ mod tests {
     #[test]
     fn all_missing_keys_are_named_at_once() {
         let none = message("{}");
-        for key in
-            ["format", "version", "image.file", "image.width", "image.height", "surface.id", "surface.corners_px"]
-        {
+        for key in [
+            "format",
+            "version",
+            "image.file",
+            "image.width",
+            "image.height",
+            "surface.id",
+            "surface.corners_px",
+        ] {
             assert!(none.contains(key), "{none}");
         }
-        assert!(none.contains("surface.width_m (or surface.height_m)"), "{none}");
-        let two = message(&TRAY.replace("\"id\": \"tray\",", "").replace("\"file\": \"bg_0001.jpg\", ", ""));
-        assert!(two.starts_with("missing keys image.file, surface.id; "), "{two}");
+        assert!(
+            none.contains("surface.width_m (or surface.height_m)"),
+            "{none}"
+        );
+        let two = message(
+            &TRAY
+                .replace("\"id\": \"tray\",", "")
+                .replace("\"file\": \"bg_0001.jpg\", ", ""),
+        );
+        assert!(
+            two.starts_with("missing keys image.file, surface.id; "),
+            "{two}"
+        );
     }
 
     #[test]
     fn a_missing_or_wrong_field_is_named() {
-        assert!(message(&TRAY.replace("\"id\": \"tray\",", "")).starts_with("missing key surface.id; "));
+        assert!(
+            message(&TRAY.replace("\"id\": \"tray\",", "")).starts_with("missing key surface.id; ")
+        );
         assert!(message(&TRAY.replace("\"version\": 1", "\"version\": 2")).contains("expected 1"));
         assert!(message(&TRAY.replace("plane-label", "plain-label")).contains("plane-label"));
         let three = message(&TRAY.replace(", [498.9, 2622.2]]", "]"));
-        assert!(three.contains("surface.corners_px: invalid length 3"), "{three}");
+        assert!(
+            three.contains("surface.corners_px: invalid length 3"),
+            "{three}"
+        );
     }
 
     #[test]

@@ -13,14 +13,24 @@ use crate::scene::{CameraSource, Scene};
 /// # Errors
 /// [`Error::Camera`](crate::Error::Camera) for corners that no camera can have seen, or that none fits.
 pub fn locate(scene: Scene) -> Result<Scene> {
-    let CameraSource::Rectangle { corners_px, photo, focal_px } = scene.camera else { return Ok(scene) };
+    let CameraSource::Rectangle {
+        corners_px,
+        photo,
+        focal_px,
+    } = scene.camera
+    else {
+        return Ok(scene);
+    };
     let mut label = Label::new(photo, corners_px, scene.surface.size);
     label.camera.focal_px = focal_px;
     let solution = solve(&label, &SolveOptions::default())?.fitting()?;
     for warning in &solution.warnings {
         log::info!("{}: {warning}", scene.plate);
     }
-    Ok(Scene { camera: CameraSource::Known(solution.camera.resized(scene.image)), ..scene })
+    Ok(Scene {
+        camera: CameraSource::Known(solution.camera.resized(scene.image)),
+        ..scene
+    })
 }
 
 #[cfg(test)]
@@ -30,11 +40,20 @@ mod tests {
     use crate::scene::{Exposure, Surface};
 
     fn scene() -> Scene {
-        let corners_px = [[199.713, 223.218], [1003.21, 207.639], [1008.381, 733.319], [216.899, 750.414]];
+        let corners_px = [
+            [199.713, 223.218],
+            [1003.21, 207.639],
+            [1008.381, 733.319],
+            [216.899, 750.414],
+        ];
         Scene {
             image: [640, 480],
             plate: "bg0000".into(),
-            camera: CameraSource::Rectangle { corners_px, photo: [1280, 960], focal_px: Some(1374.852) },
+            camera: CameraSource::Rectangle {
+                corners_px,
+                photo: [1280, 960],
+                focal_px: Some(1374.852),
+            },
             surface: Surface::new([0.56, 0.37]),
             objects: Vec::new(),
             lights: Vec::new(),
@@ -49,7 +68,9 @@ mod tests {
     #[test]
     fn the_camera_is_known_at_the_scene_s_size_and_stays_so() {
         let once = locate(scene()).unwrap();
-        let CameraSource::Known(camera) = once.camera else { panic!("still unknown") };
+        let CameraSource::Known(camera) = once.camera else {
+            panic!("still unknown")
+        };
         assert_eq!(camera.image, [640, 480]);
         assert!((camera.focal_px.x - 1374.852 / 2.0).abs() < 10.0);
         assert_eq!(locate(once.clone()).unwrap(), once);
@@ -57,9 +78,26 @@ mod tests {
 
     #[test]
     fn impossible_corners_are_an_error() {
-        let CameraSource::Rectangle { photo, focal_px, .. } = scene().camera else { unreachable!() };
+        let CameraSource::Rectangle {
+            photo, focal_px, ..
+        } = scene().camera
+        else {
+            unreachable!()
+        };
         let corners_px = [[0.0, 0.0]; 4];
-        let flat = Scene { camera: CameraSource::Rectangle { corners_px, photo, focal_px }, ..scene() };
-        assert!(locate(flat).unwrap_err().to_string().contains("corners 0 and 1 are 0.0 px apart"));
+        let flat = Scene {
+            camera: CameraSource::Rectangle {
+                corners_px,
+                photo,
+                focal_px,
+            },
+            ..scene()
+        };
+        assert!(
+            locate(flat)
+                .unwrap_err()
+                .to_string()
+                .contains("corners 0 and 1 are 0.0 px apart")
+        );
     }
 }

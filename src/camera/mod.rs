@@ -42,15 +42,16 @@ pub use doctor::doctor;
 pub use error::SolveError;
 pub use exchange::{BlenderCamera, ColmapModel, OpencvCamera, SensorFit};
 pub use file::{
-    CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model, SigmaRecord, SolvedFrom,
+    CameraFile, CameraFormat, FitRecord, FittedSurface, FocalPrior, FoundCamera, Model,
+    SigmaRecord, SolvedFrom,
 };
 pub use focal::{FocalSource, focal_from_equivalent};
 pub use import::from_labelme;
 pub use init::{commented, init_label};
 pub use joint::{Joint, one_camera, solve_joint};
 pub use label::{
-    Artwork, Crop, Framing, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface, MarkerMap,
-    PixelOrigin,
+    Artwork, Crop, Framing, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface,
+    MarkerMap, PixelOrigin,
 };
 pub use locate::locate;
 pub(crate) use marker::any_markers;
@@ -60,7 +61,9 @@ pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
-pub use read::{Labelled, check_distance, check_size, photo_of, read_label, read_labels, with_photo};
+pub use read::{
+    Labelled, check_distance, check_size, photo_of, read_label, read_labels, with_photo,
+};
 pub(crate) use read::{labels_in, learn};
 pub use rectify::{project_picture, rectify, warp};
 pub(crate) use search::TELLING;

@@ -74,7 +74,16 @@ impl State {
     /// A camera over a rectangle that is as measured.
     pub(crate) fn new(stance: Stance, focal: f64, kappa: f64, elastic: Elastic) -> Self {
         let (ln_focal, principal) = (libm::log(focal), Vector2::zeros());
-        Self { stance, ln_focal, focal, stretch: 0.0, elastic, sides: [1.0; 2], principal, kappa }
+        Self {
+            stance,
+            ln_focal,
+            focal,
+            stretch: 0.0,
+            elastic,
+            sides: [1.0; 2],
+            principal,
+            kappa,
+        }
     }
 
     /// The unknown at an index from [`LN_FOCAL`] on.
@@ -88,12 +97,20 @@ impl State {
     }
 
     pub(crate) fn with_ln_focal(self, ln_focal: f64) -> Self {
-        Self { ln_focal, focal: libm::exp(ln_focal), ..self }
+        Self {
+            ln_focal,
+            focal: libm::exp(ln_focal),
+            ..self
+        }
     }
 
     fn with_stretch(self, stretch: f64) -> Self {
         let Elastic(shares) = self.elastic;
-        Self { stretch, sides: shares.map(|share| libm::exp(share * stretch)), ..self }
+        Self {
+            stretch,
+            sides: shares.map(|share| libm::exp(share * stretch)),
+            ..self
+        }
     }
 
     /// Position of the rectangle's centre in the camera's frame.
@@ -119,15 +136,20 @@ impl State {
             kappa: self.kappa + step[KAPPA],
             ..*self
         };
-        moved.with_ln_focal(self.ln_focal + step[LN_FOCAL]).with_stretch(self.stretch + step[STRETCH])
+        moved
+            .with_ln_focal(self.ln_focal + step[LN_FOCAL])
+            .with_stretch(self.stretch + step[STRETCH])
     }
 
     /// The step that leads from here to another state.
     pub(crate) fn step_to(&self, other: &Self) -> Unknowns {
-        let turn = Rotation3::from_matrix_unchecked(other.stance.rotation * self.stance.rotation.transpose());
+        let turn = Rotation3::from_matrix_unchecked(
+            other.stance.rotation * self.stance.rotation.transpose(),
+        );
         let mut step = Unknowns::zeros();
         step.fixed_rows_mut::<3>(0).copy_from(&turn.scaled_axis());
-        step.fixed_rows_mut::<2>(CENTER).copy_from(&(other.stance.center - self.stance.center));
+        step.fixed_rows_mut::<2>(CENTER)
+            .copy_from(&(other.stance.center - self.stance.center));
         step[LN_SCALE] = libm::log(other.stance.scale / self.stance.scale);
         for unknown in LN_FOCAL..UNKNOWNS {
             step[unknown] = other.value(unknown) - self.value(unknown);
@@ -147,12 +169,17 @@ impl State {
         let w = 1.0 + self.stance.scale / self.focal * turned.z;
         let n = turned.xy() * self.stance.scale + self.stance.center - self.principal;
         let straight = n / w;
-        (w > NEAREST).then(|| self.principal + straight * (1.0 + self.kappa * straight.norm_squared()))
+        (w > NEAREST)
+            .then(|| self.principal + straight * (1.0 + self.kappa * straight.norm_squared()))
     }
 
     /// Where a point is seen and how that changes with the unknowns; none at or behind the camera.
     pub(crate) fn slope(&self, point: &Vector3<f64>, rigid: bool) -> Option<(Vector2<f64>, Slope)> {
-        let Stance { rotation, center, scale } = self.stance;
+        let Stance {
+            rotation,
+            center,
+            scale,
+        } = self.stance;
         let nearness = scale / self.focal;
         let stretched = self.stretched(point, rigid);
         let q = rotation * stretched;
@@ -161,7 +188,11 @@ impl State {
             return None;
         }
         let straight = (q.xy() * scale + center - self.principal) / w;
-        let Elastic([ex, ey]) = if rigid { Elastic([0.0; 2]) } else { self.elastic };
+        let Elastic([ex, ey]) = if rigid {
+            Elastic([0.0; 2])
+        } else {
+            self.elastic
+        };
         let pull = rotation * Vector3::new(ex * stretched.x, ey * stretched.y, 0.0);
         let (near, far) = (scale / w, nearness / w);
 
@@ -180,8 +211,8 @@ impl State {
         }
         let r2 = straight.norm_squared();
         if self.kappa != 0.0 {
-            let bent =
-                Matrix2::identity() * (1.0 + self.kappa * r2) + straight * straight.transpose() * (2.0 * self.kappa);
+            let bent = Matrix2::identity() * (1.0 + self.kappa * r2)
+                + straight * straight.transpose() * (2.0 * self.kappa);
             slope *= bent;
         }
         for axis in 0..2 {
@@ -216,9 +247,16 @@ mod tests {
     fn state(elastic: Elastic) -> State {
         let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
         let rotation = Rotation3::from_euler_angles(0.4, -0.3, 0.8).into_inner() * flip;
-        let stance = Stance { rotation, center: Vector2::new(0.2, -0.1), scale: 0.6 };
+        let stance = Stance {
+            rotation,
+            center: Vector2::new(0.2, -0.1),
+            scale: 0.6,
+        };
         let state = State::new(stance, 1.3, 0.02, elastic).with_stretch(0.03);
-        State { principal: Vector2::new(0.01, -0.02), ..state }
+        State {
+            principal: Vector2::new(0.01, -0.02),
+            ..state
+        }
     }
 
     /// The change of a value per unknown, by central differences.
@@ -232,25 +270,37 @@ mod tests {
             step[i] = h;
             value(&state.stepped(&step)).transpose()
         };
-        SMatrix::from_rows(&std::array::from_fn::<_, UNKNOWNS, _>(|i| (step(i, H) - step(i, -H)) / (2.0 * H)))
+        SMatrix::from_rows(&std::array::from_fn::<_, UNKNOWNS, _>(|i| {
+            (step(i, H) - step(i, -H)) / (2.0 * H)
+        }))
     }
 
     #[test]
     fn slopes_agree_with_differences() {
-        for (elastic, rigid) in
-            [(Elastic::BOTH, false), (Elastic::HEIGHT, false), (Elastic::WIDTH, false), (Elastic::WIDTH, true)]
-        {
+        for (elastic, rigid) in [
+            (Elastic::BOTH, false),
+            (Elastic::HEIGHT, false),
+            (Elastic::WIDTH, false),
+            (Elastic::WIDTH, true),
+        ] {
             let (state, point) = (state(elastic), Vector3::new(0.5, -0.4, 0.2));
             let (seen, slope) = state.slope(&point, rigid).unwrap();
             assert!((seen - state.project(&point, rigid).unwrap()).norm() < 1e-15);
             let expected = differences(state, |s| s.project(&point, rigid).unwrap());
-            assert!((slope - expected).abs().max() < 1e-9, "{}", slope - expected);
+            assert!(
+                (slope - expected).abs().max() < 1e-9,
+                "{}",
+                slope - expected
+            );
         }
     }
 
     #[test]
     fn a_step_to_a_state_leads_there() {
-        let (from, step) = (state(Elastic::BOTH), Unknowns::from_fn(|i, _| 0.01 * (i as f64 - 4.0)));
+        let (from, step) = (
+            state(Elastic::BOTH),
+            Unknowns::from_fn(|i, _| 0.01 * (i as f64 - 4.0)),
+        );
         assert!((from.step_to(&from.stepped(&step)) - step).norm() < 1e-12);
     }
 

@@ -61,7 +61,13 @@ pub struct Priors {
 
 impl Default for Priors {
     fn default() -> Self {
-        Self { focal_sigma: 0.35, principal_sigma: 0.005, cropped_sigma: 0.12, ratio_sigma: 0.005, kappa_sigma: 0.0 }
+        Self {
+            focal_sigma: 0.35,
+            principal_sigma: 0.005,
+            cropped_sigma: 0.12,
+            ratio_sigma: 0.005,
+            kappa_sigma: 0.0,
+        }
     }
 }
 
@@ -70,7 +76,13 @@ impl Priors {
     ///
     /// Not for photos: from near above it turns half a percent of tape error into focal errors of hundreds of percent.
     pub fn ideal() -> Self {
-        Self { principal_sigma: 0.0, cropped_sigma: 0.0, ratio_sigma: 0.0, kappa_sigma: 0.0, ..Self::default() }
+        Self {
+            principal_sigma: 0.0,
+            cropped_sigma: 0.0,
+            ratio_sigma: 0.0,
+            kappa_sigma: 0.0,
+            ..Self::default()
+        }
     }
 
     /// A cropped picture is another thing than a whole one.
@@ -80,6 +92,9 @@ impl Priors {
 
     /// The same, knowing nothing of the focal length.
     pub fn with_free_focal(self) -> Self {
-        Self { focal_sigma: f64::INFINITY, ..self }
+        Self {
+            focal_sigma: f64::INFINITY,
+            ..self
+        }
     }
 }

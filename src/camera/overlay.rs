@@ -9,10 +9,26 @@ use crate::pixel::{LinearRgb, Srgb8};
 use nalgebra::{Matrix2, SymmetricEigen};
 
 /// Colours, scene-linear.
-const GRID: LinearRgb = LinearRgb { r: 0.9, g: 0.9, b: 0.9 };
-const RECTANGLE: LinearRgb = LinearRgb { r: 0.05, g: 0.8, b: 0.1 };
-const BOX: LinearRgb = LinearRgb { r: 1.0, g: 0.3, b: 0.0 };
-const LABELLED: LinearRgb = LinearRgb { r: 0.9, g: 0.0, b: 0.35 };
+const GRID: LinearRgb = LinearRgb {
+    r: 0.9,
+    g: 0.9,
+    b: 0.9,
+};
+const RECTANGLE: LinearRgb = LinearRgb {
+    r: 0.05,
+    g: 0.8,
+    b: 0.1,
+};
+const BOX: LinearRgb = LinearRgb {
+    r: 1.0,
+    g: 0.3,
+    b: 0.0,
+};
+const LABELLED: LinearRgb = LinearRgb {
+    r: 0.9,
+    g: 0.0,
+    b: 0.35,
+};
 /// Error ellipses are drawn this many standard deviations large, to be seen at all.
 const ELLIPSE_SIGMAS: f64 = 10.0;
 const ELLIPSE_POINTS: usize = 48;
@@ -60,9 +76,11 @@ pub fn overlay(photo: &Image<LinearRgb>, solution: &Solution) -> Image<LinearRgb
     }
     let legend = legend(photo.width(), solution);
     let (width, height) = photo.size();
-    Image::from_fn(width, height + legend.height(), |x, y| match y.checked_sub(height) {
-        None => sheet.picture[(x, y)],
-        Some(below) => legend[(x, below)],
+    Image::from_fn(width, height + legend.height(), |x, y| {
+        match y.checked_sub(height) {
+            None => sheet.picture[(x, y)],
+            Some(below) => legend[(x, below)],
+        }
     })
 }
 
@@ -76,7 +94,10 @@ fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
         .into_iter()
         .flat_map(|(mark, text, ink)| {
             let lines = draw::wrapped(&text, columns.saturating_sub(left + MARGIN), size);
-            lines.into_iter().enumerate().map(move |(i, line)| (mark.filter(|_| i == 0), line, ink))
+            lines
+                .into_iter()
+                .enumerate()
+                .map(move |(i, line)| (mark.filter(|_| i == 0), line, ink))
         })
         .collect();
     let mut canvas = Image::filled(columns, 2 * MARGIN + lines.len() * size.height(), PAPER);
@@ -87,7 +108,9 @@ fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
         }
         draw::text(&mut canvas, [left as isize, top], &line, ink, size);
     }
-    Image::from_fn(width, canvas.height() * grown, |x, y| decode_srgb8(canvas[(x / grown, y / grown)]))
+    Image::from_fn(width, canvas.height() * grown, |x, y| {
+        decode_srgb8(canvas[(x / grown, y / grown)])
+    })
 }
 
 /// Lines of the legend: a mark's colour, a text and its colour.
@@ -96,9 +119,23 @@ fn entries(solution: &Solution) -> Vec<(Option<Srgb8>, String, Srgb8)> {
     let percent = 100.0 * sigma.ln_focal;
     let marks = [
         (RECTANGLE, format!("rectangle as fitted, {w:.3} x {h:.3} m")),
-        (GRID, format!("grid of {:.3} m on the surface", grid_step(solution.size))),
-        (BOX, format!("box {:.3} m high over the rectangle", sigma.reference_height)),
-        (LABELLED, format!("labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it")),
+        (
+            GRID,
+            format!("grid of {:.3} m on the surface", grid_step(solution.size)),
+        ),
+        (
+            BOX,
+            format!(
+                "box {:.3} m high over the rectangle",
+                sigma.reference_height
+            ),
+        ),
+        (
+            LABELLED,
+            format!(
+                "labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it"
+            ),
+        ),
     ];
     let found = format!(
         "focal length {:.0} px (+- {percent:.1} %), {:.3} m high, tilt {:.1} degrees, corners to {:.2} px",
@@ -108,8 +145,15 @@ fn entries(solution: &Solution) -> Vec<(Option<Srgb8>, String, Srgb8)> {
         solution.rms_px
     );
     let marks = marks.map(|(color, text)| (Some(encode_srgb8(color)), text, INK));
-    let warnings = solution.warnings.iter().map(|warning| (None, warning.to_string(), WARNING));
-    marks.into_iter().chain([(None, found, INK)]).chain(warnings).collect()
+    let warnings = solution
+        .warnings
+        .iter()
+        .map(|warning| (None, warning.to_string(), WARNING));
+    marks
+        .into_iter()
+        .chain([(None, found, INK)])
+        .chain(warnings)
+        .collect()
 }
 
 /// Lines of a grid over a rectangle: both ends, metres.
@@ -132,7 +176,11 @@ fn grid_step(size: [f64; 2]) -> f64 {
 /// The next 1, 2 or 5 times a power of ten.
 fn round_step(least: f64) -> f64 {
     let power = libm::pow(10.0, libm::floor(libm::log10(least)));
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|n| n * power).find(|&step| step >= least).unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|n| n * power)
+        .find(|&step| step >= least)
+        .unwrap_or(10.0 * power)
 }
 
 /// A picture that is drawn on.
@@ -162,10 +210,13 @@ impl Sheet {
             return;
         }
         let eigen = SymmetricEigen::new(*covariance);
-        let radii = eigen.eigenvalues.map(|v| ELLIPSE_SIGMAS * v.max(0.0).sqrt());
+        let radii = eigen
+            .eigenvalues
+            .map(|v| ELLIPSE_SIGMAS * v.max(0.0).sqrt());
         let point = |i: usize| {
             let angle = std::f64::consts::TAU * i as f64 / ELLIPSE_POINTS as f64;
-            at + eigen.eigenvectors * Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle))
+            at + eigen.eigenvectors
+                * Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle))
         };
         for i in 0..ELLIPSE_POINTS {
             self.stroke(point(i), point(i + 1), LABELLED, self.width);
@@ -180,7 +231,10 @@ impl Sheet {
             let to = (p.max(q) + reach).clamp(0.0, end as f64);
             from.floor() as usize..to.ceil() as usize
         };
-        let (columns, rows) = (bounds(a.x, b.x, self.picture.width()), bounds(a.y, b.y, self.picture.height()));
+        let (columns, rows) = (
+            bounds(a.x, b.x, self.picture.width()),
+            bounds(a.y, b.y, self.picture.height()),
+        );
         for y in rows {
             for x in columns.clone() {
                 let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
@@ -188,8 +242,11 @@ impl Sheet {
                 if cover > 0.0 {
                     let under = self.picture[(x, y)];
                     let mix = |u: f32, c: f32| u + (c - u) * cover;
-                    self.picture[(x, y)] =
-                        LinearRgb { r: mix(under.r, color.r), g: mix(under.g, color.g), b: mix(under.b, color.b) };
+                    self.picture[(x, y)] = LinearRgb {
+                        r: mix(under.r, color.r),
+                        g: mix(under.g, color.g),
+                        b: mix(under.b, color.b),
+                    };
                 }
             }
         }
@@ -211,37 +268,86 @@ mod tests {
 
     #[test]
     fn the_rectangle_is_drawn_where_it_was_labelled() {
-        let scenario = Scenario { image: [400, 300], focal_px: 320.0, ..Scenario::default() };
+        let scenario = Scenario {
+            image: [400, 300],
+            focal_px: 320.0,
+            ..Scenario::default()
+        };
         let view = scenario.tilted(30.0).view(1, 0);
         let solution = solve(&view.label, &SolveOptions::default()).unwrap();
         let drawn = overlay(&Image::filled(400, 300, LinearRgb::BLACK), &solution);
         let corners = solution.corners_px;
         let middle = nalgebra::center(&corners[0], &corners[1]);
         let near = |x: f64, y: f64| drawn[(x as usize, y as usize)];
-        assert!(near(middle.x, middle.y).g > 0.3, "{:?}", near(middle.x, middle.y));
-        assert!(drawn.pixels().iter().filter(|p| **p != LinearRgb::BLACK).count() > 1000);
+        assert!(
+            near(middle.x, middle.y).g > 0.3,
+            "{:?}",
+            near(middle.x, middle.y)
+        );
+        assert!(
+            drawn
+                .pixels()
+                .iter()
+                .filter(|p| **p != LinearRgb::BLACK)
+                .count()
+                > 1000
+        );
     }
 
     #[test]
     fn the_legend_stands_below_the_photo_and_names_the_colours() {
-        let scenario = Scenario { image: [400, 300], focal_px: 320.0, ..Scenario::default() };
-        let solution = solve(&scenario.tilted(30.0).view(1, 0).label, &SolveOptions::default()).unwrap();
-        let texts: Vec<String> = entries(&solution).into_iter().map(|(_, text, _)| text).collect();
-        for word in ["rectangle as fitted", "grid of 0.100 m", "box 0.0", "labelled corner", "focal length"] {
-            assert!(texts.iter().any(|text| text.contains(word)), "{word}: {texts:?}");
+        let scenario = Scenario {
+            image: [400, 300],
+            focal_px: 320.0,
+            ..Scenario::default()
+        };
+        let solution = solve(
+            &scenario.tilted(30.0).view(1, 0).label,
+            &SolveOptions::default(),
+        )
+        .unwrap();
+        let texts: Vec<String> = entries(&solution)
+            .into_iter()
+            .map(|(_, text, _)| text)
+            .collect();
+        for word in [
+            "rectangle as fitted",
+            "grid of 0.100 m",
+            "box 0.0",
+            "labelled corner",
+            "focal length",
+        ] {
+            assert!(
+                texts.iter().any(|text| text.contains(word)),
+                "{word}: {texts:?}"
+            );
         }
         for width in [1, 90, 400, 4000] {
             let drawn = overlay(&Image::filled(width, 300, LinearRgb::BLACK), &solution);
-            assert!(drawn.width() == width && drawn.height() > 350, "{:?}", drawn.size());
+            assert!(
+                drawn.width() == width && drawn.height() > 350,
+                "{:?}",
+                drawn.size()
+            );
         }
         let drawn = overlay(&Image::filled(400, 300, LinearRgb::BLACK), &solution);
         let green = encode_srgb8(RECTANGLE);
-        let below = drawn.rows().skip(300).flatten().filter(|p| encode_srgb8(**p) == green).count();
+        let below = drawn
+            .rows()
+            .skip(300)
+            .flatten()
+            .filter(|p| encode_srgb8(**p) == green)
+            .count();
         assert_eq!(below, MARK * MARK);
     }
 
     #[test]
     fn steps_are_round() {
-        assert_eq!([0.04, 0.05, 0.06, 3.0].map(round_step).map(|s| (s * 1e6).round()), [5e4, 5e4, 1e5, 5e6]);
+        assert_eq!(
+            [0.04, 0.05, 0.06, 3.0]
+                .map(round_step)
+                .map(|s| (s * 1e6).round()),
+            [5e4, 5e4, 1e5, 5e6]
+        );
     }
 }

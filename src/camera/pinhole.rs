@@ -24,13 +24,15 @@ pub struct Camera {
 impl Camera {
     /// The camera's centre in the world.
     pub fn center(&self) -> Point3<f64> {
-        self.camera_from_world.inverse_transform_point(&Point3::origin())
+        self.camera_from_world
+            .inverse_transform_point(&Point3::origin())
     }
 
     /// Pixel position and depth (metres along the optical axis) of a world point; none at or behind the camera.
     pub fn project(&self, world: Point3<f64>) -> Option<(Point2<f64>, f64)> {
         let c = self.camera_from_world * world;
-        let px = Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y) + self.principal_px.coords;
+        let px = Point2::new(c.x / c.z * self.focal_px.x, c.y / c.z * self.focal_px.y)
+            + self.principal_px.coords;
         (c.z > 0.0).then_some((px, c.z))
     }
 
@@ -38,7 +40,10 @@ impl Camera {
     pub fn ray(&self, px: Point2<f64>) -> Ray {
         let d = (px - self.principal_px).component_div(&self.focal_px);
         let direction = self.camera_from_world.rotation.inverse() * Vector3::new(d.x, d.y, 1.0);
-        Ray { origin: self.center(), direction }
+        Ray {
+            origin: self.center(),
+            direction,
+        }
     }
 
     /// Angle between the optical axis and the normal of the surface `z = 0`, radians; 0 looks straight down.
@@ -79,7 +84,9 @@ impl Camera {
 /// Where a point is seen through a lens with distortion; not finite behind the camera.
 pub(crate) fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
     let half = libm::hypot(f64::from(camera.image[0]), f64::from(camera.image[1])) / 2.0;
-    let Some((px, _)) = camera.project(point) else { return Point2::new(f64::NAN, f64::NAN) };
+    let Some((px, _)) = camera.project(point) else {
+        return Point2::new(f64::NAN, f64::NAN);
+    };
     let off = px - camera.principal_px;
     camera.principal_px + off * (1.0 + kappa * (off / half).norm_squared())
 }
@@ -119,7 +126,10 @@ mod tests {
     fn resizing_keeps_the_view() {
         let (cam, p) = (looking_down(), Point3::new(0.1, 0.05, 0.02));
         let half = cam.resized([320, 240]);
-        let (a, b) = (cam.project(p).expect("in front").0, half.project(p).expect("in front").0);
+        let (a, b) = (
+            cam.project(p).expect("in front").0,
+            half.project(p).expect("in front").0,
+        );
         assert!((a / 2.0 - b).norm() < 1e-10);
     }
 

@@ -60,7 +60,11 @@ pub(crate) struct Problem {
 
 impl Problem {
     /// Checks a label of a picture of some framing and brings it into the solver's units.
-    pub(crate) fn new(label: &Label, framing: Framing, options: &SolveOptions) -> Result<Self, SolveError> {
+    pub(crate) fn new(
+        label: &Label,
+        framing: Framing,
+        options: &SolveOptions,
+    ) -> Result<Self, SolveError> {
         Self::with_focal(label, framing, None, options)
     }
 
@@ -72,35 +76,60 @@ impl Problem {
         options: &SolveOptions,
     ) -> Result<Self, SolveError> {
         let image = label.image_size();
-        if let Some(size) = [image, label.taken_size()].into_iter().find(|size| size.contains(&0)) {
+        if let Some(size) = [image, label.taken_size()]
+            .into_iter()
+            .find(|size| size.contains(&0))
+        {
             return Err(SolveError::BadImage(size));
         }
         check_numbers(label)?;
         let sigma_px = label.surface.corner_sigma_px.unwrap_or(CORNER_SIGMA_PX);
-        if Sides::are_missing(label, options) && label.surface.corners_px.is_none() && label.points.len() < 4 {
+        if Sides::are_missing(label, options)
+            && label.surface.corners_px.is_none()
+            && label.points.len() < 4
+        {
             return Err(SolveError::Empty);
         }
         let sides = Sides::new(label, options)?;
-        let labelled = label.surface.corners_px.map(|corners| corners.map(|c| label.pixel(c)));
-        let quad_px = labelled.or_else(|| sides.predicted(label)).ok_or(SolveError::NoCorners)?;
-        let Checked { corners: corners_px, mut warnings } = corners::check(quad_px, sigma_px, image, options.order)?;
+        let labelled = label
+            .surface
+            .corners_px
+            .map(|corners| corners.map(|c| label.pixel(c)));
+        let quad_px = labelled
+            .or_else(|| sides.predicted(label))
+            .ok_or(SolveError::NoCorners)?;
+        let Checked {
+            corners: corners_px,
+            mut warnings,
+        } = corners::check(quad_px, sigma_px, image, options.order)?;
 
         if labelled.is_none() {
             warnings.extend(sides.lone_marker(label));
         }
 
         let diagonal = Vector2::from(image.map(f64::from));
-        let center = label.camera.principal_point_px.map_or(label.taken_center(), |px| label.pixel(px));
+        let center = label
+            .camera
+            .principal_point_px
+            .map_or(label.taken_center(), |px| label.pixel(px));
         let (principal_px, unit_px) = (center, diagonal.norm() / 2.0);
         let (mut ln_focal, witness) = focal::belief(label, framing, &options.priors);
         ln_focal.mean -= libm::log(unit_px);
         let usual = focal::usual_px(label.taken_size()) / unit_px;
 
-        let kappa = kappa(label, focal.unwrap_or_else(|| libm::exp(ln_focal.mean)), options);
+        let kappa = kappa(
+            label,
+            focal.unwrap_or_else(|| libm::exp(ln_focal.mean)),
+            options,
+        );
         let quad = corners_px.map(|c| undistorted((c - principal_px) / unit_px, kappa.mean));
         let view = View::new(&quad);
         let size = sides.completed(|| ratio_without_sides(&view, libm::exp(ln_focal.mean)));
-        let frame = Frame { principal_px, unit_px, unit: (size[0] * size[1]).sqrt() };
+        let frame = Frame {
+            principal_px,
+            unit_px,
+            unit: (size[0] * size[1]).sqrt(),
+        };
         let beliefs = Beliefs {
             ln_focal,
             stretch_sigma: sides.stretch_sigma(label, &options.priors),
@@ -109,23 +138,55 @@ impl Problem {
             ln_height: camera_height(label, &frame),
         };
         let elastic = sides.elastic();
-        let corner_sights = corner_points(size).into_iter().zip(corners_px).map(|(p, px)| (p, px, sigma_px, false));
+        let corner_sights = corner_points(size)
+            .into_iter()
+            .zip(corners_px)
+            .map(|(p, px)| (p, px, sigma_px, false));
         // Where both sides were measured, so was the point, with the same tape.
         let rigid = elastic != Elastic::BOTH;
         let points = label.points.iter();
-        let further = points.map(|p| (p.xyz_m.into(), label.pixel(p.px), p.sigma_px.unwrap_or(sigma_px), rigid));
+        let further = points.map(|p| {
+            (
+                p.xyz_m.into(),
+                label.pixel(p.px),
+                p.sigma_px.unwrap_or(sigma_px),
+                rigid,
+            )
+        });
         // Corners that were only predicted are a start and no evidence.
         let corner_sights = corner_sights.take(if labelled.is_some() { 4 } else { 0 });
-        let sights = corner_sights.chain(further).map(|(p, px, sigma, rigid)| frame.sight(p, px, sigma, rigid));
+        let sights = corner_sights
+            .chain(further)
+            .map(|(p, px, sigma, rigid)| frame.sight(p, px, sigma, rigid));
         let ln_focal_range = [1.0 / LONGEST_FOCAL, LONGEST_FOCAL].map(|f| libm::log(f * usual));
-        let evidence = Evidence { sights: sights.collect(), beliefs, ln_focal_range };
-        Ok(Self { image, framing, frame, corners_px, view, size, elastic, evidence, witness, warnings })
+        let evidence = Evidence {
+            sights: sights.collect(),
+            beliefs,
+            ln_focal_range,
+        };
+        Ok(Self {
+            image,
+            framing,
+            frame,
+            corners_px,
+            view,
+            size,
+            elastic,
+            evidence,
+            witness,
+            warnings,
+        })
     }
 
     /// The closed-form camera for a focal length.
     pub(crate) fn start(&self, focal: f64) -> State {
         let stance = self.view.stance(focal, self.unit_size());
-        State::new(stance, focal, self.evidence.beliefs.kappa.mean, self.elastic)
+        State::new(
+            stance,
+            focal,
+            self.evidence.beliefs.kappa.mean,
+            self.elastic,
+        )
     }
 
     /// The sides before they give, in the solver's unit.
@@ -158,14 +219,22 @@ impl Frame {
 
     fn sight(&self, point: Point3<f64>, px: Point2<f64>, sigma_px: f64, rigid: bool) -> Sight {
         let point: Vector3<f64> = point.coords / self.unit;
-        Sight { point, rigid, seen: self.picture(px), weight: self.unit_px / sigma_px }
+        Sight {
+            point,
+            rigid,
+            seen: self.picture(px),
+            weight: self.unit_px / sigma_px,
+        }
     }
 }
 
 /// The points that lie on a surface of this size.
 fn on_surface(label: &Label, size: [f64; 2]) -> impl Iterator<Item = &LabelPoint> {
     let near = ON_SURFACE * size[0].min(size[1]);
-    label.points.iter().filter(move |p| p.xyz_m[2].abs() <= near)
+    label
+        .points
+        .iter()
+        .filter(move |p| p.xyz_m[2].abs() <= near)
 }
 
 /// The corners of a rectangle of this size, in label order.
@@ -216,8 +285,9 @@ impl Sides {
     /// Where the corners of a rectangle of known sides must be by the further points on its surface.
     fn predicted(self, label: &Label) -> Option<[Point2<f64>; 4]> {
         let Self::Both(size) = self else { return None };
-        let pairs: Vec<_> =
-            on_surface(label, size).map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px))).collect();
+        let pairs: Vec<_> = on_surface(label, size)
+            .map(|p| (Point2::new(p.xyz_m[0], p.xyz_m[1]), label.pixel(p.px)))
+            .collect();
         let map = dlt::homography(&pairs)?;
         Some(corner_points(size).map(|c| map.map(c.xy())))
     }
@@ -227,7 +297,9 @@ impl Sides {
         let Self::Both(size) = self else { return None };
         let span = |axis: usize| {
             let along = on_surface(label, size).map(|p| p.xyz_m[axis]);
-            let [low, high] = along.fold([f64::MAX, f64::MIN], |[low, high], v| [v.min(low), v.max(high)]);
+            let [low, high] = along.fold([f64::MAX, f64::MIN], |[low, high], v| {
+                [v.min(low), v.max(high)]
+            });
             high - low
         };
         let (span, side) = (span(0).max(span(1)), size[0].max(size[1]));
@@ -255,29 +327,53 @@ impl Sides {
 fn ratio_without_sides(view: &View, believed: f64) -> f64 {
     let squared = view.focal_squared_any_ratio();
     let [short, long] = [0.2 * believed, 5.0 * believed].map(|f| f * f);
-    let focal = if (short..long).contains(&squared) { squared.sqrt() } else { believed };
+    let focal = if (short..long).contains(&squared) {
+        squared.sqrt()
+    } else {
+        believed
+    };
     view.ratio(focal).clamp(1.0 / EXTREME_RATIO, EXTREME_RATIO)
 }
 
 fn principal_sigma(label: &Label, framing: Framing, priors: &Priors) -> f64 {
-    let usual = if framing == Framing::Whole { priors.principal_sigma } else { priors.cropped_sigma };
+    let usual = if framing == Framing::Whole {
+        priors.principal_sigma
+    } else {
+        priors.cropped_sigma
+    };
     let diagonal_px = |size: [u32; 2]| libm::hypot(f64::from(size[0]), f64::from(size[1]));
     let unit_px = diagonal_px(label.image_size()) / 2.0;
-    label.camera.principal_point_sigma_px.unwrap_or(usual * diagonal_px(label.taken_size())) / unit_px
+    label
+        .camera
+        .principal_point_sigma_px
+        .unwrap_or(usual * diagonal_px(label.taken_size()))
+        / unit_px
 }
 
 /// A stated coefficient is a fact, at a focal length.
 fn kappa(label: &Label, focal: f64, options: &SolveOptions) -> Belief {
     match label.camera.k1 {
-        Some(k1) => Belief { mean: k1 / (focal * focal), sigma: 0.0 },
-        None => Belief { mean: 0.0, sigma: options.priors.kappa_sigma },
+        Some(k1) => Belief {
+            mean: k1 / (focal * focal),
+            sigma: 0.0,
+        },
+        None => Belief {
+            mean: 0.0,
+            sigma: options.priors.kappa_sigma,
+        },
     }
 }
 
 fn camera_height(label: &Label, frame: &Frame) -> Option<Belief> {
     let height = label.camera.height_m?;
-    let sigma = label.camera.height_sigma_m.map_or(HEIGHT_SIGMA, |s| s / height);
-    Some(Belief { mean: libm::log(height / frame.unit), sigma })
+    let sigma = label
+        .camera
+        .height_sigma_m
+        .map_or(HEIGHT_SIGMA, |s| s / height);
+    Some(Belief {
+        mean: libm::log(height / frame.unit),
+        sigma,
+    })
 }
 
 /// Where a point would be seen without distortion, by fixed-point iteration.
@@ -300,9 +396,28 @@ pub(crate) fn undistorted(seen: Vector2<f64>, kappa: f64) -> Vector2<f64> {
 fn check_numbers(label: &Label) -> Result<(), SolveError> {
     let (surface, camera) = (&label.surface, &label.camera);
     let finite = |at, values: &[f64]| values.iter().try_for_each(|value| bounded(at, *value));
-    finite("surface.corners_px", surface.corners_px.as_ref().map_or(&[], |c| c.as_flattened()))?;
-    finite("camera.principal_point_px", camera.principal_point_px.as_ref().map_or(&[], |c| c.as_slice()))?;
-    finite("image.crop.offset_px", label.image.crop.as_ref().map_or(&[], |c| c.offset_px.as_slice()))?;
+    finite(
+        "surface.corners_px",
+        surface
+            .corners_px
+            .as_ref()
+            .map_or(&[], |c| c.as_flattened()),
+    )?;
+    finite(
+        "camera.principal_point_px",
+        camera
+            .principal_point_px
+            .as_ref()
+            .map_or(&[], |c| c.as_slice()),
+    )?;
+    finite(
+        "image.crop.offset_px",
+        label
+            .image
+            .crop
+            .as_ref()
+            .map_or(&[], |c| c.offset_px.as_slice()),
+    )?;
     finite("camera.k1", camera.k1.as_slice())?;
     for point in &label.points {
         finite("points.xyz_m", &point.xyz_m)?;
@@ -310,11 +425,20 @@ fn check_numbers(label: &Label) -> Result<(), SolveError> {
         positive("points.sigma_px", point.sigma_px)?;
     }
     positive("surface.corner_sigma_px", surface.corner_sigma_px)?;
-    positive("surface.dimension_sigma_m", surface.dimension_sigma_m.filter(|&s| s != 0.0))?;
+    positive(
+        "surface.dimension_sigma_m",
+        surface.dimension_sigma_m.filter(|&s| s != 0.0),
+    )?;
     positive("camera.focal_px", camera.focal_px)?;
     positive("camera.focal_35mm", camera.focal_35mm)?;
-    positive("camera.focal_sigma", camera.focal_sigma.filter(|&s| s != 0.0))?;
-    positive("camera.principal_point_sigma_px", camera.principal_point_sigma_px.filter(|&s| s != 0.0))?;
+    positive(
+        "camera.focal_sigma",
+        camera.focal_sigma.filter(|&s| s != 0.0),
+    )?;
+    positive(
+        "camera.principal_point_sigma_px",
+        camera.principal_point_sigma_px.filter(|&s| s != 0.0),
+    )?;
     positive("camera.height_m", camera.height_m)?;
     positive("camera.height_sigma_m", camera.height_sigma_m)
 }
@@ -322,7 +446,11 @@ fn check_numbers(label: &Label) -> Result<(), SolveError> {
 fn positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError> {
     match value {
         Some(v) if v <= 0.0 => Err(SolveError::NotPositive { at, value: v }),
-        Some(v) if v < 1.0 / LARGEST => Err(SolveError::OutOfRange { at, value: v, most: LARGEST }),
+        Some(v) if v < 1.0 / LARGEST => Err(SolveError::OutOfRange {
+            at,
+            value: v,
+            most: LARGEST,
+        }),
         Some(v) => bounded(at, v),
         None => Ok(()),
     }
@@ -332,7 +460,11 @@ fn positive(at: &'static str, value: Option<f64>) -> Result<(), SolveError> {
 fn bounded(at: &'static str, value: f64) -> Result<(), SolveError> {
     match value.abs() {
         size if !size.is_finite() => Err(SolveError::NonFinite(at)),
-        size if size > LARGEST => Err(SolveError::OutOfRange { at, value, most: LARGEST }),
+        size if size > LARGEST => Err(SolveError::OutOfRange {
+            at,
+            value,
+            most: LARGEST,
+        }),
         _ => Ok(()),
     }
 }

@@ -28,7 +28,8 @@ pub struct Labelled {
 impl Labelled {
     /// A file of its own: `bg0001.camera.json` for the ending `camera.json`.
     pub fn beside(&self, ending: &str) -> PathBuf {
-        self.source.with_file_name(format!("{}.{ending}", self.name))
+        self.source
+            .with_file_name(format!("{}.{ending}", self.name))
     }
 
     /// Its photo, where that is there.
@@ -41,8 +42,16 @@ impl std::fmt::Display for Labelled {
     /// The file, and the picture where the file alone does not say which.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.source.display())?;
-        let file = self.source.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        if file.starts_with(&format!("{}.", self.name)) { Ok(()) } else { write!(f, " ({})", self.name) }
+        let file = self
+            .source
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        if file.starts_with(&format!("{}.", self.name)) {
+            Ok(())
+        } else {
+            write!(f, " ({})", self.name)
+        }
     }
 }
 
@@ -70,13 +79,19 @@ pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec
     let text = text_of(path)?;
     let drawings = import::drawings(&text).map_err(|e| e.in_file(path))?;
     let labels = match drawings {
-        Some(drawings) => drawings.iter().map(|drawing| drawn(drawing, path)).collect::<Result<Vec<_>>>()?,
+        Some(drawings) => drawings
+            .iter()
+            .map(|drawing| drawn(drawing, path))
+            .collect::<Result<Vec<_>>>()?,
         None => ours(&text, path)?,
     };
     if labels.is_empty() {
         return Err(Error::file(path, "no label, expected at least one"));
     }
-    labels.into_iter().map(|labelled| completed(labelled, size)).collect()
+    labels
+        .into_iter()
+        .map(|labelled| completed(labelled, size))
+        .collect()
 }
 
 /// Reads the labels of a folder in order of name. Files that are of no label format are left out, and so are other
@@ -100,10 +115,16 @@ pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Lab
             match found.iter().find(|other| other.name == labelled.name) {
                 None => found.push(labelled),
                 Some(ours) if ends_with(&ours.source, LABEL_SUFFIX) => {
-                    log::info!("{labelled}: left out, since {} is there", ours.source.display());
+                    log::info!(
+                        "{labelled}: left out, since {} is there",
+                        ours.source.display()
+                    );
                 }
                 Some(other) => {
-                    return Err(Error::file(path, format!("labels {} once more, after {other}", labelled.name)));
+                    return Err(Error::file(
+                        path,
+                        format!("labels {} once more, after {other}", labelled.name),
+                    ));
                 }
             }
         }
@@ -113,7 +134,8 @@ pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Lab
 }
 
 fn ends_with(path: &Path, suffix: &str) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(suffix))
+    path.file_name()
+        .is_some_and(|name| name.to_string_lossy().ends_with(suffix))
 }
 
 fn may_be_label(path: &Path) -> bool {
@@ -131,11 +153,17 @@ fn text_of(path: &Path) -> Result<String> {
         if io::read_header(path).is_err() {
             return error;
         }
-        let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = path
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned())
+            .unwrap_or_default();
         let label = path.with_file_name(format!("{name}{LABEL_SUFFIX}"));
         let next = match label.is_file() {
             true => format!("{} lies beside it", label.display()),
-            false => format!("`petcomp camera init {} --size WIDTHxHEIGHT` writes one", path.display()),
+            false => format!(
+                "`petcomp camera init {} --size WIDTHxHEIGHT` writes one",
+                path.display()
+            ),
         };
         Error::file(path, format!("a picture, expected a label of it; {next}"))
     })
@@ -144,36 +172,53 @@ fn text_of(path: &Path) -> Result<String> {
 /// A label of ours, or an array of them.
 fn ours(text: &str, path: &Path) -> Result<Vec<Labelled>> {
     let is_array = text.trim_start().starts_with('[');
-    let labels: Result<Vec<Label>> =
-        if is_array { io::parse_json(text) } else { io::parse_json(text).map(|label| vec![label]) };
+    let labels: Result<Vec<Label>> = if is_array {
+        io::parse_json(text)
+    } else {
+        io::parse_json(text).map(|label| vec![label])
+    };
     let labels = labels.map_err(|e| e.in_file(path))?;
     let name = |label: &Label| match is_array {
         true => stem(Path::new(&label.image.file)),
         false => {
             let file = stem(path);
-            file.strip_suffix(".label").map_or(file.clone(), str::to_owned)
+            file.strip_suffix(".label")
+                .map_or(file.clone(), str::to_owned)
         }
     };
     let labelled = |label: Label| {
         if !label.image.file.is_empty() {
             io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
         }
-        Ok(Labelled { name: name(&label), label, source: path.into() })
+        Ok(Labelled {
+            name: name(&label),
+            label,
+            source: path.into(),
+        })
     };
     labels.into_iter().map(labelled).collect()
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+    path.file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default()
 }
 
 /// The label that another program's drawing means, its photo looked for beside the file.
 fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
     let inside = |file: &&String| io::below("", file.as_str()).is_ok();
     let base = |file: &String| file.rsplit('/').next().unwrap_or_default().to_owned();
-    let names: Vec<String> =
-        drawing.files.iter().filter(inside).cloned().chain(drawing.files.iter().map(base)).collect();
-    let there = names.iter().find(|name| path.with_file_name(name).is_file());
+    let names: Vec<String> = drawing
+        .files
+        .iter()
+        .filter(inside)
+        .cloned()
+        .chain(drawing.files.iter().map(base))
+        .collect();
+    let there = names
+        .iter()
+        .find(|name| path.with_file_name(name).is_file());
     let file = there.or(names.last()).cloned().unwrap_or_default();
     if file.is_empty() {
         return Err(Error::file(path, "no name of a picture"));
@@ -186,17 +231,29 @@ fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
         let header = io::read_header(path.with_file_name(&file))?;
         (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
     }
-    Ok(Labelled { name: stem(Path::new(&file)), label, source: path.into() })
+    Ok(Labelled {
+        name: stem(Path::new(&file)),
+        label,
+        source: path.into(),
+    })
 }
 
 /// With the sides that were given where the label has none, and with what its photo knows.
 fn completed(labelled: Labelled, size: Option<[f64; 2]>) -> Result<Labelled> {
-    let Labelled { mut label, source, name } = labelled;
+    let Labelled {
+        mut label,
+        source,
+        name,
+    } = labelled;
     if let (Some([w, h]), None, None) = (size, label.surface.width_m, label.surface.height_m) {
         (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
     }
     check_size(&label).map_err(|e| e.in_file(&source))?;
-    Ok(Labelled { label: with_photo(label, &source)?, source, name })
+    Ok(Labelled {
+        label: with_photo(label, &source)?,
+        source,
+        name,
+    })
 }
 
 /// A label that was read from `path`, with the focal length of its photo's EXIF data where it says nothing itself; as it
@@ -207,11 +264,16 @@ fn completed(labelled: Labelled, size: Option<[f64; 2]>) -> Result<Labelled> {
 /// A photo that cannot be read, or has another size than the label says.
 pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let path = path.as_ref();
-    let Some(photo) = photo_of(&label, path) else { return Ok(label) };
+    let Some(photo) = photo_of(&label, path) else {
+        return Ok(label);
+    };
     let folder = path.parent().unwrap_or(Path::new(""));
     io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
     let header = io::read_header(&photo)?;
-    let (seen, told) = ([header.width, header.height], label.image_size().map(|side| side as usize));
+    let (seen, told) = (
+        [header.width, header.height],
+        label.image_size().map(|side| side as usize),
+    );
     if seen != told {
         let [[w, h], [tw, th]] = [seen, told];
         let what = format!("{tw} x {th} pixels, but {} has {w} x {h}", photo.display());
@@ -239,8 +301,13 @@ pub(crate) fn learn(label: &mut Label, header: &io::Header) {
 /// # Errors
 /// [`Error::Value`] that names the side.
 pub fn check_size(label: &Label) -> Result<()> {
-    let sides = [("surface.width_m", label.surface.width_m), ("surface.height_m", label.surface.height_m)];
-    sides.into_iter().try_for_each(|(at, side)| side.map_or(Ok(()), |metres| SURFACE.check(at, metres)))
+    let sides = [
+        ("surface.width_m", label.surface.width_m),
+        ("surface.height_m", label.surface.height_m),
+    ];
+    sides
+        .into_iter()
+        .try_for_each(|(at, side)| side.map_or(Ok(()), |metres| SURFACE.check(at, metres)))
 }
 
 /// A camera that is near enough to see objects on the surface: how far it is follows from the label's lengths.
@@ -252,9 +319,13 @@ pub fn check_distance(camera: &Camera) -> Result<()> {
     if CAMERA.contains(distance) {
         return Ok(());
     }
-    let unit = CAMERA.unit_meant(distance).map_or(String::new(), |unit| format!("; is the size in {unit}s?"));
-    let what =
-        format!("the camera would be {} m away, expected {CAMERA}{unit}", number((1e3 * distance).round() / 1e3));
+    let unit = CAMERA
+        .unit_meant(distance)
+        .map_or(String::new(), |unit| format!("; is the size in {unit}s?"));
+    let what = format!(
+        "the camera would be {} m away, expected {CAMERA}{unit}",
+        number((1e3 * distance).round() / 1e3)
+    );
     Err(Error::value("surface", what))
 }
 
@@ -280,17 +351,31 @@ mod tests {
         let [num, denom] = zoom;
         let fields = [
             (Tag::FocalLengthIn35mmFilm, Value::Short(vec![28])),
-            (Tag::DigitalZoomRatio, Value::Rational(vec![Rational { num, denom }])),
+            (
+                Tag::DigitalZoomRatio,
+                Value::Rational(vec![Rational { num, denom }]),
+            ),
             (Tag::PixelXDimension, Value::Long(vec![taken[0]])),
             (Tag::PixelYDimension, Value::Long(vec![taken[1]])),
         ];
-        let fields = fields.map(|(tag, value)| Field { tag, ifd_num: In::PRIMARY, value });
+        let fields = fields.map(|(tag, value)| Field {
+            tag,
+            ifd_num: In::PRIMARY,
+            value,
+        });
         let (mut writer, mut notes) = (Writer::new(), std::io::Cursor::new(Vec::new()));
         fields.iter().for_each(|f| writer.push_field(f));
         writer.write(&mut notes, false).unwrap();
         let (mut jpeg, notes) = (std::fs::read(&photo).unwrap(), notes.into_inner());
         let length = (notes.len() + 8) as u16;
-        jpeg.splice(2..2, [0xff, 0xe1].into_iter().chain(length.to_be_bytes()).chain(*b"Exif\0\0").chain(notes));
+        jpeg.splice(
+            2..2,
+            [0xff, 0xe1]
+                .into_iter()
+                .chain(length.to_be_bytes())
+                .chain(*b"Exif\0\0")
+                .chain(notes),
+        );
         std::fs::write(&photo, jpeg).unwrap();
         let mut label = Label::new([90, 60], [[0.0; 2]; 4], [0.6, 0.4]);
         label.image.file = "a.jpg".into();
@@ -301,7 +386,11 @@ mod tests {
     fn a_photo_tells_its_focal_length() {
         let label = photo_told([0, 1], [4500, 3000]);
         assert_eq!(
-            (label.camera.focal_35mm, label.camera.focal_sigma, label.image.cropped),
+            (
+                label.camera.focal_35mm,
+                label.camera.focal_sigma,
+                label.image.cropped
+            ),
             (Some(28.0), None, Some(false))
         );
     }
@@ -309,13 +398,24 @@ mod tests {
     #[test]
     fn a_zoomed_photo_tells_it_less_surely() {
         let label = photo_told([3, 2], [4500, 3000]);
-        assert_eq!((label.camera.focal_35mm, label.camera.focal_sigma), (Some(28.0), Some(0.25)));
+        assert_eq!(
+            (label.camera.focal_35mm, label.camera.focal_sigma),
+            (Some(28.0), Some(0.25))
+        );
     }
 
     #[test]
     fn a_photo_of_another_shape_than_it_was_taken_in_is_cropped() {
         assert_eq!(photo_told([0, 1], [4000, 3000]).image.cropped, Some(true));
-        assert_eq!(photo_told([0, 1], [3000, 4500]).image.cropped, Some(false), "turned");
-        assert_eq!(photo_told([0, 1], [2205, 1470]).image.cropped, None, "reduced, or cut out in its own shape");
+        assert_eq!(
+            photo_told([0, 1], [3000, 4500]).image.cropped,
+            Some(false),
+            "turned"
+        );
+        assert_eq!(
+            photo_told([0, 1], [2205, 1470]).image.cropped,
+            None,
+            "reduced, or cut out in its own shape"
+        );
     }
 }

@@ -39,7 +39,11 @@ impl View {
         let mean = areas.iter().sum::<f64>() / 4.0;
         let [c0, c1, c2, c3] = [0, 1, 2, 3].map(|i| corners[i].push(1.0) * (areas[i] / mean));
         let split = |e: Vector3<f64>| (e.xy(), e.z);
-        Self { along: split(c1 - c0), down: split(c3 - c0), center: (c0 + c2) / 2.0 }
+        Self {
+            along: split(c1 - c0),
+            down: split(c3 - c0),
+            center: (c0 + c2) / 2.0,
+        }
     }
 
     /// The squared focal length, for a rectangle whose width is `ratio` times its height.
@@ -51,7 +55,8 @@ impl View {
         let right_angle = dw * dh;
         let sides = dw * dw - r2 * dh * dh;
         let weight = dw * dw + r2 * dh * dh;
-        -(sides * (a.norm_squared() - r2 * b.norm_squared()) + 4.0 * r2 * right_angle * a.dot(&b)) / (weight * weight)
+        -(sides * (a.norm_squared() - r2 * b.norm_squared()) + 4.0 * r2 * right_angle * a.dot(&b))
+            / (weight * weight)
     }
 
     /// The squared focal length from the right angle alone, for a rectangle of unknown sides.
@@ -101,7 +106,11 @@ impl View {
             let x = (along / scale).push(sign * z1).normalize();
             let y = (up / scale).push(sign * z2);
             let y = (y - x * x.dot(&y)).normalize();
-            Stance { rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]), center, scale }
+            Stance {
+                rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]),
+                center,
+                scale,
+            }
         })
     }
 }
@@ -150,7 +159,11 @@ mod tests {
             * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.4);
         let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
         let rotation = turn.to_rotation_matrix().into_inner() * flip;
-        let stance = Stance { rotation, center: Vector2::new(0.1, -0.2), scale: 0.5 };
+        let stance = Stance {
+            rotation,
+            center: Vector2::new(0.1, -0.2),
+            scale: 0.5,
+        };
         (stance, View::new(&project(&stance)))
     }
 
@@ -178,7 +191,9 @@ mod tests {
     fn the_ratio_comes_back_from_the_right_angle() {
         let (_, view) = seen(0.3);
         let focal = view.focal_squared_any_ratio().sqrt();
-        assert!((focal - FOCAL).abs() < 1e-10 && (view.ratio(focal) - SIZE[0] / SIZE[1]).abs() < 1e-10);
+        assert!(
+            (focal - FOCAL).abs() < 1e-10 && (view.ratio(focal) - SIZE[0] / SIZE[1]).abs() < 1e-10
+        );
     }
 
     #[test]
@@ -188,7 +203,10 @@ mod tests {
         assert!(!view.focal_squared(SIZE[0] / SIZE[1]).is_finite());
         let stance = view.stance(2.0, SIZE);
         assert!((stance.translation(2.0) - Vector3::new(0.0, 0.0, 4.0)).norm() < 1e-12);
-        assert!((stance.rotation - Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))).norm() < 1e-12);
+        assert!(
+            (stance.rotation - Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))).norm()
+                < 1e-12
+        );
     }
 
     #[test]
@@ -205,7 +223,11 @@ mod tests {
         let (mut truth, _) = seen(0.3);
         truth.scale = 1e-3;
         let difference = |a: &Stance, b: &Stance| {
-            project(a).iter().zip(&project(b)).map(|(p, q)| (p - q).norm()).fold(0.0, f64::max)
+            project(a)
+                .iter()
+                .zip(&project(b))
+                .map(|(p, q)| (p - q).norm())
+                .fold(0.0, f64::max)
         };
         assert!(difference(&truth, &truth.mirrored(FOCAL)) < 1e-3 * truth.scale);
     }

@@ -21,7 +21,12 @@ const MOST_PIXELS: f64 = 67_108_864.0;
 ///
 /// # Errors
 /// [`Error::Value`] for a map without pixels or of more than 64 million.
-pub fn rectify<P: Mix>(photo: &Pyramid<P>, camera: &Camera, size: [f64; 2], px_per_metre: f64) -> Result<Image<P>> {
+pub fn rectify<P: Mix>(
+    photo: &Pyramid<P>,
+    camera: &Camera,
+    size: [f64; 2],
+    px_per_metre: f64,
+) -> Result<Image<P>> {
     let [width, height] = size.map(|metres| (metres * px_per_metre).round());
     if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
         return Err(Error::value(
@@ -33,25 +38,50 @@ pub fn rectify<P: Mix>(photo: &Pyramid<P>, camera: &Camera, size: [f64; 2], px_p
             ),
         ));
     }
-    let photo_from_map = Homography(camera.pixel_from_surface().0 * surface_from_map(size, [width, height]).0);
-    Ok(warp(photo, &photo_from_map, width as usize, height as usize))
+    let photo_from_map =
+        Homography(camera.pixel_from_surface().0 * surface_from_map(size, [width, height]).0);
+    Ok(warp(
+        photo,
+        &photo_from_map,
+        width as usize,
+        height as usize,
+    ))
 }
 
 /// The photo that the camera takes of a picture lying on the rectangle of `size` metres; empty beside it.
 pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64; 2]) -> Image<P> {
     let (w, h) = picture.base().size();
-    let photo_from_picture = camera.pixel_from_surface().0 * surface_from_map(size, [w as f64, h as f64]).0;
+    let photo_from_picture =
+        camera.pixel_from_surface().0 * surface_from_map(size, [w as f64, h as f64]).0;
     let [width, height] = camera.image.map(|n| n as usize);
-    let Some(inverse) = photo_from_picture.try_inverse() else { return Image::new(width, height) };
+    let Some(inverse) = photo_from_picture.try_inverse() else {
+        return Image::new(width, height);
+    };
     // In front of the camera the last coordinate is one over the depth: positive.
-    let center = inverse * photo_from_picture * nalgebra::Vector3::new(w as f64 / 2.0, h as f64 / 2.0, 1.0);
-    warp(picture, &Homography(inverse * center.z.signum()), width, height)
+    let center =
+        inverse * photo_from_picture * nalgebra::Vector3::new(w as f64 / 2.0, h as f64 / 2.0, 1.0);
+    warp(
+        picture,
+        &Homography(inverse * center.z.signum()),
+        width,
+        height,
+    )
 }
 
 /// Surface metres from the pixels of a map of so many.
 fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
     let [x, y] = [size[0] / pixels[0], size[1] / pixels[1]];
-    Homography(Matrix3::new(x, 0.0, -size[0] / 2.0, 0.0, -y, size[1] / 2.0, 0.0, 0.0, 1.0))
+    Homography(Matrix3::new(
+        x,
+        0.0,
+        -size[0] / 2.0,
+        0.0,
+        -y,
+        size[1] / 2.0,
+        0.0,
+        0.0,
+        1.0,
+    ))
 }
 
 /// A picture seen through a projective map: the value of each target pixel is the mean over what it covers of the source.
@@ -64,7 +94,12 @@ fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
 /// the short axis, so that its own blur hardly adds to the footprint's.
 ///
 /// [Heckbert]: https://www2.eecs.berkeley.edu/Pubs/TechRpts/1989/5504.html
-pub fn warp<P: Mix>(source: &Pyramid<P>, source_from_target: &Homography, width: usize, height: usize) -> Image<P> {
+pub fn warp<P: Mix>(
+    source: &Pyramid<P>,
+    source_from_target: &Homography,
+    width: usize,
+    height: usize,
+) -> Image<P> {
     let m = source_from_target.0;
     Image::from_fn(width, height, |x, y| {
         let q = m * Point2::new(x as f64 + 0.5, y as f64 + 0.5).to_homogeneous();
@@ -87,7 +122,8 @@ fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2
     let mut sum = P::default();
     for i in 0..counts[0] as u32 {
         for j in 0..counts[1] as u32 {
-            let [along, across] = [(i, counts[0]), (j, counts[1])].map(|(k, count)| (f64::from(k) + 0.5) / count - 0.5);
+            let [along, across] = [(i, counts[0]), (j, counts[1])]
+                .map(|(k, count)| (f64::from(k) + 0.5) / count - 0.5);
             let place = (at + axes[0] * along + axes[1] * across) / scale;
             sum = sum.add_scaled(weight, sample_bilinear(picture, place.x, place.y));
         }
@@ -97,7 +133,11 @@ fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2
 
 /// The last level of a pyramid whose pixels are at most so large, in pixels of the first.
 fn level_below(size: f64) -> usize {
-    if size < 2.0 { 0 } else { libm::log2(size).min(MOST_LEVELS) as usize }
+    if size < 2.0 {
+        0
+    } else {
+        libm::log2(size).min(MOST_LEVELS) as usize
+    }
 }
 
 /// No picture has more levels.
@@ -107,7 +147,10 @@ const MOST_LEVELS: f64 = 31.0;
 /// transpose, as long as the roots of the eigenvalues.
 fn axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
     let square = slope * slope.transpose();
-    let (mean, half) = (square.trace() / 2.0, (square[(0, 0)] - square[(1, 1)]) / 2.0);
+    let (mean, half) = (
+        square.trace() / 2.0,
+        (square[(0, 0)] - square[(1, 1)]) / 2.0,
+    );
     let spread = (half * half + square[(0, 1)] * square[(0, 1)]).sqrt();
     // Two ways to write the same direction; the one that does not cancel.
     let direction = match half >= 0.0 {
@@ -115,7 +158,10 @@ fn axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
         false => Vector2::new(square[(0, 1)], spread - half),
     };
     let along = direction.try_normalize(0.0).unwrap_or(Vector2::x());
-    [along * (mean + spread).sqrt(), Vector2::new(-along.y, along.x) * (mean - spread).max(0.0).sqrt()]
+    [
+        along * (mean + spread).sqrt(),
+        Vector2::new(-along.y, along.x) * (mean - spread).max(0.0).sqrt(),
+    ]
 }
 
 #[cfg(test)]
@@ -125,12 +171,18 @@ mod tests {
     use crate::pixel::Coverage;
 
     fn camera() -> Camera {
-        let scenario = Scenario { image: [400, 300], focal_px: 320.0, ..Scenario::default() };
+        let scenario = Scenario {
+            image: [400, 300],
+            focal_px: 320.0,
+            ..Scenario::default()
+        };
         scenario.tilted(35.0).view(1, 0).camera
     }
 
     fn waves(width: usize, height: usize) -> Image<Coverage> {
-        let wave = |x: usize, y: usize| 0.5 + 0.25 * (libm::sin(x as f64 / 15.0) + libm::cos(y as f64 / 11.0));
+        let wave = |x: usize, y: usize| {
+            0.5 + 0.25 * (libm::sin(x as f64 / 15.0) + libm::cos(y as f64 / 11.0))
+        };
         Image::from_fn(width, height, |x, y| Coverage(wave(x, y) as f32))
     }
 
@@ -152,8 +204,18 @@ mod tests {
     #[test]
     fn the_identity_changes_nothing() {
         let picture = waves(31, 17);
-        let same = warp(&Pyramid::new(picture.clone()), &Homography(Matrix3::identity()), 31, 17);
-        let worst = same.pixels().iter().zip(picture.pixels()).map(|(a, b)| (a.0 - b.0).abs()).fold(0.0, f32::max);
+        let same = warp(
+            &Pyramid::new(picture.clone()),
+            &Homography(Matrix3::identity()),
+            31,
+            17,
+        );
+        let worst = same
+            .pixels()
+            .iter()
+            .zip(picture.pixels())
+            .map(|(a, b)| (a.0 - b.0).abs())
+            .fold(0.0, f32::max);
         assert!(worst < 1e-6, "{worst}");
     }
 
@@ -162,13 +224,20 @@ mod tests {
         let rings = |x: f64, y: f64| 0.5 + 0.4 * libm::cos(4e-3 * (x * x + y * y));
         let mean = |x: usize, y: usize, [w, h]: [f64; 2]| {
             let part = |k: usize, at: usize, side: f64| (at as f64 + (k as f64 + 0.5) / 8.0) * side;
-            let sum: f64 = (0..64).map(|k| rings(part(k % 8, x, w), part(k / 8, y, h))).sum();
+            let sum: f64 = (0..64)
+                .map(|k| rings(part(k % 8, x, w), part(k / 8, y, h)))
+                .sum();
             Coverage((sum / 64.0) as f32)
         };
         let picture = Image::from_fn(240, 240, |x, y| mean(x, y, [1.0; 2]));
         let (w, h) = ((240.0 / by[0]) as usize, (240.0 / by[1]) as usize);
-        let shrink = Homography(Matrix3::from_diagonal(&nalgebra::Vector3::new(by[0], by[1], 1.0)));
-        (warp(&Pyramid::new(picture), &shrink, w, h), Image::from_fn(w, h, |x, y| mean(x, y, by)))
+        let shrink = Homography(Matrix3::from_diagonal(&nalgebra::Vector3::new(
+            by[0], by[1], 1.0,
+        )));
+        (
+            warp(&Pyramid::new(picture), &shrink, w, h),
+            Image::from_fn(w, h, |x, y| mean(x, y, by)),
+        )
     }
 
     #[test]
@@ -176,9 +245,14 @@ mod tests {
         // Bilinear samples blur by a pixel of their level: a seventh of the rings, the finest of which are 3 pixels wide.
         for by in [[1.3, 1.3], [2.0, 2.0], [3.0, 2.5], [1.0, 5.0]] {
             let (found, wanted) = shrunk_rings(by);
-            let inner = |i: &usize| (4..found.width() - 4).contains(&(i % found.width())) && *i >= 4 * found.width();
+            let inner = |i: &usize| {
+                (4..found.width() - 4).contains(&(i % found.width())) && *i >= 4 * found.width()
+            };
             let square = |i: usize| f64::from(found.pixels()[i].0 - wanted.pixels()[i].0).powi(2);
-            let inside: Vec<f64> = (0..found.width() * (found.height() - 4)).filter(inner).map(square).collect();
+            let inside: Vec<f64> = (0..found.width() * (found.height() - 4))
+                .filter(inner)
+                .map(square)
+                .collect();
             let rms = (inside.iter().sum::<f64>() / inside.len() as f64).sqrt();
             assert!(rms < 0.04, "{by:?}: {rms}");
         }
@@ -186,11 +260,22 @@ mod tests {
 
     #[test]
     fn axes_are_those_of_the_ellipse() {
-        for (a, b, turn) in [(3.0, 1.0, 0.3), (2.0, 2.0, 1.0), (5.0, 0.0, -1.2), (4.0, 1.5, 1.6)] {
+        for (a, b, turn) in [
+            (3.0, 1.0, 0.3),
+            (2.0, 2.0, 1.0),
+            (5.0, 0.0, -1.2),
+            (4.0, 1.5, 1.6),
+        ] {
             let rotation = nalgebra::Rotation2::new(turn).into_inner();
             let [long, short] = axes(&(rotation * Matrix2::new(a, 0.0, 0.0, b)));
-            assert!((long.norm() - a).abs() < 1e-9 && (short.norm() - b).abs() < 1e-6, "{long} {short}");
-            assert!(a == b || long.perp(&(rotation * Vector2::x())).abs() < 1e-9, "{long}");
+            assert!(
+                (long.norm() - a).abs() < 1e-9 && (short.norm() - b).abs() < 1e-6,
+                "{long} {short}"
+            );
+            assert!(
+                a == b || long.perp(&(rotation * Vector2::x())).abs() < 1e-9,
+                "{long}"
+            );
         }
     }
 
@@ -205,7 +290,11 @@ mod tests {
             for p in inner {
                 // Half in one direction only, a row of the board keeps its two-pixel squares.
                 let slack = if x > 2.0 && y > 2.0 { 0.05 } else { 0.2 };
-                assert!((small[p].0 - 0.5).abs() < slack, "{x} {y} {p:?}: {}", small[p].0);
+                assert!(
+                    (small[p].0 - 0.5).abs() < slack,
+                    "{x} {y} {p:?}: {}",
+                    small[p].0
+                );
             }
         }
     }
@@ -214,7 +303,10 @@ mod tests {
     fn a_map_without_pixels_is_an_error() {
         let photo = Pyramid::new(waves(40, 30));
         for px_per_metre in [0.0, f64::NAN, -3.0, 1e9] {
-            assert!(rectify(&photo, &camera(), [0.6, 0.4], px_per_metre).is_err(), "{px_per_metre}");
+            assert!(
+                rectify(&photo, &camera(), [0.6, 0.4], px_per_metre).is_err(),
+                "{px_per_metre}"
+            );
         }
     }
 }

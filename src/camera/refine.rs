@@ -67,7 +67,11 @@ impl Evidence {
 
     /// The normal equations at a state; none where a point would be behind the camera.
     pub(crate) fn normal(&self, state: &State) -> Option<Normal> {
-        let mut normal = Normal { information: Square::zeros(), slope: Unknowns::zeros(), cost: 0.0 };
+        let mut normal = Normal {
+            information: Square::zeros(),
+            slope: Unknowns::zeros(),
+            cost: 0.0,
+        };
         for sight in &self.sights {
             let (seen, slope) = state.slope(&sight.point, sight.rigid)?;
             let (off, weight) = (seen - sight.seen, sight.weight * sight.weight);
@@ -79,8 +83,11 @@ impl Evidence {
             let (value, slope) = state.ln_height()?;
             normal.add(value - height.mean, &slope, height.information());
         }
-        self.beliefs.forget_facts(&mut normal.information, &mut normal.slope);
-        normal.cost += self.beliefs.add_to(state, &mut normal.information, &mut normal.slope);
+        self.beliefs
+            .forget_facts(&mut normal.information, &mut normal.slope);
+        normal.cost += self
+            .beliefs
+            .add_to(state, &mut normal.information, &mut normal.slope);
         Some(normal)
     }
 
@@ -130,7 +137,12 @@ impl Evidence {
                 break;
             }
         }
-        Some(Minimum { state, cost: normal.cost, information: normal.information, steps })
+        Some(Minimum {
+            state,
+            cost: normal.cost,
+            information: normal.information,
+            steps,
+        })
     }
 }
 
@@ -150,10 +162,17 @@ impl Normal {
         for i in 0..UNKNOWNS {
             let own = damped[(i, i)];
             // An unknown without information stays where it is.
-            damped[(i, i)] = if own > 0.0 { own * (1.0 + damping) } else { 1.0 };
+            damped[(i, i)] = if own > 0.0 {
+                own * (1.0 + damping)
+            } else {
+                1.0
+            };
         }
         let step = solve_positive(damped, -self.slope)?;
-        let length = step.component_mul(&step).dot(&self.information.diagonal()).sqrt();
+        let length = step
+            .component_mul(&step)
+            .dot(&self.information.diagonal())
+            .sqrt();
         let bounded = [0, 1, 2, LN_SCALE, LN_FOCAL, STRETCH].map(|i| step[i].abs());
         let leap = bounded.into_iter().fold(LONGEST_STEP, f64::max);
         Some((step * (LONGEST_STEP / leap), length))
@@ -197,7 +216,9 @@ fn solve_positive(a: Square, b: Unknowns) -> Option<Unknowns> {
 
 /// What each unknown has to be divided by for its own information to be 1; 1 where there is none.
 pub(crate) fn unit_diagonal(information: &Square) -> Unknowns {
-    information.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 })
+    information
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 })
 }
 
 #[cfg(test)]
@@ -206,8 +227,13 @@ mod tests {
 
     #[test]
     fn a_positive_system_is_solved_and_another_refused() {
-        let root = Square::from_fn(|i, j| libm::sin((3 * i + 7 * j) as f64) + if i == j { 4.0 } else { 0.0 });
-        let (a, x) = (root * root.transpose(), Unknowns::from_fn(|i, _| i as f64 - 3.0));
+        let root = Square::from_fn(|i, j| {
+            libm::sin((3 * i + 7 * j) as f64) + if i == j { 4.0 } else { 0.0 }
+        });
+        let (a, x) = (
+            root * root.transpose(),
+            Unknowns::from_fn(|i, _| i as f64 - 3.0),
+        );
         assert!((solve_positive(a, a * x).unwrap() - x).norm() < 1e-12);
         assert_eq!(solve_positive(-a, x), None);
         assert_eq!(solve_positive(a * f64::NAN, x), None);

@@ -24,30 +24,45 @@ impl Problem {
         let mut minima: Vec<Minimum> = Vec::with_capacity(10);
         let mut lowest = f64::INFINITY;
         let mut try_from = |start: State| {
-            let minimum = self.evidence.refine(start, lowest + TELLING).filter(is_above);
+            let minimum = self
+                .evidence
+                .refine(start, lowest + TELLING)
+                .filter(is_above);
             lowest = minimum.map_or(lowest, |m| lowest.min(m.cost));
             minima.extend(minimum);
         };
         for focal in self.focal_starts().into_iter().flatten() {
             let direct = self.start(focal);
             try_from(direct);
-            try_from(State { stance: direct.stance.mirrored(focal), ..direct });
+            try_from(State {
+                stance: direct.stance.mirrored(focal),
+                ..direct
+            });
         }
         let believed = self.start(libm::exp(self.evidence.beliefs.ln_focal.mean));
         for stance in self.view.distant_stances(self.unit_size()) {
             try_from(State { stance, ..believed });
         }
         let best = *minima.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
-        let elsewhere = minima.iter().filter(|m| degrees_apart(&m.state.stance, &best.state.stance) > ONE_POSE_DEG);
-        Some(Found { best, other: elsewhere.min_by(|a, b| a.cost.total_cmp(&b.cost)).copied() })
+        let elsewhere = minima
+            .iter()
+            .filter(|m| degrees_apart(&m.state.stance, &best.state.stance) > ONE_POSE_DEG);
+        Some(Found {
+            best,
+            other: elsewhere.min_by(|a, b| a.cost.total_cmp(&b.cost)).copied(),
+        })
     }
 
     /// The closed form, where it stands above the surface, after at most so many steps.
     pub(crate) fn first_guess(&self, most_steps: usize) -> Option<Found> {
         let fact = self.evidence.beliefs.ln_focal.is_fact();
         let said = self.closed_form_focal().filter(|_| !fact);
-        let start = self.start(said.unwrap_or_else(|| libm::exp(self.evidence.beliefs.ln_focal.mean)));
-        let best = self.evidence.refine_for(start, f64::INFINITY, most_steps).filter(is_above)?;
+        let start =
+            self.start(said.unwrap_or_else(|| libm::exp(self.evidence.beliefs.ln_focal.mean)));
+        let best = self
+            .evidence
+            .refine_for(start, f64::INFINITY, most_steps)
+            .filter(is_above)?;
         Some(Found { best, other: None })
     }
 
@@ -58,7 +73,12 @@ impl Problem {
         if belief.is_fact() {
             return [Some(believed), None, None, None];
         }
-        [Some(believed), self.closed_form_focal(), Some(believed / 2.0), Some(believed * 3.0)]
+        [
+            Some(believed),
+            self.closed_form_focal(),
+            Some(believed / 2.0),
+            Some(believed * 3.0),
+        ]
     }
 }
 

@@ -84,12 +84,21 @@ impl Scenario {
     /// A camera with errors as real ones have: corners to 1 px, the principal point to 0.005 diagonals, a slight distortion,
     /// the sides to 0.5 %.
     pub fn realistic() -> Self {
-        Self { corner_sigma_px: 1.0, principal_sigma_px: 25.0, kappa: 0.01, ratio_sigma: 0.005, ..Self::default() }
+        Self {
+            corner_sigma_px: 1.0,
+            principal_sigma_px: 25.0,
+            kappa: 0.01,
+            ratio_sigma: 0.005,
+            ..Self::default()
+        }
     }
 
     /// The same, tilted by so many degrees.
     pub fn tilted(self, degrees: f64) -> Self {
-        Self { tilt: degrees.to_radians(), ..self }
+        Self {
+            tilt: degrees.to_radians(),
+            ..self
+        }
     }
 
     /// View `k` of a seed.
@@ -118,8 +127,16 @@ impl Scenario {
             let px = self.off_center * f64::from(self.image[0].max(self.image[1]));
             off += Vector2::new(libm::cos(direction), libm::sin(direction)) * px;
         }
-        let kappa = if dice.between(0.0, 1.0) < 0.5 { -self.kappa } else { self.kappa };
-        Lens { principal_px: center + off, kappa, ln_ratio: dice.normal() * self.ratio_sigma }
+        let kappa = if dice.between(0.0, 1.0) < 0.5 {
+            -self.kappa
+        } else {
+            self.kappa
+        };
+        Lens {
+            principal_px: center + off,
+            kappa,
+            ln_ratio: dice.normal() * self.ratio_sigma,
+        }
     }
 
     fn view_through(&self, lens: &Lens, dice: &mut Dice) -> View {
@@ -128,10 +145,20 @@ impl Scenario {
         let noisy = seen.map(|p| [0, 1].map(|axis| p[axis] + dice.normal() * self.corner_sigma_px));
         // The person measured another ratio than there is.
         let half = libm::exp(lens.ln_ratio / 2.0);
-        let mut label = Label::new(self.image, noisy, [self.size[0] * half, self.size[1] / half]);
-        label.surface.corner_sigma_px = (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
+        let mut label = Label::new(
+            self.image,
+            noisy,
+            [self.size[0] * half, self.size[1] / half],
+        );
+        label.surface.corner_sigma_px =
+            (self.corner_sigma_px > 0.0).then_some(self.corner_sigma_px);
         label.image.cropped = (self.off_center == 0.0).then_some(false);
-        View { label, camera, kappa: lens.kappa, size: self.size }
+        View {
+            label,
+            camera,
+            kappa: lens.kappa,
+            size: self.size,
+        }
     }
 
     fn camera(&self, lens: &Lens, dice: &mut Dice) -> Camera {
@@ -156,7 +183,10 @@ impl Scenario {
             image: self.image,
             focal_px: Vector2::repeat(self.focal_px),
             principal_px: lens.principal_px,
-            camera_from_world: Pose::from_parts(t.into(), UnitQuaternion::from_rotation_matrix(&rotation)),
+            camera_from_world: Pose::from_parts(
+                t.into(),
+                UnitQuaternion::from_rotation_matrix(&rotation),
+            ),
         }
     }
 
@@ -164,7 +194,9 @@ impl Scenario {
         let azimuth = self.azimuth.unwrap_or_else(|| dice.between(0.0, TAU));
         let axis = Vector3::new(libm::cos(azimuth), libm::sin(azimuth), 0.0);
         let roll = Rotation3::new(Vector3::z() * dice.between(0.0, TAU));
-        let down = Rotation3::from_matrix_unchecked(Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0)));
+        let down = Rotation3::from_matrix_unchecked(Matrix3::from_diagonal(&Vector3::new(
+            1.0, -1.0, -1.0,
+        )));
         roll * down * Rotation3::new(axis * self.tilt)
     }
 
@@ -176,7 +208,11 @@ impl Scenario {
             let middle = (near * far).sqrt();
             let (low, high) = self.extent(turned, middle);
             let filled = (high - low).component_div(&image).max();
-            if filled > self.fill { near = middle } else { far = middle }
+            if filled > self.fill {
+                near = middle
+            } else {
+                far = middle
+            }
         }
         far
     }
@@ -184,8 +220,14 @@ impl Scenario {
     /// Bounds of the corners in the picture when the rectangle's centre is on the axis, pixels.
     fn extent(&self, turned: &[Vector3<f64>; 4], distance: f64) -> (Vector2<f64>, Vector2<f64>) {
         let seen = turned.map(|p| p.xy() * (self.focal_px / (p.z + distance)));
-        let low = seen.iter().fold(Vector2::repeat(f64::MAX), |low, p| low.inf(p));
-        (low, seen.iter().fold(Vector2::repeat(f64::MIN), |high, p| high.sup(p)))
+        let low = seen
+            .iter()
+            .fold(Vector2::repeat(f64::MAX), |low, p| low.inf(p));
+        (
+            low,
+            seen.iter()
+                .fold(Vector2::repeat(f64::MIN), |high, p| high.sup(p)),
+        )
     }
 }
 
@@ -226,10 +268,14 @@ mod tests {
             let corners = view.label.surface.corners_px.unwrap();
             let extent = |axis: usize| {
                 let values = corners.map(|c| c[axis]);
-                values.into_iter().fold(f64::MIN, f64::max) - values.into_iter().fold(f64::MAX, f64::min)
+                values.into_iter().fold(f64::MIN, f64::max)
+                    - values.into_iter().fold(f64::MAX, f64::min)
             };
             // Exact only where the rectangle stands in the middle.
-            assert!(((extent(0) / 4000.0).max(extent(1) / 3000.0) - 0.7).abs() < 0.15, "{k}: {corners:?}");
+            assert!(
+                ((extent(0) / 4000.0).max(extent(1) / 3000.0) - 0.7).abs() < 0.15,
+                "{k}: {corners:?}"
+            );
             assert!((view.camera.tilt().to_degrees() - 30.0).abs() < 1e-9);
         }
     }

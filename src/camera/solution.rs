@@ -134,7 +134,9 @@ impl Problem {
         let seen = self.seen_corners(minimum);
         let per_corner_px = [0, 1, 2, 3].map(|i| (seen[i] - self.corners_px[i]).norm());
         let rms_px = (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt();
-        let height = options.reference_height.unwrap_or(REFERENCE_HEIGHT * size[0].min(size[1]));
+        let height = options
+            .reference_height
+            .unwrap_or(REFERENCE_HEIGHT * size[0].min(size[1]));
         let fit = self.fit(minimum, &camera, per_corner_px, uncertainty.condition);
         let sigma = self.sigma(minimum, uncertainty, height);
         let to_px = |ln_focal: f64| libm::exp(ln_focal) * self.frame.unit_px;
@@ -142,7 +144,11 @@ impl Problem {
             share: uncertainty.focal.share,
             prior_px: to_px(believed.mean),
             prior_sigma: believed.sigma,
-            from_data_px: uncertainty.focal.from_data.map(|b| to_px(b.mean)).filter(|f| f.is_finite()),
+            from_data_px: uncertainty
+                .focal
+                .from_data
+                .map(|b| to_px(b.mean))
+                .filter(|f| f.is_finite()),
         };
         let focal_source = self.focal_source(minimum, &uncertainty.focal);
         let mut solution = Solution {
@@ -171,24 +177,40 @@ impl Problem {
             image: self.image,
             focal_px: Vector2::repeat(state.focal * frame.unit_px),
             principal_px: frame.principal_px + state.principal * frame.unit_px,
-            camera_from_world: Pose::from_parts((state.translation() * frame.unit).into(), rotation),
+            camera_from_world: Pose::from_parts(
+                (state.translation() * frame.unit).into(),
+                rotation,
+            ),
         }
     }
 
     /// Where the rectangle's corners are seen, pixels, distortion included.
     fn seen_corners(&self, minimum: &Minimum) -> [Point2<f64>; 4] {
         corner_points(self.size).map(|corner| {
-            let seen = minimum.state.project(&(corner.coords / self.frame.unit), false);
-            seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| self.frame.principal_px + u * self.frame.unit_px)
+            let seen = minimum
+                .state
+                .project(&(corner.coords / self.frame.unit), false);
+            seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| {
+                self.frame.principal_px + u * self.frame.unit_px
+            })
         })
     }
 
-    fn fit(&self, minimum: &Minimum, camera: &Camera, per_corner_px: [f64; 4], condition: f64) -> Fit {
+    fn fit(
+        &self,
+        minimum: &Minimum,
+        camera: &Camera,
+        per_corner_px: [f64; 4],
+        condition: f64,
+    ) -> Fit {
         let evidence = &self.evidence;
         let seen = 2 * evidence.sights.len() + usize::from(evidence.beliefs.ln_height.is_some());
         let dof = seen.saturating_sub(6 + evidence.beliefs.unknown());
         let depths = corner_points(self.fitted_size(&minimum.state)).map(|c| depth(camera, c));
-        let (near, far) = (depths.into_iter().fold(f64::MAX, f64::min), depths.into_iter().fold(0.0, f64::max));
+        let (near, far) = (
+            depths.into_iter().fold(f64::MAX, f64::min),
+            depths.into_iter().fold(0.0, f64::max),
+        );
         Fit {
             chi2: minimum.cost,
             dof,
@@ -219,7 +241,12 @@ impl Problem {
         let believed = self.evidence.beliefs.ln_focal;
         if believed.is_fact() {
             FocalSource::Fixed
-        } else if believed.says_nothing() && self.evidence.ln_focal_range.contains(&minimum.state.ln_focal) {
+        } else if believed.says_nothing()
+            && self
+                .evidence
+                .ln_focal_range
+                .contains(&minimum.state.ln_focal)
+        {
             FocalSource::Unbounded
         } else if focal.share >= MEASURED {
             FocalSource::Measured
@@ -243,36 +270,71 @@ impl Solution {
     /// Why the solution does not fit its label, where it does not: so improbable by chance, or so much better with the
     /// sides exchanged, that it is worth nothing.
     pub fn misfit(&self) -> Option<SolveError> {
-        let severe = self.warnings.iter().any(|w| matches!(w, Warning::Inconsistent { severe: true, .. }));
+        let severe = self
+            .warnings
+            .iter()
+            .any(|w| matches!(w, Warning::Inconsistent { severe: true, .. }));
         let exchanged = self.warnings.iter().find_map(|w| match *w {
-            Warning::SidesSwapped { labelled, exchanged } if self.fit.chi2 > exchanged => Some([labelled, exchanged]),
+            Warning::SidesSwapped {
+                labelled,
+                exchanged,
+            } if self.fit.chi2 > exchanged => Some([labelled, exchanged]),
             _ => None,
         });
-        let mended = self.alternative.as_ref().is_some_and(|other| other.misfit().is_none());
+        let mended = self
+            .alternative
+            .as_ref()
+            .is_some_and(|other| other.misfit().is_none());
         let exchanged = exchanged.filter(|_| mended);
         let p_value = self.fit.p_value.unwrap_or(0.0);
-        (severe || exchanged.is_some()).then_some(SolveError::NoFit { rms_px: self.rms_px, p_value, exchanged })
+        (severe || exchanged.is_some()).then_some(SolveError::NoFit {
+            rms_px: self.rms_px,
+            p_value,
+            exchanged,
+        })
     }
 
     /// Everything that a camera file holds is finite, but for standard deviations of what nothing is known of.
     pub(crate) fn is_finite(&self) -> bool {
         let (camera, fit, focal) = (&self.camera, &self.fit, &self.focal);
         let center = camera.center();
-        let places = [camera.focal_px.x, camera.principal_px.x, camera.principal_px.y, center.x, center.y, center.z];
-        let fits = [fit.chi2, fit.depth_ratio, fit.px_per_metre, self.rms_px, self.kappa, focal.prior_px, focal.share];
-        places.iter().chain(&fits).chain(&self.size).all(|value| value.is_finite())
+        let places = [
+            camera.focal_px.x,
+            camera.principal_px.x,
+            camera.principal_px.y,
+            center.x,
+            center.y,
+            center.z,
+        ];
+        let fits = [
+            fit.chi2,
+            fit.depth_ratio,
+            fit.px_per_metre,
+            self.rms_px,
+            self.kappa,
+            focal.prior_px,
+            focal.share,
+        ];
+        places
+            .iter()
+            .chain(&fits)
+            .chain(&self.size)
+            .all(|value| value.is_finite())
     }
 
     /// From which error on objects at the reference height are warned of, pixels.
     pub(crate) fn height_limit_px(&self, options: &SolveOptions) -> f64 {
         let [w, h] = self.camera.image.map(f64::from);
-        options.max_height_sigma_px.unwrap_or(HEIGHT_SIGMA * libm::hypot(w, h))
+        options
+            .max_height_sigma_px
+            .unwrap_or(HEIGHT_SIGMA * libm::hypot(w, h))
     }
 
     /// That objects on the surface may be seen at the wrong place, where they may.
     pub(crate) fn height_warning(&self, options: &SolveOptions) -> Option<Warning> {
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
-        (sigma_px > self.height_limit_px(options)).then_some(Warning::HeightUncertain { height, sigma_px })
+        (sigma_px > self.height_limit_px(options))
+            .then_some(Warning::HeightUncertain { height, sigma_px })
     }
 
     /// Adds what is odd about the solution by itself.
@@ -282,11 +344,17 @@ impl Solution {
             self.warnings.push(Warning::Grazing { tilt_deg });
         }
         if self.focal_source == FocalSource::Unbounded {
-            self.warnings.push(Warning::FocalUnbounded { focal_px: self.camera.focal_px.x });
+            self.warnings.push(Warning::FocalUnbounded {
+                focal_px: self.camera.focal_px.x,
+            });
         }
         if let Some(p_value) = self.fit.p_value.filter(|&p| p < IMPROBABLE) {
             let severe = p_value < IMPOSSIBLE;
-            self.warnings.push(Warning::Inconsistent { p_value, rms_px: self.rms_px, severe });
+            self.warnings.push(Warning::Inconsistent {
+                p_value,
+                rms_px: self.rms_px,
+                severe,
+            });
         }
         self.warnings.extend(self.height_warning(options));
     }

@@ -60,7 +60,9 @@ struct Solved {
 /// The solution of a label as it stands.
 fn as_labelled(label: &Label, options: &SolveOptions) -> Result<Solved, SolveError> {
     match label.framing() {
-        Framing::Unknown if options.effort == Effort::Whole && options.priors.cropping_matters() => {
+        Framing::Unknown
+            if options.effort == Effort::Whole && options.priors.cropping_matters() =>
+        {
             perhaps_cropped(label, options)
         }
         Framing::Unknown => framed(label, Framing::Whole, options),
@@ -75,14 +77,22 @@ fn perhaps_cropped(label: &Label, options: &SolveOptions) -> Result<Solved, Solv
     let (whole, loose) = match (whole, loose) {
         (Ok(whole), Ok(loose)) => (whole, loose),
         (Ok(whole), Err(_)) => return Ok(whole),
-        (Err(_), loose) => return loose.map(|l| Solved { solution: l.solution.off_center(None), ..l }),
+        (Err(_), loose) => {
+            return loose.map(|l| Solved {
+                solution: l.solution.off_center(None),
+                ..l
+            });
+        }
     };
     if is_off_center(whole.minimum.cost, loose.minimum.cost) {
         let solution = loose.solution.off_center(Some(whole.solution));
         return Ok(Solved { solution, ..loose });
     }
     let apart = whole.minimum.state.step_to(&loose.minimum.state);
-    Ok(Solved { solution: whole.solution.hedged(&loose.solution, &apart, options), ..whole })
+    Ok(Solved {
+        solution: whole.solution.hedged(&loose.solution, &apart, options),
+        ..whole
+    })
 }
 
 /// The solution of a picture of some framing; another pose that fits as well is its alternative.
@@ -92,12 +102,19 @@ fn framed(label: &Label, framing: Framing, options: &SolveOptions) -> Result<Sol
     if !solution.is_finite() {
         return Err(SolveError::NoPose);
     }
-    if let Some(other) = found.other.filter(|other| other.cost < found.best.cost + TELLING) {
+    if let Some(other) = found
+        .other
+        .filter(|other| other.cost < found.best.cost + TELLING)
+    {
         let apart_deg = degrees_apart(&found.best.state.stance, &other.state.stance);
         solution.warnings.push(Warning::PoseAmbiguous { apart_deg });
         solution.alternative = Some(Box::new(problem.solution(&other, options)));
     }
-    Ok(Solved { solution, problem, minimum: found.best })
+    Ok(Solved {
+        solution,
+        problem,
+        minimum: found.best,
+    })
 }
 
 /// The search, repeated for a label that states k1 until that is understood at the focal length found.
@@ -108,7 +125,8 @@ fn with_stated_distortion(
 ) -> Result<(Problem, Found), SolveError> {
     let mut problem = Problem::new(label, framing, options)?;
     let mut found = search(&problem, options)?;
-    let known = label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.evidence.beliefs.ln_focal.is_fact();
+    let known =
+        label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.evidence.beliefs.ln_focal.is_fact();
     let mut understood = problem.evidence.beliefs.ln_focal.mean;
     for _ in 0..if known { 0 } else { MOST_REPEATS } {
         let ln_focal = found.best.state.ln_focal;
@@ -132,8 +150,14 @@ fn search(problem: &Problem, options: &SolveOptions) -> Result<Found, SolveError
 
 /// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer beside.
 fn without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
-    let Solved { mut solution, problem, minimum } = as_labelled(label, options)?;
-    let Some(conflict) = focal_conflict(&problem, &minimum) else { return Ok(solution) };
+    let Solved {
+        mut solution,
+        problem,
+        minimum,
+    } = as_labelled(label, options)?;
+    let Some(conflict) = focal_conflict(&problem, &minimum) else {
+        return Ok(solution);
+    };
     if problem.witness != Witness::Exif {
         solution.warnings.push(conflict);
         return Ok(solution);
@@ -152,25 +176,40 @@ fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Warning> {
     let sigmas = focal.conflict(believed)?.abs();
     let to_px = |ln_focal: f64| libm::exp(ln_focal) * problem.frame.unit_px;
     let (believed_px, measured_px) = (to_px(believed.mean), to_px(focal.from_data?.mean));
-    (sigmas > CONFLICT_SIGMAS).then_some(Warning::FocalPriorConflict { believed_px, measured_px, sigmas })
+    (sigmas > CONFLICT_SIGMAS).then_some(Warning::FocalPriorConflict {
+        believed_px,
+        measured_px,
+        sigmas,
+    })
 }
 
 /// Where width and height exchanged fit clearly better, says so, and has the better one beside, or before when asked.
 fn with_sides_exchanged(label: &Label, options: &SolveOptions, solution: Solution) -> Solution {
     let surface = &label.surface;
-    let differ = surface.width_m.is_some() && surface.height_m.is_some() && surface.width_m != surface.height_m;
+    let differ = surface.width_m.is_some()
+        && surface.height_m.is_some()
+        && surface.width_m != surface.height_m;
     let labelled = solution.fit.chi2;
     if !differ || labelled <= TELLING {
         return solution;
     }
     let mut exchanged = label.clone();
     (exchanged.surface.width_m, exchanged.surface.height_m) = (surface.height_m, surface.width_m);
-    let Ok(other) = without_wrong_exif(&exchanged, options) else { return solution };
+    let Ok(other) = without_wrong_exif(&exchanged, options) else {
+        return solution;
+    };
     if other.fit.chi2 + TELLING >= labelled {
         return solution;
     }
-    let swapped = Warning::SidesSwapped { labelled, exchanged: other.fit.chi2 };
-    let (mut first, second) = if options.order == CornerOrder::Auto { (other, solution) } else { (solution, other) };
+    let swapped = Warning::SidesSwapped {
+        labelled,
+        exchanged: other.fit.chi2,
+    };
+    let (mut first, second) = if options.order == CornerOrder::Auto {
+        (other, solution)
+    } else {
+        (solution, other)
+    };
     first.warnings.push(swapped);
     first.alternative = Some(Box::new(second));
     first

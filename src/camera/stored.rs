@@ -34,15 +34,28 @@ pub struct Sighting {
 /// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
 pub fn sightings(labels: &[Labelled], force: bool) -> Result<Vec<Sighting>> {
     let files = labels.iter().map(stored).collect::<Result<Vec<_>>>()?;
-    let labels: Vec<Labelled> = labels.iter().zip(&files).map(|(l, file)| with_size(l, file.as_ref())).collect();
+    let labels: Vec<Labelled> = labels
+        .iter()
+        .zip(&files)
+        .map(|(l, file)| with_size(l, file.as_ref()))
+        .collect();
     let known = together(&labels);
     let one = |(labelled, file): (&Labelled, &Option<CameraFile>)| {
-        let stale = match file.as_ref().map(|file| (file, staleness(file, labelled, &known))) {
+        let stale = match file
+            .as_ref()
+            .map(|file| (file, staleness(file, labelled, &known)))
+        {
             Some((file, None)) => return Ok(Sighting::stored(file)),
-            Some((_, Some(why))) => Some(format!("{}: {why}; solved again", path_of(labelled).display())),
+            Some((_, Some(why))) => Some(format!(
+                "{}: {why}; solved again",
+                path_of(labelled).display()
+            )),
             None => None,
         };
-        Ok(Sighting { stale, ..Sighting::solved(labelled, force)? })
+        Ok(Sighting {
+            stale,
+            ..Sighting::solved(labelled, force)?
+        })
     };
     labels.iter().zip(&files).map(one).collect()
 }
@@ -50,15 +63,32 @@ pub fn sightings(labels: &[Labelled], force: bool) -> Result<Vec<Sighting>> {
 impl Sighting {
     fn stored(file: &CameraFile) -> Self {
         let warnings = file.found.warnings.clone();
-        Self { camera: file.camera(), size: file.size(), warnings, stored: true, stale: None }
+        Self {
+            camera: file.camera(),
+            size: file.size(),
+            warnings,
+            stored: true,
+            stale: None,
+        }
     }
 
     fn solved(labelled: &Labelled, force: bool) -> Result<Self> {
-        let error = |e: SolveError| advised_on_size(Error::from(e).in_file(&labelled.source), labelled);
+        let error =
+            |e: SolveError| advised_on_size(Error::from(e).in_file(&labelled.source), labelled);
         let solution = solve(&labelled.label, &SolveOptions::default()).map_err(error)?;
-        let solution = if force { solution } else { solution.fitting().map_err(error)? };
+        let solution = if force {
+            solution
+        } else {
+            solution.fitting().map_err(error)?
+        };
         let (camera, size, warnings) = (solution.camera, solution.size, solution.warnings);
-        Ok(Self { camera, size, warnings, stored: false, stale: None })
+        Ok(Self {
+            camera,
+            size,
+            warnings,
+            stored: false,
+            stale: None,
+        })
     }
 }
 
@@ -74,13 +104,19 @@ fn stored(labelled: &Labelled) -> Result<Option<CameraFile>> {
     }
     let read = || {
         let file: CameraFile = io::read_json(&path)?;
-        file.check(labelled.label.image_size()).map_err(|e| e.in_file(&path))?;
+        file.check(labelled.label.image_size())
+            .map_err(|e| e.in_file(&path))?;
         Ok(Some(file))
     };
     read().map_err(|error: Error| {
         let what = error.to_string();
-        let what = what.strip_prefix(&format!("{}: ", path.display())).unwrap_or(&what);
-        Error::file(&path, format!("{what}; delete it, or run `petcomp camera solve` again"))
+        let what = what
+            .strip_prefix(&format!("{}: ", path.display()))
+            .unwrap_or(&what);
+        Error::file(
+            &path,
+            format!("{what}; delete it, or run `petcomp camera solve` again"),
+        )
     })
 }
 
@@ -101,14 +137,22 @@ fn advised_on_size(error: Error, labelled: &Labelled) -> Error {
 fn with_size(labelled: &Labelled, file: Option<&CameraFile>) -> Labelled {
     let mut labelled = labelled.clone();
     let surface = &mut labelled.label.surface;
-    if let (None, None, Some(from)) = (surface.width_m, surface.height_m, file.and_then(|f| f.solved_from.as_ref())) {
+    if let (None, None, Some(from)) = (
+        surface.width_m,
+        surface.height_m,
+        file.and_then(|f| f.solved_from.as_ref()),
+    ) {
         [surface.width_m, surface.height_m] = from.size_m;
     }
     labelled
 }
 
 /// Why a camera is not that of its label any more; `known` are the labels that are there.
-fn staleness(file: &CameraFile, labelled: &Labelled, known: &BTreeMap<String, u32>) -> Option<String> {
+fn staleness(
+    file: &CameraFile,
+    labelled: &Labelled,
+    known: &BTreeMap<String, u32>,
+) -> Option<String> {
     let Some(from) = &file.solved_from else {
         let older = modified(&path_of(labelled)) < modified(&labelled.source);
         return older.then(|| "older than its label".to_owned());
@@ -127,7 +171,10 @@ fn modified(path: &Path) -> Option<std::time::SystemTime> {
 
 /// The checksums of labels by name: what each of those that are solved together keeps of the others.
 pub fn together<'a>(labels: impl IntoIterator<Item = &'a Labelled>) -> BTreeMap<String, u32> {
-    labels.into_iter().map(|labelled| (labelled.name.clone(), checksum(&labelled.label))).collect()
+    labels
+        .into_iter()
+        .map(|labelled| (labelled.name.clone(), checksum(&labelled.label)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -159,7 +206,9 @@ mod tests {
 
         fn write(&self, label: &Label) -> Labelled {
             io::write_json(self.path("a.label.json"), label).unwrap();
-            read_labels(self.path("a.label.json"), None).unwrap().remove(0)
+            read_labels(self.path("a.label.json"), None)
+                .unwrap()
+                .remove(0)
         }
 
         /// A camera file whose focal length tells it from a camera solved anew.
@@ -184,11 +233,23 @@ mod tests {
         // Written anew with other spaces and a younger time: still the same label.
         let text = serde_json::to_string(&label).unwrap();
         io::write_text(desk.path("a.label.json"), &text).unwrap();
-        assert!(sighting(&read_labels(desk.path("a.label.json"), None).unwrap()[0], false).unwrap().stored);
+        assert!(
+            sighting(
+                &read_labels(desk.path("a.label.json"), None).unwrap()[0],
+                false
+            )
+            .unwrap()
+            .stored
+        );
         label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
         let found = sighting(&desk.write(&label), false).unwrap();
         assert!(!found.stored && found.camera.focal_px.x != 3333.0);
-        assert!(found.stale.unwrap().contains("a.camera.json: solved from another version of its label"));
+        assert!(
+            found
+                .stale
+                .unwrap()
+                .contains("a.camera.json: solved from another version of its label")
+        );
     }
 
     #[test]
@@ -197,9 +258,19 @@ mod tests {
         let labelled = desk.write(&desk.label(0));
         desk.store(&labelled, |file| file.solved_from = None);
         assert!(sighting(&labelled, false).unwrap().stored);
-        let file = std::fs::File::options().write(true).open(desk.path("a.camera.json")).unwrap();
-        file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
-        assert!(sighting(&labelled, false).unwrap().stale.unwrap().contains("older than its label"));
+        let file = std::fs::File::options()
+            .write(true)
+            .open(desk.path("a.camera.json"))
+            .unwrap();
+        file.set_modified(std::time::SystemTime::UNIX_EPOCH)
+            .unwrap();
+        assert!(
+            sighting(&labelled, false)
+                .unwrap()
+                .stale
+                .unwrap()
+                .contains("older than its label")
+        );
     }
 
     #[test]
@@ -209,13 +280,24 @@ mod tests {
         let other = desk.label(1);
         let path = desk.path("b.label.json");
         io::write_json(&path, &other).unwrap();
-        let mut labels = [labelled.clone(), read_labels(&path, None).unwrap().remove(0)];
-        desk.store(&labelled, |file| file.solved_from.as_mut().unwrap().together = together(&labels));
+        let mut labels = [
+            labelled.clone(),
+            read_labels(&path, None).unwrap().remove(0),
+        ];
+        desk.store(&labelled, |file| {
+            file.solved_from.as_mut().unwrap().together = together(&labels)
+        });
         assert!(sightings(&labels, false).unwrap()[0].stored);
         labels[1].label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
         let stale = sightings(&labels, false).unwrap().remove(0).stale.unwrap();
-        assert!(stale.contains("together with another version of b"), "{stale}");
-        assert!(sighting(&labelled, false).unwrap().stored, "a copy of a part of the photos");
+        assert!(
+            stale.contains("together with another version of b"),
+            "{stale}"
+        );
+        assert!(
+            sighting(&labelled, false).unwrap().stored,
+            "a copy of a part of the photos"
+        );
     }
 
     #[test]
@@ -224,9 +306,15 @@ mod tests {
         let labelled = desk.write(&desk.label(0));
         type Edit = fn(&mut CameraFile);
         let edits: [(Edit, &str); 6] = [
-            (|f| f.image.width = 1, "image: 1 x 3000 pixels, expected 4000 x 3000"),
+            (
+                |f| f.image.width = 1,
+                "image: 1 x 3000 pixels, expected 4000 x 3000",
+            ),
             (|f| f.found.model.f_px = -1.0, "model.f_px: -1e0"),
-            (|f| f.found.model.principal_point_px[0] = 1e300, "model.principal_point_px: 1e300"),
+            (
+                |f| f.found.model.principal_point_px[0] = 1e300,
+                "model.principal_point_px: 1e300",
+            ),
             (|f| f.found.opencv.r[0][0] = 7.0, "opencv.R: no rotation"),
             (|f| f.found.opencv.t = [0.0, 0.0, -1.0], "below the surface"),
             (|f| f.found.surface.width_m = 0.0, "surface: 0e0"),
@@ -234,11 +322,22 @@ mod tests {
         for (edit, expected) in edits {
             desk.store(&labelled, edit);
             let error = sighting(&labelled, true).unwrap_err().to_string();
-            assert!(error.contains(expected) && error.contains("a.camera.json: "), "{error}");
-            assert!(error.ends_with("delete it, or run `petcomp camera solve` again"), "{error}");
+            assert!(
+                error.contains(expected) && error.contains("a.camera.json: "),
+                "{error}"
+            );
+            assert!(
+                error.ends_with("delete it, or run `petcomp camera solve` again"),
+                "{error}"
+            );
         }
         io::write_text(desk.path("a.camera.json"), "{").unwrap();
-        assert!(sighting(&labelled, false).unwrap_err().to_string().contains("a.camera.json: line 1"));
+        assert!(
+            sighting(&labelled, false)
+                .unwrap_err()
+                .to_string()
+                .contains("a.camera.json: line 1")
+        );
     }
 
     #[test]
@@ -249,11 +348,21 @@ mod tests {
         (surface.width_m, surface.height_m) = (surface.height_m, surface.width_m);
         let labelled = desk.write(&label);
         let error = sighting(&labelled, false).unwrap_err().to_string();
-        assert!(error.contains("a.label.json") && error.contains("exchange width_m and height_m"), "{error}");
+        assert!(
+            error.contains("a.label.json") && error.contains("exchange width_m and height_m"),
+            "{error}"
+        );
         assert!(!sighting(&labelled, true).unwrap().stored);
         let solution = solve(&label, &SolveOptions::default()).unwrap();
         assert!(CameraFile::new(&label, &solution).forced);
-        io::write_json(desk.path("a.camera.json"), &CameraFile::new(&labelled.label, &solution)).unwrap();
-        assert!(sighting(&labelled, false).unwrap().stored, "forced when it was solved");
+        io::write_json(
+            desk.path("a.camera.json"),
+            &CameraFile::new(&labelled.label, &solution),
+        )
+        .unwrap();
+        assert!(
+            sighting(&labelled, false).unwrap().stored,
+            "forced when it was solved"
+        );
     }
 }

@@ -1,7 +1,9 @@
 //! How well a camera is known.
 
 use super::belief::Belief;
-use super::model::{CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns};
+use super::model::{
+    CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns,
+};
 use super::problem::Problem;
 use super::refine::{Minimum, unit_diagonal};
 use crate::geom::Point3;
@@ -46,7 +48,11 @@ impl Uncertainty {
         let (covariance, information) = covariance(&minimum.information);
         let condition = condition(&minimum.information, believed);
         let focal = focal_share(minimum.state.ln_focal, information, believed);
-        Self { covariance, focal, condition }
+        Self {
+            covariance,
+            focal,
+            condition,
+        }
     }
 
     /// Standard deviation of the tilt, radians.
@@ -58,7 +64,9 @@ impl Uncertainty {
             return ((c[(0, 0)] + c[(1, 1)]) / 2.0).sqrt();
         }
         let (x, y) = (normal.y / sin, -normal.x / sin);
-        (x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)]).max(0.0).sqrt()
+        (x * x * c[(0, 0)] + 2.0 * x * y * c[(0, 1)] + y * y * c[(1, 1)])
+            .max(0.0)
+            .sqrt()
     }
 
     /// Covariance of the camera's place over the rectangle.
@@ -66,7 +74,9 @@ impl Uncertainty {
         let t = state.translation();
         let back = state.stance.rotation.transpose();
         let mut slope = SMatrix::<f64, 3, UNKNOWNS>::zeros();
-        slope.fixed_columns_mut::<3>(0).copy_from(&-t.cross_matrix());
+        slope
+            .fixed_columns_mut::<3>(0)
+            .copy_from(&-t.cross_matrix());
         for axis in 0..2 {
             slope[(axis, CENTER + axis)] = -1.0 / state.stance.scale;
             slope[(axis, PRINCIPAL + axis)] = 1.0 / state.stance.scale;
@@ -80,32 +90,47 @@ impl Uncertainty {
     /// Covariance of where a point of the rectangle's frame is seen; none behind the camera.
     fn seen(&self, problem: &Problem, state: &State, point: Vector3<f64>) -> Option<Matrix2<f64>> {
         let (_, slope) = state.slope(&(point / problem.frame.unit), false)?;
-        Some(slope.transpose() * self.covariance * slope * (problem.frame.unit_px * problem.frame.unit_px))
+        Some(
+            slope.transpose()
+                * self.covariance
+                * slope
+                * (problem.frame.unit_px * problem.frame.unit_px),
+        )
     }
 
     /// The same at the rectangle's corners, squared pixels.
     pub(crate) fn corners_px(&self, problem: &Problem, state: &State) -> [Matrix2<f64>; 4] {
         let corners = super::problem::corner_points(problem.size);
-        corners.map(|c| self.seen(problem, state, c.coords).unwrap_or(Matrix2::repeat(f64::INFINITY)))
+        corners.map(|c| {
+            self.seen(problem, state, c.coords)
+                .unwrap_or(Matrix2::repeat(f64::INFINITY))
+        })
     }
 
     /// Root mean square error, pixels, of points over the rectangle at a height of `height` metres.
     pub(crate) fn height_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
-        let traces = heights(problem.size, height)
-            .map(|point| self.seen(problem, state, point.coords).map_or(f64::INFINITY, |c| variance(c.trace())));
+        let traces = heights(problem.size, height).map(|point| {
+            self.seen(problem, state, point.coords)
+                .map_or(f64::INFINITY, |c| variance(c.trace()))
+        });
         (traces.sum::<f64>() / (GRID * GRID) as f64).sqrt()
     }
 
     /// Standard deviation of a coordinate of the principal point, pixels.
     pub(crate) fn principal_px(&self, problem: &Problem) -> f64 {
-        let variance = self.covariance[(PRINCIPAL, PRINCIPAL)] + self.covariance[(PRINCIPAL + 1, PRINCIPAL + 1)];
+        let variance = self.covariance[(PRINCIPAL, PRINCIPAL)]
+            + self.covariance[(PRINCIPAL + 1, PRINCIPAL + 1)];
         problem.frame.unit_px * (variance / 2.0).sqrt()
     }
 }
 
 /// A variance as rounding has left it: nothing is surer than sure, and what is no number is not known at all.
 pub(crate) fn variance(value: f64) -> f64 {
-    if value.is_nan() { f64::INFINITY } else { value.max(0.0) }
+    if value.is_nan() {
+        f64::INFINITY
+    } else {
+        value.max(0.0)
+    }
 }
 
 /// Points of a grid over a rectangle, metres, at a height.
@@ -126,11 +151,19 @@ fn covariance(information: &Square) -> (Square, f64) {
     rest.row_mut(LN_FOCAL).fill(0.0);
     rest.column_mut(LN_FOCAL).fill(0.0);
     rest[(LN_FOCAL, LN_FOCAL)] = 1.0;
-    let inverse = rest.cholesky().or_else(|| (rest + Square::identity() * ROUNDING).cholesky());
-    let Some(mut inverse) = inverse.map(|c| c.inverse()) else { return (Square::repeat(f64::INFINITY), 0.0) };
+    let inverse = rest
+        .cholesky()
+        .or_else(|| (rest + Square::identity() * ROUNDING).cholesky());
+    let Some(mut inverse) = inverse.map(|c| c.inverse()) else {
+        return (Square::repeat(f64::INFINITY), 0.0);
+    };
     inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
     let mut response = -(inverse * coupling);
-    let own = if information[(LN_FOCAL, LN_FOCAL)] > 0.0 { 1.0 } else { 0.0 };
+    let own = if information[(LN_FOCAL, LN_FOCAL)] > 0.0 {
+        1.0
+    } else {
+        0.0
+    };
     let left = (own + coupling.dot(&response)).max(0.0);
     response[LN_FOCAL] = 1.0;
     if own > 0.0 {
@@ -140,7 +173,11 @@ fn covariance(information: &Square) -> (Square, f64) {
         inverse.row_mut(i).fill(0.0);
         inverse.column_mut(i).fill(0.0);
     }
-    let left = if left > ROUNDING { left / (scale[LN_FOCAL] * scale[LN_FOCAL]) } else { 0.0 };
+    let left = if left > ROUNDING {
+        left / (scale[LN_FOCAL] * scale[LN_FOCAL])
+    } else {
+        0.0
+    };
     (inverse.component_mul(&(scale * scale.transpose())), left)
 }
 
@@ -154,12 +191,27 @@ fn scaled(information: &Square, scale: &Unknowns) -> Square {
 /// What is known of the focal length, from the information left on its logarithm.
 pub(crate) fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> FocalShare {
     if believed.is_fact() {
-        return FocalShare { sigma: 0.0, share: 0.0, from_data: None };
+        return FocalShare {
+            sigma: 0.0,
+            share: 0.0,
+            from_data: None,
+        };
     }
     let from_data = (information - believed.information()).max(0.0);
-    let share = if information > 0.0 { from_data / information } else { 0.0 };
-    let start = if believed.says_nothing() { ln_focal } else { believed.mean };
-    let alone = Belief { mean: start + (ln_focal - start) / share, sigma: 1.0 / from_data.sqrt() };
+    let share = if information > 0.0 {
+        from_data / information
+    } else {
+        0.0
+    };
+    let start = if believed.says_nothing() {
+        ln_focal
+    } else {
+        believed.mean
+    };
+    let alone = Belief {
+        mean: start + (ln_focal - start) / share,
+        sigma: 1.0 / from_data.sqrt(),
+    };
     FocalShare {
         sigma: 1.0 / information.sqrt(),
         share,

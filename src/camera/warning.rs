@@ -111,7 +111,9 @@ pub enum Warning {
         severe: bool,
     },
     /// Width and height exchanged fit better.
-    #[error("width and height look exchanged (chi squared {labelled:.1} as labelled, {exchanged:.1} exchanged)")]
+    #[error(
+        "width and height look exchanged (chi squared {labelled:.1} as labelled, {exchanged:.1} exchanged)"
+    )]
     SidesSwapped {
         /// Chi squared as labelled.
         labelled: f64,
@@ -119,7 +121,9 @@ pub enum Warning {
         exchanged: f64,
     },
     /// Another pose explains the picture almost as well.
-    #[error("the pose is ambiguous: another one, turned by {apart_deg:.1} degrees, fits almost as well")]
+    #[error(
+        "the pose is ambiguous: another one, turned by {apart_deg:.1} degrees, fits almost as well"
+    )]
     PoseAmbiguous {
         /// Angle between the two surface normals, degrees.
         apart_deg: f64,

@@ -37,7 +37,11 @@ pub fn rgb_to_hsv(c: LinearRgb) -> Hsv {
     } else {
         4.0 + (c.r - c.g) / spread
     };
-    let h = if spread == 0.0 { 0.0 } else { turn(sixths / 6.0) };
+    let h = if spread == 0.0 {
+        0.0
+    } else {
+        turn(sixths / 6.0)
+    };
     let s = if v == 0.0 { 0.0 } else { spread / v };
     Hsv { h, s, v }
 }
@@ -66,7 +70,11 @@ pub fn shift_hsv(c: LinearRgb, hue_deg: f32, saturation: f32, value: f32) -> Lin
         return c;
     }
     let Hsv { h, s, v } = rgb_to_hsv(c);
-    let shifted = Hsv { h: h + hue_deg / 360.0, s: (s * saturation).clamp(0.0, 1.0), v: v * value };
+    let shifted = Hsv {
+        h: h + hue_deg / 360.0,
+        s: (s * saturation).clamp(0.0, 1.0),
+        v: v * value,
+    };
     hsv_to_rgb(shifted).map(|x| x.max(0.0))
 }
 
@@ -86,7 +94,9 @@ mod tests {
     /// Colours between -1 and 3, grey and pure ones included.
     fn colors() -> impl Iterator<Item = LinearRgb> {
         let steps = || (-4..=12).map(|i| i as f32 * 0.25);
-        steps().flat_map(move |r| steps().flat_map(move |g| steps().map(move |b| LinearRgb::new(r, g, b))))
+        steps().flat_map(move |r| {
+            steps().flat_map(move |g| steps().map(move |b| LinearRgb::new(r, g, b)))
+        })
     }
 
     fn largest(c: LinearRgb) -> f32 {
@@ -94,7 +104,10 @@ mod tests {
     }
 
     fn distance(a: LinearRgb, b: LinearRgb) -> f32 {
-        (a.r - b.r).abs().max((a.g - b.g).abs()).max((a.b - b.b).abs())
+        (a.r - b.r)
+            .abs()
+            .max((a.g - b.g).abs())
+            .max((a.b - b.b).abs())
     }
 
     #[test]
@@ -126,9 +139,24 @@ mod tests {
     #[test]
     fn a_third_of_a_turn_moves_red_to_green_and_a_negative_one_to_blue() {
         let red = LinearRgb::new(3.0, 0.0, 0.0);
-        assert!(distance(shift_hsv(red, 120.0, 1.0, 1.0), LinearRgb::new(0.0, 3.0, 0.0)) < 1e-6);
-        assert!(distance(shift_hsv(red, -120.0, 1.0, 1.0), LinearRgb::new(0.0, 0.0, 3.0)) < 1e-6);
-        assert!(distance(shift_hsv(red, 480.0, 1.0, 1.0), LinearRgb::new(0.0, 3.0, 0.0)) < 2e-6);
+        assert!(
+            distance(
+                shift_hsv(red, 120.0, 1.0, 1.0),
+                LinearRgb::new(0.0, 3.0, 0.0)
+            ) < 1e-6
+        );
+        assert!(
+            distance(
+                shift_hsv(red, -120.0, 1.0, 1.0),
+                LinearRgb::new(0.0, 0.0, 3.0)
+            ) < 1e-6
+        );
+        assert!(
+            distance(
+                shift_hsv(red, 480.0, 1.0, 1.0),
+                LinearRgb::new(0.0, 3.0, 0.0)
+            ) < 2e-6
+        );
     }
 
     #[test]
@@ -143,7 +171,10 @@ mod tests {
     fn shifted_colours_are_never_negative() {
         for c in colors() {
             let out = shift_hsv(c, 77.0, 3.0, 1.5);
-            assert!(out.r >= 0.0 && out.g >= 0.0 && out.b >= 0.0, "{c:?} became {out:?}");
+            assert!(
+                out.r >= 0.0 && out.g >= 0.0 && out.b >= 0.0,
+                "{c:?} became {out:?}"
+            );
         }
     }
 
@@ -153,8 +184,14 @@ mod tests {
         for c in colors().filter(|c| c.r.min(c.g).min(c.b) >= 0.0 && largest(*c) <= 1.0) {
             let theirs = Theirs::<Linear<Srgb>>::from_color(LinSrgb::new(c.r, c.g, c.b));
             let ours = rgb_to_hsv(c);
-            assert!((360.0 * ours.h - theirs.hue.into_positive_degrees()).abs() < 1e-3, "{c:?}");
-            assert!((ours.s - theirs.saturation).abs() < 1e-6 && (ours.v - theirs.value).abs() < 1e-6, "{c:?}");
+            assert!(
+                (360.0 * ours.h - theirs.hue.into_positive_degrees()).abs() < 1e-3,
+                "{c:?}"
+            );
+            assert!(
+                (ours.s - theirs.saturation).abs() < 1e-6 && (ours.v - theirs.value).abs() < 1e-6,
+                "{c:?}"
+            );
         }
     }
 }

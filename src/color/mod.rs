@@ -17,7 +17,8 @@ mod ycbcr;
 
 pub use hsv::{Hsv, hsv_to_rgb, rgb_to_hsv, shift_hsv};
 pub use quantize::{
-    decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16, from_srgb8, to_srgb8,
+    decode_row, decode_srgb8, decode_srgb16, encode_row, encode_srgb8, encode_srgb16, from_srgb8,
+    to_srgb8,
 };
 pub use space::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, xyz_from_rgb};
 pub use temperature::planckian;

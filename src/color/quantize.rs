@@ -70,7 +70,11 @@ pub fn to_srgb8(light: &Image<LinearRgb>) -> Image<Srgb8> {
 
 #[inline(always)]
 fn decode_with(table: &[f32; 256], code: Srgb8) -> LinearRgb {
-    LinearRgb::new(table[code.r as usize], table[code.g as usize], table[code.b as usize])
+    LinearRgb::new(
+        table[code.r as usize],
+        table[code.g as usize],
+        table[code.b as usize],
+    )
 }
 
 #[inline(always)]
@@ -79,8 +83,13 @@ fn encode_with(encoder: &Encoder<CELL_BITS8>, color: LinearRgb) -> Srgb8 {
     Srgb8 { r, g, b }
 }
 
-static DECODE8: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|code| light_of(code as u16, 255)));
-static DECODE16: LazyLock<Vec<f32>> = LazyLock::new(|| (0..=u16::MAX).map(|code| light_of(code, u16::MAX)).collect());
+static DECODE8: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| light_of(code as u16, 255)));
+static DECODE16: LazyLock<Vec<f32>> = LazyLock::new(|| {
+    (0..=u16::MAX)
+        .map(|code| light_of(code, u16::MAX))
+        .collect()
+});
 static ENCODE8: LazyLock<Encoder<CELL_BITS8>> = LazyLock::new(|| Encoder::new(u8::MAX.into()));
 static ENCODE16: LazyLock<Encoder<CELL_BITS16>> = LazyLock::new(|| Encoder::new(u16::MAX));
 
@@ -116,21 +125,41 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
     const REST_BITS: u32 = f32::MANTISSA_DIGITS - 1 - CELL_BITS;
 
     fn new(max: u16) -> Self {
-        let next = |code: u16| if code < max { least_light(code + 1, max) } else { f32::INFINITY };
+        let next = |code: u16| {
+            if code < max {
+                least_light(code + 1, max)
+            } else {
+                f32::INFINITY
+            }
+        };
         let first = next(0).to_bits() >> Self::REST_BITS;
-        let mut cell = Cell { code: 0, next: next(0) };
+        let mut cell = Cell {
+            code: 0,
+            next: next(0),
+        };
         let from = |number: u32| {
             while cell.next <= f32::from_bits(number << Self::REST_BITS) {
-                cell = Cell { code: cell.code + 1, next: next(cell.code + 1) };
+                cell = Cell {
+                    code: cell.code + 1,
+                    next: next(cell.code + 1),
+                };
             }
             Cell { ..cell }
         };
-        Self { cells: (first..=1.0_f32.to_bits() >> Self::REST_BITS).map(from).collect(), first }
+        Self {
+            cells: (first..=1.0_f32.to_bits() >> Self::REST_BITS)
+                .map(from)
+                .collect(),
+            first,
+        }
     }
 
     /// The code nearest to an amount of light.
     #[inline(always)]
-    #[expect(clippy::manual_clamp, reason = "`max` and then `min` take NaN to 0, `clamp` keeps it")]
+    #[expect(
+        clippy::manual_clamp,
+        reason = "`max` and then `min` take NaN to 0, `clamp` keeps it"
+    )]
     fn code(&self, light: f32) -> u16 {
         let light = light.max(0.0).min(1.0);
         let number = (light.to_bits() >> Self::REST_BITS).saturating_sub(self.first);
@@ -143,7 +172,11 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
 fn least_light(code: u16, max: u16) -> f32 {
     let exact = Curve::Srgb.decode_f64((f64::from(code) - 0.5) / f64::from(max));
     let near = exact as f32;
-    if f64::from(near) < exact { near.next_up() } else { near }
+    if f64::from(near) < exact {
+        near.next_up()
+    } else {
+        near
+    }
 }
 
 #[cfg(test)]
@@ -159,13 +192,19 @@ mod tests {
     /// Floats of all sizes from far below the first code to above 1, spread over their bit patterns.
     fn floats(count: u32) -> impl Iterator<Item = f32> {
         let (low, high) = (1e-6_f32.to_bits(), 1.01_f32.to_bits());
-        (0..count).map(move |i| f32::from_bits(low + ((high - low) as u64 * i as u64 / count as u64) as u32))
+        (0..count).map(move |i| {
+            f32::from_bits(low + ((high - low) as u64 * i as u64 / count as u64) as u32)
+        })
     }
 
     #[test]
     fn every_8_bit_code_survives() {
         for v in 0..=255 {
-            let code = Srgb8 { r: v, g: 255 - v, b: v / 2 };
+            let code = Srgb8 {
+                r: v,
+                g: 255 - v,
+                b: v / 2,
+            };
             assert_eq!(encode_srgb8(decode_srgb8(code)), code);
         }
     }
@@ -179,7 +218,11 @@ mod tests {
     fn encoding_rounds_as_f64_does() {
         for light in floats(400_000) {
             assert_eq!(ENCODE8.code(light), nearest_code(light, 255), "{light:e}");
-            assert_eq!(ENCODE16.code(light), nearest_code(light, u16::MAX), "{light:e}");
+            assert_eq!(
+                ENCODE16.code(light),
+                nearest_code(light, u16::MAX),
+                "{light:e}"
+            );
         }
     }
 
@@ -189,7 +232,11 @@ mod tests {
             for code in 1..=max {
                 let least = least_light(code, max);
                 for (light, right) in [(least, code), (least.next_down(), code - 1)] {
-                    assert_eq!((encoder.code(light), nearest_code(light, max)), (right, right), "{light:e}");
+                    assert_eq!(
+                        (encoder.code(light), nearest_code(light, max)),
+                        (right, right),
+                        "{light:e}"
+                    );
                 }
             }
         }
@@ -199,20 +246,44 @@ mod tests {
 
     #[test]
     fn what_no_code_can_hold_is_clipped() {
-        let strange = [f32::NAN, f32::NEG_INFINITY, -1.0, -0.0, f32::MIN_POSITIVE, f32::from_bits(1)];
-        assert!(strange.iter().all(|&light| ENCODE8.code(light) == 0 && ENCODE16.code(light) == 0));
-        assert!([1.0, 2.0, f32::MAX, f32::INFINITY].iter().all(|&light| ENCODE8.code(light) == 255));
+        let strange = [
+            f32::NAN,
+            f32::NEG_INFINITY,
+            -1.0,
+            -0.0,
+            f32::MIN_POSITIVE,
+            f32::from_bits(1),
+        ];
+        assert!(
+            strange
+                .iter()
+                .all(|&light| ENCODE8.code(light) == 0 && ENCODE16.code(light) == 0)
+        );
+        assert!(
+            [1.0, 2.0, f32::MAX, f32::INFINITY]
+                .iter()
+                .all(|&light| ENCODE8.code(light) == 255)
+        );
     }
 
     #[test]
     fn a_cell_holds_at_most_one_threshold() {
         assert!(ENCODE8.cells.windows(2).all(|w| w[1].code - w[0].code <= 1));
-        assert!(ENCODE16.cells.windows(2).all(|w| w[1].code - w[0].code <= 1));
+        assert!(
+            ENCODE16
+                .cells
+                .windows(2)
+                .all(|w| w[1].code - w[0].code <= 1)
+        );
     }
 
     #[test]
     fn whole_pictures_are_their_pixels() {
-        let codes = Image::from_fn(17, 9, |x, y| Srgb8 { r: x as u8 * 15, g: y as u8 * 28, b: (x * y) as u8 });
+        let codes = Image::from_fn(17, 9, |x, y| Srgb8 {
+            r: x as u8 * 15,
+            g: y as u8 * 28,
+            b: (x * y) as u8,
+        });
         assert_eq!(from_srgb8(&codes), codes.map(decode_srgb8));
         assert_eq!(to_srgb8(&from_srgb8(&codes)), codes);
         assert!(to_srgb8(&Image::new(0, 3)).is_empty());

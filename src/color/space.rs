@@ -17,13 +17,20 @@ pub struct RgbSpace {
 
 impl RgbSpace {
     /// Rec. 709 primaries and D65, which sRGB shares (ITU-R BT.709-6, IEC 61966-2-1): the library's working space.
-    pub const REC709: Self = Self { primaries: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]], white: [0.3127, 0.3290] };
+    pub const REC709: Self = Self {
+        primaries: [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]],
+        white: [0.3127, 0.3290],
+    };
     /// Rec. 2020 primaries and D65 (ITU-R BT.2020-2).
-    pub const REC2020: Self =
-        Self { primaries: [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]], white: [0.3127, 0.3290] };
+    pub const REC2020: Self = Self {
+        primaries: [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046]],
+        white: [0.3127, 0.3290],
+    };
     /// ACEScg: AP1 primaries and the ACES white, which is near D60 but not it (S-2014-004).
-    pub const ACESCG: Self =
-        Self { primaries: [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044]], white: [0.32168, 0.33767] };
+    pub const ACESCG: Self = Self {
+        primaries: [[0.713, 0.293], [0.165, 0.830], [0.128, 0.044]],
+        white: [0.32168, 0.33767],
+    };
 }
 
 /// XYZ of an RGB space's colours, relative to the space's own white: (1, 1, 1) has Y = 1.
@@ -32,7 +39,11 @@ impl RgbSpace {
 /// Columns are the primaries, scaled so that they add up to white (SMPTE RP 177).
 pub fn xyz_from_rgb(space: &RgbSpace) -> Matrix3<f64> {
     // Of any length, so that primaries without luminance, as those of XYZ itself, are columns like others.
-    let primaries = Matrix3::from_columns(&space.primaries.map(|[x, y]| Vector3::new(x, y, 1.0 - x - y)));
+    let primaries = Matrix3::from_columns(
+        &space
+            .primaries
+            .map(|[x, y]| Vector3::new(x, y, 1.0 - x - y)),
+    );
     primaries * Matrix3::from_diagonal(&(inverse(&primaries) * xyz_of(space.white)))
 }
 
@@ -55,12 +66,15 @@ pub fn rgb_from_rgb(target: &RgbSpace, source: &RgbSpace) -> Matrix3<f64> {
 /// Linear Bradford adaptation: von Kries scaling in sharpened cone responses (K. M. Lam 1985; ICC.1:2022, Annex E).
 pub fn bradford(target_white: [f64; 2], source_white: [f64; 2]) -> Matrix3<f64> {
     let [target, source] = [target_white, source_white].map(|white| CONES_FROM_XYZ * xyz_of(white));
-    inverse(&CONES_FROM_XYZ) * Matrix3::from_diagonal(&target.component_div(&source)) * CONES_FROM_XYZ
+    inverse(&CONES_FROM_XYZ)
+        * Matrix3::from_diagonal(&target.component_div(&source))
+        * CONES_FROM_XYZ
 }
 
 /// Bradford's cone responses of XYZ (ICC.1:2022, Annex E.3).
-const CONES_FROM_XYZ: Matrix3<f64> =
-    Matrix3::new(0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296);
+const CONES_FROM_XYZ: Matrix3<f64> = Matrix3::new(
+    0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685, 1.0296,
+);
 
 /// XYZ of a chromaticity at Y = 1.
 fn xyz_of([x, y]: [f64; 2]) -> Vector3<f64> {
@@ -82,7 +96,9 @@ pub struct ColorMatrix {
 
 impl From<Matrix3<f64>> for ColorMatrix {
     fn from(m: Matrix3<f64>) -> Self {
-        Self { rows: std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)] as f32)) }
+        Self {
+            rows: std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)] as f32)),
+        }
     }
 }
 
@@ -158,17 +174,29 @@ mod tests {
         let [_, y, _] = ColorMatrix::xyz_from_linear().rows;
         let c = LinearRgb::new(0.3, 0.7, 1.9);
         let exact = y[0] * c.r + y[1] * c.g + y[2] * c.b;
-        assert!((c.luminance() - exact).abs() < 1e-4, "the four-digit weights of the standard are near the exact ones");
+        assert!(
+            (c.luminance() - exact).abs() < 1e-4,
+            "the four-digit weights of the standard are near the exact ones"
+        );
     }
 
     #[test]
     fn acescg_agrees_with_the_color_crate() {
         let ours = ColorMatrix::acescg_from_linear();
-        for c in [[0.18, 0.5, 0.9], [1.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0], [-0.2, 0.1, 7.0]] {
-            let theirs =
-                color::AlphaColor::<color::LinearSrgb>::new([c[0], c[1], c[2], 1.0]).convert::<color::AcesCg>();
+        for c in [
+            [0.18, 0.5, 0.9],
+            [1.0, 0.0, 0.0],
+            [0.0, 4.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [-0.2, 0.1, 7.0],
+        ] {
+            let theirs = color::AlphaColor::<color::LinearSrgb>::new([c[0], c[1], c[2], 1.0])
+                .convert::<color::AcesCg>();
             for (a, b) in ours.apply(c).iter().zip(theirs.components) {
-                assert!((a - b).abs() < 1e-6 * c.iter().map(|x| x.abs()).fold(1.0, f32::max), "{a} {b}");
+                assert!(
+                    (a - b).abs() < 1e-6 * c.iter().map(|x| x.abs()).fold(1.0, f32::max),
+                    "{a} {b}"
+                );
             }
         }
     }
@@ -178,10 +206,20 @@ mod tests {
     fn xyz_agrees_with_the_palette_crate() {
         use palette::{FromColor, LinSrgb, Xyz};
         let ours = ColorMatrix::xyz_from_linear();
-        for c in [[0.18, 0.5, 0.9], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]] {
+        for c in [
+            [0.18, 0.5, 0.9],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 1.0, 1.0],
+        ] {
             let theirs = Xyz::from_color(LinSrgb::<f32>::from(c));
             let [x, y, z] = ours.apply(c);
-            assert!((x - theirs.x).abs() < 3e-4 && (y - theirs.y).abs() < 3e-4 && (z - theirs.z).abs() < 3e-4);
+            assert!(
+                (x - theirs.x).abs() < 3e-4
+                    && (y - theirs.y).abs() < 3e-4
+                    && (z - theirs.z).abs() < 3e-4
+            );
         }
     }
 }

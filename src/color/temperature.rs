@@ -14,14 +14,26 @@ pub fn planckian(kelvin: f64) -> LinearRgb {
     let t = kelvin.clamp(1667.0, 25_000.0);
     let cubic = |[a, b, c, d]: [f64; 4], v: f64| ((a * v + b) * v + c) * v + d;
     let x = if t <= 4000.0 {
-        cubic([-0.266_123_9e9, -0.234_358_9e6, 0.877_695_6e3, 0.179_910], 1.0 / t)
+        cubic(
+            [-0.266_123_9e9, -0.234_358_9e6, 0.877_695_6e3, 0.179_910],
+            1.0 / t,
+        )
     } else {
-        cubic([-3.025_846_9e9, 2.107_037_9e6, 0.222_634_7e3, 0.240_390], 1.0 / t)
+        cubic(
+            [-3.025_846_9e9, 2.107_037_9e6, 0.222_634_7e3, 0.240_390],
+            1.0 / t,
+        )
     };
     let y = if t <= 2222.0 {
-        cubic([-1.106_381_4, -1.348_110_20, 2.185_558_32, -0.202_196_83], x)
+        cubic(
+            [-1.106_381_4, -1.348_110_20, 2.185_558_32, -0.202_196_83],
+            x,
+        )
     } else if t <= 4000.0 {
-        cubic([-0.954_947_6, -1.374_185_93, 2.091_370_15, -0.167_488_67], x)
+        cubic(
+            [-0.954_947_6, -1.374_185_93, 2.091_370_15, -0.167_488_67],
+            x,
+        )
     } else {
         cubic([3.081_758_0, -5.873_386_70, 3.751_129_97, -0.370_014_83], x)
     };
@@ -43,13 +55,23 @@ mod tests {
             (15_000.0, [0.785_448, 0.992_522, 1.706_031]),
         ] {
             let found: [f32; 3] = planckian(kelvin).into();
-            assert!(found.iter().zip(expected).all(|(f, e): (&f32, f32)| (f - e).abs() < 1e-4), "{kelvin}: {found:?}");
+            assert!(
+                found
+                    .iter()
+                    .zip(expected)
+                    .all(|(f, e): (&f32, f32)| (f - e).abs() < 1e-4),
+                "{kelvin}: {found:?}"
+            );
         }
     }
 
     #[test]
     fn luminance_is_one_where_the_colour_exists() {
-        assert!((2000..=20_000).step_by(500).all(|t| (planckian(f64::from(t)).luminance() - 1.0).abs() < 2e-3));
+        assert!(
+            (2000..=20_000)
+                .step_by(500)
+                .all(|t| (planckian(f64::from(t)).luminance() - 1.0).abs() < 2e-3)
+        );
         assert_eq!(planckian(1.0), planckian(1667.0));
     }
 }

@@ -96,11 +96,19 @@ pub fn linear_to_srgb(light: f32) -> f32 {
 mod tests {
     use super::*;
 
-    const CURVES: [Curve; 5] = [Curve::Linear, Curve::Srgb, Curve::Rec709, Curve::Gamma(2.2), Curve::Gamma(2.6)];
+    const CURVES: [Curve; 5] = [
+        Curve::Linear,
+        Curve::Srgb,
+        Curve::Rec709,
+        Curve::Gamma(2.2),
+        Curve::Gamma(2.6),
+    ];
 
     /// 0 to 4 in steps that hit every binade, plus its awkward ends.
     fn samples() -> impl Iterator<Item = f32> {
-        (0..4000).map(|i| i as f32 * 1e-3).chain([f32::MIN_POSITIVE, 1e-6, 0.003_130_8, 0.018, 1e4])
+        (0..4000)
+            .map(|i| i as f32 * 1e-3)
+            .chain([f32::MIN_POSITIVE, 1e-6, 0.003_130_8, 0.018, 1e4])
     }
 
     /// The two parts of sRGB, with the rounded constants of its standard, miss each other by as much at the knee.
@@ -111,7 +119,10 @@ mod tests {
         for curve in CURVES {
             for x in samples() {
                 let back = curve.decode(curve.encode(x));
-                assert!((back - x).abs() <= 4.0 * f32::EPSILON * x + GAP, "{curve:?}: {x} became {back}");
+                assert!(
+                    (back - x).abs() <= 4.0 * f32::EPSILON * x + GAP,
+                    "{curve:?}: {x} became {back}"
+                );
             }
         }
     }

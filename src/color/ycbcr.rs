@@ -32,11 +32,20 @@ pub enum CodeRange {
 
 impl Ycbcr {
     /// Standard definition television and JPEG (ITU-R BT.601-7).
-    pub const BT601: Self = Self { red: 0.299, blue: 0.114 };
+    pub const BT601: Self = Self {
+        red: 0.299,
+        blue: 0.114,
+    };
     /// High definition television (ITU-R BT.709-6).
-    pub const BT709: Self = Self { red: 0.2126, blue: 0.0722 };
+    pub const BT709: Self = Self {
+        red: 0.2126,
+        blue: 0.0722,
+    };
     /// Ultra high definition television, not constant luminance (ITU-R BT.2020-2).
-    pub const BT2020: Self = Self { red: 0.2627, blue: 0.0593 };
+    pub const BT2020: Self = Self {
+        red: 0.2627,
+        blue: 0.0593,
+    };
 
     /// Y', Cb, Cr of encoded R'G'B'.
     pub fn encode(self, rgb: [f32; 3], range: CodeRange) -> [f32; 3] {
@@ -85,11 +94,25 @@ impl CodeRange {
     /// Of luma and of the differences.
     fn scales(self) -> [Scale; 2] {
         match self {
-            Self::Full => [Scale { zero: 0.0, unit: 1.0 }; 2],
+            Self::Full => {
+                [Scale {
+                    zero: 0.0,
+                    unit: 1.0,
+                }; 2]
+            }
             Self::Video { bits } => {
                 let max = libm::exp2(bits.into()) - 1.0;
                 let step = libm::exp2(f64::from(bits) - 8.0) / max;
-                [Scale { zero: 16.0 * step, unit: 219.0 * step }, Scale { zero: 128.0 * step, unit: 224.0 * step }]
+                [
+                    Scale {
+                        zero: 16.0 * step,
+                        unit: 219.0 * step,
+                    },
+                    Scale {
+                        zero: 128.0 * step,
+                        unit: 224.0 * step,
+                    },
+                ]
             }
         }
     }
@@ -100,7 +123,11 @@ mod tests {
     use super::*;
 
     const KINDS: [Ycbcr; 3] = [Ycbcr::BT601, Ycbcr::BT709, Ycbcr::BT2020];
-    const RANGES: [CodeRange; 3] = [CodeRange::Full, CodeRange::Video { bits: 8 }, CodeRange::Video { bits: 10 }];
+    const RANGES: [CodeRange; 3] = [
+        CodeRange::Full,
+        CodeRange::Video { bits: 8 },
+        CodeRange::Video { bits: 10 },
+    ];
 
     #[test]
     fn decoding_undoes_encoding() {
@@ -108,7 +135,10 @@ mod tests {
             for range in RANGES {
                 for rgb in [[0.0, 0.5, 1.0], [0.9, 0.1, 0.3], [1.5, -0.2, 0.0]] {
                     let back = kind.decode(kind.encode(rgb, range), range);
-                    assert!(back.iter().zip(rgb).all(|(a, b)| (a - b).abs() < 1e-6), "{kind:?} {range:?} {back:?}");
+                    assert!(
+                        back.iter().zip(rgb).all(|(a, b)| (a - b).abs() < 1e-6),
+                        "{kind:?} {range:?} {back:?}"
+                    );
                 }
             }
         }

@@ -78,11 +78,27 @@ pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
 pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRgba>) -> Vec<Part> {
     let fronts = Fronts { deep, shot };
     let one = |aov: &Aov| match aov {
-        Aov::Beauty => vec![floats("beauty", ["R", "G", "B", "A"], frame.pixels().iter().map(|&p| channels(p)))],
-        Aov::Coverage => vec![floats("coverage", ["Y"], pixels(deep).map(|(x, y)| [deep.flat(x, y).to_rgba().a]))],
-        Aov::Shadow => vec![floats("shadow", ["R", "G", "B"], deep.shadow().pixels().iter().map(|&c| c.into()))],
+        Aov::Beauty => vec![floats(
+            "beauty",
+            ["R", "G", "B", "A"],
+            frame.pixels().iter().map(|&p| channels(p)),
+        )],
+        Aov::Coverage => vec![floats(
+            "coverage",
+            ["Y"],
+            pixels(deep).map(|(x, y)| [deep.flat(x, y).to_rgba().a]),
+        )],
+        Aov::Shadow => vec![floats(
+            "shadow",
+            ["R", "G", "B"],
+            deep.shadow().pixels().iter().map(|&c| c.into()),
+        )],
         Aov::Id => {
-            vec![Part { name: "id".into(), channels: vec![("id".into(), fronts.ids())], metadata: Vec::new() }]
+            vec![Part {
+                name: "id".into(),
+                channels: vec![("id".into(), fronts.ids())],
+                metadata: Vec::new(),
+            }]
         }
         Aov::Depth => vec![floats("depth", ["Z"], fronts.depths())],
         Aov::Position => vec![floats("position", ["X", "Y", "Z"], fronts.positions())],
@@ -111,10 +127,21 @@ pub(super) fn floats<const N: usize>(
 ) -> Part {
     let mut planes = [const { Vec::new() }; N];
     for value in values {
-        planes.iter_mut().zip(value).for_each(|(plane, v)| plane.push(v));
+        planes
+            .iter_mut()
+            .zip(value)
+            .for_each(|(plane, v)| plane.push(v));
     }
-    let channels = names.iter().zip(planes).map(|(name, plane)| (name.to_string(), Plane::Float(plane))).collect();
-    Part { name: name.into(), channels, metadata: Vec::new() }
+    let channels = names
+        .iter()
+        .zip(planes)
+        .map(|(name, plane)| (name.to_string(), Plane::Float(plane)))
+        .collect();
+    Part {
+        name: name.into(),
+        channels,
+        metadata: Vec::new(),
+    }
 }
 
 /// The foremost object of every pixel.
@@ -129,29 +156,48 @@ impl Fronts<'_> {
     }
 
     fn ids(&self) -> Plane {
-        Plane::Whole(self.samples().map(|(_, s)| s.map_or(0, |s| s.object.0)).collect())
+        Plane::Whole(
+            self.samples()
+                .map(|(_, s)| s.map_or(0, |s| s.object.0))
+                .collect(),
+        )
     }
 
     fn depths(&self) -> impl Iterator<Item = [f32; 1]> {
-        self.samples().map(|(_, s)| [s.map_or(f32::INFINITY, |s| s.depth.0)])
+        self.samples()
+            .map(|(_, s)| [s.map_or(f32::INFINITY, |s| s.depth.0)])
     }
 
     fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.samples().map(|(at, s)| s.map_or([f32::NAN; 3], |s| self.point(at, s).coords.map(|v| v as f32).into()))
+        self.samples().map(|(at, s)| {
+            s.map_or([f32::NAN; 3], |s| {
+                self.point(at, s).coords.map(|v| v as f32).into()
+            })
+        })
     }
 
     fn texture_coordinates(&self) -> impl Iterator<Item = [f32; 2]> {
         let uv = |at, s: &DeepSample| {
             let card: &Card = self.shot.cards.iter().find(|card| card.id == s.object)?;
-            let p = card.quad.world_from_card.inverse_transform_point(&self.point(at, s));
-            Some([(p.x / card.quad.size[0] + 0.5) as f32, (0.5 - p.y / card.quad.size[1]) as f32])
+            let p = card
+                .quad
+                .world_from_card
+                .inverse_transform_point(&self.point(at, s));
+            Some([
+                (p.x / card.quad.size[0] + 0.5) as f32,
+                (0.5 - p.y / card.quad.size[1]) as f32,
+            ])
         };
-        self.samples().map(move |(at, s)| s.and_then(|s| uv(at, s)).unwrap_or([f32::NAN; 2]))
+        self.samples()
+            .map(move |(at, s)| s.and_then(|s| uv(at, s)).unwrap_or([f32::NAN; 2]))
     }
 
     /// The point of the world that a sample shows at its pixel's centre.
     fn point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
-        self.shot.camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5)).at(f64::from(sample.depth.0))
+        self.shot
+            .camera
+            .ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5))
+            .at(f64::from(sample.depth.0))
     }
 }
 
@@ -165,7 +211,10 @@ fn layer(deep: &DeepImage, id: ObjectId) -> Part {
             (PremulRgba::TRANSPARENT, LinearRgb::BLACK),
             |(sum, hidden), (i, s)| {
                 let tint = tints.get(i).copied().unwrap_or(LinearRgb::grey(s.visible));
-                (sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible)), hidden + tint)
+                (
+                    sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible)),
+                    hidden + tint,
+                )
             },
         )
     };
@@ -201,13 +250,24 @@ mod tests {
         let card = |id, z: f64, alpha: f32| Card {
             id: ObjectId(id),
             class: 0,
-            quad: Quad { world_from_card: Pose::translation(0.02 * z, 0.0, z), size: [0.4, 0.3] },
-            texture: Image::filled(8, 8, PremulRgba::new(0.3 * alpha, 0.2 * alpha, 0.1 * alpha, alpha)).into(),
+            quad: Quad {
+                world_from_card: Pose::translation(0.02 * z, 0.0, z),
+                size: [0.4, 0.3],
+            },
+            texture: Image::filled(
+                8,
+                8,
+                PremulRgba::new(0.3 * alpha, 0.2 * alpha, 0.1 * alpha, alpha),
+            )
+            .into(),
             back: None,
             outline_uv: std::sync::Arc::new([]),
             grade: Grade::default(),
         };
-        Shot::new(camera).with_card(card(3, 0.1, 0.5)).with_card(card(7, 0.2, 0.25)).with_ambient(LinearRgb::WHITE)
+        Shot::new(camera)
+            .with_card(card(3, 0.1, 0.5))
+            .with_card(card(7, 0.2, 0.25))
+            .with_ambient(LinearRgb::WHITE)
     }
 
     fn plane<'a>(part: &'a Part, name: &str) -> &'a [f32] {
@@ -229,7 +289,10 @@ mod tests {
     #[test]
     fn layers_add_up_to_the_picture() {
         let (frame, layers) = made(&["layers"]);
-        assert_eq!(layers.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["layer.3", "layer.7"]);
+        assert_eq!(
+            layers.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(),
+            ["layer.3", "layer.7"]
+        );
         for (i, p) in frame.pixels().iter().enumerate() {
             for (name, value) in [("R", p.r), ("A", p.a)] {
                 let sum: f32 = layers.iter().map(|layer| plane(layer, name)[i]).sum();
@@ -242,19 +305,35 @@ mod tests {
     fn geometry_is_that_of_the_card_in_front() {
         let (_, parts) = made(&["id", "depth", "position", "uv", "coverage"]);
         let middle = 12 * 32 + 16;
-        assert!(matches!(&parts[0].channels[0].1, Plane::Whole(ids) if ids[middle] == 7 && ids[0] == 0));
-        assert!((plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5 && plane(&parts[1], "Z")[0].is_infinite());
+        assert!(
+            matches!(&parts[0].channels[0].1, Plane::Whole(ids) if ids[middle] == 7 && ids[0] == 0)
+        );
+        assert!(
+            (plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5
+                && plane(&parts[1], "Z")[0].is_infinite()
+        );
         // The pixel's centre is half a pixel right of and below the principal point: 0.01 m at depth 0.8.
         let at = ["X", "Y", "Z"].map(|c| plane(&parts[2], c)[middle]);
-        assert!((at[0] - 0.01).abs() < 1e-5 && (at[1] + 0.01).abs() < 1e-5 && (at[2] - 0.2).abs() < 1e-5, "{at:?}");
+        assert!(
+            (at[0] - 0.01).abs() < 1e-5
+                && (at[1] + 0.01).abs() < 1e-5
+                && (at[2] - 0.2).abs() < 1e-5,
+            "{at:?}"
+        );
         let [u, v] = ["U", "V"].map(|c| plane(&parts[3], c)[middle]);
-        assert!((u - (0.5 + 0.006 / 0.4)).abs() < 1e-4 && (v - (0.5 + 0.01 / 0.3)).abs() < 1e-4, "{u} {v}");
+        assert!(
+            (u - (0.5 + 0.006 / 0.4)).abs() < 1e-4 && (v - (0.5 + 0.01 / 0.3)).abs() < 1e-4,
+            "{u} {v}"
+        );
         assert!((plane(&parts[4], "Y")[middle] - (1.0 - 0.5 * 0.75)).abs() < 1e-6);
     }
 
     #[test]
     fn an_unknown_name_is_told_with_the_known_ones() {
         let told = "normals".parse::<Aov>().unwrap_err().to_string();
-        assert!(told.contains("\"normals\"") && told.contains("cryptomatte"), "{told}");
+        assert!(
+            told.contains("\"normals\"") && told.contains("cryptomatte"),
+            "{told}"
+        );
     }
 }

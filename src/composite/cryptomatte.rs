@@ -24,9 +24,15 @@ const NAME: &str = "CryptoObject";
 ///
 /// [Cryptomatte specification]: https://github.com/Psyop/Cryptomatte
 pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
-    let mut part = floats(NAME, CHANNELS, pixels(deep).map(|(x, y)| ranks(deep, x, y, &name)));
-    let objects: BTreeMap<ObjectId, String> =
-        pixels(deep).flat_map(|(x, y)| deep.at(x, y)).map(|s| (s.object, name(s.object))).collect();
+    let mut part = floats(
+        NAME,
+        CHANNELS,
+        pixels(deep).map(|(x, y)| ranks(deep, x, y, &name)),
+    );
+    let objects: BTreeMap<ObjectId, String> = pixels(deep)
+        .flat_map(|(x, y)| deep.at(x, y))
+        .map(|s| (s.object, name(s.object)))
+        .collect();
     part.metadata = metadata(objects.values());
     part
 }
@@ -47,7 +53,12 @@ const CHANNELS: [&str; 2 * RANKS] = [
 ];
 
 /// Identifier and coverage, in turn; zeros where there are fewer objects.
-fn ranks(deep: &DeepImage, x: usize, y: usize, name: impl Fn(ObjectId) -> String) -> [f32; 2 * RANKS] {
+fn ranks(
+    deep: &DeepImage,
+    x: usize,
+    y: usize,
+    name: impl Fn(ObjectId) -> String,
+) -> [f32; 2 * RANKS] {
     let mut seen: BTreeMap<ObjectId, f32> = BTreeMap::new();
     for s in deep.at(x, y).iter().filter(|s| s.visible > 0.0) {
         *seen.entry(s.object).or_default() += s.visible;
@@ -64,7 +75,9 @@ fn ranks(deep: &DeepImage, x: usize, y: usize, name: impl Fn(ObjectId) -> String
 
 /// What the specification asks to be told: under the first seven digits of the part's own hash.
 fn metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, String)> {
-    let manifest: BTreeMap<&str, String> = names.map(|n| (n.as_str(), format!("{:08x}", identifier(n)))).collect();
+    let manifest: BTreeMap<&str, String> = names
+        .map(|n| (n.as_str(), format!("{:08x}", identifier(n))))
+        .collect();
     let key = &format!("{:08x}", murmur3(NAME.as_bytes()))[..7];
     let entry = |field: &str, value: String| (format!("cryptomatte/{key}/{field}"), value);
     vec![
@@ -91,7 +104,12 @@ mod tests {
     /// Published test vectors of MurmurHash3_x86_32 with seed 0.
     #[test]
     fn the_hash_is_murmur3() {
-        let vectors = [("", 0), ("a", 0x3c25_69b2), ("test", 0xba6b_d213), ("Hello, world!", 0xc036_3e43)];
+        let vectors = [
+            ("", 0),
+            ("a", 0x3c25_69b2),
+            ("test", 0xba6b_d213),
+            ("Hello, world!", 0xc036_3e43),
+        ];
         for (text, hash) in vectors {
             assert_eq!(murmur3(text.as_bytes()), hash, "{text}");
         }
@@ -99,7 +117,9 @@ mod tests {
 
     #[test]
     fn identifiers_are_ordinary_numbers() {
-        assert!((0..20_000).all(|i| f32::from_bits(identifier(&format!("object.{i}"))).is_normal()));
+        assert!(
+            (0..20_000).all(|i| f32::from_bits(identifier(&format!("object.{i}"))).is_normal())
+        );
     }
 
     #[test]
@@ -111,7 +131,10 @@ mod tests {
             alpha: visible,
             visible,
         };
-        let lists = [vec![sample(1, 0.25), sample(2, 0.5), sample(1, 0.125)], vec![]];
+        let lists = [
+            vec![sample(1, 0.25), sample(2, 0.5), sample(1, 0.125)],
+            vec![],
+        ];
         let deep = DeepImage::from_pixels(Image::filled(2, 1, LinearRgb::WHITE), lists);
         let part = cryptomatte(&deep, |id| format!("bottle {}", id.0));
         let at = |c: usize| match &part.channels[c].1 {
@@ -119,8 +142,19 @@ mod tests {
             Plane::Whole(_) => panic!("whole numbers"),
         };
         assert_eq!(at(0), (f32::from_bits(identifier("bottle 2")), 0.0));
-        assert_eq!((at(1), at(3), at(5)), ((0.5, 0.0), (0.375, 0.0), (0.0, 0.0)));
-        let manifest = &part.metadata.iter().find(|(key, _)| key.ends_with("/manifest")).unwrap().1;
-        assert!(manifest.contains(&format!("\"bottle 1\":\"{:08x}\"", identifier("bottle 1"))), "{manifest}");
+        assert_eq!(
+            (at(1), at(3), at(5)),
+            ((0.5, 0.0), (0.375, 0.0), (0.0, 0.0))
+        );
+        let manifest = &part
+            .metadata
+            .iter()
+            .find(|(key, _)| key.ends_with("/manifest"))
+            .unwrap()
+            .1;
+        assert!(
+            manifest.contains(&format!("\"bottle 1\":\"{:08x}\"", identifier("bottle 1"))),
+            "{manifest}"
+        );
     }
 }

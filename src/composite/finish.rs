@@ -27,14 +27,24 @@ pub fn finish(
     finish: &Finish,
 ) -> Image<PremulRgba> {
     let frame = match finish.noise {
-        Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => {
-            Sensor { shot, read, seed: finish.noise_seed }.expose(&frame, deep, plate)
+        Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => Sensor {
+            shot,
+            read,
+            seed: finish.noise_seed,
         }
+        .expose(&frame, deep, plate),
         Noise::Known { .. } | Noise::None | Noise::MatchPlate => frame,
     };
     // An infinite gain would make NaN of black.
-    let gain = finish.white_balance.scale(libm::exp2(finish.exposure_ev) as f32).map(|g| g.min(f32::MAX));
-    let frame = if gain == LinearRgb::WHITE { frame } else { balanced(&frame, gain) };
+    let gain = finish
+        .white_balance
+        .scale(libm::exp2(finish.exposure_ev) as f32)
+        .map(|g| g.min(f32::MAX));
+    let frame = if gain == LinearRgb::WHITE {
+        frame
+    } else {
+        balanced(&frame, gain)
+    };
     if finish.sharpening == 0.0 {
         return frame;
     }
@@ -98,7 +108,9 @@ impl Sensor {
 
 /// A number from the normal distribution, by Box and Muller from two uniform ones.
 fn normal(seed: u64, index: u64) -> f64 {
-    let uniform = |k: u64| (mixed(mixed(seed).wrapping_add(2 * index + k)) >> 11) as f64 / (1_u64 << 53) as f64;
+    let uniform = |k: u64| {
+        (mixed(mixed(seed).wrapping_add(2 * index + k)) >> 11) as f64 / (1_u64 << 53) as f64
+    };
     (-2.0 * libm::log(1.0 - uniform(0))).sqrt() * libm::cos(TAU * uniform(1))
 }
 
@@ -126,13 +138,24 @@ mod tests {
             alpha: 1.0,
             visible: 1.0,
         };
-        let list = |i: usize| if i % size < size / 2 { vec![] } else { vec![card] };
-        DeepImage::from_pixels(Image::filled(size, size, LinearRgb::WHITE), (0..size * size).map(list))
+        let list = |i: usize| {
+            if i % size < size / 2 {
+                vec![]
+            } else {
+                vec![card]
+            }
+        };
+        DeepImage::from_pixels(
+            Image::filled(size, size, LinearRgb::WHITE),
+            (0..size * size).map(list),
+        )
     }
 
     fn finished(change: Finish) -> (Image<PremulRgba>, Image<PremulRgba>) {
         let deep = deep(64);
-        let plate = Image::from_fn(64, 64, |x, y| LinearRgb::grey(0.1 + 0.01 * ((x + y) % 7) as f32));
+        let plate = Image::from_fn(64, 64, |x, y| {
+            LinearRgb::grey(0.1 + 0.01 * ((x + y) % 7) as f32)
+        });
         let before = frame(&deep, Some(&plate));
         (before.clone(), finish(before, &deep, Some(&plate), &change))
     }
@@ -145,25 +168,49 @@ mod tests {
 
     #[test]
     fn noise_falls_on_cards_alone_with_the_variance_told() {
-        let noise = Noise::Known { shot: 0.002, read: 0.01 };
-        let (before, after) = finished(Finish { noise, noise_seed: 5, ..Finish::default() });
+        let noise = Noise::Known {
+            shot: 0.002,
+            read: 0.01,
+        };
+        let (before, after) = finished(Finish {
+            noise,
+            noise_seed: 5,
+            ..Finish::default()
+        });
         let differences = |columns: std::ops::Range<usize>| -> Vec<f64> {
             let pixels = (0..64).flat_map(|y| columns.clone().map(move |x| (x, y)));
-            pixels.flat_map(|at| [after[at].r - before[at].r, after[at].b - before[at].b]).map(f64::from).collect()
+            pixels
+                .flat_map(|at| [after[at].r - before[at].r, after[at].b - before[at].b])
+                .map(f64::from)
+                .collect()
         };
         assert!(differences(0..32).iter().all(|d| *d == 0.0));
         let noise = differences(32..64);
         let variance = noise.iter().map(|d| d * d).sum::<f64>() / noise.len() as f64;
         // 4096 values: the variance's own standard deviation is 2.2 %.
-        assert!((variance / (0.002 * 0.5 + 0.0001) - 1.0).abs() < 0.1, "{variance}");
+        assert!(
+            (variance / (0.002 * 0.5 + 0.0001) - 1.0).abs() < 0.1,
+            "{variance}"
+        );
         let mean = noise.iter().sum::<f64>() / noise.len() as f64;
-        assert!(mean.abs() < 4.0 * (variance / noise.len() as f64).sqrt(), "{mean}");
+        assert!(
+            mean.abs() < 4.0 * (variance / noise.len() as f64).sqrt(),
+            "{mean}"
+        );
     }
 
     #[test]
     fn another_seed_is_another_noise() {
         let of = |noise_seed| {
-            finished(Finish { noise: Noise::Known { shot: 0.0, read: 0.01 }, noise_seed, ..Finish::default() }).1
+            finished(Finish {
+                noise: Noise::Known {
+                    shot: 0.0,
+                    read: 0.01,
+                },
+                noise_seed,
+                ..Finish::default()
+            })
+            .1
         };
         assert_eq!(of(1), of(1));
         assert_ne!(of(1), of(2));
@@ -172,14 +219,21 @@ mod tests {
     #[test]
     fn a_stop_doubles_and_balance_scales_each_channel() {
         let white_balance = LinearRgb::new(0.5, 1.0, 2.0);
-        let (before, after) = finished(Finish { exposure_ev: 1.0, white_balance, ..Finish::default() });
+        let (before, after) = finished(Finish {
+            exposure_ev: 1.0,
+            white_balance,
+            ..Finish::default()
+        });
         let (p, q) = (before[(3, 9)], after[(3, 9)]);
         assert_eq!([q.r, q.g, q.b, q.a], [p.r, 2.0 * p.g, 4.0 * p.b, 1.0]);
     }
 
     #[test]
     fn sharpening_leaves_flat_parts_and_lifts_edges() {
-        let (before, after) = finished(Finish { sharpening: 1.0, ..Finish::default() });
+        let (before, after) = finished(Finish {
+            sharpening: 1.0,
+            ..Finish::default()
+        });
         assert!((after[(50, 30)].g - before[(50, 30)].g).abs() < 1e-6);
         assert!(after[(32, 30)].g > before[(32, 30)].g + 0.05);
     }

@@ -39,13 +39,22 @@ mod tests {
     use crate::render::DeepSample;
 
     fn sample(light: f32, visible: f32) -> DeepSample {
-        DeepSample { object: ObjectId(1), depth: Depth(1.0), light: LinearRgb::grey(light), alpha: 0.5, visible }
+        DeepSample {
+            object: ObjectId(1),
+            depth: Depth(1.0),
+            light: LinearRgb::grey(light),
+            alpha: 0.5,
+            visible,
+        }
     }
 
     /// One bare pixel, one in shadow, one behind two samples.
     fn deep() -> DeepImage {
         let shadow = Image::from_vec(3, 1, [1.0, 0.5, 1.0].map(LinearRgb::grey).to_vec());
-        DeepImage::from_pixels(shadow, [vec![], vec![], vec![sample(0.2, 0.5), sample(0.1, 0.25)]])
+        DeepImage::from_pixels(
+            shadow,
+            [vec![], vec![], vec![sample(0.2, 0.5), sample(0.1, 0.25)]],
+        )
     }
 
     #[test]
@@ -66,10 +75,17 @@ mod tests {
 
     #[test]
     fn film_tints_the_plate() {
-        let tints = [[0.5, 0.25, 0.0], [0.25, 0.0, 0.5]].map(LinearRgb::from).to_vec();
-        let out = frame(&deep().with_tints(tints), Some(&Image::filled(3, 1, LinearRgb::grey(0.8))));
+        let tints = [[0.5, 0.25, 0.0], [0.25, 0.0, 0.5]]
+            .map(LinearRgb::from)
+            .to_vec();
+        let out = frame(
+            &deep().with_tints(tints),
+            Some(&Image::filled(3, 1, LinearRgb::grey(0.8))),
+        );
         let expected = [0.25, 0.75, 0.5].map(|pass| 0.3 + pass * 0.8);
-        assert!((0..3).all(|c| (<[f32; 3]>::from(out[(2, 0)].color())[c] - expected[c]).abs() < 1e-6));
+        assert!(
+            (0..3).all(|c| (<[f32; 3]>::from(out[(2, 0)].color())[c] - expected[c]).abs() < 1e-6)
+        );
     }
 
     #[test]

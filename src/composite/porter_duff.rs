@@ -50,7 +50,10 @@ impl Film {
     #[inline(always)]
     pub fn over(self, behind: Self) -> Self {
         let pass = self.transmittance();
-        Self { color: self.color + pass * behind.color, opacity: self.opacity + pass * behind.opacity }
+        Self {
+            color: self.color + pass * behind.color,
+            opacity: self.opacity + pass * behind.opacity,
+        }
     }
 }
 
@@ -67,7 +70,10 @@ mod tests {
 
     #[test]
     fn grey_film_goes_over_as_rgba_does() {
-        let (a, b) = (PremulRgba::new(0.1, 0.2, 0.3, 0.5), PremulRgba::new(0.2, 0.1, 0.0, 0.25));
+        let (a, b) = (
+            PremulRgba::new(0.1, 0.2, 0.3, 0.5),
+            PremulRgba::new(0.2, 0.1, 0.0, 0.25),
+        );
         assert_eq!(Film::from(a).over(b.into()), a.over(b).into());
     }
 

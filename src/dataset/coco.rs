@@ -96,7 +96,9 @@ impl Writer for Coco {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        Part::ALL.iter().try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+        Part::ALL
+            .iter()
+            .try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -123,9 +125,20 @@ impl Coco {
     fn share(&self, entry: &Entry<'_>) -> Result<Share> {
         let [width, height] = entry.sample.labels.image;
         let file_name = format!("{:06}.{}", entry.k, self.pictures.extension());
-        let image = CocoImage { id: entry.k, file_name, width, height };
-        let annotations = entry.labelled.iter().filter_map(|label| self.annotation(entry.k, label).transpose());
-        Ok(Share { image, annotations: annotations.collect::<Result<_>>()? })
+        let image = CocoImage {
+            id: entry.k,
+            file_name,
+            width,
+            height,
+        };
+        let annotations = entry
+            .labelled
+            .iter()
+            .filter_map(|label| self.annotation(entry.k, label).transpose());
+        Ok(Share {
+            image,
+            annotations: annotations.collect::<Result<_>>()?,
+        })
     }
 
     /// None for an object without a box.
@@ -157,7 +170,12 @@ impl Coco {
         if polygons.is_empty() {
             return Segmentation::Runs(mask.clone());
         }
-        Segmentation::Polygons(polygons.iter().map(|ring| ring.iter().flat_map(|p| [p.x, p.y]).collect()).collect())
+        Segmentation::Polygons(
+            polygons
+                .iter()
+                .map(|ring| ring.iter().flat_map(|p| [p.x, p.y]).collect())
+                .collect(),
+        )
     }
 }
 
@@ -165,7 +183,13 @@ fn annotation_id(k: u64, object: u32) -> Result<u64> {
     let id = Some(u64::from(object)).filter(|&id| (1..IDS_PER_IMAGE).contains(&id));
     let id = id.and_then(|id| k.checked_mul(IDS_PER_IMAGE)?.checked_add(id));
     id.ok_or_else(|| {
-        Error::value("labels.objects", format!("object {object}, expected 1 to {} for COCO", IDS_PER_IMAGE - 1))
+        Error::value(
+            "labels.objects",
+            format!(
+                "object {object}, expected 1 to {} for COCO",
+                IDS_PER_IMAGE - 1
+            ),
+        )
     })
 }
 
@@ -176,10 +200,19 @@ fn join<'a>(
     classes: &[String],
     samples: impl Iterator<Item = &'a Written>,
 ) -> std::io::Result<()> {
-    writeln!(out, "{{\"info\":{{\"description\":\"petcomp {}\"}},", env!("CARGO_PKG_VERSION"))?;
-    let category = |(i, name)| serde_json::json!({ "id": i + 1, "name": name, "supercategory": "object" });
+    writeln!(
+        out,
+        "{{\"info\":{{\"description\":\"petcomp {}\"}},",
+        env!("CARGO_PKG_VERSION")
+    )?;
+    let category =
+        |(i, name)| serde_json::json!({ "id": i + 1, "name": name, "supercategory": "object" });
     let categories: Vec<_> = classes.iter().enumerate().map(category).collect();
-    writeln!(out, "\"categories\":{},", serde_json::Value::from(categories))?;
+    writeln!(
+        out,
+        "\"categories\":{},",
+        serde_json::Value::from(categories)
+    )?;
     let mut images = Vec::new();
     write!(out, "\"annotations\":[")?;
     let mut comma = "\n";

@@ -41,7 +41,11 @@ pub struct SheetOptions {
 
 impl Default for SheetOptions {
     fn default() -> Self {
-        Self { title: String::new(), picture_width: 320, columns: 0 }
+        Self {
+            title: String::new(),
+            picture_width: 320,
+            columns: 0,
+        }
     }
 }
 
@@ -70,13 +74,24 @@ impl Tile {
         let (w, h) = picture.size();
         let width = width.clamp(1, w.max(1));
         let height = (h * width).div_ceil(w.max(1)).max(1);
-        let picture = if width < w { resize(picture, width, height) } else { picture.clone() };
-        Self { picture, labels, labelled, caption }
+        let picture = if width < w {
+            resize(picture, width, height)
+        } else {
+            picture.clone()
+        };
+        Self {
+            picture,
+            labels,
+            labelled,
+            caption,
+        }
     }
 
     fn drawn(&self) -> Image<Srgb8> {
         let mut canvas = to_srgb8(&self.picture);
-        draw_labels(&mut canvas, &self.labels, |object: &ObjectLabel| self.labelled.contains(&object.id));
+        draw_labels(&mut canvas, &self.labels, |object: &ObjectLabel| {
+            self.labelled.contains(&object.id)
+        });
         canvas
     }
 }
@@ -87,7 +102,13 @@ pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions)
     let mut sheet = Image::filled(layout.width, layout.height, PAPER);
     let mut y = MARGIN as isize;
     if !options.title.is_empty() {
-        draw::text(&mut sheet, [MARGIN as isize, y], &options.title, INK, TextSize::Large);
+        draw::text(
+            &mut sheet,
+            [MARGIN as isize, y],
+            &options.title,
+            INK,
+            TextSize::Large,
+        );
         y += (TextSize::Large.height() + GAP / 2) as isize;
     }
     legend(&mut sheet, y, &layout.legend);
@@ -95,7 +116,13 @@ pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions)
         let [x, y] = layout.place(i);
         draw::paste(&mut sheet, [x, y], &tile.drawn());
         let below = y + layout.cell[1] - TextSize::Small.height();
-        draw::text(&mut sheet, [x as isize, below as isize], &tile.caption, PALE_INK, TextSize::Small);
+        draw::text(
+            &mut sheet,
+            [x as isize, below as isize],
+            &tile.caption,
+            PALE_INK,
+            TextSize::Small,
+        );
     }
     sheet
 }
@@ -105,24 +132,45 @@ pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions)
 /// # Errors
 /// When the folder is no dataset, or was written without the [`Pictures`](crate::dataset::Pictures) or the
 /// [`Sidecar`](crate::dataset::Sidecar) that the sheet is made from.
-pub fn contact_sheet_of(folder: &Path, most: usize, options: &SheetOptions) -> Result<Image<Srgb8>> {
+pub fn contact_sheet_of(
+    folder: &Path,
+    most: usize,
+    options: &SheetOptions,
+) -> Result<Image<Srgb8>> {
     let identity = folder::identity(folder)?;
-    let identity = identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
-    let classes: Vec<String> = serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
+    let identity = identity
+        .ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
+    let classes: Vec<String> =
+        serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
     let lines = lines_of(folder)?;
     let shown = most.min(lines.len());
-    let chosen: Vec<&Line> = (0..shown).map(|i| &lines[i * lines.len() / shown]).collect();
-    let tiles: Result<Vec<_>> = chosen.par_iter().map(|line| tile(folder, line, options)).collect();
+    let chosen: Vec<&Line> = (0..shown)
+        .map(|i| &lines[i * lines.len() / shown])
+        .collect();
+    let tiles: Result<Vec<_>> = chosen
+        .par_iter()
+        .map(|line| tile(folder, line, options))
+        .collect();
     Ok(contact_sheet(&tiles?, &classes, options))
 }
 
 fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
     let record: Record = io::read_json(line.file(folder, "scenes/")?)?;
-    let part = if line.part == Part::Val { "val  " } else { "train" };
+    let part = if line.part == Part::Val {
+        "val  "
+    } else {
+        "train"
+    };
     let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
     let caption = format!("{:06} {part} {labelled}/{all} labelled", line.k);
-    Ok(Tile::new(&picture, record.labels, record.labelled, caption, options.picture_width))
+    Ok(Tile::new(
+        &picture,
+        record.labels,
+        record.labelled,
+        caption,
+        options.picture_width,
+    ))
 }
 
 /// Where everything is on a sheet, pixels.
@@ -140,7 +188,11 @@ struct Layout {
 impl Layout {
     fn of(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Self {
         let text = TextSize::Small;
-        let widest = tiles.iter().map(|t| t.picture.width().max(text.width(&t.caption))).max().unwrap_or(0);
+        let widest = tiles
+            .iter()
+            .map(|t| t.picture.width().max(text.width(&t.caption)))
+            .max()
+            .unwrap_or(0);
         let highest = tiles.iter().map(|t| t.picture.height()).max().unwrap_or(0);
         let cell = [widest, highest + CAPTION_GAP + text.height()];
         let columns = match options.columns {
@@ -151,18 +203,32 @@ impl Layout {
         let title = TextSize::Large.width(&options.title);
         let legend = entries(classes, tiles, row.max(title));
         let wide = legend.iter().map(|e| e.x + e.width()).max().unwrap_or(0);
-        let title_height = if options.title.is_empty() { 0 } else { TextSize::Large.height() + GAP / 2 };
+        let title_height = if options.title.is_empty() {
+            0
+        } else {
+            TextSize::Large.height() + GAP / 2
+        };
         let legend_lines = legend.last().map_or(0, |e| e.line + 1);
         let top = MARGIN + title_height + legend_lines * LEGEND_LINE + GAP;
         let rows = tiles.len().div_ceil(columns);
         let height = top + rows * (cell[1] + GAP) + MARGIN - GAP;
-        Self { width: row.max(title).max(wide) + 2 * MARGIN, height, columns, cell, top, legend }
+        Self {
+            width: row.max(title).max(wide) + 2 * MARGIN,
+            height,
+            columns,
+            cell,
+            top,
+            legend,
+        }
     }
 
     /// Top left corner of a picture.
     fn place(&self, i: usize) -> [usize; 2] {
         let [column, row] = [i % self.columns, i / self.columns];
-        [MARGIN + column * (self.cell[0] + GAP), self.top + row * (self.cell[1] + GAP)]
+        [
+            MARGIN + column * (self.cell[0] + GAP),
+            self.top + row * (self.cell[1] + GAP),
+        ]
     }
 }
 
@@ -198,7 +264,12 @@ impl LegendEntry {
 /// The legend's entries, in as many lines as they need within a width.
 fn entries(classes: &[String], tiles: &[Tile], width: usize) -> Vec<LegendEntry> {
     let count = |keep: &dyn Fn(&ObjectLabel, bool) -> bool| {
-        let objects = tiles.iter().flat_map(|t| t.labels.objects.iter().map(|o| (o, t.labelled.contains(&o.id))));
+        let objects = tiles.iter().flat_map(|t| {
+            t.labels
+                .objects
+                .iter()
+                .map(|o| (o, t.labelled.contains(&o.id)))
+        });
         objects.filter(|&(o, has)| keep(o, has)).count()
     };
     let class = |(i, name): (usize, &String)| {
@@ -206,11 +277,21 @@ fn entries(classes: &[String], tiles: &[Tile], width: usize) -> Vec<LegendEntry>
         (draw::class_color(i as u32), format!("{name} ({n})"))
     };
     let unlabelled = count(&|_, has| !has);
-    let last = (UNLABELLED, format!("no label, another lies over it ({unlabelled})"));
+    let last = (
+        UNLABELLED,
+        format!("no label, another lies over it ({unlabelled})"),
+    );
     let mut placed: Vec<LegendEntry> = Vec::new();
     for (color, text) in classes.iter().enumerate().map(class).chain([last]) {
-        let next = placed.last().map_or((0, 0), |e| (e.x + e.width() + 2 * GAP, e.line));
-        let mut entry = LegendEntry { color, text, x: next.0, line: next.1 };
+        let next = placed
+            .last()
+            .map_or((0, 0), |e| (e.x + e.width() + 2 * GAP, e.line));
+        let mut entry = LegendEntry {
+            color,
+            text,
+            x: next.0,
+            line: next.1,
+        };
         if entry.x > 0 && entry.x + entry.width() > width {
             (entry.x, entry.line) = (0, next.1 + 1);
         }
@@ -225,7 +306,13 @@ fn legend(sheet: &mut Image<Srgb8>, top: isize, entries: &[LegendEntry]) {
         let y = top + (entry.line * LEGEND_LINE) as isize;
         let down = ((TextSize::Small.height() - MARK) / 2) as isize;
         draw::fill(sheet, [x, y + down], [MARK, MARK], entry.color);
-        draw::text(sheet, [x + MARK as isize + 8, y], &entry.text, INK, TextSize::Small);
+        draw::text(
+            sheet,
+            [x + MARK as isize + 8, y],
+            &entry.text,
+            INK,
+            TextSize::Small,
+        );
     }
 }
 
@@ -250,7 +337,16 @@ mod tests {
     #[test]
     fn a_small_picture_is_not_made_larger() {
         let picture = Image::filled(40, 30, LinearRgb::WHITE);
-        let tile = |width| Tile::new(&picture, Labels::default(), Vec::new(), String::new(), width).picture;
+        let tile = |width| {
+            Tile::new(
+                &picture,
+                Labels::default(),
+                Vec::new(),
+                String::new(),
+                width,
+            )
+            .picture
+        };
         assert_eq!((tile(320).size(), tile(20).size()), ((40, 30), (20, 15)));
     }
 

@@ -35,17 +35,31 @@ impl LongRun {
             return None;
         }
         let each = elapsed.as_secs_f64() / if at_least { threads } else { made } as f64;
-        let run = Self { seconds: each * left as f64, left, each, at_least };
+        let run = Self {
+            seconds: each * left as f64,
+            left,
+            each,
+            at_least,
+        };
         (run.seconds > LONG.as_secs_f64()).then_some(run)
     }
 }
 
 impl fmt::Display for LongRun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { seconds, left, each, at_least } = *self;
+        let Self {
+            seconds,
+            left,
+            each,
+            at_least,
+        } = *self;
         let about = if at_least { "at least" } else { "about" };
         let hours = seconds / 3600.0;
-        let time = if hours < 48.0 { format!("{hours:.1} hours") } else { format!("{:.0} days", hours / 24.0) };
+        let time = if hours < 48.0 {
+            format!("{hours:.1} hours")
+        } else {
+            format!("{:.0} days", hours / 24.0)
+        };
         write!(f, "{about} {time} for {left} pictures, one in {each:.2} s")
     }
 }
@@ -61,7 +75,10 @@ mod tests {
 
     #[test]
     fn the_rest_is_in_proportion_to_what_was_made() {
-        assert_eq!(told(100, 10_100, 100, 50).as_deref(), Some("about 1.4 hours for 10000 pictures, one in 0.50 s"));
+        assert_eq!(
+            told(100, 10_100, 100, 50).as_deref(),
+            Some("about 1.4 hours for 10000 pictures, one in 0.50 s")
+        );
         assert_eq!(
             told(100, 10_000_000, 100, 10).as_deref(),
             Some("about 12 days for 9999900 pictures, one in 0.10 s")
@@ -73,7 +90,10 @@ mod tests {
     #[test]
     fn a_first_picture_without_end_is_noticed() {
         assert_eq!(told(0, 24, 0, 250), None);
-        assert_eq!(told(0, 24, 0, 400).as_deref(), Some("at least 1.3 hours for 24 pictures, one in 200.00 s"));
+        assert_eq!(
+            told(0, 24, 0, 400).as_deref(),
+            Some("at least 1.3 hours for 24 pictures, one in 200.00 s")
+        );
     }
 
     #[test]

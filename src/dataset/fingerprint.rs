@@ -24,8 +24,17 @@ pub(super) fn fingerprint(
     surroundings: &Surroundings,
     inputs: &mut Inputs,
 ) -> Result<Value> {
-    let Setup { scene, render, labels, .. } = setup;
-    let assets: Vec<Value> = library.assets.iter().map(|asset| of_asset(asset, &library.classes)).collect();
+    let Setup {
+        scene,
+        render,
+        labels,
+        ..
+    } = setup;
+    let assets: Vec<Value> = library
+        .assets
+        .iter()
+        .map(|asset| of_asset(asset, &library.classes))
+        .collect();
     Ok(json!({
         "scene": scene,
         "render": render,
@@ -58,8 +67,15 @@ fn of_photo(photo: &Photo) -> Value {
 }
 
 fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
-    let files: Vec<(String, &Path)> =
-        places.iter().map(|place| (format!("background {}", place.background.name), place.photo.as_path())).collect();
+    let files: Vec<(String, &Path)> = places
+        .iter()
+        .map(|place| {
+            (
+                format!("background {}", place.background.name),
+                place.photo.as_path(),
+            )
+        })
+        .collect();
     let photos = inputs.checksums(&files)?;
     let of_place = |(place, photo): (&Place, u32)| {
         let background = &place.background;
@@ -76,13 +92,17 @@ fn of_places(places: &[Place], inputs: &mut Inputs) -> Result<Vec<Value>> {
 /// What a person should know of the backgrounds, by their names: the report shows it.
 fn notes(places: &[Place]) -> BTreeMap<&str, &[String]> {
     let noted = places.iter().filter(|place| !place.notes.is_empty());
-    noted.map(|place| (place.background.name.as_str(), place.notes.as_slice())).collect()
+    noted
+        .map(|place| (place.background.name.as_str(), place.notes.as_slice()))
+        .collect()
 }
 
 fn of_surroundings(surroundings: &Surroundings, inputs: &mut Inputs) -> Result<Vec<Value>> {
     let files: Vec<_> = surroundings.files().collect();
-    let named: Vec<(String, &Path)> =
-        files.iter().map(|(name, path)| (format!("environment {name}"), path.as_path())).collect();
+    let named: Vec<(String, &Path)> = files
+        .iter()
+        .map(|(name, path)| (format!("environment {name}"), path.as_path()))
+        .collect();
     let checksums = inputs.checksums(&named)?;
     let entry = |((name, _), checksum): (&(&str, _), u32)| json!({ "file": name, "content": shown(checksum) });
     Ok(files.iter().zip(checksums).map(entry).collect())

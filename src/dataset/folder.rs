@@ -27,35 +27,52 @@ pub(crate) struct Claim {
 pub(crate) fn claim(plan: &Plan) -> Result<Claim> {
     let folder = plan.folder.as_path();
     if folder.exists() && !folder.is_dir() {
-        return Err(Error::file(folder, "is a file, expected a folder for the dataset"));
+        return Err(Error::file(
+            folder,
+            "is a file, expected a folder for the dataset",
+        ));
     }
     let before = identity(folder)?;
     if before.is_none() && holds_something(folder)? {
-        return Err(Error::file(folder, format!("is not empty and has no {IDENTITY}, expected a new or empty folder")));
+        return Err(Error::file(
+            folder,
+            format!("is not empty and has no {IDENTITY}, expected a new or empty folder"),
+        ));
     }
     io::create_folder(folder)?;
     io::refuse_links(folder)?;
-    [LOCK, JOURNAL, RUNS].iter().try_for_each(|name| io::refuse_foreign(&folder.join(name)))?;
+    [LOCK, JOURNAL, RUNS]
+        .iter()
+        .try_for_each(|name| io::refuse_foreign(&folder.join(name)))?;
     let lock = lock(folder)?;
     let now = plan_identity(plan)?;
     if let Some(before) = before {
         of_this_format(&before, folder)?;
-        same(&before, &now, "").map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))?;
+        same(&before, &now, "")
+            .map_err(|(at, what)| Error::value(at, what).in_file(folder.join(IDENTITY)))?;
     }
     sweep(folder)?;
     io::write_json(folder.join(IDENTITY), &now)?;
-    plan.writers.iter().try_for_each(|writer| writer.begin(folder, &plan.classes))?;
+    plan.writers
+        .iter()
+        .try_for_each(|writer| writer.begin(folder, &plan.classes))?;
     Ok(Claim { _lock: lock })
 }
 
 /// Claims the folder of a dataset that was begun before.
 pub(crate) fn reclaim(folder: &Path) -> Result<Claim> {
     let before = identity(folder)?;
-    let before = before
-        .ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset that was begun before")))?;
+    let before = before.ok_or_else(|| {
+        Error::file(
+            folder,
+            format!("no {IDENTITY}, expected a dataset that was begun before"),
+        )
+    })?;
     io::refuse_links(folder)?;
     of_this_format(&before, folder)?;
-    Ok(Claim { _lock: lock(folder)? })
+    Ok(Claim {
+        _lock: lock(folder)?,
+    })
 }
 
 /// The folder was begun before every input was recorded and lines had checksums.
@@ -71,7 +88,10 @@ fn format_of(identity: &Value) -> u64 {
 pub(crate) fn of_this_format(identity: &Value, folder: &Path) -> Result<()> {
     let (what, others) = match format_of(identity) {
         FORMAT => return Ok(()),
-        ..FORMAT => ("was begun by an older petcomp, which did not record every input", "older"),
+        ..FORMAT => (
+            "was begun by an older petcomp, which did not record every input",
+            "older",
+        ),
         _ => ("was begun by a newer petcomp", "newer"),
     };
     let what = format!("{what}: finish it with the {others} one, or begin a new folder");
@@ -100,18 +120,25 @@ fn lock(folder: &Path) -> Result<File> {
     let file = io::open_own(&path)?;
     match file.try_lock() {
         Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(Error::file(folder, "another run is writing this dataset")),
+        Err(TryLockError::WouldBlock) => {
+            Err(Error::file(folder, "another run is writing this dataset"))
+        }
         Err(TryLockError::Error(e)) => Err(Error::file(&path, e)),
     }
 }
 
 /// Deletes what a killed run left half-written.
 fn sweep(folder: &Path) -> Result<()> {
-    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?.flatten() {
+    for entry in std::fs::read_dir(folder)
+        .map_err(|e| Error::file(folder, e))?
+        .flatten()
+    {
         let name = entry.file_name().to_string_lossy().into_owned();
         match entry.file_type() {
             Ok(kind) if kind.is_dir() => sweep(&entry.path())?,
-            Ok(kind) if kind.is_file() && name.starts_with(".petcomp-") && name.ends_with(".tmp") => {
+            Ok(kind)
+                if kind.is_file() && name.starts_with(".petcomp-") && name.ends_with(".tmp") =>
+            {
                 std::fs::remove_file(entry.path()).map_err(|e| Error::file(entry.path(), e))?;
             }
             _ => {}
@@ -142,7 +169,11 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
 }
 
 /// Compares two documents and names the first field in which they differ; entries of lists by their own name or file.
-pub(crate) fn same(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
+pub(crate) fn same(
+    before: &Value,
+    now: &Value,
+    at: &str,
+) -> std::result::Result<(), (String, String)> {
     match (before, now) {
         (Value::Object(a), Value::Object(b)) => same_keys(a, b, at),
         (Value::Array(a), Value::Array(b)) => same_entries(a, b, at),
@@ -152,22 +183,34 @@ pub(crate) fn same(before: &Value, now: &Value, at: &str) -> std::result::Result
 }
 
 fn differ(before: &Value, now: &Value, at: &str) -> std::result::Result<(), (String, String)> {
-    let what = format!("the dataset was begun with {}, this run has {}", brief(before), brief(now));
+    let what = format!(
+        "the dataset was begun with {}, this run has {}",
+        brief(before),
+        brief(now)
+    );
     Err((at.to_owned(), what))
 }
 
 fn same_entries(a: &[Value], b: &[Value], at: &str) -> std::result::Result<(), (String, String)> {
     for (i, (before, now)) in a.iter().zip(b).enumerate() {
         match (name_of(before), name_of(now)) {
-            (Some(first), Some(second)) if first == second => same(before, now, &format!("{at}[{first}]"))?,
-            (Some(first), Some(second)) => differ(&first.into(), &second.into(), &format!("{at}[{i}]"))?,
+            (Some(first), Some(second)) if first == second => {
+                same(before, now, &format!("{at}[{first}]"))?
+            }
+            (Some(first), Some(second)) => {
+                differ(&first.into(), &second.into(), &format!("{at}[{i}]"))?
+            }
             _ => same(before, now, &format!("{at}[{i}]"))?,
         }
     }
     match a.len() == b.len() {
         true => Ok(()),
         false => {
-            let what = format!("the dataset was begun with {} entries, this run has {}", a.len(), b.len());
+            let what = format!(
+                "the dataset was begun with {} entries, this run has {}",
+                a.len(),
+                b.len()
+            );
             Err((at.to_owned(), what))
         }
     }
@@ -175,7 +218,9 @@ fn same_entries(a: &[Value], b: &[Value], at: &str) -> std::result::Result<(), (
 
 /// What an entry of a list is called.
 fn name_of(entry: &Value) -> Option<&str> {
-    ["name", "file"].iter().find_map(|key| entry.get(key)?.as_str())
+    ["name", "file"]
+        .iter()
+        .find_map(|key| entry.get(key)?.as_str())
 }
 
 /// Longest value that a message shows whole, letters.
@@ -189,12 +234,24 @@ fn brief(value: &Value) -> String {
     }
 }
 
-fn same_keys(a: &Map<String, Value>, b: &Map<String, Value>, at: &str) -> std::result::Result<(), (String, String)> {
+fn same_keys(
+    a: &Map<String, Value>,
+    b: &Map<String, Value>,
+    at: &str,
+) -> std::result::Result<(), (String, String)> {
     let none = Value::Null;
     let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
     for key in keys {
-        let at = if at.is_empty() { key.clone() } else { format!("{at}.{key}") };
-        same(a.get(key).unwrap_or(&none), b.get(key).unwrap_or(&none), &at)?;
+        let at = if at.is_empty() {
+            key.clone()
+        } else {
+            format!("{at}.{key}")
+        };
+        same(
+            a.get(key).unwrap_or(&none),
+            b.get(key).unwrap_or(&none),
+            &at,
+        )?;
     }
     Ok(())
 }
@@ -211,15 +268,27 @@ mod tests {
         let (at, what) = differs(json!([asset("b0", 0.1), asset("b1", 0.3)]));
         assert_eq!(
             (at.as_str(), what.as_str()),
-            ("assets[b1].mass", "the dataset was begun with 0.2, this run has 0.3")
+            (
+                "assets[b1].mass",
+                "the dataset was begun with 0.2, this run has 0.3"
+            )
         );
         let (at, what) = differs(json!([asset("b0", 0.1), asset("a", 0.4)]));
         assert_eq!(
             (at.as_str(), what.as_str()),
-            ("assets[1]", "the dataset was begun with \"b1\", this run has \"a\"")
+            (
+                "assets[1]",
+                "the dataset was begun with \"b1\", this run has \"a\""
+            )
         );
         let (at, what) = differs(json!([asset("b0", 0.1)]));
-        assert_eq!((at.as_str(), what.as_str()), ("assets", "the dataset was begun with 2 entries, this run has 1"));
+        assert_eq!(
+            (at.as_str(), what.as_str()),
+            (
+                "assets",
+                "the dataset was begun with 2 entries, this run has 1"
+            )
+        );
         let (_, what) = differs(json!("x".repeat(500)));
         assert!(what.len() < 260 && what.ends_with(".."), "{what}");
     }

@@ -76,7 +76,11 @@ impl Extent {
 
 impl Default for LabelSetup {
     fn default() -> Self {
-        let LabelOptions { amodal, alpha_threshold, overlap_iou } = LabelOptions::default();
+        let LabelOptions {
+            amodal,
+            alpha_threshold,
+            overlap_iou,
+        } = LabelOptions::default();
         Self {
             obstructed: Obstructed::default(),
             overlap_iou,
@@ -101,12 +105,17 @@ impl LabelSetup {
         share.check("overlap_iou", self.overlap_iou)?;
         share.check("alpha_threshold", self.alpha_threshold.into())?;
         Bounds::new(0.0, 1000.0, "pixels").check("simplify", self.simplify)?;
-        Bounds::new(1.0, 1e6, "samples in an archive").check("webdataset.samples", self.webdataset.samples as f64)
+        Bounds::new(1.0, 1e6, "samples in an archive")
+            .check("webdataset.samples", self.webdataset.samples as f64)
     }
 
     /// How labels are made.
     pub fn options(&self) -> LabelOptions {
-        LabelOptions { amodal: self.amodal, alpha_threshold: self.alpha_threshold, overlap_iou: self.overlap_iou }
+        LabelOptions {
+            amodal: self.amodal,
+            alpha_threshold: self.alpha_threshold,
+            overlap_iou: self.overlap_iou,
+        }
     }
 
     /// The writers of the layouts, each once, in the order in which [`Format`] lists them: [`WebDataset`] packs what the
@@ -115,14 +124,27 @@ impl LabelSetup {
         let mut formats = self.formats.clone();
         formats.sort();
         formats.dedup();
-        formats.into_iter().map(|format| self.writer(format, pictures)).collect()
+        formats
+            .into_iter()
+            .map(|format| self.writer(format, pictures))
+            .collect()
     }
 
     fn writer(&self, format: Format, pictures: &Pictures) -> Box<dyn Writer> {
         match format {
-            Format::Yolo => Box::new(Yolo { simplify: self.simplify, ..self.yolo }),
-            Format::Coco => Box::new(Coco { pictures: pictures.format, simplify: self.simplify, ..self.coco }),
-            Format::Voc => Box::new(Voc { pictures: pictures.format, ..self.voc }),
+            Format::Yolo => Box::new(Yolo {
+                simplify: self.simplify,
+                ..self.yolo
+            }),
+            Format::Coco => Box::new(Coco {
+                pictures: pictures.format,
+                simplify: self.simplify,
+                ..self.coco
+            }),
+            Format::Voc => Box::new(Voc {
+                pictures: pictures.format,
+                ..self.voc
+            }),
             Format::Layers => Box::new(self.layers),
             Format::WebDataset => Box::new(self.webdataset),
         }
@@ -143,9 +165,18 @@ mod tests {
         let told = |recipe: &str| {
             let setup: LabelSetup = toml::from_str(recipe).unwrap();
             setup.check().unwrap();
-            setup.writers(&Pictures::default()).iter().map(|w| w.settings().to_string()).collect::<String>()
+            setup
+                .writers(&Pictures::default())
+                .iter()
+                .map(|w| w.settings().to_string())
+                .collect::<String>()
         };
-        assert_eq!(told("formats = ['yolo', 'coco']\nsimplify = 1.5").matches("\"simplify\":1.5").count(), 2);
+        assert_eq!(
+            told("formats = ['yolo', 'coco']\nsimplify = 1.5")
+                .matches("\"simplify\":1.5")
+                .count(),
+            2
+        );
         assert!(!told("formats = ['yolo', 'coco']").contains("simplify"));
     }
 
@@ -157,17 +188,32 @@ mod tests {
             ("alpha_threshold = 2", "alpha_threshold: 2"),
             ("overlap_iou = nan", "overlap_iou: NaN"),
         ] {
-            let e = toml::from_str::<LabelSetup>(recipe).unwrap().check().unwrap_err().to_string();
+            let e = toml::from_str::<LabelSetup>(recipe)
+                .unwrap()
+                .check()
+                .unwrap_err()
+                .to_string();
             assert!(e.contains(at), "{e}");
         }
-        assert!(toml::from_str::<LabelSetup>("yolo = { simplify = 1 }").is_err(), "one place to say it");
+        assert!(
+            toml::from_str::<LabelSetup>("yolo = { simplify = 1 }").is_err(),
+            "one place to say it"
+        );
     }
 
     #[test]
     fn formats_are_written_once_and_archives_last() {
-        let asked: LabelSetup = toml::from_str(r#"formats = ["webdataset", "coco", "yolo", "coco"]"#).unwrap();
-        let names = asked.writers(&Pictures::default()).iter().map(|w| w.settings()).collect::<Vec<_>>();
-        let keys: Vec<_> = names.iter().flat_map(|s| s.as_object().unwrap().keys().cloned()).collect();
+        let asked: LabelSetup =
+            toml::from_str(r#"formats = ["webdataset", "coco", "yolo", "coco"]"#).unwrap();
+        let names = asked
+            .writers(&Pictures::default())
+            .iter()
+            .map(|w| w.settings())
+            .collect::<Vec<_>>();
+        let keys: Vec<_> = names
+            .iter()
+            .flat_map(|s| s.as_object().unwrap().keys().cloned())
+            .collect();
         assert_eq!(keys, ["yolo", "coco", "webdataset"]);
     }
 

@@ -35,7 +35,10 @@ pub struct Plan {
 impl Plan {
     /// Hash of everything but the seed that decides what a sample is.
     pub fn recipe_hash(&self) -> String {
-        format!("{:08x}", crc32fast::hash(self.recipe.to_string().as_bytes()))
+        format!(
+            "{:08x}",
+            crc32fast::hash(self.recipe.to_string().as_bytes())
+        )
     }
 }
 
@@ -64,18 +67,37 @@ pub fn generate(
     let write = |k| {
         let sample = make(k)?;
         let (line, write) = timed(|| write(plan, &recipe_hash, k, &sample));
-        Ok((line?, Times { write, ..sample.times }))
+        Ok((
+            line?,
+            Times {
+                write,
+                ..sample.times
+            },
+        ))
     };
     run(plan, write, progress, stop)
 }
 
 /// Writes the files of a sample.
 fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<Line> {
-    let Plan { folder, seed, classes, .. } = plan;
+    let Plan {
+        folder,
+        seed,
+        classes,
+        ..
+    } = plan;
     check(sample, classes.len())?;
     let labelled = plan.obstructed.labelled(&sample.labels, classes.len());
     let part = plan.split.part(k, plan.count);
-    let entry = Entry { k, seed: *seed, classes, recipe_hash, part, sample, labelled: &labelled };
+    let entry = Entry {
+        k,
+        seed: *seed,
+        classes,
+        recipe_hash,
+        part,
+        sample,
+        labelled: &labelled,
+    };
     let mut files = Vec::new();
     for writer in &plan.writers {
         files.extend(writer.write(folder, &entry)?);
@@ -88,12 +110,23 @@ fn check(sample: &Sample, classes: usize) -> Result<()> {
     let (w, h) = sample.frame.size();
     let [lw, lh] = sample.labels.image;
     if (w, h) != (lw as usize, lh as usize) {
-        return Err(Error::value("labels.image", format!("{lw} x {lh}, but the picture has {w} x {h}")));
+        return Err(Error::value(
+            "labels.image",
+            format!("{lw} x {lh}, but the picture has {w} x {h}"),
+        ));
     }
-    match sample.labels.objects.iter().position(|object| object.class as usize >= classes) {
+    match sample
+        .labels
+        .objects
+        .iter()
+        .position(|object| object.class as usize >= classes)
+    {
         Some(i) => {
             let class = sample.labels.objects[i].class;
-            Err(Error::value(format!("labels.objects[{i}].class"), format!("{class}, but there are {classes} classes")))
+            Err(Error::value(
+                format!("labels.objects[{i}].class"),
+                format!("{class}, but there are {classes} classes"),
+            ))
         }
         None => Ok(()),
     }

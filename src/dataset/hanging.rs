@@ -20,10 +20,16 @@ struct Fall {
 /// A fault for each sidecar file with objects that hang in the air, and for each that cannot be read.
 pub(super) fn hanging(dataset: &Path) -> Vec<Fault> {
     let options = options(dataset);
-    let files: Vec<PathBuf> = ["scenes/train", "scenes/val"].iter().flat_map(|part| list(dataset, part)).collect();
-    let scenes = files.into_par_iter().filter(|path| path.extension().is_some_and(|e| e == "json"));
+    let files: Vec<PathBuf> = ["scenes/train", "scenes/val"]
+        .iter()
+        .flat_map(|part| list(dataset, part))
+        .collect();
+    let scenes = files
+        .into_par_iter()
+        .filter(|path| path.extension().is_some_and(|e| e == "json"));
     let wrong = |path: PathBuf| {
-        let what = told(&dataset.join(&path), &options).unwrap_or_else(|e| Some(short(dataset, &e)))?;
+        let what =
+            told(&dataset.join(&path), &options).unwrap_or_else(|e| Some(short(dataset, &e)))?;
         Some(fault(path, None, what))
     };
     scenes.filter_map(wrong).collect()
@@ -33,7 +39,9 @@ pub(super) fn hanging(dataset: &Path) -> Vec<Fault> {
 fn options(dataset: &Path) -> SettleOptions {
     let identity = folder::identity(dataset).ok().flatten();
     let settle = identity.and_then(|identity| identity.pointer("/recipe/scene/settle").cloned());
-    settle.and_then(|settle| serde_json::from_value(settle).ok()).unwrap_or_default()
+    settle
+        .and_then(|settle| serde_json::from_value(settle).ok())
+        .unwrap_or_default()
 }
 
 fn told(path: &Path, options: &SettleOptions) -> Result<Option<String>> {

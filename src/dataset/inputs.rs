@@ -43,8 +43,13 @@ fn settled() -> bool {
 impl Inputs {
     /// What an earlier run kept in a dataset's folder; nothing where there is none.
     pub(crate) fn kept(folder: &Path) -> Self {
-        let before = io::inside(folder, INPUTS).and_then(io::read_json).unwrap_or_default();
-        Self { before, now: BTreeMap::new() }
+        let before = io::inside(folder, INPUTS)
+            .and_then(io::read_json)
+            .unwrap_or_default();
+        Self {
+            before,
+            now: BTreeMap::new(),
+        }
     }
 
     /// CRC-32 of files, each with a name that it has in every run.
@@ -56,10 +61,14 @@ impl Inputs {
     }
 
     fn checksums_at(&mut self, files: &[(String, &Path)], now: SystemTime) -> Result<Vec<u32>> {
-        let read: Vec<Result<Input>> = files.par_iter().map(|(name, path)| self.look(name, path, now)).collect();
+        let read: Vec<Result<Input>> = files
+            .par_iter()
+            .map(|(name, path)| self.look(name, path, now))
+            .collect();
         let read: Vec<Input> = read.into_iter().collect::<Result<_>>()?;
         let checksums = read.iter().map(|input| input.crc32).collect();
-        self.now.extend(files.iter().map(|(name, _)| name.clone()).zip(read));
+        self.now
+            .extend(files.iter().map(|(name, _)| name.clone()).zip(read));
         Ok(checksums)
     }
 
@@ -68,13 +77,21 @@ impl Inputs {
         let stamp = stamp(&meta);
         match self.before.get(name).filter(|input| input.stamp == stamp) {
             Some(input) => Ok(input.clone()),
-            None => Ok(Input { stamp, crc32: Checksum::of(path)?.crc32, is_settled: is_settled(&meta, now) }),
+            None => Ok(Input {
+                stamp,
+                crc32: Checksum::of(path)?.crc32,
+                is_settled: is_settled(&meta, now),
+            }),
         }
     }
 
     /// Keeps the checksums for the next run. They only save time: a folder without room for them is no error.
     pub(crate) fn keep(&self, folder: &Path) {
-        let settled: BTreeMap<_, _> = self.now.iter().filter(|(_, input)| input.is_settled).collect();
+        let settled: BTreeMap<_, _> = self
+            .now
+            .iter()
+            .filter(|(_, input)| input.is_settled)
+            .collect();
         if settled.is_empty() || settled == self.before.iter().collect() {
             return;
         }
@@ -96,7 +113,13 @@ impl Inputs {
 #[cfg(unix)]
 fn stamp(meta: &Metadata) -> String {
     use std::os::unix::fs::MetadataExt as M;
-    let times = format!("{}.{:09} {}.{:09}", M::mtime(meta), M::mtime_nsec(meta), M::ctime(meta), M::ctime_nsec(meta));
+    let times = format!(
+        "{}.{:09} {}.{:09}",
+        M::mtime(meta),
+        M::mtime_nsec(meta),
+        M::ctime(meta),
+        M::ctime_nsec(meta)
+    );
     format!("{} {times} {} {}", meta.len(), M::dev(meta), M::ino(meta))
 }
 
@@ -107,7 +130,10 @@ fn stamp(meta: &Metadata) -> String {
 }
 
 fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
-    let latest = [meta.modified().ok(), changed(meta)].into_iter().flatten().max();
+    let latest = [meta.modified().ok(), changed(meta)]
+        .into_iter()
+        .flatten()
+        .max();
     latest.is_some_and(|latest| now.duration_since(latest).is_ok_and(|age| age > SETTLED))
 }
 
@@ -116,7 +142,10 @@ fn is_settled(meta: &Metadata, now: SystemTime) -> bool {
 fn changed(meta: &Metadata) -> Option<SystemTime> {
     use std::os::unix::fs::MetadataExt as M;
     let seconds = u64::try_from(M::ctime(meta)).ok()?;
-    UNIX_EPOCH.checked_add(Duration::new(seconds, u32::try_from(M::ctime_nsec(meta)).ok()?))
+    UNIX_EPOCH.checked_add(Duration::new(
+        seconds,
+        u32::try_from(M::ctime_nsec(meta)).ok()?,
+    ))
 }
 
 /// Not told here.
@@ -146,7 +175,9 @@ mod tests {
         assert_eq!(run(dir.path(), &file, later), crc32fast::hash(b"one"));
         // Known by its stamp: what is kept is believed.
         let kept = dir.path().join(INPUTS);
-        let wrong = io::read_text(&kept).unwrap().replace(&crc32fast::hash(b"one").to_string(), "7");
+        let wrong = io::read_text(&kept)
+            .unwrap()
+            .replace(&crc32fast::hash(b"one").to_string(), "7");
         std::fs::write(&kept, wrong).unwrap();
         assert_eq!(run(dir.path(), &file, later), 7);
         // Another content of the same length.
@@ -172,8 +203,15 @@ mod tests {
         std::fs::write(&file, "one").unwrap();
         for damaged in ["{", "[]", "{\"a\": 3}"] {
             std::fs::write(dir.path().join(INPUTS), damaged).unwrap();
-            assert_eq!(run(dir.path(), &file, SystemTime::now()), crc32fast::hash(b"one"));
+            assert_eq!(
+                run(dir.path(), &file, SystemTime::now()),
+                crc32fast::hash(b"one")
+            );
         }
-        assert!(Inputs::kept(dir.path()).checksums(&[("a".into(), Path::new("none"))]).is_err());
+        assert!(
+            Inputs::kept(dir.path())
+                .checksums(&[("a".into(), Path::new("none"))])
+                .is_err()
+        );
     }
 }

@@ -62,7 +62,10 @@ impl Line {
         let objects = &entry.sample.labels.objects;
         let mut classes = vec![[0; 2]; entry.classes.len()];
         for object in objects {
-            let label = entry.labelled.iter().find(|label| label.object.id == object.id);
+            let label = entry
+                .labelled
+                .iter()
+                .find(|label| label.object.id == object.id);
             let count = &mut classes[label.map_or(object.class, |label| label.class) as usize];
             count[0] += 1;
             count[1] += u32::from(label.is_some());
@@ -74,14 +77,25 @@ impl Line {
             obstructed: objects.iter().filter(|object| !object.is_topmost()).count() as u32,
             knotted: knotted(objects).len() as u32,
             retries: entry.sample.rejected.len() as u32,
-            files: files.iter().map(|path| Finished::of(folder, path)).collect::<Result<_>>()?,
+            files: files
+                .iter()
+                .map(|path| Finished::of(folder, path))
+                .collect::<Result<_>>()?,
         })
     }
 
     /// What a writer needs to know to join it with others.
     pub(crate) fn written(&self) -> Written {
-        let files = self.files.iter().map(|file| file.path.split('/').collect()).collect();
-        Written { k: self.k, part: self.part, files }
+        let files = self
+            .files
+            .iter()
+            .map(|file| file.path.split('/').collect())
+            .collect();
+        Written {
+            k: self.k,
+            part: self.part,
+            files,
+        }
     }
 
     /// The sample's file in a folder of the dataset: `images/`.
@@ -90,7 +104,8 @@ impl Line {
     /// When it has none, or none that lies in the dataset.
     pub(crate) fn file(&self, folder: &Path, kind: &str) -> Result<PathBuf> {
         let file = self.files.iter().find(|file| file.path.starts_with(kind));
-        let file = file.ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", self.k)))?;
+        let file =
+            file.ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", self.k)))?;
         io::inside(folder, &file.path)
     }
 
@@ -101,7 +116,9 @@ impl Line {
 
     /// Every file is there in its full size.
     fn holds(&self, folder: &Path) -> bool {
-        self.files.iter().all(|file| file.length(folder) == Some(file.bytes))
+        self.files
+            .iter()
+            .all(|file| file.length(folder) == Some(file.bytes))
     }
 }
 
@@ -110,12 +127,19 @@ impl Finished {
     pub(crate) fn of(folder: &Path, path: &Path) -> Result<Self> {
         let Checksum { bytes, crc32 } = Checksum::of(io::inside(folder, path)?)?;
         let names: Vec<_> = path.iter().map(|name| name.to_string_lossy()).collect();
-        Ok(Self { path: names.join("/"), bytes, crc32 })
+        Ok(Self {
+            path: names.join("/"),
+            bytes,
+            crc32,
+        })
     }
 
     /// What it was when it was written.
     pub(crate) fn checksum(&self) -> Checksum {
-        Checksum { bytes: self.bytes, crc32: self.crc32 }
+        Checksum {
+            bytes: self.bytes,
+            crc32: self.crc32,
+        }
     }
 
     /// Its length now; none where it is not there.
@@ -128,7 +152,9 @@ impl Finished {
         let Self { path, bytes, crc32 } = self;
         match self.length(folder) {
             None => Some(format!("{path} is missing")),
-            Some(length) if length != *bytes => Some(format!("{path} has {length} bytes, expected {bytes}")),
+            Some(length) if length != *bytes => {
+                Some(format!("{path} has {length} bytes, expected {bytes}"))
+            }
             Some(_) => match Self::of(folder, Path::new(path)) {
                 Ok(found) if found.crc32 == *crc32 => None,
                 Ok(_) => Some(format!("{path} has other bytes than when it was written")),
@@ -142,7 +168,10 @@ impl Finished {
         io::below("", &self.path).map_err(|e| e.to_string())?;
         let is_hidden = self.path.split('/').any(|step| step.starts_with('.'));
         if is_hidden || [JOURNAL, IDENTITY].contains(&self.path.as_str()) {
-            return Err(format!("file: \"{}\", expected a file of a sample", self.path));
+            return Err(format!(
+                "file: \"{}\", expected a file of a sample",
+                self.path
+            ));
         }
         Ok(())
     }
@@ -170,11 +199,20 @@ impl Journal {
         let read = read(BufReader::new(&file), false).map_err(fail)?;
         let damaged = read.iter().filter(|(_, line)| line.is_err()).count();
         if damaged > 0 {
-            log::warn!("{}: {damaged} lines are damaged; their samples are made again", path.display());
+            log::warn!(
+                "{}: {damaged} lines are damaged; their samples are made again",
+                path.display()
+            );
         }
         let known: Vec<Line> = read.into_iter().filter_map(|(_, line)| line.ok()).collect();
         let last = known.len().saturating_sub(UNSURE);
-        let holds = |(i, line): &(usize, Line)| if *i < last { line.holds(folder) } else { line.is_whole(folder) };
+        let holds = |(i, line): &(usize, Line)| {
+            if *i < last {
+                line.holds(folder)
+            } else {
+                line.is_whole(folder)
+            }
+        };
         let held: Vec<_> = known.into_par_iter().enumerate().filter(holds).collect();
         let lines = held.into_iter().map(|(_, line)| (line.k, line)).collect();
         if is_cut(&file).map_err(fail)? {
@@ -190,20 +228,28 @@ impl Journal {
 
     /// One more than the number of the last finished sample.
     pub(crate) fn end(&self) -> u64 {
-        self.lines.keys().next_back().map_or(0, |k| k.saturating_add(1))
+        self.lines
+            .keys()
+            .next_back()
+            .map_or(0, |k| k.saturating_add(1))
     }
 
     /// Adds a finished sample.
     pub(crate) fn add(&mut self, line: Line) -> Result<()> {
         let text = line_text(&line);
-        self.file.write_all(text.as_bytes()).map_err(|e| Error::file(&self.path, e))?;
+        self.file
+            .write_all(text.as_bytes())
+            .map_err(|e| Error::file(&self.path, e))?;
         self.lines.insert(line.k, line);
         Ok(())
     }
 
     /// Number of finished samples below `count` that are wanted.
     pub(crate) fn count(&self, count: u64, wanted: impl Fn(u64) -> bool) -> u64 {
-        self.lines.range(..count).filter(|(k, _)| wanted(**k)).count() as u64
+        self.lines
+            .range(..count)
+            .filter(|(k, _)| wanted(**k))
+            .count() as u64
     }
 
     /// Puts the lines in order and returns those of the samples below `count`.
@@ -238,9 +284,16 @@ pub fn mend(folder: &Path) -> Result<(usize, usize)> {
     let file = io::open_own(&path)?;
     let read = read(BufReader::new(file), false).map_err(|e| Error::file(&path, e))?;
     let all = read.len();
-    let lines: BTreeMap<u64, Line> = read.into_iter().filter_map(|(_, line)| line.ok()).map(|l| (l.k, l)).collect();
+    let lines: BTreeMap<u64, Line> = read
+        .into_iter()
+        .filter_map(|(_, line)| line.ok())
+        .map(|l| (l.k, l))
+        .collect();
     let lines: Vec<Line> = lines.into_values().collect();
-    let whole: Vec<&Line> = lines.par_iter().filter(|line| line.is_whole(folder)).collect();
+    let whole: Vec<&Line> = lines
+        .par_iter()
+        .filter(|line| line.is_whole(folder))
+        .collect();
     write(&path, whole.iter().copied())?;
     Ok((whole.len(), all - whole.len()))
 }
@@ -250,9 +303,16 @@ pub(crate) fn lines_of(folder: &Path) -> Result<Vec<Line>> {
     let read = numbered_lines_of(folder)?;
     let damaged = read.iter().filter(|(_, line)| line.is_err()).count();
     if damaged > 0 {
-        log::warn!("{}: {damaged} lines are damaged and left out", folder.join(JOURNAL).display());
+        log::warn!(
+            "{}: {damaged} lines are damaged and left out",
+            folder.join(JOURNAL).display()
+        );
     }
-    let lines: BTreeMap<u64, Line> = read.into_iter().filter_map(|(_, line)| line.ok()).map(|l| (l.k, l)).collect();
+    let lines: BTreeMap<u64, Line> = read
+        .into_iter()
+        .filter_map(|(_, line)| line.ok())
+        .map(|l| (l.k, l))
+        .collect();
     Ok(lines.into_values().collect())
 }
 
@@ -275,7 +335,12 @@ pub(crate) fn read(mut from: impl BufRead, is_older: bool) -> std::io::Result<Nu
     let mut lines = Vec::new();
     for i in 1.. {
         let mut text = Vec::new();
-        if from.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut text)? == 0 {
+        if from
+            .by_ref()
+            .take(LONGEST_LINE)
+            .read_until(b'\n', &mut text)?
+            == 0
+        {
             break;
         }
         if text.len() as u64 == LONGEST_LINE {
@@ -294,7 +359,9 @@ pub(crate) fn read(mut from: impl BufRead, is_older: bool) -> std::io::Result<Nu
 /// A line, if it is as it was written.
 fn parse(text: &[u8], is_older: bool) -> std::result::Result<Line, String> {
     let line: Line = match unsealed(text) {
-        Some((body, crc32)) if crc32fast::hash(body) == crc32 => serde_json::from_slice(&[body, b"}"].concat()),
+        Some((body, crc32)) if crc32fast::hash(body) == crc32 => {
+            serde_json::from_slice(&[body, b"}"].concat())
+        }
         Some(_) => return Err("has other bytes than when it was written".into()),
         None if is_older => serde_json::from_slice(text),
         None => return Err("has no checksum, or is torn".into()),
@@ -309,7 +376,10 @@ const SEAL: &str = ",\"crc32\":";
 
 /// The part of a line that its checksum is of, and the checksum.
 fn unsealed(text: &[u8]) -> Option<(&[u8], u32)> {
-    let (body, crc32) = std::str::from_utf8(text).ok()?.strip_suffix('}')?.rsplit_once(SEAL)?;
+    let (body, crc32) = std::str::from_utf8(text)
+        .ok()?
+        .strip_suffix('}')?
+        .rsplit_once(SEAL)?;
     Some((body.as_bytes(), crc32.parse().ok()?))
 }
 
@@ -322,7 +392,9 @@ fn line_text(line: &Line) -> String {
 /// Writes a journal anew.
 fn write<'a>(path: &Path, lines: impl Iterator<Item = &'a Line>) -> Result<()> {
     let mut lines = lines;
-    io::write_through(path, |out| lines.try_for_each(|line| out.write_all(line_text(line).as_bytes())))
+    io::write_through(path, |out| {
+        lines.try_for_each(|line| out.write_all(line_text(line).as_bytes()))
+    })
 }
 
 /// What a dataset holds.
@@ -375,8 +447,14 @@ impl Report {
     pub(crate) fn of(lines: &[Line], plan: &Plan, asked: u64, made: u64) -> Self {
         let class = |(i, name): (usize, &String)| {
             let counts = lines.iter().filter_map(|line| line.classes.get(i));
-            let [objects, labelled] = counts.fold([0; 2], |[a, b], &[c, d]| [a + u64::from(c), b + u64::from(d)]);
-            ClassCount { name: name.clone(), objects, labelled }
+            let [objects, labelled] = counts.fold([0; 2], |[a, b], &[c, d]| {
+                [a + u64::from(c), b + u64::from(d)]
+            });
+            ClassCount {
+                name: name.clone(),
+                objects,
+                labelled,
+            }
         };
         let classes: Vec<_> = plan.classes.iter().enumerate().map(class).collect();
         let for_trainers = plan.writers.iter().flat_map(|writer| writer.for_trainers());
@@ -392,7 +470,9 @@ impl Report {
             retries: lines.iter().map(|line| u64::from(line.retries)).sum(),
             classes,
             policy: plan.obstructed,
-            for_trainers: for_trainers.filter(|path| plan.folder.join(path).exists()).collect(),
+            for_trainers: for_trainers
+                .filter(|path| plan.folder.join(path).exists())
+                .collect(),
         }
     }
 }
@@ -402,14 +482,30 @@ mod tests {
     use super::*;
 
     fn line() -> Line {
-        let file = Finished { path: "labels/val/000000.txt".into(), bytes: 3, crc32: 7 };
+        let file = Finished {
+            path: "labels/val/000000.txt".into(),
+            bytes: 3,
+            crc32: 7,
+        };
         let classes = vec![[2, 1], [1, 0]];
-        Line { k: 0, part: Part::Val, classes, obstructed: 2, knotted: 0, retries: 0, files: vec![file] }
+        Line {
+            k: 0,
+            part: Part::Val,
+            classes,
+            obstructed: 2,
+            knotted: 0,
+            retries: 0,
+            files: vec![file],
+        }
     }
 
     /// The lines of a text that are whole.
     fn whole(text: &str, is_older: bool) -> Vec<Line> {
-        read(text.as_bytes(), is_older).unwrap().into_iter().filter_map(|(_, line)| line.ok()).collect()
+        read(text.as_bytes(), is_older)
+            .unwrap()
+            .into_iter()
+            .filter_map(|(_, line)| line.ok())
+            .collect()
     }
 
     /// A line with another body and the checksum of that.
@@ -423,9 +519,12 @@ mod tests {
     fn a_line_reads_back_and_an_edited_one_does_not() {
         let text = line_text(&line());
         assert_eq!(whole(&text, false), [line()]);
-        for (from, to) in
-            [("\"val\"", "\"train\""), ("[[2,1]", "[[2,2]"), ("{\"path\"", " {\"path\""), ("\"k\":0", "\"k\":1")]
-        {
+        for (from, to) in [
+            ("\"val\"", "\"train\""),
+            ("[[2,1]", "[[2,2]"),
+            ("{\"path\"", " {\"path\""),
+            ("\"k\":0", "\"k\":1"),
+        ] {
             assert_eq!(whole(&text.replace(from, to), false), [], "{from}");
         }
         for end in 0..text.len() - 1 {
@@ -436,28 +535,65 @@ mod tests {
     #[test]
     fn lines_of_older_datasets_have_no_checksum() {
         let older = r#"{"k":0,"part":"val","classes":[[2,1],[1,0]],"knotted":0,"retries":0,"files":[{"path":"labels/val/000000.txt","bytes":3,"crc32":7}]}"#;
-        assert_eq!(whole(older, true), [Line { obstructed: 0, ..line() }]);
+        assert_eq!(
+            whole(older, true),
+            [Line {
+                obstructed: 0,
+                ..line()
+            }]
+        );
         assert_eq!(whole(older, false), []);
     }
 
     #[test]
     fn a_line_names_files_of_its_sample_alone() {
         let text = line_text(&line());
-        for bad in ["../evil.sh", "/etc/passwd", "a/../../b", ".lock", "labels/.x", "index.jsonl", "dataset.json", ""] {
-            assert_eq!(whole(&resealed(&text, "labels/val/000000.txt", bad), false), [], "{bad}");
+        for bad in [
+            "../evil.sh",
+            "/etc/passwd",
+            "a/../../b",
+            ".lock",
+            "labels/.x",
+            "index.jsonl",
+            "dataset.json",
+            "",
+        ] {
+            assert_eq!(
+                whole(&resealed(&text, "labels/val/000000.txt", bad), false),
+                [],
+                "{bad}"
+            );
         }
-        assert_eq!(whole(&resealed(&text, "labels/val/000000.txt", "labels/val/0.txt"), false).len(), 1);
+        assert_eq!(
+            whole(
+                &resealed(&text, "labels/val/000000.txt", "labels/val/0.txt"),
+                false
+            )
+            .len(),
+            1
+        );
     }
 
     #[test]
     fn counts_that_no_picture_has_are_refused() {
         let text = line_text(&line());
-        assert_eq!(whole(&resealed(&text, "[[2,1]", "[[18446744073709551615,1]"), false), []);
+        assert_eq!(
+            whole(
+                &resealed(&text, "[[2,1]", "[[18446744073709551615,1]"),
+                false
+            ),
+            []
+        );
     }
 
     #[test]
     fn a_line_without_an_end_is_no_journal() {
         let zeros = std::io::repeat(0).take(LONGEST_LINE + 1);
-        assert!(read(BufReader::new(zeros), false).unwrap_err().to_string().contains("line 1 is longer than"));
+        assert!(
+            read(BufReader::new(zeros), false)
+                .unwrap_err()
+                .to_string()
+                .contains("line 1 is longer than")
+        );
     }
 }

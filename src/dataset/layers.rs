@@ -42,19 +42,35 @@ impl Writer for Layers {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        Part::ALL.iter().try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+        Part::ALL
+            .iter()
+            .try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
-        let names: Vec<_> = sample.labels.objects.iter().map(|o| (o.id, name(o.id, o.class, entry.classes))).collect();
+        let names: Vec<_> = sample
+            .labels
+            .objects
+            .iter()
+            .map(|o| (o.id, name(o.id, o.class, entry.classes)))
+            .collect();
         let ids = Cryptomatte::new(&sample.deep, "CryptoObject", &names);
         let mut planes = picture(entry);
         planes.extend(ids.channels);
         if self.cards {
-            planes.extend(sample.labels.objects.iter().flat_map(|object| card(&sample.deep, object.id)));
+            planes.extend(
+                sample
+                    .labels
+                    .objects
+                    .iter()
+                    .flat_map(|object| card(&sample.deep, object.id)),
+            );
         }
-        let borrowed: Vec<_> = planes.iter().map(|(name, plane)| (name.as_str(), plane.as_slice())).collect();
+        let borrowed: Vec<_> = planes
+            .iter()
+            .map(|(name, plane)| (name.as_str(), plane.as_slice()))
+            .collect();
         let mut notes = ids.metadata;
         notes.push(("petcomp:recipe".into(), entry.recipe_hash.into()));
         notes.push(("petcomp:seed".into(), entry.seed.to_string()));
@@ -65,7 +81,10 @@ impl Writer for Layers {
 }
 
 fn name(id: ObjectId, class: u32, classes: &[String]) -> String {
-    let class = classes.get(class as usize).cloned().unwrap_or_else(|| class.to_string());
+    let class = classes
+        .get(class as usize)
+        .cloned()
+        .unwrap_or_else(|| class.to_string());
     format!("object{:03}_{class}", id.0)
 }
 
@@ -92,7 +111,10 @@ fn picture(entry: &Entry<'_>) -> Vec<Plane> {
 /// Depth of the first sample of a pixel of which enough is seen to belong to a mask.
 fn nearest(samples: &[DeepSample]) -> f32 {
     let least = LabelOptions::default().alpha_threshold;
-    samples.iter().find(|sample| sample.visible > least).map_or(f32::INFINITY, |sample| sample.depth.0)
+    samples
+        .iter()
+        .find(|sample| sample.visible > least)
+        .map_or(f32::INFINITY, |sample| sample.depth.0)
 }
 
 /// One channel of an object.
@@ -106,17 +128,53 @@ struct Channel {
 
 /// The channels of an object.
 const CARD: [Channel; 6] = [
-    Channel { layer: "object", name: "R", value: |s| s.light.r, none: 0.0 },
-    Channel { layer: "object", name: "G", value: |s| s.light.g, none: 0.0 },
-    Channel { layer: "object", name: "B", value: |s| s.light.b, none: 0.0 },
-    Channel { layer: "object", name: "A", value: |s| s.visible, none: 0.0 },
-    Channel { layer: "object", name: "Z", value: |s| s.depth.0, none: f32::INFINITY },
-    Channel { layer: "amodal", name: "A", value: |s| s.alpha, none: 0.0 },
+    Channel {
+        layer: "object",
+        name: "R",
+        value: |s| s.light.r,
+        none: 0.0,
+    },
+    Channel {
+        layer: "object",
+        name: "G",
+        value: |s| s.light.g,
+        none: 0.0,
+    },
+    Channel {
+        layer: "object",
+        name: "B",
+        value: |s| s.light.b,
+        none: 0.0,
+    },
+    Channel {
+        layer: "object",
+        name: "A",
+        value: |s| s.visible,
+        none: 0.0,
+    },
+    Channel {
+        layer: "object",
+        name: "Z",
+        value: |s| s.depth.0,
+        none: f32::INFINITY,
+    },
+    Channel {
+        layer: "amodal",
+        name: "A",
+        value: |s| s.alpha,
+        none: 0.0,
+    },
 ];
 
 fn card(deep: &DeepImage, id: ObjectId) -> Vec<Plane> {
-    let plane = |Channel { layer, name, value, none }: &Channel| {
-        let own = |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(*none, value);
+    let plane = |Channel {
+                     layer,
+                     name,
+                     value,
+                     none,
+                 }: &Channel| {
+        let own =
+            |samples: &[DeepSample]| samples.iter().find(|s| s.object == id).map_or(*none, value);
         (format!("{layer}{:03}.{name}", id.0), each(deep, own))
     };
     CARD.iter().map(plane).collect()

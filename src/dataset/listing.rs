@@ -25,8 +25,15 @@ impl Listing {
     pub fn read(folder: &Path) -> Result<Self> {
         let folder = std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
         let (yaml, _) = DataYaml::read(&io::read_text(folder.join("data.yaml"))?);
-        let images = |part| yaml.folder(part).map_or(Ok(Vec::new()), |part| images(&folder, part));
-        Ok(Self { train: images(Part::Train)?, val: images(Part::Val)?, classes: yaml.names().to_vec() })
+        let images = |part| {
+            yaml.folder(part)
+                .map_or(Ok(Vec::new()), |part| images(&folder, part))
+        };
+        Ok(Self {
+            train: images(Part::Train)?,
+            val: images(Part::Val)?,
+            classes: yaml.names().to_vec(),
+        })
     }
 
     /// All images in order of name: the series as it was taken.
@@ -43,10 +50,18 @@ impl Listing {
     /// A share that is not in `0..=1`.
     pub fn head(&self, share: f64) -> Result<Self> {
         if !(0.0..=1.0).contains(&share) {
-            return Err(Error::value("head", format!("{share}, expected a share, 0 to 1")));
+            return Err(Error::value(
+                "head",
+                format!("{share}, expected a share, 0 to 1"),
+            ));
         }
-        let head = |images: &[PathBuf]| images[..(images.len() as f64 * share).round() as usize].to_vec();
-        Ok(Self { train: head(&self.train), val: head(&self.val), classes: self.classes.clone() })
+        let head =
+            |images: &[PathBuf]| images[..(images.len() as f64 * share).round() as usize].to_vec();
+        Ok(Self {
+            train: head(&self.train),
+            val: head(&self.val),
+            classes: self.classes.clone(),
+        })
     }
 
     /// Writes `train.txt`, `val.txt` and `data.yaml`, paths relative to the folder.
@@ -59,9 +74,15 @@ impl Listing {
         for (part, images) in Part::ALL.into_iter().zip([&self.train, &self.val]) {
             // Trainers take `./` for the folder of the list.
             let line = |path: &PathBuf| format!("./{}\n", io::relative(path, &folder).display());
-            io::write_text(folder.join(format!("{}.txt", part.name())), &images.iter().map(line).collect::<String>())?;
+            io::write_text(
+                folder.join(format!("{}.txt", part.name())),
+                &images.iter().map(line).collect::<String>(),
+            )?;
         }
-        io::write_text(folder.join("data.yaml"), &DataYaml::write_with(&self.classes, |part| format!("{part}.txt")))
+        io::write_text(
+            folder.join("data.yaml"),
+            &DataYaml::write_with(&self.classes, |part| format!("{part}.txt")),
+        )
     }
 }
 
@@ -71,10 +92,18 @@ fn images(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
     if part.ends_with(".txt") {
         let from = path.parent().unwrap_or(folder).to_path_buf();
         let text = io::read_text(&path)?;
-        return Ok(text.lines().filter(|line| !line.is_empty()).map(|line| plain(&from.join(line))).collect());
+        return Ok(text
+            .lines()
+            .filter(|line| !line.is_empty())
+            .map(|line| plain(&from.join(line)))
+            .collect());
     }
     let entries = std::fs::read_dir(&path).map_err(|e| Error::file(&path, e))?;
-    let mut images: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|path| is_image(path)).collect();
+    let mut images: Vec<PathBuf> = entries
+        .flatten()
+        .map(|e| e.path())
+        .filter(|path| is_image(path))
+        .collect();
     images.sort();
     Ok(images)
 }
@@ -102,6 +131,15 @@ pub(crate) fn is_image(path: &Path) -> bool {
 /// # Errors
 /// When there is none beside it.
 pub(crate) fn record_of(image: &Path) -> Result<Record> {
-    let swapped: PathBuf = image.iter().map(|step| if step == "images" { "scenes".as_ref() } else { step }).collect();
+    let swapped: PathBuf = image
+        .iter()
+        .map(|step| {
+            if step == "images" {
+                "scenes".as_ref()
+            } else {
+                step
+            }
+        })
+        .collect();
     io::read_json(swapped.with_extension("json"))
 }

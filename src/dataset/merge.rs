@@ -35,17 +35,29 @@ pub fn merge(
     let count = identity.count;
     let mut lines = BTreeMap::new();
     for (shard, share) in shards.iter().zip(&identity.shares) {
-        lines.extend(lines_in(shard, *share, count)?.into_iter().map(|line| (line.k, (shard, line))));
+        lines.extend(
+            lines_in(shard, *share, count)?
+                .into_iter()
+                .map(|line| (line.k, (shard, line))),
+        );
     }
     if let Some(k) = (0..count).find(|k| !lines.contains_key(k)) {
-        let shard = shards.iter().zip(&identity.shares).find(|(_, share)| share.contains(k));
+        let shard = shards
+            .iter()
+            .zip(&identity.shares)
+            .find(|(_, share)| share.contains(k));
         let shard = shard.map_or(folder, |(shard, _)| shard);
-        return Err(Error::file(shard, format!("sample {k} is missing: finish this shard first")));
+        return Err(Error::file(
+            shard,
+            format!("sample {k} is missing: finish this shard first"),
+        ));
     }
     let plan = plan(identity.document, count, folder)?;
     let copy = |k| {
         let (shard, line): &(&PathBuf, Line) = &lines[&k];
-        line.files.iter().try_for_each(|file| copy(shard, folder, file))?;
+        line.files
+            .iter()
+            .try_for_each(|file| copy(shard, folder, file))?;
         Ok((line.clone(), Times::default()))
     };
     run(&plan, copy, progress, stop)
@@ -57,12 +69,19 @@ fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<Line>> {
     let mend = "run this shard again with --resume";
     let checked = |(i, line): (usize, std::result::Result<Line, String>)| match line {
         Err(what) => Err(wrong(i, format!("{what}; {mend}"))),
-        Ok(line) if line.k >= count || !shard.contains(line.k) => {
-            Err(wrong(i, format!("sample {} is none of shard {shard} of {count} samples", line.k)))
-        }
+        Ok(line) if line.k >= count || !shard.contains(line.k) => Err(wrong(
+            i,
+            format!(
+                "sample {} is none of shard {shard} of {count} samples",
+                line.k
+            ),
+        )),
         Ok(line) => Ok(line),
     };
-    numbered_lines_of(folder)?.into_iter().map(checked).collect()
+    numbered_lines_of(folder)?
+        .into_iter()
+        .map(checked)
+        .collect()
 }
 
 /// What all shards say of themselves.
@@ -89,16 +108,27 @@ fn common(shards: &[PathBuf]) -> Result<Common> {
             first = Some((document, shard.of, count));
         }
         if let Some(twin) = places.insert(shard.index, i) {
-            return Err(Error::file(path, format!("is shard {shard}, as {} is", shards[twin].display())));
+            return Err(Error::file(
+                path,
+                format!("is shard {shard}, as {} is", shards[twin].display()),
+            ));
         }
         shares.push(shard);
     }
-    let (document, of, count) = first.ok_or_else(|| Error::value("shards", "none, expected their folders"))?;
+    let (document, of, count) =
+        first.ok_or_else(|| Error::value("shards", "none, expected their folders"))?;
     if let Some(index) = (1..=of).find(|index| !places.contains_key(index)) {
-        return Err(Error::value("shards", format!("shard {index}/{of} is missing")));
+        return Err(Error::value(
+            "shards",
+            format!("shard {index}/{of} is missing"),
+        ));
     }
     let document = document.as_object().cloned().unwrap_or_default();
-    Ok(Common { document, count, shares })
+    Ok(Common {
+        document,
+        count,
+        shares,
+    })
 }
 
 /// What the folder of a shard says of its share.
@@ -121,22 +151,31 @@ impl Share {
 /// What a shard's folder was made from, and which share it is.
 fn open(path: &Path) -> Result<(Value, Share)> {
     let document = folder::identity(path)?;
-    let mut document = document.ok_or_else(|| Error::file(path, format!("no {IDENTITY}, expected a shard")))?;
+    let mut document =
+        document.ok_or_else(|| Error::file(path, format!("no {IDENTITY}, expected a shard")))?;
     let share = document.as_object_mut().and_then(|map| map.remove("shard"));
     let share = share.ok_or_else(|| Error::file(path, "is a whole dataset, expected a shard"))?;
     folder::of_this_format(&document, path)?;
-    let share = serde_json::from_value(share).map_err(|e| Error::value("shard", e)).and_then(Share::check);
+    let share = serde_json::from_value(share)
+        .map_err(|e| Error::value("shard", e))
+        .and_then(Share::check);
     Ok((document, share.map_err(|e| e.in_file(path.join(IDENTITY)))?))
 }
 
 /// The plan that a dataset was made with, but for where its samples come from.
 fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<Plan> {
     let said: Vec<Map<String, Value>> = field(&mut document, "writers")?;
-    let pictures = match said.iter().find(|settings| settings.contains_key("pictures")) {
+    let pictures = match said
+        .iter()
+        .find(|settings| settings.contains_key("pictures"))
+    {
         Some(settings) => field(&mut settings.clone(), "pictures")?,
         None => Pictures::default(),
     };
-    let writers = said.into_iter().flatten().map(|(name, settings)| writer(&name, settings, &pictures));
+    let writers = said
+        .into_iter()
+        .flatten()
+        .map(|(name, settings)| writer(&name, settings, &pictures));
     Ok(Plan {
         folder: folder.into(),
         count,
@@ -151,8 +190,12 @@ fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<P
     })
 }
 
-fn field<T: serde::de::DeserializeOwned>(document: &mut Map<String, Value>, name: &str) -> Result<T> {
-    serde_json::from_value(document.remove(name).unwrap_or_default()).map_err(|e| Error::value(name, e))
+fn field<T: serde::de::DeserializeOwned>(
+    document: &mut Map<String, Value>,
+    name: &str,
+) -> Result<T> {
+    serde_json::from_value(document.remove(name).unwrap_or_default())
+        .map_err(|e| Error::value(name, e))
 }
 
 /// The writer of a name and settings, as [`Writer::settings`] told them.
@@ -168,14 +211,21 @@ fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Wr
             }
             let setup: LabelSetup = serde_json::from_value(setup).map_err(wrong)?;
             let unknown = || Error::value(format!("writers.{name}"), "no such layout");
-            setup.writers(pictures).into_iter().next().ok_or_else(unknown)
+            setup
+                .writers(pictures)
+                .into_iter()
+                .next()
+                .ok_or_else(unknown)
         }
     }
 }
 
 /// Copies a file, if it is as it was written.
 fn copy(shard: &Path, folder: &Path, file: &Finished) -> Result<()> {
-    let (from, to) = (io::inside(shard, &file.path)?, io::below(folder, &file.path)?);
+    let (from, to) = (
+        io::inside(shard, &file.path)?,
+        io::below(folder, &file.path)?,
+    );
     io::create_folder(to.parent().unwrap_or(folder))?;
     io::copy(from, to, file.checksum())
 }

@@ -136,7 +136,13 @@ pub struct Entry<'a> {
 impl Entry<'_> {
     /// Path below the dataset's folder: `images/train/000012.png`.
     pub fn path(&self, kind: &str, extension: &str) -> PathBuf {
-        [kind, self.part.name(), &format!("{:06}.{extension}", self.k)].iter().collect()
+        [
+            kind,
+            self.part.name(),
+            &format!("{:06}.{extension}", self.k),
+        ]
+        .iter()
+        .collect()
     }
 }
 
@@ -157,8 +163,14 @@ impl Written {
     /// # Errors
     /// When there is none.
     pub fn file(&self, kind: &str) -> std::io::Result<&Path> {
-        let found = self.files.iter().find(|file| file.starts_with(kind)).map(PathBuf::as_path);
-        found.ok_or_else(|| std::io::Error::other(format!("sample {} has no file in {kind}", self.k)))
+        let found = self
+            .files
+            .iter()
+            .find(|file| file.starts_with(kind))
+            .map(PathBuf::as_path);
+        found.ok_or_else(|| {
+            std::io::Error::other(format!("sample {} has no file in {kind}", self.k))
+        })
     }
 }
 

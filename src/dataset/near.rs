@@ -34,8 +34,15 @@ pub(crate) struct Thumbnail(Vec<u8>);
 
 impl Thumbnail {
     pub(crate) fn of(picture: &Image<LinearRgb>) -> Self {
-        let grey = |[r, g, b]: [u8; 3]| ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
-        Self(to_srgb8(&resize(picture, SMALL[0], SMALL[1])).pixels().iter().map(|p| grey([p.r, p.g, p.b])).collect())
+        let grey =
+            |[r, g, b]: [u8; 3]| ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
+        Self(
+            to_srgb8(&resize(picture, SMALL[0], SMALL[1]))
+                .pixels()
+                .iter()
+                .map(|p| grey([p.r, p.g, p.b]))
+                .collect(),
+        )
     }
 
     /// Root mean square difference, 8-bit codes.
@@ -47,10 +54,19 @@ impl Thumbnail {
 }
 
 /// For each of `val` the nearest of `train`, as places in the lists, where it is nearer than `codes`.
-pub(crate) fn nearest(train: &[Thumbnail], val: &[Thumbnail], codes: f64) -> Vec<(usize, usize, f64)> {
+pub(crate) fn nearest(
+    train: &[Thumbnail],
+    val: &[Thumbnail],
+    codes: f64,
+) -> Vec<(usize, usize, f64)> {
     let nearest = |(i, own): (usize, &Thumbnail)| {
-        let all = train.iter().enumerate().map(|(j, other)| (j, own.codes_from(other)));
-        all.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, d)| *d < codes).map(|(j, d)| (i, j, d))
+        let all = train
+            .iter()
+            .enumerate()
+            .map(|(j, other)| (j, own.codes_from(other)));
+        all.min_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, d)| *d < codes)
+            .map(|(j, d)| (i, j, d))
     };
     val.par_iter().enumerate().filter_map(nearest).collect()
 }
@@ -58,10 +74,20 @@ pub(crate) fn nearest(train: &[Thumbnail], val: &[Thumbnail], codes: f64) -> Vec
 /// The images of `val` that are nearly the same as one of `train`.
 pub(crate) fn near_pairs(train: &[PathBuf], val: &[PathBuf], codes: f64) -> Result<Vec<Near>> {
     let small = |images: &[PathBuf]| -> Result<Vec<Thumbnail>> {
-        images.par_iter().map(|path| Ok(Thumbnail::of(&io::read::<LinearRgb>(path)?))).collect()
+        images
+            .par_iter()
+            .map(|path| Ok(Thumbnail::of(&io::read::<LinearRgb>(path)?)))
+            .collect()
     };
-    let pair = |(i, j, codes): (usize, usize, f64)| Near { val: val[i].clone(), train: train[j].clone(), codes };
-    Ok(nearest(&small(train)?, &small(val)?, codes).into_iter().map(pair).collect())
+    let pair = |(i, j, codes): (usize, usize, f64)| Near {
+        val: val[i].clone(),
+        train: train[j].clone(),
+        codes,
+    };
+    Ok(nearest(&small(train)?, &small(val)?, codes)
+        .into_iter()
+        .map(pair)
+        .collect())
 }
 
 #[cfg(test)]

@@ -43,7 +43,9 @@ impl Obstructed {
         let mut classes = classes.to_vec();
         if self == Self::Class {
             if classes.iter().any(|name| name == OBSTRUCTED) {
-                let what = format!("\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name");
+                let what = format!(
+                    "\"class\" adds a class \"{OBSTRUCTED}\", but the assets have one of that name"
+                );
                 return Err(Error::value("labels.obstructed", what));
             }
             classes.push(OBSTRUCTED.into());
@@ -53,17 +55,31 @@ impl Obstructed {
 
     /// The objects that get a label, `class_count` classes of labels being there.
     pub fn labelled(self, labels: &Labels, class_count: usize) -> Vec<Labelled<'_>> {
-        labels.objects.iter().filter_map(|object| self.label(object, class_count)).collect()
+        labels
+            .objects
+            .iter()
+            .filter_map(|object| self.label(object, class_count))
+            .collect()
     }
 
     fn label(self, object: &ObjectLabel, class_count: usize) -> Option<Labelled<'_>> {
-        let plain = Labelled { object, class: object.class, ignored: false };
+        let plain = Labelled {
+            object,
+            class: object.class,
+            ignored: false,
+        };
         match self {
             _ if object.is_topmost() => Some(plain),
             Self::Drop => None,
             Self::Keep => Some(plain),
-            Self::Ignore => Some(Labelled { ignored: true, ..plain }),
-            Self::Class => Some(Labelled { class: class_count.saturating_sub(1) as u32, ..plain }),
+            Self::Ignore => Some(Labelled {
+                ignored: true,
+                ..plain
+            }),
+            Self::Class => Some(Labelled {
+                class: class_count.saturating_sub(1) as u32,
+                ..plain
+            }),
         }
     }
 }
@@ -74,16 +90,32 @@ mod tests {
     use crate::pixel::ObjectId;
 
     fn pair() -> Labels {
-        let below = ObjectLabel { id: ObjectId(1), class: 1, covered_by: vec![ObjectId(2)], ..ObjectLabel::default() };
-        let above = ObjectLabel { id: ObjectId(2), class: 0, ..ObjectLabel::default() };
-        Labels { image: [8, 8], objects: vec![below, above] }
+        let below = ObjectLabel {
+            id: ObjectId(1),
+            class: 1,
+            covered_by: vec![ObjectId(2)],
+            ..ObjectLabel::default()
+        };
+        let above = ObjectLabel {
+            id: ObjectId(2),
+            class: 0,
+            ..ObjectLabel::default()
+        };
+        Labels {
+            image: [8, 8],
+            objects: vec![below, above],
+        }
     }
 
     /// Id, class and whether ignored, of each label.
     fn told(policy: Obstructed) -> Vec<(u32, u32, bool)> {
         let labels = pair();
         let classes = policy.classes(&["cap", "none"].map(String::from)).unwrap();
-        policy.labelled(&labels, classes.len()).iter().map(|l| (l.object.id.0, l.class, l.ignored)).collect()
+        policy
+            .labelled(&labels, classes.len())
+            .iter()
+            .map(|l| (l.object.id.0, l.class, l.ignored))
+            .collect()
     }
 
     #[test]
@@ -97,6 +129,9 @@ mod tests {
     #[test]
     fn a_class_that_is_there_already_is_not_added() {
         assert!(Obstructed::Class.classes(&[OBSTRUCTED.to_owned()]).is_err());
-        assert_eq!(Obstructed::Keep.classes(&[OBSTRUCTED.to_owned()]).unwrap(), [OBSTRUCTED]);
+        assert_eq!(
+            Obstructed::Keep.classes(&[OBSTRUCTED.to_owned()]).unwrap(),
+            [OBSTRUCTED]
+        );
     }
 }

@@ -23,7 +23,11 @@ pub struct Pictures {
 impl Default for Pictures {
     fn default() -> Self {
         let format = PictureFormat::default();
-        Self { format, jpeg_quality: WriteOptions::default().jpeg_quality, exr: false }
+        Self {
+            format,
+            jpeg_quality: WriteOptions::default().jpeg_quality,
+            exr: false,
+        }
     }
 }
 
@@ -59,8 +63,15 @@ impl Writer for Pictures {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        let kinds = if self.exr { &["images", "exr"][..] } else { &["images"] };
-        for dir in kinds.iter().flat_map(|kind| Part::ALL.map(|part| folder.join(kind).join(part.name()))) {
+        let kinds = if self.exr {
+            &["images", "exr"][..]
+        } else {
+            &["images"]
+        };
+        for dir in kinds
+            .iter()
+            .flat_map(|kind| Part::ALL.map(|part| folder.join(kind).join(part.name())))
+        {
             io::create_folder(&dir)?;
         }
         Ok(())
@@ -68,8 +79,15 @@ impl Writer for Pictures {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let mut paths = vec![entry.path("images", self.format.extension())];
-        let options = WriteOptions { jpeg_quality: self.jpeg_quality, ..WriteOptions::default() };
-        io::write_with(folder.join(&paths[0]), &entry.sample.frame.map(|p| p.color()), &options)?;
+        let options = WriteOptions {
+            jpeg_quality: self.jpeg_quality,
+            ..WriteOptions::default()
+        };
+        io::write_with(
+            folder.join(&paths[0]),
+            &entry.sample.frame.map(|p| p.color()),
+            &options,
+        )?;
         if self.exr {
             let exr = entry.path("exr", "exr");
             io::write(folder.join(&exr), &entry.sample.frame)?;

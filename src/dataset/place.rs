@@ -50,13 +50,15 @@ impl Place {
     pub(crate) fn all(folder: &Path, options: PlaceOptions) -> Result<Vec<Self>> {
         let labels = camera::labels_in(folder, options.surface_size)?;
         if labels.is_empty() {
-            let what =
-                "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
+            let what = "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
             return Err(Error::file(folder, what));
         }
         let sightings = camera::sightings(&labels, options.force)?;
         said(&labels, &sightings);
-        let opened = labels.iter().zip(&sightings).map(|(label, seen)| Self::open(label, seen, options.image));
+        let opened = labels
+            .iter()
+            .zip(&sightings)
+            .map(|(label, seen)| Self::open(label, seen, options.image));
         let places = opened.collect::<Result<Vec<_>>>()?;
         said_of_shapes(&places);
         Ok(places)
@@ -66,15 +68,32 @@ impl Place {
         let taken = labelled.label.image_size();
         let kept = middle(taken, image);
         let camera = cropped(seen.camera, kept).resized(image);
-        let background =
-            Background { name: labelled.name.clone(), size: seen.size, camera: CameraSource::Known(camera) };
+        let background = Background {
+            name: labelled.name.clone(),
+            size: seen.size,
+            camera: CameraSource::Known(camera),
+        };
         let folder = labelled.source.parent().unwrap_or(Path::new(""));
         let inside = |e: Error| e.within("image").in_file(&labelled.source);
         let photo = io::inside(folder, &labelled.label.image.file).map_err(inside)?;
         camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
         let (label, notes, plate) = (labelled.source.clone(), Vec::new(), OnceLock::new());
-        let mut place = Self { background, label, photo, notes, taken, kept, image, plate };
-        place.notes = seen.warnings.iter().map(ToString::to_string).chain(place.shape_note()).collect();
+        let mut place = Self {
+            background,
+            label,
+            photo,
+            notes,
+            taken,
+            kept,
+            image,
+            plate,
+        };
+        place.notes = seen
+            .warnings
+            .iter()
+            .map(ToString::to_string)
+            .chain(place.shape_note())
+            .collect();
         Ok(place)
     }
 
@@ -90,18 +109,30 @@ impl Place {
             return None;
         }
         let ([w, h], Roi { width, height, .. }) = (self.taken, self.kept);
-        let rectangle = if self.cuts_off() { ", without a part of the rectangle" } else { "" };
-        Some(format!("of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"))
+        let rectangle = if self.cuts_off() {
+            ", without a part of the rectangle"
+        } else {
+            ""
+        };
+        Some(format!(
+            "of {w} x {h} pixels the middle {width} x {height} are shown{rectangle}"
+        ))
     }
 
     /// A corner of the rectangle that the photo shows is not in the pictures.
     fn cuts_off(&self) -> bool {
-        let CameraSource::Known(camera) = self.background.camera else { return false };
+        let CameraSource::Known(camera) = self.background.camera else {
+            return false;
+        };
         let [x, y] = self.background.size.map(|side| side / 2.0);
         let [w, h] = self.image.map(f64::from);
-        let grown = [self.taken[0] as f64 / self.kept.width as f64, self.taken[1] as f64 / self.kept.height as f64];
+        let grown = [
+            self.taken[0] as f64 / self.kept.width as f64,
+            self.taken[1] as f64 / self.kept.height as f64,
+        ];
         let inside = |v: f64, middle: f64, side: f64| (v - middle).abs() < (0.5 + CUT_OFF) * side;
-        let corners = [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| camera.project(Point3::new(x, y, 0.0)));
+        let corners = [[-x, y], [x, y], [x, -y], [-x, -y]]
+            .map(|[x, y]| camera.project(Point3::new(x, y, 0.0)));
         corners.into_iter().flatten().any(|(px, _)| {
             let whole = inside(px.x, w / 2.0, w * grown[0]) && inside(px.y, h / 2.0, h * grown[1]);
             whole && !(inside(px.x, w / 2.0, w) && inside(px.y, h / 2.0, h))
@@ -116,7 +147,10 @@ impl Place {
         let photo = io::read::<LinearRgb>(&self.photo)?;
         let ((w, h), [tw, th]) = (photo.size(), self.taken);
         if [w, h] != self.taken.map(|side| side as usize) {
-            return Err(Error::file(&self.photo, format!("{w} x {h} pixels, but its label says {tw} x {th}")));
+            return Err(Error::file(
+                &self.photo,
+                format!("{w} x {h} pixels, but its label says {tw} x {th}"),
+            ));
         }
         let [width, height] = self.image.map(|side| side as usize);
         let plate = Arc::new(filter::resize(&photo.crop(self.kept), width, height));
@@ -131,7 +165,9 @@ fn said(labels: &[Labelled], sightings: &[Sighting]) {
         log::warn!("{stale}");
     }
     for (labelled, seen) in labels.iter().zip(sightings) {
-        seen.warnings.iter().for_each(|warning| log::info!("{labelled}: {warning}"));
+        seen.warnings
+            .iter()
+            .for_each(|warning| log::info!("{labelled}: {warning}"));
     }
     let unsaid: Vec<&str> = labels
         .iter()
@@ -150,9 +186,14 @@ fn said(labels: &[Labelled], sightings: &[Sighting]) {
 
 /// Says, once for all, that photos are of another shape than the pictures, where that costs much of them.
 fn said_of_shapes(places: &[Place]) {
-    let odd: Vec<&Place> = places.iter().filter(|place| place.part() < SMALL_PART || place.cuts_off()).collect();
+    let odd: Vec<&Place> = places
+        .iter()
+        .filter(|place| place.part() < SMALL_PART || place.cuts_off())
+        .collect();
     let least = odd.iter().min_by(|a, b| a.part().total_cmp(&b.part()));
-    let Some((least, note)) = least.and_then(|place| Some((place, place.shape_note()?))) else { return };
+    let Some((least, note)) = least.and_then(|place| Some((place, place.shape_note()?))) else {
+        return;
+    };
     let [w, h] = least.image;
     log::warn!(
         "{} of {} backgrounds have another shape than the pictures ({w} x {h}): {}: {note}; change scene.image or crop them",
@@ -168,13 +209,22 @@ fn middle(photo: [u32; 2], image: [u32; 2]) -> Roi {
     let [iw, ih] = image.map(u64::from);
     let width = w.min((h * iw).div_ceil(ih)) as usize;
     let height = h.min((w * ih).div_ceil(iw)) as usize;
-    Roi { x: (w as usize - width) / 2, y: (h as usize - height) / 2, width, height }
+    Roi {
+        x: (w as usize - width) / 2,
+        y: (h as usize - height) / 2,
+        width,
+        height,
+    }
 }
 
 /// The camera of a part of its picture.
 fn cropped(camera: Camera, kept: Roi) -> Camera {
     let corner = crate::geom::Vector2::new(kept.x as f64, kept.y as f64);
-    Camera { image: [kept.width as u32, kept.height as u32], principal_px: camera.principal_px - corner, ..camera }
+    Camera {
+        image: [kept.width as u32, kept.height as u32],
+        principal_px: camera.principal_px - corner,
+        ..camera
+    }
 }
 
 #[cfg(test)]
@@ -183,16 +233,40 @@ mod tests {
 
     #[test]
     fn a_photo_of_the_picture_s_shape_is_kept_whole() {
-        assert_eq!(middle([1280, 960], [640, 480]), Roi { x: 0, y: 0, width: 1280, height: 960 });
+        assert_eq!(
+            middle([1280, 960], [640, 480]),
+            Roi {
+                x: 0,
+                y: 0,
+                width: 1280,
+                height: 960
+            }
+        );
     }
 
     #[test]
     fn a_wider_photo_loses_its_sides() {
-        assert_eq!(middle([1920, 960], [640, 480]), Roi { x: 320, y: 0, width: 1280, height: 960 });
+        assert_eq!(
+            middle([1920, 960], [640, 480]),
+            Roi {
+                x: 320,
+                y: 0,
+                width: 1280,
+                height: 960
+            }
+        );
     }
 
     #[test]
     fn a_portrait_photo_loses_top_and_bottom() {
-        assert_eq!(middle([600, 1000], [640, 480]), Roi { x: 0, y: 275, width: 600, height: 450 });
+        assert_eq!(
+            middle([600, 1000], [640, 480]),
+            Roi {
+                x: 0,
+                y: 275,
+                width: 600,
+                height: 450
+            }
+        );
     }
 }

@@ -32,7 +32,10 @@ const MOST_SAMPLES: u64 = 1_000_000_000;
 pub(super) fn check_count(count: u64) -> Result<()> {
     match count <= MOST_SAMPLES {
         true => Ok(()),
-        false => Err(Error::value("count", format!("{count} samples, expected at most {MOST_SAMPLES}"))),
+        false => Err(Error::value(
+            "count",
+            format!("{count} samples, expected at most {MOST_SAMPLES}"),
+        )),
     }
 }
 
@@ -50,15 +53,40 @@ pub(super) fn run(
     let journal = Journal::open(&plan.folder)?;
     let again = matches!(plan.numbers, Numbers::One(_));
     // One sample is made again whatever the number of the others.
-    let count = if again { plan.count.max(journal.end()) } else { plan.count };
+    let count = if again {
+        plan.count.max(journal.end())
+    } else {
+        plan.count
+    };
     nothing_beyond(&journal, count, plan)?;
     let done = journal.count(count, |k| plan.numbers.contains(k));
     let asked = plan.numbers.count_below(count);
-    let missing = if again { asked } else { asked.saturating_sub(done) };
+    let missing = if again {
+        asked
+    } else {
+        asked.saturating_sub(done)
+    };
     let next = Mutex::new(plan.numbers.below(count));
-    let progressed = Progress { done, count: asked, made: 0 };
-    let books = Mutex::new(Books { journal, progressed, times: Times::default(), failure: None });
-    let run = Run { plan, count, write, progress, stop, books, began: Instant::now() };
+    let progressed = Progress {
+        done,
+        count: asked,
+        made: 0,
+    };
+    let books = Mutex::new(Books {
+        journal,
+        progressed,
+        times: Times::default(),
+        failure: None,
+    });
+    let run = Run {
+        plan,
+        count,
+        write,
+        progress,
+        stop,
+        books,
+        began: Instant::now(),
+    };
     run.tell(&run.books());
     run.work(missing, || {
         let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
@@ -137,7 +165,9 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
             }
             // Not this sample's fault: it is made by the run that goes on.
             Err(Error::Interrupted { .. }) if self.stop.load(Ordering::Relaxed) => {}
-            Err(e) if books.failure.as_ref().is_none_or(|(first, _)| k < *first) => books.failure = Some((k, e)),
+            Err(e) if books.failure.as_ref().is_none_or(|(first, _)| k < *first) => {
+                books.failure = Some((k, e))
+            }
             Err(_) => {}
         }
     }
@@ -154,12 +184,25 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
     /// Closes the books, whatever happened, then says what did.
     fn finish(self) -> Result<Report> {
         let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
-        let Books { journal, progressed: Progress { made, .. }, times, failure } =
-            self.books.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let Books {
+            journal,
+            progressed: Progress { made, .. },
+            times,
+            failure,
+        } = self
+            .books
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
         io::sync(&plan.folder);
         times.append(&plan.folder, made, wall);
-        let (done, asked) = (journal.count(count, |k| plan.numbers.contains(k)), plan.numbers.count_below(count));
-        let state = format!("{done} of {asked} samples are in {}; the same command goes on", plan.folder.display());
+        let (done, asked) = (
+            journal.count(count, |k| plan.numbers.contains(k)),
+            plan.numbers.count_below(count),
+        );
+        let state = format!(
+            "{done} of {asked} samples are in {}; the same command goes on",
+            plan.folder.display()
+        );
         let closed = journal.close(count);
         if let Some((k, error)) = failure {
             log::warn!("sample {k} failed; {state}");
@@ -171,7 +214,9 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
         }
         if lines.len() as u64 == count {
             let samples: Vec<_> = lines.iter().map(Line::written).collect();
-            plan.writers.iter().try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
+            plan.writers
+                .iter()
+                .try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
         }
         Ok(Report::of(&lines, plan, count, made))
     }
@@ -182,7 +227,11 @@ impl Books {
         let Progress { done, count, made } = self.progressed;
         let new = u64::from(!self.journal.has(line.k));
         self.journal.add(line)?;
-        self.progressed = Progress { done: done + new, count, made: made + 1 };
+        self.progressed = Progress {
+            done: done + new,
+            count,
+            made: made + 1,
+        };
         self.times += times;
         Ok(())
     }

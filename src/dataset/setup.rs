@@ -136,22 +136,39 @@ mod tests {
     /// Whole numbers and broken ones that are equal are the same.
     fn same(a: &Value, b: &Value) -> bool {
         match (a, b) {
-            (Value::Integer(a), Value::Float(b)) | (Value::Float(b), Value::Integer(a)) => *a as f64 == *b,
+            (Value::Integer(a), Value::Float(b)) | (Value::Float(b), Value::Integer(a)) => {
+                *a as f64 == *b
+            }
             // Single precision prints with digits that nobody writes.
             (Value::Float(a), Value::Float(b)) => *a as f32 == *b as f32,
-            (Value::Array(a), Value::Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)),
+            (Value::Array(a), Value::Array(b)) => {
+                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b))
+            }
             _ => a == b,
         }
     }
 
     /// What one table says and the other does not.
     fn missing(from: &Table, all: &Table, at: &str) -> Vec<String> {
-        let key = |key: &String| if at.is_empty() { key.clone() } else { format!("{at}.{key}") };
+        let key = |key: &String| {
+            if at.is_empty() {
+                key.clone()
+            } else {
+                format!("{at}.{key}")
+            }
+        };
         let of = |(name, value): (&String, &Value)| match (value, from.get(name)) {
             (Value::Table(all), Some(Value::Table(from))) => missing(from, all, &key(name)),
-            (Value::Array(all), Some(Value::Array(from))) if all.first().is_some_and(Value::is_table) => {
-                let pairs = from.iter().zip(all).filter_map(|(from, all)| Some((from.as_table()?, all.as_table()?)));
-                pairs.flat_map(|(from, all)| missing(from, all, &key(name))).collect()
+            (Value::Array(all), Some(Value::Array(from)))
+                if all.first().is_some_and(Value::is_table) =>
+            {
+                let pairs = from
+                    .iter()
+                    .zip(all)
+                    .filter_map(|(from, all)| Some((from.as_table()?, all.as_table()?)));
+                pairs
+                    .flat_map(|(from, all)| missing(from, all, &key(name)))
+                    .collect()
             }
             (all, Some(from)) if same(all, from) => vec![],
             (all, _) => vec![format!("{} = {all}", key(name))],
@@ -163,15 +180,24 @@ mod tests {
     #[test]
     fn the_template_tells_every_default() {
         let bare = |line: &str| {
-            let key = line.strip_prefix('#').filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase()));
+            let key = line
+                .strip_prefix('#')
+                .filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase()));
             key.unwrap_or(line).to_owned()
         };
         let template: Vec<String> = Setup::template().lines().map(bare).collect();
         let told: Table = template.join("\n").parse().unwrap();
         let all = Table::try_from(Setup::default()).unwrap();
-        assert_eq!(missing(&told, &all, ""), [""; 0], "not in template.toml, or otherwise");
+        assert_eq!(
+            missing(&told, &all, ""),
+            [""; 0],
+            "not in template.toml, or otherwise"
+        );
         assert_eq!(missing(&all, &told, ""), [""; 0], "only in template.toml");
-        assert_eq!(toml::from_str::<Setup>(Setup::template()).unwrap(), Setup::default());
+        assert_eq!(
+            toml::from_str::<Setup>(Setup::template()).unwrap(),
+            Setup::default()
+        );
     }
 
     /// What the template says a key may be: its path, and the ends of "A to B" in its comment.
@@ -179,8 +205,14 @@ mod tests {
         let (mut table, mut comment, mut told) = (String::new(), String::new(), Vec::new());
         for line in Setup::template().lines() {
             if let Some(header) = line.strip_prefix('[') {
-                table = header.trim_matches(['[', ']']).replace("scene.lights", "scene.lights[0]");
-            } else if let Some((key, _)) = line.strip_prefix('#').and_then(|l| l.split_once(" = ")).filter(is_key) {
+                table = header
+                    .trim_matches(['[', ']'])
+                    .replace("scene.lights", "scene.lights[0]");
+            } else if let Some((key, _)) = line
+                .strip_prefix('#')
+                .and_then(|l| l.split_once(" = "))
+                .filter(is_key)
+            {
                 told.extend(ends(&comment).map(|ends| (format!("{table}.{key}"), ends)));
                 comment.clear();
             } else {
@@ -195,8 +227,16 @@ mod tests {
     }
 
     fn ends(comment: &str) -> Option<[f64; 2]> {
-        let words: Vec<&str> = comment.split_whitespace().map(|w| w.trim_end_matches([',', '.', ';', ':'])).collect();
-        words.windows(3).rev().find_map(|w| Some([w[0].parse().ok().filter(|_| w[1] == "to")?, w[2].parse().ok()?]))
+        let words: Vec<&str> = comment
+            .split_whitespace()
+            .map(|w| w.trim_end_matches([',', '.', ';', ':']))
+            .collect();
+        words.windows(3).rev().find_map(|w| {
+            Some([
+                w[0].parse().ok().filter(|_| w[1] == "to")?,
+                w[2].parse().ok()?,
+            ])
+        })
     }
 
     #[test]
@@ -204,14 +244,23 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("recipe.toml");
         io::write_text(&path, Setup::template()).unwrap();
-        let with = |key: &str, value: f64| Setup::read(&path, &[format!("{key}={value}").parse().unwrap()]);
+        let with = |key: &str, value: f64| {
+            Setup::read(&path, &[format!("{key}={value}").parse().unwrap()])
+        };
         let told = told_bounds();
         assert!(told.len() > 35, "{told:?}");
         for (key, [low, high]) in told {
             for end in [low, high] {
-                assert!(with(&key, end).is_ok(), "{key} = {end}: {:?}", with(&key, end));
+                assert!(
+                    with(&key, end).is_ok(),
+                    "{key} = {end}: {:?}",
+                    with(&key, end)
+                );
             }
-            let beyond = [low - low.abs().clamp(1e-9, 1.0), high + (0.01 * high).max(1.0)];
+            let beyond = [
+                low - low.abs().clamp(1e-9, 1.0),
+                high + (0.01 * high).max(1.0),
+            ];
             for value in beyond.map(|v| if low.fract() == 0.0 { v.floor() } else { v }) {
                 let e = with(&key, value).map(|_| ()).unwrap_err().to_string();
                 assert!(e.contains(&format!("{key}: ")), "{key} = {value}: {e}");
@@ -230,16 +279,31 @@ mod tests {
         let text = io::read_text(dir.path().join("x/y/recipe.toml")).unwrap();
         assert!(text.contains("assets = \"../../a/b\""), "{text}");
         let again = Setup::read(dir.path().join("x/y/recipe.toml"), &[]).unwrap();
-        assert_eq!((&again.scene.objects, &again.labels), (&setup.scene.objects, &setup.labels));
+        assert_eq!(
+            (&again.scene.objects, &again.labels),
+            (&setup.scene.objects, &setup.labels)
+        );
         assert_eq!(again.scene.environment.files, ["../../sky.hdr"]);
-        let same = |setup: &Setup| setup.folder.join(&setup.scene.environment.files[0]).to_string_lossy().into_owned();
-        assert_eq!(same(&again).replace("x/y/../../", ""), format!("{}/sky.hdr", dir.path().display()));
+        let same = |setup: &Setup| {
+            setup
+                .folder
+                .join(&setup.scene.environment.files[0])
+                .to_string_lossy()
+                .into_owned()
+        };
+        assert_eq!(
+            same(&again).replace("x/y/../../", ""),
+            format!("{}/sky.hdr", dir.path().display())
+        );
     }
 
     #[test]
     fn the_ablations_are_the_paper_s() {
         let base = Setup::default();
-        let names: Vec<_> = base.ablations().map(|(ablation, setup)| (ablation.name, setup.scene.off.len())).collect();
+        let names: Vec<_> = base
+            .ablations()
+            .map(|(ablation, setup)| (ablation.name, setup.scene.off.len()))
+            .collect();
         assert_eq!(names.len(), 7);
         assert_eq!((names[0], names[6]), (("all", 0), ("all_off", 5)));
     }
@@ -248,7 +312,12 @@ mod tests {
     fn a_wrong_key_is_answered_with_the_right_one() {
         let dir = tempfile::tempdir().unwrap();
         io::write_text(dir.path().join("recipe.toml"), "[scene]\nobject = 3\n").unwrap();
-        let told = Setup::read(dir.path().join("recipe.toml"), &[]).unwrap_err().to_string();
-        assert!(told.ends_with("scene: unknown key \"object\", did you mean \"objects\"? (line 2)"), "{told}");
+        let told = Setup::read(dir.path().join("recipe.toml"), &[])
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.ends_with("scene: unknown key \"object\", did you mean \"objects\"? (line 2)"),
+            "{told}"
+        );
     }
 }

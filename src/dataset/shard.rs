@@ -73,16 +73,26 @@ impl Shard {
     pub fn new(index: u64, of: u64) -> Result<Self> {
         let shard = Self { index, of };
         match index {
-            _ if of == 0 => Err(Error::value("shard", format!("{shard}, expected at least one shard"))),
-            0 => Err(Error::value("shard", format!("{shard}, expected 1/{of} to {of}/{of}"))),
-            _ if index > of => Err(Error::value("shard", format!("{shard}, expected at most {of}/{of}"))),
+            _ if of == 0 => Err(Error::value(
+                "shard",
+                format!("{shard}, expected at least one shard"),
+            )),
+            0 => Err(Error::value(
+                "shard",
+                format!("{shard}, expected 1/{of} to {of}/{of}"),
+            )),
+            _ if index > of => Err(Error::value(
+                "shard",
+                format!("{shard}, expected at most {of}/{of}"),
+            )),
             _ => Ok(shard),
         }
     }
 
     /// Sample `k` belongs to it.
     pub fn contains(self, k: u64) -> bool {
-        k.checked_rem(self.of).is_some_and(|rest| rest + 1 == self.index)
+        k.checked_rem(self.of)
+            .is_some_and(|rest| rest + 1 == self.index)
     }
 
     /// Name of its folder: names in order are shards in order.
@@ -113,7 +123,9 @@ impl FromStr for ShardChoice {
         match text.split_once('/') {
             None if text == "auto" => Ok(Self::Auto { of: None }),
             None => Err(wrong()),
-            Some(("auto", of)) => Ok(Self::Auto { of: Some(number(of)?) }),
+            Some(("auto", of)) => Ok(Self::Auto {
+                of: Some(number(of)?),
+            }),
             Some((index, of)) => Shard::new(number(index)?, number(of)?).map(Self::Given),
         }
     }
@@ -135,7 +147,9 @@ impl ShardChoice {
         };
         let number = |name: &str| -> Result<Option<u64>> {
             let read = |text: String| {
-                text.trim().parse().map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+                text.trim()
+                    .parse()
+                    .map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
             };
             variable(name).map(read).transpose()
         };
@@ -144,7 +158,10 @@ impl ShardChoice {
         }
         match (number("JOB_COMPLETION_INDEX")?, of) {
             (Some(index), Some(of)) => Shard::new(index.saturating_add(1), of),
-            (Some(_), None) => Err(Error::value("shard", "Kubernetes does not tell the number of shards: say auto/N")),
+            (Some(_), None) => Err(Error::value(
+                "shard",
+                "Kubernetes does not tell the number of shards: say auto/N",
+            )),
             (None, _) => {
                 let what = "auto, but neither SLURM_ARRAY_TASK_ID nor JOB_COMPLETION_INDEX is set";
                 Err(Error::value("shard", what))
@@ -162,15 +179,22 @@ fn slurm(id: u64, of: Option<u64>, number: impl Fn(&str) -> Result<Option<u64>>)
     if let (Some(count), Some(last)) = (count, last)
         && (count == 0 || last.checked_sub(first) != (count - 1).checked_mul(step))
     {
-        let what = format!("{count} tasks from {first} to {last}: tasks are missing, expected all of 1-N");
+        let what =
+            format!("{count} tasks from {first} to {last}: tasks are missing, expected all of 1-N");
         return Err(Error::value("SLURM_ARRAY_TASK_COUNT", what));
     }
     let Some(of) = of.or(count) else {
-        return Err(Error::value("shard", "SLURM_ARRAY_TASK_COUNT is not set: say auto/N"));
+        return Err(Error::value(
+            "shard",
+            "SLURM_ARRAY_TASK_COUNT is not set: say auto/N",
+        ));
     };
     match id.checked_sub(first) {
         Some(past) => Shard::new((past / step).saturating_add(1), of),
-        None => Err(Error::value("SLURM_ARRAY_TASK_ID", format!("{id}, expected at least {first}"))),
+        None => Err(Error::value(
+            "SLURM_ARRAY_TASK_ID",
+            format!("{id}, expected at least {first}"),
+        )),
     }
 }
 
@@ -179,15 +203,24 @@ mod tests {
     use super::*;
 
     fn within(text: &str, variables: &[(&str, &str)]) -> std::result::Result<String, String> {
-        let find = |name: &str| variables.iter().find(|(n, _)| *n == name).map(|(_, v)| (*v).to_string());
-        let shard = text.parse::<ShardChoice>().and_then(|choice| choice.within(find));
+        let find = |name: &str| {
+            variables
+                .iter()
+                .find(|(n, _)| *n == name)
+                .map(|(_, v)| (*v).to_string())
+        };
+        let shard = text
+            .parse::<ShardChoice>()
+            .and_then(|choice| choice.within(find));
         shard.map(|s| s.to_string()).map_err(|e| e.to_string())
     }
 
     #[test]
     fn every_sample_belongs_to_one_shard() {
         for of in 1..7 {
-            let shards: Vec<Shard> = (1..=of).map(|index| Shard::new(index, of).unwrap()).collect();
+            let shards: Vec<Shard> = (1..=of)
+                .map(|index| Shard::new(index, of).unwrap())
+                .collect();
             assert!((0..50).all(|k| shards.iter().filter(|s| s.contains(k)).count() == 1));
         }
     }
@@ -195,17 +228,43 @@ mod tests {
     #[test]
     fn numbers_are_counted_without_counting() {
         let shard = |index, of| Numbers::Shard(Shard { index, of });
-        for numbers in
-            [Numbers::All, Numbers::One(0), Numbers::One(7), Numbers::One(49), shard(1, 3), shard(3, 3), shard(9, 9)]
-        {
+        for numbers in [
+            Numbers::All,
+            Numbers::One(0),
+            Numbers::One(7),
+            Numbers::One(49),
+            shard(1, 3),
+            shard(3, 3),
+            shard(9, 9),
+        ] {
             for count in [0, 1, 7, 8, 50] {
                 let wanted: Vec<u64> = (0..count).filter(|&k| numbers.contains(k)).collect();
-                assert_eq!(numbers.below(count).collect::<Vec<_>>(), wanted, "{numbers:?} below {count}");
-                assert_eq!(numbers.count_below(count), wanted.len() as u64, "{numbers:?} below {count}");
+                assert_eq!(
+                    numbers.below(count).collect::<Vec<_>>(),
+                    wanted,
+                    "{numbers:?} below {count}"
+                );
+                assert_eq!(
+                    numbers.count_below(count),
+                    wanted.len() as u64,
+                    "{numbers:?} below {count}"
+                );
             }
         }
-        assert_eq!(Numbers::One(u64::MAX - 1).below(u64::MAX).collect::<Vec<_>>(), [u64::MAX - 1]);
-        assert_eq!(Numbers::Shard(Shard { index: 2, of: u64::MAX }).count_below(u64::MAX), 1);
+        assert_eq!(
+            Numbers::One(u64::MAX - 1)
+                .below(u64::MAX)
+                .collect::<Vec<_>>(),
+            [u64::MAX - 1]
+        );
+        assert_eq!(
+            Numbers::Shard(Shard {
+                index: 2,
+                of: u64::MAX
+            })
+            .count_below(u64::MAX),
+            1
+        );
     }
 
     #[test]
@@ -219,26 +278,54 @@ mod tests {
     #[test]
     fn a_shard_is_given_by_hand() {
         assert_eq!(within("3/8", &[]).unwrap(), "3/8");
-        assert_eq!(within("0/8", &[]).unwrap_err(), "shard: 0/8, expected 1/8 to 8/8");
-        assert_eq!(within("9/8", &[]).unwrap_err(), "shard: 9/8, expected at most 8/8");
+        assert_eq!(
+            within("0/8", &[]).unwrap_err(),
+            "shard: 0/8, expected 1/8 to 8/8"
+        );
+        assert_eq!(
+            within("9/8", &[]).unwrap_err(),
+            "shard: 9/8, expected at most 8/8"
+        );
         for wrong in ["3", "3/", "a/b", "auto/x", ""] {
-            assert!(within(wrong, &[]).unwrap_err().contains("expected I/N, auto or auto/N"), "{wrong}");
+            assert!(
+                within(wrong, &[])
+                    .unwrap_err()
+                    .contains("expected I/N, auto or auto/N"),
+                "{wrong}"
+            );
         }
     }
 
     #[test]
     fn a_slurm_array_tells_the_shard() {
         let array = |id, min, max, step, count| {
-            let v = [("ID", id), ("MIN", min), ("MAX", max), ("STEP", step), ("COUNT", count)];
-            let named: Vec<(String, &str)> = v.iter().map(|(n, v)| (format!("SLURM_ARRAY_TASK_{n}"), *v)).collect();
+            let v = [
+                ("ID", id),
+                ("MIN", min),
+                ("MAX", max),
+                ("STEP", step),
+                ("COUNT", count),
+            ];
+            let named: Vec<(String, &str)> = v
+                .iter()
+                .map(|(n, v)| (format!("SLURM_ARRAY_TASK_{n}"), *v))
+                .collect();
             let named: Vec<(&str, &str)> = named.iter().map(|(n, v)| (n.as_str(), *v)).collect();
             within("auto", &named)
         };
         assert_eq!(array("3", "1", "4", "1", "4").unwrap(), "3/4");
         assert_eq!(array("0", "0", "6", "2", "4").unwrap(), "1/4");
         assert_eq!(array("6", "0", "6", "2", "4").unwrap(), "4/4");
-        assert!(array("7", "0", "7", "1", "3").unwrap_err().contains("tasks are missing"));
-        assert!(array("x", "0", "7", "1", "8").unwrap_err().contains("\"x\", expected a number"));
+        assert!(
+            array("7", "0", "7", "1", "3")
+                .unwrap_err()
+                .contains("tasks are missing")
+        );
+        assert!(
+            array("x", "0", "7", "1", "8")
+                .unwrap_err()
+                .contains("\"x\", expected a number")
+        );
     }
 
     #[test]
@@ -252,14 +339,24 @@ mod tests {
         assert!(within("auto/4", &[("SLURM_ARRAY_TASK_ID", &most)]).is_err());
         assert!(within("auto", &[]).unwrap_err().contains("neither"));
         let last = [("JOB_COMPLETION_INDEX", "18446744073709551615")];
-        assert!(within("auto/4", &last).unwrap_err().contains("expected at most 4/4"));
+        assert!(
+            within("auto/4", &last)
+                .unwrap_err()
+                .contains("expected at most 4/4")
+        );
         let last = [("SLURM_ARRAY_TASK_ID", "18446744073709551615")];
-        assert!(within("auto/4", &last).unwrap_err().contains("expected at most 4/4"));
+        assert!(
+            within("auto/4", &last)
+                .unwrap_err()
+                .contains("expected at most 4/4")
+        );
     }
 
     #[test]
     fn folders_of_shards_are_in_order() {
-        let names: Vec<String> = (1..=12).map(|i| Shard { index: i, of: 12 }.folder()).collect();
+        let names: Vec<String> = (1..=12)
+            .map(|i| Shard { index: i, of: 12 }.folder())
+            .collect();
         assert!(names.is_sorted());
         assert_eq!(names[0], "shard-01-of-12");
     }

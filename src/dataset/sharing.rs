@@ -51,7 +51,12 @@ impl FromStr for Group {
 
     fn from_str(text: &str) -> Result<Self> {
         let known = Self::ALL.into_iter().find(|group| group.name() == text);
-        known.ok_or_else(|| Error::value("group", format!("\"{text}\", expected background or selection")))
+        known.ok_or_else(|| {
+            Error::value(
+                "group",
+                format!("\"{text}\", expected background or selection"),
+            )
+        })
     }
 }
 
@@ -72,22 +77,35 @@ impl Listing {
     /// A ratio outside 0..1; groups of images without sidecars.
     pub fn shared(&self, how: Sharing, ratio: f64, seed: u64) -> Result<Self> {
         if !(ratio > 0.0 && ratio < 1.0) {
-            return Err(Error::value("ratio", format!("{ratio}, expected a share between 0 and 1")));
+            return Err(Error::value(
+                "ratio",
+                format!("{ratio}, expected a share between 0 and 1"),
+            ));
         }
         let all = self.series();
         let train = (all.len() as f64 * ratio).round() as usize;
         let parts = match how {
-            Sharing::Consecutive { guard } => {
-                [all[..train].to_vec(), all[train.saturating_add(guard).min(all.len())..].to_vec()]
-            }
+            Sharing::Consecutive { guard } => [
+                all[..train].to_vec(),
+                all[train.saturating_add(guard).min(all.len())..].to_vec(),
+            ],
             Sharing::Random => {
                 let own = |i: usize| i.to_string();
-                grouped(&all, &(0..all.len()).map(own).collect::<Vec<_>>(), train, seed)
+                grouped(
+                    &all,
+                    &(0..all.len()).map(own).collect::<Vec<_>>(),
+                    train,
+                    seed,
+                )
             }
             Sharing::Grouped(group) => grouped(&all, &groups(&all, group)?, train, seed),
         };
         let [train, val] = parts;
-        Ok(Self { train, val, classes: self.classes.clone() })
+        Ok(Self {
+            train,
+            val,
+            classes: self.classes.clone(),
+        })
     }
 
     /// What leaks from training to validation; images are near when they differ by less than `near_codes` (root mean
@@ -98,11 +116,15 @@ impl Listing {
     pub fn leaks(&self, near_codes: f64) -> Result<Leaks> {
         let shared = |group: Group| {
             let of = |images: &[PathBuf]| groups(images, group).map(BTreeSet::from_iter);
-            let (train, val): (BTreeSet<String>, BTreeSet<String>) = (of(&self.train).ok()?, of(&self.val).ok()?);
+            let (train, val): (BTreeSet<String>, BTreeSet<String>) =
+                (of(&self.train).ok()?, of(&self.val).ok()?);
             Some((group.name(), [val.len(), val.intersection(&train).count()]))
         };
         let groups = Group::ALL.into_iter().filter_map(shared).collect();
-        Ok(Leaks { groups, near: near_pairs(&self.train, &self.val, near_codes)? })
+        Ok(Leaks {
+            groups,
+            near: near_pairs(&self.train, &self.val, near_codes)?,
+        })
     }
 }
 
@@ -113,7 +135,11 @@ fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
         Ok(match group {
             Group::Background => scene.plate,
             Group::Selection => {
-                let mut things: Vec<_> = scene.objects.iter().map(|o| format!("{}/{}", o.asset, o.photo)).collect();
+                let mut things: Vec<_> = scene
+                    .objects
+                    .iter()
+                    .map(|o| format!("{}/{}", o.asset, o.photo))
+                    .collect();
                 things.sort();
                 things.join(" ")
             }
@@ -125,7 +151,9 @@ fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
 /// Groups in an order of chance go to validation until it has its share; the rest is for training.
 fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [Vec<PathBuf>; 2] {
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
-    groups.iter().for_each(|group| *sizes.entry(group).or_default() += 1);
+    groups
+        .iter()
+        .for_each(|group| *sizes.entry(group).or_default() += 1);
     let mut order: Vec<(&str, usize)> = sizes.into_iter().collect();
     order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
     let wanted = images.len() - train;
@@ -140,7 +168,10 @@ fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [V
     }
     let of = |want: bool| {
         let pairs = images.iter().zip(groups);
-        pairs.filter(|(_, group)| val.contains(group.as_str()) == want).map(|(image, _)| image.clone()).collect()
+        pairs
+            .filter(|(_, group)| val.contains(group.as_str()) == want)
+            .map(|(image, _)| image.clone())
+            .collect()
     };
     [of(false), of(true)]
 }
@@ -150,16 +181,25 @@ mod tests {
     use super::*;
 
     fn listing(n: usize) -> Listing {
-        Listing { train: (0..n).map(|i| format!("/d/images/{i:04}.png").into()).collect(), ..Listing::default() }
+        Listing {
+            train: (0..n)
+                .map(|i| format!("/d/images/{i:04}.png").into())
+                .collect(),
+            ..Listing::default()
+        }
     }
 
     #[test]
     fn the_paper_s_series_is_cut_once() {
-        let cut = listing(2031).shared(Sharing::Consecutive { guard: 0 }, 0.8, 0).unwrap();
+        let cut = listing(2031)
+            .shared(Sharing::Consecutive { guard: 0 }, 0.8, 0)
+            .unwrap();
         // 80 % of 2031 is 1624.8; the paper says 1624 or, rounded, 1625.
         assert_eq!((cut.train.len(), cut.val.len()), (1625, 406));
         assert!(cut.train.last() < cut.val.first());
-        let guarded = listing(100).shared(Sharing::Consecutive { guard: 5 }, 0.8, 0).unwrap();
+        let guarded = listing(100)
+            .shared(Sharing::Consecutive { guard: 5 }, 0.8, 0)
+            .unwrap();
         assert_eq!((guarded.train.len(), guarded.val.len()), (80, 15));
     }
 
@@ -185,9 +225,15 @@ mod tests {
 
     #[test]
     fn the_head_is_taken_of_both_parts() {
-        let split = listing(100).shared(Sharing::Consecutive { guard: 0 }, 0.8, 0).unwrap().head(0.25).unwrap();
+        let split = listing(100)
+            .shared(Sharing::Consecutive { guard: 0 }, 0.8, 0)
+            .unwrap()
+            .head(0.25)
+            .unwrap();
         assert_eq!((split.train.len(), split.val.len()), (20, 5));
-        assert!(listing(3).head(1.5).is_err() && listing(3).shared(Sharing::Random, 1.0, 0).is_err());
+        assert!(
+            listing(3).head(1.5).is_err() && listing(3).shared(Sharing::Random, 1.0, 0).is_err()
+        );
     }
 
     #[test]
@@ -195,7 +241,11 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let root = std::path::absolute(dir.path()).unwrap();
         let image = |part: &str| root.join(format!("images/{part}/0.png"));
-        let listing = Listing { train: vec![image("train")], val: vec![image("val")], classes: vec!["a: b".into()] };
+        let listing = Listing {
+            train: vec![image("train")],
+            val: vec![image("val")],
+            classes: vec!["a: b".into()],
+        };
         listing.write(&root.join("splits/one")).unwrap();
         assert_eq!(Listing::read(&root.join("splits/one")).unwrap(), listing);
     }

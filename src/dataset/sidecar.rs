@@ -70,7 +70,15 @@ impl Writer for Sidecar {
 impl Record {
     /// What there is to say of an entry.
     fn of(entry: &Entry<'_>) -> Self {
-        let Sample { labels, drawn, scene, scene_seed, rejected, draws, .. } = entry.sample;
+        let Sample {
+            labels,
+            drawn,
+            scene,
+            scene_seed,
+            rejected,
+            draws,
+            ..
+        } = entry.sample;
         Self {
             petcomp: env!("CARGO_PKG_VERSION").to_owned(),
             recipe_hash: entry.recipe_hash.to_owned(),
@@ -79,10 +87,18 @@ impl Record {
             index: entry.k,
             part: entry.part,
             labelled: entry.labelled.iter().map(|label| label.object.id).collect(),
-            topmost: labels.objects.iter().filter(|object| object.is_topmost()).map(|object| object.id).collect(),
+            topmost: labels
+                .objects
+                .iter()
+                .filter(|object| object.is_topmost())
+                .map(|object| object.id)
+                .collect(),
             knotted: knotted(&labels.objects),
             rejected: rejected.clone(),
-            draws: draws.iter().map(|draw| (draw.path.clone(), draw.value)).collect(),
+            draws: draws
+                .iter()
+                .map(|draw| (draw.path.clone(), draw.value))
+                .collect(),
             labels: labels.clone(),
             drawn: drawn.clone(),
             scene: scene.clone(),

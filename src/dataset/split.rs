@@ -39,7 +39,10 @@ pub struct Split {
 
 impl Default for Split {
     fn default() -> Self {
-        Self { val_percent: 20, order: SplitOrder::Interleaved }
+        Self {
+            val_percent: 20,
+            order: SplitOrder::Interleaved,
+        }
     }
 }
 
@@ -82,19 +85,33 @@ mod tests {
     #[test]
     fn five_thousand_samples_give_four_thousand_to_train_on() {
         for order in [SplitOrder::Interleaved, SplitOrder::Consecutive] {
-            assert_eq!(count(Split { val_percent: 20, order }, 5000), 1000);
+            assert_eq!(
+                count(
+                    Split {
+                        val_percent: 20,
+                        order
+                    },
+                    5000
+                ),
+                1000
+            );
         }
     }
 
     #[test]
     fn every_fifth_sample_is_for_validation() {
-        let val: Vec<_> = (0..20).filter(|&k| Split::default().part(k, 20) == Part::Val).collect();
+        let val: Vec<_> = (0..20)
+            .filter(|&k| Split::default().part(k, 20) == Part::Val)
+            .collect();
         assert_eq!(val, [0, 5, 10, 15]);
     }
 
     #[test]
     fn a_consecutive_split_cuts_once_and_like_the_paper() {
-        let split = Split { val_percent: 20, order: SplitOrder::Consecutive };
+        let split = Split {
+            val_percent: 20,
+            order: SplitOrder::Consecutive,
+        };
         let parts: Vec<_> = (0..2031).map(|k| split.part(k, 2031)).collect();
         assert_eq!(parts.iter().filter(|&&p| p == Part::Val).count(), 407);
         assert!(parts.is_sorted_by_key(|p| p.name()));
@@ -103,8 +120,26 @@ mod tests {
     #[test]
     fn none_or_all_may_be_for_validation() {
         for order in [SplitOrder::Interleaved, SplitOrder::Consecutive] {
-            assert_eq!(count(Split { val_percent: 0, order }, 7), 0);
-            assert_eq!(count(Split { val_percent: 100, order }, 7), 7);
+            assert_eq!(
+                count(
+                    Split {
+                        val_percent: 0,
+                        order
+                    },
+                    7
+                ),
+                0
+            );
+            assert_eq!(
+                count(
+                    Split {
+                        val_percent: 100,
+                        order
+                    },
+                    7
+                ),
+                7
+            );
         }
     }
 }

@@ -47,7 +47,10 @@ impl Studio {
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
     pub fn open(setup: Setup) -> Result<Self> {
         let studio = Self::with_assets(setup, |_| true)?;
-        studio.places.iter().try_for_each(|place| studio.check_size_in(place))?;
+        studio
+            .places
+            .iter()
+            .try_for_each(|place| studio.check_size_in(place))?;
         Ok(studio)
     }
 
@@ -56,9 +59,13 @@ impl Studio {
         let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
         let mut lengths: Vec<f64> = photos.map(|photo| photo.record.object_m[0]).collect();
         lengths.sort_by(f64::total_cmp);
-        let Some(&median) = lengths.get(lengths.len() / 2) else { return Ok(()) };
+        let Some(&median) = lengths.get(lengths.len() / 2) else {
+            return Ok(());
+        };
         let (median, factor) = (median, self.setup.scene.scale.middle().min);
-        let CameraSource::Known(camera) = &place.background.camera else { return Ok(()) };
+        let CameraSource::Known(camera) = &place.background.camera else {
+            return Ok(());
+        };
         let px = camera.focal_px.x * median * factor / camera.center().coords.norm();
         if px >= LEAST_OBJECT_PX {
             return Ok(());
@@ -76,17 +83,38 @@ impl Studio {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
-        Self::with_assets(setup, |name| scene.objects.iter().any(|object| object.asset == name))
+        Self::with_assets(setup, |name| {
+            scene.objects.iter().any(|object| object.asset == name)
+        })
     }
 
     fn with_assets(setup: Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let library = Library::open_some(&setup.assets, wanted)?;
-        let (image, surface_size, force) = (setup.scene.image, setup.surface_size, setup.force_cameras);
-        let places = Place::all(&setup.backgrounds, PlaceOptions { image, surface_size, force })?;
-        let backgrounds = places.iter().map(|place| place.background.clone()).collect();
+        let (image, surface_size, force) =
+            (setup.scene.image, setup.surface_size, setup.force_cameras);
+        let places = Place::all(
+            &setup.backgrounds,
+            PlaceOptions {
+                image,
+                surface_size,
+                force,
+            },
+        )?;
+        let backgrounds = places
+            .iter()
+            .map(|place| place.background.clone())
+            .collect();
         let stock = stock(&library);
         let surroundings = Surroundings::of(&setup);
-        Ok(Self { setup, library, places, backgrounds, stock, surroundings, stop: &NEVER })
+        Ok(Self {
+            setup,
+            library,
+            places,
+            backgrounds,
+            stock,
+            surroundings,
+            stop: &NEVER,
+        })
     }
 
     /// The same, whose falls end with [`Error::Interrupted`] once a flag is true.
@@ -110,17 +138,27 @@ impl Studio {
     /// Classes that the setup's policy for obstructed objects cannot add to; an asset that fits between the walls of some
     /// background in no direction; a photo or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
-        self.setup.scene.check_room(&self.backgrounds, &self.stock).map_err(|e| e.within("scene"))?;
+        self.setup
+            .scene
+            .check_room(&self.backgrounds, &self.stock)
+            .map_err(|e| e.within("scene"))?;
         let (folder, labels) = (folder.into(), &self.setup.labels);
         let mut inputs = Inputs::kept(&folder);
-        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
+        let mut writers: Vec<Box<dyn Writer>> =
+            vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
         writers.extend(labels.writers(&self.setup.pictures));
         Ok(Plan {
             folder,
             count,
             numbers: Numbers::All,
             seed,
-            recipe: fingerprint(&self.setup, &self.library, &self.places, &self.surroundings, &mut inputs)?,
+            recipe: fingerprint(
+                &self.setup,
+                &self.library,
+                &self.places,
+                &self.surroundings,
+                &mut inputs,
+            )?,
             classes: labels.obstructed.classes(&self.library.classes)?,
             split: self.setup.split,
             obstructed: labels.obstructed,
@@ -142,7 +180,9 @@ impl Studio {
     /// # Errors
     /// As [`draw`](Self::draw).
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
-        self.setup.scene.explained(seed, k, &self.backgrounds, &self.stock)
+        self.setup
+            .scene
+            .explained(seed, k, &self.backgrounds, &self.stock)
     }
 
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.
@@ -156,8 +196,17 @@ impl Studio {
             let scene_seed = redraw_seed(seed, k, rejected.len());
             let (scene, draws) = self.explain(scene_seed, k)?;
             match self.take_within(scene, &allowance) {
-                Ok(sample) => return Ok(Sample { rejected, draws, scene_seed, ..sample }),
-                Err(Error::Unsettled { what }) if rejected.len() < REDRAWS && !allowance.is_spent() => {
+                Ok(sample) => {
+                    return Ok(Sample {
+                        rejected,
+                        draws,
+                        scene_seed,
+                        ..sample
+                    });
+                }
+                Err(Error::Unsettled { what })
+                    if rejected.len() < REDRAWS && !allowance.is_spent() =>
+                {
                     log::info!("scene {k} is drawn again: {what}");
                     rejected.push(what);
                 }
@@ -180,8 +229,23 @@ impl Studio {
         let (scene, shot) = resolved?;
         let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
         let (labels, label) = timed(|| label::label(&deep, &shot, &self.setup.labels.options()));
-        let times = Times { settle, render, label, ..Times::default() };
-        Ok(Sample { frame, deep, labels, drawn, scene, scene_seed: 0, rejected: vec![], draws: vec![], times })
+        let times = Times {
+            settle,
+            render,
+            label,
+            ..Times::default()
+        };
+        Ok(Sample {
+            frame,
+            deep,
+            labels,
+            drawn,
+            scene,
+            scene_seed: 0,
+            rejected: vec![],
+            draws: vec![],
+            times,
+        })
     }
 
     /// Labels a scene without making its picture: nothing is lit, and neither plate nor environment is read.
@@ -192,7 +256,11 @@ impl Studio {
     /// As [`take`](Self::take).
     pub fn label(&self, scene: Scene) -> Result<Labels> {
         let (_, shot) = self.resolve(scene.unlit())?;
-        Ok(label::label(&render::cover(&shot, &self.setup.render), &shot, &self.setup.labels.options()))
+        Ok(label::label(
+            &render::cover(&shot, &self.setup.render),
+            &shot,
+            &self.setup.labels.options(),
+        ))
     }
 
     /// Renders a shot and finishes its frame as the scene asks.
@@ -222,13 +290,19 @@ impl Studio {
         if let Some(plate) = &plate {
             scene = light::match_plate(scene, plate);
         }
-        let shot = scene.resolve(|object| Look::of(&self.library, object), plate, self.panorama(&scene)?)?;
+        let shot = scene.resolve(
+            |object| Look::of(&self.library, object),
+            plate,
+            self.panorama(&scene)?,
+        )?;
         Ok((scene, shot))
     }
 
     #[cfg(feature = "settle")]
     fn rest(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
-        crate::settle::settle_within(scene, &self.setup.scene.settle, 0, allowance)?.0.into_scene()
+        crate::settle::settle_within(scene, &self.setup.scene.settle, 0, allowance)?
+            .0
+            .into_scene()
     }
 
     #[cfg(not(feature = "settle"))]
@@ -239,18 +313,27 @@ impl Studio {
     /// The picture of the surroundings that a scene names.
     fn panorama(&self, scene: &Scene) -> Result<Option<Arc<Panorama>>> {
         let shining = scene.environment.as_ref().filter(|map| map.shines());
-        shining.map(|map| self.surroundings.picture(&map.file)).transpose()
+        shining
+            .map(|map| self.surroundings.picture(&map.file))
+            .transpose()
     }
 
     fn plate(&self, name: &str) -> Result<Option<Arc<Image<LinearRgb>>>> {
         if name.is_empty() {
             return Ok(None);
         }
-        match self.places.iter().find(|place| place.background.name == name) {
+        match self
+            .places
+            .iter()
+            .find(|place| place.background.name == name)
+        {
             Some(place) => place.plate().map(Some),
             None => {
                 let known: Vec<&str> = self.backgrounds.iter().map(|b| b.name.as_str()).collect();
-                Err(Error::value("plate", format!("\"{name}\", expected one of {}", known.join(", "))))
+                Err(Error::value(
+                    "plate",
+                    format!("\"{name}\", expected one of {}", known.join(", ")),
+                ))
             }
         }
     }

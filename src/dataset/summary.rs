@@ -112,9 +112,11 @@ impl Summary {
     /// A folder that is no dataset, or was written without its sidecars.
     pub fn read(folder: &Path) -> Result<Self> {
         let identity = folder::identity(folder)?;
-        let identity = identity.ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
+        let identity = identity
+            .ok_or_else(|| Error::file(folder, format!("no {IDENTITY}, expected a dataset")))?;
         let lines = lines_of(folder)?;
-        let classes: Vec<String> = serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
+        let classes: Vec<String> =
+            serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
         let mut summary = Self {
             images: Part::ALL.map(|part| lines.iter().filter(|line| line.part == part).count()),
             balance: vec![[[0; 2]; 2]; classes.len()],
@@ -135,7 +137,10 @@ impl Summary {
             let told: Result<Vec<_>> = part.par_iter().map(|line| told(folder, line)).collect();
             for (told, line) in told?.into_iter().zip(part) {
                 summary.add(&told, line);
-                let files = [name(folder, line, "images/")?, name(folder, line, "scenes/")?];
+                let files = [
+                    name(folder, line, "images/")?,
+                    name(folder, line, "scenes/")?,
+                ];
                 summary.glances.push(Glance::of(&told, files));
             }
         }
@@ -147,13 +152,20 @@ impl Summary {
     /// # Errors
     /// A record that cannot be read.
     pub fn shown(&self, folder: &Path, place: usize) -> Result<Shown> {
-        let [picture, record] = self.glances[place].files.each_ref().map(|file| folder.join(file));
-        Ok(Shown { picture, record: io::read_json(record)? })
+        let [picture, record] = self.glances[place]
+            .files
+            .each_ref()
+            .map(|file| folder.join(file));
+        Ok(Shown {
+            picture,
+            record: io::read_json(record)?,
+        })
     }
 
     /// The distribution of a drawn number: least and greatest value, and whether it is a whole number.
     pub fn range(&self, key: &str) -> Option<([f64; 2], bool)> {
-        let recipe: Recipe = serde_json::from_value(self.identity["recipe"]["scene"].clone()).ok()?;
+        let recipe: Recipe =
+            serde_json::from_value(self.identity["recipe"]["scene"].clone()).ok()?;
         let recipe = serde_json::to_value(recipe.narrowed()).ok()?;
         let pointer = format!("/{}", key.replace(['.', '['], "/").replace(']', ""));
         let value = recipe.pointer(&pointer)?;
@@ -172,7 +184,14 @@ impl Summary {
                 self.drawn.entry(key).or_default().push(value);
             }
         }
-        let mut count = |what, name: String| *self.chosen.entry(what).or_default().entry(name).or_default() += 1;
+        let mut count = |what, name: String| {
+            *self
+                .chosen
+                .entry(what)
+                .or_default()
+                .entry(name)
+                .or_default() += 1
+        };
         count("background", record.drawn.plate.clone());
         for object in &record.drawn.objects {
             count("asset", object.asset.clone());
@@ -184,29 +203,41 @@ impl Summary {
                 *self.unlabelled.entry(reason).or_default() += 1;
                 self.unlabelled_visible.push(object.visible_fraction);
             } else {
-                self.boxes.push([object.amodal_box.width(), object.amodal_box.height()]);
+                self.boxes
+                    .push([object.amodal_box.width(), object.amodal_box.height()]);
             }
         }
         for (class, counts) in self.balance.iter_mut().zip(&line.classes) {
             let of = &mut class[usize::from(*part == Part::Val)];
             *of = [of[0] + u64::from(counts[0]), of[1] + u64::from(counts[1])];
         }
-        self.rejected.extend(record.rejected.iter().map(|why| (*k, why.clone())));
+        self.rejected
+            .extend(record.rejected.iter().map(|why| (*k, why.clone())));
     }
 }
 
 impl Glance {
     fn of(told: &Told, files: [String; 2]) -> Self {
         let Told { k, part, record } = told;
-        let labelled = || record.labels.objects.iter().filter(|object| NoLabel::of(object, record).is_none());
+        let labelled = || {
+            record
+                .labels
+                .objects
+                .iter()
+                .filter(|object| NoLabel::of(object, record).is_none())
+        };
         Self {
             index: *k,
             part: *part,
             files,
             image: record.labels.image,
             objects: record.labels.objects.len(),
-            labels: labelled().map(|object| (object.class, object.amodal_box)).collect(),
-            least_visible: labelled().map(|object| object.visible_fraction).fold(1.0, f64::min),
+            labels: labelled()
+                .map(|object| (object.class, object.amodal_box))
+                .collect(),
+            least_visible: labelled()
+                .map(|object| object.visible_fraction)
+                .fold(1.0, f64::min),
             rejected: record.rejected.len(),
         }
     }
@@ -216,25 +247,39 @@ impl Glance {
 const STEP: usize = 256;
 
 fn told(folder: &Path, line: &Line) -> Result<Told> {
-    Ok(Told { k: line.k, part: line.part, record: io::read_json(line.file(folder, "scenes/")?)? })
+    Ok(Told {
+        k: line.k,
+        part: line.part,
+        record: io::read_json(line.file(folder, "scenes/")?)?,
+    })
 }
 
 /// The file of a sample in one of the dataset's folders, as the journal has it.
 fn name(folder: &Path, line: &Line, kind: &str) -> Result<String> {
     line.file(folder, kind)?;
     let file = line.files.iter().find(|file| file.path.starts_with(kind));
-    file.map(|file| file.path.clone()).ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
+    file.map(|file| file.path.clone())
+        .ok_or_else(|| Error::file(folder, format!("sample {} has no {kind}", line.k)))
 }
 
 /// The key in the recipe of a draw's distribution; none for a choice from a list and for a turn that was drawn again.
 fn key(path: &str) -> Option<String> {
-    let choice =
-        path == "background" || path.ends_with(".asset") || path.ends_with(".photo") || path.ends_with(".file");
+    let choice = path == "background"
+        || path.ends_with(".asset")
+        || path.ends_with(".photo")
+        || path.ends_with(".file");
     if choice || path.contains('#') {
         return None;
     }
-    let own = path.strip_prefix("objects[").and_then(|rest| rest.split_once("].")).map(|(_, own)| own);
-    Some(own.or(path.strip_prefix("selection.")).unwrap_or(path).to_owned())
+    let own = path
+        .strip_prefix("objects[")
+        .and_then(|rest| rest.split_once("]."))
+        .map(|(_, own)| own);
+    Some(
+        own.or(path.strip_prefix("selection."))
+            .unwrap_or(path)
+            .to_owned(),
+    )
 }
 
 #[cfg(test)]
@@ -243,8 +288,22 @@ mod tests {
 
     #[test]
     fn the_key_of_a_draw_is_that_of_its_distribution() {
-        let keys = ["objects[12].start.x", "lights[0].color[1]", "selection.objects", "selection[3].asset"].map(key);
-        assert_eq!(keys, [Some("start.x".into()), Some("lights[0].color[1]".into()), Some("objects".into()), None]);
+        let keys = [
+            "objects[12].start.x",
+            "lights[0].color[1]",
+            "selection.objects",
+            "selection[3].asset",
+        ]
+        .map(key);
+        assert_eq!(
+            keys,
+            [
+                Some("start.x".into()),
+                Some("lights[0].color[1]".into()),
+                Some("objects".into()),
+                None
+            ]
+        );
         assert_eq!(key("objects[1].start.yaw_deg#3"), None);
     }
 }

@@ -24,12 +24,18 @@ pub(crate) struct Surroundings {
 impl Surroundings {
     pub(crate) fn of(setup: &Setup) -> Self {
         let listed = setup.scene.environment.files.clone();
-        Self { folder: setup.folder.clone(), listed, kept: Mutex::default() }
+        Self {
+            folder: setup.folder.clone(),
+            listed,
+            kept: Mutex::default(),
+        }
     }
 
     /// Name and path of each picture that the recipe lists.
     pub(crate) fn files(&self) -> impl Iterator<Item = (&str, PathBuf)> {
-        self.listed.iter().map(|name| (name.as_str(), self.folder.join(name)))
+        self.listed
+            .iter()
+            .map(|name| (name.as_str(), self.folder.join(name)))
     }
 
     /// The picture that a scene names.
@@ -73,7 +79,13 @@ impl Surroundings {
         let picture = Arc::new(picture);
         let mut kept = self.kept();
         kept.push((name.to_owned(), picture.clone()));
-        while kept.len() > 1 && kept.iter().map(|(_, picture)| bytes(picture)).sum::<usize>() > KEPT_BYTES {
+        while kept.len() > 1
+            && kept
+                .iter()
+                .map(|(_, picture)| bytes(picture))
+                .sum::<usize>()
+                > KEPT_BYTES
+        {
             kept.remove(0);
         }
         picture
@@ -106,9 +118,16 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         io::create_folder(dir.path().join("own")).unwrap();
         for name in ["far.exr", "own/near.exr"] {
-            io::write(dir.path().join(name), &Image::filled(4, 2, LinearRgb::WHITE)).unwrap();
+            io::write(
+                dir.path().join(name),
+                &Image::filled(4, 2, LinearRgb::WHITE),
+            )
+            .unwrap();
         }
-        let mut setup = Setup { folder: dir.path().join("own"), ..Setup::default() };
+        let mut setup = Setup {
+            folder: dir.path().join("own"),
+            ..Setup::default()
+        };
         setup.scene.environment.files = vec!["../far.exr".into()];
         (dir, setup)
     }
@@ -119,19 +138,34 @@ mod tests {
         let surroundings = Surroundings::of(&setup);
         let [first, second] = [0, 1].map(|_| surroundings.picture("near.exr").unwrap());
         assert!(Arc::ptr_eq(&first, &second));
-        assert!(!Arc::ptr_eq(&first, &surroundings.picture("../far.exr").unwrap()));
-        assert!(Arc::ptr_eq(&first, &surroundings.picture("near.exr").unwrap()));
+        assert!(!Arc::ptr_eq(
+            &first,
+            &surroundings.picture("../far.exr").unwrap()
+        ));
+        assert!(Arc::ptr_eq(
+            &first,
+            &surroundings.picture("near.exr").unwrap()
+        ));
     }
 
     #[test]
     fn a_scene_names_pictures_of_the_recipe_or_of_its_folder() {
         let (dir, setup) = folder();
-        assert!(Surroundings::of(&setup).picture("../far.exr").is_ok(), "listed");
-        let surroundings = Surroundings::of(&Setup { scene: Default::default(), ..setup });
+        assert!(
+            Surroundings::of(&setup).picture("../far.exr").is_ok(),
+            "listed"
+        );
+        let surroundings = Surroundings::of(&Setup {
+            scene: Default::default(),
+            ..setup
+        });
         let refused = |name: &str| surroundings.picture(name).unwrap_err().to_string();
         let absolute = dir.path().join("far.exr").to_string_lossy().into_owned();
         for name in ["../far.exr", &absolute] {
-            assert!(refused(name).starts_with(&format!("environment.file: \"{name}\", expected one that")));
+            assert!(
+                refused(name)
+                    .starts_with(&format!("environment.file: \"{name}\", expected one that"))
+            );
         }
         assert!(refused("none.exr").ends_with("own/none.exr: no such file"));
     }

@@ -63,10 +63,15 @@ impl Times {
             label_s: self.label.as_secs_f64(),
             write_s: self.write.as_secs_f64(),
         };
-        let text = serde_json::to_string(&line).map(|text| text + "\n").unwrap_or_default();
+        let text = serde_json::to_string(&line)
+            .map(|text| text + "\n")
+            .unwrap_or_default();
         let path = folder.join(RUNS);
         let file = io::open_own(&path);
-        if let Err(e) = file.and_then(|mut f| f.write_all(text.as_bytes()).map_err(|e| Error::file(&path, e))) {
+        if let Err(e) = file.and_then(|mut f| {
+            f.write_all(text.as_bytes())
+                .map_err(|e| Error::file(&path, e))
+        }) {
             log::warn!("{e}");
         }
     }
@@ -74,8 +79,12 @@ impl Times {
 
 /// The runs that wrote a folder.
 pub(crate) fn runs_of(folder: &Path) -> Vec<RunTimes> {
-    let text = io::inside(folder, RUNS).and_then(io::read_text).unwrap_or_default();
-    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+    let text = io::inside(folder, RUNS)
+        .and_then(io::read_text)
+        .unwrap_or_default();
+    text.lines()
+        .filter_map(|line| serde_json::from_str(line).ok())
+        .collect()
 }
 
 /// What a closure gives, and how long it took.

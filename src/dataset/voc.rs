@@ -36,7 +36,9 @@ impl Writer for Voc {
     }
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
-        Part::ALL.iter().try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
+        Part::ALL
+            .iter()
+            .try_for_each(|part| io::create_folder(folder.join(KIND).join(part.name())))
     }
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
@@ -51,8 +53,10 @@ impl Writer for Voc {
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
         Part::ALL.iter().try_for_each(|&part| {
-            let numbers =
-                samples.iter().filter(|sample| sample.part == part).map(|sample| format!("{:06}\n", sample.k));
+            let numbers = samples
+                .iter()
+                .filter(|sample| sample.part == part)
+                .map(|sample| format!("{:06}\n", sample.k));
             io::write_text(folder.join(list(part)), &numbers.collect::<String>())
         })
     }
@@ -62,11 +66,13 @@ impl Voc {
     fn document(&self, entry: &Entry<'_>) -> String {
         let [w, h] = entry.sample.labels.image;
         let (part, k, extension) = (entry.part.name(), entry.k, self.pictures.extension());
-        let mut xml =
-            format!("<annotation>\n  <folder>images/{part}</folder>\n  <filename>{k:06}.{extension}</filename>\n");
+        let mut xml = format!(
+            "<annotation>\n  <folder>images/{part}</folder>\n  <filename>{k:06}.{extension}</filename>\n"
+        );
         xml += "  <source>\n    <database>petcomp</database>\n  </source>\n";
-        xml +=
-            &format!("  <size>\n    <width>{w}</width>\n    <height>{h}</height>\n    <depth>3</depth>\n  </size>\n");
+        xml += &format!(
+            "  <size>\n    <width>{w}</width>\n    <height>{h}</height>\n    <depth>3</depth>\n  </size>\n"
+        );
         xml += "  <segmented>0</segmented>\n";
         let objects = entry.labelled.iter().map(|label| self.object(entry, label));
         xml.extend(objects);
@@ -79,12 +85,19 @@ impl Voc {
         if b.is_empty() {
             return String::new();
         }
-        let name =
-            entry.classes.get(label.class as usize).map_or_else(|| label.class.to_string(), |name| escaped(name));
+        let name = entry
+            .classes
+            .get(label.class as usize)
+            .map_or_else(|| label.class.to_string(), |name| escaped(name));
         let [w, h] = entry.sample.labels.image.map(f64::from);
         let is_cut = b.x0 <= 0.0 || b.y0 <= 0.0 || b.x1 >= w || b.y1 >= h;
-        let claims = [("truncated", is_cut), ("difficult", label.ignored), ("occluded", !label.object.is_topmost())];
-        let mut xml = format!("  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n");
+        let claims = [
+            ("truncated", is_cut),
+            ("difficult", label.ignored),
+            ("occluded", !label.object.is_topmost()),
+        ];
+        let mut xml =
+            format!("  <object>\n    <name>{name}</name>\n    <pose>Unspecified</pose>\n");
         for (claim, is_so) in claims {
             xml += &format!("    <{claim}>{}</{claim}>\n", u8::from(is_so));
         }
@@ -100,7 +113,12 @@ impl Voc {
 fn pixels(b: &BBox) -> [(&'static str, u64); 4] {
     let first = |v: f64| libm::floor(v) as u64 + 1;
     let last = |v: f64| libm::ceil(v) as u64;
-    [("xmin", first(b.x0)), ("ymin", first(b.y0)), ("xmax", last(b.x1)), ("ymax", last(b.y1))]
+    [
+        ("xmin", first(b.x0)),
+        ("ymin", first(b.y0)),
+        ("xmax", last(b.x1)),
+        ("ymax", last(b.y1)),
+    ]
 }
 
 /// Text that XML does not take for its own; what XML cannot hold at all becomes a space.
@@ -108,7 +126,9 @@ fn escaped(text: &str) -> String {
     let mut xml = String::new();
     for letter in text.chars() {
         match letter {
-            '&' | '<' | '>' => write!(xml, "&#{};", u32::from(letter)).expect("a string takes all that is written"),
+            '&' | '<' | '>' => {
+                write!(xml, "&#{};", u32::from(letter)).expect("a string takes all that is written")
+            }
             c if c.is_control() => xml.push(' '),
             c => xml.push(c),
         }
@@ -122,7 +142,12 @@ mod tests {
 
     #[test]
     fn a_box_of_whole_pixels_holds_its_first_and_last() {
-        let b = BBox { x0: 0.0, y0: 2.0, x1: 3.0, y1: 4.0 };
+        let b = BBox {
+            x0: 0.0,
+            y0: 2.0,
+            x1: 3.0,
+            y1: 4.0,
+        };
         assert_eq!(pixels(&b).map(|(_, at)| at), [1, 3, 3, 4]);
     }
 

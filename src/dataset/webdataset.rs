@@ -38,7 +38,10 @@ impl Writer for WebDataset {
 
     fn begin(&self, folder: &Path, _classes: &[String]) -> Result<()> {
         if self.samples == 0 {
-            return Err(Error::value("labels.webdataset.samples", "0, expected at least 1"));
+            return Err(Error::value(
+                "labels.webdataset.samples",
+                "0, expected at least 1",
+            ));
         }
         io::create_folder(folder.join(KIND))
     }
@@ -53,23 +56,30 @@ impl Writer for WebDataset {
 
     fn finish(&self, folder: &Path, _classes: &[String], samples: &[Written]) -> Result<()> {
         for part in Part::ALL {
-            let of_part: Vec<_> = samples.iter().filter(|sample| sample.part == part).collect();
+            let of_part: Vec<_> = samples
+                .iter()
+                .filter(|sample| sample.part == part)
+                .collect();
             let archives: Vec<_> = of_part.chunks(self.samples.max(1)).collect();
             for (i, samples) in archives.iter().enumerate() {
                 io::write_through(&archive(folder, part, i), |out| pack(out, folder, samples))?;
             }
             // A dataset that had more samples before.
-            let left_over = (archives.len()..).map(|i| archive(folder, part, i)).take_while(|path| path.exists());
-            left_over
-                .into_iter()
-                .try_for_each(|path| std::fs::remove_file(&path).map_err(|e| Error::file(&path, e)))?;
+            let left_over = (archives.len()..)
+                .map(|i| archive(folder, part, i))
+                .take_while(|path| path.exists());
+            left_over.into_iter().try_for_each(|path| {
+                std::fs::remove_file(&path).map_err(|e| Error::file(&path, e))
+            })?;
         }
         Ok(())
     }
 }
 
 fn archive(folder: &Path, part: Part, i: usize) -> PathBuf {
-    folder.join(KIND).join(format!("{}-{i:06}.tar", part.name()))
+    folder
+        .join(KIND)
+        .join(format!("{}-{i:06}.tar", part.name()))
 }
 
 fn pack(out: &mut dyn Write, folder: &Path, samples: &[&Written]) -> std::io::Result<()> {
@@ -77,7 +87,8 @@ fn pack(out: &mut dyn Write, folder: &Path, samples: &[&Written]) -> std::io::Re
     for sample in samples {
         for (name, file) in named(sample) {
             let file = io::inside(folder, file).map_err(std::io::Error::other)?;
-            let file = std::fs::File::open(&file).map_err(|e| std::io::Error::other(Error::file(&file, e)))?;
+            let file = std::fs::File::open(&file)
+                .map_err(|e| std::io::Error::other(Error::file(&file, e)))?;
             let mut header = tar::Header::new_ustar();
             header.set_size(file.metadata()?.len());
             header.set_mode(MODE);
@@ -96,7 +107,14 @@ fn named(sample: &Written) -> Vec<(String, &Path)> {
         let short = format!("{:06}.{extension}", sample.k);
         let kind = file.iter().next().unwrap_or_default().to_string_lossy();
         let is_taken = named.iter().any(|(name, _)| *name == short);
-        named.push((if is_taken { format!("{:06}.{kind}.{extension}", sample.k) } else { short }, file));
+        named.push((
+            if is_taken {
+                format!("{:06}.{kind}.{extension}", sample.k)
+            } else {
+                short
+            },
+            file,
+        ));
     }
     named
 }
@@ -107,8 +125,17 @@ mod tests {
 
     #[test]
     fn files_of_one_kind_get_names_of_their_own() {
-        let files = ["images/val/000007.png", "scenes/val/000007.json", "coco/val/000007.json"].map(PathBuf::from);
-        let sample = Written { k: 7, part: Part::Val, files: files.to_vec() };
+        let files = [
+            "images/val/000007.png",
+            "scenes/val/000007.json",
+            "coco/val/000007.json",
+        ]
+        .map(PathBuf::from);
+        let sample = Written {
+            k: 7,
+            part: Part::Val,
+            files: files.to_vec(),
+        };
         let names: Vec<_> = named(&sample).into_iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["000007.png", "000007.json", "000007.coco.json"]);
     }

@@ -85,7 +85,12 @@ impl Yolo {
     fn rows(&self, entry: &Entry<'_>) -> String {
         let image = entry.sample.labels.image.map(f64::from);
         let mut rows: Vec<String> = Vec::new();
-        for row in entry.labelled.iter().filter(|label| !label.ignored).filter_map(|label| self.row_of(label, image)) {
+        for row in entry
+            .labelled
+            .iter()
+            .filter(|label| !label.ignored)
+            .filter_map(|label| self.row_of(label, image))
+        {
             if !rows.contains(&row) {
                 rows.push(row);
             }
@@ -93,7 +98,11 @@ impl Yolo {
         rows.concat()
     }
 
-    fn row_of(&self, &Labelled { object, class, .. }: &Labelled<'_>, image: [f64; 2]) -> Option<String> {
+    fn row_of(
+        &self,
+        &Labelled { object, class, .. }: &Labelled<'_>,
+        image: [f64; 2],
+    ) -> Option<String> {
         let (chosen, mask) = self.boxes.of(object);
         match self.task {
             _ if chosen.is_empty() => None,
@@ -106,7 +115,10 @@ impl Yolo {
 
 fn box_row(class: u32, b: &BBox, [w, h]: [f64; 2]) -> String {
     let center = b.center();
-    row(class, [center.x / w, center.y / h, b.width() / w, b.height() / h])
+    row(
+        class,
+        [center.x / w, center.y / h, b.width() / w, b.height() / h],
+    )
 }
 
 fn ring_row(class: u32, ring: &[Point2<f64>], [w, h]: [f64; 2]) -> String {

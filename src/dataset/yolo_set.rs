@@ -32,7 +32,11 @@ impl YoloSet {
         }
         let root = yaml.root(folder);
         let part = |part| images(&root.join(yaml.folder(part).unwrap_or_default()));
-        Ok(Self { classes: yaml.names().to_vec(), train: part(Part::Train)?, val: part(Part::Val)? })
+        Ok(Self {
+            classes: yaml.names().to_vec(),
+            train: part(Part::Train)?,
+            val: part(Part::Val)?,
+        })
     }
 
     /// The label file of an image: its path with the last `images` replaced by `labels`.
@@ -48,7 +52,11 @@ impl YoloSet {
 }
 
 fn images(place: &Path) -> Result<Vec<PathBuf>> {
-    let found = if place.extension().is_some_and(|e| e == "txt") { listed(place)? } else { inside(place)? };
+    let found = if place.extension().is_some_and(|e| e == "txt") {
+        listed(place)?
+    } else {
+        inside(place)?
+    };
     if found.is_empty() {
         return Err(Error::file(place, "no images, expected at least one"));
     }
@@ -60,7 +68,12 @@ fn listed(list: &Path) -> Result<Vec<PathBuf>> {
     let text = io::read_text(list)?;
     let folder = list.parent().unwrap_or(Path::new(""));
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    Ok(lines.map(|line| line.strip_prefix("./").map_or_else(|| line.into(), |below| folder.join(below))).collect())
+    Ok(lines
+        .map(|line| {
+            line.strip_prefix("./")
+                .map_or_else(|| line.into(), |below| folder.join(below))
+        })
+        .collect())
 }
 
 fn inside(folder: &Path) -> Result<Vec<PathBuf>> {
@@ -68,7 +81,9 @@ fn inside(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in entries {
         let path = entry.map_err(|e| Error::file(folder, e))?.path();
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let extension = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
         if extension.is_some_and(|e| ["jpg", "jpeg", "png"].contains(&e.as_str())) {
             images.push(path);
         }
@@ -86,7 +101,12 @@ mod tests {
         for part in ["images/train", "images/val"] {
             std::fs::create_dir_all(folder.path().join(part)).unwrap();
         }
-        for image in ["images/train/b.png", "images/train/a.jpg", "images/train/note.md", "images/val/c.png"] {
+        for image in [
+            "images/train/b.png",
+            "images/train/a.jpg",
+            "images/train/note.md",
+            "images/val/c.png",
+        ] {
             std::fs::write(folder.path().join(image), "").unwrap();
         }
         std::fs::write(folder.path().join("some.txt"), "./images/val/c.png\n\n").unwrap();
@@ -98,8 +118,17 @@ mod tests {
     fn folders_and_lists_of_images_are_read() {
         let set = folder("train: images/train\nval: some.txt\nnames: [cap]\n");
         let read = YoloSet::open(set.path()).unwrap();
-        assert_eq!(read.train, ["images/train/a.jpg", "images/train/b.png"].map(|p| set.path().join(p)));
-        assert_eq!((read.val, read.classes), (vec![set.path().join("images/val/c.png")], vec!["cap".into()]));
+        assert_eq!(
+            read.train,
+            ["images/train/a.jpg", "images/train/b.png"].map(|p| set.path().join(p))
+        );
+        assert_eq!(
+            (read.val, read.classes),
+            (
+                vec![set.path().join("images/val/c.png")],
+                vec!["cap".into()]
+            )
+        );
     }
 
     #[test]

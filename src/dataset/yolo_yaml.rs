@@ -27,7 +27,9 @@ impl DataYaml {
 
     /// Where the folders of the parts are, for a file in `folder`.
     pub(crate) fn root(&self, folder: &Path) -> PathBuf {
-        self.path.as_deref().map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
+        self.path
+            .as_deref()
+            .map_or_else(|| folder.to_path_buf(), |path| folder.join(path))
     }
 
     /// Number of classes: of names that are there, whatever `nc` claims.
@@ -47,7 +49,9 @@ impl DataYaml {
 
     /// The text of a `data.yaml` whose parts lie where `place` says.
     pub(crate) fn write_with(classes: &[String], place: impl Fn(&str) -> String) -> String {
-        let mut yaml = String::from("# Folders are relative to this file. YOLOv5: add a line `path: <this folder>`.\n");
+        let mut yaml = String::from(
+            "# Folders are relative to this file. YOLOv5: add a line `path: <this folder>`.\n",
+        );
         for part in Part::ALL {
             yaml += &format!("{}: {}\n", part.name(), place(part.name()));
         }
@@ -82,18 +86,30 @@ impl DataYaml {
             self.names.push(unquoted(name));
             return Ok(());
         }
-        let (key, value) = bare.split_once(':').ok_or_else(|| format!("\"{bare}\", expected a key and a value"))?;
+        let (key, value) = bare
+            .split_once(':')
+            .ok_or_else(|| format!("\"{bare}\", expected a key and a value"))?;
         let value = value.trim();
         if line.starts_with(' ') {
             let expected = self.names.len();
             self.names.push(unquoted(value));
-            return if key == expected.to_string() { Ok(()) } else { Err(format!("class {key}, expected {expected}")) };
+            return if key == expected.to_string() {
+                Ok(())
+            } else {
+                Err(format!("class {key}, expected {expected}"))
+            };
         }
         match key {
             "path" => self.path = Some(unquoted(value)),
             "train" => self.train = Some(unquoted(value)),
             "val" => self.val = Some(unquoted(value)),
-            "nc" => self.nc = Some(value.parse().map_err(|_| format!("nc: {value}, expected a number"))?),
+            "nc" => {
+                self.nc = Some(
+                    value
+                        .parse()
+                        .map_err(|_| format!("nc: {value}, expected a number"))?,
+                )
+            }
             "names" => self.names.extend(inline(value)),
             _ => {}
         }
@@ -102,21 +118,33 @@ impl DataYaml {
 
     fn missing(&self) -> Vec<String> {
         let mut missing = Vec::new();
-        for part in Part::ALL.iter().filter(|&&part| self.folder(part).is_none()) {
+        for part in Part::ALL
+            .iter()
+            .filter(|&&part| self.folder(part).is_none())
+        {
             missing.push(format!("no {}:, which trainers require", part.name()));
         }
         if self.names.is_empty() {
             missing.push("no names, expected one for each class".into());
         } else if let Some(nc) = self.nc.filter(|&nc| nc != self.names.len()) {
-            missing.push(format!("nc: {nc}, but there are {} names", self.names.len()));
+            missing.push(format!(
+                "nc: {nc}, but there are {} names",
+                self.names.len()
+            ));
         }
         missing
     }
 }
 
 fn inline(value: &str) -> Vec<String> {
-    let list = value.strip_prefix('[').and_then(|v| v.strip_suffix(']')).unwrap_or_default();
-    list.split(',').map(unquoted).filter(|name| !name.is_empty()).collect()
+    let list = value
+        .strip_prefix('[')
+        .and_then(|v| v.strip_suffix(']'))
+        .unwrap_or_default();
+    list.split(',')
+        .map(unquoted)
+        .filter(|name| !name.is_empty())
+        .collect()
 }
 
 fn unquoted(text: &str) -> String {
@@ -140,7 +168,10 @@ mod tests {
     fn names_may_be_a_list() {
         for names in ["names: [cap, 'none']\n", "names:\n- cap\n- \"none\"\n"] {
             let (yaml, faults) = DataYaml::read(&format!("train: a\nval: b\n{names}"));
-            assert_eq!((yaml.names.as_slice(), faults), (&["cap", "none"].map(String::from)[..], vec![]));
+            assert_eq!(
+                (yaml.names.as_slice(), faults),
+                (&["cap", "none"].map(String::from)[..], vec![])
+            );
         }
     }
 

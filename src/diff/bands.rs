@@ -48,7 +48,9 @@ impl<P, F: Fn(Range<usize>) -> Image<P> + Sync> Rows<P> for RowsBy<F> {
 /// The rows of a picture in bands.
 pub(super) fn bands((width, height): (usize, usize)) -> impl Iterator<Item = Range<usize>> {
     let rows = (BAND / width.max(1)).max(LEAST_ROWS);
-    (0..height).step_by(rows).map(move |start| start..(start + rows).min(height))
+    (0..height)
+        .step_by(rows)
+        .map(move |start| start..(start + rows).min(height))
 }
 
 /// A band with rows beside it, as far as there are any.

@@ -10,7 +10,9 @@ pub(super) struct Kernel {
 impl Kernel {
     /// `f(-radius)` to `f(radius)`.
     pub(super) fn new(radius: i32, f: impl Fn(f64) -> f64) -> Self {
-        Self { weights: (-radius..=radius).map(|i| f(f64::from(i)) as f32).collect() }
+        Self {
+            weights: (-radius..=radius).map(|i| f(f64::from(i)) as f32).collect(),
+        }
     }
 
     /// A Gaussian that sums to 1.
@@ -20,7 +22,12 @@ impl Kernel {
 
     /// Positive weights made to sum to 1, negative ones to -1.
     pub(super) fn balanced(self) -> Self {
-        let sum = |sign: f32| self.weights.iter().map(|w| (w * sign).max(0.0)).sum::<f32>();
+        let sum = |sign: f32| {
+            self.weights
+                .iter()
+                .map(|w| (w * sign).max(0.0))
+                .sum::<f32>()
+        };
         let (positive, negative) = (sum(1.0), sum(-1.0));
         let scaled = |w: f32| {
             if w > 0.0 {
@@ -31,7 +38,9 @@ impl Kernel {
                 0.0
             }
         };
-        Self { weights: self.weights.iter().map(|&w| scaled(w)).collect() }
+        Self {
+            weights: self.weights.iter().map(|&w| scaled(w)).collect(),
+        }
     }
 
     /// The weighted sum around `at` of a line of `len` values, each end going on.
@@ -39,7 +48,11 @@ impl Kernel {
     fn sum(&self, at: usize, len: usize, value: impl Fn(usize) -> f32) -> f32 {
         let (radius, last) = ((self.weights.len() / 2) as isize, len as isize - 1);
         let place = |i: usize| (at as isize + i as isize - radius).clamp(0, last) as usize;
-        self.weights.iter().enumerate().map(|(i, w)| w * value(place(i))).sum()
+        self.weights
+            .iter()
+            .enumerate()
+            .map(|(i, w)| w * value(place(i)))
+            .sum()
     }
 }
 
@@ -50,7 +63,9 @@ pub(super) fn correlate(plane: &Image<f32>, along_x: &Kernel, along_y: &Kernel) 
         let row = plane.row(y);
         along_x.sum(x, width, |i| row[i])
     });
-    Image::from_fn(width, height, |x, y| along_y.sum(y, height, |j| mixed[(x, j)]))
+    Image::from_fn(width, height, |x, y| {
+        along_y.sum(y, height, |j| mixed[(x, j)])
+    })
 }
 
 /// One channel of a picture of three.
@@ -66,8 +81,18 @@ mod tests {
     fn a_plane_of_one_value_stays_and_has_no_edges() {
         let plane = Image::filled(7, 5, 0.3);
         let (blur, edge) = (Kernel::gaussian(4, 1.5), Kernel::new(3, |x| -x).balanced());
-        assert!(correlate(&plane, &blur, &blur).pixels().iter().all(|v| (v - 0.3).abs() < 1e-6));
-        assert!(correlate(&plane, &edge, &blur).pixels().iter().all(|v| v.abs() < 1e-6));
+        assert!(
+            correlate(&plane, &blur, &blur)
+                .pixels()
+                .iter()
+                .all(|v| (v - 0.3).abs() < 1e-6)
+        );
+        assert!(
+            correlate(&plane, &edge, &blur)
+                .pixels()
+                .iter()
+                .all(|v| v.abs() < 1e-6)
+        );
     }
 
     #[test]

@@ -11,7 +11,11 @@ use std::ops::Range;
 const PIXELS_PER_DEGREE: f64 = 3840.0 / 0.7 * 0.7 * PI / 180.0;
 
 /// Contrast sensitivity of the eye as sums of Gaussians over degrees: pairs of weight and width (table 1).
-const SENSITIVITY: [&[[f64; 2]]; 3] = [&[[1.0, 0.0047]], &[[1.0, 0.0053]], &[[34.1, 0.04], [13.5, 0.025]]];
+const SENSITIVITY: [&[[f64; 2]]; 3] = [
+    &[[1.0, 0.0047]],
+    &[[1.0, 0.0053]],
+    &[[34.1, 0.04], [13.5, 0.025]],
+];
 /// The widest of them decides the radius of all.
 const WIDEST: f64 = 0.04;
 
@@ -49,7 +53,11 @@ pub(super) fn reach() -> usize {
 }
 
 /// Sums of the differences in some rows.
-pub(super) fn row_sums(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>, rows: Range<usize>) -> Vec<f64> {
+pub(super) fn row_sums(
+    reference: &Image<[f32; 3]>,
+    test: &Image<[f32; 3]>,
+    rows: Range<usize>,
+) -> Vec<f64> {
     let eye = Eye::new();
     let [a, b] = [reference, test].map(|image| eye.see(image));
     let largest = eye.largest();
@@ -57,10 +65,15 @@ pub(super) fn row_sums(reference: &Image<[f32; 3]>, test: &Image<[f32; 3]>, rows
         let color = remapped(hyab(a.colors[at], b.colors[at]), largest);
         let (f, g) = (a.features[at], b.features[at]);
         let feature = (f[0] - g[0]).abs().max((f[1] - g[1]).abs());
-        let feature = libm::pow(f64::from(feature) * std::f64::consts::FRAC_1_SQRT_2, FEATURE_EXPONENT);
+        let feature = libm::pow(
+            f64::from(feature) * std::f64::consts::FRAC_1_SQRT_2,
+            FEATURE_EXPONENT,
+        );
         libm::pow(color, 1.0 - feature)
     };
-    rows.into_par_iter().map(|y| (0..test.width()).map(|x| difference((x, y))).sum()).collect()
+    rows.into_par_iter()
+        .map(|y| (0..test.width()).map(|x| difference((x, y))).sum())
+        .collect()
 }
 
 /// What is seen of a picture.
@@ -81,18 +94,23 @@ impl Eye {
     fn new() -> Self {
         let xyz_from_linear = ColorMatrix::xyz_from_linear();
         let white = xyz_from_linear.apply([1.0; 3]);
-        Self { xyz_from_linear, linear_from_xyz: ColorMatrix::linear_from_xyz(), white }
+        Self {
+            xyz_from_linear,
+            linear_from_xyz: ColorMatrix::linear_from_xyz(),
+            white,
+        }
     }
 
     fn see(&self, image: &Image<[f32; 3]>) -> Seen {
         let opponent = image.map(|p| self.opponent(p));
         let [luminance, red_green, blue_yellow] = [0, 1, 2].map(|c| channel(&opponent, c));
         let features = features(&luminance.map(|y| (y + 16.0) / 116.0));
-        let [y, cx, cz] =
-            [(0, &luminance), (1, &red_green), (2, &blue_yellow)].map(|(c, plane)| blurred(plane, SENSITIVITY[c]));
+        let [y, cx, cz] = [(0, &luminance), (1, &red_green), (2, &blue_yellow)]
+            .map(|(c, plane)| blurred(plane, SENSITIVITY[c]));
         let (width, height) = image.size();
-        let colors =
-            Image::from_fn(width, height, |i, j| self.hunt_lab(self.linear([y[(i, j)], cx[(i, j)], cz[(i, j)]])));
+        let colors = Image::from_fn(width, height, |i, j| {
+            self.hunt_lab(self.linear([y[(i, j)], cx[(i, j)], cz[(i, j)]]))
+        });
         Seen { colors, features }
     }
 
@@ -107,7 +125,9 @@ impl Eye {
         let y = (y + 16.0) / 116.0;
         let xyz = [y + cx / 500.0, y, y - cz / 200.0];
         let absolute = std::array::from_fn(|c| xyz[c] * self.white[c]);
-        self.linear_from_xyz.apply(absolute).map(|v| v.clamp(0.0, 1.0))
+        self.linear_from_xyz
+            .apply(absolute)
+            .map(|v| v.clamp(0.0, 1.0))
     }
 
     /// XYZ as shares of white.
@@ -119,15 +139,28 @@ impl Eye {
     /// CIELAB, its colourfulness scaled down in the dark (Hunt).
     fn hunt_lab(&self, linear: [f32; 3]) -> [f32; 3] {
         const BEND: f32 = 6.0 / 29.0;
-        let f = |t: f32| if t > BEND * BEND * BEND { libm::cbrtf(t) } else { t / (3.0 * BEND * BEND) + 4.0 / 29.0 };
+        let f = |t: f32| {
+            if t > BEND * BEND * BEND {
+                libm::cbrtf(t)
+            } else {
+                t / (3.0 * BEND * BEND) + 4.0 / 29.0
+            }
+        };
         let [x, y, z] = self.relative(linear).map(f);
         let lightness = 116.0 * y - 16.0;
-        [lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z)]
+        [
+            lightness,
+            0.01 * lightness * 500.0 * (x - y),
+            0.01 * lightness * 200.0 * (y - z),
+        ]
     }
 
     /// The largest difference on a screen, that of green and blue, evened out.
     fn largest(&self) -> f64 {
-        hyab(self.hunt_lab([0.0, 1.0, 0.0]), self.hunt_lab([0.0, 0.0, 1.0]))
+        hyab(
+            self.hunt_lab([0.0, 1.0, 0.0]),
+            self.hunt_lab([0.0, 0.0, 1.0]),
+        )
     }
 }
 
@@ -160,10 +193,17 @@ fn feature_radius() -> i32 {
 /// A plane as the eye blurs it.
 fn blurred(plane: &Image<f32>, sensitivity: &[[f64; 2]]) -> Image<f32> {
     let radius = blur_radius();
-    let gaussian =
-        |width: f64| move |x: f64| libm::exp(-PI * PI * (x / PIXELS_PER_DEGREE) * (x / PIXELS_PER_DEGREE) / width);
+    let gaussian = |width: f64| {
+        move |x: f64| {
+            libm::exp(-PI * PI * (x / PIXELS_PER_DEGREE) * (x / PIXELS_PER_DEGREE) / width)
+        }
+    };
     // The weight of each Gaussian in the whole, which sums to 1.
-    let sum = |width: f64| (-radius..=radius).map(|i| gaussian(width)(f64::from(i))).sum::<f64>();
+    let sum = |width: f64| {
+        (-radius..=radius)
+            .map(|i| gaussian(width)(f64::from(i)))
+            .sum::<f64>()
+    };
     let share = |[a, b]: [f64; 2]| a * (PI / b).sqrt() * sum(b) * sum(b);
     let whole: f64 = sensitivity.iter().map(|&g| share(g)).sum();
     let part = |&[a, b]: &[f64; 2]| {
@@ -182,11 +222,16 @@ fn features(luminance: &Image<f32>) -> Image<[f32; 2]> {
     let gaussian = |x: f64| libm::exp(-x * x / (2.0 * sigma * sigma));
     let blur = Kernel::gaussian(radius, sigma);
     let strength = |kernel: &Kernel| {
-        let (x, y) = (correlate(luminance, kernel, &blur), correlate(luminance, &blur, kernel));
+        let (x, y) = (
+            correlate(luminance, kernel, &blur),
+            correlate(luminance, &blur, kernel),
+        );
         x.zip_map(&y, |u: f32, v: f32| libm::hypotf(u, v))
     };
     let edges = strength(&Kernel::new(radius, |x| -x * gaussian(x)).balanced());
-    let points = strength(&Kernel::new(radius, |x| (x * x / (sigma * sigma) - 1.0) * gaussian(x)).balanced());
+    let points = strength(
+        &Kernel::new(radius, |x| (x * x / (sigma * sigma) - 1.0) * gaussian(x)).balanced(),
+    );
     edges.zip_map(&points, |e, p| [e, p])
 }
 

@@ -33,7 +33,12 @@ impl Likeness {
         let mut sums = Sums::default();
         for band in bands((width, height)) {
             let outer = grown(&band, flip::reach().max(ssim::RADIUS), height);
-            sums.add([picture.rows(outer.clone()), reference.rows(outer.clone())], band, outer.start, height);
+            sums.add(
+                [picture.rows(outer.clone()), reference.rows(outer.clone())],
+                band,
+                outer.start,
+                height,
+            );
         }
         let count = (width * height) as f64;
         Some(Self {
@@ -56,11 +61,19 @@ struct Sums {
 
 impl Sums {
     /// Adds a band of a picture of so many rows; the two pictures begin at row `first`, above it.
-    fn add(&mut self, [picture, reference]: [Image<LinearRgb>; 2], band: Range<usize>, first: usize, height: usize) {
+    fn add(
+        &mut self,
+        [picture, reference]: [Image<LinearRgb>; 2],
+        band: Range<usize>,
+        first: usize,
+        height: usize,
+    ) {
         let inner = |rows: Range<usize>| rows.start - first..rows.end - first;
         for y in inner(band.clone()) {
             let pairs = picture.row(y).iter().zip(reference.row(y));
-            let differences = pairs.flat_map(|(p, q)| [p.r - q.r, p.g - q.g, p.b - q.b]).map(f64::from);
+            let differences = pairs
+                .flat_map(|(p, q)| [p.r - q.r, p.g - q.g, p.b - q.b])
+                .map(f64::from);
             let (sum, squares) = differences.fold((0.0, 0.0), |(s, t), d| (s + d, t + d * d));
             (self.errors, self.squares) = (self.errors + sum, self.squares + squares);
         }
@@ -68,9 +81,12 @@ impl Sums {
         let windows = ssim::inside(height);
         let windows = band.start.max(windows.start)..band.end.min(windows.end);
         if !windows.is_empty() {
-            self.ssim.extend(ssim::row_sums(&wanted, &shown, inner(windows)));
+            self.ssim
+                .extend(ssim::row_sums(&wanted, &shown, inner(windows)));
         }
-        self.flip += flip::row_sums(&wanted, &shown, inner(band)).iter().sum::<f64>();
+        self.flip += flip::row_sums(&wanted, &shown, inner(band))
+            .iter()
+            .sum::<f64>();
     }
 }
 
@@ -81,8 +97,16 @@ fn displayed(image: &Image<LinearRgb>) -> Image<[f32; 3]> {
 
 impl fmt::Display for Likeness {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { rmse, bias, ssim, flip } = self;
-        write!(f, "RMSE = {rmse:.6}, bias = {bias:+.7}, SSIM = {ssim:.6}, FLIP = {flip:.6}")
+        let Self {
+            rmse,
+            bias,
+            ssim,
+            flip,
+        } = self;
+        write!(
+            f,
+            "RMSE = {rmse:.6}, bias = {bias:+.7}, SSIM = {ssim:.6}, FLIP = {flip:.6}"
+        )
     }
 }
 
@@ -130,7 +154,9 @@ pub(crate) mod tests {
         assert!((likeness.flip - super::flip::flip(&wanted, &shown).unwrap()).abs() < 1e-12);
         assert!((likeness.ssim - super::ssim::ssim(&wanted, &shown).unwrap()).abs() < 1e-12);
         assert!(
-            (likeness.bias - a.pixels().iter().map(|c| f64::from(c.r * 0.1)).sum::<f64>() / (width * height) as f64)
+            (likeness.bias
+                - a.pixels().iter().map(|c| f64::from(c.r * 0.1)).sum::<f64>()
+                    / (width * height) as f64)
                 .abs()
                 < 1e-6
         );
@@ -139,7 +165,12 @@ pub(crate) mod tests {
     #[test]
     fn a_picture_is_like_itself() {
         let image = pattern().map(LinearRgb::from);
-        let Likeness { rmse, bias, ssim, flip } = Likeness::of(&image, &image).unwrap();
+        let Likeness {
+            rmse,
+            bias,
+            ssim,
+            flip,
+        } = Likeness::of(&image, &image).unwrap();
         assert_eq!((rmse, bias, flip), (0.0, 0.0, 0.0));
         assert!((ssim - 1.0).abs() < 1e-7);
         assert_eq!(Likeness::of(&image, &Image::new(3, 3)), None);

@@ -115,9 +115,14 @@ pub fn compare<P: Channels>(a: &impl Rows<P>, b: &impl Rows<P>, thresholds: &Thr
     let tallies = bands((width, height)).flat_map(|band| {
         let (a, b) = (a.rows(band.clone()), b.rows(band.clone()));
         let rows = band.clone().into_par_iter().map(|y| (y, y - band.start));
-        rows.map(|(y, i)| compare_rows(a.row(i), b.row(i), y, thresholds)).collect::<Vec<Tally>>()
+        rows.map(|(y, i)| compare_rows(a.row(i), b.row(i), y, thresholds))
+            .collect::<Vec<Tally>>()
     });
-    Report::new::<P>(tallies.fold(Tally::default(), Tally::then), width * height, thresholds)
+    Report::new::<P>(
+        tallies.fold(Tally::default(), Tally::then),
+        width * height,
+        thresholds,
+    )
 }
 
 fn compare_rows<P: Channels>(a: &[P], b: &[P], y: usize, thresholds: &Thresholds) -> Tally {
@@ -152,7 +157,11 @@ mod tests {
 
     #[test]
     fn a_picture_matches_itself_even_with_nan_and_infinity() {
-        let strange = picture(&[(0, 0, f32::NAN), (1, 0, f32::INFINITY), (2, 0, f32::NEG_INFINITY)]);
+        let strange = picture(&[
+            (0, 0, f32::NAN),
+            (1, 0, f32::INFINITY),
+            (2, 0, f32::NEG_INFINITY),
+        ]);
         let report = compare(&strange, &strange, &Thresholds::default());
         assert_eq!(report.verdict, Verdict::Match);
         assert_eq!((report.max_error, report.psnr), (0.0, f64::INFINITY));
@@ -176,16 +185,84 @@ mod tests {
         for (thresholds, expected) in [
             (d, Verdict::Failure),
             (Thresholds { fail: 0.15, ..d }, Verdict::Failure),
-            (Thresholds { fail_percent: 20.0, ..d }, Verdict::Warning),
-            (Thresholds { fail_percent: 16.666, ..d }, Verdict::Failure),
-            (Thresholds { fail_percent: 20.0, hard_fail: 0.15, ..d }, Verdict::Failure),
-            (Thresholds { fail_percent: 20.0, warn_percent: 20.0, ..d }, Verdict::Match),
-            (Thresholds { fail_percent: 20.0, warn: 1.0, hard_warn: 0.1, ..d }, Verdict::Warning),
-            (Thresholds { allow_failures: 2, hard_fail: 0.1, ..d }, Verdict::Match),
-            (Thresholds { allow_failures: 1, ..d }, Verdict::Failure),
-            (Thresholds { allow_failures: 1, fail_percent: 10.0, ..d }, Verdict::Failure),
-            (Thresholds { fail: 1.0, warn: 0.05, ..d }, Verdict::Match),
-            (Thresholds { fail: 1.0, hard_warn: 0.1, ..d }, Verdict::Match),
+            (
+                Thresholds {
+                    fail_percent: 20.0,
+                    ..d
+                },
+                Verdict::Warning,
+            ),
+            (
+                Thresholds {
+                    fail_percent: 16.666,
+                    ..d
+                },
+                Verdict::Failure,
+            ),
+            (
+                Thresholds {
+                    fail_percent: 20.0,
+                    hard_fail: 0.15,
+                    ..d
+                },
+                Verdict::Failure,
+            ),
+            (
+                Thresholds {
+                    fail_percent: 20.0,
+                    warn_percent: 20.0,
+                    ..d
+                },
+                Verdict::Match,
+            ),
+            (
+                Thresholds {
+                    fail_percent: 20.0,
+                    warn: 1.0,
+                    hard_warn: 0.1,
+                    ..d
+                },
+                Verdict::Warning,
+            ),
+            (
+                Thresholds {
+                    allow_failures: 2,
+                    hard_fail: 0.1,
+                    ..d
+                },
+                Verdict::Match,
+            ),
+            (
+                Thresholds {
+                    allow_failures: 1,
+                    ..d
+                },
+                Verdict::Failure,
+            ),
+            (
+                Thresholds {
+                    allow_failures: 1,
+                    fail_percent: 10.0,
+                    ..d
+                },
+                Verdict::Failure,
+            ),
+            (
+                Thresholds {
+                    fail: 1.0,
+                    warn: 0.05,
+                    ..d
+                },
+                Verdict::Match,
+            ),
+            (
+                Thresholds {
+                    fail: 1.0,
+                    hard_warn: 0.1,
+                    ..d
+                },
+                Verdict::Match,
+            ),
         ] {
             assert_eq!(verdict(&TWO, thresholds), expected, "{thresholds:?}");
         }
@@ -195,29 +272,53 @@ mod tests {
     fn relative_thresholds_are_parts_of_the_mean_magnitude() {
         let one = |v| Image::filled(1, 1, Coverage(v));
         let fails = |a, b, fail_relative| {
-            let thresholds = Thresholds { fail_relative, ..Default::default() };
+            let thresholds = Thresholds {
+                fail_relative,
+                ..Default::default()
+            };
             compare(&one(a), &one(b), &thresholds).verdict == Verdict::Failure
         };
-        for (a, b, part) in [(1.0, 1.2, 0.2 / 1.1), (1.2, 1.0, 0.2 / 1.1), (10.0, 12.0, 2.0 / 11.0), (-1.0, 1.0, 2.0)] {
-            assert!(fails(a, b, part - 1e-3) && !fails(a, b, part + 1e-3), "{a} {b}");
+        for (a, b, part) in [
+            (1.0, 1.2, 0.2 / 1.1),
+            (1.2, 1.0, 0.2 / 1.1),
+            (10.0, 12.0, 2.0 / 11.0),
+            (-1.0, 1.0, 2.0),
+        ] {
+            assert!(
+                fails(a, b, part - 1e-3) && !fails(a, b, part + 1e-3),
+                "{a} {b}"
+            );
         }
     }
 
     #[test]
     fn a_difference_equal_to_the_threshold_passes() {
-        assert_eq!(verdict(&[(0, 0, 1e-6)], Thresholds::default()), Verdict::Match);
-        assert_eq!(verdict(&[(0, 0, 1e-6_f32.next_up())], Thresholds::default()), Verdict::Failure);
+        assert_eq!(
+            verdict(&[(0, 0, 1e-6)], Thresholds::default()),
+            Verdict::Match
+        );
+        assert_eq!(
+            verdict(&[(0, 0, 1e-6_f32.next_up())], Thresholds::default()),
+            Verdict::Failure
+        );
     }
 
     #[test]
     fn nan_against_a_number_fails_at_any_threshold() {
         for strange in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            let loose = Thresholds { fail: f32::MAX, warn: f32::MAX, ..Default::default() };
+            let loose = Thresholds {
+                fail: f32::MAX,
+                warn: f32::MAX,
+                ..Default::default()
+            };
             assert_eq!(verdict(&[(0, 0, strange)], loose), Verdict::Failure);
         }
         let [up, down] = [f32::INFINITY, f32::NEG_INFINITY].map(|v| picture(&[(0, 0, v)]));
         let report = compare(&up, &down, &Thresholds::default());
-        assert_eq!((report.verdict, report.max_error, report.mean_error), (Verdict::Failure, f64::INFINITY, 0.0));
+        assert_eq!(
+            (report.verdict, report.max_error, report.mean_error),
+            (Verdict::Failure, f64::INFINITY, 0.0)
+        );
     }
 
     #[test]
@@ -239,7 +340,10 @@ mod tests {
         };
         let report = compare(&rows(0.5), &rows(0.75), &Thresholds::default());
         let largest = report.largest.unwrap();
-        assert_eq!((largest.x, largest.y, report.failed, report.max_error), (0, height - 1, width, 0.25));
+        assert_eq!(
+            (largest.x, largest.y, report.failed, report.max_error),
+            (0, height - 1, width, 0.25)
+        );
         assert!((report.mean_error - 0.25 / height as f64).abs() < 1e-12);
     }
 

@@ -79,14 +79,22 @@ impl Report {
     /// Of pictures that differ in size.
     pub(super) fn incomparable() -> Self {
         let nothing = Self::from_tally(Tally::default(), &[], 0, &Thresholds::default());
-        Self { verdict: Verdict::Incomparable, ..nothing }
+        Self {
+            verdict: Verdict::Incomparable,
+            ..nothing
+        }
     }
 
     pub(super) fn new<P: Channels>(tally: Tally, pixels: usize, thresholds: &Thresholds) -> Self {
         Self::from_tally(tally, P::NAMES, pixels, thresholds)
     }
 
-    fn from_tally(tally: Tally, names: &[&'static str], pixels: usize, thresholds: &Thresholds) -> Self {
+    fn from_tally(
+        tally: Tally,
+        names: &[&'static str],
+        pixels: usize,
+        thresholds: &Thresholds,
+    ) -> Self {
         let values = (pixels * names.len()).max(1) as f64;
         let rms_error = (tally.squares / values).sqrt();
         Self {
@@ -99,7 +107,12 @@ impl Report {
             failed: tally.failed,
             pixels,
             thresholds: *thresholds,
-            largest: tally.largest.map(|[x, y, c]| Largest { x, y, channel: names[c], values: tally.values }),
+            largest: tally.largest.map(|[x, y, c]| Largest {
+                x,
+                y,
+                channel: names[c],
+                values: tally.values,
+            }),
         }
     }
 }
@@ -136,7 +149,13 @@ impl Default for Tally {
 impl Tally {
     /// Adds the channels of one pixel of both pictures.
     #[inline]
-    pub(super) fn add_pixel(&mut self, a: &[f32], b: &[f32], [x, y]: [usize; 2], thresholds: &Thresholds) {
+    pub(super) fn add_pixel(
+        &mut self,
+        a: &[f32],
+        b: &[f32],
+        [x, y]: [usize; 2],
+        thresholds: &Thresholds,
+    ) {
         let (mut warned, mut failed) = (false, false);
         for (channel, (&u, &v)) in a.iter().zip(b).enumerate() {
             let error = self.add_error(u, v);
@@ -146,7 +165,11 @@ impl Tally {
                 self.values = [a.to_vec(), b.to_vec()];
             }
             // An infinite error has no magnitude to be a part of.
-            let relative = if error < f64::INFINITY { error / mean_magnitude(u, v) } else { error };
+            let relative = if error < f64::INFINITY {
+                error / mean_magnitude(u, v)
+            } else {
+                error
+            };
             warned |= error > thresholds.warn.into() && relative > thresholds.warn_relative.into();
             failed |= error > thresholds.fail.into() && relative > thresholds.fail_relative.into();
         }
@@ -193,7 +216,8 @@ impl Tally {
     }
 
     fn verdict(&self, pixels: usize, t: &Thresholds) -> Verdict {
-        let over = |count: usize, percent: f32| count as f64 > f64::from(percent) / 100.0 * pixels as f64;
+        let over =
+            |count: usize, percent: f32| count as f64 > f64::from(percent) / 100.0 * pixels as f64;
         if self.failed <= t.allow_failures {
             Verdict::Match
         } else if over(self.failed, t.fail_percent) || self.max_error > t.hard_fail.into() {
@@ -221,13 +245,28 @@ impl fmt::Display for Report {
         writeln!(f, "  Peak SNR = {}", short(self.psnr))?;
         write!(f, "  Max error  = {}", short(self.max_error))?;
         if let Some(at) = &self.largest {
-            let [a, b] = at.values.each_ref().map(|v| v.iter().map(f32::to_string).collect::<Vec<_>>().join(", "));
-            write!(f, " @ ({}, {}, {})  values are {a} vs {b}", at.x, at.y, at.channel)?;
+            let [a, b] = at
+                .values
+                .each_ref()
+                .map(|v| v.iter().map(f32::to_string).collect::<Vec<_>>().join(", "));
+            write!(
+                f,
+                " @ ({}, {}, {})  values are {a} vs {b}",
+                at.x, at.y, at.channel
+            )?;
         }
         writeln!(f)?;
-        for (count, threshold) in [(self.warned, self.thresholds.warn), (self.failed, self.thresholds.fail)] {
+        for (count, threshold) in [
+            (self.warned, self.thresholds.warn),
+            (self.failed, self.thresholds.fail),
+        ] {
             let percent = 100.0 * count as f64 / self.pixels.max(1) as f64;
-            writeln!(f, "  {count} pixels ({}%) over {}", general(percent, 3), short(threshold.into()))?;
+            writeln!(
+                f,
+                "  {count} pixels ({}%) over {}",
+                general(percent, 3),
+                short(threshold.into())
+            )?;
         }
         write!(f, "{}", self.verdict)
     }
@@ -236,10 +275,17 @@ impl fmt::Display for Report {
 /// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent where it is short.
 fn general(x: f64, digits: usize) -> String {
     let scientific = format!("{x:.*e}", digits - 1);
-    let Some((mantissa, exponent)) = scientific.split_once('e') else { return scientific.to_lowercase() };
+    let Some((mantissa, exponent)) = scientific.split_once('e') else {
+        return scientific.to_lowercase();
+    };
     let exponent: i32 = exponent.parse().unwrap_or_default();
-    let trimmed =
-        |s: &str| if s.contains('.') { s.trim_end_matches('0').trim_end_matches('.').into() } else { s.to_string() };
+    let trimmed = |s: &str| {
+        if s.contains('.') {
+            s.trim_end_matches('0').trim_end_matches('.').into()
+        } else {
+            s.to_string()
+        }
+    };
     if (-4..digits as i32).contains(&exponent) {
         return trimmed(&format!("{x:.*}", (digits as i32 - 1 - exponent) as usize));
     }
@@ -267,12 +313,21 @@ mod tests {
         ] {
             assert_eq!(general(x, 6), text);
         }
-        assert_eq!((general(16.6667, 3), general(100.0, 3)), ("16.7".into(), "100".into()));
+        assert_eq!(
+            (general(16.6667, 3), general(100.0, 3)),
+            ("16.7".into(), "100".into())
+        );
     }
 
     #[test]
     fn exit_codes_are_those_of_idiff() {
-        let all = [Verdict::Match, Verdict::Warning, Verdict::Failure, Verdict::Incomparable, Verdict::Unreadable];
+        let all = [
+            Verdict::Match,
+            Verdict::Warning,
+            Verdict::Failure,
+            Verdict::Incomparable,
+            Verdict::Unreadable,
+        ];
         assert_eq!(all.map(Verdict::exit_code), [0, 1, 2, 3, 4]);
     }
 }

@@ -40,9 +40,15 @@ pub(super) fn mean(rows: &[[f64; 3]], (width, height): (usize, usize)) -> Option
 }
 
 /// Sums over the windows of some rows, which lie wholly inside, for each channel.
-pub(super) fn row_sums(a: &Image<[f32; 3]>, b: &Image<[f32; 3]>, rows: Range<usize>) -> Vec<[f64; 3]> {
+pub(super) fn row_sums(
+    a: &Image<[f32; 3]>,
+    b: &Image<[f32; 3]>,
+    rows: Range<usize>,
+) -> Vec<[f64; 3]> {
     let channels = [0, 1, 2].map(|c| of_channel(&channel(a, c), &channel(b, c), rows.clone()));
-    (0..rows.len()).map(|y| [0, 1, 2].map(|c| channels[c][y])).collect()
+    (0..rows.len())
+        .map(|y| [0, 1, 2].map(|c| channels[c][y]))
+        .collect()
 }
 
 fn of_channel(a: &Image<f32>, b: &Image<f32>, rows: Range<usize>) -> Vec<f64> {
@@ -56,9 +62,12 @@ fn of_channel(a: &Image<f32>, b: &Image<f32>, rows: Range<usize>) -> Vec<f64> {
         let i = (x, y);
         let (u, v) = (ma[i], mb[i]);
         let (spread, shared) = (aa[i] - u * u + bb[i] - v * v, ab[i] - u * v);
-        f64::from((2.0 * u * v + C[0]) * (2.0 * shared + C[1])) / f64::from((u * u + v * v + C[0]) * (spread + C[1]))
+        f64::from((2.0 * u * v + C[0]) * (2.0 * shared + C[1]))
+            / f64::from((u * u + v * v + C[0]) * (spread + C[1]))
     };
-    rows.into_par_iter().map(|y| inside(width).map(|x| at(x, y)).sum()).collect()
+    rows.into_par_iter()
+        .map(|y| inside(width).map(|x| at(x, y)).sum())
+        .collect()
 }
 
 #[cfg(test)]

@@ -22,7 +22,11 @@ pub fn difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<
 ///
 /// # Panics
 /// When the sizes differ.
-pub fn absolute_difference<P: Channels>(a: &impl Rows<P>, b: &impl Rows<P>, scale: f32) -> Image<P> {
+pub fn absolute_difference<P: Channels>(
+    a: &impl Rows<P>,
+    b: &impl Rows<P>,
+    scale: f32,
+) -> Image<P> {
     let (width, height) = a.size();
     assert_eq!((width, height), b.size(), "images of different size");
     let mut pixels = Vec::with_capacity(width * height);
@@ -33,7 +37,11 @@ pub fn absolute_difference<P: Channels>(a: &impl Rows<P>, b: &impl Rows<P>, scal
     Image::from_vec(width, height, pixels)
 }
 
-fn combined<P: Channels>(a: &Image<P>, b: &Image<P>, f: impl Fn(f32, f32) -> f32 + Sync) -> Image<P> {
+fn combined<P: Channels>(
+    a: &Image<P>,
+    b: &Image<P>,
+    f: impl Fn(f32, f32) -> f32 + Sync,
+) -> Image<P> {
     a.zip_map(b, |mut p, q| {
         let values = bytemuck::cast_slice_mut::<P, f32>(std::slice::from_mut(&mut p));
         for (u, &v) in values.iter_mut().zip(channels(&q)) {
@@ -53,9 +61,16 @@ pub fn triple<P: Channels>(expected: &Image<P>, actual: &Image<P>) -> Image<Line
     Image::from_fn(3 * width, height, |x, y| {
         let [left, right] = [expected, actual].map(|image| pixel(image, x % width, y));
         match x / width {
-            0 => left.as_ref().map_or(LinearRgb::BLACK, |p| shown(channels(p))),
-            1 => shown_difference(left.as_ref().map_or(&[], channels), right.as_ref().map_or(&[], channels)),
-            _ => right.as_ref().map_or(LinearRgb::BLACK, |p| shown(channels(p))),
+            0 => left
+                .as_ref()
+                .map_or(LinearRgb::BLACK, |p| shown(channels(p))),
+            1 => shown_difference(
+                left.as_ref().map_or(&[], channels),
+                right.as_ref().map_or(&[], channels),
+            ),
+            _ => right
+                .as_ref()
+                .map_or(LinearRgb::BLACK, |p| shown(channels(p))),
         }
     })
 }
@@ -96,7 +111,10 @@ fn shown_difference(a: &[f32], b: &[f32]) -> LinearRgb {
     match count {
         0 => LinearRgb::BLACK,
         1 => LinearRgb::grey(error(0)),
-        _ => LinearRgb::new(error(0), error(1), error(2)) + LinearRgb::grey(if count > 3 { error(3) } else { 0.0 }),
+        _ => {
+            LinearRgb::new(error(0), error(1), error(2))
+                + LinearRgb::grey(if count > 3 { error(3) } else { 0.0 })
+        }
     }
 }
 
@@ -109,18 +127,25 @@ mod tests {
     fn a_difference_has_the_sign_of_the_first() {
         let [a, b] = [0.25, 0.5].map(|v| Image::filled(2, 1, Coverage(v)));
         assert_eq!(difference(&a, &b, 2.0), Image::filled(2, 1, Coverage(-0.5)));
-        assert_eq!(absolute_difference(&a, &b, 2.0), Image::filled(2, 1, Coverage(0.5)));
+        assert_eq!(
+            absolute_difference(&a, &b, 2.0),
+            Image::filled(2, 1, Coverage(0.5))
+        );
     }
 
     #[test]
     fn three_pictures_stand_side_by_side() {
         let [a, b] = [0.25, 0.375].map(|v| Image::filled(2, 1, Coverage(v)));
-        assert_eq!(triple(&a, &b).pixels(), [0.25, 0.25, 2.0, 2.0, 0.375, 0.375].map(LinearRgb::grey));
+        assert_eq!(
+            triple(&a, &b).pixels(),
+            [0.25, 0.25, 2.0, 2.0, 0.375, 0.375].map(LinearRgb::grey)
+        );
     }
 
     #[test]
     fn a_difference_of_alpha_alone_is_seen() {
-        let [a, b] = [0.5, 0.25].map(|alpha| Image::filled(1, 1, PremulRgba::new(0.0, 0.0, 0.0, alpha)));
+        let [a, b] =
+            [0.5, 0.25].map(|alpha| Image::filled(1, 1, PremulRgba::new(0.0, 0.0, 0.0, alpha)));
         assert_eq!(triple(&a, &b)[(1, 0)], LinearRgb::grey(4.0));
     }
 
@@ -133,9 +158,15 @@ mod tests {
 
     #[test]
     fn pictures_of_different_size_are_shown_all_the_same() {
-        let out = triple(&Image::filled(1, 2, Coverage(1.0)), &Image::filled(2, 1, Coverage(1.0)));
+        let out = triple(
+            &Image::filled(1, 2, Coverage(1.0)),
+            &Image::filled(2, 1, Coverage(1.0)),
+        );
         assert_eq!(out.size(), (6, 2));
-        assert_eq!((out[(0, 1)], out[(2, 1)]), (LinearRgb::WHITE, LinearRgb::grey(16.0)));
+        assert_eq!(
+            (out[(0, 1)], out[(2, 1)]),
+            (LinearRgb::WHITE, LinearRgb::grey(16.0))
+        );
         assert!(triple(&Image::<Coverage>::new(0, 0), &Image::new(0, 0)).is_empty());
     }
 }

@@ -13,11 +13,19 @@ pub(super) const POINTS: usize = 101;
 /// As YOLOv5 computes it (its file `utils/metrics.py`, function `compute_ap`, method `interp`).
 pub(super) fn trapezoid(recall: &[f64], precision: &[f64]) -> f64 {
     let xs: Vec<f64> = [0.0].iter().chain(recall).chain(&[1.0]).copied().collect();
-    let mut ys: Vec<f64> = [1.0].iter().chain(precision).chain(&[0.0]).copied().collect();
+    let mut ys: Vec<f64> = [1.0]
+        .iter()
+        .chain(precision)
+        .chain(&[0.0])
+        .copied()
+        .collect();
     falling(&mut ys);
     let mut after = 0;
     let read: [f64; POINTS] = std::array::from_fn(|i| {
-        after += xs[after..].iter().take_while(|&&at| at <= recall_at(i)).count();
+        after += xs[after..]
+            .iter()
+            .take_while(|&&at| at <= recall_at(i))
+            .count();
         between(recall_at(i), after, &xs, &ys)
     });
     let strip = |i: usize| (recall_at(i + 1) - recall_at(i)) * (read[i + 1] + read[i]) / 2.0;
@@ -36,14 +44,30 @@ pub(super) fn mean_of_samples(recall: &[f64], precision: &[f64]) -> f64 {
 pub(super) fn samples(recall: &[f64], precision: &[f64]) -> [f64; POINTS] {
     let mut ys = precision.to_vec();
     falling(&mut ys);
-    std::array::from_fn(|i| ys.get(recall.partition_point(|&r| r < recall_at(i))).copied().unwrap_or(0.0))
+    std::array::from_fn(|i| {
+        ys.get(recall.partition_point(|&r| r < recall_at(i)))
+            .copied()
+            .unwrap_or(0.0)
+    })
 }
 
 /// Recall and precision after each detection, `epsilon` keeping the divisions defined.
-pub(super) fn recall_and_precision(sums: &Running, truths: f64, epsilon: [f64; 2]) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn recall_and_precision(
+    sums: &Running,
+    truths: f64,
+    epsilon: [f64; 2],
+) -> (Vec<f64>, Vec<f64>) {
     let both = sums.right.iter().zip(&sums.wrong);
-    let recall = sums.right.iter().map(|right| right / (truths + epsilon[0])).collect();
-    (recall, both.map(|(right, wrong)| right / (right + wrong + epsilon[1])).collect())
+    let recall = sums
+        .right
+        .iter()
+        .map(|right| right / (truths + epsilon[0]))
+        .collect();
+    (
+        recall,
+        both.map(|(right, wrong)| right / (right + wrong + epsilon[1]))
+            .collect(),
+    )
 }
 
 /// Piecewise linear reading as NumPy's `interp` does it; the last of equal positions counts.
@@ -72,7 +96,11 @@ fn falling(values: &mut [f64]) {
 }
 
 pub(super) fn recall_at(i: usize) -> f64 {
-    if i + 1 == POINTS { 1.0 } else { i as f64 * 0.01 }
+    if i + 1 == POINTS {
+        1.0
+    } else {
+        i as f64 * 0.01
+    }
 }
 
 #[cfg(test)]
@@ -98,6 +126,9 @@ mod tests {
     #[test]
     fn reading_between_outside_and_at_doubled_places() {
         let (xs, ys) = ([0.0, 1.0, 1.0, 2.0], [0.0, 1.0, 3.0, 5.0]);
-        assert_eq!([-1.0, 0.5, 1.0, 1.5, 9.0].map(|x| interpolated(x, &xs, &ys)), [0.0, 0.5, 3.0, 4.0, 5.0]);
+        assert_eq!(
+            [-1.0, 0.5, 1.0, 1.5, 9.0].map(|x| interpolated(x, &xs, &ys)),
+            [0.0, 0.5, 3.0, 4.0, 5.0]
+        );
     }
 }

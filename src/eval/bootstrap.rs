@@ -46,9 +46,17 @@ pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
         values[low] + (values[high] - values[low]) * (place - low as f64)
     };
     if values.is_empty() {
-        return Interval { value, low: value, high: value };
+        return Interval {
+            value,
+            low: value,
+            high: value,
+        };
     }
-    Interval { value, low: quantile(0.025), high: quantile(0.975) }
+    Interval {
+        value,
+        low: quantile(0.025),
+        high: quantile(0.975),
+    }
 }
 
 /// How often each of `count` things is drawn in `count` draws.
@@ -79,7 +87,13 @@ mod tests {
     fn an_interval_holds_its_value_and_shrinks_with_more_images() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
         let some = |n: usize| -> Vec<Sheet> {
-            let seen = |i: usize| if i.is_multiple_of(3) { vec![] } else { vec![found(0, b, 0.5)] };
+            let seen = |i: usize| {
+                if i.is_multiple_of(3) {
+                    vec![]
+                } else {
+                    vec![found(0, b, 0.5)]
+                }
+            };
             (0..n).map(|i| sheet(vec![there(0, b)], seen(i))).collect()
         };
         let [few, many] = [12, 300].map(|n| bootstrap(&some(n), Definition::Coco, 200, 7));
@@ -89,6 +103,13 @@ mod tests {
 
     #[test]
     fn no_rounds_give_a_point() {
-        assert_eq!(interval(0.5, vec![]), Interval { value: 0.5, low: 0.5, high: 0.5 });
+        assert_eq!(
+            interval(0.5, vec![]),
+            Interval {
+                value: 0.5,
+                low: 0.5,
+                high: 0.5
+            }
+        );
     }
 }

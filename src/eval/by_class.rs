@@ -38,31 +38,60 @@ pub(super) struct ImageBoxes<'a> {
 
 impl<'a> ByClass<'a> {
     pub(super) fn new(sheets: &'a [Sheet]) -> Self {
-        let at = |sheet| move |(index, class)| Place { class, sheet, index };
+        let at = |sheet| {
+            move |(index, class)| Place {
+                class,
+                sheet,
+                index,
+            }
+        };
         let each = || sheets.iter().enumerate();
-        let truth = |(i, s): (usize, &'a Sheet)| s.truth.iter().map(|t| t.class).enumerate().map(at(i));
-        let found = |(i, s): (usize, &'a Sheet)| s.found.iter().map(|f| f.class).enumerate().map(at(i));
-        let (mut truth, mut found): (Vec<_>, Vec<_>) =
-            (each().flat_map(truth).collect(), each().flat_map(found).collect());
+        let truth =
+            |(i, s): (usize, &'a Sheet)| s.truth.iter().map(|t| t.class).enumerate().map(at(i));
+        let found =
+            |(i, s): (usize, &'a Sheet)| s.found.iter().map(|f| f.class).enumerate().map(at(i));
+        let (mut truth, mut found): (Vec<_>, Vec<_>) = (
+            each().flat_map(truth).collect(),
+            each().flat_map(found).collect(),
+        );
         // Both sorts keep the order of equal ones.
         truth.par_sort_by_key(|p| p.class);
         let confidence = |p: &Place| sheets[p.sheet].found[p.index].confidence;
         found.par_sort_by(|a, b| {
-            (a.class, a.sheet).cmp(&(b.class, b.sheet)).then_with(|| confidence(b).total_cmp(&confidence(a)))
+            (a.class, a.sheet)
+                .cmp(&(b.class, b.sheet))
+                .then_with(|| confidence(b).total_cmp(&confidence(a)))
         });
-        Self { sheets, truth, found }
+        Self {
+            sheets,
+            truth,
+            found,
+        }
     }
 
     /// The classes that occur in the truth, in order.
     pub(super) fn classes<'s>(&'s self) -> Vec<ClassBoxes<'s>> {
         let boxes = |truth: &'s [Place]| {
             let class = truth[0].class;
-            let [first, last] = [class, class.saturating_add(1)].map(|c| self.found.partition_point(|p| p.class < c));
+            let [first, last] = [class, class.saturating_add(1)]
+                .map(|c| self.found.partition_point(|p| p.class < c));
             // The greatest class has no next one.
-            let last = if class == u32::MAX { self.found.len() } else { last };
-            ClassBoxes { class, sheets: self.sheets, truth, found: &self.found[first..last] }
+            let last = if class == u32::MAX {
+                self.found.len()
+            } else {
+                last
+            };
+            ClassBoxes {
+                class,
+                sheets: self.sheets,
+                truth,
+                found: &self.found[first..last],
+            }
         };
-        self.truth.chunk_by(|a, b| a.class == b.class).map(boxes).collect()
+        self.truth
+            .chunk_by(|a, b| a.class == b.class)
+            .map(boxes)
+            .collect()
     }
 }
 
@@ -70,13 +99,23 @@ impl<'a> ClassBoxes<'a> {
     /// The images with boxes of the class, in order.
     pub(super) fn images(&self) -> Vec<ImageBoxes<'a>> {
         let same = |a: &Place, b: &Place| a.sheet == b.sheet;
-        let (mut truth, mut found) = (self.truth.chunk_by(same).peekable(), self.found.chunk_by(same).peekable());
+        let (mut truth, mut found) = (
+            self.truth.chunk_by(same).peekable(),
+            self.found.chunk_by(same).peekable(),
+        );
         let mut images = Vec::new();
         loop {
-            let next = [truth.peek(), found.peek()].into_iter().flatten().map(|places| places[0].sheet).min();
+            let next = [truth.peek(), found.peek()]
+                .into_iter()
+                .flatten()
+                .map(|places| places[0].sheet)
+                .min();
             let Some(sheet) = next else { return images };
             let here = |places: &&[Place]| places[0].sheet == sheet;
-            let (truth, found) = (truth.next_if(here).unwrap_or_default(), found.next_if(here).unwrap_or_default());
+            let (truth, found) = (
+                truth.next_if(here).unwrap_or_default(),
+                found.next_if(here).unwrap_or_default(),
+            );
             let boxes = &self.sheets[sheet];
             images.push(ImageBoxes {
                 sheet,
@@ -96,18 +135,40 @@ mod tests {
     fn each_class_has_its_boxes_and_no_other() {
         let b = bbox(0.0, 0.0, 1.0, 1.0);
         let sheets = [
-            sheet(vec![there(u32::MAX, b), there(2, b)], vec![found(2, b, 0.1), found(2, b, 0.9), found(5, b, 0.5)]),
+            sheet(
+                vec![there(u32::MAX, b), there(2, b)],
+                vec![found(2, b, 0.1), found(2, b, 0.9), found(5, b, 0.5)],
+            ),
             sheet(vec![], vec![found(u32::MAX, b, 0.3)]),
             sheet(vec![there(2, b)], vec![]),
         ];
         let all = ByClass::new(&sheets);
         let classes = all.classes();
         let told = |class: &ClassBoxes<'_>| {
-            let image = |i: ImageBoxes<'_>| (i.sheet, i.truth.len(), i.found.iter().map(|f| f.confidence).collect());
-            (class.class, class.images().into_iter().map(image).collect::<Vec<(usize, usize, Vec<f64>)>>())
+            let image = |i: ImageBoxes<'_>| {
+                (
+                    i.sheet,
+                    i.truth.len(),
+                    i.found.iter().map(|f| f.confidence).collect(),
+                )
+            };
+            (
+                class.class,
+                class
+                    .images()
+                    .into_iter()
+                    .map(image)
+                    .collect::<Vec<(usize, usize, Vec<f64>)>>(),
+            )
         };
-        assert_eq!(told(&classes[0]), (2, vec![(0, 1, vec![0.9, 0.1]), (2, 1, vec![])]));
-        assert_eq!(told(&classes[1]), (u32::MAX, vec![(0, 1, vec![]), (1, 0, vec![0.3])]));
+        assert_eq!(
+            told(&classes[0]),
+            (2, vec![(0, 1, vec![0.9, 0.1]), (2, 1, vec![])])
+        );
+        assert_eq!(
+            told(&classes[1]),
+            (u32::MAX, vec![(0, 1, vec![]), (1, 0, vec![0.3])])
+        );
         assert_eq!(classes.len(), 2);
     }
 }

@@ -4,7 +4,9 @@ use super::average::{mean_of_samples, recall_and_precision};
 use super::by_class::{ByClass, ClassBoxes, ImageBoxes};
 use super::overlap::{BoxIndex, area, intersection, share};
 use super::rank::{Hit, Marks, Ranking};
-use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox, mean, thresholds};
+use super::{
+    ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox, mean, thresholds,
+};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -69,16 +71,24 @@ impl AreaRange {
 /// # Panics
 /// When there are weights and not one per sheet.
 pub fn coco(sheets: &[Sheet], weights: &[u32]) -> CocoScores {
-    assert!(weights.is_empty() || weights.len() == sheets.len(), "one weight per sheet");
+    assert!(
+        weights.is_empty() || weights.len() == sheets.len(),
+        "one weight per sheet"
+    );
     let classes = ByClass::new(sheets);
     let rankings = AreaRange::ALL.map(|range| rankings(&classes, range));
-    let [all, by_area @ ..] = rankings.each_ref().map(|rankings| measured(rankings, weights));
+    let [all, by_area @ ..] = rankings
+        .each_ref()
+        .map(|rankings| measured(rankings, weights));
     let recall_within = |count| over(&all, |m| mean(m.recall_within(count)));
     CocoScores {
         ap_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.ap))),
         ar_by_count: MAX_DETECTIONS.map(recall_within),
         ar_by_area: by_area.each_ref().map(|m| over(m, |m| mean(m.recall))),
-        scores: Scores { definition: Definition::Coco, classes: all.iter().map(Measured::scores).collect() },
+        scores: Scores {
+            definition: Definition::Coco,
+            classes: all.iter().map(Measured::scores).collect(),
+        },
     }
 }
 
@@ -89,7 +99,13 @@ pub(super) fn rankings(classes: &ByClass<'_>, range: AreaRange) -> Vec<Ranking> 
 }
 
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
-    Scores { definition: Definition::Coco, classes: measured(rankings, weights).iter().map(Measured::scores).collect() }
+    Scores {
+        definition: Definition::Coco,
+        classes: measured(rankings, weights)
+            .iter()
+            .map(Measured::scores)
+            .collect(),
+    }
 }
 
 /// Average precision of a class at every threshold; none where there is nothing to find.
@@ -98,7 +114,10 @@ pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f
 }
 
 fn measured<'a>(rankings: &'a [Ranking], weights: &'a [u32]) -> Vec<Measured<'a>> {
-    rankings.par_iter().filter_map(|ranking| Measured::new(ranking, weights)).collect()
+    rankings
+        .par_iter()
+        .filter_map(|ranking| Measured::new(ranking, weights))
+        .collect()
 }
 
 fn over(measured: &[Measured<'_>], value: impl Fn(&Measured<'_>) -> f64) -> Option<f64> {
@@ -120,13 +139,17 @@ impl<'a> Measured<'a> {
     fn new(ranking: &'a Ranking, weights: &'a [u32]) -> Option<Self> {
         let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
         let turns = ranking.turns(weights);
-        let curves = turns.each_ref().map(|sums| recall_and_precision(sums, truths, [0.0, EPSILON]));
+        let curves = turns
+            .each_ref()
+            .map(|sums| recall_and_precision(sums, truths, [0.0, EPSILON]));
         let last = |values: &[f64]| values.last().copied().unwrap_or(0.0);
         Some(Self {
             ranking,
             weights,
             truths,
-            ap: curves.each_ref().map(|(recall, precision)| mean_of_samples(recall, precision)),
+            ap: curves
+                .each_ref()
+                .map(|(recall, precision)| mean_of_samples(recall, precision)),
             recall: curves.each_ref().map(|(recall, _)| last(recall)),
             precision: last(&curves[0].1),
         })
@@ -135,16 +158,37 @@ impl<'a> Measured<'a> {
     /// Recall with so many detections an image.
     fn recall_within(&self, count: usize) -> [f64; THRESHOLDS] {
         let mut right = [0.0; THRESHOLDS];
-        for (hit, weight) in self.ranking.counting(self.weights).filter(|(hit, _)| (hit.place as usize) < count) {
+        for (hit, weight) in self
+            .ranking
+            .counting(self.weights)
+            .filter(|(hit, _)| (hit.place as usize) < count)
+        {
             let marks = hit.right & !hit.ignored;
-            right.iter_mut().enumerate().filter(|(t, _)| marks >> t & 1 == 1).for_each(|(_, sum)| *sum += weight);
+            right
+                .iter_mut()
+                .enumerate()
+                .filter(|(t, _)| marks >> t & 1 == 1)
+                .for_each(|(_, sum)| *sum += weight);
         }
         right.map(|sum| sum / self.truths)
     }
 
     fn scores(&self) -> ClassScores {
-        let Self { ranking, truths, ap, recall, precision, .. } = *self;
-        ClassScores { class: ranking.class, truths: truths as u64, precision, recall: recall[0], ap }
+        let Self {
+            ranking,
+            truths,
+            ap,
+            recall,
+            precision,
+            ..
+        } = *self;
+        ClassScores {
+            class: ranking.class,
+            truths: truths as u64,
+            precision,
+            recall: recall[0],
+            ap,
+        }
     }
 }
 
@@ -158,7 +202,11 @@ struct Target<'a> {
 
 /// The detections of a class in one image, and how many boxes there are to be found.
 fn held_against(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
-    let target = |&truth| Target { truth, ignored: truth.crowd || !range.holds(truth.area), taken: 0 };
+    let target = |&truth| Target {
+        truth,
+        ignored: truth.crowd || !range.holds(truth.area),
+        taken: 0,
+    };
     let mut targets: Vec<Target<'_>> = image.truth.iter().map(target).collect();
     // Those that count come first: a detection takes an ignored box only where none of them is left.
     targets.sort_by_key(|t| t.ignored);
@@ -166,23 +214,39 @@ fn held_against(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
     let surest = image.found.iter().take(MAX_DETECTIONS[2]).enumerate();
     let hits = surest.map(|(place, found)| {
         let overlap = |k: usize| (k, overlap(found, targets[k].truth));
-        let overlaps: Vec<(usize, f64)> = index.near(&found.bbox).into_iter().map(overlap).collect();
+        let overlaps: Vec<(usize, f64)> =
+            index.near(&found.bbox).into_iter().map(overlap).collect();
         let (right, ignored) = marks(found, &mut targets, &overlaps, range);
-        Hit { confidence: found.confidence, sheet: image.sheet, place: place as u32, right, ignored }
+        Hit {
+            confidence: found.confidence,
+            sheet: image.sheet,
+            place: place as u32,
+            right,
+            ignored,
+        }
     });
     let hits = hits.collect();
     (hits, targets.iter().filter(|t| !t.ignored).count())
 }
 
 /// Thresholds at which a detection finds something, and at which it counts for nobody.
-fn marks(found: &FoundBox, targets: &mut [Target<'_>], overlaps: &[(usize, f64)], range: AreaRange) -> (Marks, Marks) {
+fn marks(
+    found: &FoundBox,
+    targets: &mut [Target<'_>],
+    overlaps: &[(usize, f64)],
+    range: AreaRange,
+) -> (Marks, Marks) {
     let (mut right, mut ignored) = (0, 0);
     for (i, threshold) in thresholds().into_iter().enumerate() {
         let bit: Marks = 1 << i;
         match nearest(targets, overlaps, threshold, bit) {
             Some(k) => {
                 targets[k].taken |= bit;
-                if targets[k].ignored { ignored |= bit } else { right |= bit }
+                if targets[k].ignored {
+                    ignored |= bit
+                } else {
+                    right |= bit
+                }
             }
             None if !range.holds(area(&found.bbox)) => ignored |= bit,
             None => {}
@@ -193,7 +257,12 @@ fn marks(found: &FoundBox, targets: &mut [Target<'_>], overlaps: &[(usize, f64)]
 
 /// The free target with the greatest overlap from `threshold` on, the last of equal ones; those that count before
 /// ignored ones.
-fn nearest(targets: &[Target<'_>], overlaps: &[(usize, f64)], threshold: f64, bit: Marks) -> Option<usize> {
+fn nearest(
+    targets: &[Target<'_>],
+    overlaps: &[(usize, f64)],
+    threshold: f64,
+    bit: Marks,
+) -> Option<usize> {
     let mut least = threshold.min(ALMOST_ONE);
     let mut best: Option<usize> = None;
     for &(k, overlap) in overlaps {
@@ -214,7 +283,11 @@ fn nearest(targets: &[Target<'_>], overlaps: &[(usize, f64)], threshold: f64, bi
 /// Intersection over union; over the detection's own area where the truth is a crowd.
 fn overlap(found: &FoundBox, truth: &TrueBox) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
-    let whole = if truth.crowd { area(&found.bbox) } else { area(&found.bbox) + area(&truth.bbox) - shared };
+    let whole = if truth.crowd {
+        area(&found.bbox)
+    } else {
+        area(&found.bbox) + area(&truth.bbox) - shared
+    };
     share(shared, whole)
 }
 
@@ -226,9 +299,24 @@ mod tests {
     #[test]
     fn a_crowd_is_neither_found_nor_missed() {
         let (b, crowd) = (bbox(0.0, 0.0, 40.0, 40.0), bbox(100.0, 0.0, 200.0, 200.0));
-        let in_crowd = [found(0, bbox(110.0, 10.0, 30.0, 30.0), 0.9), found(0, bbox(150.0, 10.0, 30.0, 30.0), 0.8)];
-        let truth = vec![there(0, b), TrueBox { crowd: true, ..there(0, crowd) }];
-        let scores = coco(&[sheet(truth, [vec![found(0, b, 0.5)], in_crowd.to_vec()].concat())], &[]);
+        let in_crowd = [
+            found(0, bbox(110.0, 10.0, 30.0, 30.0), 0.9),
+            found(0, bbox(150.0, 10.0, 30.0, 30.0), 0.8),
+        ];
+        let truth = vec![
+            there(0, b),
+            TrueBox {
+                crowd: true,
+                ..there(0, crowd)
+            },
+        ];
+        let scores = coco(
+            &[sheet(
+                truth,
+                [vec![found(0, b, 0.5)], in_crowd.to_vec()].concat(),
+            )],
+            &[],
+        );
         assert!((scores.scores.map() - 1.0).abs() < 1e-12);
         assert_eq!(scores.scores.classes[0].truths, 1);
     }
@@ -236,7 +324,13 @@ mod tests {
     #[test]
     fn sizes_are_scored_apart() {
         let (small, large) = (bbox(0.0, 0.0, 20.0, 20.0), bbox(100.0, 100.0, 200.0, 200.0));
-        let scores = coco(&[sheet(vec![there(0, small), there(0, large)], vec![found(0, large, 0.5)])], &[]);
+        let scores = coco(
+            &[sheet(
+                vec![there(0, small), there(0, large)],
+                vec![found(0, large, 0.5)],
+            )],
+            &[],
+        );
         let whole = |v: Option<f64>| v.map(|v| (v * 1e12).round() / 1e12);
         assert_eq!(scores.ap_by_area.map(whole), [Some(0.0), None, Some(1.0)]);
         assert_eq!(scores.ar_by_area, [Some(0.0), None, Some(1.0)]);
@@ -246,7 +340,16 @@ mod tests {
     fn more_than_a_hundred_detections_do_not_count() {
         let b = bbox(0.0, 0.0, 20.0, 20.0);
         let noise = (0..100).map(|i| found(0, bbox(100.0 + f64::from(i), 50.0, 9.0, 9.0), 0.9));
-        let scores = coco(&[sheet(vec![there(0, b)], noise.chain([found(0, b, 0.1)]).collect())], &[]);
-        assert_eq!((scores.scores.map(), scores.ar_by_count), (0.0, [Some(0.0); 3]));
+        let scores = coco(
+            &[sheet(
+                vec![there(0, b)],
+                noise.chain([found(0, b, 0.1)]).collect(),
+            )],
+            &[],
+        );
+        assert_eq!(
+            (scores.scores.map(), scores.ar_by_count),
+            (0.0, [Some(0.0); 3])
+        );
     }
 }

@@ -80,7 +80,9 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// # Errors
 /// As [`read_coco_truth`].
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
-    truth.add(&io::read_json_data::<Vec<Detection>>(path)?).map_err(|e| e.in_file(path))
+    truth
+        .add(&io::read_json_data::<Vec<Detection>>(path)?)
+        .map_err(|e| e.in_file(path))
 }
 
 /// What documents of truth and of detections give, for the fuzzers.
@@ -96,18 +98,31 @@ impl CocoTruth {
         let categories = places("categories", document.categories.iter().map(|c| c.id))?;
         let name = |&i: &usize| document.categories[i].name.clone();
         let mut truth = Self {
-            sheets: images.values().map(|&i| Sheet::new(document.images[i].name(), Vec::new())).collect(),
+            sheets: images
+                .values()
+                .map(|&i| Sheet::new(document.images[i].name(), Vec::new()))
+                .collect(),
             classes: categories.values().map(name).collect(),
-            files: images.values().map(|&i| document.images[i].file()).collect(),
+            files: images
+                .values()
+                .map(|&i| document.images[i].file())
+                .collect(),
             images: images.into_keys().zip(0..).collect(),
             categories: categories.into_keys().zip(0..).collect(),
         };
         for (i, a) in document.annotations.iter().enumerate() {
             let at = || format!("annotations[{i}]");
-            let (image, class) = truth.place(a.image_id, a.category_id).map_err(|e| e.within(&at()))?;
+            let (image, class) = truth
+                .place(a.image_id, a.category_id)
+                .map_err(|e| e.within(&at()))?;
             let bbox = corners(a.bbox).map_err(|e| e.within(&at()))?;
             let area = a.area.unwrap_or(a.bbox[2] * a.bbox[3]);
-            truth.sheets[image].truth.push(TrueBox { class, bbox, area, crowd: a.iscrowd != 0 });
+            truth.sheets[image].truth.push(TrueBox {
+                class,
+                bbox,
+                area,
+                crowd: a.iscrowd != 0,
+            });
         }
         Ok(truth)
     }
@@ -115,17 +130,30 @@ impl CocoTruth {
     fn add(&mut self, found: &[Detection]) -> Result<()> {
         for (i, d) in found.iter().enumerate() {
             let at = || format!("[{i}]");
-            let (image, class) = self.place(d.image_id, d.category_id).map_err(|e| e.within(&at()))?;
+            let (image, class) = self
+                .place(d.image_id, d.category_id)
+                .map_err(|e| e.within(&at()))?;
             let bbox = corners(d.bbox).map_err(|e| e.within(&at()))?;
-            self.sheets[image].found.push(FoundBox { class, bbox, confidence: d.score });
+            self.sheets[image].found.push(FoundBox {
+                class,
+                bbox,
+                confidence: d.score,
+            });
         }
         Ok(())
     }
 
     fn place(&self, image: i64, category: i64) -> Result<(usize, u32)> {
-        let unknown = |at: &str, id| Error::value(at, format!("{id}, expected one that the truth lists"));
-        let image = *self.images.get(&image).ok_or_else(|| unknown("image_id", image))?;
-        let class = *self.categories.get(&category).ok_or_else(|| unknown("category_id", category))?;
+        let unknown =
+            |at: &str, id| Error::value(at, format!("{id}, expected one that the truth lists"));
+        let image = *self
+            .images
+            .get(&image)
+            .ok_or_else(|| unknown("image_id", image))?;
+        let class = *self
+            .categories
+            .get(&category)
+            .ok_or_else(|| unknown("category_id", category))?;
         Ok((image, class))
     }
 
@@ -134,9 +162,18 @@ impl CocoTruth {
     pub fn pictures(&self, path: &Path, folder: Option<&Path>) -> Vec<Option<Picture>> {
         let roots = folder.map_or_else(|| beside(path), |folder| vec![folder.to_path_buf()]);
         let picture = |(name, size): &(String, Option<[f64; 2]>)| {
-            let below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-            let path = roots.iter().map(|root| root.join(name)).find(|path| below && path.is_file())?;
-            let size = size.or_else(|| io::read_header(&path).ok().map(|h| [h.width as f64, h.height as f64]))?;
+            let below = Path::new(name)
+                .components()
+                .all(|part| matches!(part, Component::Normal(_)));
+            let path = roots
+                .iter()
+                .map(|root| root.join(name))
+                .find(|path| below && path.is_file())?;
+            let size = size.or_else(|| {
+                io::read_header(&path)
+                    .ok()
+                    .map(|h| [h.width as f64, h.height as f64])
+            })?;
             Some(Picture { path, size })
         };
         self.files.iter().map(picture).collect()
@@ -147,10 +184,19 @@ impl CocoTruth {
 fn beside(path: &Path) -> Vec<PathBuf> {
     let here = path.parent().unwrap_or(Path::new(""));
     let above = here.join("..");
-    let stem = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = path
+        .file_stem()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let part = stem.rsplit('_').next().unwrap_or_default().to_owned();
-    let roots =
-        |root: &Path| [root.to_path_buf(), root.join("images"), root.join(&part), root.join("images").join(&part)];
+    let roots = |root: &Path| {
+        [
+            root.to_path_buf(),
+            root.join("images"),
+            root.join(&part),
+            root.join("images").join(&part),
+        ]
+    };
     [roots(here), roots(&above)].concat()
 }
 
@@ -171,26 +217,46 @@ fn places(list: &str, ids: impl Iterator<Item = i64>) -> Result<BTreeMap<i64, us
 impl ImageRecord {
     fn file(&self) -> (String, Option<[f64; 2]>) {
         let address = self.coco_url.rsplit('/').next().unwrap_or_default();
-        let name = if self.file_name.is_empty() { address } else { &self.file_name };
+        let name = if self.file_name.is_empty() {
+            address
+        } else {
+            &self.file_name
+        };
         let side = |side: Option<f64>| side.filter(|side| *side >= 1.0);
-        (name.to_owned(), side(self.width).zip(side(self.height)).map(|(w, h)| [w, h]))
+        (
+            name.to_owned(),
+            side(self.width).zip(side(self.height)).map(|(w, h)| [w, h]),
+        )
     }
 
     /// The file's name without folder and extension; the id of an image without a file.
     fn name(&self) -> String {
         let (file, _) = self.file();
-        Path::new(&file).file_stem().map_or_else(|| self.id.to_string(), |n| n.to_string_lossy().into_owned())
+        Path::new(&file)
+            .file_stem()
+            .map_or_else(|| self.id.to_string(), |n| n.to_string_lossy().into_owned())
     }
 }
 
 fn corners([x, y, w, h]: [f64; 4]) -> Result<BBox> {
-    let bbox = BBox { x0: x, y0: y, x1: x + w, y1: y + h };
-    let near = [bbox.x0, bbox.y0, bbox.x1, bbox.y1].iter().all(|v| v.abs() <= FARTHEST_PX);
+    let bbox = BBox {
+        x0: x,
+        y0: y,
+        x1: x + w,
+        y1: y + h,
+    };
+    let near = [bbox.x0, bbox.y0, bbox.x1, bbox.y1]
+        .iter()
+        .all(|v| v.abs() <= FARTHEST_PX);
     if near && w >= 0.0 && h >= 0.0 {
         return Ok(bbox);
     }
-    let expected = format!("expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels");
-    Err(Error::value("bbox", format!("{:?}, {expected}", [x, y, w, h])))
+    let expected =
+        format!("expected x, y, width and height of at least 0, all within {FARTHEST_PX} pixels");
+    Err(Error::value(
+        "bbox",
+        format!("{:?}, {expected}", [x, y, w, h]),
+    ))
 }
 
 #[cfg(test)]
@@ -214,7 +280,14 @@ mod tests {
         let (_keep, path) = file(TRUTH);
         let truth = read_coco_truth(&path).unwrap();
         assert_eq!(truth.classes, ["label", "cap"]);
-        assert_eq!(truth.sheets.iter().map(|s| s.image.as_str()).collect::<Vec<_>>(), ["a", "x"]);
+        assert_eq!(
+            truth
+                .sheets
+                .iter()
+                .map(|s| s.image.as_str())
+                .collect::<Vec<_>>(),
+            ["a", "x"]
+        );
         let b = truth.sheets[1].truth[0];
         assert_eq!((b.class, b.area, b.crowd, b.bbox.x1), (1, 6.5, true, 4.0));
         assert_eq!(truth.sheets[0].truth[0].area, 4.0);
@@ -223,26 +296,41 @@ mod tests {
     #[test]
     fn what_cannot_be_is_named_with_its_place() {
         let truth = |from: &str, to: &str| {
-            let document = io::parse_json(&TRUTH.replace(from, to)).and_then(|d| CocoTruth::new(&d));
+            let document =
+                io::parse_json(&TRUTH.replace(from, to)).and_then(|d| CocoTruth::new(&d));
             document.unwrap_err().to_string()
         };
-        assert_eq!(truth("\"id\": 3,", "\"id\": 7,"), "images[1].id: 7, as of images[0], expected another");
+        assert_eq!(
+            truth("\"id\": 3,", "\"id\": 7,"),
+            "images[1].id: 7, as of images[0], expected another"
+        );
         assert!(
             truth("[1, 2, 3, 4]", "[1, 2, -3, 4]")
                 .starts_with("annotations[0].bbox: [1.0, 2.0, -3.0, 4.0], expected x")
         );
         assert!(truth("[0, 0, 2, 2]", "[0, 0, 2, 1e300]").contains("within 1000000000 pixels"));
         assert!(truth("\"image_id\": 3", "\"image_id\": \"3\"").contains("expected an integer"));
-        assert!(truth("\"iscrowd\": 1", "\"iscrowd\": 256").contains("expected an integer from 0 to 255"));
+        assert!(
+            truth("\"iscrowd\": 1", "\"iscrowd\": 256")
+                .contains("expected an integer from 0 to 255")
+        );
     }
 
     #[test]
     fn pictures_are_looked_for_where_coco_has_them_and_nowhere_else() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("annotations/instances_val.json");
-        for file in ["annotations/instances_val.json", "images/val/b/x.png", "a.png"] {
+        for file in [
+            "annotations/instances_val.json",
+            "images/val/b/x.png",
+            "a.png",
+        ] {
             std::fs::create_dir_all(root.path().join(file).parent().unwrap()).unwrap();
-            std::fs::write(root.path().join(file), TRUTH.replace("a.png", "../../a.png")).unwrap();
+            std::fs::write(
+                root.path().join(file),
+                TRUTH.replace("a.png", "../../a.png"),
+            )
+            .unwrap();
         }
         let found = read_coco_truth(&path).unwrap().pictures(&path, None);
         // Neither the one above the folder, nor the one whose size nobody tells.
@@ -257,8 +345,14 @@ mod tests {
     fn detections_of_unknown_images_are_named() {
         let (_keep, path) = file(TRUTH);
         let mut truth = read_coco_truth(&path).unwrap();
-        let (_keep, path) = file(r#"[{"image_id": 8, "category_id": 10, "bbox": [0, 0, 2, 2], "score": 0.5}]"#);
-        let said = read_coco_results(&path, &mut truth).unwrap_err().to_string();
-        assert!(said.contains("[0].image_id: 8, expected one that the truth lists"), "{said}");
+        let (_keep, path) =
+            file(r#"[{"image_id": 8, "category_id": 10, "bbox": [0, 0, 2, 2], "score": 0.5}]"#);
+        let said = read_coco_results(&path, &mut truth)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.contains("[0].image_id: 8, expected one that the truth lists"),
+            "{said}"
+        );
     }
 }

@@ -24,7 +24,10 @@ pub struct ConfusionOptions {
 
 impl Default for ConfusionOptions {
     fn default() -> Self {
-        Self { confidence: 0.25, iou: 0.45 }
+        Self {
+            confidence: 0.25,
+            iou: 0.45,
+        }
     }
 }
 
@@ -35,7 +38,10 @@ impl Confusion {
         let mut confusion = Self::default();
         for sheet in sheets {
             for pair in pairs(sheet, options) {
-                let key = [pair.found.map(|f| sheet.found[f].class), pair.truth.map(|t| sheet.truth[t].class)];
+                let key = [
+                    pair.found.map(|f| sheet.found[f].class),
+                    pair.truth.map(|t| sheet.truth[t].class),
+                ];
                 *confusion.counts.entry(key).or_default() += 1;
             }
         }
@@ -79,11 +85,30 @@ mod tests {
     fn every_box_is_counted_once() {
         let (a, b) = (bbox(0.0, 0.0, 10.0, 10.0), bbox(50.0, 0.0, 10.0, 10.0));
         let nowhere = bbox(90.0, 90.0, 5.0, 5.0);
-        let seen = vec![found(1, a, 0.9), found(0, a, 0.8), found(1, nowhere, 0.9), found(0, b, 0.1)];
-        let confusion = Confusion::new(&[sheet(vec![there(0, a), there(1, b)], seen)], &Default::default());
+        let seen = vec![
+            found(1, a, 0.9),
+            found(0, a, 0.8),
+            found(1, nowhere, 0.9),
+            found(0, b, 0.1),
+        ];
+        let confusion = Confusion::new(
+            &[sheet(vec![there(0, a), there(1, b)], seen)],
+            &Default::default(),
+        );
         let count = |found, truth| confusion.count(found, truth);
-        assert_eq!([count(Some(1), Some(0)), count(Some(0), None), count(Some(1), None), count(None, Some(1))], [1; 4]);
+        assert_eq!(
+            [
+                count(Some(1), Some(0)),
+                count(Some(0), None),
+                count(Some(1), None),
+                count(None, Some(1))
+            ],
+            [1; 4]
+        );
         assert_eq!(confusion.counts.len(), 4);
-        assert_eq!((confusion.classes().len(), confusion.worst()), (2, vec![1, 0]));
+        assert_eq!(
+            (confusion.classes().len(), confusion.worst()),
+            (2, vec![1, 0])
+        );
     }
 }

@@ -42,30 +42,49 @@ pub(super) fn of(rankings: &[Ranking]) -> Curves {
 }
 
 fn precision_recall(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
-    let all: Vec<[f64; 2]> = ranked.recall.iter().zip(&ranked.precision).map(|(&r, &p)| [r, p]).collect();
+    let all: Vec<[f64; 2]> = ranked
+        .recall
+        .iter()
+        .zip(&ranked.precision)
+        .map(|(&r, &p)| [r, p])
+        .collect();
     let last = all.len().saturating_sub(1);
     let step = all.len().div_ceil(POINTS).max(1);
-    all.into_iter().enumerate().filter(|(i, _)| i % step == 0 || *i == last).map(|(_, p)| p).collect()
+    all.into_iter()
+        .enumerate()
+        .filter(|(i, _)| i % step == 0 || *i == last)
+        .map(|(_, p)| p)
+        .collect()
 }
 
 fn mean_precision(ranked: &[Ranked<'_>]) -> Vec<[f64; 2]> {
     let read = |r: &Ranked<'_>| -> Vec<[f64; 2]> {
         let samples = average::samples(&r.recall, &r.precision);
-        samples.into_iter().enumerate().map(|(i, precision)| [average::recall_at(i), precision]).collect()
+        samples
+            .into_iter()
+            .enumerate()
+            .map(|(i, precision)| [average::recall_at(i), precision])
+            .collect()
     };
     mean_over(&ranked.iter().map(read).collect::<Vec<_>>())
 }
 
 /// The mean of curves with points at the same places.
 fn mean_over(curves: &[Vec<[f64; 2]>]) -> Vec<[f64; 2]> {
-    let Some(first) = curves.first() else { return Vec::new() };
-    let point = |(i, [x, _]): (usize, &[f64; 2])| [*x, mean(curves.iter().map(|curve| curve[i][1]))];
+    let Some(first) = curves.first() else {
+        return Vec::new();
+    };
+    let point =
+        |(i, [x, _]): (usize, &[f64; 2])| [*x, mean(curves.iter().map(|curve| curve[i][1]))];
     first.iter().enumerate().map(point).collect()
 }
 
 fn f1(ranked: &Ranked<'_>) -> Vec<[f64; 2]> {
     let at = |i| [confidence(i), ranked.f1_at(confidence(i))];
-    (0..CONFIDENCES).step_by(CONFIDENCES / POINTS).map(at).collect()
+    (0..CONFIDENCES)
+        .step_by(CONFIDENCES / POINTS)
+        .map(at)
+        .collect()
 }
 
 #[cfg(test)]
@@ -78,11 +97,18 @@ mod tests {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
         let curves = curves(&[sheet(vec![there(2, b)], vec![found(2, b, 0.6)])]);
         assert_eq!(curves.classes, [2]);
-        let f1 = |c: f64| curves.f1[0].iter().min_by(|a, b| (a[0] - c).abs().total_cmp(&(b[0] - c).abs())).unwrap()[1];
+        let f1 = |c: f64| {
+            curves.f1[0]
+                .iter()
+                .min_by(|a, b| (a[0] - c).abs().total_cmp(&(b[0] - c).abs()))
+                .unwrap()[1]
+        };
         assert!(f1(0.3) > 0.99 && f1(0.9) < 0.01);
         assert!(curves.best_confidence < 0.6);
         assert_eq!(curves.precision_recall, [[[1.0, 1.0]]]);
-        assert!(curves.mean_precision.len() == 101 && curves.mean_precision.iter().all(|p| p[1] == 1.0));
+        assert!(
+            curves.mean_precision.len() == 101 && curves.mean_precision.iter().all(|p| p[1] == 1.0)
+        );
         assert_eq!(curves.mean_f1, curves.f1[0]);
     }
 }

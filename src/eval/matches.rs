@@ -21,7 +21,11 @@ impl Matches {
             Definition::Yolov5 => yolov5::rankings(sheets),
             Definition::Coco => coco::rankings(&ByClass::new(sheets), AreaRange::All),
         };
-        Self { definition, images: sheets.len(), rankings }
+        Self {
+            definition,
+            images: sheets.len(),
+            rankings,
+        }
     }
 
     /// How many images there are.
@@ -51,7 +55,12 @@ impl Matches {
             Definition::Yolov5 => yolov5::average_precision,
             Definition::Coco => coco::average_precision,
         };
-        let each: Vec<f64> = self.rankings.par_iter().filter_map(|r| average_precision(r, weights)).map(mean).collect();
+        let each: Vec<f64> = self
+            .rankings
+            .par_iter()
+            .filter_map(|r| average_precision(r, weights))
+            .map(mean)
+            .collect();
         mean(each)
     }
 
@@ -61,7 +70,10 @@ impl Matches {
     }
 
     fn check(&self, weights: &[u32]) {
-        assert!(weights.is_empty() || weights.len() == self.images, "one weight per sheet");
+        assert!(
+            weights.is_empty() || weights.len() == self.images,
+            "one weight per sheet"
+        );
     }
 }
 
@@ -75,7 +87,9 @@ mod tests {
     fn the_mean_is_that_of_the_scores_for_any_weights() {
         let near = |i: u32| bbox(10.0 + f64::from(i), 10.0, 50.0, 40.0);
         let one = |i: u32| {
-            let seen = (0..i).map(|k| found(k % 3, near(k), 0.1 * f64::from(k + 1))).collect();
+            let seen = (0..i)
+                .map(|k| found(k % 3, near(k), 0.1 * f64::from(k + 1)))
+                .collect();
             sheet((0..3).map(|class| there(class, near(0))).collect(), seen)
         };
         let sheets: Vec<Sheet> = (0..6).map(one).collect();
@@ -83,7 +97,10 @@ mod tests {
             let matches = Matches::new(&sheets, definition);
             for weights in [&[][..], &[1, 0, 3, 1, 2, 1], &[0, 0, 0, 0, 0, 5], &[0; 6]] {
                 let scores = evaluate(&sheets, definition, weights);
-                assert_eq!((matches.map(weights), &matches.scores(weights)), (scores.map(), &scores));
+                assert_eq!(
+                    (matches.map(weights), &matches.scores(weights)),
+                    (scores.map(), &scores)
+                );
             }
         }
     }

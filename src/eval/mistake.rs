@@ -37,11 +37,20 @@ pub struct Mistake {
 pub fn mistakes(sheets: &[Sheet], options: &ConfusionOptions) -> Vec<Mistake> {
     let of_sheet = |(i, sheet): (usize, &Sheet)| -> Vec<(f64, Mistake)> {
         let mistakes = in_sheet(i, sheet, options);
-        mistakes.into_iter().map(|m| (badness(sheet, &m), m)).collect()
+        mistakes
+            .into_iter()
+            .map(|m| (badness(sheet, &m), m))
+            .collect()
     };
-    let mut all: Vec<(f64, Mistake)> = sheets.par_iter().enumerate().flat_map_iter(of_sheet).collect();
+    let mut all: Vec<(f64, Mistake)> = sheets
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(of_sheet)
+        .collect();
     let worse = |a: &(f64, Mistake), b: &(f64, Mistake)| -> Ordering {
-        (a.1.kind == Kind::Missed).cmp(&(b.1.kind == Kind::Missed)).then(b.0.total_cmp(&a.0))
+        (a.1.kind == Kind::Missed)
+            .cmp(&(b.1.kind == Kind::Missed))
+            .then(b.0.total_cmp(&a.0))
     };
     all.sort_by(worse);
     all.into_iter().map(|(_, mistake)| mistake).collect()
@@ -52,10 +61,15 @@ fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mist
     let found = BoxIndex::new(sheet.found.iter().map(|f| f.bbox));
     let overlap = |f: usize, t: usize| iou(&sheet.found[f].bbox, &sheet.truth[t].bbox);
     let most = |near: Vec<usize>, overlap: &dyn Fn(usize) -> f64| -> Option<(usize, f64)> {
-        near.into_iter().map(|i| (i, overlap(i))).max_by(|a, b| a.1.total_cmp(&b.1))
+        near.into_iter()
+            .map(|i| (i, overlap(i)))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
     };
     let mistake = |pair: Pair| match pair {
-        Pair { found: Some(f), truth: Some(t) } => {
+        Pair {
+            found: Some(f),
+            truth: Some(t),
+        } => {
             let wrong = sheet.found[f].class != sheet.truth[t].class;
             wrong.then(|| Mistake {
                 sheet: place,
@@ -65,19 +79,43 @@ fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mist
                 iou: overlap(f, t),
             })
         }
-        Pair { found: Some(f), truth: None } => {
+        Pair {
+            found: Some(f),
+            truth: None,
+        } => {
             let nearest = most(truth.near(&sheet.found[f].bbox), &|t| overlap(f, t));
             let (truth, iou) = nearest.map_or((None, 0.0), |(t, iou)| (Some(t), iou));
-            Some(Mistake { sheet: place, kind: Kind::FalseAlarm, found: Some(f), truth, iou })
+            Some(Mistake {
+                sheet: place,
+                kind: Kind::FalseAlarm,
+                found: Some(f),
+                truth,
+                iou,
+            })
         }
-        Pair { found: None, truth: Some(t) } => {
+        Pair {
+            found: None,
+            truth: Some(t),
+        } => {
             let nearest = most(found.near(&sheet.truth[t].bbox), &|f| overlap(f, t));
             let (found, iou) = nearest.map_or((None, 0.0), |(f, iou)| (Some(f), iou));
-            Some(Mistake { sheet: place, kind: Kind::Missed, found, truth: Some(t), iou })
+            Some(Mistake {
+                sheet: place,
+                kind: Kind::Missed,
+                found,
+                truth: Some(t),
+                iou,
+            })
         }
-        Pair { found: None, truth: None } => None,
+        Pair {
+            found: None,
+            truth: None,
+        } => None,
     };
-    pairs(sheet, options).into_iter().filter_map(mistake).collect()
+    pairs(sheet, options)
+        .into_iter()
+        .filter_map(mistake)
+        .collect()
 }
 
 fn badness(sheet: &Sheet, mistake: &Mistake) -> f64 {
@@ -97,8 +135,15 @@ mod tests {
     fn the_worst_come_first_with_what_is_nearest_to_them() {
         let (small, large) = (bbox(0.0, 0.0, 10.0, 10.0), bbox(50.0, 0.0, 40.0, 40.0));
         let aside = bbox(50.0, 30.0, 40.0, 40.0);
-        let seen = vec![found(0, bbox(200.0, 0.0, 9.0, 9.0), 0.5), found(1, small, 0.9), found(0, aside, 0.3)];
-        let all = mistakes(&[sheet(vec![there(0, small), there(1, large)], seen)], &Default::default());
+        let seen = vec![
+            found(0, bbox(200.0, 0.0, 9.0, 9.0), 0.5),
+            found(1, small, 0.9),
+            found(0, aside, 0.3),
+        ];
+        let all = mistakes(
+            &[sheet(vec![there(0, small), there(1, large)], seen)],
+            &Default::default(),
+        );
         let told = |m: &Mistake| (m.kind, m.found, m.truth);
         assert_eq!(
             all.iter().map(told).collect::<Vec<_>>(),

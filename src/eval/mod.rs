@@ -84,7 +84,11 @@ pub struct Sheet {
 impl Sheet {
     /// An image in which nothing was found yet.
     pub fn new(image: impl Into<String>, truth: Vec<TrueBox>) -> Self {
-        Self { image: image.into(), truth, found: Vec::new() }
+        Self {
+            image: image.into(),
+            truth,
+            found: Vec::new(),
+        }
     }
 }
 
@@ -171,12 +175,24 @@ pub fn evaluate(sheets: &[Sheet], definition: Definition, weights: &[u32]) -> Sc
 /// 0.50, 0.55 .. 0.95, as NumPy's `linspace` gives them.
 pub fn thresholds() -> [f64; THRESHOLDS] {
     let step = (0.95 - 0.5) / (THRESHOLDS - 1) as f64;
-    std::array::from_fn(|i| if i + 1 == THRESHOLDS { 0.95 } else { i as f64 * step + 0.5 })
+    std::array::from_fn(|i| {
+        if i + 1 == THRESHOLDS {
+            0.95
+        } else {
+            i as f64 * step + 0.5
+        }
+    })
 }
 
 fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (sum, count) = values.into_iter().fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
-    if count == 0 { 0.0 } else { sum / f64::from(count) }
+    let (sum, count) = values
+        .into_iter()
+        .fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
+    if count == 0 {
+        0.0
+    } else {
+        sum / f64::from(count)
+    }
 }
 
 #[cfg(test)]
@@ -184,19 +200,37 @@ pub(crate) mod tests {
     use super::*;
 
     pub(crate) fn bbox(x0: f64, y0: f64, w: f64, h: f64) -> BBox {
-        BBox { x0, y0, x1: x0 + w, y1: y0 + h }
+        BBox {
+            x0,
+            y0,
+            x1: x0 + w,
+            y1: y0 + h,
+        }
     }
 
     pub(crate) fn there(class: u32, bbox: BBox) -> TrueBox {
-        TrueBox { class, bbox, area: bbox.width() * bbox.height(), crowd: false }
+        TrueBox {
+            class,
+            bbox,
+            area: bbox.width() * bbox.height(),
+            crowd: false,
+        }
     }
 
     pub(crate) fn found(class: u32, bbox: BBox, confidence: f64) -> FoundBox {
-        FoundBox { class, bbox, confidence }
+        FoundBox {
+            class,
+            bbox,
+            confidence,
+        }
     }
 
     pub(crate) fn sheet(truth: Vec<TrueBox>, found: Vec<FoundBox>) -> Sheet {
-        Sheet { image: String::new(), truth, found }
+        Sheet {
+            image: String::new(),
+            truth,
+            found,
+        }
     }
 
     #[test]
@@ -220,14 +254,26 @@ pub(crate) mod tests {
     #[test]
     fn an_image_that_counts_twice_is_an_image_that_is_there_twice() {
         let b = bbox(10.0, 10.0, 50.0, 40.0);
-        let good = sheet(vec![there(0, b)], vec![found(0, b, 0.8), found(0, bbox(80.0, 0.0, 9.0, 9.0), 0.9)]);
-        let bad = sheet(vec![there(0, b)], vec![found(0, bbox(12.0, 9.0, 50.0, 40.0), 0.7)]);
+        let good = sheet(
+            vec![there(0, b)],
+            vec![found(0, b, 0.8), found(0, bbox(80.0, 0.0, 9.0, 9.0), 0.9)],
+        );
+        let bad = sheet(
+            vec![there(0, b)],
+            vec![found(0, bbox(12.0, 9.0, 50.0, 40.0), 0.7)],
+        );
         for definition in [Definition::Yolov5, Definition::Coco] {
             let twice = evaluate(&[good.clone(), good.clone(), bad.clone()], definition, &[]);
             let weighted = evaluate(&[good.clone(), bad.clone()], definition, &[2, 1]);
-            assert!((twice.map() - weighted.map()).abs() < 1e-12, "{definition:?}");
+            assert!(
+                (twice.map() - weighted.map()).abs() < 1e-12,
+                "{definition:?}"
+            );
             let without = evaluate(&[good.clone(), bad.clone()], definition, &[0, 1]);
-            assert_eq!(without.map(), evaluate(std::slice::from_ref(&bad), definition, &[]).map());
+            assert_eq!(
+                without.map(),
+                evaluate(std::slice::from_ref(&bad), definition, &[]).map()
+            );
         }
     }
 

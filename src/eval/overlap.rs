@@ -39,14 +39,22 @@ impl BoxIndex {
 
     pub(super) fn new(boxes: impl IntoIterator<Item = BBox>) -> Self {
         let boxes: Vec<BBox> = boxes.into_iter().collect();
-        let mut order: Vec<usize> = if boxes.len() > Self::FEW { (0..boxes.len()).collect() } else { Vec::new() };
+        let mut order: Vec<usize> = if boxes.len() > Self::FEW {
+            (0..boxes.len()).collect()
+        } else {
+            Vec::new()
+        };
         order.sort_by(|&a, &b| boxes[a].x0.total_cmp(&boxes[b].x0));
         let farthest = |reach: &mut f64, &i: &usize| {
             *reach = reach.max(boxes[i].x1);
             Some(*reach)
         };
         let reach = order.iter().scan(f64::NEG_INFINITY, farthest).collect();
-        Self { boxes, order, reach }
+        Self {
+            boxes,
+            order,
+            reach,
+        }
     }
 
     /// Those that share more than an edge with a box, in order.
@@ -57,7 +65,11 @@ impl BoxIndex {
         }
         let end = self.order.partition_point(|&i| self.boxes[i].x0 < b.x1);
         let start = self.reach[..end].partition_point(|&reach| reach <= b.x0);
-        let mut near: Vec<usize> = self.order[start..end].iter().copied().filter(overlaps).collect();
+        let mut near: Vec<usize> = self.order[start..end]
+            .iter()
+            .copied()
+            .filter(overlaps)
+            .collect();
         near.sort_unstable();
         near
     }
@@ -88,14 +100,20 @@ mod tests {
     #[test]
     fn overlap_is_symmetric_and_one_only_for_the_same_box() {
         let (a, b) = (bbox(0.0, 0.0, 4.0, 4.0), bbox(2.0, 0.0, 4.0, 4.0));
-        assert_eq!((iou(&a, &a), iou(&a, &b), iou(&b, &a)), (1.0, 1.0 / 3.0, 1.0 / 3.0));
+        assert_eq!(
+            (iou(&a, &a), iou(&a, &b), iou(&b, &a)),
+            (1.0, 1.0 / 3.0, 1.0 / 3.0)
+        );
     }
 
     #[test]
     fn boxes_apart_or_without_area_share_nothing() {
         let a = bbox(0.0, 0.0, 4.0, 4.0);
         assert_eq!(iou(&a, &bbox(5.0, 5.0, 4.0, 4.0)), 0.0);
-        assert_eq!(iou(&bbox(1.0, 1.0, 0.0, 0.0), &bbox(1.0, 1.0, 0.0, 0.0)), 0.0);
+        assert_eq!(
+            iou(&bbox(1.0, 1.0, 0.0, 0.0), &bbox(1.0, 1.0, 0.0, 0.0)),
+            0.0
+        );
         assert_eq!(iou(&a, &bbox(3.0, 3.0, -2.0, -2.0)), 0.0);
     }
 }

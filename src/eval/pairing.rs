@@ -30,9 +30,17 @@ pub(super) fn pairs(sheet: &Sheet, options: &ConfusionOptions) -> Vec<Pair> {
         }
     }
     let missed = (0..sheet.truth.len()).filter(|&t| !search.taken[t] && !sheet.truth[t].crowd);
-    let missed = missed.map(|t| Pair { found: None, truth: Some(t) });
-    let seen = found.iter().map(|&f| Pair { found: Some(f), truth: names[f] });
-    let mut pairs: Vec<Pair> = seen.filter(|p| p.truth.is_some() || !search.in_crowd(p.found)).collect();
+    let missed = missed.map(|t| Pair {
+        found: None,
+        truth: Some(t),
+    });
+    let seen = found.iter().map(|&f| Pair {
+        found: Some(f),
+        truth: names[f],
+    });
+    let mut pairs: Vec<Pair> = seen
+        .filter(|p| p.truth.is_some() || !search.in_crowd(p.found))
+        .collect();
     pairs.extend(missed);
     pairs
 }
@@ -71,23 +79,43 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(sheet: &'a Sheet, options: &ConfusionOptions) -> Self {
         let index = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
-        Self { sheet, index, taken: vec![false; sheet.truth.len()], least: options.iou }
+        Self {
+            sheet,
+            index,
+            taken: vec![false; sheet.truth.len()],
+            least: options.iou,
+        }
     }
 
     fn best(&self, found: usize) -> Option<Candidate> {
         let bbox = &self.sheet.found[found].bbox;
         let free = |&t: &usize| !self.taken[t] && !self.sheet.truth[t].crowd;
-        let candidate = |t: usize| Candidate { overlap: iou(&self.sheet.truth[t].bbox, bbox), truth: t, found };
-        let near = self.index.near(bbox).into_iter().filter(free).map(candidate);
-        near.filter(|candidate| candidate.overlap > self.least).max()
+        let candidate = |t: usize| Candidate {
+            overlap: iou(&self.sheet.truth[t].bbox, bbox),
+            truth: t,
+            found,
+        };
+        let near = self
+            .index
+            .near(bbox)
+            .into_iter()
+            .filter(free)
+            .map(candidate);
+        near.filter(|candidate| candidate.overlap > self.least)
+            .max()
     }
 
     /// As the COCO tools have it, by the share of the detection that lies in a crowd.
     fn in_crowd(&self, found: Option<usize>) -> bool {
         found.is_some_and(|f| {
             let bbox = &self.sheet.found[f].bbox;
-            let inside = |t: usize| share(intersection(bbox, &self.sheet.truth[t].bbox), area(bbox)) > self.least;
-            self.index.near(bbox).into_iter().any(|t| self.sheet.truth[t].crowd && inside(t))
+            let inside = |t: usize| {
+                share(intersection(bbox, &self.sheet.truth[t].bbox), area(bbox)) > self.least
+            };
+            self.index
+                .near(bbox)
+                .into_iter()
+                .any(|t| self.sheet.truth[t].crowd && inside(t))
         })
     }
 }
@@ -102,7 +130,9 @@ mod tests {
     /// All pairs in order of overlap: what the search above saves.
     fn by_sorting(sheet: &Sheet, least: f64) -> Vec<(usize, usize)> {
         let each = (0..sheet.truth.len()).flat_map(|t| (0..sheet.found.len()).map(move |f| (t, f)));
-        let mut all: Vec<_> = each.map(|(t, f)| (iou(&sheet.truth[t].bbox, &sheet.found[f].bbox), t, f)).collect();
+        let mut all: Vec<_> = each
+            .map(|(t, f)| (iou(&sheet.truth[t].bbox, &sheet.found[f].bbox), t, f))
+            .collect();
         all.retain(|pair| pair.0 > least);
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let (mut truths, mut names) = (vec![], vec![]);
@@ -139,9 +169,30 @@ mod tests {
     #[test]
     fn a_crowd_is_not_missed_and_what_lies_in_it_is_no_alarm() {
         let (b, crowd) = (bbox(0.0, 0.0, 10.0, 10.0), bbox(50.0, 0.0, 100.0, 100.0));
-        let seen = vec![found(0, bbox(60.0, 10.0, 9.0, 9.0), 0.9), found(0, bbox(300.0, 0.0, 9.0, 9.0), 0.9)];
-        let all = sheet(vec![there(0, b), TrueBox { crowd: true, ..there(0, crowd) }], seen);
-        let expected = [Pair { found: Some(1), truth: None }, Pair { found: None, truth: Some(0) }];
+        let seen = vec![
+            found(0, bbox(60.0, 10.0, 9.0, 9.0), 0.9),
+            found(0, bbox(300.0, 0.0, 9.0, 9.0), 0.9),
+        ];
+        let all = sheet(
+            vec![
+                there(0, b),
+                TrueBox {
+                    crowd: true,
+                    ..there(0, crowd)
+                },
+            ],
+            seen,
+        );
+        let expected = [
+            Pair {
+                found: Some(1),
+                truth: None,
+            },
+            Pair {
+                found: None,
+                truth: Some(0),
+            },
+        ];
         assert_eq!(pairs(&all, &Default::default()), expected);
     }
 }

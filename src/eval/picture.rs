@@ -19,13 +19,30 @@ pub const CURVES_SHOWN: usize = 7;
 /// Precision over recall: the mean of all classes, and the first of the classes to be `shown`.
 pub fn precision_recall_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
     let lines = (&curves.mean_precision, &curves.precision_recall[..]);
-    picture("precision and recall at IoU 0.5", ["recall", "precision"], lines, curves, names, shown)
+    picture(
+        "precision and recall at IoU 0.5",
+        ["recall", "precision"],
+        lines,
+        curves,
+        names,
+        shown,
+    )
 }
 
 /// F1 over confidence, for the same classes.
 pub fn f1_picture(curves: &Curves, names: &[String], shown: &[u32]) -> String {
-    let title = format!("F1 at IoU 0.5, best mean at confidence {:.3}", curves.best_confidence);
-    picture(&title, ["confidence", "F1"], (&curves.mean_f1, &curves.f1[..]), curves, names, shown)
+    let title = format!(
+        "F1 at IoU 0.5, best mean at confidence {:.3}",
+        curves.best_confidence
+    );
+    picture(
+        &title,
+        ["confidence", "F1"],
+        (&curves.mean_f1, &curves.f1[..]),
+        curves,
+        names,
+        shown,
+    )
 }
 
 type Line = Vec<[f64; 2]>;
@@ -38,16 +55,29 @@ fn picture(
     names: &[String],
     shown: &[u32],
 ) -> String {
-    let [across, up] = axes.map(|title| Axis { title: title.into(), range: [0.0, 1.0], logarithmic: false });
+    let [across, up] = axes.map(|title| Axis {
+        title: title.into(),
+        range: [0.0, 1.0],
+        logarithmic: false,
+    });
     let place = |class: &u32| curves.classes.binary_search(class).ok();
     let places: Vec<usize> = shown.iter().filter_map(place).take(CURVES_SHOWN).collect();
-    let mut chart = Chart { title: title.into(), across, up, ..Default::default() };
+    let mut chart = Chart {
+        title: title.into(),
+        across,
+        up,
+        ..Default::default()
+    };
     if curves.classes.len() > 1 {
-        chart.names.push(format!("mean of {} classes", curves.classes.len()));
+        chart
+            .names
+            .push(format!("mean of {} classes", curves.classes.len()));
         chart.curves.push(mean.clone());
     }
     for place in places {
-        chart.names.push(clipped(&class_name(curves.classes[place], names), LETTERS));
+        chart
+            .names
+            .push(clipped(&class_name(curves.classes[place], names), LETTERS));
         chart.curves.push(lines[place].clone());
     }
     Chart::row(&[chart])
@@ -75,7 +105,10 @@ pub fn confusion_picture(confusion: &Confusion, names: &[String], shown: &[u32])
         svg += &word([middle, NAMES - 8.0], "start", &short, &turned);
     }
     svg += &matrix.lines(cell);
-    matrix.counts.iter().for_each(|(&at, &count)| svg += &matrix.cell(at, count, cell));
+    matrix
+        .counts
+        .iter()
+        .for_each(|(&at, &count)| svg += &matrix.cell(at, count, cell));
     svg + "</svg>\n"
 }
 
@@ -91,8 +124,15 @@ struct Matrix {
 
 impl Matrix {
     fn new(confusion: &Confusion, names: &[String], shown: &[u32]) -> Self {
-        let mut titles: Vec<String> = shown.iter().map(|&class| class_name(class, names)).collect();
-        let others = confusion.classes().iter().filter(|class| !shown.contains(class)).count();
+        let mut titles: Vec<String> = shown
+            .iter()
+            .map(|&class| class_name(class, names))
+            .collect();
+        let others = confusion
+            .classes()
+            .iter()
+            .filter(|class| !shown.contains(class))
+            .count();
         if others > 0 {
             titles.push(format!("{others} others"));
         }
@@ -108,7 +148,11 @@ impl Matrix {
             *counts.entry([place(truth), place(found)]).or_default() += count;
             sums[place(truth)] += count;
         }
-        Self { titles, counts, sums }
+        Self {
+            titles,
+            counts,
+            sums,
+        }
     }
 
     fn lines(&self, cell: f64) -> String {
@@ -128,14 +172,22 @@ impl Matrix {
         let light = 255.0 - 200.0 * share;
         let ink = if share > 0.6 { " fill=\"white\"" } else { "" };
         let mut svg = String::new();
-        let told = format!("found {}, true {}: {count}", self.titles[row], self.titles[column]);
+        let told = format!(
+            "found {}, true {}: {count}",
+            self.titles[row], self.titles[column]
+        );
         let _ = writeln!(
             svg,
             "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{cell:.1}\" height=\"{cell:.1}\" \
              fill=\"rgb({light:.0},{light:.0},255)\" stroke=\"#ccc\"><title>{}</title></rect>",
             escaped(&told)
         );
-        svg + &word([x + cell / 2.0, y + cell / 2.0 + 4.0], "middle", &short(count), ink)
+        svg + &word(
+            [x + cell / 2.0, y + cell / 2.0 + 4.0],
+            "middle",
+            &short(count),
+            ink,
+        )
     }
 }
 
@@ -149,12 +201,18 @@ fn short(count: u64) -> String {
 }
 
 fn word([x, y]: [f64; 2], anchor: &str, text: &str, more: &str) -> String {
-    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n", escaped(text))
+    format!(
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\"{more}>{}</text>\n",
+        escaped(text)
+    )
 }
 
 /// What a class is called: by number where it has no name.
 pub(crate) fn class_name(class: u32, names: &[String]) -> String {
-    names.get(class as usize).cloned().unwrap_or_else(|| format!("class {class}"))
+    names
+        .get(class as usize)
+        .cloned()
+        .unwrap_or_else(|| format!("class {class}"))
 }
 
 #[cfg(test)]
@@ -162,7 +220,9 @@ mod tests {
     use super::*;
 
     fn confusion(counts: &[([Option<u32>; 2], u64)]) -> Confusion {
-        Confusion { counts: counts.iter().copied().collect() }
+        Confusion {
+            counts: counts.iter().copied().collect(),
+        }
     }
 
     #[test]
@@ -175,18 +235,35 @@ mod tests {
 
     #[test]
     fn what_is_not_shown_is_counted_as_others() {
-        let many: Vec<_> = (0..2000).map(|class| ([Some(class), Some(class)], 1)).collect();
+        let many: Vec<_> = (0..2000)
+            .map(|class| ([Some(class), Some(class)], 1))
+            .collect();
         let matrix = Matrix::new(&confusion(&many), &[], &[7, 1999]);
-        assert_eq!(matrix.titles, ["class 7", "class 1999", "1998 others", "background"]);
-        assert_eq!(matrix.counts, BTreeMap::from([([0, 0], 1), ([1, 1], 1), ([2, 2], 1998)]));
+        assert_eq!(
+            matrix.titles,
+            ["class 7", "class 1999", "1998 others", "background"]
+        );
+        assert_eq!(
+            matrix.counts,
+            BTreeMap::from([([0, 0], 1), ([1, 1], 1), ([2, 2], 1998)])
+        );
         assert!(
-            confusion_picture(&confusion(&many), &["x".repeat(10_000)], &(0..50).collect::<Vec<_>>()).len() < 100_000
+            confusion_picture(
+                &confusion(&many),
+                &["x".repeat(10_000)],
+                &(0..50).collect::<Vec<_>>()
+            )
+            .len()
+                < 100_000
         );
     }
 
     #[test]
     fn counts_stay_in_their_cells() {
-        assert_eq!([7, 9_999, 12_345, 7_654_321].map(short), ["7", "9999", "12k", "7M"]);
+        assert_eq!(
+            [7, 9_999, 12_345, 7_654_321].map(short),
+            ["7", "9999", "12k", "7M"]
+        );
     }
 
     #[test]

@@ -46,21 +46,34 @@ impl Ranking {
     ) -> Self {
         let images = boxes.images();
         let each: Vec<(Vec<Hit>, usize)> = images.par_iter().map(held).collect();
-        let counted = images.iter().zip(&each).map(|(image, (_, count))| (image.sheet, *count));
+        let counted = images
+            .iter()
+            .zip(&each)
+            .map(|(image, (_, count))| (image.sheet, *count));
         let truths = counted.filter(|&(_, count)| count > 0).collect();
         let mut hits: Vec<Hit> = each.into_iter().flat_map(|(hits, _)| hits).collect();
         hits.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        Self { class: boxes.class, truths, hits }
+        Self {
+            class: boxes.class,
+            truths,
+            hits,
+        }
     }
 
     /// How many boxes there are to be found.
     pub(super) fn truths(&self, weights: &[u32]) -> f64 {
-        self.truths.iter().map(|&(sheet, count)| weight(weights, sheet) * count as f64).sum()
+        self.truths
+            .iter()
+            .map(|&(sheet, count)| weight(weights, sheet) * count as f64)
+            .sum()
     }
 
     /// Those of images that count.
     pub(super) fn counting(&self, weights: &[u32]) -> impl Iterator<Item = (&Hit, f64)> {
-        self.hits.iter().map(|hit| (hit, weight(weights, hit.sheet))).filter(|(_, count)| *count > 0.0)
+        self.hits
+            .iter()
+            .map(|hit| (hit, weight(weights, hit.sheet)))
+            .filter(|(_, count)| *count > 0.0)
     }
 
     /// Sums at a threshold after each detection that counts.
@@ -112,7 +125,12 @@ impl Running {
 
     /// Adds sums that are others than the last ones.
     fn turn(&mut self, right: f64, wrong: f64) {
-        let last = self.right.last().copied().zip(self.wrong.last().copied()).unwrap_or_default();
+        let last = self
+            .right
+            .last()
+            .copied()
+            .zip(self.wrong.last().copied())
+            .unwrap_or_default();
         if last != (right, wrong) {
             self.push(right, wrong);
         }
@@ -130,7 +148,11 @@ fn marked(mut marks: Marks) -> impl Iterator<Item = usize> {
 
 /// How often an image counts.
 fn weight(weights: &[u32], sheet: usize) -> f64 {
-    if weights.is_empty() { 1.0 } else { f64::from(weights[sheet]) }
+    if weights.is_empty() {
+        1.0
+    } else {
+        f64::from(weights[sheet])
+    }
 }
 
 #[cfg(test)]
@@ -142,11 +164,21 @@ mod tests {
     use proptest::prelude::*;
 
     fn ranking(hits: Vec<Hit>) -> Ranking {
-        Ranking { class: 0, truths: vec![(0, 9)], hits }
+        Ranking {
+            class: 0,
+            truths: vec![(0, 9)],
+            hits,
+        }
     }
 
     fn hit(right: Marks, ignored: Marks) -> Hit {
-        Hit { confidence: 0.5, sheet: 0, place: 0, right, ignored }
+        Hit {
+            confidence: 0.5,
+            sheet: 0,
+            place: 0,
+            right,
+            ignored,
+        }
     }
 
     #[test]
@@ -154,21 +186,41 @@ mod tests {
         let b = bbox(0.0, 0.0, 9.0, 9.0);
         let sheets = [0.5, 0.9, 0.5].map(|c| sheet(vec![there(0, b)], vec![found(0, b, c)]));
         let held = |image: &ImageBoxes<'_>| {
-            let hits = image.found.iter().map(|f| Hit { confidence: f.confidence, sheet: image.sheet, ..hit(0, 0) });
+            let hits = image.found.iter().map(|f| Hit {
+                confidence: f.confidence,
+                sheet: image.sheet,
+                ..hit(0, 0)
+            });
             (hits.collect(), image.truth.len())
         };
         let ranking = Ranking::new(&ByClass::new(&sheets).classes()[0], held);
-        assert_eq!(ranking.hits.iter().map(|h| h.sheet).collect::<Vec<_>>(), [1, 0, 2]);
-        assert_eq!((ranking.truths(&[]), ranking.truths(&[1, 0, 3])), (3.0, 4.0));
+        assert_eq!(
+            ranking.hits.iter().map(|h| h.sheet).collect::<Vec<_>>(),
+            [1, 0, 2]
+        );
+        assert_eq!(
+            (ranking.truths(&[]), ranking.truths(&[1, 0, 3])),
+            (3.0, 4.0)
+        );
     }
 
     #[test]
     fn ignored_detections_move_neither_sum() {
-        let all = ranking([(1, 0), (0, 1), (0, 0)].map(|(right, ignored)| hit(right, ignored)).to_vec());
+        let all = ranking(
+            [(1, 0), (0, 1), (0, 0)]
+                .map(|(right, ignored)| hit(right, ignored))
+                .to_vec(),
+        );
         let sums = all.running(0, &[]);
-        assert_eq!((sums.right, sums.wrong), (vec![1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0]));
+        assert_eq!(
+            (sums.right, sums.wrong),
+            (vec![1.0, 1.0, 1.0], vec![0.0, 0.0, 1.0])
+        );
         let turns = &all.turns(&[])[0];
-        assert_eq!((&turns.right[..], &turns.wrong[..]), (&[1.0, 1.0][..], &[0.0, 1.0][..]));
+        assert_eq!(
+            (&turns.right[..], &turns.wrong[..]),
+            (&[1.0, 1.0][..], &[0.0, 1.0][..])
+        );
     }
 
     proptest! {

@@ -23,21 +23,46 @@ pub fn read_tags(path: &Path) -> Result<Tags> {
 }
 
 fn parse(text: &str) -> std::result::Result<Tags, String> {
-    let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    let cells = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
-    let titles = lines.next().map(|(_, line)| cells(line)).unwrap_or_default();
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty());
+    let cells = |line: &str| {
+        line.split(',')
+            .map(|cell| cell.trim().to_owned())
+            .collect::<Vec<_>>()
+    };
+    let titles = lines
+        .next()
+        .map(|(_, line)| cells(line))
+        .unwrap_or_default();
     if titles.len() < 2 {
         return Err("no factors, expected a first line such as image,light,camera".into());
     }
-    let mut tags = Tags { factors: titles[1..].to_vec(), levels: BTreeMap::new() };
+    let mut tags = Tags {
+        factors: titles[1..].to_vec(),
+        levels: BTreeMap::new(),
+    };
     for (i, line) in lines {
         let row = cells(line);
         if row.len() != titles.len() {
-            return Err(format!("line {}: {} cells, expected {}", i + 1, row.len(), titles.len()));
+            return Err(format!(
+                "line {}: {} cells, expected {}",
+                i + 1,
+                row.len(),
+                titles.len()
+            ));
         }
-        let stem = Path::new(&row[0]).file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = Path::new(&row[0])
+            .file_stem()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         if tags.levels.insert(stem, row[1..].to_vec()).is_some() {
-            return Err(format!("line {}: image \"{}\" is told twice", i + 1, row[0]));
+            return Err(format!(
+                "line {}: image \"{}\" is told twice",
+                i + 1,
+                row[0]
+            ));
         }
     }
     Ok(tags)
@@ -51,7 +76,10 @@ impl Tags {
 
     /// Everything that a factor is for some image, in order.
     pub fn levels(&self, factor: usize) -> BTreeSet<&str> {
-        self.levels.values().filter_map(|row| row.get(factor).map(String::as_str)).collect()
+        self.levels
+            .values()
+            .filter_map(|row| row.get(factor).map(String::as_str))
+            .collect()
     }
 }
 
@@ -62,14 +90,28 @@ mod tests {
     #[test]
     fn factors_are_told_by_image() {
         let tags = parse("image,light,camera\na.png, dim, v0\nb,bright,v1\n").unwrap();
-        assert_eq!((tags.of("a", 0), tags.of("b", 1), tags.of("c", 0)), (Some("dim"), Some("v1"), None));
-        assert_eq!(tags.levels(0).into_iter().collect::<Vec<_>>(), ["bright", "dim"]);
+        assert_eq!(
+            (tags.of("a", 0), tags.of("b", 1), tags.of("c", 0)),
+            (Some("dim"), Some("v1"), None)
+        );
+        assert_eq!(
+            tags.levels(0).into_iter().collect::<Vec<_>>(),
+            ["bright", "dim"]
+        );
     }
 
     #[test]
     fn bad_tables_are_named() {
         assert!(parse("").unwrap_err().contains("no factors"));
-        assert!(parse("image,light\na,dim,v0\n").unwrap_err().contains("line 2: 3 cells, expected 2"));
-        assert!(parse("image,light\na,dim\na.png,dim\n").unwrap_err().contains("told twice"));
+        assert!(
+            parse("image,light\na,dim,v0\n")
+                .unwrap_err()
+                .contains("line 2: 3 cells, expected 2")
+        );
+        assert!(
+            parse("image,light\na,dim\na.png,dim\n")
+                .unwrap_err()
+                .contains("told twice")
+        );
     }
 }

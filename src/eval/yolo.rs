@@ -31,8 +31,14 @@ pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTrut
     let one = |(name, path): (&String, &PathBuf)| {
         let image = image_of(labels, name);
         let size = size.map_or_else(|| image_size(labels, name, image.as_deref()), Ok)?;
-        let boxes = rows(path, 0)?.into_iter().map(|row| row.truth(size)).collect();
-        let picture = image.map(|path| Picture { path, size: size.map(f64::from) });
+        let boxes = rows(path, 0)?
+            .into_iter()
+            .map(|row| row.truth(size))
+            .collect();
+        let picture = image.map(|path| Picture {
+            path,
+            size: size.map(f64::from),
+        });
         Ok((Sheet::new(name, boxes), size, picture))
     };
     let all: Vec<_> = texts(labels)?.par_iter().map(one).collect::<Result<_>>()?;
@@ -55,23 +61,53 @@ pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTrut
 /// # Errors
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
 pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
-    let known: BTreeMap<String, usize> = truth.sheets.iter().enumerate().map(|(i, s)| (s.image.clone(), i)).collect();
+    let known: BTreeMap<String, usize> = truth
+        .sheets
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (s.image.clone(), i))
+        .collect();
     let one = |(name, path): (&String, &PathBuf)| {
         let Some(&i) = known.get(name) else {
-            return Err(Error::file(path, format!("no image \"{name}\" in the truth of {} images", known.len())));
+            return Err(Error::file(
+                path,
+                format!("no image \"{name}\" in the truth of {} images", known.len()),
+            ));
         };
-        Ok((i, rows(path, 1)?.into_iter().map(|row| row.found(truth.sizes[i])).collect()))
+        Ok((
+            i,
+            rows(path, 1)?
+                .into_iter()
+                .map(|row| row.found(truth.sizes[i]))
+                .collect(),
+        ))
     };
-    let found: Vec<(usize, Vec<FoundBox>)> = texts(folder)?.par_iter().map(one).collect::<Result<_>>()?;
-    found.into_iter().for_each(|(i, found)| truth.sheets[i].found = found);
+    let found: Vec<(usize, Vec<FoundBox>)> =
+        texts(folder)?.par_iter().map(one).collect::<Result<_>>()?;
+    found
+        .into_iter()
+        .for_each(|(i, found)| truth.sheets[i].found = found);
     Ok(())
 }
 
 /// What a text of labels and one of detections give, for the fuzzers.
-pub(crate) fn sheet_of(truth: &str, found: &str, size: [u32; 2]) -> std::result::Result<Sheet, String> {
-    let truth = rows_of(truth, 0)?.into_iter().map(|row| row.truth(size)).collect();
-    let found = rows_of(found, 1)?.into_iter().map(|row| row.found(size)).collect();
-    Ok(Sheet { found, ..Sheet::new("", truth) })
+pub(crate) fn sheet_of(
+    truth: &str,
+    found: &str,
+    size: [u32; 2],
+) -> std::result::Result<Sheet, String> {
+    let truth = rows_of(truth, 0)?
+        .into_iter()
+        .map(|row| row.truth(size))
+        .collect();
+    let found = rows_of(found, 1)?
+        .into_iter()
+        .map(|row| row.found(size))
+        .collect();
+    Ok(Sheet {
+        found,
+        ..Sheet::new("", truth)
+    })
 }
 
 /// The text files of a folder by their names without extension, in order.
@@ -95,7 +131,13 @@ fn images_of(labels: &Path) -> PathBuf {
     parts
         .iter()
         .enumerate()
-        .map(|(i, part)| if Some(i) == place { "images".as_ref() } else { part.as_os_str() })
+        .map(|(i, part)| {
+            if Some(i) == place {
+                "images".as_ref()
+            } else {
+                part.as_os_str()
+            }
+        })
         .collect()
 }
 
@@ -110,7 +152,9 @@ fn image_of(labels: &Path, name: &str) -> Option<PathBuf> {
 
 fn image_size(labels: &Path, name: &str, image: Option<&Path>) -> Result<[u32; 2]> {
     let Some(image) = image else {
-        let what = format!("no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead");
+        let what = format!(
+            "no image \"{name}\" (.jpg, .png, ..) to take the size from; give the size instead"
+        );
         return Err(Error::file(images_of(labels), what));
     };
     let header = io::read_header(image)?;
@@ -133,53 +177,98 @@ fn rows(path: &Path, extra: usize) -> Result<Vec<Row>> {
 }
 
 fn rows_of(text: &str, extra: usize) -> std::result::Result<Vec<Row>, String> {
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    lines.map(|(i, line)| row(line, extra).map_err(|what| format!("line {}: {what}", i + 1))).collect()
+    let lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty());
+    lines
+        .map(|(i, line)| row(line, extra).map_err(|what| format!("line {}: {what}", i + 1)))
+        .collect()
 }
 
 fn row(line: &str, extra: usize) -> std::result::Result<Row, String> {
     let mut words = line.split_ascii_whitespace();
     let class = words.next().unwrap_or_default();
-    let class = class.parse::<u32>().map_err(|_| format!("class \"{class}\", expected 0, 1, .."))?;
+    let class = class
+        .parse::<u32>()
+        .map_err(|_| format!("class \"{class}\", expected 0, 1, .."))?;
     let number = |word: &str| match word.parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
         _ => Err(format!("\"{word}\", expected a number")),
     };
     let numbers: Vec<f64> = words.map(number).collect::<std::result::Result<_, _>>()?;
-    let Some(count) = numbers.len().checked_sub(extra) else { return Err(too_few(&numbers, extra)) };
+    let Some(count) = numbers.len().checked_sub(extra) else {
+        return Err(too_few(&numbers, extra));
+    };
     let (place, behind) = numbers.split_at(count);
     if let Some(far) = place.iter().find(|share| share.abs() > FARTHEST) {
-        return Err(format!("{far}, expected a share of the image, 0 to 1; is it in pixels?"));
+        return Err(format!(
+            "{far}, expected a share of the image, 0 to 1; is it in pixels?"
+        ));
     }
     let shares = match place {
-        &[_, _, w, h] if w < 0.0 || h < 0.0 => return Err(format!("a box of {w} x {h}, expected sides of at least 0")),
-        &[cx, cy, w, h] => BBox { x0: cx - w / 2.0, y0: cy - h / 2.0, x1: cx + w / 2.0, y1: cy + h / 2.0 },
-        outline if outline.len() >= 6 && outline.len().is_multiple_of(2) => {
-            BBox::around(outline.chunks_exact(2).map(|p| crate::geom::Point2::new(p[0], p[1])))
+        &[_, _, w, h] if w < 0.0 || h < 0.0 => {
+            return Err(format!("a box of {w} x {h}, expected sides of at least 0"));
         }
+        &[cx, cy, w, h] => BBox {
+            x0: cx - w / 2.0,
+            y0: cy - h / 2.0,
+            x1: cx + w / 2.0,
+            y1: cy + h / 2.0,
+        },
+        outline if outline.len() >= 6 && outline.len().is_multiple_of(2) => BBox::around(
+            outline
+                .chunks_exact(2)
+                .map(|p| crate::geom::Point2::new(p[0], p[1])),
+        ),
         _ => return Err(too_few(&numbers, extra)),
     };
-    Ok(Row { class, shares, confidence: behind.first().copied().unwrap_or(1.0) })
+    Ok(Row {
+        class,
+        shares,
+        confidence: behind.first().copied().unwrap_or(1.0),
+    })
 }
 
 fn too_few(numbers: &[f64], extra: usize) -> String {
-    let expected = if extra == 0 { "cx cy w h, or an outline" } else { "cx cy w h confidence" };
-    format!("{} numbers behind the class, expected {expected}", numbers.len())
+    let expected = if extra == 0 {
+        "cx cy w h, or an outline"
+    } else {
+        "cx cy w h confidence"
+    };
+    format!(
+        "{} numbers behind the class, expected {expected}",
+        numbers.len()
+    )
 }
 
 impl Row {
     fn bbox(&self, [w, h]: [u32; 2]) -> BBox {
         let (w, h, s) = (f64::from(w), f64::from(h), self.shares);
-        BBox { x0: s.x0 * w, y0: s.y0 * h, x1: s.x1 * w, y1: s.y1 * h }
+        BBox {
+            x0: s.x0 * w,
+            y0: s.y0 * h,
+            x1: s.x1 * w,
+            y1: s.y1 * h,
+        }
     }
 
     fn truth(&self, size: [u32; 2]) -> TrueBox {
         let bbox = self.bbox(size);
-        TrueBox { class: self.class, bbox, area: bbox.width() * bbox.height(), crowd: false }
+        TrueBox {
+            class: self.class,
+            bbox,
+            area: bbox.width() * bbox.height(),
+            crowd: false,
+        }
     }
 
     fn found(&self, size: [u32; 2]) -> FoundBox {
-        FoundBox { class: self.class, bbox: self.bbox(size), confidence: self.confidence }
+        FoundBox {
+            class: self.class,
+            bbox: self.bbox(size),
+            confidence: self.confidence,
+        }
     }
 }
 
@@ -197,42 +286,85 @@ mod tests {
 
     #[test]
     fn boxes_and_outlines_become_pixels() {
-        let labels = folder(&[("a.txt", "1 0.5 0.5 0.2 0.4\n\n2 0 0 0.5 0 0.5 0.25\n"), ("b.txt", "")]);
+        let labels = folder(&[
+            ("a.txt", "1 0.5 0.5 0.2 0.4\n\n2 0 0 0.5 0 0.5 0.25\n"),
+            ("b.txt", ""),
+        ]);
         let truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
-        assert_eq!(truth.sheets[0].truth[0].bbox, BBox { x0: 40.0, y0: 60.0, x1: 60.0, y1: 140.0 });
-        assert_eq!(truth.sheets[0].truth[1].bbox, BBox { x0: 0.0, y0: 0.0, x1: 50.0, y1: 50.0 });
-        assert_eq!((truth.sheets[1].image.as_str(), truth.sheets[1].truth.len()), ("b", 0));
+        assert_eq!(
+            truth.sheets[0].truth[0].bbox,
+            BBox {
+                x0: 40.0,
+                y0: 60.0,
+                x1: 60.0,
+                y1: 140.0
+            }
+        );
+        assert_eq!(
+            truth.sheets[0].truth[1].bbox,
+            BBox {
+                x0: 0.0,
+                y0: 0.0,
+                x1: 50.0,
+                y1: 50.0
+            }
+        );
+        assert_eq!(
+            (truth.sheets[1].image.as_str(), truth.sheets[1].truth.len()),
+            ("b", 0)
+        );
     }
 
     #[test]
     fn detections_come_with_confidence_and_may_be_missing() {
-        let labels = folder(&[("a.txt", "1 0.5 0.5 0.2 0.4\n"), ("b.txt", "0 0.5 0.5 1 1\n")]);
+        let labels = folder(&[
+            ("a.txt", "1 0.5 0.5 0.2 0.4\n"),
+            ("b.txt", "0 0.5 0.5 1 1\n"),
+        ]);
         let mut truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
         let found = folder(&[("b.txt", "0 0.5 0.5 1 1 0.25\n")]);
         read_yolo_found(found.path(), &mut truth).unwrap();
-        assert_eq!((truth.sheets[0].found.len(), truth.sheets[1].found[0].confidence), (0, 0.25));
+        assert_eq!(
+            (
+                truth.sheets[0].found.len(),
+                truth.sheets[1].found[0].confidence
+            ),
+            (0, 0.25)
+        );
     }
 
     #[test]
     fn bad_lines_are_named() {
         let said = |line: &str| {
             let labels = folder(&[("a.txt", line)]);
-            read_yolo_truth(labels.path(), Some([9, 9])).unwrap_err().to_string()
+            read_yolo_truth(labels.path(), Some([9, 9]))
+                .unwrap_err()
+                .to_string()
         };
         assert!(said("0 0.5 0.5 0.1\n").contains("a.txt: line 1: 3 numbers behind the class"));
         assert!(said("0 0.5 0.5 0.1 0.1\ncap 0 0 0 0\n").contains("line 2: class \"cap\""));
         assert!(said("0 0.5 NaN 0.1 0.1").contains("\"NaN\", expected a number"));
         assert!(said("0 0.5 1e999 0.1 0.1").contains("\"1e999\", expected a number"));
-        assert!(said("0 320 240 100 80").contains("320, expected a share of the image, 0 to 1; is it in pixels?"));
-        assert!(said("0 0.5 0.5 -0.1 0.1").contains("a box of -0.1 x 0.1, expected sides of at least 0"));
-        assert!(said("4294967296 0.5 0.5 0.1 0.1").contains("class \"4294967296\", expected 0, 1, .."));
+        assert!(
+            said("0 320 240 100 80")
+                .contains("320, expected a share of the image, 0 to 1; is it in pixels?")
+        );
+        assert!(
+            said("0 0.5 0.5 -0.1 0.1")
+                .contains("a box of -0.1 x 0.1, expected sides of at least 0")
+        );
+        assert!(
+            said("4294967296 0.5 0.5 0.1 0.1").contains("class \"4294967296\", expected 0, 1, ..")
+        );
     }
 
     #[test]
     fn a_detection_for_an_unknown_image_is_refused() {
         let labels = folder(&[("a.txt", "")]);
         let mut truth = read_yolo_truth(labels.path(), Some([9, 9])).unwrap();
-        let said = read_yolo_found(folder(&[("c.txt", "")]).path(), &mut truth).unwrap_err().to_string();
+        let said = read_yolo_found(folder(&[("c.txt", "")]).path(), &mut truth)
+            .unwrap_err()
+            .to_string();
         assert!(said.contains("no image \"c\""), "{said}");
     }
 
@@ -244,7 +376,12 @@ mod tests {
         }
         std::fs::write(root.path().join("labels/val/a.txt"), "0 0.5 0.5 1 1\n").unwrap();
         let labels = root.path().join("labels/val");
-        assert!(read_yolo_truth(&labels, None).unwrap_err().to_string().contains("to take the size from"));
+        assert!(
+            read_yolo_truth(&labels, None)
+                .unwrap_err()
+                .to_string()
+                .contains("to take the size from")
+        );
         let image = crate::Image::filled(8, 6, crate::LinearRgb::WHITE);
         io::write(root.path().join("images/val/a.png"), &image).unwrap();
         assert_eq!(read_yolo_truth(&labels, None).unwrap().sizes, [[8, 6]]);

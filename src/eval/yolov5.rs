@@ -30,20 +30,33 @@ const SMOOTHING: usize = 50;
 /// # Panics
 /// When there are weights and not one per sheet.
 pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
-    assert!(weights.is_empty() || weights.len() == sheets.len(), "one weight per sheet");
+    assert!(
+        weights.is_empty() || weights.len() == sheets.len(),
+        "one weight per sheet"
+    );
     scores(&rankings(sheets), weights)
 }
 
 /// The detections of every class with something to find.
 pub(super) fn rankings(sheets: &[Sheet]) -> Vec<Ranking> {
-    ByClass::new(sheets).classes().par_iter().map(|boxes| Ranking::new(boxes, held_against)).collect()
+    ByClass::new(sheets)
+        .classes()
+        .par_iter()
+        .map(|boxes| Ranking::new(boxes, held_against))
+        .collect()
 }
 
 pub(super) fn scores(rankings: &[Ranking], weights: &[u32]) -> Scores {
     let classes = ranked(rankings, weights);
     let best = best_confidence(&classes);
-    let scores = classes.par_iter().map(|class| class.scores(best, weights)).collect();
-    Scores { definition: Definition::Yolov5, classes: scores }
+    let scores = classes
+        .par_iter()
+        .map(|class| class.scores(best, weights))
+        .collect();
+    Scores {
+        definition: Definition::Yolov5,
+        classes: scores,
+    }
 }
 
 /// Average precision of a class at every threshold; none where there is nothing to find.
@@ -51,14 +64,21 @@ pub(super) fn average_precision(ranking: &Ranking, weights: &[u32]) -> Option<[f
     let truths = Some(ranking.truths(weights)).filter(|&truths| truths > 0.0)?;
     let area = |sums: &Running| {
         let (recall, precision) = curve(sums, truths);
-        if recall.is_empty() { 0.0 } else { trapezoid(&recall, &precision) }
+        if recall.is_empty() {
+            0.0
+        } else {
+            trapezoid(&recall, &precision)
+        }
     };
     Some(ranking.turns(weights).each_ref().map(area))
 }
 
 /// The classes with something to find, to be read at a confidence.
 pub(super) fn ranked<'a>(rankings: &'a [Ranking], weights: &[u32]) -> Vec<Ranked<'a>> {
-    rankings.par_iter().filter_map(|ranking| Ranked::new(ranking, weights)).collect()
+    rankings
+        .par_iter()
+        .filter_map(|ranking| Ranked::new(ranking, weights))
+        .collect()
 }
 
 /// The precision and recall of a class over confidence, at threshold 0.5.
@@ -74,8 +94,16 @@ impl<'a> Ranked<'a> {
     fn new(ranking: &'a Ranking, weights: &[u32]) -> Option<Self> {
         let truths = ranking.truths(weights);
         let (recall, precision) = curve(&ranking.running(0, weights), truths);
-        let confidences = ranking.counting(weights).map(|(hit, _)| -hit.confidence).collect();
-        (truths > 0.0).then_some(Self { ranking, recall, precision, confidences })
+        let confidences = ranking
+            .counting(weights)
+            .map(|(hit, _)| -hit.confidence)
+            .collect();
+        (truths > 0.0).then_some(Self {
+            ranking,
+            recall,
+            precision,
+            confidences,
+        })
     }
 
     fn scores(&self, best: usize, weights: &[u32]) -> ClassScores {
@@ -122,7 +150,12 @@ pub(super) fn confidence(i: usize) -> f64 {
 
 /// Where the smoothed mean F1 of the classes is greatest.
 pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
-    let f1 = |i| classes.iter().map(|class| class.f1_at(confidence(i))).sum::<f64>();
+    let f1 = |i| {
+        classes
+            .iter()
+            .map(|class| class.f1_at(confidence(i)))
+            .sum::<f64>()
+    };
     let f1: Vec<f64> = (0..CONFIDENCES).into_par_iter().map(f1).collect();
     let at = |i: isize| f1[i.clamp(0, CONFIDENCES as isize - 1) as usize];
     let window = |i: usize| -> f64 {
@@ -143,7 +176,10 @@ fn held_against(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
     let mut taken: Vec<Marks> = vec![0; image.truth.len()];
     let hit = |(place, f): (usize, &&FoundBox)| {
-        let overlaps = index.near(&f.bbox).into_iter().map(|t| (t, overlap(&image.truth[t].bbox, &f.bbox)));
+        let overlaps = index
+            .near(&f.bbox)
+            .into_iter()
+            .map(|t| (t, overlap(&image.truth[t].bbox, &f.bbox)));
         // Of equal overlaps the last: that is how the original's descending sort leaves them.
         let nearest = overlaps.max_by(|a, b| a.1.total_cmp(&b.1));
         let right = nearest.map_or(0, |(nearest, most)| {
@@ -152,25 +188,42 @@ fn held_against(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
             taken[nearest] |= reached;
             right
         });
-        Hit { confidence: f.confidence, sheet: image.sheet, place: place as u32, right, ignored: 0 }
+        Hit {
+            confidence: f.confidence,
+            sheet: image.sheet,
+            place: place as u32,
+            right,
+            ignored: 0,
+        }
     };
-    (image.found.iter().enumerate().map(hit).collect(), image.truth.len())
+    (
+        image.found.iter().enumerate().map(hit).collect(),
+        image.truth.len(),
+    )
 }
 
 /// Intersection over union in single precision.
 fn overlap(a: &BBox, b: &BBox) -> f32 {
     let [a, b] = [a, b].map(|b| [b.x0, b.y0, b.x1, b.y1].map(|v| v as f32));
     let area = |b: [f32; 4]| (b[2] - b[0]) * (b[3] - b[1]);
-    let shared = (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
+    let shared =
+        (a[2].min(b[2]) - a[0].max(b[0])).max(0.0) * (a[3].min(b[3]) - a[1].max(b[1])).max(0.0);
     shared / (area(a) + area(b) - shared + AREA_EPSILON)
 }
 
 fn reached(overlap: f32) -> Marks {
     let step = (0.95_f32 - 0.5) / (THRESHOLDS - 1) as f32;
     // From both ends, as PyTorch's `linspace` rounds.
-    let threshold =
-        |i: usize| if i < THRESHOLDS / 2 { 0.5 + step * i as f32 } else { 0.95 - step * (THRESHOLDS - 1 - i) as f32 };
-    (0..THRESHOLDS).filter(|&i| overlap >= threshold(i)).fold(0, |marks, i| marks | 1 << i)
+    let threshold = |i: usize| {
+        if i < THRESHOLDS / 2 {
+            0.5 + step * i as f32
+        } else {
+            0.95 - step * (THRESHOLDS - 1 - i) as f32
+        }
+    };
+    (0..THRESHOLDS)
+        .filter(|&i| overlap >= threshold(i))
+        .fold(0, |marks, i| marks | 1 << i)
 }
 
 #[cfg(test)]
@@ -182,7 +235,10 @@ mod tests {
     fn the_surer_of_two_that_name_a_box_counts() {
         let b = bbox(0.0, 0.0, 100.0, 100.0);
         let near = bbox(0.0, 0.0, 100.0, 90.0);
-        let sheets = [sheet(vec![there(0, b)], vec![found(0, b, 0.5), found(0, near, 0.9)])];
+        let sheets = [sheet(
+            vec![there(0, b)],
+            vec![found(0, b, 0.5), found(0, near, 0.9)],
+        )];
         let hits = rankings(&sheets).remove(0).hits;
         assert_eq!(hits[0].confidence, 0.9);
         // The surer one overlaps by 0.9 (just below, with the original's epsilon); the exact one has only the rest.
@@ -194,7 +250,13 @@ mod tests {
     #[test]
     fn a_class_that_was_never_found_scores_zero_and_counts() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
-        let scores = yolov5(&[sheet(vec![there(0, b), there(1, b)], vec![found(0, b, 0.5)])], &[]);
+        let scores = yolov5(
+            &[sheet(
+                vec![there(0, b), there(1, b)],
+                vec![found(0, b, 0.5)],
+            )],
+            &[],
+        );
         assert_eq!(scores.classes[1].ap, [0.0; 10]);
         assert!((scores.map() - 0.995 / 2.0).abs() < 1e-12);
     }
@@ -202,7 +264,13 @@ mod tests {
     #[test]
     fn other_classes_do_not_take_a_box() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
-        let scores = yolov5(&[sheet(vec![there(0, b)], vec![found(1, b, 0.9), found(0, b, 0.5)])], &[]);
+        let scores = yolov5(
+            &[sheet(
+                vec![there(0, b)],
+                vec![found(1, b, 0.9), found(0, b, 0.5)],
+            )],
+            &[],
+        );
         assert!((scores.map_at(0) - 0.995).abs() < 1e-12);
     }
 }

@@ -34,13 +34,17 @@ pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
 
 /// A Gaussian around every sample of a line.
 fn gaussian(len: usize, sigma: f64) -> Vec<Taps> {
-    windows(len, (GAUSSIAN_REACH * sigma).ceil() as usize, |d| libm::exp(-0.5 * (d as f64 / sigma).powi(2)))
+    windows(len, (GAUSSIAN_REACH * sigma).ceil() as usize, |d| {
+        libm::exp(-0.5 * (d as f64 / sigma).powi(2))
+    })
 }
 
 /// Around every sample of a line, weights by a function of the distance, out to `reach`.
 fn windows(len: usize, reach: usize, weight: impl Fn(isize) -> f64) -> Vec<Taps> {
     let reach = reach.min(len) as isize;
-    (0..len as isize).map(|i| Taps::new(i - reach..i + reach + 1, len, |j| weight(j - i))).collect()
+    (0..len as isize)
+        .map(|i| Taps::new(i - reach..i + reach + 1, len, |j| weight(j - i)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -49,7 +53,13 @@ mod tests {
     use crate::pixel::{Coverage, LinearRgb};
 
     fn dot(size: usize) -> Image<Coverage> {
-        Image::from_fn(size, size, |x, y| Coverage(if (x, y) == (size / 2, size / 2) { 1.0 } else { 0.0 }))
+        Image::from_fn(size, size, |x, y| {
+            Coverage(if (x, y) == (size / 2, size / 2) {
+                1.0
+            } else {
+                0.0
+            })
+        })
     }
 
     #[test]
@@ -58,35 +68,54 @@ mod tests {
             // So large that no window with the dot in it is cut off.
             let out = gaussian_blur(&dot(81), sigma);
             let mass: f64 = out.pixels().iter().map(|c| f64::from(c.0)).sum();
-            let variance: f64 = (0..81).map(|x| (x as f64 - 40.0).powi(2) * column(&out, x)).sum();
+            let variance: f64 = (0..81)
+                .map(|x| (x as f64 - 40.0).powi(2) * column(&out, x))
+                .sum();
             assert!((mass - 1.0).abs() < 1e-5);
-            assert!((variance / f64::from(sigma * sigma) - 1.0).abs() < 2e-3, "{sigma}: {variance}");
+            assert!(
+                (variance / f64::from(sigma * sigma) - 1.0).abs() < 2e-3,
+                "{sigma}: {variance}"
+            );
         }
     }
 
     fn column(image: &Image<Coverage>, x: usize) -> f64 {
-        (0..image.height()).map(|y| f64::from(image[(x, y)].0)).sum()
+        (0..image.height())
+            .map(|y| f64::from(image[(x, y)].0))
+            .sum()
     }
 
     #[test]
     fn a_box_is_flat() {
         let out = box_blur(&dot(9), 2);
         assert_eq!(out.pixels().iter().filter(|c| c.0 > 0.0).count(), 25);
-        assert!(out.pixels().iter().all(|c| c.0 == 0.0 || (c.0 - 0.04).abs() < 1e-7));
+        assert!(
+            out.pixels()
+                .iter()
+                .all(|c| c.0 == 0.0 || (c.0 - 0.04).abs() < 1e-7)
+        );
     }
 
     #[test]
     fn blurs_keep_a_constant_up_to_the_border() {
         let img = Image::filled(5, 3, LinearRgb::new(0.5, 1.0, 2.0));
         for out in [gaussian_blur(&img, 3.0), box_blur(&img, 4)] {
-            assert!(out.pixels().iter().all(|c| (c.g - 1.0).abs() < 1e-6 && (c.b - 2.0).abs() < 1e-6));
+            assert!(
+                out.pixels()
+                    .iter()
+                    .all(|c| (c.g - 1.0).abs() < 1e-6 && (c.b - 2.0).abs() < 1e-6)
+            );
         }
     }
 
     #[test]
     fn no_blur_is_no_change() {
         let img = dot(5);
-        assert!([0.0, -1.0, f32::NAN].iter().all(|&s| gaussian_blur(&img, s) == img));
+        assert!(
+            [0.0, -1.0, f32::NAN]
+                .iter()
+                .all(|&s| gaussian_blur(&img, s) == img)
+        );
         assert_eq!(box_blur(&img, 0), img);
     }
 
@@ -94,7 +123,10 @@ mod tests {
     fn a_window_larger_than_the_picture_is_its_mean() {
         let img = Image::from_vec(2, 1, [0.0, 1.0].map(Coverage).to_vec());
         assert_eq!(box_blur(&img, usize::MAX / 4).pixels(), [Coverage(0.5); 2]);
-        assert_eq!(gaussian_blur(&img, f32::INFINITY).pixels(), [Coverage(0.5); 2]);
+        assert_eq!(
+            gaussian_blur(&img, f32::INFINITY).pixels(),
+            [Coverage(0.5); 2]
+        );
         assert!(box_blur(&Image::<Coverage>::new(0, 0), 3).is_empty());
     }
 }

@@ -17,9 +17,11 @@ pub fn depth(mask: &Image<bool>) -> Image<f32> {
     let (width, height) = mask.size();
     let columns = vertical_distances(&mask.map(|set| !set));
     let mut out = Image::new(width, height);
-    out.par_rows_mut().zip(columns.par_chunks_exact(width.max(1))).for_each(|(row, columns)| {
-        nearest(row, columns);
-    });
+    out.par_rows_mut()
+        .zip(columns.par_chunks_exact(width.max(1)))
+        .for_each(|(row, columns)| {
+            nearest(row, columns);
+        });
     out
 }
 
@@ -33,9 +35,15 @@ struct Parabola {
 /// The distances along one row whose columns are so far from their nearest unset pixel.
 fn nearest(row: &mut [f32], columns: &[u32]) {
     let mut envelope: Vec<Parabola> = Vec::new();
-    for (x, &column) in columns.iter().enumerate().filter(|(_, column)| **column < u32::MAX) {
+    for (x, &column) in columns
+        .iter()
+        .enumerate()
+        .filter(|(_, column)| **column < u32::MAX)
+    {
         let (foot, floor) = (x as f64, f64::from(column) * f64::from(column));
-        let meets = |p: &Parabola| 0.5 * ((floor + foot * foot) - (p.floor + p.foot * p.foot)) / (foot - p.foot);
+        let meets = |p: &Parabola| {
+            0.5 * ((floor + foot * foot) - (p.floor + p.foot * p.foot)) / (foot - p.foot)
+        };
         while envelope.last().is_some_and(|last| meets(last) <= last.from) {
             envelope.pop();
         }
@@ -44,10 +52,15 @@ fn nearest(row: &mut [f32], columns: &[u32]) {
     }
     let mut lowest = 0;
     for (x, pixel) in row.iter_mut().enumerate() {
-        while envelope.get(lowest + 1).is_some_and(|next| next.from <= x as f64) {
+        while envelope
+            .get(lowest + 1)
+            .is_some_and(|next| next.from <= x as f64)
+        {
             lowest += 1;
         }
-        let square = envelope.get(lowest).map_or(f64::INFINITY, |p| p.floor + (x as f64 - p.foot).powi(2));
+        let square = envelope
+            .get(lowest)
+            .map_or(f64::INFINITY, |p| p.floor + (x as f64 - p.foot).powi(2));
         *pixel = square.sqrt() as f32;
     }
 }
@@ -62,18 +75,35 @@ mod tests {
         let found = depth(&mask);
         for y in 0..17 {
             for x in 0..23 {
-                let outside = (0..17 * 23).map(|i| (i % 23, i / 23)).filter(|&at| !mask[at]);
-                let far = outside.map(|(ox, oy)| libm::hypot(ox as f64 - x as f64, oy as f64 - y as f64));
+                let outside = (0..17 * 23)
+                    .map(|i| (i % 23, i / 23))
+                    .filter(|&at| !mask[at]);
+                let far =
+                    outside.map(|(ox, oy)| libm::hypot(ox as f64 - x as f64, oy as f64 - y as f64));
                 let expected = far.fold(f64::INFINITY, f64::min);
-                assert!((f64::from(found[(x, y)]) - expected).abs() < 1e-5, "({x}, {y}): {} {expected}", found[(x, y)]);
+                assert!(
+                    (f64::from(found[(x, y)]) - expected).abs() < 1e-5,
+                    "({x}, {y}): {} {expected}",
+                    found[(x, y)]
+                );
             }
         }
     }
 
     #[test]
     fn without_an_outside_it_is_infinite_and_without_pixels_nothing() {
-        assert!(depth(&Image::filled(4, 3, true)).pixels().iter().all(|d| *d == f32::INFINITY));
-        assert!(depth(&Image::filled(4, 3, false)).pixels().iter().all(|d| *d == 0.0));
+        assert!(
+            depth(&Image::filled(4, 3, true))
+                .pixels()
+                .iter()
+                .all(|d| *d == f32::INFINITY)
+        );
+        assert!(
+            depth(&Image::filled(4, 3, false))
+                .pixels()
+                .iter()
+                .all(|d| *d == 0.0)
+        );
         assert_eq!(depth(&Image::new(0, 0)).size(), (0, 0));
     }
 }

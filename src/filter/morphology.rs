@@ -22,9 +22,11 @@ pub fn dilate(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
     let reach = reach_by_distance(mask, radius_px);
     let distances = vertical_distances(mask);
     let mut out = Image::new(mask.width(), mask.height());
-    out.par_rows_mut().zip(distances.par_chunks_exact(mask.width().max(1))).for_each(|(row, distances)| {
-        mark(row, distances, &reach);
-    });
+    out.par_rows_mut()
+        .zip(distances.par_chunks_exact(mask.width().max(1)))
+        .for_each(|(row, distances)| {
+            mark(row, distances, &reach);
+        });
     out
 }
 
@@ -39,7 +41,9 @@ pub fn erode(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
 fn reach_by_distance(mask: &Image<bool>, radius: f64) -> Vec<usize> {
     let last = radius.min(mask.height() as f64) as usize;
     let sideways = |d: usize| ((radius - d as f64) * (radius + d as f64)).sqrt();
-    (0..=last).map(|d| sideways(d).min(mask.width() as f64) as usize).collect()
+    (0..=last)
+        .map(|d| sideways(d).min(mask.width() as f64) as usize)
+        .collect()
 }
 
 /// For every pixel the distance to the nearest set pixel of its column; very large where there is none.
@@ -97,7 +101,10 @@ mod tests {
             let (dx, dy) = (x.abs_diff(i) as f64, y.abs_diff(j) as f64);
             dx * dx + dy * dy <= radius * radius
         };
-        let set: Vec<_> = (0..w * h).map(|k| (k % w, k / w)).filter(|&at| mask[at]).collect();
+        let set: Vec<_> = (0..w * h)
+            .map(|k| (k % w, k / w))
+            .filter(|&at| mask[at])
+            .collect();
         Image::from_fn(w, h, |x, y| set.iter().any(|&at| near((x, y), at)))
     }
 
@@ -106,7 +113,11 @@ mod tests {
         for (w, h) in [(31, 17), (1, 40), (40, 1), (3, 3)] {
             let mask = speckles(w, h);
             for radius in [1.0, 1.5, 2.0, 2.9, 5.0, 13.0, 100.0] {
-                assert_eq!(dilate(&mask, radius), dilated_slowly(&mask, radius), "{w} x {h}, radius {radius}");
+                assert_eq!(
+                    dilate(&mask, radius),
+                    dilated_slowly(&mask, radius),
+                    "{w} x {h}, radius {radius}"
+                );
             }
         }
     }
@@ -114,7 +125,10 @@ mod tests {
     #[test]
     fn erosion_is_dilation_of_the_rest() {
         let mask = speckles(31, 17).map(|set| !set);
-        assert_eq!(erode(&mask, 2.0), dilated_slowly(&mask.map(|set| !set), 2.0).map(|set| !set));
+        assert_eq!(
+            erode(&mask, 2.0),
+            dilated_slowly(&mask.map(|set| !set), 2.0).map(|set| !set)
+        );
     }
 
     #[test]
@@ -130,21 +144,35 @@ mod tests {
     fn an_endless_radius_fills_and_a_small_or_strange_one_changes_nothing() {
         let mask = speckles(20, 9);
         assert_eq!(dilate(&mask, f64::INFINITY), Image::filled(20, 9, true));
-        assert!([0.0, 0.9, -3.0, f64::NAN].iter().all(|&radius| dilate(&mask, radius) == mask));
+        assert!(
+            [0.0, 0.9, -3.0, f64::NAN]
+                .iter()
+                .all(|&radius| dilate(&mask, radius) == mask)
+        );
     }
 
     #[test]
     fn closing_a_small_hole_leaves_the_outline() {
-        let disc = Image::from_fn(41, 41, |x, y| (x as i32 - 20).pow(2) + (y as i32 - 20).pow(2) <= 150);
+        let disc = Image::from_fn(41, 41, |x, y| {
+            (x as i32 - 20).pow(2) + (y as i32 - 20).pow(2) <= 150
+        });
         let mut holed = disc.clone();
         holed[(20, 20)] = false;
         let closed = erode(&dilate(&holed, 2.0), 2.0);
         assert!(closed[(20, 20)]);
-        assert!(closed.pixels().iter().zip(disc.pixels()).all(|(&c, &d)| c >= d));
+        assert!(
+            closed
+                .pixels()
+                .iter()
+                .zip(disc.pixels())
+                .all(|(&c, &d)| c >= d)
+        );
     }
 
     #[test]
     fn empty_masks_survive() {
-        assert!(dilate(&Image::new(0, 4), 2.0).is_empty() && erode(&Image::new(4, 0), 2.0).is_empty());
+        assert!(
+            dilate(&Image::new(0, 4), 2.0).is_empty() && erode(&Image::new(4, 0), 2.0).is_empty()
+        );
     }
 }

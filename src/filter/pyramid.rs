@@ -20,7 +20,10 @@ impl<P: Mix> Pyramid<P> {
     pub fn new(base: Image<P>) -> Self {
         let longest = base.width().max(base.height()).max(1);
         let count = longest.next_power_of_two().trailing_zeros() as usize;
-        Self { base, halves: (0..count).map(|_| OnceLock::new()).collect() }
+        Self {
+            base,
+            halves: (0..count).map(|_| OnceLock::new()).collect(),
+        }
     }
 
     /// The full picture.
@@ -35,7 +38,9 @@ impl<P: Mix> Pyramid<P> {
 
     /// The picture halved `level` times; the smallest there is for a larger `level`.
     pub fn level(&self, level: usize) -> &Image<P> {
-        let Some(n) = level.min(self.halves.len()).checked_sub(1) else { return &self.base };
+        let Some(n) = level.min(self.halves.len()).checked_sub(1) else {
+            return &self.base;
+        };
         if let Some(half) = self.halves[n].get() {
             return half;
         }
@@ -56,7 +61,11 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 }
 
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
-    let taps = |len: usize| lines(len.div_ceil(2), |i| Taps::new(2 * i..2 * i + 2, len, |_| 1.0));
+    let taps = |len: usize| {
+        lines(len.div_ceil(2), |i| {
+            Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
+        })
+    };
     filter(image, &taps(image.width()), &taps(image.height()))
 }
 
@@ -71,7 +80,11 @@ fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
     work::add(Kind::Filters, 1);
-    let taps = |len: usize| lines(len.div_ceil(2), |i| Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i)));
+    let taps = |len: usize| {
+        lines(len.div_ceil(2), |i| {
+            Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i))
+        })
+    };
     filter(image, &taps(image.width()), &taps(image.height()))
 }
 
@@ -90,7 +103,11 @@ pub fn expand<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P>
     let half = (width.div_ceil(2), height.div_ceil(2));
     assert_eq!(image.size(), half, "not half of {width} x {height}");
     work::add(Kind::Filters, 1);
-    let taps = |from, to| lines(to, |i| Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i)));
+    let taps = |from, to| {
+        lines(to, |i| {
+            Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i))
+        })
+    };
     filter(image, &taps(half.0, width), &taps(half.1, height))
 }
 
@@ -115,7 +132,9 @@ mod tests {
     use crate::pixel::Coverage;
 
     fn noise(width: usize, height: usize) -> Image<Coverage> {
-        Image::from_fn(width, height, |x, y| Coverage(((x * 7919 + y * 104_729) % 101) as f32 / 100.0))
+        Image::from_fn(width, height, |x, y| {
+            Coverage(((x * 7919 + y * 104_729) % 101) as f32 / 100.0)
+        })
     }
 
     #[test]
@@ -156,7 +175,10 @@ mod tests {
         for (w, h) in [(1, 1), (2, 3), (9, 6), (16, 16)] {
             let img = Image::filled(w, h, Coverage(0.7));
             let back = expand(&reduce(&img), w, h);
-            assert!(back.pixels().iter().all(|c| (c.0 - 0.7).abs() < 1e-6), "{w} x {h}");
+            assert!(
+                back.pixels().iter().all(|c| (c.0 - 0.7).abs() < 1e-6),
+                "{w} x {h}"
+            );
         }
     }
 
@@ -173,16 +195,28 @@ mod tests {
             let smooth = expand(&reduce(img), img.width(), img.height());
             img.zip_map(&smooth, |a, b| a.0 - b.0)
         };
-        let mean = |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>() / values.len() as f32;
-        let wave = Image::from_fn(64, 48, |x, y| Coverage(libm::sinf(0.05 * x as f32) * libm::cosf(0.07 * y as f32)));
-        assert!(mean(detail(&wave).pixels()) < 0.01, "a smooth picture has hardly any");
-        assert!(mean(detail(&noise(64, 48)).pixels()) > 0.1, "noise is little else");
+        let mean =
+            |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>() / values.len() as f32;
+        let wave = Image::from_fn(64, 48, |x, y| {
+            Coverage(libm::sinf(0.05 * x as f32) * libm::cosf(0.07 * y as f32))
+        });
+        assert!(
+            mean(detail(&wave).pixels()) < 0.01,
+            "a smooth picture has hardly any"
+        );
+        assert!(
+            mean(detail(&noise(64, 48)).pixels()) > 0.1,
+            "noise is little else"
+        );
     }
 
     #[test]
     fn empty_pictures_survive() {
         let empty = Image::<Coverage>::new(0, 5);
-        assert_eq!((halve(&empty).size(), reduce(&empty).size()), ((0, 3), (0, 3)));
+        assert_eq!(
+            (halve(&empty).size(), reduce(&empty).size()),
+            ((0, 3), (0, 3))
+        );
         assert!(expand(&reduce(&empty), 0, 5).is_empty());
     }
 }

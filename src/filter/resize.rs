@@ -15,7 +15,11 @@ pub fn resize<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P>
         return image.clone();
     }
     work::add(Kind::Filters, 1);
-    filter(image, &taps(image.width(), width), &taps(image.height(), height))
+    filter(
+        image,
+        &taps(image.width(), width),
+        &taps(image.height(), height),
+    )
 }
 
 fn taps(from: usize, to: usize) -> Vec<Taps> {
@@ -24,7 +28,9 @@ fn taps(from: usize, to: usize) -> Vec<Taps> {
     let tap = |i: usize| {
         let center = (i as f64 + 0.5) * scale;
         let window = (center - half_width).floor() as isize..(center + half_width).ceil() as isize;
-        Taps::new(window, from, |j| 1.0 - ((j as f64 + 0.5 - center) / half_width).abs())
+        Taps::new(window, from, |j| {
+            1.0 - ((j as f64 + 0.5 - center) / half_width).abs()
+        })
     };
     (0..to).map(tap).collect()
 }
@@ -46,7 +52,11 @@ mod tests {
         for (w, h) in [(1, 1), (3, 50), (7, 5), (64, 2)] {
             let out = resize(&Image::filled(7, 5, color), w, h);
             assert_eq!(out.size(), (w, h));
-            assert!(out.pixels().iter().all(|p| (p.r - 0.1).abs() < 1e-6 && (p.b - 3.0).abs() < 1e-6));
+            assert!(
+                out.pixels()
+                    .iter()
+                    .all(|p| (p.r - 0.1).abs() < 1e-6 && (p.b - 3.0).abs() < 1e-6)
+            );
         }
     }
 
@@ -57,7 +67,11 @@ mod tests {
             let out = resize(&ramp, width, 1);
             for x in width / 4..3 * width / 4 {
                 let expected = (x as f32 + 0.5) * 40.0 / width as f32;
-                assert!((out[(x, 0)].0 - expected).abs() < 0.6, "{width}: {} at {x}", out[(x, 0)].0);
+                assert!(
+                    (out[(x, 0)].0 - expected).abs() < 0.6,
+                    "{width}: {} at {x}",
+                    out[(x, 0)].0
+                );
             }
         }
     }
@@ -66,9 +80,15 @@ mod tests {
     fn empty_pictures_and_single_pixels_survive() {
         let empty: Image<Coverage> = Image::new(0, 3);
         assert_eq!(resize(&empty, 2, 2), Image::new(2, 2));
-        assert_eq!(resize(&Image::<Coverage>::new(3, 0), 2, 2), Image::new(2, 2));
+        assert_eq!(
+            resize(&Image::<Coverage>::new(3, 0), 2, 2),
+            Image::new(2, 2)
+        );
         assert!(resize(&Image::filled(3, 3, Coverage(1.0)), 0, 7).is_empty());
-        assert_eq!(resize(&Image::filled(1, 1, Coverage(0.5)), 3, 2), Image::filled(3, 2, Coverage(0.5)));
+        assert_eq!(
+            resize(&Image::filled(1, 1, Coverage(0.5)), 3, 2),
+            Image::filled(3, 2, Coverage(0.5))
+        );
     }
 
     #[test]

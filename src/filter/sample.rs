@@ -10,8 +10,13 @@ use crate::pixel::Mix;
 #[inline]
 pub fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
     let at = |i: isize, j: isize| {
-        let inside = (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j);
-        if inside { image[(i as usize, j as usize)] } else { P::default() }
+        let inside =
+            (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j);
+        if inside {
+            image[(i as usize, j as usize)]
+        } else {
+            P::default()
+        }
     };
     bilinear(at, x, y)
 }
@@ -29,7 +34,8 @@ pub fn sample_bilinear_clamped<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
 /// The pixel whose square holds `(x, y)`, for pixels of any kind; `None` outside the picture.
 #[inline]
 pub fn sample_nearest<P: Copy>(image: &Image<P>, x: f64, y: f64) -> Option<P> {
-    let inside = (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
+    let inside =
+        (0.0..image.width() as f64).contains(&x) && (0.0..image.height() as f64).contains(&y);
     inside.then(|| image[(x as usize, y as usize)])
 }
 
@@ -95,7 +101,10 @@ mod tests {
             assert_eq!(sample_bilinear_clamped(&img, 1.0, x), Coverage(0.0));
         }
         assert_eq!(sample_bilinear(&img, -1e300, 0.0), Coverage(0.0));
-        assert_eq!(sample_bilinear_clamped(&Image::<Coverage>::new(0, 0), 1.0, 1.0), Coverage(0.0));
+        assert_eq!(
+            sample_bilinear_clamped(&Image::<Coverage>::new(0, 0), 1.0, 1.0),
+            Coverage(0.0)
+        );
     }
 
     #[test]

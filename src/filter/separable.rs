@@ -16,13 +16,23 @@ impl Taps {
     /// The samples `window` of a line of `len`, cut off at its ends, weighted by `weight` and made to add up to 1.
     ///
     /// Samples at the ends of the window that weigh nothing are left out.
-    pub(super) fn new(window: std::ops::Range<isize>, len: usize, weight: impl Fn(isize) -> f64) -> Self {
+    pub(super) fn new(
+        window: std::ops::Range<isize>,
+        len: usize,
+        weight: impl Fn(isize) -> f64,
+    ) -> Self {
         let last = window.end.min(len as isize);
         let inside = window.start.max(0)..last;
         let first = inside.clone().find(|&i| weight(i) > 0.0).unwrap_or(last);
-        let end = inside.rev().find(|&i| weight(i) > 0.0).map_or(first, |i| i + 1);
+        let end = inside
+            .rev()
+            .find(|&i| weight(i) > 0.0)
+            .map_or(first, |i| i + 1);
         let sum: f64 = (first..end).map(&weight).sum();
-        Self { first: first.max(0) as usize, weights: (first..end).map(|i| (weight(i) / sum) as f32).collect() }
+        Self {
+            first: first.max(0) as usize,
+            weights: (first..end).map(|i| (weight(i) / sum) as f32).collect(),
+        }
     }
 
     /// The same weights one sample further on.
@@ -46,20 +56,25 @@ const BLOCK: usize = 512;
 /// along itself. There is no picture in between. Neighbours with the same weights (a blur) are summed tap by tap, not
 /// pixel by pixel, for the same reason.
 pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) -> Image<P> {
-    let runs: Vec<&[Taps]> = columns.chunk_by(|a, b| b.follows(a)).flat_map(|run| run.chunks(BLOCK)).collect();
+    let runs: Vec<&[Taps]> = columns
+        .chunk_by(|a, b| b.follows(a))
+        .flat_map(|run| run.chunks(BLOCK))
+        .collect();
     let mut out = Image::new(columns.len(), rows.len());
     let mixed = || vec![P::default(); image.width()];
-    out.par_rows_mut().zip(rows).for_each_init(mixed, |mixed, (mut out, taps)| {
-        for (block, mixed) in mixed.chunks_mut(BLOCK).enumerate() {
-            let row = |k: usize| &image.row(taps.first + k)[block * BLOCK..];
-            mix(&taps.weights, row, mixed);
-        }
-        for run in &runs {
-            let (here, rest) = out.split_at_mut(run.len());
-            mix_along(mixed, run, here);
-            out = rest;
-        }
-    });
+    out.par_rows_mut()
+        .zip(rows)
+        .for_each_init(mixed, |mixed, (mut out, taps)| {
+            for (block, mixed) in mixed.chunks_mut(BLOCK).enumerate() {
+                let row = |k: usize| &image.row(taps.first + k)[block * BLOCK..];
+                mix(&taps.weights, row, mixed);
+            }
+            for run in &runs {
+                let (here, rest) = out.split_at_mut(run.len());
+                mix_along(mixed, run, here);
+                out = rest;
+            }
+        });
     out
 }
 
@@ -79,7 +94,11 @@ fn mix<'a, P: Mix + 'a>(weights: &[f32], line: impl Fn(usize) -> &'a [P], out: &
     for (i, &[a, b, c, d]) in fours.iter().enumerate() {
         let [p, q, r, s] = [0, 1, 2, 3].map(|k| line(4 * i + k));
         for (sum, (((&p, &q), &r), &s)) in out.iter_mut().zip(p.iter().zip(q).zip(r).zip(s)) {
-            *sum = sum.add_scaled(a, p).add_scaled(b, q).add_scaled(c, r).add_scaled(d, s);
+            *sum = sum
+                .add_scaled(a, p)
+                .add_scaled(b, q)
+                .add_scaled(c, r)
+                .add_scaled(d, s);
         }
     }
     for (k, &weight) in rest.iter().enumerate() {
@@ -95,7 +114,9 @@ mod tests {
     use crate::pixel::Coverage;
 
     fn triangle(len: usize) -> Vec<Taps> {
-        (0..len as isize).map(|i| Taps::new(i - 2..i + 3, len, |j| 3.0 - (j - i).abs() as f64)).collect()
+        (0..len as isize)
+            .map(|i| Taps::new(i - 2..i + 3, len, |j| 3.0 - (j - i).abs() as f64))
+            .collect()
     }
 
     /// The definition, in `f64`.
@@ -115,11 +136,16 @@ mod tests {
     #[test]
     fn runs_and_single_pixels_are_weighted_means() {
         for (width, height) in [(1, 7), (4, 4), (2 * BLOCK + 7, 6)] {
-            let img = Image::from_fn(width, height, |x, y| Coverage(((x * 7919 + y * 104_729) % 101) as f32));
+            let img = Image::from_fn(width, height, |x, y| {
+                Coverage(((x * 7919 + y * 104_729) % 101) as f32)
+            });
             let out = filter(&img, &triangle(width), &triangle(height));
             for (k, value) in out.pixels().iter().enumerate() {
                 let exact = slowly(&img, (k % width) as isize, (k / width) as isize);
-                assert!((f64::from(value.0) - exact).abs() < 1e-4, "{k} of {width} x {height}");
+                assert!(
+                    (f64::from(value.0) - exact).abs() < 1e-4,
+                    "{k} of {width} x {height}"
+                );
             }
         }
     }

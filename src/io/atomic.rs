@@ -17,18 +17,30 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::File`] with what `fill` or the system says.
-pub fn write_through(path: &Path, fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    let failed = |e: std::io::Error| Error::file(path, format!("cannot be written: {}", reason(&e)));
+pub fn write_through(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<()> {
+    let failed =
+        |e: std::io::Error| Error::file(path, format!("cannot be written: {}", reason(&e)));
     if path.is_dir() {
         return Err(Error::file(path, "cannot be written: is a folder"));
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut file = new_beside(folder).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => Error::file(path, format!("cannot be written: no folder {}", folder.display())),
+        std::io::ErrorKind::NotFound => Error::file(
+            path,
+            format!("cannot be written: no folder {}", folder.display()),
+        ),
         _ => failed(e),
     })?;
     let mut pieces = BufWriter::new(&mut file);
-    fill(&mut pieces).and_then(|()| pieces.flush()).map_err(failed)?;
+    fill(&mut pieces)
+        .and_then(|()| pieces.flush())
+        .map_err(failed)?;
     drop(pieces);
     // Before it gets its name: after a power cut there is the old file or the new one.
     file.as_file().sync_all().map_err(failed)?;
@@ -88,7 +100,11 @@ pub fn copy(from: impl AsRef<Path>, to: impl AsRef<Path>, expected: Checksum) ->
     let mut same = true;
     let written = write_through(to, |out| {
         same = pump(file.take(bytes), out)? == expected;
-        if same { Ok(()) } else { Err(std::io::Error::other("other bytes")) }
+        if same {
+            Ok(())
+        } else {
+            Err(std::io::Error::other("other bytes"))
+        }
     });
     if same { written } else { Err(changed()) }
 }
@@ -101,7 +117,12 @@ fn pump(mut from: impl Read, to: &mut dyn Write) -> std::io::Result<Checksum> {
     let (mut hasher, mut bytes, mut piece) = (crc32fast::Hasher::new(), 0, vec![0; PIECE]);
     loop {
         let filled = match from.read(&mut piece) {
-            Ok(0) => return Ok(Checksum { bytes, crc32: hasher.finalize() }),
+            Ok(0) => {
+                return Ok(Checksum {
+                    bytes,
+                    crc32: hasher.finalize(),
+                });
+            }
             Ok(filled) => filled,
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
             Err(e) => return Err(e),
@@ -122,8 +143,14 @@ pub(crate) fn open_own(path: &Path) -> Result<File> {
     options.read(true).append(true).create(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, own_flags());
-    let file = options.open(path).map_err(|e| Error::file(path, reason(&e)))?;
-    match file.metadata().map_err(|e| Error::file(path, reason(&e)))?.is_file() {
+    let file = options
+        .open(path)
+        .map_err(|e| Error::file(path, reason(&e)))?;
+    match file
+        .metadata()
+        .map_err(|e| Error::file(path, reason(&e)))?
+        .is_file()
+    {
         true => Ok(file),
         false => Err(foreign(path)),
     }
@@ -141,7 +168,10 @@ pub(crate) fn refuse_foreign(path: &Path) -> Result<()> {
 }
 
 fn foreign(path: &Path) -> Error {
-    Error::file(path, "is a link or no regular file, expected petcomp's own file; take it away")
+    Error::file(
+        path,
+        "is a link or no regular file, expected petcomp's own file; take it away",
+    )
 }
 
 /// A link that takes the file's place after it was looked at is not followed, and a FIFO is not waited for.
@@ -155,7 +185,8 @@ fn own_flags() -> i32 {
 /// Where it cannot be done nothing is lost but time: what is not there is made again.
 pub fn sync(folder: impl AsRef<Path>) {
     #[cfg(target_os = "linux")]
-    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?)) {
+    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?))
+    {
         log::debug!("{}: syncfs: {e}", folder.as_ref().display());
     }
     #[cfg(not(target_os = "linux"))]
@@ -173,7 +204,11 @@ fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
 
 /// The way from a folder to a file or folder, both absolute.
 pub fn relative(to: &Path, from: &Path) -> PathBuf {
-    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
+    let shared = to
+        .components()
+        .zip(from.components())
+        .take_while(|(a, b)| a == b)
+        .count();
     let up = from.components().skip(shared).map(|_| Component::ParentDir);
     up.chain(to.components().skip(shared)).collect()
 }
@@ -187,7 +222,8 @@ pub fn create_folder(path: impl AsRef<Path>) -> Result<()> {
     if let Some(file) = path.ancestors().find(|p| p.is_file()) {
         return Err(Error::file(file, "is a file, expected a folder"));
     }
-    std::fs::create_dir_all(path).map_err(|e| Error::file(path, format!("cannot be made: {}", reason(&e))))
+    std::fs::create_dir_all(path)
+        .map_err(|e| Error::file(path, format!("cannot be made: {}", reason(&e))))
 }
 
 #[cfg(test)]
@@ -199,7 +235,12 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let place = dir.path().join("folder");
         create_folder(&place).unwrap();
-        assert!(write_bytes(&place, b"x").unwrap_err().to_string().contains("is a folder"));
+        assert!(
+            write_bytes(&place, b"x")
+                .unwrap_err()
+                .to_string()
+                .contains("is a folder")
+        );
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
@@ -209,10 +250,25 @@ mod tests {
         let [from, to] = ["a", "b"].map(|name| dir.path().join(name));
         write_bytes(&from, &vec![7; 2 * PIECE + 3]).unwrap();
         let sum = Checksum::of(&from).unwrap();
-        assert_eq!(sum, Checksum { bytes: 2 * PIECE as u64 + 3, crc32: crc32fast::hash(&vec![7; 2 * PIECE + 3]) });
-        for wrong in [Checksum { bytes: 5, ..sum }, Checksum { crc32: sum.crc32 ^ 1, ..sum }] {
+        assert_eq!(
+            sum,
+            Checksum {
+                bytes: 2 * PIECE as u64 + 3,
+                crc32: crc32fast::hash(&vec![7; 2 * PIECE + 3])
+            }
+        );
+        for wrong in [
+            Checksum { bytes: 5, ..sum },
+            Checksum {
+                crc32: sum.crc32 ^ 1,
+                ..sum
+            },
+        ] {
             let said = copy(&from, &to, wrong).unwrap_err().to_string();
-            assert!(said.ends_with("a: has other bytes than when it was written"), "{said}");
+            assert!(
+                said.ends_with("a: has other bytes than when it was written"),
+                "{said}"
+            );
             assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
         }
         copy(&from, &to, sum).unwrap();
@@ -223,16 +279,28 @@ mod tests {
     #[test]
     fn own_files_are_no_links_and_nothing_to_wait_for() {
         let dir = tempfile::tempdir().unwrap();
-        let [own, link, pipe, victim] = ["own", "link", "pipe", "victim"].map(|name| dir.path().join(name));
+        let [own, link, pipe, victim] =
+            ["own", "link", "pipe", "victim"].map(|name| dir.path().join(name));
         std::fs::write(&victim, "mine").unwrap();
         std::os::unix::fs::symlink(&victim, &link).unwrap();
         rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, 0o600.into()).unwrap();
         for refused in [&link, &pipe, &dir.path().to_path_buf()] {
-            assert!(open_own(refused).unwrap_err().to_string().contains("is a link or no regular file"));
+            assert!(
+                open_own(refused)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("is a link or no regular file")
+            );
         }
         open_own(&own).unwrap().write_all(b"a").unwrap();
         open_own(&own).unwrap().write_all(b"b").unwrap();
-        assert_eq!((std::fs::read(&own).unwrap(), std::fs::read(&victim).unwrap()), (b"ab".into(), b"mine".into()));
+        assert_eq!(
+            (
+                std::fs::read(&own).unwrap(),
+                std::fs::read(&victim).unwrap()
+            ),
+            (b"ab".into(), b"mine".into())
+        );
     }
 
     #[test]
@@ -247,7 +315,9 @@ mod tests {
     #[test]
     fn a_missing_folder_is_named() {
         let dir = tempfile::tempdir().unwrap();
-        let e = write_bytes(&dir.path().join("no/x.png"), b"x").unwrap_err().to_string();
+        let e = write_bytes(&dir.path().join("no/x.png"), b"x")
+            .unwrap_err()
+            .to_string();
         assert!(e.contains("no folder"), "{e}");
     }
 }

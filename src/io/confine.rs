@@ -26,14 +26,26 @@ impl Memory {
     /// Fixes what may never be exceeded under these limits.
     pub(super) fn new(limits: &Limits) -> Self {
         let at_start = mapped_bytes().unwrap_or(ASSUMED_MAPPED);
-        let budget = limits.decoded_bytes.saturating_mul(COPIES).saturating_add(limits.file_bytes);
-        Self { at_start, most: at_start.saturating_add(HEADROOM).saturating_add(budget) }
+        let budget = limits
+            .decoded_bytes
+            .saturating_mul(COPIES)
+            .saturating_add(limits.file_bytes);
+        Self {
+            at_start,
+            most: at_start.saturating_add(HEADROOM).saturating_add(budget),
+        }
     }
 
     /// Lets a file of so many bytes ask for so many decoded ones.
     pub(super) fn allow(&self, file_bytes: u64, decoded_bytes: u64) {
-        let budget = decoded_bytes.saturating_mul(COPIES).saturating_add(file_bytes);
-        let current = self.at_start.saturating_add(HEADROOM).saturating_add(budget).min(self.most);
+        let budget = decoded_bytes
+            .saturating_mul(COPIES)
+            .saturating_add(file_bytes);
+        let current = self
+            .at_start
+            .saturating_add(HEADROOM)
+            .saturating_add(budget)
+            .min(self.most);
         limit(Resource::As, current, self.most);
     }
 }
@@ -43,13 +55,24 @@ const ASSUMED_MAPPED: u64 = 768 << 20;
 
 /// Address space in use, by the system's account of it.
 fn mapped_bytes() -> Option<u64> {
-    let pages: u64 = std::fs::read_to_string("/proc/self/statm").ok()?.split(' ').next()?.parse().ok()?;
+    let pages: u64 = std::fs::read_to_string("/proc/self/statm")
+        .ok()?
+        .split(' ')
+        .next()?
+        .parse()
+        .ok()?;
     pages.checked_mul(rustix::param::page_size() as u64)
 }
 
 fn limit(resource: Resource, current: u64, maximum: u64) {
     // Lowering one's own limits is always allowed; a system without one of them has no such danger either.
-    let _ = setrlimit(resource, Rlimit { current: Some(current), maximum: Some(maximum) });
+    let _ = setrlimit(
+        resource,
+        Rlimit {
+            current: Some(current),
+            maximum: Some(maximum),
+        },
+    );
 }
 
 /// Gives up everything but memory, the pipes that are open, and some CPU time. Returns what the system could not do.
@@ -71,13 +94,21 @@ pub(super) fn confine(limits: &Limits) -> (Memory, Vec<String>) {
 mod linux {
     use landlock::{ABI, Access, AccessFs, AccessNet, Ruleset, RulesetAttr, RulesetStatus, Scope};
     use seccompiler::{
-        BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter, SeccompRule,
+        BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter,
+        SeccompRule,
     };
     use std::collections::BTreeMap;
 
     pub(super) fn confine() -> Vec<String> {
-        let steps = [("no_new_privs", no_new_privileges()), ("Landlock", no_files()), ("seccomp", few_calls())];
-        steps.into_iter().filter_map(|(name, done)| done.err().map(|e| format!("{name}: {e}"))).collect()
+        let steps = [
+            ("no_new_privs", no_new_privileges()),
+            ("Landlock", no_files()),
+            ("seccomp", few_calls()),
+        ];
+        steps
+            .into_iter()
+            .filter_map(|(name, done)| done.err().map(|e| format!("{name}: {e}")))
+            .collect()
     }
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -144,18 +175,32 @@ mod linux {
 
     /// Every other call fails with EPERM, among them all that open, execute, connect, trace and start.
     fn few_calls() -> Outcome {
-        let mut rules: BTreeMap<i64, Vec<SeccompRule>> = CALLS.into_iter().map(|call| (call, Vec::new())).collect();
+        let mut rules: BTreeMap<i64, Vec<SeccompRule>> =
+            CALLS.into_iter().map(|call| (call, Vec::new())).collect();
         // Its own limits, and a signal to itself (abort), are its own business.
         rules.insert(libc::SYS_prlimit64, vec![first_argument(0)?]);
-        rules.insert(libc::SYS_tgkill, vec![first_argument(std::process::id().into())?]);
+        rules.insert(
+            libc::SYS_tgkill,
+            vec![first_argument(std::process::id().into())?],
+        );
         let refused = SeccompAction::Errno(libc::EPERM as u32);
-        let filter = SeccompFilter::new(rules, refused, SeccompAction::Allow, std::env::consts::ARCH.try_into()?)?;
+        let filter = SeccompFilter::new(
+            rules,
+            refused,
+            SeccompAction::Allow,
+            std::env::consts::ARCH.try_into()?,
+        )?;
         let program: BpfProgram = filter.try_into()?;
         // OpenImageIO's libraries have started threads of their own by now.
         Ok(seccompiler::apply_filter_all_threads(&program)?)
     }
 
     fn first_argument(value: u64) -> Result<SeccompRule, seccompiler::BackendError> {
-        SeccompRule::new(vec![SeccompCondition::new(0, SeccompCmpArgLen::Dword, SeccompCmpOp::Eq, value)?])
+        SeccompRule::new(vec![SeccompCondition::new(
+            0,
+            SeccompCmpArgLen::Dword,
+            SeccompCmpOp::Eq,
+            value,
+        )?])
     }
 }

@@ -26,14 +26,21 @@ pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 ///
 /// # Errors
 /// As [`read_toml`]; an override that leads nowhere.
-pub fn read_toml_with<T: DeserializeOwned>(path: impl AsRef<Path>, overrides: &[Override]) -> Result<T> {
+pub fn read_toml_with<T: DeserializeOwned>(
+    path: impl AsRef<Path>,
+    overrides: &[Override],
+) -> Result<T> {
     let path = path.as_ref();
     if overrides.is_empty() {
         return read_toml(path);
     }
     let mut document: toml::Table = read_toml(path)?;
-    overrides.iter().try_for_each(|o| o.apply(&mut document)).map_err(|e| e.in_file(path))?;
-    let text = toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
+    overrides
+        .iter()
+        .try_for_each(|o| o.apply(&mut document))
+        .map_err(|e| e.in_file(path))?;
+    let text =
+        toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
     // Lines of that text are not those of the file.
     parse_toml_lines(&text, |_| None).map_err(|e| e.in_file(path))
 }
@@ -47,9 +54,14 @@ pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) 
     let mut document = toml::Table::new();
     document.insert(table.into(), toml::Table::new().into());
     overrides.iter().try_for_each(|o| o.apply(&mut document))?;
-    let settings = document.remove(table).unwrap_or_else(|| toml::Table::new().into());
+    let settings = document
+        .remove(table)
+        .unwrap_or_else(|| toml::Table::new().into());
     if let Some(key) = document.keys().next() {
-        return Err(Error::value(key, format!("no such table, expected {table}.NAME=VALUE")));
+        return Err(Error::value(
+            key,
+            format!("no such table, expected {table}.NAME=VALUE"),
+        ));
     }
     from_value(settings, &format!("{table}."))
 }
@@ -66,7 +78,12 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
     serde_path_to_error::deserialize(value).map_err(|e| {
         let at = format!("{outer}{}", e.path());
         let e: toml::de::Error = e.into_inner();
-        Mistake { at: at.trim_end_matches('.').into(), line: None, what: e.message().into() }.into_error()
+        Mistake {
+            at: at.trim_end_matches('.').into(),
+            line: None,
+            what: e.message().into(),
+        }
+        .into_error()
     })
 }
 
@@ -75,7 +92,11 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
 /// # Errors
 /// As [`read_toml`].
 pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
-    if is_json(path.as_ref()) { read_json(path) } else { read_toml(path) }
+    if is_json(path.as_ref()) {
+        read_json(path)
+    } else {
+        read_toml(path)
+    }
 }
 
 /// Writes a document in the format of its extension: JSON (`.json`) or TOML (any other).
@@ -83,11 +104,16 @@ pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 /// # Errors
 /// As [`write_toml`].
 pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
-    if is_json(path.as_ref()) { write_json(path, value) } else { write_toml(path, value) }
+    if is_json(path.as_ref()) {
+        write_json(path, value)
+    } else {
+        write_toml(path, value)
+    }
 }
 
 fn is_json(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
 }
 
 /// Reads a JSON document.
@@ -107,9 +133,14 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
 pub fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
     let path = path.as_ref();
     let limits = ReadOptions::default().limits;
-    let text = text_of(path, read_regular(path, (limits.file_bytes, "file_bytes"), "text file")?)?;
+    let text = text_of(
+        path,
+        read_regular(path, (limits.file_bytes, "file_bytes"), "text file")?,
+    )?;
     // Keeping track of the place costs as much as all the rest, and only a mistake has one.
-    serde_json::from_str(&text).or_else(|_| typed_json(&text)).map_err(|e| e.in_file(path))
+    serde_json::from_str(&text)
+        .or_else(|_| typed_json(&text))
+        .map_err(|e| e.in_file(path))
 }
 
 /// Reads a text file.
@@ -123,7 +154,14 @@ pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
 
 /// The bytes of a text file.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    read_regular(path, (ReadOptions::default().limits.document_bytes, "document_bytes"), "text file")
+    read_regular(
+        path,
+        (
+            ReadOptions::default().limits.document_bytes,
+            "document_bytes",
+        ),
+        "text file",
+    )
 }
 
 fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
@@ -136,7 +174,10 @@ fn text_of(path: &Path, bytes: Vec<u8>) -> Result<String> {
 /// [`Error::File`] where TOML cannot say it or the file cannot be written.
 pub fn write_toml<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
     let path = path.as_ref();
-    write_text(path, &toml::to_string_pretty(value).map_err(|e| Error::file(path, one_line(&e.to_string())))?)
+    write_text(
+        path,
+        &toml::to_string_pretty(value).map_err(|e| Error::file(path, one_line(&e.to_string())))?,
+    )
 }
 
 /// Writes a document as indented JSON.
@@ -166,14 +207,27 @@ pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
 }
 
 /// `line` tells the line of a byte, if that means something to the person who wrote the document.
-fn parse_toml_lines<T: DeserializeOwned>(text: &str, line: impl Fn(usize) -> Option<usize>) -> Result<T> {
+fn parse_toml_lines<T: DeserializeOwned>(
+    text: &str,
+    line: impl Fn(usize) -> Option<usize>,
+) -> Result<T> {
     let mistake = |e: toml::de::Error, at: String| {
         let line = e.span().and_then(|span| line(span.start));
-        Mistake { at, line, what: e.message().into() }.into_error()
+        Mistake {
+            at,
+            line,
+            what: e.message().into(),
+        }
+        .into_error()
     };
     let document = DeTable::parse(text).map_err(|e| mistake(e, String::new()))?;
     if let Some((what, span)) = unsound_toml(&document, deepest()) {
-        return Err(Mistake { at: String::new(), line: line(span.start), what }.into_error());
+        return Err(Mistake {
+            at: String::new(),
+            line: line(span.start),
+            what,
+        }
+        .into_error());
     }
     serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
         let at = e.path().to_string();
@@ -192,9 +246,11 @@ pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
 
 fn typed_json<T: DeserializeOwned>(text: &str) -> Result<T> {
     let mut document = serde_json::Deserializer::from_str(text);
-    let value =
-        serde_path_to_error::deserialize(&mut document).map_err(|e| json_mistake(e.inner(), e.path().to_string()))?;
-    document.end().map_err(|e| json_mistake(&e, String::new()))?;
+    let value = serde_path_to_error::deserialize(&mut document)
+        .map_err(|e| json_mistake(e.inner(), e.path().to_string()))?;
+    document
+        .end()
+        .map_err(|e| json_mistake(&e, String::new()))?;
     Ok(value)
 }
 
@@ -235,7 +291,9 @@ impl Mistake {
         let mut at = self.at.as_str();
         if let Some((key, _)) = &unknown {
             // The path of an unknown key ends with the key itself, which the message names anyway.
-            at = at.strip_suffix(key.as_str()).map_or(at, |front| front.trim_end_matches('.'));
+            at = at
+                .strip_suffix(key.as_str())
+                .map_or(at, |front| front.trim_end_matches('.'));
         }
         let line = self.line.map_or(String::new(), |n| format!("line {n}"));
         match (at, line.as_str()) {
@@ -249,7 +307,9 @@ impl Mistake {
 
 /// The same without the names that Rust has for what was expected.
 fn in_words(said: &str) -> String {
-    let Some((front, wanted)) = said.rsplit_once("expected ") else { return said.into() };
+    let Some((front, wanted)) = said.rsplit_once("expected ") else {
+        return said.into();
+    };
     let kind = wanted.split(' ').next().unwrap_or_default();
     let words = match kind {
         "u8" => "an integer from 0 to 255",
@@ -272,7 +332,10 @@ fn unknown_key(said: &str) -> Option<(String, String)> {
     let mut quoted = rest.split('`').skip(1).step_by(2);
     let key = quoted.next()?;
     let known: Vec<&str> = quoted.collect();
-    Some((key.into(), format!("unknown key \"{key}\", {}", suggestion(key, &known))))
+    Some((
+        key.into(),
+        format!("unknown key \"{key}\", {}", suggestion(key, &known)),
+    ))
 }
 
 fn missing_key(said: &str) -> Option<&str> {
@@ -319,18 +382,30 @@ mod tests {
     }
 
     fn toml(text: &str) -> String {
-        parse_toml::<Recipe>(text).unwrap_err().in_file("recipe.toml").to_string()
+        parse_toml::<Recipe>(text)
+            .unwrap_err()
+            .in_file("recipe.toml")
+            .to_string()
     }
 
     fn json(text: &str) -> String {
-        parse_json::<Recipe>(text).unwrap_err().in_file("recipe.json").to_string()
+        parse_json::<Recipe>(text)
+            .unwrap_err()
+            .in_file("recipe.json")
+            .to_string()
     }
 
     #[test]
     fn an_unknown_key_is_met_with_the_one_that_was_meant() {
         let expected = "objects: unknown key \"cuont\", did you mean \"count\"?";
-        assert_eq!(toml("seed = 1\n[objects]\ncuont = 3\n"), format!("recipe.toml: {expected} (line 3)"));
-        assert_eq!(json(r#"{"seed": 1, "objects": {"cuont": 3}}"#), format!("recipe.json: {expected} (line 1)"));
+        assert_eq!(
+            toml("seed = 1\n[objects]\ncuont = 3\n"),
+            format!("recipe.toml: {expected} (line 3)")
+        );
+        assert_eq!(
+            json(r#"{"seed": 1, "objects": {"cuont": 3}}"#),
+            format!("recipe.json: {expected} (line 1)")
+        );
         assert_eq!(
             toml("seed = 1\n[objects]\ncount = 3\n[[lights]]\ncount = 1\ncolour = 2"),
             "recipe.toml: lights[0]: unknown key \"colour\", expected one of count, size_m (line 6)"
@@ -339,52 +414,85 @@ mod tests {
 
     #[test]
     fn an_unknown_key_at_the_top_names_its_line() {
-        assert_eq!(toml("\nseeed = 1\n"), "recipe.toml: line 2: unknown key \"seeed\", did you mean \"seed\"?");
+        assert_eq!(
+            toml("\nseeed = 1\n"),
+            "recipe.toml: line 2: unknown key \"seeed\", did you mean \"seed\"?"
+        );
     }
 
     #[test]
     fn a_value_of_the_wrong_kind_is_named_with_its_field() {
         let expected = "objects.count: invalid type: string \"three\", expected an integer from 0 to 4294967295";
-        assert_eq!(toml("seed = 1\n[objects]\ncount = \"three\""), format!("recipe.toml: {expected} (line 3)"));
+        assert_eq!(
+            toml("seed = 1\n[objects]\ncount = \"three\""),
+            format!("recipe.toml: {expected} (line 3)")
+        );
         let json = json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}");
         assert_eq!(json, format!("recipe.json: {expected} (line 1)"));
     }
 
     #[test]
     fn no_name_of_a_type_of_rust_is_in_a_message() {
-        assert!(toml("seed = 1\nobjects = 3").contains("objects: invalid type: integer `3`, expected a table"));
+        assert!(
+            toml("seed = 1\nobjects = 3")
+                .contains("objects: invalid type: integer `3`, expected a table")
+        );
         assert!(json("[1, 2]").contains("expected"), "{}", json("[1, 2]"));
-        assert!(json("3").ends_with("invalid type: integer `3`, expected a table"), "{}", json("3"));
-        assert!(json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": \"x\"}}").contains("expected a number"));
+        assert!(
+            json("3").ends_with("invalid type: integer `3`, expected a table"),
+            "{}",
+            json("3")
+        );
+        assert!(
+            json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": \"x\"}}")
+                .contains("expected a number")
+        );
     }
 
     #[test]
     fn settings_are_made_of_overrides_alone() {
         let made = |texts: &[&str]| {
             let overrides: Result<Vec<Override>> = texts.iter().map(|t| t.parse()).collect();
-            overrides.and_then(|o| from_overrides::<Objects>("key", &o)).map_err(|e| e.to_string())
+            overrides
+                .and_then(|o| from_overrides::<Objects>("key", &o))
+                .map_err(|e| e.to_string())
         };
         let objects = made(&["key.count=3", "key.size_m = 0.5"]).unwrap();
         assert_eq!((objects.count, objects.size_m), (3, Some(0.5)));
-        assert_eq!(made(&["key.cuont=3"]).unwrap_err(), "key: unknown key \"cuont\", did you mean \"count\"?");
+        assert_eq!(
+            made(&["key.cuont=3"]).unwrap_err(),
+            "key: unknown key \"cuont\", did you mean \"count\"?"
+        );
         assert_eq!(
             made(&["key.count=x"]).unwrap_err(),
             "key.count: invalid type: string \"x\", expected an integer from 0 to 4294967295"
         );
-        assert_eq!(made(&["kye.count=3"]).unwrap_err(), "kye: no such table, expected key.NAME=VALUE");
+        assert_eq!(
+            made(&["kye.count=3"]).unwrap_err(),
+            "kye: no such table, expected key.NAME=VALUE"
+        );
     }
 
     #[test]
     fn a_missing_key_is_named() {
-        assert_eq!(toml("seed = 1\n[objects]\n"), "recipe.toml: objects: missing key \"count\" (line 2)");
+        assert_eq!(
+            toml("seed = 1\n[objects]\n"),
+            "recipe.toml: objects: missing key \"count\" (line 2)"
+        );
     }
 
     #[test]
     fn broken_syntax_is_one_line_with_a_line_number() {
         let e = toml("seed = 1\nobjects = [");
-        assert!(e.starts_with("recipe.toml: line 2: ") && !e.contains('\n'), "{e}");
+        assert!(
+            e.starts_with("recipe.toml: line 2: ") && !e.contains('\n'),
+            "{e}"
+        );
         let e = json("{\"seed\": 1,\n x}");
-        assert!(e.starts_with("recipe.json: line 2: ") && !e.contains('\n'), "{e}");
+        assert!(
+            e.starts_with("recipe.json: line 2: ") && !e.contains('\n'),
+            "{e}"
+        );
         assert!(json("{} {}").contains("missing key") || json("{} {}").contains("line"));
     }
 
@@ -395,10 +503,20 @@ mod tests {
         assert!(toml("seed = 1\nseed = 2").starts_with("recipe.toml: line 2: duplicate key"));
         let e = toml("seed = 1\n[objects]\ncount = 1\nsize_m = -inf");
         assert_eq!(e, "recipe.toml: line 4: -inf, expected a finite number");
-        assert!(json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": 1e999}}").contains("out of range"));
+        assert!(
+            json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": 1e999}}")
+                .contains("out of range")
+        );
         assert!(json("{\"seed\": NaN}").contains("line 1"));
-        let infinite = ["objects.size_m=inf".parse::<Override>(), "a=[1, { b = nan }]".parse()];
-        assert!(infinite.into_iter().all(|o| o.unwrap_err().to_string().contains("expected a finite number")));
+        let infinite = [
+            "objects.size_m=inf".parse::<Override>(),
+            "a=[1, { b = nan }]".parse(),
+        ];
+        assert!(infinite.into_iter().all(|o| {
+            o.unwrap_err()
+                .to_string()
+                .contains("expected a finite number")
+        }));
     }
 
     #[test]
@@ -424,11 +542,17 @@ mod tests {
         let told = read_json::<Vec<u8>>(&path).unwrap_err().to_string();
         let expected = "16777219 bytes, over the limit of 16777216 (Limits::document_bytes; --limit document_bytes=N)";
         assert!(told.ends_with(expected), "{told}");
-        assert_eq!(read_json_data::<Vec<u8>>(&path).unwrap().len(), (8 << 20) + 1);
+        assert_eq!(
+            read_json_data::<Vec<u8>>(&path).unwrap().len(),
+            (8 << 20) + 1
+        );
     }
 
     #[test]
     fn a_missing_document_says_so() {
-        assert_eq!(read_toml::<Recipe>("no/x.toml").unwrap_err().to_string(), "no/x.toml: no such file");
+        assert_eq!(
+            read_toml::<Recipe>("no/x.toml").unwrap_err().to_string(),
+            "no/x.toml: no such file"
+        );
     }
 }

@@ -25,7 +25,12 @@ pub(super) struct CameraNotes {
 
 impl Default for CameraNotes {
     fn default() -> Self {
-        Self { orientation: Orientation(1), focal_35mm: None, digital_zoom: false, size: None }
+        Self {
+            orientation: Orientation(1),
+            focal_35mm: None,
+            digital_zoom: false,
+            size: None,
+        }
     }
 }
 
@@ -43,21 +48,38 @@ impl CameraNotes {
     pub(super) fn has_associated_alpha(tiff: &[u8]) -> bool {
         const EXTRA_SAMPLES: Tag = Tag(exif::Context::Tiff, 338);
         let exif = exif::Reader::new().read_from_container(&mut std::io::Cursor::new(tiff));
-        let extra = exif.ok().and_then(|e| e.get_field(EXTRA_SAMPLES, In::PRIMARY)?.value.get_uint(0));
+        let extra = exif
+            .ok()
+            .and_then(|e| e.get_field(EXTRA_SAMPLES, In::PRIMARY)?.value.get_uint(0));
         extra == Some(1)
     }
 
     fn of(exif: &Exif) -> Self {
-        let number = |tag| exif.get_field(tag, In::PRIMARY).and_then(|f| f.value.get_uint(0));
-        let orientation = number(Tag::Orientation).and_then(|v| u8::try_from(v).ok()).unwrap_or(1);
-        let equivalent = number(Tag::FocalLengthIn35mmFilm).filter(|&mm| mm > 0).map(f64::from);
+        let number = |tag| {
+            exif.get_field(tag, In::PRIMARY)
+                .and_then(|f| f.value.get_uint(0))
+        };
+        let orientation = number(Tag::Orientation)
+            .and_then(|v| u8::try_from(v).ok())
+            .unwrap_or(1);
+        let equivalent = number(Tag::FocalLengthIn35mmFilm)
+            .filter(|&mm| mm > 0)
+            .map(f64::from);
         let side = |tag| number(tag).filter(|&px| px > 0).map(f64::from);
-        let size = side(Tag::PixelXDimension).zip(side(Tag::PixelYDimension)).map(|(w, h)| [w, h]);
+        let size = side(Tag::PixelXDimension)
+            .zip(side(Tag::PixelYDimension))
+            .map(|(w, h)| [w, h]);
         let by_sensor = || equivalent_by_sensor(exif, size?);
         // A ratio of 0 says that there was none.
-        let digital_zoom = real(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
+        let digital_zoom =
+            real(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
         let focal_35mm = equivalent.or_else(by_sensor);
-        Self { orientation: Orientation(orientation), focal_35mm, digital_zoom, size }
+        Self {
+            orientation: Orientation(orientation),
+            focal_35mm,
+            digital_zoom,
+            size,
+        }
     }
 
     /// The camera noted the size that the file has, or a whole multiple of it, whichever way up: nothing was cut away.
@@ -66,14 +88,20 @@ impl CameraNotes {
         let stored = sorted(stored.map(|s| s as f64));
         self.size.map(sorted).is_some_and(|taken| {
             let reduced = (taken[0] / stored[0]).round();
-            reduced >= 1.0 && taken.iter().zip(stored).all(|(t, s)| (t / (reduced * s) - 1.0).abs() <= SAME_SIZE)
+            reduced >= 1.0
+                && taken
+                    .iter()
+                    .zip(stored)
+                    .all(|(t, s)| (t / (reduced * s) - 1.0).abs() <= SAME_SIZE)
         })
     }
 
     /// The camera noted a size of another shape than the file has, whichever way up.
     pub(super) fn taken_in_another_shape(&self, stored: [usize; 2]) -> bool {
         let shape = |[w, h]: [f64; 2]| w.max(h) / w.min(h);
-        self.size.is_some_and(|taken| (shape(taken) / shape(stored.map(|s| s as f64)) - 1.0).abs() > SAME_SHAPE)
+        self.size.is_some_and(|taken| {
+            (shape(taken) / shape(stored.map(|s| s as f64)) - 1.0).abs() > SAME_SHAPE
+        })
     }
 }
 
@@ -81,7 +109,9 @@ impl CameraNotes {
 fn equivalent_by_sensor(exif: &Exif, size: [f64; 2]) -> Option<f64> {
     const INCH: u32 = 2;
     const CENTIMETRE: u32 = 3;
-    let unit = exif.get_field(Tag::FocalPlaneResolutionUnit, In::PRIMARY).and_then(|f| f.value.get_uint(0));
+    let unit = exif
+        .get_field(Tag::FocalPlaneResolutionUnit, In::PRIMARY)
+        .and_then(|f| f.value.get_uint(0));
     let unit_mm = match unit.unwrap_or(INCH) {
         INCH => 25.4,
         CENTIMETRE => 10.0,
@@ -109,13 +139,25 @@ mod tests {
 
     #[test]
     fn damaged_notes_are_no_notes() {
-        assert_eq!(CameraNotes::of_file(Cursor::new(b"\xff\xd8\xff\xe1\x00\x08Exif\0\0II")), CameraNotes::default());
-        assert_eq!(CameraNotes::of_file(Cursor::new(b"")), CameraNotes::default());
+        assert_eq!(
+            CameraNotes::of_file(Cursor::new(b"\xff\xd8\xff\xe1\x00\x08Exif\0\0II")),
+            CameraNotes::default()
+        );
+        assert_eq!(
+            CameraNotes::of_file(Cursor::new(b"")),
+            CameraNotes::default()
+        );
     }
 
     fn notes(fields: &[(Tag, Value)]) -> CameraNotes {
-        let fields: Vec<_> =
-            fields.iter().map(|(tag, value)| Field { tag: *tag, ifd_num: In::PRIMARY, value: value.clone() }).collect();
+        let fields: Vec<_> = fields
+            .iter()
+            .map(|(tag, value)| Field {
+                tag: *tag,
+                ifd_num: In::PRIMARY,
+                value: value.clone(),
+            })
+            .collect();
         let mut writer = Writer::new();
         fields.iter().for_each(|f| writer.push_field(f));
         let mut tiff = std::io::Cursor::new(Vec::new());
@@ -144,8 +186,14 @@ mod tests {
         // 3888 px on 22.2 mm; the sensor's diagonal is 26.7 mm, so 50 mm are 81 mm equivalent.
         let by_inch = reflex(rational(3_888_000, 875), None).focal_35mm.unwrap();
         assert!((by_inch - 81.0).abs() < 0.2, "{by_inch}");
-        assert_eq!(reflex(rational(3888, 875), Some(4)).focal_35mm, None, "a unit that EXIF does not have");
-        let by_centimetre = reflex(rational(1_749_300, 1000), Some(3)).focal_35mm.unwrap();
+        assert_eq!(
+            reflex(rational(3888, 875), Some(4)).focal_35mm,
+            None,
+            "a unit that EXIF does not have"
+        );
+        let by_centimetre = reflex(rational(1_749_300, 1000), Some(3))
+            .focal_35mm
+            .unwrap();
         assert!((by_centimetre - 81.0).abs() < 0.2, "{by_centimetre}");
         assert_eq!(reflex(rational(1, 0), None).focal_35mm, None);
         assert_eq!(reflex(rational(0, 1), None).focal_35mm, None);
@@ -161,7 +209,13 @@ mod tests {
     fn zoom_is_neither_nothing_nor_one() {
         let zoomed = |ratio| notes(&[(Tag::DigitalZoomRatio, ratio)]).digital_zoom;
         assert_eq!(
-            [rational(0, 1), rational(0, 0), rational(1, 1), rational(3, 2)].map(zoomed),
+            [
+                rational(0, 1),
+                rational(0, 0),
+                rational(1, 1),
+                rational(3, 2)
+            ]
+            .map(zoomed),
             [false, false, false, true]
         );
     }
@@ -170,9 +224,21 @@ mod tests {
     fn the_size_that_the_file_has_or_a_multiple_of_it_is_whole() {
         let of = reflex(rational(1, 1), None);
         assert!(
-            [[3888, 2592], [2592, 3888], [3888, 2584], [1944, 1296], [972, 648]].into_iter().all(|s| of.taken_whole(s))
+            [
+                [3888, 2592],
+                [2592, 3888],
+                [3888, 2584],
+                [1944, 1296],
+                [972, 648]
+            ]
+            .into_iter()
+            .all(|s| of.taken_whole(s))
         );
-        assert!([[3000, 2000], [3888, 2400], [1024, 683], [7776, 5184]].into_iter().all(|s| !of.taken_whole(s)));
+        assert!(
+            [[3000, 2000], [3888, 2400], [1024, 683], [7776, 5184]]
+                .into_iter()
+                .all(|s| !of.taken_whole(s))
+        );
         assert!(!CameraNotes::default().taken_whole([1, 1]));
     }
 

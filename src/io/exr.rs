@@ -17,8 +17,8 @@ use crate::work::{self, Kind};
 use crate::{Error, Result};
 use exr::meta::attribute::Chromaticities;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, IntegerBounds, Layer, LayerAttributes, MetaData, Text, Vec2,
-    WritableImage, f16,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, IntegerBounds, Layer, LayerAttributes,
+    MetaData, Text, Vec2, WritableImage, f16,
 };
 use std::borrow::Cow;
 use std::io::{BufReader, Cursor, Read};
@@ -27,7 +27,9 @@ use std::path::Path;
 impl From<exr::error::Error> for Refusal {
     fn from(e: exr::error::Error) -> Self {
         match e {
-            exr::error::Error::NotSupported(what) => Self::Unsupported(format!("unsupported EXR: {what}")),
+            exr::error::Error::NotSupported(what) => {
+                Self::Unsupported(format!("unsupported EXR: {what}"))
+            }
             exr::error::Error::Io(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
                 Self::Broken("truncated EXR".into())
             }
@@ -59,9 +61,13 @@ pub fn write_channels(
     metadata: &[(String, String)],
 ) -> Result<()> {
     let path = path.as_ref();
-    let planes = channels.iter().map(|&(name, samples)| (name, FlatSamples::F32(samples.to_vec()))).collect();
+    let planes = channels
+        .iter()
+        .map(|&(name, samples)| (name, FlatSamples::F32(samples.to_vec())))
+        .collect();
     work::add(Kind::Encodes, 1);
-    let bytes = encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
+    let bytes =
+        encode(size, planes, Compression::Zip, metadata).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
 }
 
@@ -76,7 +82,10 @@ pub fn write_half_channels(
     metadata: &[(String, String)],
 ) -> Result<()> {
     let path = path.as_ref();
-    let planes = channels.iter().map(|&(name, samples)| (name, to_halves(samples))).collect();
+    let planes = channels
+        .iter()
+        .map(|&(name, samples)| (name, to_halves(samples)))
+        .collect();
     work::add(Kind::Encodes, 1);
     let bytes = exr_runs::encode(size, planes, metadata).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
@@ -90,21 +99,36 @@ pub fn read_channels(path: impl AsRef<Path>) -> Result<((usize, usize), Vec<Chan
     let (path, limits) = (path.as_ref(), ReadOptions::default().limits);
     let source = Source::open(path, &limits)?;
     if source.format != Format::Exr {
-        return Err(Error::file(path, format!("is {}, expected an EXR", source.format.name())));
+        return Err(Error::file(
+            path,
+            format!("is {}, expected an EXR", source.format.name()),
+        ));
     }
     super::caught(|| channels(&source.bytes, &limits)).map_err(|e| Error::file(path, e))
 }
 
-fn channels(bytes: &[u8], limits: &Limits) -> std::result::Result<((usize, usize), Vec<Channel>), Refusal> {
+fn channels(
+    bytes: &[u8],
+    limits: &Limits,
+) -> std::result::Result<((usize, usize), Vec<Channel>), Refusal> {
     let file = File::new(bytes, limits)?;
     let part = file.flat_parts().next().ok_or("no part with pixels")?;
     let names = file.names(part);
     let (width, height) = size_of(file.window());
     limits.room(width, height, names.len())?;
     let picked: Vec<usize> = (0..names.len()).collect();
-    let samples = file.job(part, &picked, file.window(), Order::Planar)?.read()?;
+    let samples = file
+        .job(part, &picked, file.window(), Order::Planar)?
+        .read()?;
     let planes = samples.chunks_exact(width * height).map(<[f32]>::to_vec);
-    Ok(((width, height), names.into_iter().zip(planes).map(|(name, samples)| Channel { name, samples }).collect()))
+    Ok((
+        (width, height),
+        names
+            .into_iter()
+            .zip(planes)
+            .map(|(name, samples)| Channel { name, samples })
+            .collect(),
+    ))
 }
 
 /// A file whose headers were checked.
@@ -124,18 +148,34 @@ impl<'a> File<'a> {
         if let (Some(sampling), [header]) = (&sampling, &meta.headers[..]) {
             sampling.check(header)?;
         } else if sampling.is_some() {
-            return Err(Refusal::Unsupported("unsupported EXR: subsampled channels in one of several parts".into()));
+            return Err(Refusal::Unsupported(
+                "unsupported EXR: subsampled channels in one of several parts".into(),
+            ));
         }
-        Ok(Self { bytes, meta, sampling })
+        Ok(Self {
+            bytes,
+            meta,
+            sampling,
+        })
     }
 
     /// The parts whose pixels have one sample for each channel.
     fn flat_parts(&self) -> impl Iterator<Item = usize> {
-        self.meta.headers.iter().enumerate().filter(|(_, header)| !header.deep).map(|(part, _)| part)
+        self.meta
+            .headers
+            .iter()
+            .enumerate()
+            .filter(|(_, header)| !header.deep)
+            .map(|(part, _)| part)
     }
 
     fn names(&self, part: usize) -> Vec<String> {
-        self.meta.headers[part].channels.list.iter().map(|c| c.name.to_string()).collect()
+        self.meta.headers[part]
+            .channels
+            .list
+            .iter()
+            .map(|c| c.name.to_string())
+            .collect()
     }
 
     /// What all parts are shown in.
@@ -145,7 +185,10 @@ impl<'a> File<'a> {
 
     /// The primaries that are named, or ours.
     fn space(&self) -> RgbSpace {
-        self.meta.headers[0].shared_attributes.chromaticities.map_or(RgbSpace::REC709, space)
+        self.meta.headers[0]
+            .shared_attributes
+            .chromaticities
+            .map_or(RgbSpace::REC709, space)
     }
 
     fn job<'j>(
@@ -158,13 +201,24 @@ impl<'a> File<'a> {
         let (width, height) = size_of(window);
         affordable((width * height * picked.len()) as u64 * FLOAT)?;
         let (bytes, meta, sampling) = (&*self.bytes, &self.meta, self.sampling.as_ref());
-        Ok(Job { bytes, meta, part, picked, window, order, sampling })
+        Ok(Job {
+            bytes,
+            meta,
+            part,
+            picked,
+            window,
+            order,
+            sampling,
+        })
     }
 }
 
 fn space(named: Chromaticities) -> RgbSpace {
     let xy = |v: Vec2<f32>| [f64::from(v.x()), f64::from(v.y())];
-    RgbSpace { primaries: [named.red, named.green, named.blue].map(xy), white: xy(named.white) }
+    RgbSpace {
+        primaries: [named.red, named.green, named.blue].map(xy),
+        white: xy(named.white),
+    }
 }
 
 fn size_of(window: IntegerBounds) -> (usize, usize) {
@@ -172,26 +226,57 @@ fn size_of(window: IntegerBounds) -> (usize, usize) {
 }
 
 /// The headers alone, checked against the limits: data and display window of every part, and their sum.
-fn check(file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Result<MetaData, Refusal> {
-    let meta = MetaData::read_from_buffered(BufReader::new(file.take(limits.metadata_bytes)), false);
+fn check(
+    file: impl Read,
+    file_bytes: u64,
+    limits: &Limits,
+) -> std::result::Result<MetaData, Refusal> {
+    let meta =
+        MetaData::read_from_buffered(BufReader::new(file.take(limits.metadata_bytes)), false);
     if meta.is_err() && file_bytes > limits.metadata_bytes {
-        at_most(file_bytes, limits.metadata_bytes, "bytes without an end of the header", "metadata_bytes")?;
+        at_most(
+            file_bytes,
+            limits.metadata_bytes,
+            "bytes without an end of the header",
+            "metadata_bytes",
+        )?;
     }
     let meta = meta?;
     at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
     let mut total = 0_u64;
     for header in &meta.headers {
         let channels = header.channels.list.len() as u64;
-        let bytes_per_pixel = header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample() as u64).sum();
-        for size in [header.layer_size, header.shared_attributes.display_window.size] {
+        let bytes_per_pixel = header
+            .channels
+            .list
+            .iter()
+            .map(|c| c.sample_type.bytes_per_sample() as u64)
+            .sum();
+        for size in [
+            header.layer_size,
+            header.shared_attributes.display_window.size,
+        ] {
             let (width, height) = (size.x() as u64, size.y() as u64);
-            limits.check(Demand { width, height, channels, bytes_per_pixel, file_bytes })?;
+            limits.check(Demand {
+                width,
+                height,
+                channels,
+                bytes_per_pixel,
+                file_bytes,
+            })?;
         }
         total += header.layer_size.area() as u64 * bytes_per_pixel;
     }
-    at_most(total, limits.decoded_bytes, "decoded bytes", "decoded_bytes")?;
+    at_most(
+        total,
+        limits.decoded_bytes,
+        "decoded bytes",
+        "decoded_bytes",
+    )?;
     if meta.headers.iter().all(|h| h.deep) {
-        return Err(Refusal::Unsupported("deep EXR, expected flat pixels".into()));
+        return Err(Refusal::Unsupported(
+            "deep EXR, expected flat pixels".into(),
+        ));
     }
     Ok(meta)
 }
@@ -202,9 +287,16 @@ const FLOAT: u64 = 4;
 /// More than the attributes of a file take that says where its channels have fewer samples than pixels.
 const FIRST_BYTES: u64 = 1 << 16;
 
-pub(super) fn header(mut file: impl Read, file_bytes: u64, limits: &Limits) -> std::result::Result<Header, Refusal> {
+pub(super) fn header(
+    mut file: impl Read,
+    file_bytes: u64,
+    limits: &Limits,
+) -> std::result::Result<Header, Refusal> {
     let mut start = Vec::new();
-    file.by_ref().take(FIRST_BYTES).read_to_end(&mut start).map_err(exr::error::Error::from)?;
+    file.by_ref()
+        .take(FIRST_BYTES)
+        .read_to_end(&mut start)
+        .map_err(exr::error::Error::from)?;
     let start = Sampling::of(&start).map_or(start, |(_, even)| even);
     let meta = check(start.chain(file), file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
@@ -218,8 +310,15 @@ pub(super) fn header(mut file: impl Read, file_bytes: u64, limits: &Limits) -> s
         width,
         height,
         channels: in_usual_order(list.iter().map(|c| c.name.to_string()).collect()),
-        bits: list.iter().map(|c| 8 * c.sample_type.bytes_per_sample() as u32).max().unwrap_or(0),
-        data_at: [at(position.x(), shown.position.x()), at(position.y(), shown.position.y())],
+        bits: list
+            .iter()
+            .map(|c| 8 * c.sample_type.bytes_per_sample() as u32)
+            .max()
+            .unwrap_or(0),
+        data_at: [
+            at(position.x(), shown.position.x()),
+            at(position.y(), shown.position.y()),
+        ],
         data_size: [first.layer_size.x(), first.layer_size.y()],
         metadata: texts(first),
         ..Header::default()
@@ -228,13 +327,25 @@ pub(super) fn header(mut file: impl Read, file_bytes: u64, limits: &Limits) -> s
 
 /// `R G B A` first, the rest by name.
 fn in_usual_order(mut names: Vec<String>) -> Vec<String> {
-    names.sort_by_key(|n| ("RGBA".find(n.as_str()).filter(|_| n.len() == 1).unwrap_or(4), n.clone()));
+    names.sort_by_key(|n| {
+        (
+            "RGBA"
+                .find(n.as_str())
+                .filter(|_| n.len() == 1)
+                .unwrap_or(4),
+            n.clone(),
+        )
+    });
     names
 }
 
 fn texts(header: &exr::meta::header::Header) -> Notes {
     use exr::meta::attribute::AttributeValue;
-    let all = header.own_attributes.other.iter().chain(&header.shared_attributes.other);
+    let all = header
+        .own_attributes
+        .other
+        .iter()
+        .chain(&header.shared_attributes.other);
     let mut notes: Notes = all
         .filter_map(|(name, value)| match value {
             AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
@@ -253,9 +364,15 @@ pub(super) fn decode(
     shown: Window,
 ) -> std::result::Result<Raster, Refusal> {
     let file = File::new(bytes, limits)?;
-    let choices = file.flat_parts().map(|part| (part, choose(wanted, &file.names(part))));
-    let best =
-        choices.min_by_key(|(_, choice)| choice.as_ref().ok().map_or((true, None), |(fit, _)| (false, Some(*fit))));
+    let choices = file
+        .flat_parts()
+        .map(|part| (part, choose(wanted, &file.names(part))));
+    let best = choices.min_by_key(|(_, choice)| {
+        choice
+            .as_ref()
+            .ok()
+            .map_or((true, None), |(fit, _)| (false, Some(*fit)))
+    });
     let (part, choice) = best.ok_or("no part with pixels")?;
     let (_, mut picked) = choice?;
     picked.dedup();
@@ -268,7 +385,9 @@ pub(super) fn decode(
     limits.room(width, height, n)?;
     let all = file.names(part);
     let mut names: Vec<String> = picked.iter().map(|&i| all[i].clone()).collect();
-    let mut samples = file.job(part, &picked, window, Order::Interleaved)?.read()?;
+    let mut samples = file
+        .job(part, &picked, window, Order::Interleaved)?
+        .read()?;
     if matches!(wanted, Wanted::Color | Wanted::Film) && n >= 3 {
         let space = file.space();
         if names.starts_with(&LUMINANCE_CHROMA.map(String::from)) {
@@ -279,15 +398,27 @@ pub(super) fn decode(
             convert(&mut samples, n, &matrix);
         }
     }
-    Ok(Raster { width, height, names, samples: Samples::F32(samples), display_encoded: false, premultiplied: true })
+    Ok(Raster {
+        width,
+        height,
+        names,
+        samples: Samples::F32(samples),
+        display_encoded: false,
+        premultiplied: true,
+    })
 }
 
 /// Luminance with its differences where there are those, and what is chosen of other channels elsewhere.
 fn choose(wanted: Wanted, names: &[String]) -> std::result::Result<(Fit, Vec<usize>), String> {
     let at = |name: &str| names.iter().position(|n| n == name);
-    let chroma = LUMINANCE_CHROMA.into_iter().map(at).collect::<Option<Vec<_>>>();
+    let chroma = LUMINANCE_CHROMA
+        .into_iter()
+        .map(at)
+        .collect::<Option<Vec<_>>>();
     match (wanted, chroma) {
-        (Wanted::Color | Wanted::Film, Some(picked)) => Ok((Fit::Named, picked.into_iter().chain(at("A")).collect())),
+        (Wanted::Color | Wanted::Film, Some(picked)) => {
+            Ok((Fit::Named, picked.into_iter().chain(at("A")).collect()))
+        }
         _ => wanted.choose(names),
     }
 }
@@ -334,22 +465,41 @@ pub(super) fn encode(
     compression: Compression,
     metadata: &[(String, String)],
 ) -> std::result::Result<Vec<u8>, String> {
-    let text = |s: &str| Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"));
+    let text = |s: &str| {
+        Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"))
+    };
     let mut list = exr::prelude::SmallVec::new();
     for (name, samples) in planes {
         if samples.len() != width * height {
-            return Err(format!("channel {name}: {} samples, expected {width} x {height}", samples.len()));
+            return Err(format!(
+                "channel {name}: {} samples, expected {width} x {height}",
+                samples.len()
+            ));
         }
         list.push(AnyChannel::new(text(name)?, samples));
     }
     let mut attributes = LayerAttributes::default();
     for (key, value) in metadata {
-        attributes.other.insert(text(key)?, exr::meta::attribute::AttributeValue::Text(text(value)?));
+        attributes.other.insert(
+            text(key)?,
+            exr::meta::attribute::AttributeValue::Text(text(value)?),
+        );
     }
-    let encoding = Encoding { compression: compression.of_exr(), ..Encoding::SMALL_LOSSLESS };
-    let layer = Layer::new(Vec2(width, height), attributes, encoding, AnyChannels::sort(list));
+    let encoding = Encoding {
+        compression: compression.of_exr(),
+        ..Encoding::SMALL_LOSSLESS
+    };
+    let layer = Layer::new(
+        Vec2(width, height),
+        attributes,
+        encoding,
+        AnyChannels::sort(list),
+    );
     let mut out = Cursor::new(Vec::new());
-    exr::prelude::Image::from_layer(layer).write().to_buffered(&mut out).map_err(|e| e.to_string())?;
+    exr::prelude::Image::from_layer(layer)
+        .write()
+        .to_buffered(&mut out)
+        .map_err(|e| e.to_string())?;
     let mut bytes = out.into_inner();
     sort_attributes(&mut bytes, HEADER).ok_or("header of an unknown kind")?;
     Ok(bytes)
@@ -381,12 +531,22 @@ mod tests {
     use super::*;
 
     fn notes(n: usize) -> Notes {
-        (0..n).map(|i| (format!("petcomp:{i}"), format!("value {i}"))).collect()
+        (0..n)
+            .map(|i| (format!("petcomp:{i}"), format!("value {i}")))
+            .collect()
     }
 
     #[test]
     fn attributes_are_in_the_order_of_their_names() {
-        let file = || encode((2, 1), vec![("Z", floats(vec![1.0, 2.0]))], Compression::Zip, &notes(12)).unwrap();
+        let file = || {
+            encode(
+                (2, 1),
+                vec![("Z", floats(vec![1.0, 2.0]))],
+                Compression::Zip,
+                &notes(12),
+            )
+            .unwrap()
+        };
         assert_eq!(file(), file());
         let meta = header(file().as_slice(), 10_000, &Limits::default()).unwrap();
         assert_eq!(meta.metadata.len(), 12);
@@ -405,7 +565,13 @@ mod tests {
     #[test]
     fn other_primaries_become_ours() {
         let plane = |name, v: f32| AnyChannel::new(name, floats(vec![v]));
-        let list = [plane("R", 0.322_761), plane("G", 0.482_919), plane("B", 0.841_329)].into_iter().collect();
+        let list = [
+            plane("R", 0.322_761),
+            plane("G", 0.482_919),
+            plane("B", 0.841_329),
+        ]
+        .into_iter()
+        .collect();
         let mut image = exr::prelude::Image::from_channels(Vec2(1, 1), AnyChannels::sort(list));
         let xy = |x, y| Vec2(x, y);
         image.attributes.chromaticities = Some(Chromaticities {
@@ -417,9 +583,16 @@ mod tests {
         let read = |image: &exr::prelude::Image<_>| {
             let mut out = Cursor::new(Vec::new());
             WritableImage::write(image).to_buffered(&mut out).unwrap();
-            decode(out.get_ref(), &Limits::default(), Wanted::Color, Window::Display)
+            decode(
+                out.get_ref(),
+                &Limits::default(),
+                Wanted::Color,
+                Window::Display,
+            )
         };
-        let Samples::F32(rgb) = read(&image).unwrap().samples else { panic!("not floats") };
+        let Samples::F32(rgb) = read(&image).unwrap().samples else {
+            panic!("not floats")
+        };
         for (v, expected) in rgb.iter().zip([0.18, 0.5, 0.9]) {
             assert!((v - expected).abs() < 1e-4, "{rgb:?}");
         }
@@ -431,10 +604,17 @@ mod tests {
             white: xy(third, third),
         });
         assert!(read(&image).is_ok(), "CIE XYZ");
-        image.attributes.chromaticities =
-            Some(Chromaticities { red: xy(0.0, 0.0), ..image.attributes.chromaticities.unwrap() });
+        image.attributes.chromaticities = Some(Chromaticities {
+            red: xy(0.0, 0.0),
+            ..image.attributes.chromaticities.unwrap()
+        });
         image.attributes.chromaticities.as_mut().unwrap().white = xy(0.3, 0.0);
-        assert!(read(&image).unwrap_err().to_string().contains("expected those of a colour space"));
+        assert!(
+            read(&image)
+                .unwrap_err()
+                .to_string()
+                .contains("expected those of a colour space")
+        );
     }
 
     #[test]
@@ -443,19 +623,44 @@ mod tests {
             Vec2(2, 2),
             LayerAttributes::default(),
             Encoding::UNCOMPRESSED,
-            AnyChannels::sort([AnyChannel::new("Y", floats(vec![1.0, 2.0, 3.0, 4.0]))].into_iter().collect()),
+            AnyChannels::sort(
+                [AnyChannel::new("Y", floats(vec![1.0, 2.0, 3.0, 4.0]))]
+                    .into_iter()
+                    .collect(),
+            ),
         );
         layer.attributes.layer_position = Vec2(-1, 1);
         let mut image = exr::prelude::Image::from_layer(layer);
         image.attributes.display_window = IntegerBounds::from_dimensions(Vec2(2, 3));
         let mut out = Cursor::new(Vec::new());
         image.write().to_buffered(&mut out).unwrap();
-        let raster = decode(out.get_ref(), &Limits::default(), Wanted::Coverage, Window::Display).unwrap();
+        let raster = decode(
+            out.get_ref(),
+            &Limits::default(),
+            Wanted::Coverage,
+            Window::Display,
+        )
+        .unwrap();
         assert_eq!((raster.width, raster.height), (2, 3));
-        assert_eq!(raster.samples, Samples::F32(vec![0.0, 0.0, 2.0, 0.0, 4.0, 0.0]));
-        let kept = decode(out.get_ref(), &Limits::default(), Wanted::Coverage, Window::Data).unwrap();
-        assert_eq!((kept.width, kept.height, kept.samples), (2, 2, Samples::F32(vec![1.0, 2.0, 3.0, 4.0])));
+        assert_eq!(
+            raster.samples,
+            Samples::F32(vec![0.0, 0.0, 2.0, 0.0, 4.0, 0.0])
+        );
+        let kept = decode(
+            out.get_ref(),
+            &Limits::default(),
+            Wanted::Coverage,
+            Window::Data,
+        )
+        .unwrap();
+        assert_eq!(
+            (kept.width, kept.height, kept.samples),
+            (2, 2, Samples::F32(vec![1.0, 2.0, 3.0, 4.0]))
+        );
         let told = header(out.get_ref().as_slice(), 1_000, &Limits::default()).unwrap();
-        assert_eq!((told.width, told.height, told.data_at, told.data_size), (2, 3, [-1, 1], [2, 2]));
+        assert_eq!(
+            (told.width, told.height, told.data_at, told.data_size),
+            (2, 3, [-1, 1], [2, 2])
+        );
     }
 }

@@ -53,31 +53,46 @@ impl Job<'_> {
         let mut out = Out::new(self);
         let chunks = Reader::read_from_buffered(Cursor::new(self.bytes), false)?;
         let largest = Vec2(0, 0);
-        let mut chunks =
-            chunks.filter_chunks(false, |_, _, block| block.layer == self.part && block.level == largest)?;
+        let mut chunks = chunks.filter_chunks(false, |_, _, block| {
+            block.layer == self.part && block.level == largest
+        })?;
         let block_bytes = self.header().max_block_byte_size().max(1);
         let at_once = (IN_HAND / block_bytes).max(rayon::current_num_threads());
         loop {
-            let batch = chunks.by_ref().take(at_once).collect::<exr::error::Result<Vec<Chunk>>>()?;
+            let batch = chunks
+                .by_ref()
+                .take(at_once)
+                .collect::<exr::error::Result<Vec<Chunk>>>()?;
             if batch.is_empty() {
-                self.sampling.into_iter().for_each(|sampling| out.blend(sampling));
+                self.sampling
+                    .into_iter()
+                    .for_each(|sampling| out.blend(sampling));
                 return Ok(out.samples);
             }
-            let blocks = batch.into_par_iter().map(|chunk| self.decoded(chunk)).collect::<Result<Vec<_>>>()?;
+            let blocks = batch
+                .into_par_iter()
+                .map(|chunk| self.decoded(chunk))
+                .collect::<Result<Vec<_>>>()?;
             blocks.iter().for_each(|lines| lines.put(&mut out));
         }
     }
 
     fn decoded(&self, chunk: Chunk) -> Result<Block<'_>> {
         if let Some(sampling) = self.sampling {
-            return Ok(Block { header: self.header(), data: Data::Lines(sampling.lines(self, chunk)?) });
+            return Ok(Block {
+                header: self.header(),
+                data: Data::Lines(sampling.lines(self, chunk)?),
+            });
         }
         let block = UncompressedBlock::decompress_chunk(chunk, self.meta, false)?;
         // The table of blocks may lie.
         if block.index.layer != self.part || block.index.level != Vec2(0, 0) {
             return Err("damaged EXR: a block of another part".into());
         }
-        Ok(Block { header: self.header(), data: Data::Block(block) })
+        Ok(Block {
+            header: self.header(),
+            data: Data::Block(block),
+        })
     }
 }
 
@@ -103,12 +118,18 @@ enum Data {
 impl Block<'_> {
     fn put(&self, out: &mut Out<'_>) {
         match &self.data {
-            Data::Lines(lines) => lines.iter().for_each(|l| out.put(l.channel, l.x, l.y, &l.samples)),
+            Data::Lines(lines) => lines
+                .iter()
+                .for_each(|l| out.put(l.channel, l.x, l.y, &l.samples)),
             Data::Block(block) => {
                 let mut floats = Vec::new();
                 for line in block.lines(&self.header.channels) {
                     let (at, channel) = (line.location.position, line.location.channel);
-                    to_floats(line.value, self.header.channels.list[channel].sample_type, &mut floats);
+                    to_floats(
+                        line.value,
+                        self.header.channels.list[channel].sample_type,
+                        &mut floats,
+                    );
                     out.put(channel, at.x(), at.y(), &floats);
                 }
             }
@@ -151,23 +172,41 @@ impl<'a> Out<'a> {
     fn new(job: &Job<'a>) -> Self {
         let (width, height) = (job.window.size.x(), job.window.size.y());
         let shift = |at: i32, origin: i32| i64::from(at) - i64::from(origin);
-        let (at, window) = (job.header().own_attributes.layer_position, job.window.position);
+        let (at, window) = (
+            job.header().own_attributes.layer_position,
+            job.window.position,
+        );
         let (left, top) = (shift(at.x(), window.x()), shift(at.y(), window.y()));
         let samples = bytemuck::zeroed_vec(width * height * job.picked.len());
         let rows = job.header().layer_size.y();
-        Self { picked: job.picked, width, height, left, top, rows, order: job.order, samples }
+        Self {
+            picked: job.picked,
+            width,
+            height,
+            left,
+            top,
+            rows,
+            order: job.order,
+            samples,
+        }
     }
 
     /// A run of samples of a channel, cut to the window.
     fn put(&mut self, channel: usize, x: usize, y: usize, samples: &[f32]) {
-        let Some(slot) = self.picked.iter().position(|&c| c == channel) else { return };
+        let Some(slot) = self.picked.iter().position(|&c| c == channel) else {
+            return;
+        };
         let (x, y) = (x as i64 + self.left, y as i64 + self.top);
         let columns = super::exr::overlap(x, samples.len(), self.width);
         let rows = super::exr::overlap(y, 1, self.height);
-        let Some(row) = rows.into_iter().next().filter(|_| !columns.is_empty()) else { return };
+        let Some(row) = rows.into_iter().next().filter(|_| !columns.is_empty()) else {
+            return;
+        };
         let samples = &samples[(columns.start as i64 - x) as usize..][..columns.len()];
         let (at, step) = self.place(slot, row);
-        let to = self.samples[at + columns.start * step..].iter_mut().step_by(step);
+        let to = self.samples[at + columns.start * step..]
+            .iter_mut()
+            .step_by(step);
         to.zip(samples).for_each(|(to, &from)| *to = from);
     }
 

@@ -28,7 +28,10 @@ impl Sampling {
     pub(super) fn of(file: &[u8]) -> Option<(Self, Vec<u8>)> {
         let places = sampling_places(file)?;
         let number = |at: usize| Some(u32::from_le_bytes(*file.get(at..)?.first_chunk()?));
-        let pairs = places.iter().map(|&at| Some([number(at)?, number(at + 4)?])).collect::<Option<Vec<_>>>()?;
+        let pairs = places
+            .iter()
+            .map(|&at| Some([number(at)?, number(at + 4)?]))
+            .collect::<Option<Vec<_>>>()?;
         let known = pairs.iter().flatten().all(|&n| (1..=COARSEST).contains(&n));
         if !known || pairs.iter().flatten().all(|&n| n == 1) {
             return None;
@@ -37,7 +40,15 @@ impl Sampling {
         for at in places {
             even[at..at + 8].copy_from_slice(&[1, 0, 0, 0, 1, 0, 0, 0]);
         }
-        Some((Self(pairs.into_iter().map(|pair| pair.map(|n| n as usize)).collect()), even))
+        Some((
+            Self(
+                pairs
+                    .into_iter()
+                    .map(|pair| pair.map(|n| n as usize))
+                    .collect(),
+            ),
+            even,
+        ))
     }
 
     /// Whether the part is one that is read: rows, with a window that every sampling divides.
@@ -64,32 +75,43 @@ impl Sampling {
         let CompressedBlock::ScanLine(block) = chunk.compressed_block else {
             return Err("damaged EXR: a block of another kind".into());
         };
-        let top = i64::from(block.y_coordinate) - i64::from(header.own_attributes.layer_position.y());
+        let top =
+            i64::from(block.y_coordinate) - i64::from(header.own_attributes.layer_position.y());
         let (width, height) = (header.layer_size.x(), header.layer_size.y());
         let most = header.compression.scan_lines_per_block();
-        let top = usize::try_from(top).ok().filter(|y| *y < height && y % most == 0);
+        let top = usize::try_from(top)
+            .ok()
+            .filter(|y| *y < height && y % most == 0);
         let top = top.ok_or("damaged EXR: a block outside the picture")?;
         let rows = top..(top + most).min(height);
         // Bytes of each line that there is, in the order of the file.
         let present = |y: usize| (0..self.0.len()).filter(move |&c| y.is_multiple_of(self.0[c][1]));
         let lines = rows.clone().flat_map(|y| present(y).map(move |c| (c, y)));
-        let bytes = |c: usize| width / self.0[c][0] * header.channels.list[c].sample_type.bytes_per_sample();
+        let bytes = |c: usize| {
+            width / self.0[c][0] * header.channels.list[c].sample_type.bytes_per_sample()
+        };
         let total: usize = lines.clone().map(|(c, _)| bytes(c)).sum();
         let mut told = header.clone();
         told.channels.bytes_per_pixel = total / (width * rows.len());
         if told.channels.bytes_per_pixel * width * rows.len() != total {
-            return Err(Refusal::Unsupported("unsupported EXR: channels of this sampling".into()));
+            return Err(Refusal::Unsupported(
+                "unsupported EXR: channels of this sampling".into(),
+            ));
         }
         for (channel, &[x, y]) in told.channels.list.iter_mut().zip(&self.0) {
             channel.sampling = Vec2(x, y);
         }
         let section = IntegerBounds::new(Vec2(0, top as i32), Vec2(width, rows.len()));
         let pixels = block.compressed_pixels_le;
-        let data = header.compression.decompress_image_section_from_le(&told, pixels, section, false)?;
+        let data = header
+            .compression
+            .decompress_image_section_from_le(&told, pixels, section, false)?;
         let mut rest = &data[..];
         let mut out = Vec::new();
         for (c, y) in lines {
-            let (line, behind) = rest.split_at_checked(bytes(c)).ok_or("damaged EXR: a block that is too short")?;
+            let (line, behind) = rest
+                .split_at_checked(bytes(c))
+                .ok_or("damaged EXR: a block that is too short")?;
             rest = behind;
             let mut samples = Vec::new();
             to_floats(line, header.channels.list[c].sample_type, &mut samples);

@@ -6,8 +6,8 @@ use crate::work::{self, Kind};
 use crate::{Error, Result};
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes,
-    SmallVec, Text, Vec2, WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, SmallVec, Text, Vec2, WritableImage,
 };
 use std::io::Cursor;
 use std::path::Path;
@@ -55,23 +55,41 @@ pub fn write_parts(path: impl AsRef<Path>, size: (usize, usize), parts: &[Part])
 
 fn encode((width, height): (usize, usize), parts: &[Part]) -> std::result::Result<Vec<u8>, String> {
     if parts.is_empty() || width == 0 || height == 0 {
-        return Err(format!("{} parts of {width} x {height} pixels, expected at least one pixel", parts.len()));
+        return Err(format!(
+            "{} parts of {width} x {height} pixels, expected at least one pixel",
+            parts.len()
+        ));
     }
-    if let Some(twice) = parts.iter().enumerate().find(|(i, p)| parts[..*i].iter().any(|q| q.name == p.name)) {
+    if let Some(twice) = parts
+        .iter()
+        .enumerate()
+        .find(|(i, p)| parts[..*i].iter().any(|q| q.name == p.name))
+    {
         return Err(format!("two parts are called \"{}\"", twice.1.name));
     }
-    let layers = parts.iter().map(|part| layer((width, height), part)).collect::<std::result::Result<Vec<_>, _>>()?;
+    let layers = parts
+        .iter()
+        .map(|part| layer((width, height), part))
+        .collect::<std::result::Result<Vec<_>, _>>()?;
     let window = IntegerBounds::from_dimensions(Vec2(width, height));
     let image = Image::from_layers(ImageAttributes::new(window), layers);
     let mut out = Cursor::new(Vec::new());
-    image.write().to_buffered(&mut out).map_err(|e| e.to_string())?;
+    image
+        .write()
+        .to_buffered(&mut out)
+        .map_err(|e| e.to_string())?;
     let mut bytes = out.into_inner();
     sort_headers(&mut bytes).ok_or("header of an unknown kind")?;
     Ok(bytes)
 }
 
-fn layer((width, height): (usize, usize), part: &Part) -> std::result::Result<Layer<AnyChannels<FlatSamples>>, String> {
-    let text = |s: &str| Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"));
+fn layer(
+    (width, height): (usize, usize),
+    part: &Part,
+) -> std::result::Result<Layer<AnyChannels<FlatSamples>>, String> {
+    let text = |s: &str| {
+        Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"))
+    };
     let mut list = SmallVec::new();
     for (name, plane) in &part.channels {
         let samples = plane.samples();
@@ -86,9 +104,16 @@ fn layer((width, height): (usize, usize), part: &Part) -> std::result::Result<La
     }
     let mut attributes = LayerAttributes::named(text(&part.name)?);
     for (key, value) in &part.metadata {
-        attributes.other.insert(text(key)?, AttributeValue::Text(text(value)?));
+        attributes
+            .other
+            .insert(text(key)?, AttributeValue::Text(text(value)?));
     }
-    Ok(Layer::new(Vec2(width, height), attributes, Encoding::SMALL_LOSSLESS, AnyChannels::sort(list)))
+    Ok(Layer::new(
+        Vec2(width, height),
+        attributes,
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(list),
+    ))
 }
 
 /// Start of the first header: behind the magic number and the version.
@@ -117,11 +142,17 @@ mod tests {
     use exr::prelude::{ReadChannels, ReadLayers};
 
     fn parts() -> Vec<Part> {
-        let notes = |n: usize| (0..n).map(|i| (format!("note {i}"), format!("{i}"))).collect();
+        let notes = |n: usize| {
+            (0..n)
+                .map(|i| (format!("note {i}"), format!("{i}")))
+                .collect()
+        };
         vec![
             Part {
                 name: "beauty".into(),
-                channels: ["R", "G", "B"].map(|c| (c.to_string(), Plane::Float(vec![0.5, 2.0]))).to_vec(),
+                channels: ["R", "G", "B"]
+                    .map(|c| (c.to_string(), Plane::Float(vec![0.5, 2.0])))
+                    .to_vec(),
                 metadata: notes(9),
             },
             Part {
@@ -147,7 +178,10 @@ mod tests {
         assert_eq!(image.layer_data.len(), 2);
         let id = &image.layer_data[1];
         assert_eq!(id.attributes.layer_name.as_ref().unwrap().to_string(), "id");
-        assert_eq!(id.channel_data.list[0].sample_data, FlatSamples::U32(vec![7, u32::MAX]));
+        assert_eq!(
+            id.channel_data.list[0].sample_data,
+            FlatSamples::U32(vec![7, u32::MAX])
+        );
         assert_eq!(id.attributes.other.len(), 7);
     }
 
@@ -156,9 +190,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
         write_parts(&path, (2, 1), &parts()[..1]).unwrap();
-        assert_eq!(crate::io::read::<crate::LinearRgb>(&path).unwrap()[(1, 0)], crate::LinearRgb::grey(2.0));
+        assert_eq!(
+            crate::io::read::<crate::LinearRgb>(&path).unwrap()[(1, 0)],
+            crate::LinearRgb::grey(2.0)
+        );
         write_parts(&path, (2, 1), &parts()).unwrap();
-        assert_eq!(crate::io::read::<crate::LinearRgb>(&path).unwrap()[(0, 0)], crate::LinearRgb::grey(0.5));
+        assert_eq!(
+            crate::io::read::<crate::LinearRgb>(&path).unwrap()[(0, 0)],
+            crate::LinearRgb::grey(0.5)
+        );
     }
 
     #[test]

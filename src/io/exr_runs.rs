@@ -37,20 +37,46 @@ pub(super) fn encode(
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
     channels.sort_by_key(|(name, _)| *name);
-    if let Some((name, samples)) = channels.iter().find(|(_, samples)| samples.len() != width * height) {
-        return Err(format!("channel {name}: {} samples, expected {width} x {height}", samples.len()));
+    if let Some((name, samples)) = channels
+        .iter()
+        .find(|(_, samples)| samples.len() != width * height)
+    {
+        return Err(format!(
+            "channel {name}: {} samples, expected {width} x {height}",
+            samples.len()
+        ));
     }
-    let header = header((width, height), channels.iter().map(|(name, _)| *name), metadata)?;
+    let header = header(
+        (width, height),
+        channels.iter().map(|(name, _)| *name),
+        metadata,
+    )?;
     let first_rows: Vec<usize> = (0..height).step_by(ROWS).collect();
     let block = |y: &usize| deflated(&samples_of(&channels, width, *y..(*y + ROWS).min(height)));
     let blocks: Vec<Vec<u8>> = first_rows.par_iter().map(block).collect();
     let mut out = Cursor::new(Vec::new());
-    let written = exr::block::write(&mut out, SmallVec::from_elem(header, 1), true, |_, writer| {
-        first_rows.iter().zip(blocks).enumerate().try_for_each(|(i, (y, compressed_pixels_le))| {
-            let block = CompressedScanLineBlock { y_coordinate: *y as i32, compressed_pixels_le };
-            writer.write_chunk(i, Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) })
-        })
-    });
+    let written = exr::block::write(
+        &mut out,
+        SmallVec::from_elem(header, 1),
+        true,
+        |_, writer| {
+            first_rows.iter().zip(blocks).enumerate().try_for_each(
+                |(i, (y, compressed_pixels_le))| {
+                    let block = CompressedScanLineBlock {
+                        y_coordinate: *y as i32,
+                        compressed_pixels_le,
+                    };
+                    writer.write_chunk(
+                        i,
+                        Chunk {
+                            layer_index: 0,
+                            compressed_block: CompressedBlock::ScanLine(block),
+                        },
+                    )
+                },
+            )
+        },
+    );
     written.map_err(|e| e.to_string())?;
     let mut bytes = out.into_inner();
     sort_attributes(&mut bytes, HEADER).ok_or("header of an unknown kind")?;
@@ -62,35 +88,63 @@ fn header<'a>(
     names: impl Iterator<Item = &'a str>,
     metadata: &[(String, String)],
 ) -> Result<Header, String> {
-    let text = |s: &str| Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"));
+    let text = |s: &str| {
+        Text::new_or_none(s).ok_or_else(|| format!("{s:?} cannot stand in an EXR (not Latin-1)"))
+    };
     let channels = names.map(|name| Ok(ChannelDescription::named(text(name)?, SampleType::F16)));
     let channels: SmallVec<[ChannelDescription; 5]> = channels.collect::<Result<_, String>>()?;
     let mut attributes = LayerAttributes::default();
     for (key, value) in metadata {
-        attributes.other.insert(text(key)?, AttributeValue::Text(text(value)?));
+        attributes
+            .other
+            .insert(text(key)?, AttributeValue::Text(text(value)?));
     }
-    let header = Header::new(Text::default(), Vec2(size.0, size.1), channels).with_attributes(attributes);
-    Ok(header.with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing))
+    let header =
+        Header::new(Text::default(), Vec2(size.0, size.1), channels).with_attributes(attributes);
+    Ok(header.with_encoding(
+        Compression::ZIP16,
+        BlockDescription::ScanLines,
+        LineOrder::Increasing,
+    ))
 }
 
 /// The samples of some rows as a block has them: row by row, channel by channel.
-fn samples_of(channels: &[(&str, Vec<f16>)], width: usize, rows: std::ops::Range<usize>) -> Vec<f16> {
-    let lines = rows.flat_map(|y| channels.iter().map(move |(_, samples)| &samples[y * width..][..width]));
+fn samples_of(
+    channels: &[(&str, Vec<f16>)],
+    width: usize,
+    rows: std::ops::Range<usize>,
+) -> Vec<f16> {
+    let lines = rows.flat_map(|y| {
+        channels
+            .iter()
+            .map(move |(_, samples)| &samples[y * width..][..width])
+    });
     lines.collect::<Vec<_>>().concat()
 }
 
 /// What EXR deflates: all low bytes before all high ones, each as its difference from the one before, plus 128.
 fn predicted(samples: &[f16]) -> Vec<u8> {
     let bits = || samples.iter().map(|v| v.to_bits().to_le_bytes());
-    let bytes: Vec<u8> = bits().map(|[low, _]| low).chain(bits().map(|[_, high]| high)).collect();
-    let differences = bytes.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
-    bytes.first().copied().into_iter().chain(differences).collect()
+    let bytes: Vec<u8> = bits()
+        .map(|[low, _]| low)
+        .chain(bits().map(|[_, high]| high))
+        .collect();
+    let differences = bytes
+        .windows(2)
+        .map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
+    bytes
+        .first()
+        .copied()
+        .into_iter()
+        .chain(differences)
+        .collect()
 }
 
 /// A block as the file has it: deflated, or as it is where that is not larger.
 fn deflated(samples: &[f16]) -> Vec<u8> {
     let plain = predicted(samples);
-    let mut deflate = CompressorOxide::new(create_comp_flags_from_zip_params(LEVEL, WINDOW_BITS, RUNS));
+    let mut deflate =
+        CompressorOxide::new(create_comp_flags_from_zip_params(LEVEL, WINDOW_BITS, RUNS));
     let mut out = vec![0; plain.len()];
     match compress(&mut deflate, &plain, &mut out, TDEFLFlush::Finish) {
         (TDEFLStatus::Done, _, length) if length < plain.len() => {
@@ -109,16 +163,28 @@ mod tests {
     use exr::prelude::FlatSamples;
 
     fn grain(count: usize) -> Vec<f32> {
-        (0..count).map(|i| if i % 7 < 3 { 1.0 } else { ((i * 7919) % 1009) as f32 / 1009.0 }).collect()
+        (0..count)
+            .map(|i| {
+                if i % 7 < 3 {
+                    1.0
+                } else {
+                    ((i * 7919) % 1009) as f32 / 1009.0
+                }
+            })
+            .collect()
     }
 
     fn samples(values: &[f32]) -> Vec<f16> {
-        let FlatSamples::F16(samples) = halves(values) else { panic!("not halves") };
+        let FlatSamples::F16(samples) = halves(values) else {
+            panic!("not halves")
+        };
         samples
     }
 
     fn decoded(bytes: &[u8]) -> (usize, usize, Samples) {
-        let raster = super::super::exr::decode(bytes, &Limits::default(), Wanted::Color, Window::Display).unwrap();
+        let raster =
+            super::super::exr::decode(bytes, &Limits::default(), Wanted::Color, Window::Display)
+                .unwrap();
         (raster.width, raster.height, raster.samples)
     }
 
@@ -127,17 +193,32 @@ mod tests {
         let (size, values) = ((67, 41), grain(67 * 41));
         let names = ["R", "G", "B"];
         let notes = [("petcomp:note".to_string(), "text".to_string())];
-        let ours = encode(size, names.map(|name| (name, samples(&values))).into(), &notes).unwrap();
-        let usual =
-            encode_any(size, names.map(|name| (name, halves(&values))).into(), Compression::Zip, &notes).unwrap();
+        let ours = encode(
+            size,
+            names.map(|name| (name, samples(&values))).into(),
+            &notes,
+        )
+        .unwrap();
+        let usual = encode_any(
+            size,
+            names.map(|name| (name, halves(&values))).into(),
+            Compression::Zip,
+            &notes,
+        )
+        .unwrap();
         assert_eq!(decoded(&ours), decoded(&usual));
         let end = sort_attributes(&mut usual.clone(), HEADER).unwrap();
-        assert_eq!(String::from_utf8_lossy(&ours[..end]), String::from_utf8_lossy(&usual[..end]));
+        assert_eq!(
+            String::from_utf8_lossy(&ours[..end]),
+            String::from_utf8_lossy(&usual[..end])
+        );
     }
 
     #[test]
     fn what_does_not_shrink_is_kept_as_it_is() {
-        let noise: Vec<f16> = (0..48_u64).map(|i| f16::from_bits((i * i * 40_503 % 31_744) as u16)).collect();
+        let noise: Vec<f16> = (0..48_u64)
+            .map(|i| f16::from_bits((i * i * 40_503 % 31_744) as u16))
+            .collect();
         let bytes = encode((48, 1), vec![("Y", noise.clone())], &[]).unwrap();
         let raw: Vec<u8> = noise.iter().flat_map(|v| v.to_le_bytes()).collect();
         assert!(bytes.ends_with(&raw));
@@ -145,8 +226,19 @@ mod tests {
 
     #[test]
     fn a_channel_of_another_size_or_twice_is_refused() {
-        assert!(encode((2, 2), vec![("Y", vec![f16::ONE; 3])], &[]).unwrap_err().contains("expected 2 x 2"));
-        assert!(encode((1, 1), vec![("Y", vec![f16::ONE]), ("Y", vec![f16::ONE])], &[]).is_err());
+        assert!(
+            encode((2, 2), vec![("Y", vec![f16::ONE; 3])], &[])
+                .unwrap_err()
+                .contains("expected 2 x 2")
+        );
+        assert!(
+            encode(
+                (1, 1),
+                vec![("Y", vec![f16::ONE]), ("Y", vec![f16::ONE])],
+                &[]
+            )
+            .is_err()
+        );
         assert!(encode((0, 0), vec![("Y", vec![])], &[]).is_err());
     }
 }

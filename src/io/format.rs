@@ -46,7 +46,10 @@ const MAGIC: [(&[u8], Format); 13] = [
 impl Format {
     /// The kind of a file from its first bytes.
     pub(super) fn of_bytes(bytes: &[u8]) -> Option<Self> {
-        MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, format)| format)
+        MAGIC
+            .iter()
+            .find(|(magic, _)| bytes.starts_with(magic))
+            .map(|&(_, format)| format)
     }
 
     /// The kind that an extension promises, in any case; what a new file is written as.
@@ -79,7 +82,10 @@ impl Format {
     /// The kind whose [`name`](Self::name) it is.
     #[cfg(feature = "oiio")]
     pub(super) fn of_name(name: &str) -> Option<Self> {
-        MAGIC.iter().map(|&(_, format)| format).find(|f| f.name() == name)
+        MAGIC
+            .iter()
+            .map(|&(_, format)| format)
+            .find(|f| f.name() == name)
     }
 }
 
@@ -104,16 +110,28 @@ impl Opened {
         let mut file = BufReader::new(file);
         let start = file.fill_buf().map_err(|e| Error::file(path, reason(&e)))?;
         let format = recognized(path, start).map_err(|e| Error::file(path, e))?;
-        Ok(Self { file, bytes, format })
+        Ok(Self {
+            file,
+            bytes,
+            format,
+        })
     }
 }
 
 impl Source {
     /// Reads a picture file that is worth decoding.
     pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
-        let Opened { file, bytes, format } = Opened::open(path, limits)?;
+        let Opened {
+            file,
+            bytes,
+            format,
+        } = Opened::open(path, limits)?;
         let bytes = all_of(file, bytes, limits.file_bytes).map_err(|e| Error::file(path, e))?;
-        Ok(Self { path: path.into(), bytes, format })
+        Ok(Self {
+            path: path.into(),
+            bytes,
+            format,
+        })
     }
 }
 
@@ -125,11 +143,19 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
         return Err("empty file (0 bytes), expected a picture".into());
     }
     match Format::of_bytes(start) {
-        Some(format @ (Format::Dpx | Format::Cineon)) if Format::of_extension(path) != Some(format) => {
-            Err(format!("is {} under another name, {EXPECTED}", format.name()))
+        Some(format @ (Format::Dpx | Format::Cineon))
+            if Format::of_extension(path) != Some(format) =>
+        {
+            Err(format!(
+                "is {} under another name, {EXPECTED}",
+                format.name()
+            ))
         }
         Some(format) => Ok(format),
-        None => Err(format!("not a picture petcomp reads (starts with {}), {EXPECTED}", beginning(start))),
+        None => Err(format!(
+            "not a picture petcomp reads (starts with {}), {EXPECTED}",
+            beginning(start)
+        )),
     }
 }
 
@@ -138,7 +164,8 @@ fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> 
 pub(super) fn open_regular(path: &Path, most: (u64, &str), expected: &str) -> Result<(File, u64)> {
     let failed = |e: std::io::Error| Error::file(path, reason(&e));
     // Looked at before it is opened, because opening may wait, and after, because it may be another by then.
-    regular(&std::fs::metadata(path).map_err(failed)?, expected).map_err(|e| Error::file(path, e))?;
+    regular(&std::fs::metadata(path).map_err(failed)?, expected)
+        .map_err(|e| Error::file(path, e))?;
     let file = File::open(path).map_err(failed)?;
     let meta = file.metadata().map_err(failed)?;
     regular(&meta, expected)
@@ -165,7 +192,9 @@ pub(super) fn read_regular(path: &Path, most: (u64, &str), expected: &str) -> Re
 fn all_of(file: impl Read, told: u64, most: u64) -> std::result::Result<Vec<u8>, String> {
     affordable(told)?;
     let mut bytes = Vec::with_capacity(usize::try_from(told).unwrap_or(0));
-    file.take(most).read_to_end(&mut bytes).map_err(|e| reason(&e))?;
+    file.take(most)
+        .read_to_end(&mut bytes)
+        .map_err(|e| reason(&e))?;
     work::add_all([(Kind::FilesRead, 1), (Kind::BytesRead, bytes.len() as u64)]);
     Ok(bytes)
 }
@@ -180,7 +209,10 @@ pub(super) fn reason(e: &std::io::Error) -> String {
         K::StorageFull => "no space left on the disk".into(),
         _ => {
             let text = e.to_string().to_lowercase();
-            text.split(" (os error").next().unwrap_or_default().to_string()
+            text.split(" (os error")
+                .next()
+                .unwrap_or_default()
+                .to_string()
         }
     }
 }
@@ -189,8 +221,18 @@ pub(super) fn reason(e: &std::io::Error) -> String {
 fn beginning(bytes: &[u8]) -> String {
     let head = &bytes[..bytes.len().min(12)];
     match std::str::from_utf8(head) {
-        Ok(text) if text.chars().all(|c| !c.is_control() || c.is_ascii_whitespace()) => format!("{text:?}"),
-        _ => head[..head.len().min(8)].iter().map(|b| format!("{b:02x}")).collect::<Vec<_>>().join(" "),
+        Ok(text)
+            if text
+                .chars()
+                .all(|c| !c.is_control() || c.is_ascii_whitespace()) =>
+        {
+            format!("{text:?}")
+        }
+        _ => head[..head.len().min(8)]
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect::<Vec<_>>()
+            .join(" "),
     }
 }
 
@@ -200,9 +242,15 @@ mod tests {
 
     #[test]
     fn content_decides_and_the_extension_is_only_a_hint() {
-        assert_eq!(Format::of_bytes(b"\x89PNG\r\n\x1a\n...."), Some(Format::Png));
+        assert_eq!(
+            Format::of_bytes(b"\x89PNG\r\n\x1a\n...."),
+            Some(Format::Png)
+        );
         assert_eq!(Format::of_bytes(b"hello"), None);
-        assert_eq!(Format::of_extension(Path::new("a/b.TIFF")), Some(Format::Tiff));
+        assert_eq!(
+            Format::of_extension(Path::new("a/b.TIFF")),
+            Some(Format::Tiff)
+        );
         assert_eq!(Format::of_extension(Path::new("a/b")), None);
     }
 

@@ -30,7 +30,10 @@ const FIRST_LINE: &[u8] = b"#?RADIANCE\n";
 const RGBE: &[u8] = b"FORMAT=32-bit_rle_rgbe\n";
 const XYZE: &[u8] = b"FORMAT=32-bit_rle_xyze\n";
 /// CIE XYZ as the primaries of light: its white is that of equal energy.
-const XYZ: RgbSpace = RgbSpace { primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0; 2] };
+const XYZ: RgbSpace = RgbSpace {
+    primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
+    white: [1.0 / 3.0; 2],
+};
 
 /// A file that the decoder takes for one of rows from the top in its own primaries, and what it really is.
 struct Opened<R: Read> {
@@ -39,11 +42,21 @@ struct Opened<R: Read> {
     is_xyz: bool,
 }
 
-fn open(mut file: impl BufRead, file_bytes: u64, limits: &Limits) -> Result<Opened<impl Read>, Refusal> {
+fn open(
+    mut file: impl BufRead,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Opened<impl Read>, Refusal> {
     let line = |file: &mut dyn BufRead| {
         let mut line = Vec::new();
-        let count = file.read_until(b'\n', &mut line).map_err(ImageError::from)?;
-        if count == 0 { Err(Refusal::from("truncated HDR (no picture)")) } else { Ok(line) }
+        let count = file
+            .read_until(b'\n', &mut line)
+            .map_err(ImageError::from)?;
+        if count == 0 {
+            Err(Refusal::from("truncated HDR (no picture)"))
+        } else {
+            Ok(line)
+        }
     };
     line(&mut file)?;
     let (mut head, mut is_xyz) = (FIRST_LINE.to_vec(), false);
@@ -66,7 +79,11 @@ fn open(mut file: impl BufRead, file_bytes: u64, limits: &Limits) -> Result<Open
         bytes_per_pixel: 12,
         file_bytes,
     })?;
-    Ok(Opened { decoder, orientation, is_xyz })
+    Ok(Opened {
+        decoder,
+        orientation,
+        is_xyz,
+    })
 }
 
 /// Characters of a line that are told where it is no size.
@@ -78,8 +95,14 @@ fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
     let text = String::from_utf8_lossy(line);
     // Where the line does not end, all of the pixels would be in the message.
     let shown: String = text.trim().chars().take(LONGEST_SHOWN).collect();
-    let unknown = || Refusal::Broken(format!("damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""));
-    let [rows, height, columns, width] = text.split_whitespace().collect::<Vec<_>>()[..] else { return Err(unknown()) };
+    let unknown = || {
+        Refusal::Broken(format!(
+            "damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""
+        ))
+    };
+    let [rows, height, columns, width] = text.split_whitespace().collect::<Vec<_>>()[..] else {
+        return Err(unknown());
+    };
     let orientation = match (rows, columns) {
         ("-Y", "+X") => 1,
         ("-Y", "-X") => 2,
@@ -95,8 +118,16 @@ fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
     Ok(([number(width)?, number(height)?], Orientation(orientation)))
 }
 
-pub(super) fn header(file: impl BufRead, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
-    let Opened { decoder, orientation, .. } = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
+pub(super) fn header(
+    file: impl BufRead,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
+    let Opened {
+        decoder,
+        orientation,
+        ..
+    } = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
     let (width, height) = decoder.dimensions();
     let (width, height) = orientation.size((width as usize, height as usize));
     Ok(Header {
@@ -111,18 +142,33 @@ pub(super) fn header(file: impl BufRead, file_bytes: u64, limits: &Limits) -> Re
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
-    check_length(&bytes[..bytes.len().min(limits.metadata_bytes as usize + 1)], limits)?;
-    let Opened { decoder, orientation, is_xyz } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    check_length(
+        &bytes[..bytes.len().min(limits.metadata_bytes as usize + 1)],
+        limits,
+    )?;
+    let Opened {
+        decoder,
+        orientation,
+        is_xyz,
+    } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
     let (width, height) = (width as usize, height as usize);
     limits.room(width, height, 3)?;
     let mut data = vec![0_f32; width * height * 3];
     decoder.read_image(bytemuck::cast_slice_mut(&mut data))?;
     if let (true, Some(matrix)) = (is_xyz, to_rec709(&XYZ)?) {
-        data.chunks_exact_mut(3).for_each(|px| px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]])));
+        data.chunks_exact_mut(3)
+            .for_each(|px| px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]])));
     }
     let (names, samples) = (usual_names(3).unwrap_or_default(), Samples::F32(data));
-    let raster = Raster { width, height, names, samples, display_encoded: false, premultiplied: false };
+    let raster = Raster {
+        width,
+        height,
+        names,
+        samples,
+        display_encoded: false,
+        premultiplied: false,
+    };
     Ok(raster.upright(orientation))
 }
 
@@ -134,19 +180,37 @@ mod tests {
     fn read(format: &str, size: &str) -> Raster {
         let pixels = (0..6_u8).flat_map(|i| [128 + i, 128, 128, 129]);
         let head = format!("#?RGBE\nFORMAT=32-bit_rle_{format}\n\n{size}\n");
-        decode(&head.into_bytes().into_iter().chain(pixels).collect::<Vec<_>>(), &Limits::default()).unwrap()
+        decode(
+            &head
+                .into_bytes()
+                .into_iter()
+                .chain(pixels)
+                .collect::<Vec<_>>(),
+            &Limits::default(),
+        )
+        .unwrap()
     }
 
     fn reds(raster: &Raster) -> Vec<i32> {
-        let Samples::F32(v) = &raster.samples else { panic!("not floats") };
-        v.iter().step_by(3).map(|v| (v * 128.0 - 128.0).round() as i32).collect()
+        let Samples::F32(v) = &raster.samples else {
+            panic!("not floats")
+        };
+        v.iter()
+            .step_by(3)
+            .map(|v| (v * 128.0 - 128.0).round() as i32)
+            .collect()
     }
 
     #[test]
     fn a_size_without_an_end_is_told_in_part() {
         let file = [b"#?RGBE\n\n-Y 30 +X 40".as_slice(), &[1; 4_000], b"\n"].concat();
-        let Err(Refusal::Broken(what)) = decode(&file, &Limits::default()) else { panic!("read") };
-        assert!(what.starts_with("damaged HDR: size \"-Y 30 +X 40") && what.len() < 300, "{what}");
+        let Err(Refusal::Broken(what)) = decode(&file, &Limits::default()) else {
+            panic!("read")
+        };
+        assert!(
+            what.starts_with("damaged HDR: size \"-Y 30 +X 40") && what.len() < 300,
+            "{what}"
+        );
     }
 
     #[test]
@@ -162,14 +226,24 @@ mod tests {
             ("+X 2 +Y 3", (2, 3), [2, 5, 1, 4, 0, 3]),
         ] {
             let raster = read("rgbe", size);
-            assert_eq!(((raster.width, raster.height), reds(&raster)), (shape, expected.to_vec()), "{size}");
+            assert_eq!(
+                ((raster.width, raster.height), reds(&raster)),
+                (shape, expected.to_vec()),
+                "{size}"
+            );
         }
         assert!(resolution(b"-Y 2 -Y 3").is_err() && resolution(b"-Y 2 +X").is_err());
     }
 
     #[test]
     fn xyz_of_equal_energy_is_white() {
-        let Samples::F32(v) = read("xyze", "-Y 2 +X 3").samples else { panic!("not floats") };
-        assert!(v[..3].iter().all(|v| (v - 1.0).abs() < 1e-5), "{:?}", &v[..3]);
+        let Samples::F32(v) = read("xyze", "-Y 2 +X 3").samples else {
+            panic!("not floats")
+        };
+        assert!(
+            v[..3].iter().all(|v| (v - 1.0).abs() < 1e-5),
+            "{:?}",
+            &v[..3]
+        );
     }
 }

@@ -61,10 +61,16 @@ pub(super) fn note(key: &str, value: &str) -> (String, String) {
 
 /// Notes for formats that keep a single text: a line `key=value` each.
 pub(super) fn lines_of_notes(notes: &Notes) -> String {
-    notes.iter().map(|(key, value)| format!("{key}={}\n", value.replace('\n', " "))).collect()
+    notes
+        .iter()
+        .map(|(key, value)| format!("{key}={}\n", value.replace('\n', " ")))
+        .collect()
 }
 
 /// The inverse of [`lines_of_notes`]; other lines are left out.
 pub(super) fn notes_of_lines(text: &str) -> Notes {
-    text.lines().filter_map(|line| line.split_once('=')).map(|(key, value)| note(key, value)).collect()
+    text.lines()
+        .filter_map(|line| line.split_once('='))
+        .map(|(key, value)| note(key, value))
+        .collect()
 }

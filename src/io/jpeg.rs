@@ -47,7 +47,12 @@ pub(super) fn head(file: &mut impl Read, limits: &Limits) -> Result<Vec<u8>, Ref
         let length = usize::from(u16::from_be_bytes([bytes[at + 2], bytes[at + 3]])).max(2);
         bytes.resize(at + 2 + length, 0);
         file.read_exact(&mut bytes[at + 4..]).map_err(cut)?;
-        at_most(bytes.len() as u64, limits.metadata_bytes, "bytes in front of the picture", "metadata_bytes")?;
+        at_most(
+            bytes.len() as u64,
+            limits.metadata_bytes,
+            "bytes in front of the picture",
+            "metadata_bytes",
+        )?;
         check_kind(marker, bytes.get(at + 4))?;
         if marker == SOS {
             return Ok(bytes);
@@ -68,12 +73,22 @@ fn check_kind(marker: u8, bits: Option<&u8>) -> Result<(), Refusal> {
     Err(Refusal::Unsupported(format!("unsupported JPEG: {kind}")))
 }
 
-fn open<'a>(bytes: &'a [u8], file_bytes: u64, limits: &Limits) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
+fn open<'a>(
+    bytes: &'a [u8],
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
     let decoder = JpegDecoder::new(Cursor::new(bytes))?;
     let (width, height) = decoder.dimensions();
     let channels = u64::from(decoder.color_type().channel_count());
     let (width, height) = (width.into(), height.into());
-    limits.check(Demand { width, height, channels, bytes_per_pixel: channels, file_bytes })?;
+    limits.check(Demand {
+        width,
+        height,
+        channels,
+        bytes_per_pixel: channels,
+        file_bytes,
+    })?;
     Ok(decoder)
 }
 
@@ -81,7 +96,9 @@ fn open<'a>(bytes: &'a [u8], file_bytes: u64, limits: &Limits) -> Result<JpegDec
 pub(super) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
     let decoder = open(start, file_bytes, limits)?;
     let (width, height) = decoder.dimensions();
-    let comments = segments(start).filter(|s| s.marker == COM).map(|s| String::from_utf8_lossy(s.data).into_owned());
+    let comments = segments(start)
+        .filter(|s| s.marker == COM)
+        .map(|s| String::from_utf8_lossy(s.data).into_owned());
     Ok(Header {
         format: Format::Jpeg,
         width: width as usize,
@@ -95,9 +112,14 @@ pub(super) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<H
 
 /// The embedded colour profile, which segments of 64 KiB hold in parts.
 pub(super) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
-    let parts = segments(bytes).take_while(|s| s.marker != SOS).filter(|s| s.marker == APP2);
+    let parts = segments(bytes)
+        .take_while(|s| s.marker != SOS)
+        .filter(|s| s.marker == APP2);
     let numbered = |s: Segment<'_>| {
-        s.data.strip_prefix(ICC)?.split_first_chunk().map(|(&[number, _], part)| (number, part.to_vec()))
+        s.data
+            .strip_prefix(ICC)?
+            .split_first_chunk()
+            .map(|(&[number, _], part)| (number, part.to_vec()))
     };
     let mut parts: Vec<(u8, Vec<u8>)> = parts.filter_map(numbered).collect();
     parts.sort_by_key(|&(number, _)| number);
@@ -112,7 +134,8 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     }
     let decoder = open(bytes, bytes.len() as u64, limits)?;
     let (width, height) = decoder.dimensions();
-    let names = usual_names(decoder.color_type().channel_count().into()).ok_or("channels of an unknown kind")?;
+    let names = usual_names(decoder.color_type().channel_count().into())
+        .ok_or("channels of an unknown kind")?;
     limits.room(width as usize, height as usize, names.len())?;
     let mut data = vec![0; usize::try_from(decoder.total_bytes()).map_err(|_| "size overflows")?];
     decoder.read_image(&mut data)?;
@@ -144,7 +167,9 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = Segment<'_>> {
         while rest.first() == Some(&0xff) && rest.get(1) == Some(&0xff) {
             rest = &rest[1..];
         }
-        let (&[0xff, marker], tail) = rest.split_first_chunk()? else { return None };
+        let (&[0xff, marker], tail) = rest.split_first_chunk()? else {
+            return None;
+        };
         if marker == EOI {
             rest = &[];
             return Some(Segment { marker, data: &[] });
@@ -170,8 +195,15 @@ pub(super) fn encode(
     quality: u8,
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
-    let color = if codes.len() == width * height { ExtendedColorType::L8 } else { ExtendedColorType::Rgb8 };
-    let (width, height) = u32::try_from(width).ok().zip(u32::try_from(height).ok()).ok_or("size overflows")?;
+    let color = if codes.len() == width * height {
+        ExtendedColorType::L8
+    } else {
+        ExtendedColorType::Rgb8
+    };
+    let (width, height) = u32::try_from(width)
+        .ok()
+        .zip(u32::try_from(height).ok())
+        .ok_or("size overflows")?;
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality)
         .encode(codes, width, height, color)
@@ -182,10 +214,22 @@ pub(super) fn encode(
 
 /// A picture as it comes back from a file of a quality, 1 to 100; nothing for one without pixels.
 pub(crate) fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
-    let file = encode(image.size(), bytemuck::cast_slice(image.pixels()), quality, &[]).ok()?;
+    let file = encode(
+        image.size(),
+        bytemuck::cast_slice(image.pixels()),
+        quality,
+        &[],
+    )
+    .ok()?;
     let raster = decode(&file, &Limits::default()).ok()?;
-    let Samples::U8(codes) = raster.samples else { return None };
-    Some(Image::from_vec(raster.width, raster.height, bytemuck::pod_collect_to_vec(&codes)))
+    let Samples::U8(codes) = raster.samples else {
+        return None;
+    };
+    Some(Image::from_vec(
+        raster.width,
+        raster.height,
+        bytemuck::pod_collect_to_vec(&codes),
+    ))
 }
 
 /// Puts the notes into a comment segment right behind the start marker.
@@ -194,8 +238,12 @@ fn insert_comment(jpeg: &mut Vec<u8>, notes: &Notes) -> Result<(), String> {
         return Ok(());
     }
     let text = lines_of_notes(notes);
-    let length = u16::try_from(text.len() + 2).map_err(|_| "metadata of more than 65,533 bytes does not fit a JPEG")?;
-    let segment = [0xff, COM].into_iter().chain(length.to_be_bytes()).chain(text.into_bytes());
+    let length = u16::try_from(text.len() + 2)
+        .map_err(|_| "metadata of more than 65,533 bytes does not fit a JPEG")?;
+    let segment = [0xff, COM]
+        .into_iter()
+        .chain(length.to_be_bytes())
+        .chain(text.into_bytes());
     jpeg.splice(2..2, segment);
     Ok(())
 }
@@ -206,7 +254,8 @@ mod tests {
 
     #[test]
     fn a_thumbnail_does_not_end_the_file() {
-        let thumbnail = b"\xff\xd8\xff\xe1\x00\x06\xff\xd8\xff\xd9\xff\xda\x00\x02\x12\xff\x00\x34\xff\xd0\x56";
+        let thumbnail =
+            b"\xff\xd8\xff\xe1\x00\x06\xff\xd8\xff\xd9\xff\xda\x00\x02\x12\xff\x00\x34\xff\xd0\x56";
         assert!(!segments(thumbnail).any(|s| s.marker == EOI));
         let whole = [thumbnail.as_slice(), b"\xff\xd9"].concat();
         assert!(segments(&whole).any(|s| s.marker == EOI));
@@ -242,7 +291,12 @@ mod tests {
         let bytes = encode((8, 8), &[90; 8 * 8 * 3], 90, &notes).unwrap();
         let start = head(&mut &bytes[..], &Limits::default()).unwrap();
         assert!(start.len() < bytes.len());
-        assert_eq!(header(&start, bytes.len() as u64, &Limits::default()).unwrap().metadata, notes);
+        assert_eq!(
+            header(&start, bytes.len() as u64, &Limits::default())
+                .unwrap()
+                .metadata,
+            notes
+        );
         assert!(decode(&bytes, &Limits::default()).is_ok());
     }
 }

@@ -87,14 +87,26 @@ impl FromStr for Raise {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let (name, number) =
-            text.split_once('=').ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
-        let unit = SUFFIXES.iter().find(|(suffix, _)| number.ends_with(*suffix));
-        let (digits, factor) = unit.map_or((number, 1), |&(suffix, factor)| (number.trim_end_matches(suffix), factor));
+        let (name, number) = text
+            .split_once('=')
+            .ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
+        let unit = SUFFIXES
+            .iter()
+            .find(|(suffix, _)| number.ends_with(*suffix));
+        let (digits, factor) = unit.map_or((number, 1), |&(suffix, factor)| {
+            (number.trim_end_matches(suffix), factor)
+        });
         let value = digits.parse().ok().and_then(|v: u64| v.checked_mul(factor));
-        let value =
-            value.ok_or_else(|| Error::value(name, format!("{number:?}, expected a number such as 65536 or 4G")))?;
-        let raise = Self { name: name.into(), value };
+        let value = value.ok_or_else(|| {
+            Error::value(
+                name,
+                format!("{number:?}, expected a number such as 65536 or 4G"),
+            )
+        })?;
+        let raise = Self {
+            name: name.into(),
+            value,
+        };
         Limits::default().with(&raise)?;
         Ok(raise)
     }
@@ -123,12 +135,18 @@ impl Limits {
         let Raise { name, value } = raise;
         match named.iter_mut().find(|(known, ..)| known == name) {
             Some((_, _, most)) if *value > *most => {
-                return Err(Error::value(name, format!("{value}, expected at most {most}")));
+                return Err(Error::value(
+                    name,
+                    format!("{value}, expected at most {most}"),
+                ));
             }
             Some((_, limit, _)) => **limit = *value,
             None => {
                 let known = named.map(|(name, ..)| name).join(", ");
-                return Err(Error::value(name, format!("no such limit, expected one of {known}")));
+                return Err(Error::value(
+                    name,
+                    format!("no such limit, expected one of {known}"),
+                ));
             }
         }
         Ok(self)
@@ -150,28 +168,51 @@ impl Limits {
     pub(super) fn check(&self, d: Demand) -> std::result::Result<(), String> {
         let Demand { width, height, .. } = d;
         if width == 0 || height == 0 || d.channels == 0 {
-            return Err(format!("{width} x {height} pixels with {} channels, expected at least 1 of each", d.channels));
+            return Err(format!(
+                "{width} x {height} pixels with {} channels, expected at least 1 of each",
+                d.channels
+            ));
         }
         at_most(width.max(height), self.side, "pixels along a side", "side")?;
         let pixels = width.checked_mul(height).ok_or("size overflows")?;
         at_most(pixels, self.pixels, "pixels", "pixels")?;
         at_most(d.channels, self.channels, "channels", "channels")?;
-        let bytes = pixels.checked_mul(d.bytes_per_pixel).ok_or("size overflows")?;
+        let bytes = pixels
+            .checked_mul(d.bytes_per_pixel)
+            .ok_or("size overflows")?;
         at_most(bytes, self.decoded_bytes, "decoded bytes", "decoded_bytes")?;
         if bytes > RATIO_FREE_BYTES {
-            at_most(bytes / d.file_bytes.max(1), self.ratio, "decoded bytes for each byte of the file", "ratio")?;
+            at_most(
+                bytes / d.file_bytes.max(1),
+                self.ratio,
+                "decoded bytes for each byte of the file",
+                "ratio",
+            )?;
         }
         affordable(bytes)
     }
 
     /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where the system does not
     /// say how much it has, nothing is refused.
-    pub(super) fn room(&self, width: usize, height: usize, channels: usize) -> std::result::Result<(), String> {
-        machine_bytes().map_or(Ok(()), |machine| self.room_in(machine, [width, height, channels].map(|n| n as u64)))
+    pub(super) fn room(
+        &self,
+        width: usize,
+        height: usize,
+        channels: usize,
+    ) -> std::result::Result<(), String> {
+        machine_bytes().map_or(Ok(()), |machine| {
+            self.room_in(machine, [width, height, channels].map(|n| n as u64))
+        })
     }
 
-    fn room_in(&self, machine: u64, [width, height, channels]: [u64; 3]) -> std::result::Result<(), String> {
-        let need = [height, channels, BYTES_IN_HAND].into_iter().fold(width, u64::saturating_mul);
+    fn room_in(
+        &self,
+        machine: u64,
+        [width, height, channels]: [u64; 3],
+    ) -> std::result::Result<(), String> {
+        let need = [height, channels, BYTES_IN_HAND]
+            .into_iter()
+            .fold(width, u64::saturating_mul);
         let percent = self.memory_percent;
         if u128::from(need) * 100 <= u128::from(machine) * u128::from(percent) {
             return Ok(());
@@ -190,8 +231,13 @@ pub(super) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
     *BYTES.get_or_init(|| {
         let told = std::fs::read_to_string("/proc/meminfo").ok()?;
-        let kib: u64 =
-            told.lines().find_map(|l| l.strip_prefix("MemTotal:")?.trim().strip_suffix(" kB")?.parse().ok())?;
+        let kib: u64 = told.lines().find_map(|l| {
+            l.strip_prefix("MemTotal:")?
+                .trim()
+                .strip_suffix(" kB")?
+                .parse()
+                .ok()
+        })?;
         Some(control_group_bytes().unwrap_or(u64::MAX).min(kib << 10))
     })
 }
@@ -201,23 +247,45 @@ fn control_group_bytes() -> Option<u64> {
     let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
     let own = groups.lines().find_map(|l| l.strip_prefix("0::/"))?;
     let most = |group: &std::path::Path| -> Option<u64> {
-        std::fs::read_to_string(group.join("memory.max")).ok()?.trim().parse().ok()
+        std::fs::read_to_string(group.join("memory.max"))
+            .ok()?
+            .trim()
+            .parse()
+            .ok()
     };
-    std::path::Path::new("/sys/fs/cgroup").join(own).ancestors().filter_map(most).min()
+    std::path::Path::new("/sys/fs/cgroup")
+        .join(own)
+        .ancestors()
+        .filter_map(most)
+        .min()
 }
 
 /// One limit: `what` is counted, `name` is the field to raise.
-pub(super) fn at_most(count: u64, limit: u64, what: &str, name: &str) -> std::result::Result<(), String> {
+pub(super) fn at_most(
+    count: u64,
+    limit: u64,
+    what: &str,
+    name: &str,
+) -> std::result::Result<(), String> {
     if count <= limit {
         return Ok(());
     }
-    Err(format!("{count} {what}, over the limit of {limit} (Limits::{name}; --limit {name}=N)"))
+    Err(format!(
+        "{count} {what}, over the limit of {limit} (Limits::{name}; --limit {name}=N)"
+    ))
 }
 
 /// Refuses what the system has no memory for, as far as it says so: an allocation that fails ends the process.
 pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
     let fits = usize::try_from(bytes).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
-    if fits { Ok(()) } else { Err(format!("needs {} MiB of memory, more than the system gives", bytes >> 20)) }
+    if fits {
+        Ok(())
+    } else {
+        Err(format!(
+            "needs {} MiB of memory, more than the system gives",
+            bytes >> 20
+        ))
+    }
 }
 
 #[cfg(test)]
@@ -225,12 +293,25 @@ mod tests {
     use super::*;
 
     fn demand(width: u64, height: u64) -> Demand {
-        Demand { width, height, channels: 4, bytes_per_pixel: 16, file_bytes: 1_000 }
+        Demand {
+            width,
+            height,
+            channels: 4,
+            bytes_per_pixel: 16,
+            file_bytes: 1_000,
+        }
     }
 
     #[test]
     fn an_ordinary_photo_passes() {
-        assert!(Limits::default().check(Demand { file_bytes: 6 << 20, ..demand(6000, 4000) }).is_ok());
+        assert!(
+            Limits::default()
+                .check(Demand {
+                    file_bytes: 6 << 20,
+                    ..demand(6000, 4000)
+                })
+                .is_ok()
+        );
     }
 
     #[test]
@@ -243,7 +324,11 @@ mod tests {
 
     #[test]
     fn sizes_that_overflow_are_refused() {
-        let all = Limits { side: u64::MAX, pixels: u64::MAX, ..Default::default() };
+        let all = Limits {
+            side: u64::MAX,
+            pixels: u64::MAX,
+            ..Default::default()
+        };
         assert!(all.check(demand(u64::MAX, u64::MAX)).is_err());
         assert!(all.check(demand(u64::MAX / 8, 1)).is_err());
     }
@@ -252,13 +337,34 @@ mod tests {
     fn every_limit_has_a_name() {
         let json = serde_json::to_value(Limits::default()).unwrap();
         for name in json.as_object().unwrap().keys() {
-            let raised = Limits::default().with(&format!("{name}=80").parse().unwrap()).unwrap();
+            let raised = Limits::default()
+                .with(&format!("{name}=80").parse().unwrap())
+                .unwrap();
             assert_eq!(serde_json::to_value(raised).unwrap()[name], 80);
-            let most = format!("{name}={}", u64::MAX).parse::<Raise>().unwrap_err().to_string();
-            assert!(most.starts_with(&format!("{name}: 18446744073709551615, expected at most ")), "{most}");
+            let most = format!("{name}={}", u64::MAX)
+                .parse::<Raise>()
+                .unwrap_err()
+                .to_string();
+            assert!(
+                most.starts_with(&format!("{name}: 18446744073709551615, expected at most ")),
+                "{most}"
+            );
         }
-        assert_eq!(Limits::default().with(&"side=3K".parse().unwrap()).unwrap().side, 3072);
-        for bad in ["side", "side=x", "side=99999999999G", "sides=3", "side=-1", "side=G"] {
+        assert_eq!(
+            Limits::default()
+                .with(&"side=3K".parse().unwrap())
+                .unwrap()
+                .side,
+            3072
+        );
+        for bad in [
+            "side",
+            "side=x",
+            "side=99999999999G",
+            "sides=3",
+            "side=-1",
+            "side=G",
+        ] {
             assert!(bad.parse::<Raise>().is_err(), "{bad}");
         }
     }
@@ -273,14 +379,29 @@ mod tests {
             "11585 x 11585 pixels x 3 channels x 12 bytes = 4607 MiB of memory, over 50 % of this machine's 8192 MiB \
              (Limits::memory_percent; --limit memory_percent=N)"
         );
-        assert!(Limits { memory_percent: 60, ..Default::default() }.room_in(8 * gib, square).is_ok());
-        assert!(Limits::default().room_in(8 * gib, [u64::MAX, 2, 2]).is_err());
+        assert!(
+            Limits {
+                memory_percent: 60,
+                ..Default::default()
+            }
+            .room_in(8 * gib, square)
+            .is_ok()
+        );
+        assert!(
+            Limits::default()
+                .room_in(8 * gib, [u64::MAX, 2, 2])
+                .is_err()
+        );
     }
 
     #[test]
     fn more_than_there_is_is_not_attempted() {
         assert!(affordable(1 << 20).is_ok());
-        assert!(affordable(u64::MAX).unwrap_err().contains("more than the system gives"));
+        assert!(
+            affordable(u64::MAX)
+                .unwrap_err()
+                .contains("more than the system gives")
+        );
     }
 
     #[test]

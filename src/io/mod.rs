@@ -85,8 +85,8 @@ mod write;
 pub use atomic::{Checksum, copy, create_folder, relative, sync, write_through};
 pub(crate) use atomic::{open_own, refuse_foreign};
 pub use document::{
-    from_overrides, parse_json, parse_toml, read_document, read_json, read_json_data, read_text, read_toml,
-    read_toml_with, write_document, write_json, write_text, write_toml,
+    from_overrides, parse_json, parse_toml, read_document, read_json, read_json_data, read_text,
+    read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
 };
 pub(crate) use document::{from_table, read_bytes, suggestion};
 pub use format::Format;
@@ -103,7 +103,9 @@ pub use raster::{FromFile, TRANSMITTANCE, VIEW_TRANSMITTANCE};
 pub use serve::serve as serve_worker;
 #[cfg(feature = "oiio")]
 pub use worker::worker_version;
-pub use write::{Bits, Compression, PngEffort, ToFile, WriteOptions, jpeg_bytes, write, write_with};
+pub use write::{
+    Bits, Compression, PngEffort, ToFile, WriteOptions, jpeg_bytes, write, write_with,
+};
 
 use crate::{Error, Image, Result};
 use exif::CameraNotes;
@@ -171,7 +173,11 @@ static CHOSEN: OnceLock<ReadOptions> = OnceLock::new();
 
 impl Default for ReadOptions {
     fn default() -> Self {
-        let built_in = || Self { limits: Limits::default(), fallback: Fallback::default(), window: Window::default() };
+        let built_in = || Self {
+            limits: Limits::default(),
+            fallback: Fallback::default(),
+            window: Window::default(),
+        };
         CHOSEN.get().cloned().unwrap_or_else(built_in)
     }
 }
@@ -183,7 +189,9 @@ impl ReadOptions {
     /// # Errors
     /// [`Error::Value`] when it was done before.
     pub fn make_default(self) -> Result<()> {
-        CHOSEN.set(self).map_err(|_| Error::value("read options", "the defaults were chosen before"))
+        CHOSEN
+            .set(self)
+            .map_err(|_| Error::value("read options", "the defaults were chosen before"))
     }
 }
 
@@ -196,7 +204,11 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> 
 }
 
 /// Samples by our decoders, or by OpenImageIO where those do not know the kind.
-fn raster_of(source: &Source, options: &ReadOptions, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+fn raster_of(
+    source: &Source,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> std::result::Result<Raster, Refusal> {
     match caught(|| decode(source, options, wanted)) {
         Err(Refusal::Unsupported(what)) => elsewhere(source, what, options, wanted),
         decoded => decoded,
@@ -210,7 +222,11 @@ fn raster_of(source: &Source, options: &ReadOptions, wanted: Wanted) -> std::res
 pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
     let (path, options) = (path.as_ref(), ReadOptions::default());
     let mut opened = Opened::open(path, &options.limits)?;
-    let Opened { file, bytes, format } = &mut opened;
+    let Opened {
+        file,
+        bytes,
+        format,
+    } = &mut opened;
     let (mut header, notes) = match caught(|| header(file, *bytes, *format, &options.limits)) {
         Err(Refusal::Unsupported(what)) => header_elsewhere(path, what, &options)?,
         header => header.map_err(|e| Error::file(path, e))?,
@@ -228,7 +244,12 @@ pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
 /// The header of a file in memory, for fuzzing: nothing is caught.
 pub(crate) fn header_of(bytes: &[u8]) -> std::result::Result<Header, String> {
     let format = Format::of_bytes(bytes).ok_or("no picture")?;
-    let told = header(&mut Cursor::new(bytes), bytes.len() as u64, format, &Limits::default());
+    let told = header(
+        &mut Cursor::new(bytes),
+        bytes.len() as u64,
+        format,
+        &Limits::default(),
+    );
     told.map(|(header, _)| header).map_err(|e| e.to_string())
 }
 
@@ -237,7 +258,10 @@ pub(crate) fn header_of(bytes: &[u8]) -> std::result::Result<Header, String> {
 pub(crate) fn worker_answer(bytes: &[u8]) -> bool {
     let mut from = bytes;
     let shape = protocol::receive_shape(&mut from, &Limits::default(), bytes.len() as u64);
-    shape.ok().and_then(|shape| protocol::receive_samples(&mut from, shape.ok()?).ok()).is_some()
+    shape
+        .ok()
+        .and_then(|shape| protocol::receive_samples(&mut from, shape.ok()?).ok())
+        .is_some()
 }
 
 /// What the camera noted; EXR and HDR have no place for it.
@@ -264,9 +288,17 @@ fn header<R: BufRead + Seek>(
         Format::Tiff => tiff::header(&mut *file, bytes, limits)?,
         Format::Jpeg => {
             let start = jpeg::head(file, limits)?;
-            return Ok((jpeg::header(&start, bytes, limits)?, CameraNotes::of_file(Cursor::new(&start))));
+            return Ok((
+                jpeg::header(&start, bytes, limits)?,
+                CameraNotes::of_file(Cursor::new(&start)),
+            ));
         }
-        other => return Err(Refusal::Unsupported(format!("{} needs OpenImageIO", other.name()))),
+        other => {
+            return Err(Refusal::Unsupported(format!(
+                "{} needs OpenImageIO",
+                other.name()
+            )));
+        }
     };
     let notes = match format {
         Format::Png | Format::Tiff if file.rewind().is_ok() => CameraNotes::of_file(file),
@@ -275,7 +307,11 @@ fn header<R: BufRead + Seek>(
     Ok((header, notes))
 }
 
-fn decode(source: &Source, options: &ReadOptions, wanted: Wanted) -> std::result::Result<Raster, Refusal> {
+fn decode(
+    source: &Source,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> std::result::Result<Raster, Refusal> {
     let limits = &options.limits;
     match source.format {
         Format::Exr => exr::decode(&source.bytes, limits, wanted, options.window),
@@ -283,12 +319,17 @@ fn decode(source: &Source, options: &ReadOptions, wanted: Wanted) -> std::result
         Format::Jpeg => jpeg::decode(&source.bytes, limits),
         Format::Tiff => tiff::decode(&source.bytes, limits),
         Format::Hdr => hdr::decode(&source.bytes, limits),
-        other => Err(Refusal::Unsupported(format!("{} needs OpenImageIO", other.name()))),
+        other => Err(Refusal::Unsupported(format!(
+            "{} needs OpenImageIO",
+            other.name()
+        ))),
     }
 }
 
 /// The last defence: a decoder that panics has met a damaged file.
-fn caught<T>(f: impl FnOnce() -> std::result::Result<T, Refusal>) -> std::result::Result<T, Refusal> {
+fn caught<T>(
+    f: impl FnOnce() -> std::result::Result<T, Refusal>,
+) -> std::result::Result<T, Refusal> {
     catch_unwind(AssertUnwindSafe(f)).unwrap_or_else(|_| Err("damaged: the decoder gave up".into()))
 }
 
@@ -300,7 +341,15 @@ fn elsewhere(
     options: &ReadOptions,
     wanted: Wanted,
 ) -> std::result::Result<Raster, Refusal> {
-    let told = told(source, what.clone(), options, Ask::Pixels { wanted, window: options.window });
+    let told = told(
+        source,
+        what.clone(),
+        options,
+        Ask::Pixels {
+            wanted,
+            window: options.window,
+        },
+    );
     match told.map_err(|e| e.after(&what))? {
         Told::Raster(raster) => Ok(oiio::associated(raster, source)),
         Told::Shape(_) => Err("OpenImageIO gave no pixels".into()),
@@ -309,19 +358,42 @@ fn elsewhere(
 
 /// What the other decoder says of a header.
 #[cfg(feature = "oiio")]
-fn header_elsewhere(path: &Path, what: String, options: &ReadOptions) -> Result<(Header, CameraNotes)> {
+fn header_elsewhere(
+    path: &Path,
+    what: String,
+    options: &ReadOptions,
+) -> Result<(Header, CameraNotes)> {
     let source = Source::open(path, &options.limits)?;
     let told = told(&source, what, options, Ask::Header).map_err(|e| Error::file(path, e))?;
-    let Told::Shape(Shape { width, height, names, sample, .. }) = told else {
+    let Told::Shape(Shape {
+        width,
+        height,
+        names,
+        sample,
+        ..
+    }) = told
+    else {
         return Err(Error::file(path, "OpenImageIO gave no header"));
     };
     let bits = 8 * Sample::bytes(sample);
-    let header = Header { format: source.format, width, height, channels: names, bits, ..Header::default() };
+    let header = Header {
+        format: source.format,
+        width,
+        height,
+        channels: names,
+        bits,
+        ..Header::default()
+    };
     Ok((header, camera_notes(&source)))
 }
 
 #[cfg(feature = "oiio")]
-fn told(source: &Source, what: String, options: &ReadOptions, ask: Ask) -> std::result::Result<Told, Refusal> {
+fn told(
+    source: &Source,
+    what: String,
+    options: &ReadOptions,
+    ask: Ask,
+) -> std::result::Result<Told, Refusal> {
     match options.fallback {
         Fallback::Nothing => Err(Refusal::Unsupported(what)),
         Fallback::Worker => worker::ask(source, &options.limits, false, ask),
@@ -332,9 +404,16 @@ fn told(source: &Source, what: String, options: &ReadOptions, ask: Ask) -> std::
 
 /// Every pixel by OpenImageIO, even those that ours could read.
 #[cfg(feature = "oiio")]
-fn read_by<P: FromFile>(fallback: Fallback, path: &Path, options: &ReadOptions) -> Result<Image<P>> {
+fn read_by<P: FromFile>(
+    fallback: Fallback,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<Image<P>> {
     let source = Source::open(path, &options.limits)?;
-    let options = ReadOptions { fallback, ..options.clone() };
+    let options = ReadOptions {
+        fallback,
+        ..options.clone()
+    };
     let raster = elsewhere(&source, String::new(), &options, P::WANTED);
     Picture::of(raster, &source, &options.limits, P::WANTED)?.into_image()
 }
@@ -345,18 +424,31 @@ fn read_by<P: FromFile>(fallback: Fallback, path: &Path, options: &ReadOptions) 
 /// As [`read_with`].
 #[cfg(feature = "oiio")]
 #[doc(hidden)]
-pub fn read_in_worker<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
+pub fn read_in_worker<P: FromFile>(
+    path: impl AsRef<Path>,
+    options: &ReadOptions,
+) -> Result<Image<P>> {
     read_by(Fallback::Worker, path.as_ref(), options)
 }
 
 /// Without OpenImageIO there is no other decoder.
 #[cfg(not(feature = "oiio"))]
-fn elsewhere(_: &Source, what: String, _: &ReadOptions, _: Wanted) -> std::result::Result<Raster, Refusal> {
-    Err(Refusal::Unsupported(format!("{what} (petcomp was built without OpenImageIO)")))
+fn elsewhere(
+    _: &Source,
+    what: String,
+    _: &ReadOptions,
+    _: Wanted,
+) -> std::result::Result<Raster, Refusal> {
+    Err(Refusal::Unsupported(format!(
+        "{what} (petcomp was built without OpenImageIO)"
+    )))
 }
 
 /// Without OpenImageIO there is no other decoder.
 #[cfg(not(feature = "oiio"))]
 fn header_elsewhere(path: &Path, what: String, _: &ReadOptions) -> Result<(Header, CameraNotes)> {
-    Err(Error::file(path, format!("{what} (petcomp was built without OpenImageIO)")))
+    Err(Error::file(
+        path,
+        format!("{what} (petcomp was built without OpenImageIO)"),
+    ))
 }

@@ -36,7 +36,9 @@ impl std::fmt::Debug for Linked {
 pub fn in_process() -> Linked {
     Linked(|source, limits, ask| match ask {
         Ask::Header => shape(source, limits).map(Told::Shape),
-        Ask::Pixels { wanted, window } => decode(source, limits, wanted, window, |_| ()).map(Told::Raster),
+        Ask::Pixels { wanted, window } => {
+            decode(source, limits, wanted, window, |_| ()).map(Told::Raster)
+        }
     })
 }
 
@@ -45,14 +47,24 @@ pub fn in_process() -> Linked {
 /// # Errors
 /// [`Error::File`] as [`io::read`](super::read). A damaged file may end the process instead.
 pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
-    super::read_by(Fallback::InProcess(in_process()), path.as_ref(), &ReadOptions::default())
+    super::read_by(
+        Fallback::InProcess(in_process()),
+        path.as_ref(),
+        &ReadOptions::default(),
+    )
 }
 
 /// What TIFF alpha means is read from the file's own tag: OpenImageIO takes an unspecified one for associated.
 pub(super) fn associated(raster: Raster, source: &Source) -> Raster {
     match source.format {
-        Format::Tiff => Raster { premultiplied: CameraNotes::has_associated_alpha(&source.bytes), ..raster },
-        Format::Exr => Raster { premultiplied: true, ..raster },
+        Format::Tiff => Raster {
+            premultiplied: CameraNotes::has_associated_alpha(&source.bytes),
+            ..raster
+        },
+        Format::Exr => Raster {
+            premultiplied: true,
+            ..raster
+        },
         _ => raster,
     }
 }
@@ -108,7 +120,10 @@ pub(super) fn decode(
     })
 }
 
-fn open<'a>(source: &'a Source, limits: &Limits) -> std::result::Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
+fn open<'a>(
+    source: &'a Source,
+    limits: &Limits,
+) -> std::result::Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
     start()?;
     // Named in messages, and opened by the few readers that know only files.
     let name = source.path.to_string_lossy();
@@ -121,7 +136,10 @@ fn open<'a>(source: &'a Source, limits: &Limits) -> std::result::Result<(UniqueP
 /// Once for the process; what went wrong the first time is not tried again.
 pub(super) fn start() -> std::result::Result<(), Refusal> {
     static STARTED: OnceLock<std::result::Result<(), String>> = OnceLock::new();
-    STARTED.get_or_init(|| ffi::start().map_err(|e| e.what().to_owned())).clone().map_err(Refusal::Broken)
+    STARTED
+        .get_or_init(|| ffi::start().map_err(|e| e.what().to_owned()))
+        .clone()
+        .map_err(Refusal::Broken)
 }
 
 fn said(e: cxx::Exception) -> Refusal {
@@ -130,10 +148,19 @@ fn said(e: cxx::Exception) -> Refusal {
 
 fn check(layout: &Layout, file_bytes: u64, limits: &Limits) -> std::result::Result<(), Refusal> {
     let size = |v: i64| u64::try_from(v).unwrap_or(0);
-    for (width, height) in [(layout.width, layout.height), (layout.data_width, layout.data_height)] {
+    for (width, height) in [
+        (layout.width, layout.height),
+        (layout.data_width, layout.data_height),
+    ] {
         let channels = layout.channels.len() as u64;
         let bytes_per_pixel = channels * u64::from(layout.bytes.unsigned_abs());
-        limits.check(Demand { width: size(width), height: size(height), channels, bytes_per_pixel, file_bytes })?;
+        limits.check(Demand {
+            width: size(width),
+            height: size(height),
+            channels,
+            bytes_per_pixel,
+            file_bytes,
+        })?;
     }
     Ok(())
 }
@@ -144,7 +171,10 @@ fn distinct(mut picked: Vec<usize>) -> Vec<usize> {
     picked
 }
 
-fn filled<T: bytemuck::Pod>(count: usize, reader: &ffi::Reader<'_>) -> std::result::Result<Vec<T>, Refusal> {
+fn filled<T: bytemuck::Pod>(
+    count: usize,
+    reader: &ffi::Reader<'_>,
+) -> std::result::Result<Vec<T>, Refusal> {
     let mut samples: Vec<T> = bytemuck::zeroed_vec(count);
     ffi::read(reader, bytemuck::cast_slice_mut(&mut samples)).map_err(said)?;
     Ok(samples)
@@ -154,8 +184,8 @@ fn filled<T: bytemuck::Pod>(count: usize, reader: &ffi::Reader<'_>) -> std::resu
 fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
     let (width, height) = (layout.width as usize, layout.height as usize);
     let (columns, stride) = (layout.data_width as usize, layout.channels.len());
-    let same_window =
-        (layout.x, layout.y, layout.data_width, layout.data_height) == (0, 0, layout.width, layout.height);
+    let same_window = (layout.x, layout.y, layout.data_width, layout.data_height)
+        == (0, 0, layout.width, layout.height);
     if same_window && picked.iter().copied().eq(0..stride) {
         return samples;
     }
@@ -164,7 +194,8 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
     let xs = super::exr::overlap(layout.x, columns, width);
     for y in ys {
         for x in xs.clone() {
-            let from = ((y as i64 - layout.y) as usize * columns + (x as i64 - layout.x) as usize) * stride;
+            let from = ((y as i64 - layout.y) as usize * columns + (x as i64 - layout.x) as usize)
+                * stride;
             let to = (y * width + x) * picked.len();
             for (slot, &channel) in out[to..].iter_mut().zip(picked) {
                 *slot = samples[from + channel];
@@ -175,24 +206,39 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
 }
 
 /// The rule of [`io`](super) for integers and floats; film scans say themselves what their codes are.
-fn meaning(samples: Samples, format: Format, space: &str) -> std::result::Result<(Samples, bool), Refusal> {
+fn meaning(
+    samples: Samples,
+    format: Format,
+    space: &str,
+) -> std::result::Result<(Samples, bool), Refusal> {
     let is_integer = !samples.are_float();
     match (format, space) {
         (Format::Dpx | Format::Cineon, "Linear" | "linear") => Ok((samples, false)),
-        (Format::Dpx | Format::Cineon, "Rec709") => Ok((Samples::F32(in_light(samples, Curve::Rec709)), false)),
-        (Format::Dpx | Format::Cineon, "" | "sRGB") => Ok((samples, is_integer)),
-        (Format::Dpx | Format::Cineon, other) => {
-            Err(Refusal::Broken(format!("colour space {other}, expected linear, sRGB or Rec709 (convert it first)")))
+        (Format::Dpx | Format::Cineon, "Rec709") => {
+            Ok((Samples::F32(in_light(samples, Curve::Rec709)), false))
         }
+        (Format::Dpx | Format::Cineon, "" | "sRGB") => Ok((samples, is_integer)),
+        (Format::Dpx | Format::Cineon, other) => Err(Refusal::Broken(format!(
+            "colour space {other}, expected linear, sRGB or Rec709 (convert it first)"
+        ))),
         _ => Ok((samples, is_integer)),
     }
 }
 
 fn in_light(samples: Samples, curve: Curve) -> Vec<f32> {
     match samples {
-        Samples::U8(v) => v.into_iter().map(|code| curve.decode(f32::from(code) / 255.0)).collect(),
-        Samples::U16(v) => v.into_iter().map(|code| curve.decode(f32::from(code) / 65_535.0)).collect(),
-        Samples::F16(v) => v.into_iter().map(|value| curve.decode(value.into())).collect(),
+        Samples::U8(v) => v
+            .into_iter()
+            .map(|code| curve.decode(f32::from(code) / 255.0))
+            .collect(),
+        Samples::U16(v) => v
+            .into_iter()
+            .map(|code| curve.decode(f32::from(code) / 65_535.0))
+            .collect(),
+        Samples::F16(v) => v
+            .into_iter()
+            .map(|value| curve.decode(value.into()))
+            .collect(),
         Samples::F32(v) => v.into_iter().map(|value| curve.decode(value)).collect(),
     }
 }
@@ -201,12 +247,20 @@ fn in_light(samples: Samples, curve: Curve) -> Vec<f32> {
 ///
 /// # Errors
 /// [`Error::File`] as [`io::write_with`](super::write_with); the file is written in place, not beside it.
-pub fn write_with<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>, options: &WriteOptions) -> Result<()> {
+pub fn write_with<P: ToFile>(
+    path: impl AsRef<Path>,
+    image: &Image<P>,
+    options: &WriteOptions,
+) -> Result<()> {
     let path = path.as_ref();
     encode(path, image, options).map_err(|e| Error::file(path, e))
 }
 
-fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> std::result::Result<(), Refusal> {
+fn encode<P: ToFile>(
+    path: &Path,
+    image: &Image<P>,
+    options: &WriteOptions,
+) -> std::result::Result<(), Refusal> {
     start()?;
     let format = Format::of_extension(path).ok_or("an extension that is not written")?;
     let bits = match format {
@@ -231,14 +285,24 @@ fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> s
         premultiplied: matches!(bits, Bits::Half | Bits::Float),
         color_space: String::new(),
     };
-    let notes: Vec<_> =
-        options.metadata.iter().map(|(key, value)| ffi::Note { key: key.clone(), value: value.clone() }).collect();
+    let notes: Vec<_> = options
+        .metadata
+        .iter()
+        .map(|(key, value)| ffi::Note {
+            key: key.clone(),
+            value: value.clone(),
+        })
+        .collect();
     let samples = match bits {
         Bits::Eight => super::write::flat(image, P::codes::<u8>),
         Bits::Sixteen => bytemuck::cast_slice(&super::write::flat(image, P::codes::<u16>)).to_vec(),
-        Bits::Half | Bits::Float => bytemuck::cast_slice(&super::write::flat(image, P::linear)).to_vec(),
+        Bits::Half | Bits::Float => {
+            bytemuck::cast_slice(&super::write::flat(image, P::linear)).to_vec()
+        }
     };
-    let name = path.to_str().ok_or("a file name that is not UTF-8, which OpenImageIO cannot open")?;
+    let name = path
+        .to_str()
+        .ok_or("a file name that is not UTF-8, which OpenImageIO cannot open")?;
     ffi::write(name, format.name(), &layout, &samples, &notes).map_err(said)
 }
 
@@ -248,7 +312,10 @@ mod tests {
 
     #[test]
     fn what_is_thrown_becomes_an_error() {
-        assert_eq!(ffi::throw_an_int().unwrap_err().what(), "unknown C++ exception");
+        assert_eq!(
+            ffi::throw_an_int().unwrap_err().what(),
+            "unknown C++ exception"
+        );
         assert!(ffi::open("no such file.png", "png", b"").is_err());
         assert!(ffi::open("no such file.png", "no such reader", b"").is_err());
     }

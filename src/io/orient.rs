@@ -15,7 +15,11 @@ impl Orientation {
 
     /// Size of the upright picture.
     pub(super) fn size(self, (width, height): (usize, usize)) -> (usize, usize) {
-        if self.is_sideways() { (height, width) } else { (width, height) }
+        if self.is_sideways() {
+            (height, width)
+        } else {
+            (width, height)
+        }
     }
 
     /// Where the upright pixel `(x, y)` lies in the file, whose last column and row are `right` and `bottom`.
@@ -38,16 +42,23 @@ impl Orientation {
     }
 
     /// The samples of the upright picture, out of those of the stored one, `n` to a pixel.
-    pub(super) fn apply<T: Pod + Send + Sync>(self, stored: &[T], n: usize, size: (usize, usize)) -> Vec<T> {
+    pub(super) fn apply<T: Pod + Send + Sync>(
+        self,
+        stored: &[T],
+        n: usize,
+        size: (usize, usize),
+    ) -> Vec<T> {
         let (width, _) = self.size(size);
         let (right, bottom) = (size.0 - 1, size.1 - 1);
         let mut out = zeroed_vec(stored.len());
-        out.par_chunks_exact_mut(width * n).enumerate().for_each(|(y, row)| {
-            for (x, pixel) in row.chunks_exact_mut(n).enumerate() {
-                let (i, j) = self.stored(x, y, right, bottom);
-                pixel.copy_from_slice(&stored[(j * size.0 + i) * n..][..n]);
-            }
-        });
+        out.par_chunks_exact_mut(width * n)
+            .enumerate()
+            .for_each(|(y, row)| {
+                for (x, pixel) in row.chunks_exact_mut(n).enumerate() {
+                    let (i, j) = self.stored(x, y, right, bottom);
+                    pixel.copy_from_slice(&stored[(j * size.0 + i) * n..][..n]);
+                }
+            });
         out
     }
 }
@@ -61,7 +72,10 @@ mod tests {
         let turn = Orientation(orientation);
         let letters = turn.apply(b"abcdef", 1, (2, 3));
         let (width, _) = turn.size((2, 3));
-        letters.chunks(width).map(|row| String::from_utf8_lossy(row).into_owned()).collect()
+        letters
+            .chunks(width)
+            .map(|row| String::from_utf8_lossy(row).into_owned())
+            .collect()
     }
 
     /// EXIF 2.3, tag 274: "the 0th row is at the visual (top, bottom, left, right), the 0th column at the visual ...".
@@ -69,7 +83,11 @@ mod tests {
     fn all_eight_orientations_are_those_of_the_standard() {
         assert_eq!(turned(1), ["ab", "cd", "ef"]);
         assert_eq!(turned(2), ["ba", "dc", "fe"], "row 0 top, column 0 right");
-        assert_eq!(turned(3), ["fe", "dc", "ba"], "row 0 bottom, column 0 right");
+        assert_eq!(
+            turned(3),
+            ["fe", "dc", "ba"],
+            "row 0 bottom, column 0 right"
+        );
         assert_eq!(turned(4), ["ef", "cd", "ab"], "row 0 bottom, column 0 left");
         assert_eq!(turned(5), ["ace", "bdf"], "row 0 left, column 0 top");
         assert_eq!(turned(6), ["eca", "fdb"], "row 0 right, column 0 top");

@@ -22,7 +22,10 @@ impl Pipe {
         // A smaller pipe is a slower one.
         #[cfg(target_os = "linux")]
         let _ = rustix::pipe::fcntl_setpipe_size(&end, PIPE_BYTES);
-        Ok(Self { file: end.into(), deadline: Instant::now() })
+        Ok(Self {
+            file: end.into(),
+            deadline: Instant::now(),
+        })
     }
 
     fn wait(&self, what: PollFlags) -> Result<()> {
@@ -83,6 +86,9 @@ mod tests {
         let (_reader, writer) = std::io::pipe().unwrap();
         let mut pipe = Pipe::new(writer.into()).unwrap();
         pipe.deadline = Instant::now() + Duration::from_millis(20);
-        assert_eq!(pipe.write_all(&vec![0; 3 * PIPE_BYTES]).unwrap_err().kind(), ErrorKind::TimedOut);
+        assert_eq!(
+            pipe.write_all(&vec![0; 3 * PIPE_BYTES]).unwrap_err().kind(),
+            ErrorKind::TimedOut
+        );
     }
 }

@@ -27,13 +27,20 @@ impl Picture {
     /// [`Error::File`] as [`read`](super::read).
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         let picture = Self::decode(path.as_ref(), &ReadOptions::default(), Wanted::Color)?;
-        Wanted::Color.pick(&picture.raster.names).map_err(|e| Error::file(&picture.path, e))?;
+        Wanted::Color
+            .pick(&picture.raster.names)
+            .map_err(|e| Error::file(&picture.path, e))?;
         Ok(picture)
     }
 
     pub(super) fn decode(path: &Path, options: &ReadOptions, wanted: Wanted) -> Result<Self> {
         let source = Source::open(path, &options.limits)?;
-        Self::of(raster_of(&source, options, wanted), &source, &options.limits, wanted)
+        Self::of(
+            raster_of(&source, options, wanted),
+            &source,
+            &options.limits,
+            wanted,
+        )
     }
 
     /// Says what samples mean, and turns the picture the way the camera was held.
@@ -50,7 +57,12 @@ impl Picture {
         };
         warn_of_samples(&raster, source, wanted);
         let raster = raster.upright(camera_notes(source).orientation);
-        Ok(Self { path: source.path.clone(), format: source.format, raster, profile })
+        Ok(Self {
+            path: source.path.clone(),
+            format: source.format,
+            raster,
+            profile,
+        })
     }
 
     /// Width and height, upright.
@@ -65,7 +77,9 @@ impl Picture {
 
     /// Its colours have alpha.
     pub fn has_alpha(&self) -> bool {
-        Wanted::Color.pick(&self.raster.names).is_ok_and(|picked| picked.len() > 3)
+        Wanted::Color
+            .pick(&self.raster.names)
+            .is_ok_and(|picked| picked.len() > 3)
     }
 
     /// The colours of some rows, as [`read`](super::read) makes them; of `LinearRgb`, without a look at alpha.
@@ -74,14 +88,24 @@ impl Picture {
     /// When the rows reach outside the picture, or the pixels asked for are no colours.
     pub fn rows<P: FromFile>(&self, rows: Range<usize>) -> Image<P> {
         assert_eq!(P::WANTED, Wanted::Color, "pixels that are no colours");
-        self.raster.pixels(self.profile.as_ref(), rows).expect("colours were found when the picture was read")
+        self.raster
+            .pixels(self.profile.as_ref(), rows)
+            .expect("colours were found when the picture was read")
     }
 
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {
-        let Self { path, raster, profile, .. } = self;
-        let bytes =
-            [raster.height, size_of::<P>()].into_iter().fold(raster.width as u64, |n, m| n.saturating_mul(m as u64));
-        affordable(bytes).and_then(|()| raster.into_image(profile.as_ref())).map_err(|e| Error::file(path, e))
+        let Self {
+            path,
+            raster,
+            profile,
+            ..
+        } = self;
+        let bytes = [raster.height, size_of::<P>()]
+            .into_iter()
+            .fold(raster.width as u64, |n, m| n.saturating_mul(m as u64));
+        affordable(bytes)
+            .and_then(|()| raster.into_image(profile.as_ref()))
+            .map_err(|e| Error::file(path, e))
     }
 }
 
@@ -90,7 +114,9 @@ fn profile_of(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profi
     let path = source.path.display();
     match caught(|| Ok(Profile::of_file(source, limits)?)) {
         Ok(Some(_)) if !raster.display_encoded => {
-            log::warn!("{path}: has a colour profile, but float samples; taken for linear Rec. 709");
+            log::warn!(
+                "{path}: has a colour profile, but float samples; taken for linear Rec. 709"
+            );
             None
         }
         Ok(profile) => profile,
@@ -105,13 +131,21 @@ fn profile_of(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profi
 fn warn_of_samples(raster: &Raster, source: &Source, wanted: Wanted) {
     let path = source.path.display();
     // Endless depth is where nothing is.
-    let wild = if wanted == Wanted::Depth { 0 } else { raster.not_finite() };
+    let wild = if wanted == Wanted::Depth {
+        0
+    } else {
+        raster.not_finite()
+    };
     if wild > 0 {
         log::warn!("{path}: {wild} samples are infinite or no number");
     }
     match wanted.choose(&raster.names) {
-        Ok((Fit::Layer, _)) => log::warn!("{path}: the channels {} are taken", raster.names.join(" ")),
-        Ok((Fit::Alone, _)) => log::warn!("{path}: the channel {} is taken for grey", raster.names[0]),
+        Ok((Fit::Layer, _)) => {
+            log::warn!("{path}: the channels {} are taken", raster.names.join(" "))
+        }
+        Ok((Fit::Alone, _)) => {
+            log::warn!("{path}: the channel {} is taken for grey", raster.names[0])
+        }
         _ => {}
     }
 }

@@ -13,31 +13,62 @@ use std::io::{BufRead, Cursor, Seek};
 impl From<png::DecodingError> for Refusal {
     fn from(e: png::DecodingError) -> Self {
         let cut = matches!(&e, png::DecodingError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof);
-        Self::Broken(if cut { "truncated PNG".into() } else { format!("damaged PNG: {e}") })
+        Self::Broken(if cut {
+            "truncated PNG".into()
+        } else {
+            format!("damaged PNG: {e}")
+        })
     }
 }
 
 /// The file up to its pixels, checked against the limits.
-fn open<R: BufRead + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<png::Reader<R>, Refusal> {
-    let most = png::Limits { bytes: usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX) };
+fn open<R: BufRead + Seek>(
+    file: R,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<png::Reader<R>, Refusal> {
+    let most = png::Limits {
+        bytes: usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX),
+    };
     let mut decoder = png::Decoder::new_with_limits(file, most);
     decoder.set_transformations(Transformations::EXPAND);
     decoder.read_header_info()?;
     let reader = decoder.read_info()?;
     let (color, depth) = reader.output_color_type();
     let channels = color.samples() as u64;
-    let (width, height) = (u64::from(reader.info().width), u64::from(reader.info().height));
+    let (width, height) = (
+        u64::from(reader.info().width),
+        u64::from(reader.info().height),
+    );
     let bytes_per_pixel = channels * if depth == BitDepth::Sixteen { 2 } else { 1 };
-    limits.check(Demand { width, height, channels, bytes_per_pixel, file_bytes })?;
+    limits.check(Demand {
+        width,
+        height,
+        channels,
+        bytes_per_pixel,
+        file_bytes,
+    })?;
     Ok(reader)
 }
 
-pub(super) fn header(file: impl BufRead + Seek, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
+pub(super) fn header(
+    file: impl BufRead + Seek,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
     let reader = open(file, file_bytes, limits)?;
     let (info, (color, depth)) = (reader.info(), reader.output_color_type());
     let mut metadata: Notes = Vec::new();
-    metadata.extend(info.uncompressed_latin1_text.iter().map(|t| note(&t.keyword, &t.text)));
-    metadata.extend(info.utf8_text.iter().filter_map(|t| Some(note(&t.keyword, &t.get_text().ok()?))));
+    metadata.extend(
+        info.uncompressed_latin1_text
+            .iter()
+            .map(|t| note(&t.keyword, &t.text)),
+    );
+    metadata.extend(
+        info.utf8_text
+            .iter()
+            .filter_map(|t| Some(note(&t.keyword, &t.get_text().ok()?))),
+    );
     Ok(Header {
         format: Format::Png,
         width: info.width as usize,
@@ -55,7 +86,10 @@ pub(super) fn colors(bytes: &[u8], limits: &Limits) -> Option<Said> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
     if let Some(cicp) = info.coding_independent_code_points {
-        return Some(Said::CodePoints(cicp.color_primaries, cicp.transfer_function));
+        return Some(Said::CodePoints(
+            cicp.color_primaries,
+            cicp.transfer_function,
+        ));
     }
     if info.srgb.is_some() {
         return None;
@@ -63,17 +97,27 @@ pub(super) fn colors(bytes: &[u8], limits: &Limits) -> Option<Said> {
     if let Some(icc) = &info.icc_profile {
         return Some(Said::Icc(icc.to_vec()));
     }
-    let exponent = info.gama_chunk.map(|gamma| GAMA_ONE / f64::from(gamma.into_scaled()));
+    let exponent = info
+        .gama_chunk
+        .map(|gamma| GAMA_ONE / f64::from(gamma.into_scaled()));
     let primaries = info.chrm_chunk.map(space);
-    (exponent.is_some() || primaries.is_some()).then_some(Said::Curve { exponent, primaries })
+    (exponent.is_some() || primaries.is_some()).then_some(Said::Curve {
+        exponent,
+        primaries,
+    })
 }
 
 /// `gAMA` of 1: the exponent of encoding times this.
 const GAMA_ONE: f64 = 100_000.0;
 
 fn space(named: png::SourceChromaticities) -> RgbSpace {
-    let xy = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [x, y].map(|v| f64::from(v.into_scaled()) / GAMA_ONE);
-    RgbSpace { primaries: [named.red, named.green, named.blue].map(xy), white: xy(named.white) }
+    let xy = |(x, y): (png::ScaledFloat, png::ScaledFloat)| {
+        [x, y].map(|v| f64::from(v.into_scaled()) / GAMA_ONE)
+    };
+    RgbSpace {
+        primaries: [named.red, named.green, named.blue].map(xy),
+        white: xy(named.white),
+    }
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
@@ -86,16 +130,29 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     reader.next_frame(&mut data)?;
     reader.finish()?;
     let samples = match depth {
-        BitDepth::Sixteen => {
-            Samples::U16(data.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
-        }
+        BitDepth::Sixteen => Samples::U16(
+            data.chunks_exact(2)
+                .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
+                .collect(),
+        ),
         _ => Samples::U8(data),
     };
-    Ok(Raster { width, height, names, samples, display_encoded: true, premultiplied: false })
+    Ok(Raster {
+        width,
+        height,
+        names,
+        samples,
+        display_encoded: true,
+        premultiplied: false,
+    })
 }
 
 /// A whole file; the fast compression takes a few milliseconds for 640 x 480.
-pub(super) fn encode(picture: &Coded<'_>, effort: PngEffort, metadata: &[(String, String)]) -> Result<Vec<u8>, String> {
+pub(super) fn encode(
+    picture: &Coded<'_>,
+    effort: PngEffort,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     write(&mut bytes, picture, effort, metadata).map_err(|e| e.to_string())?;
     Ok(bytes)
@@ -146,24 +203,42 @@ mod tests {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
         colors(&mut encoder);
-        encoder.write_header().unwrap().write_image_data(&[128]).unwrap();
-        let profile = super::colors(&bytes, &Limits::default()).map_or(Ok(None), Profile::said).unwrap();
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&[128])
+            .unwrap();
+        let profile = super::colors(&bytes, &Limits::default())
+            .map_or(Ok(None), Profile::said)
+            .unwrap();
         let code = 128.0 / 255.0;
-        profile.map_or([crate::color::srgb_to_linear(code); 3], |p| p.light([code; 3]))
+        profile.map_or([crate::color::srgb_to_linear(code); 3], |p| {
+            p.light([code; 3])
+        })
     }
 
     #[test]
     fn gamma_is_applied_and_that_of_screens_is_srgb() {
         let code = 128.0_f64 / 255.0;
-        for (gama, exponent) in
-            [(100_000, 1.0), (55_556, 1.8), (50_000, 2.0), (220_000, 1.0 / 2.2), (35_000, 1.0 / 0.35)]
-        {
+        for (gama, exponent) in [
+            (100_000, 1.0),
+            (55_556, 1.8),
+            (50_000, 2.0),
+            (220_000, 1.0 / 2.2),
+            (35_000, 1.0 / 0.35),
+        ] {
             let [r, g, b] = light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama)));
             let expected = libm::pow(code, exponent) as f32;
-            assert!((r - expected).abs() < 2e-5 && r == g && g == b, "{gama}: {r}, expected {expected}");
+            assert!(
+                (r - expected).abs() < 2e-5 && r == g && g == b,
+                "{gama}: {r}, expected {expected}"
+            );
         }
         for gama in [45_455, 45_454, 45_000] {
-            assert_eq!(light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama))), light(|_| ()));
+            assert_eq!(
+                light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama))),
+                light(|_| ())
+            );
         }
     }
 
@@ -179,14 +254,27 @@ mod tests {
     #[test]
     fn primaries_are_converted() {
         let chunk = |at: [f32; 8]| {
-            png::SourceChromaticities::new((at[0], at[1]), (at[2], at[3]), (at[4], at[5]), (at[6], at[7]))
+            png::SourceChromaticities::new(
+                (at[0], at[1]),
+                (at[2], at[3]),
+                (at[4], at[5]),
+                (at[6], at[7]),
+            )
         };
         let p3 = chunk([0.3127, 0.329, 0.68, 0.32, 0.265, 0.69, 0.15, 0.06]);
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
         encoder.set_source_chromaticities(p3);
-        encoder.write_header().unwrap().write_image_data(&[0]).unwrap();
-        let profile = colors(&bytes, &Limits::default()).map(Profile::said).unwrap().unwrap().unwrap();
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&[0])
+            .unwrap();
+        let profile = colors(&bytes, &Limits::default())
+            .map(Profile::said)
+            .unwrap()
+            .unwrap()
+            .unwrap();
         // Display P3 red in Rec. 709.
         let red = profile.light([1.0, 0.0, 0.0]);
         for (v, expected) in red.iter().zip([1.224_94, -0.042_06, -0.019_64]) {

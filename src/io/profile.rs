@@ -28,7 +28,10 @@ pub(super) enum Said {
     /// A colour profile.
     Icc(Vec<u8>),
     /// Light is the code raised to an exponent, if that is said, in primaries, if those are.
-    Curve { exponent: Option<f64>, primaries: Option<RgbSpace> },
+    Curve {
+        exponent: Option<f64>,
+        primaries: Option<RgbSpace>,
+    },
     /// Primaries and transfer function by their numbers in ITU-T H.273.
     CodePoints(u8, u8),
 }
@@ -63,23 +66,38 @@ impl Profile {
     pub(super) fn said(said: Said) -> Result<Option<Self>, String> {
         match said {
             Said::Icc(bytes) => Self::parsed(&bytes),
-            Said::Curve { exponent, primaries } => Self::of_curve(exponent, primaries),
+            Said::Curve {
+                exponent,
+                primaries,
+            } => Self::of_curve(exponent, primaries),
             Said::CodePoints(a, b) if (a, b) == CODE_POINTS_SRGB => Ok(None),
-            Said::CodePoints(a, b) if (a, b) == CODE_POINTS_LINEAR => Self::of_curve(Some(1.0), None),
-            Said::CodePoints(primaries, transfer) => Err(format!("code points {primaries}/{transfer} for its colours")),
+            Said::CodePoints(a, b) if (a, b) == CODE_POINTS_LINEAR => {
+                Self::of_curve(Some(1.0), None)
+            }
+            Said::CodePoints(primaries, transfer) => Err(format!(
+                "code points {primaries}/{transfer} for its colours"
+            )),
         }
     }
 
-    fn of_curve(exponent: Option<f64>, primaries: Option<RgbSpace>) -> Result<Option<Self>, String> {
+    fn of_curve(
+        exponent: Option<f64>,
+        primaries: Option<RgbSpace>,
+    ) -> Result<Option<Self>, String> {
         let exponent = exponent.filter(|e| !OF_SCREENS.contains(e));
         let matrix = primaries.map_or(Ok(None), |space| to_rec709(&space))?;
         if exponent.is_none() && matrix.is_none() {
             return Ok(None);
         }
-        let light = |x: f64| exponent.map_or_else(|| f64::from(srgb_to_linear(x as f32)), |e| libm::pow(x, e));
+        let light = |x: f64| {
+            exponent.map_or_else(|| f64::from(srgb_to_linear(x as f32)), |e| libm::pow(x, e))
+        };
         let curve = tabled(light).ok_or("a gamma that is none")?;
         let to_rec709 = matrix.unwrap_or_else(|| Matrix3::identity().into());
-        Ok(Some(Self { curves: std::array::from_fn(|_| curve.clone()), to_rec709 }))
+        Ok(Some(Self {
+            curves: std::array::from_fn(|_| curve.clone()),
+            to_rec709,
+        }))
     }
 
     fn parsed(bytes: &[u8]) -> Result<Option<Self>, String> {
@@ -90,25 +108,46 @@ impl Profile {
                 curves: std::array::from_fn(|_| curve.clone()),
                 to_rec709: Matrix3::identity().into(),
             }),
-            other => return Err(format!("a colour profile for {}", format!("{other:?}").to_uppercase())),
+            other => {
+                return Err(format!(
+                    "a colour profile for {}",
+                    format!("{other:?}").to_uppercase()
+                ));
+            }
         };
         let profile = profile.ok_or("a colour profile without primaries and curves")?;
         Ok((!profile.is_srgb()).then_some(profile))
     }
 
     fn of_primaries(icc: &ColorProfile) -> Option<Self> {
-        let columns = [icc.red_colorant, icc.green_colorant, icc.blue_colorant].map(|c| [c.x, c.y, c.z]);
+        let columns =
+            [icc.red_colorant, icc.green_colorant, icc.blue_colorant].map(|c| [c.x, c.y, c.z]);
         let xyz_d50_from_rgb = Matrix3::from_columns(&columns.map(Into::into));
-        let matrix = rgb_from_xyz(&RgbSpace::REC709) * bradford(RgbSpace::REC709.white, D50) * xyz_d50_from_rgb;
+        let matrix = rgb_from_xyz(&RgbSpace::REC709)
+            * bradford(RgbSpace::REC709.white, D50)
+            * xyz_d50_from_rgb;
         let curve = |trc: &Option<ToneReprCurve>| trc.as_ref().and_then(table);
-        let curves = [curve(&icc.red_trc)?, curve(&icc.green_trc)?, curve(&icc.blue_trc)?];
-        matrix.iter().all(|v| v.is_finite()).then(|| Self { curves, to_rec709: matrix.into() })
+        let curves = [
+            curve(&icc.red_trc)?,
+            curve(&icc.green_trc)?,
+            curve(&icc.blue_trc)?,
+        ];
+        matrix.iter().all(|v| v.is_finite()).then(|| Self {
+            curves,
+            to_rec709: matrix.into(),
+        })
     }
 
     fn is_srgb(&self) -> bool {
         let near = |v: f32, w: f32| (v - w).abs() < SAME;
         let unit = ColorMatrix::from(Matrix3::identity());
-        let plain = self.to_rec709.rows.iter().flatten().zip(unit.rows.iter().flatten()).all(|(&v, &w)| near(v, w));
+        let plain = self
+            .to_rec709
+            .rows
+            .iter()
+            .flatten()
+            .zip(unit.rows.iter().flatten())
+            .all(|(&v, &w)| near(v, w));
         plain
             && self
                 .curves
@@ -135,7 +174,9 @@ fn table(curve: &ToneReprCurve) -> Option<Vec<f32>> {
 }
 
 fn tabled(curve: impl Fn(f64) -> f64) -> Option<Vec<f32>> {
-    let light: Vec<f32> = (0..CODES).map(|code| curve(f64::from(code as u16) / f64::from(FULL)) as f32).collect();
+    let light: Vec<f32> = (0..CODES)
+        .map(|code| curve(f64::from(code as u16) / f64::from(FULL)) as f32)
+        .collect();
     light.iter().all(|v| v.is_finite()).then_some(light)
 }
 
@@ -149,16 +190,29 @@ const SMALLEST_GAMUT: f64 = 1e-3;
 /// # Errors
 /// For primaries and a white that no colour space has.
 pub(super) fn to_rec709(named: &RgbSpace) -> Result<Option<ColorMatrix>, String> {
-    let pairs = |space: &RgbSpace| space.primaries.into_iter().chain([space.white]).flatten().collect::<Vec<_>>();
+    let pairs = |space: &RgbSpace| {
+        space
+            .primaries
+            .into_iter()
+            .chain([space.white])
+            .flatten()
+            .collect::<Vec<_>>()
+    };
     let [r, g, b] = named.primaries;
     let area = ((g[0] - r[0]) * (b[1] - r[1]) - (b[0] - r[0]) * (g[1] - r[1])).abs() / 2.0;
     // Primaries may be no colours that can be seen, as those of XYZ and ACES are.
     let all_real = pairs(named).iter().all(|v| v.abs() <= 2.0);
     if !all_real || area < SMALLEST_GAMUT || named.white[1] < SMALLEST_GAMUT {
-        return Err(format!("chromaticities {:?}, expected those of a colour space", pairs(named)));
+        return Err(format!(
+            "chromaticities {:?}, expected those of a colour space",
+            pairs(named)
+        ));
     }
     let ours = RgbSpace::REC709;
-    let same = pairs(named).iter().zip(pairs(&ours)).all(|(v, w)| (v - w).abs() < SAME_CHROMATICITY);
+    let same = pairs(named)
+        .iter()
+        .zip(pairs(&ours))
+        .all(|(v, w)| (v - w).abs() < SAME_CHROMATICITY);
     Ok((!same).then(|| rgb_from_rgb(&ours, named).into()))
 }
 
@@ -170,38 +224,40 @@ fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
             [gamma] => libm::pow(x, f64::from(gamma) / 256.0),
             _ => interpolated(table, x),
         },
-        ToneReprCurve::Parametric(p) => match p.iter().map(|&v| f64::from(v)).collect::<Vec<_>>()[..] {
-            [g] => libm::pow(x, g),
-            [g, a, b] => {
-                if x >= -b / a {
-                    libm::pow(a * x + b, g)
-                } else {
-                    0.0
+        ToneReprCurve::Parametric(p) => {
+            match p.iter().map(|&v| f64::from(v)).collect::<Vec<_>>()[..] {
+                [g] => libm::pow(x, g),
+                [g, a, b] => {
+                    if x >= -b / a {
+                        libm::pow(a * x + b, g)
+                    } else {
+                        0.0
+                    }
                 }
-            }
-            [g, a, b, c] => {
-                if x >= -b / a {
-                    libm::pow(a * x + b, g) + c
-                } else {
-                    c
+                [g, a, b, c] => {
+                    if x >= -b / a {
+                        libm::pow(a * x + b, g) + c
+                    } else {
+                        c
+                    }
                 }
-            }
-            [g, a, b, c, d] => {
-                if x >= d {
-                    libm::pow(a * x + b, g)
-                } else {
-                    c * x
+                [g, a, b, c, d] => {
+                    if x >= d {
+                        libm::pow(a * x + b, g)
+                    } else {
+                        c * x
+                    }
                 }
-            }
-            [g, a, b, c, d, e, f] => {
-                if x >= d {
-                    libm::pow(a * x + b, g) + e
-                } else {
-                    c * x + f
+                [g, a, b, c, d, e, f] => {
+                    if x >= d {
+                        libm::pow(a * x + b, g) + e
+                    } else {
+                        c * x + f
+                    }
                 }
+                _ => f64::NAN,
             }
-            _ => f64::NAN,
-        },
+        }
     }
 }
 
@@ -238,8 +294,14 @@ mod tests {
     /// SMPTE EG 432-1: P3 primaries, D65; Adobe RGB (1998): 4.3.1 and gamma 563/256.
     #[test]
     fn other_primaries_become_rec_709() {
-        let p3 = RgbSpace { primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]], white: [0.3127, 0.3290] };
-        let adobe = RgbSpace { primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]], white: [0.3127, 0.3290] };
+        let p3 = RgbSpace {
+            primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]],
+            white: [0.3127, 0.3290],
+        };
+        let adobe = RgbSpace {
+            primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]],
+            white: [0.3127, 0.3290],
+        };
         fn gamma(v: f64) -> f64 {
             libm::pow(v, 563.0 / 256.0)
         }
@@ -248,17 +310,29 @@ mod tests {
         }
         let cases = [
             (ColorProfile::new_display_p3(), p3, srgb as fn(f64) -> f64),
-            (ColorProfile::new_adobe_rgb(), adobe, gamma as fn(f64) -> f64),
+            (
+                ColorProfile::new_adobe_rgb(),
+                adobe,
+                gamma as fn(f64) -> f64,
+            ),
         ];
         for (icc, space, curve) in cases {
             let profile = parsed(&icc).unwrap();
-            for display in [[0.2, 0.5, 0.9], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [0.8, 0.1, 0.3]] {
+            for display in [
+                [0.2, 0.5, 0.9],
+                [1.0, 1.0, 1.0],
+                [0.0, 0.0, 0.0],
+                [0.8, 0.1, 0.3],
+            ] {
                 let light = nalgebra::Vector3::from(display.map(curve));
                 let expected = rgb_from_rgb(&RgbSpace::REC709, &space) * light;
                 let got = profile.light(display.map(|v| v as f32));
                 // Colorants are stored in steps of 1/65536, and some programs round their curves to 1/256.
                 for (v, w) in got.iter().zip(expected.iter()) {
-                    assert!((f64::from(*v) - w).abs() < 1e-3, "{display:?}: {got:?}, expected {expected:?}");
+                    assert!(
+                        (f64::from(*v) - w).abs() < 1e-3,
+                        "{display:?}: {got:?}, expected {expected:?}"
+                    );
                 }
             }
         }
@@ -272,22 +346,43 @@ mod tests {
         assert_eq!(at(ToneReprCurve::Lut(vec![0, 0, 65_535]), 0.75), 0.5);
         assert_eq!(at(ToneReprCurve::Lut(vec![0, 65_535]), 1.0), 1.0);
         assert_eq!(at(ToneReprCurve::Parametric(vec![2.0]), 0.5), 0.25);
-        assert_eq!(at(ToneReprCurve::Parametric(vec![2.0, 1.0, -0.5]), 0.25), 0.0);
-        assert_eq!(at(ToneReprCurve::Parametric(vec![2.0, 1.0, 0.0, 0.5, 0.25]), 0.125), 0.0625);
+        assert_eq!(
+            at(ToneReprCurve::Parametric(vec![2.0, 1.0, -0.5]), 0.25),
+            0.0
+        );
+        assert_eq!(
+            at(
+                ToneReprCurve::Parametric(vec![2.0, 1.0, 0.0, 0.5, 0.25]),
+                0.125
+            ),
+            0.0625
+        );
         assert!(table(&ToneReprCurve::Parametric(vec![1.0, 2.0])).is_none());
     }
 
     #[test]
     fn code_points_other_than_those_of_screens_are_named() {
         assert_eq!(Profile::said(Said::CodePoints(1, 13)), Ok(None));
-        assert_eq!(Profile::said(Said::CodePoints(1, 8)).unwrap().unwrap().light([0.5; 3])[0], 32768.0 / 65535.0);
-        assert_eq!(Profile::said(Said::CodePoints(9, 16)).unwrap_err(), "code points 9/16 for its colours");
+        assert_eq!(
+            Profile::said(Said::CodePoints(1, 8))
+                .unwrap()
+                .unwrap()
+                .light([0.5; 3])[0],
+            32768.0 / 65535.0
+        );
+        assert_eq!(
+            Profile::said(Said::CodePoints(9, 16)).unwrap_err(),
+            "code points 9/16 for its colours"
+        );
     }
 
     /// CIE XYZ of equal energy: its middle is the white of Rec. 709.
     #[test]
     fn primaries_without_luminance_are_primaries() {
-        let xyz = RgbSpace { primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], white: [1.0 / 3.0; 2] };
+        let xyz = RgbSpace {
+            primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
+            white: [1.0 / 3.0; 2],
+        };
         let matrix = to_rec709(&xyz).unwrap().unwrap();
         let white = matrix.apply([1.0; 3]);
         assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-6), "{white:?}");
@@ -295,10 +390,23 @@ mod tests {
         let [r, g, b] = matrix.apply([0.0, 1.0, 0.0]);
         assert!(g > 1.0 && r < 0.0 && b < 0.0, "{r} {g} {b}");
         assert_eq!(to_rec709(&RgbSpace::REC709), Ok(None));
-        let line = RgbSpace { primaries: [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]], ..xyz };
-        let black = RgbSpace { white: [0.3, 0.0], ..xyz };
-        let endless = RgbSpace { white: [f64::NAN, 0.3], ..xyz };
-        assert!([line, black, endless].iter().all(|space| to_rec709(space).is_err()));
+        let line = RgbSpace {
+            primaries: [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]],
+            ..xyz
+        };
+        let black = RgbSpace {
+            white: [0.3, 0.0],
+            ..xyz
+        };
+        let endless = RgbSpace {
+            white: [f64::NAN, 0.3],
+            ..xyz
+        };
+        assert!(
+            [line, black, endless]
+                .iter()
+                .all(|space| to_rec709(space).is_err())
+        );
     }
 
     #[test]
@@ -308,6 +416,9 @@ mod tests {
             // A cut may spare everything that counts.
             let _ = Profile::parsed(&whole[..length]);
         }
-        assert_eq!(Profile::parsed(b"profile").unwrap_err(), "a damaged colour profile");
+        assert_eq!(
+            Profile::parsed(b"profile").unwrap_err(),
+            "a damaged colour profile"
+        );
     }
 }

@@ -117,15 +117,35 @@ pub(super) fn receive<T: DeserializeOwned>(from: &mut impl BufRead) -> Result<T>
 
 /// Asks about a file.
 pub(super) fn ask(to: &mut impl Write, format: Format, ask: Ask, file: &[u8]) -> Result<()> {
-    send(to, &Question { format: format.name().into(), ask, bytes: file.len() as u64 })?;
+    send(
+        to,
+        &Question {
+            format: format.name().into(),
+            ask,
+            bytes: file.len() as u64,
+        },
+    )?;
     to.write_all(file)?;
     to.flush()
 }
 
 /// Answers with a picture and its samples.
 pub(super) fn send_raster(to: &mut impl Write, raster: &Raster) -> Result<()> {
-    let &Raster { width, height, ref names, ref samples, display_encoded, .. } = raster;
-    let shape = Shape { width, height, names: names.clone(), sample: Sample::of(samples), display_encoded };
+    let &Raster {
+        width,
+        height,
+        ref names,
+        ref samples,
+        display_encoded,
+        ..
+    } = raster;
+    let shape = Shape {
+        width,
+        height,
+        names: names.clone(),
+        sample: Sample::of(samples),
+        display_encoded,
+    };
     send(to, &Answer::Picture(shape))?;
     to.write_all(match samples {
         Samples::U8(v) => v,
@@ -149,14 +169,28 @@ pub(super) fn receive_shape(
     let channels = shape.names.len() as u64;
     let bytes_per_pixel = channels * u64::from(shape.sample.bytes());
     let (width, height) = (shape.width as u64, shape.height as u64);
-    let demand = Demand { width, height, channels, bytes_per_pixel, file_bytes };
-    limits.check(demand).map_err(|e| Error::new(ErrorKind::InvalidData, e))?;
+    let demand = Demand {
+        width,
+        height,
+        channels,
+        bytes_per_pixel,
+        file_bytes,
+    };
+    limits
+        .check(demand)
+        .map_err(|e| Error::new(ErrorKind::InvalidData, e))?;
     Ok(Ok(shape))
 }
 
 /// Receives the samples of a shape that was checked.
 pub(super) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Raster> {
-    let Shape { width, height, names, sample, display_encoded } = shape;
+    let Shape {
+        width,
+        height,
+        names,
+        sample,
+        display_encoded,
+    } = shape;
     let count = width * height * names.len();
     let samples = match sample {
         Sample::U8 => Samples::U8(filled(from, count)?),
@@ -164,7 +198,14 @@ pub(super) fn receive_samples(from: &mut impl Read, shape: Shape) -> Result<Rast
         Sample::F16 => Samples::F16(filled(from, count)?),
         Sample::F32 => Samples::F32(filled(from, count)?),
     };
-    Ok(Raster { width, height, names, samples, display_encoded, premultiplied: false })
+    Ok(Raster {
+        width,
+        height,
+        names,
+        samples,
+        display_encoded,
+        premultiplied: false,
+    })
 }
 
 fn filled<T: bytemuck::Pod>(from: &mut impl Read, count: usize) -> Result<Vec<T>> {
@@ -183,7 +224,8 @@ mod tests {
         receive_samples(&mut from, shape.map_err(|e| e.to_string())?).map_err(|e| e.to_string())
     }
 
-    const HEAD: &str = r#"{"picture":{"width":1,"height":1,"names":["Y"],"sample":"u16","display_encoded":true}}"#;
+    const HEAD: &str =
+        r#"{"picture":{"width":1,"height":1,"names":["Y"],"sample":"u16","display_encoded":true}}"#;
 
     #[test]
     fn what_is_sent_is_received() {
@@ -215,7 +257,11 @@ mod tests {
         assert!(received(&[b'x'; 1 << 17]).is_err());
         assert!(received(format!("{HEAD}\n\x01").as_bytes()).is_err());
         let huge = HEAD.replace("\"width\":1", "\"width\":999999999");
-        assert!(received(format!("{huge}\n").as_bytes()).unwrap_err().contains("Limits::side"));
+        assert!(
+            received(format!("{huge}\n").as_bytes())
+                .unwrap_err()
+                .contains("Limits::side")
+        );
         assert_eq!(received(b"{\"refused\":\"why\"}\n").unwrap_err(), "why");
     }
 }

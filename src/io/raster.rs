@@ -81,7 +81,9 @@ impl Refusal {
     /// With what another decoder could not read, where it said so: that is the file's own, and why it came here.
     pub(super) fn after(self, what: &str) -> Self {
         match self {
-            Self::Broken(why) if what.starts_with("unsupported") => Self::Broken(format!("{what} ({why})")),
+            Self::Broken(why) if what.starts_with("unsupported") => {
+                Self::Broken(format!("{what} ({why})"))
+            }
             other => other,
         }
     }
@@ -150,12 +152,20 @@ impl Wanted {
             Self::Film => film(names),
             Self::Color => color(names),
             _ if names.len() == 1 => Some(named(0)),
-            Self::Coverage => {
-                color_of_layer(names, "").map(|picked| (Fit::Named, picked)).or_else(|| at("A").map(named))
-            }
-            Self::Depth => at("Z").map(named).or_else(|| Some((Fit::Layer, vec![only(names, |n| last(n) == "Z")?]))),
+            Self::Coverage => color_of_layer(names, "")
+                .map(|picked| (Fit::Named, picked))
+                .or_else(|| at("A").map(named)),
+            Self::Depth => at("Z")
+                .map(named)
+                .or_else(|| Some((Fit::Layer, vec![only(names, |n| last(n) == "Z")?]))),
         };
-        found.ok_or_else(|| format!("has the channels {}, expected {}", names.join(" "), self.expected()))
+        found.ok_or_else(|| {
+            format!(
+                "has the channels {}, expected {}",
+                names.join(" "),
+                self.expected()
+            )
+        })
     }
 
     fn expected(self) -> &'static str {
@@ -171,7 +181,9 @@ impl Wanted {
 fn film(names: &[String]) -> Option<(Fit, Vec<usize>)> {
     let at = |name: &str| names.iter().position(|n| n == name);
     let all = |three: [&str; 3]| three.into_iter().map(at).collect::<Option<Vec<_>>>();
-    let through = all(VIEW_TRANSMITTANCE).or_else(|| all(TRANSMITTANCE)).unwrap_or_default();
+    let through = all(VIEW_TRANSMITTANCE)
+        .or_else(|| all(TRANSMITTANCE))
+        .unwrap_or_default();
     let (fit, mut picked) = color(names)?;
     picked.truncate(if through.is_empty() { picked.len() } else { 3 });
     picked.extend(through);
@@ -183,24 +195,39 @@ fn color(names: &[String]) -> Option<(Fit, Vec<usize>)> {
     if let Some(picked) = color_of_layer(names, "") {
         return Some((Fit::Named, picked));
     }
-    let layers = names.iter().filter_map(|name| Some(&name[..=name.rfind('.')?]));
-    let layers: Vec<(&str, Vec<usize>)> = layers.filter_map(|l| Some((l, color_of_layer(names, l)?))).collect();
-    let is_finished = |layer: &str| FINISHED.contains(&last(layer.trim_end_matches('.')).to_lowercase().as_str());
-    let chosen = layers.iter().find(|(layer, _)| is_finished(layer)).or(layers.first());
+    let layers = names
+        .iter()
+        .filter_map(|name| Some(&name[..=name.rfind('.')?]));
+    let layers: Vec<(&str, Vec<usize>)> = layers
+        .filter_map(|l| Some((l, color_of_layer(names, l)?)))
+        .collect();
+    let is_finished =
+        |layer: &str| FINISHED.contains(&last(layer.trim_end_matches('.')).to_lowercase().as_str());
+    let chosen = layers
+        .iter()
+        .find(|(layer, _)| is_finished(layer))
+        .or(layers.first());
     if let Some((_, picked)) = chosen {
         return Some((Fit::Layer, picked.clone()));
     }
-    let seen = only(names, |_| true).or_else(|| only(names, |name| !["A", "Z", "ZBack"].contains(&last(name))))?;
+    let seen = only(names, |_| true)
+        .or_else(|| only(names, |name| !["A", "Z", "ZBack"].contains(&last(name))))?;
     let alpha = only(names, |name| last(name) == "A").filter(|&a| a != seen);
     Some((Fit::Alone, [seen; 3].into_iter().chain(alpha).collect()))
 }
 
 /// `R G B` or `Y` of a layer, with its `A`.
 fn color_of_layer(names: &[String], layer: &str) -> Option<Vec<usize>> {
-    let at = |name: &str| names.iter().position(|n| n.strip_prefix(layer) == Some(name));
+    let at = |name: &str| {
+        names
+            .iter()
+            .position(|n| n.strip_prefix(layer) == Some(name))
+    };
     let all = |three: [&str; 3]| three.into_iter().map(at).collect::<Option<Vec<_>>>();
     let grey = || at("Y").map(|y| vec![y; 3]);
-    let color = all(["R", "G", "B"]).or_else(|| all(["r", "g", "b"])).or_else(grey)?;
+    let color = all(["R", "G", "B"])
+        .or_else(|| all(["r", "g", "b"]))
+        .or_else(grey)?;
     Some(color.into_iter().chain(at("A").or(at("a"))).collect())
 }
 
@@ -302,7 +329,12 @@ impl FromFile for Film {
         let picked = Wanted::Film.pick(&rows.raster.names)?;
         match (&rows.raster.samples, &picked[..]) {
             (Samples::F32(v), &[r, g, b, tr, tg, tb]) => {
-                rows.each(v, pixels, |px| Film::new([px[r], px[g], px[b]].into(), [px[tr], px[tg], px[tb]].into()));
+                rows.each(v, pixels, |px| {
+                    Film::new(
+                        [px[r], px[g], px[b]].into(),
+                        [px[tr], px[tg], px[tb]].into(),
+                    )
+                });
             }
             (Samples::F16(v), &[r, g, b, tr, tg, tb]) => rows.each(v, pixels, |px| {
                 let three = |at: [usize; 3]| at.map(|i| f32::from(px[i])).into();
@@ -311,7 +343,10 @@ impl FromFile for Film {
             _ => {
                 let mut rgba = zeroed_vec::<PremulRgba>(pixels.len());
                 rows.colors(&mut rgba)?;
-                pixels.iter_mut().zip(rgba).for_each(|(film, rgba)| *film = rgba.into());
+                pixels
+                    .iter_mut()
+                    .zip(rgba)
+                    .for_each(|(film, rgba)| *film = rgba.into());
             }
         }
         Ok(())
@@ -380,7 +415,9 @@ impl Opaque<'_> {
         if clear == 0 {
             return Ok(());
         }
-        Err(format!("{clear} pixels with alpha below 1, expected an opaque picture (put it over a background first)"))
+        Err(format!(
+            "{clear} pixels with alpha below 1, expected an opaque picture (put it over a background first)"
+        ))
     }
 
     /// Pixels whose channel `a` says that they are not opaque.
@@ -393,7 +430,9 @@ impl Opaque<'_> {
     fn matte(&self) -> Result<usize, String> {
         let names = &self.raster.names;
         let picked = Wanted::Coverage.pick(names)?;
-        let &[r, g, b, ref alpha @ ..] = &picked[..] else { return Ok(picked[0]) };
+        let &[r, g, b, ref alpha @ ..] = &picked[..] else {
+            return Ok(picked[0]);
+        };
         let differ = |value: &dyn Fn(usize) -> f32| {
             let [r, g, b] = [r, g, b].map(value);
             r.max(g).max(b) - r.min(g).min(b) > EQUAL
@@ -401,10 +440,17 @@ impl Opaque<'_> {
         let coloured = self.count_values(differ);
         match alpha.first() {
             None if coloured == 0 => Ok(r),
-            None => Err(format!("{coloured} coloured pixels, expected {}", Wanted::Coverage.expected())),
+            None => Err(format!(
+                "{coloured} coloured pixels, expected {}",
+                Wanted::Coverage.expected()
+            )),
             Some(&a) if coloured == 0 && self.clear(a) == 0 => Ok(r),
             Some(&a) if r != g => Ok(a),
-            Some(_) => Err(format!("has the channels {}, expected {}", names.join(" "), Wanted::Coverage.expected())),
+            Some(_) => Err(format!(
+                "has the channels {}, expected {}",
+                names.join(" "),
+                Wanted::Coverage.expected()
+            )),
         }
     }
 
@@ -420,22 +466,58 @@ impl Opaque<'_> {
 
     fn colors<P: Colored>(&self, pixels: &mut [P]) -> Result<(), String> {
         let picked = Wanted::Color.pick(&self.raster.names)?;
-        let at = Channels { color: [picked[0], picked[1], picked[2]], alpha: picked.get(3).copied() };
-        let light = |display: [f32; 3]| self.profile.map_or_else(|| display.map(srgb_to_linear), |p| p.light(display));
+        let at = Channels {
+            color: [picked[0], picked[1], picked[2]],
+            alpha: picked.get(3).copied(),
+        };
+        let light = |display: [f32; 3]| {
+            self.profile
+                .map_or_else(|| display.map(srgb_to_linear), |p| p.light(display))
+        };
         match (&self.raster.samples, self.profile) {
             (Samples::U8(v), None) => {
-                self.decoded(v, pixels, &at, 255.0, |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into(), light);
+                self.decoded(
+                    v,
+                    pixels,
+                    &at,
+                    255.0,
+                    |[r, g, b]| decode_srgb8(Srgb8 { r, g, b }).into(),
+                    light,
+                );
             }
             (Samples::U16(v), None) => {
-                self.decoded(v, pixels, &at, 65_535.0, |codes| codes.map(decode_srgb16), light);
+                self.decoded(
+                    v,
+                    pixels,
+                    &at,
+                    65_535.0,
+                    |codes| codes.map(decode_srgb16),
+                    light,
+                );
             }
             (Samples::U8(v), Some(p)) => {
-                self.decoded(v, pixels, &at, 255.0, |c| p.light(c.map(|c| f32::from(c) / 255.0)), light);
+                self.decoded(
+                    v,
+                    pixels,
+                    &at,
+                    255.0,
+                    |c| p.light(c.map(|c| f32::from(c) / 255.0)),
+                    light,
+                );
             }
             (Samples::U16(v), Some(p)) => {
-                self.decoded(v, pixels, &at, 65_535.0, |c| p.light(c.map(|c| f32::from(c) / 65_535.0)), light);
+                self.decoded(
+                    v,
+                    pixels,
+                    &at,
+                    65_535.0,
+                    |c| p.light(c.map(|c| f32::from(c) / 65_535.0)),
+                    light,
+                );
             }
-            (Samples::F16(v), _) => self.decoded(v, pixels, &at, 1.0, |c| light(c.map(f32::from)), light),
+            (Samples::F16(v), _) => {
+                self.decoded(v, pixels, &at, 1.0, |c| light(c.map(f32::from)), light)
+            }
             (Samples::F32(v), _) => self.decoded(v, pixels, &at, 1.0, light, light),
         }
         Ok(())
@@ -453,12 +535,19 @@ impl Opaque<'_> {
     ) {
         let a = |px: &[T]| at.alpha.map_or(1.0, |i| px[i].into() / full);
         let plain = |px: &[T]| at.color.map(|i| px[i].into() / full);
-        match (self.raster.display_encoded, self.raster.premultiplied && at.alpha.is_some()) {
-            (true, false) => self.each(samples, pixels, |px| P::straight(decode(at.color.map(|i| px[i])), a(px))),
+        match (
+            self.raster.display_encoded,
+            self.raster.premultiplied && at.alpha.is_some(),
+        ) {
+            (true, false) => self.each(samples, pixels, |px| {
+                P::straight(decode(at.color.map(|i| px[i])), a(px))
+            }),
             (false, false) => self.each(samples, pixels, |px| P::straight(plain(px), a(px))),
             (false, true) => self.each(samples, pixels, |px| P::premultiplied(plain(px), a(px))),
             (true, true) => {
-                self.each(samples, pixels, |px| P::straight(light(unassociated(plain(px), a(px))), a(px)));
+                self.each(samples, pixels, |px| {
+                    P::straight(light(unassociated(plain(px), a(px))), a(px))
+                });
             }
         }
     }
@@ -480,9 +569,16 @@ impl Opaque<'_> {
         Ok(())
     }
 
-    fn each<T: Sync, P: Send>(&self, samples: &[T], pixels: &mut [P], f: impl Fn(&[T]) -> P + Sync + Send) {
+    fn each<T: Sync, P: Send>(
+        &self,
+        samples: &[T],
+        pixels: &mut [P],
+        f: impl Fn(&[T]) -> P + Sync + Send,
+    ) {
         let pixels = pixels.par_iter_mut().with_min_len(self.raster.width.max(1));
-        pixels.zip(self.stored(samples)).for_each(|(pixel, px)| *pixel = f(px));
+        pixels
+            .zip(self.stored(samples))
+            .for_each(|(pixel, px)| *pixel = f(px));
     }
 
     fn count<T: Sync>(&self, samples: &[T], is: impl Fn(&[T]) -> bool + Sync + Send) -> usize {
@@ -490,9 +586,13 @@ impl Opaque<'_> {
     }
 
     /// The samples of each pixel of the rows.
-    fn stored<'s, T: Sync>(&self, samples: &'s [T]) -> impl IndexedParallelIterator<Item = &'s [T]> {
+    fn stored<'s, T: Sync>(
+        &self,
+        samples: &'s [T],
+    ) -> impl IndexedParallelIterator<Item = &'s [T]> {
         let row = self.raster.row();
-        samples[self.rows.start * row..self.rows.end * row].par_chunks_exact(self.raster.names.len())
+        samples[self.rows.start * row..self.rows.end * row]
+            .par_chunks_exact(self.raster.names.len())
     }
 }
 
@@ -513,15 +613,29 @@ impl Raster {
     ) -> Result<Image<P>, String> {
         let (width, height) = (self.width, rows.len());
         let mut pixels = zeroed_vec(width * height);
-        P::fill(&Opaque { raster: self, profile, rows }, &mut pixels)?;
+        P::fill(
+            &Opaque {
+                raster: self,
+                profile,
+                rows,
+            },
+            &mut pixels,
+        )?;
         Ok(Image::from_vec(width, height, pixels))
     }
 
     /// All pixels, from the last row up; the samples' memory is given back on the way, so that never much more than one
     /// of the two is there.
-    pub(super) fn into_image<P: FromFile>(mut self, profile: Option<&Profile>) -> Result<Image<P>, String> {
+    pub(super) fn into_image<P: FromFile>(
+        mut self,
+        profile: Option<&Profile>,
+    ) -> Result<Image<P>, String> {
         let (width, height) = (self.width, self.height);
-        let whole = Opaque { raster: &self, profile, rows: 0..height };
+        let whole = Opaque {
+            raster: &self,
+            profile,
+            rows: 0..height,
+        };
         P::check(&whole)?;
         if let Some(channel) = P::channel(&whole)? {
             self = self.narrowed(channel);
@@ -532,7 +646,14 @@ impl Raster {
         while rows.start > 0 {
             rows = rows.start.saturating_sub((BAND / width.max(1)).max(1))..rows.start;
             let part = &mut pixels[rows.start * width..rows.end * width];
-            P::fill(&Opaque { raster: &self, profile, rows: rows.clone() }, part)?;
+            P::fill(
+                &Opaque {
+                    raster: &self,
+                    profile,
+                    rows: rows.clone(),
+                },
+                part,
+            )?;
             self.samples.shorten(rows.start * row);
         }
         Ok(Image::from_vec(width, height, pixels))
@@ -553,7 +674,11 @@ impl Raster {
             Samples::F16(v) => Samples::F16(every(v, count, channel)),
             Samples::F32(v) => Samples::F32(every(v, count, channel)),
         };
-        Self { names: vec![self.names[channel].clone()], samples, ..self }
+        Self {
+            names: vec![self.names[channel].clone()],
+            samples,
+            ..self
+        }
     }
 
     /// The picture the way the camera was held.
@@ -569,7 +694,12 @@ impl Raster {
             Samples::F32(v) => Samples::F32(orientation.apply(v, n, stored)),
         };
         let (width, height) = orientation.size(stored);
-        Self { width, height, samples, ..self }
+        Self {
+            width,
+            height,
+            samples,
+            ..self
+        }
     }
 
     /// Samples that are no number, or endless.
@@ -606,7 +736,14 @@ mod tests {
 
     fn raster(samples: Samples, names: &str, display_encoded: bool, premultiplied: bool) -> Raster {
         let names = names.split(' ').map(String::from).collect();
-        Raster { width: 1, height: 1, names, samples, display_encoded, premultiplied }
+        Raster {
+            width: 1,
+            height: 1,
+            names,
+            samples,
+            display_encoded,
+            premultiplied,
+        }
     }
 
     fn pixel<P: FromFile>(raster: Raster) -> Result<P, String> {
@@ -621,9 +758,17 @@ mod tests {
 
     #[test]
     fn alpha_multiplies_linear_light() {
-        let half_white = raster(Samples::U8(vec![255, 255, 255, 128]), "R G B A", true, false);
+        let half_white = raster(
+            Samples::U8(vec![255, 255, 255, 128]),
+            "R G B A",
+            true,
+            false,
+        );
         let p = pixel::<PremulRgba>(half_white).unwrap();
-        assert_eq!(p, PremulRgba::new(128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0));
+        assert_eq!(
+            p,
+            PremulRgba::new(128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0, 128.0 / 255.0)
+        );
     }
 
     #[test]
@@ -637,7 +782,10 @@ mod tests {
     #[test]
     fn an_opaque_alpha_is_dropped_and_a_transparent_one_refused() {
         let opaque = raster(Samples::U8(vec![255, 0, 0, 255]), "R G B A", true, false);
-        assert_eq!(pixel::<LinearRgb>(opaque).unwrap(), LinearRgb::new(1.0, 0.0, 0.0));
+        assert_eq!(
+            pixel::<LinearRgb>(opaque).unwrap(),
+            LinearRgb::new(1.0, 0.0, 0.0)
+        );
         let clear = raster(Samples::U8(vec![255, 0, 0, 254]), "R G B A", true, false);
         assert!(pixel::<LinearRgb>(clear).unwrap_err().contains("alpha"));
     }
@@ -652,20 +800,34 @@ mod tests {
     fn a_grey_picture_of_three_channels_is_a_matte_with_an_alpha_of_one_and_without() {
         let matte = |codes: &[u8], names: &str| {
             let pixels = codes.len() / names.split(' ').count();
-            let matte = Raster { width: pixels, ..raster(Samples::U8(codes.to_vec()), names, true, false) };
-            matte.into_image(None).map(|image: Image<Coverage>| image.pixels().iter().map(|c| c.0).collect::<Vec<_>>())
+            let matte = Raster {
+                width: pixels,
+                ..raster(Samples::U8(codes.to_vec()), names, true, false)
+            };
+            matte.into_image(None).map(|image: Image<Coverage>| {
+                image.pixels().iter().map(|c| c.0).collect::<Vec<_>>()
+            })
         };
         let (full, none) = (1.0, 0.0);
         assert_eq!(matte(&[51, 51, 51, 0, 0, 0], "R G B").unwrap(), [0.2, none]);
-        assert_eq!(matte(&[51, 51, 51, 255, 0, 0, 0, 255], "R G B A").unwrap(), [0.2, none]);
+        assert_eq!(
+            matte(&[51, 51, 51, 255, 0, 0, 0, 255], "R G B A").unwrap(),
+            [0.2, none]
+        );
         assert_eq!(matte(&[51, 255, 0, 255], "Y A").unwrap(), [0.2, none]);
         // An alpha that says something is the matte.
-        assert_eq!(matte(&[51, 51, 51, 255, 0, 0, 0, 0], "R G B A").unwrap(), [full, none]);
+        assert_eq!(
+            matte(&[51, 51, 51, 255, 0, 0, 0, 0], "R G B A").unwrap(),
+            [full, none]
+        );
         assert_eq!(matte(&[51, 0, 0, 255], "R G B A").unwrap(), [full]);
         let expected = "expected one channel, three equal ones R G B, or one named A or Y";
         let coloured = matte(&[51, 51, 51, 51, 0, 51], "R G B").unwrap_err();
         assert_eq!(coloured, format!("1 coloured pixels, {expected}"));
-        assert_eq!(matte(&[51, 128], "Y A").unwrap_err(), format!("has the channels Y A, {expected}"));
+        assert_eq!(
+            matte(&[51, 128], "Y A").unwrap_err(),
+            format!("has the channels Y A, {expected}")
+        );
     }
 
     fn names(text: &str) -> Vec<String> {
@@ -692,7 +854,14 @@ mod tests {
         ] {
             let names = names(channels);
             let (found, indices) = Wanted::Color.choose(&names).unwrap();
-            let found = (found, indices.into_iter().map(|i| names[i].as_str()).collect::<Vec<_>>().join(" "));
+            let found = (
+                found,
+                indices
+                    .into_iter()
+                    .map(|i| names[i].as_str())
+                    .collect::<Vec<_>>()
+                    .join(" "),
+            );
             assert_eq!(found, (fit, picked.to_string()), "{channels}");
         }
         for none in ["u v", "A Z", "d.R d.G s.B", "N.x N.y N.z"] {
@@ -703,14 +872,24 @@ mod tests {
     #[test]
     fn depth_is_found_in_a_layer() {
         assert_eq!(Wanted::Depth.pick(&names("V.C.R V.Depth.Z")).unwrap(), [1]);
-        assert!(Wanted::Depth.pick(&names("V.C.R V.Depth.Z V.Mist.Z")).is_err());
+        assert!(
+            Wanted::Depth
+                .pick(&names("V.C.R V.Depth.Z V.Mist.Z"))
+                .is_err()
+        );
     }
 
     #[test]
     fn a_picture_made_in_bands_is_the_same() {
         let (width, height) = (1 << 10, (2 << 10) + 1);
-        let codes: Vec<u8> = (0..width * height).map(|i| (i * 7 + i / width) as u8).collect();
-        let grey = || Raster { width, height, ..raster(Samples::U8(codes.clone()), "Y", true, false) };
+        let codes: Vec<u8> = (0..width * height)
+            .map(|i| (i * 7 + i / width) as u8)
+            .collect();
+        let grey = || Raster {
+            width,
+            height,
+            ..raster(Samples::U8(codes.clone()), "Y", true, false)
+        };
         let whole: Image<Coverage> = grey().pixels(None, 0..height).unwrap();
         assert!(grey().into_image::<Coverage>(None).unwrap() == whole);
         let rows: Image<Coverage> = grey().pixels(None, 5..9).unwrap();
@@ -719,7 +898,12 @@ mod tests {
 
     #[test]
     fn straight_colour_under_zero_alpha_is_kept() {
-        let clear = raster(Samples::F32(vec![0.5, 0.25, 0.125, 0.0]), "R G B A", false, false);
+        let clear = raster(
+            Samples::F32(vec![0.5, 0.25, 0.125, 0.0]),
+            "R G B A",
+            false,
+            false,
+        );
         let p = pixel::<StraightRgba>(clear).unwrap();
         assert_eq!((p.r, p.g, p.b, p.a), (0.5, 0.25, 0.125, 0.0));
     }

@@ -15,10 +15,16 @@ use std::process::ExitCode;
 pub fn serve(mut arguments: impl Iterator<Item = OsString>) -> ExitCode {
     let argument = arguments.next().unwrap_or_default();
     let Ok(limits) = serde_json::from_str(&argument.to_string_lossy()) else {
-        let _ = writeln!(std::io::stderr(), "petcomp starts this program to read pictures; people do not");
+        let _ = writeln!(
+            std::io::stderr(),
+            "petcomp starts this program to read pictures; people do not"
+        );
         return ExitCode::FAILURE;
     };
-    let (mut from, mut to) = (BufReader::new(std::io::stdin().lock()), std::io::stdout().lock());
+    let (mut from, mut to) = (
+        BufReader::new(std::io::stdin().lock()),
+        std::io::stdout().lock(),
+    );
     match answer_all(&limits, &mut from, &mut to) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) => ExitCode::FAILURE,
@@ -32,7 +38,14 @@ fn answer_all(limits: &Limits, from: &mut impl BufRead, to: &mut impl Write) -> 
     // Asked while files can be opened.
     machine_bytes();
     let (memory, missing) = confine(limits);
-    send(to, &Ready { petcomp: env!("CARGO_PKG_VERSION").into(), openimageio: oiio::version(), missing })?;
+    send(
+        to,
+        &Ready {
+            petcomp: env!("CARGO_PKG_VERSION").into(),
+            openimageio: oiio::version(),
+            missing,
+        },
+    )?;
     to.flush()?;
     while !from.fill_buf()?.is_empty() {
         let question: Question = receive(from)?;
@@ -50,11 +63,18 @@ fn received_file(
     limits: &Limits,
     from: &mut impl Read,
 ) -> Result<std::result::Result<Source, String>> {
-    at_most(question.bytes, limits.file_bytes, "bytes", "file_bytes").map_err(std::io::Error::other)?;
+    at_most(question.bytes, limits.file_bytes, "bytes", "file_bytes")
+        .map_err(std::io::Error::other)?;
     let mut bytes = vec![0; question.bytes as usize];
     from.read_exact(&mut bytes)?;
     let format = Format::of_name(&question.format).ok_or("a format of an unknown name");
-    Ok(format.map(|format| Source { path: PathBuf::new(), bytes, format }).map_err(String::from))
+    Ok(format
+        .map(|format| Source {
+            path: PathBuf::new(),
+            bytes,
+            format,
+        })
+        .map_err(String::from))
 }
 
 fn answer(
@@ -75,7 +95,8 @@ fn answer(
             Ok(shape) => send(to, &Answer::Picture(shape)),
             Err(e) => refused(to, &e),
         },
-        Ask::Pixels { wanted, window } => match oiio::decode(&source, limits, wanted, window, room) {
+        Ask::Pixels { wanted, window } => match oiio::decode(&source, limits, wanted, window, room)
+        {
             Ok(raster) => send_raster(to, &raster),
             Err(e) => refused(to, &e),
         },

@@ -10,12 +10,18 @@ use toml::de::{DeTable, DeValue};
 /// what is nested deeper than so many levels.
 pub(super) fn sound_json(text: &str, deepest: u64) -> serde_json::Result<()> {
     let mut document = serde_json::Deserializer::from_str(text);
-    Sound { levels: deepest, deepest }.deserialize(&mut document)
+    Sound {
+        levels: deepest,
+        deepest,
+    }
+    .deserialize(&mut document)
 }
 
 /// What is wrong with a document that is nested too deeply.
 fn too_deep(deepest: u64) -> String {
-    format!("nested deeper than {deepest} levels (Limits::document_depth; --limit document_depth=N)")
+    format!(
+        "nested deeper than {deepest} levels (Limits::document_depth; --limit document_depth=N)"
+    )
 }
 
 /// A value that may be nested by so many levels more.
@@ -27,7 +33,10 @@ struct Sound {
 
 impl Sound {
     fn deeper<E: Error>(self) -> Result<Self, E> {
-        let levels = self.levels.checked_sub(1).ok_or_else(|| E::custom(too_deep(self.deepest)))?;
+        let levels = self
+            .levels
+            .checked_sub(1)
+            .ok_or_else(|| E::custom(too_deep(self.deepest)))?;
         Ok(Self { levels, ..self })
     }
 }
@@ -82,8 +91,16 @@ impl<'de> Visitor<'de> for Sound {
 
 /// What a TOML document holds that JSON cannot say, and where: a number that is infinite or none at all; or nesting deeper
 /// than so many levels.
-pub(super) fn unsound_toml(document: &Spanned<DeTable<'_>>, deepest: u64) -> Option<(String, Range<usize>)> {
-    unsound_table(document.get_ref(), document.span(), deepest.checked_sub(1), deepest)
+pub(super) fn unsound_toml(
+    document: &Spanned<DeTable<'_>>,
+    deepest: u64,
+) -> Option<(String, Range<usize>)> {
+    unsound_table(
+        document.get_ref(),
+        document.span(),
+        deepest.checked_sub(1),
+        deepest,
+    )
 }
 
 /// `levels` more may be nested in it; none where it is too deep itself.
@@ -96,11 +113,22 @@ fn unsound(
     let deeper = || levels.and_then(|n| n.checked_sub(1));
     match value {
         DeValue::Float(number) => {
-            let finite = number.as_str().replace('_', "").parse().is_ok_and(f64::is_finite);
-            (!finite).then(|| (format!("{}, expected a finite number", number.as_str()), span))
+            let finite = number
+                .as_str()
+                .replace('_', "")
+                .parse()
+                .is_ok_and(f64::is_finite);
+            (!finite).then(|| {
+                (
+                    format!("{}, expected a finite number", number.as_str()),
+                    span,
+                )
+            })
         }
         DeValue::Array(_) if deeper().is_none() => Some((too_deep(deepest), span)),
-        DeValue::Array(list) => list.iter().find_map(|v| unsound(v.get_ref(), v.span(), deeper(), deepest)),
+        DeValue::Array(list) => list
+            .iter()
+            .find_map(|v| unsound(v.get_ref(), v.span(), deeper(), deepest)),
         DeValue::Table(table) => unsound_table(table, span, deeper(), deepest),
         _ => None,
     }
@@ -115,7 +143,9 @@ fn unsound_table(
     if levels.is_none() {
         return Some((too_deep(deepest), span));
     }
-    table.values().find_map(|value| unsound(value.get_ref(), value.span(), levels, deepest))
+    table
+        .values()
+        .find_map(|value| unsound(value.get_ref(), value.span(), levels, deepest))
 }
 
 #[cfg(test)]
@@ -125,7 +155,10 @@ mod tests {
     #[test]
     fn a_key_twice_is_named_with_its_line() {
         let e = sound_json("{\"a\": [{\"b\": 1,\n \"b\": 2}]}", 9).unwrap_err();
-        assert!(e.to_string().contains("key \"b\" twice") && e.line() == 2, "{e}");
+        assert!(
+            e.to_string().contains("key \"b\" twice") && e.line() == 2,
+            "{e}"
+        );
         assert!(sound_json(r#"{"a": {"b": 1.5, "c": null}, "b": [true, "a", -1]}"#, 9).is_ok());
     }
 
@@ -135,8 +168,12 @@ mod tests {
 
     #[test]
     fn numbers_that_are_none_are_found() {
-        let number = |text| found(text, 9).map(|what| what.replace(", expected a finite number", ""));
-        assert_eq!(number("a = 1.5\nb = [1, { c = -inf }]").as_deref(), Some("-inf"));
+        let number =
+            |text| found(text, 9).map(|what| what.replace(", expected a finite number", ""));
+        assert_eq!(
+            number("a = 1.5\nb = [1, { c = -inf }]").as_deref(),
+            Some("-inf")
+        );
         assert_eq!(number("[a.b]\nc = nan").as_deref(), Some("nan"));
         assert_eq!(number("a = 1e999").as_deref(), Some("1e999"));
         assert_eq!(number("a = 1_000.5\nb = \"inf\"\ninf = 3"), None);
@@ -144,10 +181,22 @@ mod tests {
 
     #[test]
     fn levels_are_counted_alike_in_json_and_toml() {
-        for (json, toml) in [("{\"a\": [[1]]}", "a = [[1]]"), ("{\"a\": {\"b\": [1]}}", "[a]\nb = [1]")] {
-            assert!(sound_json(json, 3).is_ok() && found(toml, 3).is_none(), "{toml}");
-            let told = "nested deeper than 2 levels (Limits::document_depth; --limit document_depth=N)";
-            assert!(sound_json(json, 2).unwrap_err().to_string().starts_with(told));
+        for (json, toml) in [
+            ("{\"a\": [[1]]}", "a = [[1]]"),
+            ("{\"a\": {\"b\": [1]}}", "[a]\nb = [1]"),
+        ] {
+            assert!(
+                sound_json(json, 3).is_ok() && found(toml, 3).is_none(),
+                "{toml}"
+            );
+            let told =
+                "nested deeper than 2 levels (Limits::document_depth; --limit document_depth=N)";
+            assert!(
+                sound_json(json, 2)
+                    .unwrap_err()
+                    .to_string()
+                    .starts_with(told)
+            );
             assert_eq!(found(toml, 2).as_deref(), Some(told));
         }
     }

@@ -30,7 +30,10 @@ impl From<TiffError> for Refusal {
             TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
                 Self::Broken("truncated TIFF".into())
             }
-            e => Self::Broken(format!("damaged TIFF: {}", e.to_string().trim_start_matches("format error: "))),
+            e => Self::Broken(format!(
+                "damaged TIFF: {}",
+                e.to_string().trim_start_matches("format error: ")
+            )),
         }
     }
 }
@@ -53,23 +56,45 @@ fn open<R: Read + Seek>(file: R, file_bytes: u64, limits: &Limits) -> Result<Ope
     let mut decoder = first_picture(file)?.with_limits(most);
     let (width, height) = decoder.dimensions()?;
     refuse_missing_palette(&mut decoder)?;
-    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
+    let extra = decoder
+        .find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?
+        .unwrap_or_default();
     let (channels, bits) = match decoder.colortype()? {
         ColorType::Gray(bits) => (1, bits),
-        ColorType::Multiband { bit_depth, num_samples: 2 } if is_alpha(&extra) => (2, bit_depth),
+        ColorType::Multiband {
+            bit_depth,
+            num_samples: 2,
+        } if is_alpha(&extra) => (2, bit_depth),
         ColorType::RGB(bits) => (3, bits),
         ColorType::RGBA(bits) | ColorType::CMYK(bits) => (4, bits),
         other => {
             let kind = format!("{other:?}").to_lowercase().replace(['(', ')'], " ");
-            return Err(Refusal::Unsupported(format!("unsupported TIFF: {}", kind.trim())));
+            return Err(Refusal::Unsupported(format!(
+                "unsupported TIFF: {}",
+                kind.trim()
+            )));
         }
     };
     let (w, h) = (width.into(), height.into());
     let bytes_per_pixel = channels * u64::from(bits).div_ceil(8);
-    limits.check(Demand { width: w, height: h, channels, bytes_per_pixel, file_bytes })?;
+    limits.check(Demand {
+        width: w,
+        height: h,
+        channels,
+        bytes_per_pixel,
+        file_bytes,
+    })?;
     let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
-    let names = usual_names(if inks { 3 } else { channels as usize }).ok_or("channels of an unknown kind")?;
-    Ok(Opened { decoder, width: width as usize, height: height as usize, names, bits, inks })
+    let names = usual_names(if inks { 3 } else { channels as usize })
+        .ok_or("channels of an unknown kind")?;
+    Ok(Opened {
+        decoder,
+        width: width as usize,
+        height: height as usize,
+        names,
+        bits,
+        inks,
+    })
 }
 
 fn is_alpha(extra: &[u16]) -> bool {
@@ -82,7 +107,10 @@ fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
     let unsupported = |what: &str| Refusal::Unsupported(format!("unsupported TIFF: {what}"));
     let tags = first_tags(&mut file).unwrap_or_default();
     file.rewind().map_err(TiffError::from)?;
-    if [Tag::TileWidth, Tag::StripOffsets].iter().all(|tag| tags.contains(&tag.to_u16())) {
+    if [Tag::TileWidth, Tag::StripOffsets]
+        .iter()
+        .all(|tag| tags.contains(&tag.to_u16()))
+    {
         return Err(unsupported("tiles under the tags of strips"));
     }
     let mut decoder = Decoder::new(file)?;
@@ -130,12 +158,24 @@ fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(),
     if decoder.find_tag_unsigned(Tag::PhotometricInterpretation)? != Some(PALETTE) {
         return Ok(());
     }
-    let bits = decoder.find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?.unwrap_or_default();
-    let colors = bits.first().and_then(|&bits| 1_usize.checked_shl(bits.into())).unwrap_or(0);
-    let entries = decoder.find_tag_unsigned_vec::<u16>(Tag::ColorMap)?.unwrap_or_default().len();
+    let bits = decoder
+        .find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?
+        .unwrap_or_default();
+    let colors = bits
+        .first()
+        .and_then(|&bits| 1_usize.checked_shl(bits.into()))
+        .unwrap_or(0);
+    let entries = decoder
+        .find_tag_unsigned_vec::<u16>(Tag::ColorMap)?
+        .unwrap_or_default()
+        .len();
     match entries == 3 * colors {
         true => Ok(()),
-        false => Err(format!("damaged TIFF: a palette of {entries} entries, expected {}", 3 * colors).into()),
+        false => Err(format!(
+            "damaged TIFF: a palette of {entries} entries, expected {}",
+            3 * colors
+        )
+        .into()),
     }
 }
 
@@ -148,28 +188,63 @@ pub(super) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
     decoder.get_tag_u8_vec(Tag::IccProfile).ok()
 }
 
-pub(super) fn header(file: impl Read + Seek, file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
-    let Opened { mut decoder, width, height, names, bits, .. } = open(file, file_bytes, limits)?;
-    let text = decoder.get_tag_ascii_string(Tag::ImageDescription).unwrap_or_default();
+pub(super) fn header(
+    file: impl Read + Seek,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
+    let Opened {
+        mut decoder,
+        width,
+        height,
+        names,
+        bits,
+        ..
+    } = open(file, file_bytes, limits)?;
+    let text = decoder
+        .get_tag_ascii_string(Tag::ImageDescription)
+        .unwrap_or_default();
     let (bits, metadata) = (u32::from(bits), notes_of_lines(&text));
-    Ok(Header { format: Format::Tiff, width, height, channels: names, bits, metadata, ..Header::default() })
+    Ok(Header {
+        format: Format::Tiff,
+        width,
+        height,
+        channels: names,
+        bits,
+        metadata,
+        ..Header::default()
+    })
 }
 
 pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     let mut file = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
     let (width, height, inks) = (file.width, file.height, file.inks);
     limits.room(width, height, file.names.len())?;
-    let extra = file.decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
+    let extra = file
+        .decoder
+        .find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?
+        .unwrap_or_default();
     refuse_old_lzw(&mut file.decoder, bytes)?;
     let samples = match all_chunks(&mut file)? {
         Samples::U8(v) if inks => Samples::U8(left_by_inks(&v, u8::MAX.into())),
         Samples::U16(v) if inks => Samples::U16(left_by_inks(&v, u16::MAX.into())),
-        _ if inks => return Err(Refusal::Unsupported("unsupported TIFF: inks in float".into())),
+        _ if inks => {
+            return Err(Refusal::Unsupported(
+                "unsupported TIFF: inks in float".into(),
+            ));
+        }
         samples => samples,
     };
     let display_encoded = !samples.are_float();
     let premultiplied = extra.first() == Some(&ASSOCIATED_ALPHA);
-    Ok(Raster { width, height, names: file.names, samples, display_encoded, premultiplied })
+    Ok(Raster {
+        width,
+        height,
+        names: file.names,
+        samples,
+        display_encoded,
+        premultiplied,
+    })
 }
 
 /// Codes from the lowest bit up, as before 1990: they begin with the code that says so (TIFF 6.0, section 13).
@@ -177,10 +252,16 @@ fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Resu
     if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW) {
         return Ok(());
     }
-    let strips = decoder.find_tag_unsigned_vec::<u64>(Tag::StripOffsets)?.unwrap_or_default();
-    let first = strips.first().and_then(|&at| bytes.get(usize::try_from(at).ok()?..)?.first_chunk());
+    let strips = decoder
+        .find_tag_unsigned_vec::<u64>(Tag::StripOffsets)?
+        .unwrap_or_default();
+    let first = strips
+        .first()
+        .and_then(|&at| bytes.get(usize::try_from(at).ok()?..)?.first_chunk());
     match first {
-        Some(&[0, second]) if second & 1 == 1 => Err(Refusal::Unsupported("unsupported TIFF: old LZW".into())),
+        Some(&[0, second]) if second & 1 == 1 => {
+            Err(Refusal::Unsupported("unsupported TIFF: old LZW".into()))
+        }
         _ => Ok(()),
     }
 }
@@ -223,10 +304,17 @@ impl Grid {
     /// Puts the samples of a strip or tile, of which `columns` and `rows` are there, into the picture.
     fn put<T: Copy>(&self, to: &mut [T], from: &[T], index: usize, [columns, rows]: [usize; 2]) {
         let (plane, place) = (index / self.count(), index % self.count());
-        let (left, top) = (place % self.across() * self.size.0, place / self.across() * self.size.1);
+        let (left, top) = (
+            place % self.across() * self.size.0,
+            place / self.across() * self.size.1,
+        );
         let stored = if self.planes { 1 } else { self.channels };
         let kept = columns.min(self.width - left);
-        for (y, row) in from.chunks_exact(columns * stored).take(rows.min(self.height - top)).enumerate() {
+        for (y, row) in from
+            .chunks_exact(columns * stored)
+            .take(rows.min(self.height - top))
+            .enumerate()
+        {
             let at = ((top + y) * self.width + left) * self.channels + plane;
             if self.planes {
                 let to = to[at..].iter_mut().step_by(self.channels);
@@ -242,7 +330,10 @@ impl Grid {
 /// black where tiles reach over the border, and knows no planes.
 fn all_chunks(file: &mut Opened<impl Read + Seek>) -> Result<Samples, Refusal> {
     if !file.bits.is_multiple_of(8) {
-        return Err(Refusal::Unsupported(format!("unsupported TIFF: {} bits a sample", file.bits)));
+        return Err(Refusal::Unsupported(format!(
+            "unsupported TIFF: {} bits a sample",
+            file.bits
+        )));
     }
     let grid = Grid::of(file)?;
     let mut whole: Option<Samples> = None;
@@ -308,11 +399,16 @@ fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: 
         let product = (full - ink.into()) * (full - black.into());
         T::try_from((product + full / 2) / full).unwrap_or_default()
     };
-    inks.chunks_exact(4).flat_map(|px| [left(px[0], px[3]), left(px[1], px[3]), left(px[2], px[3])]).collect()
+    inks.chunks_exact(4)
+        .flat_map(|px| [left(px[0], px[3]), left(px[1], px[3]), left(px[2], px[3])])
+        .collect()
 }
 
 /// A whole file of integer codes; alpha is straight.
-pub(super) fn encode_codes(picture: &Coded<'_>, metadata: &[(String, String)]) -> Result<Vec<u8>, String> {
+pub(super) fn encode_codes(
+    picture: &Coded<'_>,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
     let (size, n) = ((picture.width, picture.height), picture.names.len());
     let alpha = ExtraSamples::UnassociatedAlpha;
     match (&picture.codes, n) {
@@ -336,7 +432,12 @@ pub(super) fn encode_floats(
     match channels {
         1 => encode::<colortype::Gray32Float>(size, samples, None, metadata),
         3 => encode::<colortype::RGB32Float>(size, samples, None, metadata),
-        _ => encode::<colortype::RGB32Float>(size, samples, Some(ExtraSamples::AssociatedAlpha), metadata),
+        _ => encode::<colortype::RGB32Float>(
+            size,
+            samples,
+            Some(ExtraSamples::AssociatedAlpha),
+            metadata,
+        ),
     }
     .map_err(|e| e.to_string())
 }
@@ -357,8 +458,13 @@ where
         image.extra_samples(&[alpha])?;
     }
     if !metadata.is_empty() {
-        let text: String = lines_of_notes(&metadata.to_vec()).chars().filter(char::is_ascii).collect();
-        image.encoder().write_tag(Tag::ImageDescription, text.as_str())?;
+        let text: String = lines_of_notes(&metadata.to_vec())
+            .chars()
+            .filter(char::is_ascii)
+            .collect();
+        image
+            .encoder()
+            .write_tag(Tag::ImageDescription, text.as_str())?;
     }
     image.write_data(samples)?;
     Ok(out.into_inner())
@@ -396,12 +502,20 @@ mod tests {
     #[test]
     fn tiles_that_reach_over_the_border_are_cut() {
         for planes in [false, true] {
-            let grid = Grid { width: 5, height: 3, channels: 2, planes, size: (4, 2) };
+            let grid = Grid {
+                width: 5,
+                height: 3,
+                channels: 2,
+                planes,
+                size: (4, 2),
+            };
             assert_eq!(grid.count(), 4);
             let mut whole = vec![0; 30];
             for index in 0..if planes { 8 } else { 4 } {
                 let (plane, place) = (index / 4, index % 4);
-                let value = |x: usize, y: usize, c: usize| 100 * c + 10 * (place / 2 * 2 + y) + place % 2 * 4 + x;
+                let value = |x: usize, y: usize, c: usize| {
+                    100 * c + 10 * (place / 2 * 2 + y) + place % 2 * 4 + x
+                };
                 let channels = if planes { plane..plane + 1 } else { 0..2 };
                 let tile: Vec<usize> = (0..2)
                     .flat_map(|y| (0..4).flat_map(move |x| (0..2).map(move |c| (x, y, c))))
@@ -410,8 +524,9 @@ mod tests {
                     .collect();
                 grid.put(&mut whole, &tile, index, [4, 2]);
             }
-            let expected: Vec<usize> =
-                (0..3).flat_map(|y| (0..5).flat_map(move |x| (0..2).map(move |c| 100 * c + 10 * y + x))).collect();
+            let expected: Vec<usize> = (0..3)
+                .flat_map(|y| (0..5).flat_map(move |x| (0..2).map(move |c| 100 * c + 10 * y + x)))
+                .collect();
             assert_eq!(whole, expected, "planes {planes}");
         }
     }

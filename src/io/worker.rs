@@ -34,10 +34,17 @@ const STARTS: usize = 3;
 const LAST_BREATH: Duration = Duration::from_secs(2);
 
 /// The workers of this program that have nothing to do.
-static IDLE: Pool = Pool { idle: Mutex::new(Vec::new()) };
+static IDLE: Pool = Pool {
+    idle: Mutex::new(Vec::new()),
+};
 
 /// What a worker says about a file. A strict one refuses to be read by a worker that the system does not confine.
-pub(super) fn ask(source: &Source, limits: &Limits, strict: bool, ask: Ask) -> Result<Told, Refusal> {
+pub(super) fn ask(
+    source: &Source,
+    limits: &Limits,
+    strict: bool,
+    ask: Ask,
+) -> Result<Told, Refusal> {
     let program = program().ok_or_else(|| {
         format!("needs OpenImageIO, and {PROGRAM} is not beside this program ({PROGRAM_VARIABLE} may name it)")
     })?;
@@ -50,7 +57,8 @@ pub(super) fn ask(source: &Source, limits: &Limits, strict: bool, ask: Ask) -> R
 /// [`Error::File`] where there is no worker program or it does not start.
 pub fn worker_version() -> crate::Result<String> {
     let program = program().ok_or_else(|| Error::file(PROGRAM, "not found beside this program"))?;
-    let worker = Worker::start(&program, &Limits::default()).map_err(|e| Error::file(&program, e))?;
+    let worker =
+        Worker::start(&program, &Limits::default()).map_err(|e| Error::file(&program, e))?;
     Ok(format!("OpenImageIO {}", worker.ready.openimageio))
 }
 
@@ -61,7 +69,11 @@ fn program() -> Option<PathBuf> {
     }
     let own = std::env::current_exe().ok()?;
     let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
-    own.ancestors().skip(1).take(2).map(|folder| folder.join(&name)).find(|p| p.is_file())
+    own.ancestors()
+        .skip(1)
+        .take(2)
+        .map(|folder| folder.join(&name))
+        .find(|p| p.is_file())
 }
 
 /// Workers that wait for a question.
@@ -79,11 +91,22 @@ enum Failure {
 }
 
 impl Pool {
-    fn ask(&self, program: &Path, source: &Source, limits: &Limits, strict: bool, ask: Ask) -> Result<Told, Refusal> {
+    fn ask(
+        &self,
+        program: &Path,
+        source: &Source,
+        limits: &Limits,
+        strict: bool,
+        ask: Ask,
+    ) -> Result<Told, Refusal> {
         let mut cause = String::new();
         for attempt in 0..TRIES {
             // The second try is for a worker that nothing has happened to yet.
-            let idle = if attempt == 0 { self.take(limits) } else { None };
+            let idle = if attempt == 0 {
+                self.take(limits)
+            } else {
+                None
+            };
             let mut worker = match idle {
                 Some(worker) => worker,
                 None => Worker::start(program, limits)?,
@@ -91,14 +114,18 @@ impl Pool {
             worker.confinement(strict)?;
             match worker.answer(source, ask) {
                 Ok(answer) => {
-                    self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(worker);
+                    self.idle
+                        .lock()
+                        .unwrap_or_else(PoisonError::into_inner)
+                        .push(worker);
                     return answer;
                 }
                 Err(Failure::Slow(patience)) => {
                     let seconds = patience.as_secs_f64();
-                    return Err(
-                        format!("unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)").into()
-                    );
+                    return Err(format!(
+                        "unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)"
+                    )
+                    .into());
                 }
                 Err(Failure::Died(how)) => {
                     log::debug!("{}: OpenImageIO died on it ({how})", source.path.display());
@@ -136,12 +163,18 @@ impl Drop for Worker {
 
 impl Worker {
     fn start(program: &Path, limits: &Limits) -> Result<Self, Refusal> {
-        let not_started =
-            |how: &dyn std::fmt::Display| format!("needs OpenImageIO, and {} does not start: {how}", program.display());
+        let not_started = |how: &dyn std::fmt::Display| {
+            format!(
+                "needs OpenImageIO, and {} does not start: {how}",
+                program.display()
+            )
+        };
         let mut cause = String::new();
         for _ in 0..STARTS {
             let mut worker = Self::launch(program, limits).map_err(|e| not_started(&e))?;
-            let Err(e) = worker.greeting() else { return Ok(worker) };
+            let Err(e) = worker.greeting() else {
+                return Ok(worker);
+            };
             cause = worker.how_it_died(&e);
             if !has_closed(&e) {
                 break;
@@ -155,22 +188,38 @@ impl Worker {
         let mut child = Command::new(program)
             .arg(serde_json::to_string(limits)?)
             .env_clear()
-            .envs(ENVIRONMENT.iter().filter_map(|name| Some((name, std::env::var_os(name)?))))
+            .envs(
+                ENVIRONMENT
+                    .iter()
+                    .filter_map(|name| Some((name, std::env::var_os(name)?))),
+            )
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()?;
         let pipes = child.stdin.take().zip(child.stdout.take());
         let (stdin, stdout) = pipes.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
-        let (to, from) = (Pipe::new(stdin.into())?, BufReader::new(Pipe::new(stdout.into())?));
-        Ok(Self { child, to, from, limits: limits.clone(), ready: Ready::default() })
+        let (to, from) = (
+            Pipe::new(stdin.into())?,
+            BufReader::new(Pipe::new(stdout.into())?),
+        );
+        Ok(Self {
+            child,
+            to,
+            from,
+            limits: limits.clone(),
+            ready: Ready::default(),
+        })
     }
 
     fn greeting(&mut self) -> std::io::Result<()> {
         self.from.get_mut().deadline = Instant::now() + START;
         self.ready = protocol::receive(&mut self.from)?;
         if self.ready.petcomp != env!("CARGO_PKG_VERSION") {
-            return Err(std::io::Error::other(format!("belongs to petcomp {}", self.ready.petcomp)));
+            return Err(std::io::Error::other(format!(
+                "belongs to petcomp {}",
+                self.ready.petcomp
+            )));
         }
         Ok(())
     }
@@ -180,7 +229,10 @@ impl Worker {
         let missing = self.ready.missing.join("; ");
         match (strict, missing.is_empty()) {
             (_, true) => Ok(()),
-            (true, _) => Err(format!("needs OpenImageIO, and its worker cannot be confined here ({missing})").into()),
+            (true, _) => Err(format!(
+                "needs OpenImageIO, and its worker cannot be confined here ({missing})"
+            )
+            .into()),
             (false, _) => {
                 warn_of(&missing);
                 Ok(())
@@ -192,13 +244,17 @@ impl Worker {
         let started = Instant::now();
         let mut patience = Duration::from_secs(self.limits.seconds);
         self.wait_until(started + patience);
-        let shape = match self.ask_shape(source, ask).map_err(|e| self.failure(e, patience))? {
+        let shape = match self
+            .ask_shape(source, ask)
+            .map_err(|e| self.failure(e, patience))?
+        {
             Ok(shape) if ask != Ask::Header => shape,
             other => return Ok(other.map(Told::Shape)),
         };
         patience += patience_for(&shape);
         self.wait_until(started + patience);
-        let raster = protocol::receive_samples(&mut self.from, shape).map_err(|e| self.failure(e, patience))?;
+        let raster = protocol::receive_samples(&mut self.from, shape)
+            .map_err(|e| self.failure(e, patience))?;
         Ok(Ok(Told::Raster(raster)))
     }
 
@@ -221,7 +277,11 @@ impl Worker {
 
     /// The signal that ended it, or what else went wrong. It does not run any more.
     fn how_it_died(&mut self, e: &std::io::Error) -> String {
-        let status = if has_closed(e) { self.status_within(LAST_BREATH) } else { None };
+        let status = if has_closed(e) {
+            self.status_within(LAST_BREATH)
+        } else {
+            None
+        };
         // It may have ended by itself.
         let _ = self.child.kill();
         match status {
@@ -239,7 +299,9 @@ impl Worker {
         let deadline = Instant::now() + patience;
         loop {
             match self.child.try_wait() {
-                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(1)),
+                Ok(None) if Instant::now() < deadline => {
+                    std::thread::sleep(Duration::from_millis(1))
+                }
                 status => return status.ok().flatten(),
             }
         }
@@ -252,13 +314,17 @@ fn has_closed(e: &std::io::Error) -> bool {
 }
 
 fn patience_for(shape: &Shape) -> Duration {
-    Duration::from_secs((shape.width as u64).saturating_mul(shape.height as u64) / PIXELS_PER_SECOND)
+    Duration::from_secs(
+        (shape.width as u64).saturating_mul(shape.height as u64) / PIXELS_PER_SECOND,
+    )
 }
 
 /// Confinement that a worker could not have; said once.
 fn warn_of(missing: &str) {
     static SAID: Once = Once::new();
-    SAID.call_once(|| log::warn!("the OpenImageIO worker is less confined than it could be: {missing}"));
+    SAID.call_once(|| {
+        log::warn!("the OpenImageIO worker is less confined than it could be: {missing}")
+    });
 }
 
 #[cfg(test)]
@@ -272,14 +338,25 @@ mod tests {
     /// test's child, forked at that moment, still holds it open (ETXTBSY).
     fn write_program(program: &Path, text: &str) {
         let mut shell = Command::new("/bin/sh");
-        shell.args(["-c", "cat >\"$0\" && chmod 755 \"$0\""]).arg(program).stdin(Stdio::piped());
+        shell
+            .args(["-c", "cat >\"$0\" && chmod 755 \"$0\""])
+            .arg(program)
+            .stdin(Stdio::piped());
         let mut child = shell.spawn().unwrap();
-        child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+        child
+            .stdin
+            .take()
+            .unwrap()
+            .write_all(text.as_bytes())
+            .unwrap();
         assert!(child.wait().unwrap().success());
     }
 
-    const GREETING: &str =
-        concat!(r#"echo '{"petcomp":""#, env!("CARGO_PKG_VERSION"), r#"","openimageio":"0","missing":[]}'"#);
+    const GREETING: &str = concat!(
+        r#"echo '{"petcomp":""#,
+        env!("CARGO_PKG_VERSION"),
+        r#"","openimageio":"0","missing":[]}'"#
+    );
 
     /// A worker that greets and then does what a shell script says.
     fn asked(script: &str, limits: &Limits) -> Result<Raster, String> {
@@ -291,11 +368,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let program = folder.path().join("worker");
         let count = folder.path().join("count");
-        let text = format!("#!/bin/sh\necho x >>{count}\nn=$(wc -l <{count})\n{script}\n", count = count.display());
+        let text = format!(
+            "#!/bin/sh\necho x >>{count}\nn=$(wc -l <{count})\n{script}\n",
+            count = count.display()
+        );
         write_program(&program, &text);
-        let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
-        let pool = Pool { idle: Mutex::new(Vec::new()) };
-        let ask = Ask::Pixels { wanted: Wanted::Coverage, window: Window::Display };
+        let source = Source {
+            path: "a.tif".into(),
+            bytes: vec![0; 3],
+            format: Format::Tiff,
+        };
+        let pool = Pool {
+            idle: Mutex::new(Vec::new()),
+        };
+        let ask = Ask::Pixels {
+            wanted: Wanted::Coverage,
+            window: Window::Display,
+        };
         match pool.ask(&program, &source, limits, strict, ask) {
             Ok(Told::Raster(raster)) => Ok(raster),
             Ok(Told::Shape(shape)) => panic!("{shape:?}"),
@@ -303,8 +392,7 @@ mod tests {
         }
     }
 
-    const GREY: &str =
-        r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
+    const GREY: &str = r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
 
     #[test]
     fn an_answer_is_a_line_and_samples() {
@@ -322,14 +410,19 @@ mod tests {
 
     #[test]
     fn a_worker_that_hangs_is_killed() {
-        let limits = Limits { seconds: 0, ..Default::default() };
+        let limits = Limits {
+            seconds: 0,
+            ..Default::default()
+        };
         let e = asked("exec sleep 30", &limits).unwrap_err();
         assert!(e.contains("took longer than 0 s (Limits::seconds)"), "{e}");
     }
 
     #[test]
     fn a_death_before_the_greeting_is_no_fault_of_the_file() {
-        let script = |deaths: usize| format!("[ $n -le {deaths} ] && kill -ABRT $$\n{GREETING}\n{GREY}; sleep 5");
+        let script = |deaths: usize| {
+            format!("[ $n -le {deaths} ] && kill -ABRT $$\n{GREETING}\n{GREY}; sleep 5")
+        };
         assert!(asked_of(&script(STARTS - 1), &Limits::default(), false).is_ok());
         let e = asked_of(&script(STARTS), &Limits::default(), false).unwrap_err();
         assert!(e.ends_with("does not start: signal 6"), "{e}");
@@ -340,7 +433,11 @@ mod tests {
         let start = Instant::now();
         let e = asked("exec <&- >&- sleep 600", &Limits::default()).unwrap_err();
         assert!(e.contains("closed its pipes"), "{e}");
-        assert!(start.elapsed() < Duration::from_secs(120), "{:?}", start.elapsed());
+        assert!(
+            start.elapsed() < Duration::from_secs(120),
+            "{:?}",
+            start.elapsed()
+        );
     }
 
     #[test]
@@ -349,8 +446,18 @@ mod tests {
         let script = format!("{loose}\n{GREY}; sleep 5");
         assert!(asked_of(&script, &Limits::default(), false).is_ok());
         let e = asked_of(&script, &Limits::default(), true).unwrap_err();
-        assert!(e.ends_with("its worker cannot be confined here (Landlock: not in this kernel)"), "{e}");
-        assert!(asked_of(&format!("{GREETING}\n{GREY}; sleep 5"), &Limits::default(), true).is_ok());
+        assert!(
+            e.ends_with("its worker cannot be confined here (Landlock: not in this kernel)"),
+            "{e}"
+        );
+        assert!(
+            asked_of(
+                &format!("{GREETING}\n{GREY}; sleep 5"),
+                &Limits::default(),
+                true
+            )
+            .is_ok()
+        );
     }
 
     #[test]
@@ -358,16 +465,32 @@ mod tests {
         let e = asked("echo nonsense; exec sleep 30", &Limits::default()).unwrap_err();
         assert!(e.contains("garbled answer"), "{e}");
         let half = GREY.replace("printf ab", "printf a");
-        assert!(asked(&half, &Limits::default()).unwrap_err().contains("exit status: 0"));
+        assert!(
+            asked(&half, &Limits::default())
+                .unwrap_err()
+                .contains("exit status: 0")
+        );
     }
 
     #[test]
     fn a_program_that_is_no_worker_is_named() {
-        let source = Source { path: "a.tif".into(), bytes: vec![0; 3], format: Format::Tiff };
-        let pool = Pool { idle: Mutex::new(Vec::new()) };
+        let source = Source {
+            path: "a.tif".into(),
+            bytes: vec![0; 3],
+            format: Format::Tiff,
+        };
+        let pool = Pool {
+            idle: Mutex::new(Vec::new()),
+        };
         for program in ["/bin/true", "/bin/echo", "/no/such/program"] {
             let e = pool
-                .ask(Path::new(program), &source, &Limits::default(), false, Ask::Header)
+                .ask(
+                    Path::new(program),
+                    &source,
+                    &Limits::default(),
+                    false,
+                    Ask::Header,
+                )
                 .err()
                 .unwrap()
                 .to_string();

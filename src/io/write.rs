@@ -4,7 +4,9 @@ use super::atomic::write_bytes;
 use super::{Format, exr, jpeg, png, tiff};
 use crate::color::{decode_srgb8, encode_srgb8, encode_srgb16};
 use crate::work::{self, Kind};
-use crate::{Coverage, Depth, Error, Film, Image, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba};
+use crate::{
+    Coverage, Depth, Error, Film, Image, LinearRgb, PremulRgba, Result, Srgb8, Srgba8, StraightRgba,
+};
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -260,8 +262,18 @@ impl ToFile for Srgba8 {
         [self.r, self.g, self.b, self.a].map(C::of8)
     }
     fn linear(self) -> [f32; CHANNELS] {
-        let LinearRgb { r, g, b } = decode_srgb8(Srgb8 { r: self.r, g: self.g, b: self.b });
-        StraightRgba { r, g, b, a: f32::from(self.a) / 255.0 }.linear()
+        let LinearRgb { r, g, b } = decode_srgb8(Srgb8 {
+            r: self.r,
+            g: self.g,
+            b: self.b,
+        });
+        StraightRgba {
+            r,
+            g,
+            b,
+            a: f32::from(self.a) / 255.0,
+        }
+        .linear()
     }
 }
 
@@ -287,9 +299,12 @@ pub(super) fn flat<P: ToFile, T: Copy + Default + Send, const N: usize>(
     let n = P::NAMES.len();
     let mut out = vec![T::default(); image.pixels().len() * n];
     let rows = image.width().max(1);
-    out.par_chunks_exact_mut(n).with_min_len(rows).zip(image.pixels()).for_each(|(slot, &p)| {
-        slot.copy_from_slice(&f(p)[..n]);
-    });
+    out.par_chunks_exact_mut(n)
+        .with_min_len(rows)
+        .zip(image.pixels())
+        .for_each(|(slot, &p)| {
+            slot.copy_from_slice(&f(p)[..n]);
+        });
     out
 }
 
@@ -299,7 +314,12 @@ fn coded<P: ToFile>(image: &Image<P>, bits: Bits) -> Coded<'static> {
         Bits::Sixteen => Codes::U16(flat(image, P::codes::<u16>)),
         _ => Codes::U8(flat(image, P::codes::<u8>)),
     };
-    Coded { width, height, names: P::NAMES, codes }
+    Coded {
+        width,
+        height,
+        names: P::NAMES,
+        codes,
+    }
 }
 
 /// Writes a picture with the defaults of [`WriteOptions`]; see [`write_with`].
@@ -319,7 +339,11 @@ pub fn write<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>) -> Result<()> 
 /// # Errors
 /// [`Error::File`] for an extension that is not written, samples that the format or the pixel cannot have, transparent
 /// pixels in a JPEG, an empty picture, and whatever the system says.
-pub fn write_with<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>, options: &WriteOptions) -> Result<()> {
+pub fn write_with<P: ToFile>(
+    path: impl AsRef<Path>,
+    image: &Image<P>,
+    options: &WriteOptions,
+) -> Result<()> {
     let path = path.as_ref();
     let bytes = encode(path, image, options).map_err(|e| Error::file(path, e))?;
     write_bytes(path, &bytes)
@@ -330,21 +354,35 @@ pub fn write_with<P: ToFile>(path: impl AsRef<Path>, image: &Image<P>, options: 
 /// # Errors
 /// An image without pixels, or with transparent ones.
 pub fn jpeg_bytes<P: ToFile>(image: &Image<P>, quality: u8) -> Result<Vec<u8>> {
-    let options = WriteOptions { jpeg_quality: quality, ..WriteOptions::default() };
+    let options = WriteOptions {
+        jpeg_quality: quality,
+        ..WriteOptions::default()
+    };
     encode(Path::new("picture.jpg"), image, &options).map_err(|what| Error::value("picture", what))
 }
 
-fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> std::result::Result<Vec<u8>, String> {
+fn encode<P: ToFile>(
+    path: &Path,
+    image: &Image<P>,
+    options: &WriteOptions,
+) -> std::result::Result<Vec<u8>, String> {
     if image.is_empty() {
-        return Err(format!("{} x {} pixels, expected at least 1 x 1", image.width(), image.height()));
+        return Err(format!(
+            "{} x {} pixels, expected at least 1 x 1",
+            image.width(),
+            image.height()
+        ));
     }
     work::add(Kind::Encodes, 1);
     let format = Format::of_extension(path);
     match (format, stored_as::<P>(format, options.bits)?) {
         (Some(Format::Exr), bits) => encode_exr(image, bits, options),
-        (Some(Format::Tiff), Bits::Float) => {
-            tiff::encode_floats(image.size(), P::NAMES.len(), &flat(image, P::linear), &marked(&options.metadata))
-        }
+        (Some(Format::Tiff), Bits::Float) => tiff::encode_floats(
+            image.size(),
+            P::NAMES.len(),
+            &flat(image, P::linear),
+            &marked(&options.metadata),
+        ),
         (Some(Format::Tiff), bits) => tiff::encode_codes(&coded(image, bits), &options.metadata),
         (Some(Format::Jpeg), _) => encode_jpeg(image, options),
         (_, bits) => png::encode(&coded(image, bits), options.png, &options.metadata),
@@ -352,7 +390,10 @@ fn encode<P: ToFile>(path: &Path, image: &Image<P>, options: &WriteOptions) -> s
 }
 
 /// The storage of a sample: as asked, or the format's own.
-pub(super) fn stored_as<P: ToFile>(format: Option<Format>, asked: Option<Bits>) -> std::result::Result<Bits, String> {
+pub(super) fn stored_as<P: ToFile>(
+    format: Option<Format>,
+    asked: Option<Bits>,
+) -> std::result::Result<Bits, String> {
     let possible: &[Bits] = match format {
         Some(Format::Exr) if P::CODED => &[Bits::Half, Bits::Float],
         Some(Format::Exr) => &[Bits::Float, Bits::Half],
@@ -363,35 +404,77 @@ pub(super) fn stored_as<P: ToFile>(format: Option<Format>, asked: Option<Bits>) 
         }
         Some(Format::Png) => &[Bits::Eight, Bits::Sixteen],
         Some(Format::Jpeg) => &[Bits::Eight],
-        _ => return Err("cannot be written, expected the extension .exr, .png, .jpg or .tif".into()),
+        _ => {
+            return Err(
+                "cannot be written, expected the extension .exr, .png, .jpg or .tif".into(),
+            );
+        }
     };
     let bits = asked.unwrap_or(possible[0]);
     if possible.contains(&bits) {
         return Ok(bits);
     }
     let possible: Vec<&str> = possible.iter().map(|bits| bits.name()).collect();
-    Err(format!("{} samples, expected {}", bits.name(), possible.join(" or ")))
+    Err(format!(
+        "{} samples, expected {}",
+        bits.name(),
+        possible.join(" or ")
+    ))
 }
 
-fn encode_exr<P: ToFile>(image: &Image<P>, bits: Bits, options: &WriteOptions) -> std::result::Result<Vec<u8>, String> {
-    let plane = |c: usize| -> Vec<f32> { image.pixels().par_iter().map(|p| p.linear()[c]).collect() };
-    let stored = |c: usize| if bits == Bits::Half { exr::halves(&plane(c)) } else { exr::floats(plane(c)) };
-    let planes = P::NAMES.iter().enumerate().map(|(c, &name)| (name, stored(c))).collect();
-    exr::encode(image.size(), planes, options.compression, &marked(&options.metadata))
+fn encode_exr<P: ToFile>(
+    image: &Image<P>,
+    bits: Bits,
+    options: &WriteOptions,
+) -> std::result::Result<Vec<u8>, String> {
+    let plane =
+        |c: usize| -> Vec<f32> { image.pixels().par_iter().map(|p| p.linear()[c]).collect() };
+    let stored = |c: usize| {
+        if bits == Bits::Half {
+            exr::halves(&plane(c))
+        } else {
+            exr::floats(plane(c))
+        }
+    };
+    let planes = P::NAMES
+        .iter()
+        .enumerate()
+        .map(|(c, &name)| (name, stored(c)))
+        .collect();
+    exr::encode(
+        image.size(),
+        planes,
+        options.compression,
+        &marked(&options.metadata),
+    )
 }
 
-fn encode_jpeg<P: ToFile>(image: &Image<P>, options: &WriteOptions) -> std::result::Result<Vec<u8>, String> {
+fn encode_jpeg<P: ToFile>(
+    image: &Image<P>,
+    options: &WriteOptions,
+) -> std::result::Result<Vec<u8>, String> {
     if !(1..=100).contains(&options.jpeg_quality) {
-        return Err(format!("jpeg quality {}, expected 1 to 100", options.jpeg_quality));
+        return Err(format!(
+            "jpeg quality {}, expected 1 to 100",
+            options.jpeg_quality
+        ));
     }
     let mut codes = flat(image, P::codes::<u8>);
     if P::NAMES.len() == 4 {
         if codes.iter().skip(3).step_by(4).any(|&a| a != 255) {
             return Err("transparent pixels, and JPEG has no alpha: expected .png or .exr".into());
         }
-        codes = codes.chunks_exact(4).flat_map(|px| [px[0], px[1], px[2]]).collect();
+        codes = codes
+            .chunks_exact(4)
+            .flat_map(|px| [px[0], px[1], px[2]])
+            .collect();
     }
-    jpeg::encode(image.size(), &codes, options.jpeg_quality, &options.metadata)
+    jpeg::encode(
+        image.size(),
+        &codes,
+        options.jpeg_quality,
+        &options.metadata,
+    )
 }
 
 /// The texts with the colour space in front, unless the caller named one.
@@ -409,10 +492,19 @@ mod tests {
     fn a_film_reads_back_and_other_readers_see_its_grey_alpha() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("film.exr");
-        let film = Film::new(LinearRgb::new(0.5, 0.25, 0.125), LinearRgb::new(0.25, 0.5, 0.75));
+        let film = Film::new(
+            LinearRgb::new(0.5, 0.25, 0.125),
+            LinearRgb::new(0.25, 0.5, 0.75),
+        );
         write(&path, &Image::filled(3, 2, film)).unwrap();
-        assert_eq!(crate::io::read::<Film>(&path).unwrap(), Image::filled(3, 2, film));
-        assert_eq!(crate::io::read::<PremulRgba>(&path).unwrap()[(0, 0)], PremulRgba::new(0.5, 0.25, 0.125, 0.5));
+        assert_eq!(
+            crate::io::read::<Film>(&path).unwrap(),
+            Image::filled(3, 2, film)
+        );
+        assert_eq!(
+            crate::io::read::<PremulRgba>(&path).unwrap()[(0, 0)],
+            PremulRgba::new(0.5, 0.25, 0.125, 0.5)
+        );
         assert!(write(folder.path().join("film.png"), &Image::filled(3, 2, film)).is_err());
     }
 

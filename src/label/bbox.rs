@@ -39,7 +39,10 @@ impl BBox {
 
     /// `other` lies inside, edges included; an empty box lies inside every box.
     pub fn contains(&self, other: &Self) -> bool {
-        let inside = self.x0 <= other.x0 && self.y0 <= other.y0 && self.x1 >= other.x1 && self.y1 >= other.y1;
+        let inside = self.x0 <= other.x0
+            && self.y0 <= other.y0
+            && self.x1 >= other.x1
+            && self.y1 >= other.y1;
         other.is_empty() || inside
     }
 
@@ -50,7 +53,12 @@ impl BBox {
 
     /// The smallest box around points; empty around none.
     pub fn around(points: impl IntoIterator<Item = Point2<f64>>) -> Self {
-        let dots = points.into_iter().map(|p| Self { x0: p.x, y0: p.y, x1: p.x, y1: p.y });
+        let dots = points.into_iter().map(|p| Self {
+            x0: p.x,
+            y0: p.y,
+            x1: p.x,
+            y1: p.y,
+        });
         dots.reduce(Self::hull).unwrap_or_default()
     }
 
@@ -58,13 +66,27 @@ impl BBox {
     #[cfg(test)]
     pub(crate) fn with_pixel(self, x: usize, y: usize) -> Self {
         let (x, y) = (x as f64, y as f64);
-        let pixel = Self { x0: x, y0: y, x1: x + 1.0, y1: y + 1.0 };
-        if self.is_empty() { pixel } else { self.hull(pixel) }
+        let pixel = Self {
+            x0: x,
+            y0: y,
+            x1: x + 1.0,
+            y1: y + 1.0,
+        };
+        if self.is_empty() {
+            pixel
+        } else {
+            self.hull(pixel)
+        }
     }
 
     /// The smallest box around two; neither is empty.
     pub(crate) fn hull(self, o: Self) -> Self {
-        Self { x0: self.x0.min(o.x0), y0: self.y0.min(o.y0), x1: self.x1.max(o.x1), y1: self.y1.max(o.y1) }
+        Self {
+            x0: self.x0.min(o.x0),
+            y0: self.y0.min(o.y0),
+            x1: self.x1.max(o.x1),
+            y1: self.y1.max(o.y1),
+        }
     }
 }
 
@@ -74,7 +96,12 @@ mod tests {
 
     #[test]
     fn the_default_box_is_empty_and_lies_in_every_box() {
-        let somewhere = BBox { x0: 3.0, y0: 4.0, x1: 5.0, y1: 6.0 };
+        let somewhere = BBox {
+            x0: 3.0,
+            y0: 4.0,
+            x1: 5.0,
+            y1: 6.0,
+        };
         assert!(BBox::default().is_empty() && somewhere.contains(&BBox::default()));
         assert!(!BBox::default().contains(&somewhere));
     }
@@ -82,13 +109,31 @@ mod tests {
     #[test]
     fn a_box_holds_the_whole_of_its_pixels() {
         let b = BBox::default().with_pixel(2, 7).with_pixel(4, 3);
-        assert_eq!(b, BBox { x0: 2.0, y0: 3.0, x1: 5.0, y1: 8.0 });
+        assert_eq!(
+            b,
+            BBox {
+                x0: 2.0,
+                y0: 3.0,
+                x1: 5.0,
+                y1: 8.0
+            }
+        );
     }
 
     #[test]
     fn boxes_that_share_an_edge_do_not_overlap() {
-        let a = BBox { x0: 0.0, y0: 0.0, x1: 2.0, y1: 2.0 };
-        let b = BBox { x0: 2.0, y0: 0.0, x1: 4.0, y1: 2.0 };
+        let a = BBox {
+            x0: 0.0,
+            y0: 0.0,
+            x1: 2.0,
+            y1: 2.0,
+        };
+        let b = BBox {
+            x0: 2.0,
+            y0: 0.0,
+            x1: 4.0,
+            y1: 2.0,
+        };
         assert!(!a.overlaps(&b) && a.overlaps(&a));
     }
 

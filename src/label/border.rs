@@ -37,10 +37,24 @@ mod tests {
     #[test]
     fn an_object_of_which_nothing_is_seen_has_a_whole_border_and_none_that_is_seen() {
         let amodal_mask = Mask::from_fn([9, 9], |x, y| x + y < 8);
-        let object = ObjectLabel { id: ObjectId(3), class: 2, amodal_mask, ..ObjectLabel::default() };
-        let labels = Labels { image: [9, 9], objects: vec![object] };
+        let object = ObjectLabel {
+            id: ObjectId(3),
+            class: 2,
+            amodal_mask,
+            ..ObjectLabel::default()
+        };
+        let labels = Labels {
+            image: [9, 9],
+            objects: vec![object],
+        };
         let [exact, loose] = [0.0, 1.0].map(|tolerance| borders(&labels, tolerance).remove(0));
-        assert_eq!((exact.id, exact.class, exact.visible.len()), (ObjectId(3), 2, 0));
-        assert!(exact.amodal[0].len() > 2 * loose.amodal[0].len(), "{loose:?}");
+        assert_eq!(
+            (exact.id, exact.class, exact.visible.len()),
+            (ObjectId(3), 2, 0)
+        );
+        assert!(
+            exact.amodal[0].len() > 2 * loose.amodal[0].len(),
+            "{loose:?}"
+        );
     }
 }

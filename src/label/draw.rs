@@ -38,23 +38,38 @@ pub(crate) fn class_color(class: u32) -> Srgb8 {
 pub(crate) fn ink_on(paper: Srgb8) -> Srgb8 {
     // Luma of Rec. 601 on the codes: close to how light a colour looks.
     let luma = 299 * u32::from(paper.r) + 587 * u32::from(paper.g) + 114 * u32::from(paper.b);
-    if luma > 140_000 { rgb(0, 0, 0) } else { rgb(255, 255, 255) }
+    if luma > 140_000 {
+        rgb(0, 0, 0)
+    } else {
+        rgb(255, 255, 255)
+    }
 }
 
 /// Mixes a colour into a pixel, where there is one.
 fn blend(canvas: &mut Image<Srgb8>, x: isize, y: isize, color: Srgb8, alpha: f32) {
     let (w, h) = canvas.size();
-    let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { return };
+    let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else {
+        return;
+    };
     if x >= w || y >= h {
         return;
     }
     let under = canvas[(x, y)];
     let mix = |a: u8, b: u8| (f32::from(a) + alpha * (f32::from(b) - f32::from(a)) + 0.5) as u8;
-    canvas[(x, y)] = rgb(mix(under.r, color.r), mix(under.g, color.g), mix(under.b, color.b));
+    canvas[(x, y)] = rgb(
+        mix(under.r, color.r),
+        mix(under.g, color.g),
+        mix(under.b, color.b),
+    );
 }
 
 /// A filled rectangle; what lies outside the canvas is left out.
-pub(crate) fn fill(canvas: &mut Image<Srgb8>, [x, y]: [isize; 2], [w, h]: [usize; 2], color: Srgb8) {
+pub(crate) fn fill(
+    canvas: &mut Image<Srgb8>,
+    [x, y]: [isize; 2],
+    [w, h]: [usize; 2],
+    color: Srgb8,
+) {
     for row in y..y + h as isize {
         for column in x..x + w as isize {
             blend(canvas, column, row, color, 1.0);
@@ -93,7 +108,9 @@ pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: i
 pub(crate) fn outline(canvas: &mut Image<Srgb8>, ring: &[Point2<f64>], color: Srgb8) {
     for (radius, color, alpha) in [(1.5, HALO, HALO_ALPHA), (0.5, color, 1.0)] {
         for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-            segment(canvas, *a, *b, radius, |canvas, x, y, cover| blend(canvas, x, y, color, alpha * cover));
+            segment(canvas, *a, *b, radius, |canvas, x, y, cover| {
+                blend(canvas, x, y, color, alpha * cover)
+            });
         }
     }
 }
@@ -113,7 +130,8 @@ fn segment(
     for y in clamp(a.y.min(b.y) - reach, h)..clamp(a.y.max(b.y) + reach + 1.0, h) {
         for x in clamp(a.x.min(b.x) - reach, w)..clamp(a.x.max(b.x) + reach + 1.0, w) {
             let p = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-            let t = ((p - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let t =
+                ((p - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             let cover = (radius + 0.5 - (p - (a + along * t)).norm()).clamp(0.0, 1.0);
             if cover > 0.0 {
                 dot(canvas, x, y, cover as f32);
@@ -175,11 +193,19 @@ pub(crate) fn wrapped(text: &str, width: usize, size: TextSize) -> Vec<String> {
 }
 
 /// A line of text with its top left corner at a point; characters beyond ASCII become `?`.
-pub(crate) fn text(canvas: &mut Image<Srgb8>, [x, y]: [isize; 2], line: &str, color: Srgb8, size: TextSize) {
+pub(crate) fn text(
+    canvas: &mut Image<Srgb8>,
+    [x, y]: [isize; 2],
+    line: &str,
+    color: Srgb8,
+    size: TextSize,
+) {
     let advance = get_raster_width(FontWeight::Regular, size.raster()) as isize;
     for (i, letter) in line.chars().enumerate() {
         let glyph = |c| get_raster(c, FontWeight::Regular, size.raster());
-        let Some(glyph) = glyph(letter).or_else(|| glyph('?')) else { continue };
+        let Some(glyph) = glyph(letter).or_else(|| glyph('?')) else {
+            continue;
+        };
         for (v, row) in glyph.rows().enumerate() {
             for (u, &ink) in row.iter().enumerate().filter(|&(_, &ink)| ink > 0) {
                 let at = [x + i as isize * advance + u as isize, y + v as isize];
@@ -200,19 +226,59 @@ mod tests {
     #[test]
     fn a_border_covers_its_outermost_pixels_and_nothing_inside() {
         let mut canvas = black(12, 10);
-        border(&mut canvas, &BBox { x0: 2.0, y0: 3.0, x1: 9.0, y1: 8.0 }, rgb(255, 0, 0), 1);
-        let red: Vec<_> = (0..120).filter(|i| canvas.pixels()[*i].r == 255).map(|i| (i % 12, i / 12)).collect();
+        border(
+            &mut canvas,
+            &BBox {
+                x0: 2.0,
+                y0: 3.0,
+                x1: 9.0,
+                y1: 8.0,
+            },
+            rgb(255, 0, 0),
+            1,
+        );
+        let red: Vec<_> = (0..120)
+            .filter(|i| canvas.pixels()[*i].r == 255)
+            .map(|i| (i % 12, i / 12))
+            .collect();
         assert_eq!(red.len(), 2 * 7 + 2 * 3);
-        assert!(red.iter().all(|&(x, y)| x == 2 || x == 8 || y == 3 || y == 7));
+        assert!(
+            red.iter()
+                .all(|&(x, y)| x == 2 || x == 8 || y == 3 || y == 7)
+        );
     }
 
     #[test]
     fn drawing_outside_the_canvas_draws_nothing() {
         let mut canvas = black(8, 8);
-        border(&mut canvas, &BBox { x0: -50.0, y0: -50.0, x1: 90.0, y1: 90.0 }, rgb(9, 9, 9), 1);
-        outline(&mut canvas, &[Point2::new(-1e9, -1e9), Point2::new(1e9, -1e9)], rgb(255, 255, 255));
-        text(&mut canvas, [-40, 100], "out of sight", rgb(255, 255, 255), TextSize::Large);
-        paste(&mut canvas, [20, 20], &Image::filled(4, 4, rgb(255, 255, 255)));
+        border(
+            &mut canvas,
+            &BBox {
+                x0: -50.0,
+                y0: -50.0,
+                x1: 90.0,
+                y1: 90.0,
+            },
+            rgb(9, 9, 9),
+            1,
+        );
+        outline(
+            &mut canvas,
+            &[Point2::new(-1e9, -1e9), Point2::new(1e9, -1e9)],
+            rgb(255, 255, 255),
+        );
+        text(
+            &mut canvas,
+            [-40, 100],
+            "out of sight",
+            rgb(255, 255, 255),
+            TextSize::Large,
+        );
+        paste(
+            &mut canvas,
+            [20, 20],
+            &Image::filled(4, 4, rgb(255, 255, 255)),
+        );
         assert!(canvas.pixels().iter().all(|p| p.r < 10));
     }
 
@@ -221,7 +287,9 @@ mod tests {
         let mut canvas = Image::filled(40, 40, rgb(0, 0, 0));
         let (a, b) = (Point2::new(5.3, 8.1), Point2::new(33.2, 29.0));
         let mut ink = 0.0;
-        segment(&mut canvas, a, b, 0.5, |_, _, _, cover| ink += f64::from(cover));
+        segment(&mut canvas, a, b, 0.5, |_, _, _, cover| {
+            ink += f64::from(cover)
+        });
         // A ramp from full to nothing over one pixel on either side integrates to a width of 1; the two round ends add
         // about one more.
         let length = (b - a).norm();
@@ -234,14 +302,27 @@ mod tests {
         let lines = |text| wrapped(text, width, TextSize::Small);
         assert_eq!(lines("two words or more"), ["two words", "or more"]);
         assert_eq!(lines("a 0123456789abc z"), ["a", "0123456789", "abc z"]);
-        assert_eq!((lines(""), wrapped("ab", 0, TextSize::Large)), (vec![String::new()], vec!["a".into(), "b".into()]));
-        assert!(lines("none is longer than there is room for").iter().all(|l| TextSize::Small.width(l) <= width));
+        assert_eq!(
+            (lines(""), wrapped("ab", 0, TextSize::Large)),
+            (vec![String::new()], vec!["a".into(), "b".into()])
+        );
+        assert!(
+            lines("none is longer than there is room for")
+                .iter()
+                .all(|l| TextSize::Small.width(l) <= width)
+        );
     }
 
     #[test]
     fn letters_beyond_ascii_take_a_place() {
         let mut canvas = black(60, 20);
-        text(&mut canvas, [0, 0], "öß", rgb(255, 255, 255), TextSize::Small);
+        text(
+            &mut canvas,
+            [0, 0],
+            "öß",
+            rgb(255, 255, 255),
+            TextSize::Small,
+        );
         assert!(canvas.pixels().iter().any(|p| p.r > 128));
         assert_eq!(TextSize::Small.width("öß"), TextSize::Small.width("ab"));
     }

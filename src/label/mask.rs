@@ -39,7 +39,8 @@ impl Mask {
     /// From runs; none unless they add up to the picture, no run but the first being empty.
     pub(crate) fn from_runs(size: [u32; 2], runs: Vec<u32>) -> Option<Self> {
         let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
-        let whole = sum == u64::from(size[0]) * u64::from(size[1]) && runs.iter().skip(1).all(|&n| n > 0);
+        let whole =
+            sum == u64::from(size[0]) * u64::from(size[1]) && runs.iter().skip(1).all(|&n| n > 0);
         whole.then_some(Self { size, runs })
     }
 
@@ -69,16 +70,30 @@ impl Mask {
         let around = |(start, n): (u64, u64)| {
             let (first, last) = (start / h, (start + n - 1) / h);
             // A run that turns into the next column touches the picture's lower and upper edge.
-            let rows = if first == last { [start % h, (start + n - 1) % h + 1] } else { [0, h] };
-            BBox { x0: first as f64, y0: rows[0] as f64, x1: (last + 1) as f64, y1: rows[1] as f64 }
+            let rows = if first == last {
+                [start % h, (start + n - 1) % h + 1]
+            } else {
+                [0, h]
+            };
+            BBox {
+                x0: first as f64,
+                y0: rows[0] as f64,
+                x1: (last + 1) as f64,
+                y1: rows[1] as f64,
+            }
         };
-        self.inside().map(around).reduce(BBox::hull).unwrap_or_default()
+        self.inside()
+            .map(around)
+            .reduce(BBox::hull)
+            .unwrap_or_default()
     }
 
     /// The pixels inside, column and row, column by column.
     pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> {
         let h = u64::from(self.size[1]);
-        self.inside().flat_map(|(start, n)| start..start + n).map(move |i| ((i / h) as u32, (i % h) as u32))
+        self.inside()
+            .flat_map(|(start, n)| start..start + n)
+            .map(move |i| ((i / h) as u32, (i % h) as u32))
     }
 
     /// Start and length of each run of pixels inside.
@@ -104,7 +119,10 @@ impl Bits {
     /// No pixel is inside.
     pub(crate) fn new(size: [u32; 2]) -> Self {
         let pixels = size[0] as usize * size[1] as usize;
-        Self { words: vec![0; pixels.div_ceil(u64::BITS as usize)], size }
+        Self {
+            words: vec![0; pixels.div_ceil(u64::BITS as usize)],
+            size,
+        }
     }
 
     /// Takes a pixel in.
@@ -124,7 +142,10 @@ impl Bits {
             runs.push((next - at) as u32);
             (at, value) = (next, !value);
         }
-        Mask { size: self.size, runs }
+        Mask {
+            size: self.size,
+            runs,
+        }
     }
 
     /// The first place from `at` on that has this value, or any place beyond the end.
@@ -172,7 +193,15 @@ mod tests {
     fn a_full_mask_starts_with_an_empty_run() {
         let full = Mask::from_fn([3, 2], |_, _| true);
         assert_eq!((full.runs(), full.area()), (&[0, 6][..], 6));
-        assert_eq!(full.bounds(), BBox { x0: 0.0, y0: 0.0, x1: 3.0, y1: 2.0 });
+        assert_eq!(
+            full.bounds(),
+            BBox {
+                x0: 0.0,
+                y0: 0.0,
+                x1: 3.0,
+                y1: 2.0
+            }
+        );
     }
 
     #[test]

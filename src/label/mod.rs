@@ -92,7 +92,11 @@ pub struct LabelOptions {
 
 impl Default for LabelOptions {
     fn default() -> Self {
-        Self { amodal: AmodalBox::Mask, alpha_threshold: 0.1, overlap_iou: 0.0 }
+        Self {
+            amodal: AmodalBox::Mask,
+            alpha_threshold: 0.1,
+            overlap_iou: 0.0,
+        }
     }
 }
 
@@ -125,17 +129,33 @@ struct Silhouette<'a> {
 /// When `deep` does not have the size of the shot's camera.
 pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
     let image = shot.camera.image;
-    assert_eq!((deep.width(), deep.height()), (image[0] as usize, image[1] as usize), "deep picture and camera differ");
+    assert_eq!(
+        (deep.width(), deep.height()),
+        (image[0] as usize, image[1] as usize),
+        "deep picture and camera differ"
+    );
     let mut cards: Vec<&Card> = shot.cards.iter().collect();
     cards.sort_by_key(|card| card.id);
     let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
     let seen = visibility::fold(deep, &ids, options);
     let regions = cards.iter().map(|card| outline::region(card, &shot.camera));
-    let all = cards.iter().zip(regions).zip(seen).map(|((&card, region), seen)| Silhouette { card, region, seen });
-    let touching: Vec<_> = all.filter(|s| !s.amodal_box(options.amodal).is_empty()).collect();
+    let all = cards
+        .iter()
+        .zip(regions)
+        .zip(seen)
+        .map(|((&card, region), seen)| Silhouette { card, region, seen });
+    let touching: Vec<_> = all
+        .filter(|s| !s.amodal_box(options.amodal).is_empty())
+        .collect();
     let covers = topmost::covers(&touching, &shot.camera, options.overlap_iou);
-    let objects = touching.into_iter().zip(covers).map(|(s, covered_by)| s.into_label(options.amodal, covered_by));
-    Labels { image, objects: objects.collect() }
+    let objects = touching
+        .into_iter()
+        .zip(covers)
+        .map(|(s, covered_by)| s.into_label(options.amodal, covered_by));
+    Labels {
+        image,
+        objects: objects.collect(),
+    }
 }
 
 impl Silhouette<'_> {
@@ -147,7 +167,8 @@ impl Silhouette<'_> {
     }
 
     fn into_label(self, amodal: AmodalBox, covered_by: Vec<ObjectId>) -> ObjectLabel {
-        let [visible, whole] = [&self.seen.visible, &self.seen.amodal].map(|mask| mask.area() as f64);
+        let [visible, whole] =
+            [&self.seen.visible, &self.seen.amodal].map(|mask| mask.area() as f64);
         ObjectLabel {
             id: self.card.id,
             class: self.card.class,

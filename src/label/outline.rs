@@ -30,20 +30,33 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     let outline = Polygon::new(LineString(px), Vec::new());
     let parts = outline.intersection_with_fill_rule(&picture(camera), FillRule::NonZero);
     let [w, h] = camera.image.map(f64::from);
-    let inside = |c: Coord<f64>| Coord { x: c.x.clamp(0.0, w), y: c.y.clamp(0.0, h) };
-    parts.into_iter().filter(|part| part.unsigned_area() > SLIVER_PX).map(|part| part.map_coords(inside)).collect()
+    let inside = |c: Coord<f64>| Coord {
+        x: c.x.clamp(0.0, w),
+        y: c.y.clamp(0.0, h),
+    };
+    parts
+        .into_iter()
+        .filter(|part| part.unsigned_area() > SLIVER_PX)
+        .map(|part| part.map_coords(inside))
+        .collect()
 }
 
 /// What two outlines share, slivers left out.
 pub(crate) fn overlap(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>) -> MultiPolygon<f64> {
-    a.intersection(b).into_iter().filter(|part| part.unsigned_area() > SLIVER_PX).collect()
+    a.intersection(b)
+        .into_iter()
+        .filter(|part| part.unsigned_area() > SLIVER_PX)
+        .collect()
 }
 
 /// The outer rings of a region, each without a repeated last point.
 pub(crate) fn rings(region: &MultiPolygon<f64>) -> Vec<Vec<Point2<f64>>> {
     let ring = |part: &Polygon<f64>| {
         let coords = &part.exterior().0;
-        coords[..coords.len().saturating_sub(1)].iter().map(|c| Point2::new(c.x, c.y)).collect()
+        coords[..coords.len().saturating_sub(1)]
+            .iter()
+            .map(|c| Point2::new(c.x, c.y))
+            .collect()
     };
     region.iter().map(ring).collect()
 }
@@ -51,7 +64,12 @@ pub(crate) fn rings(region: &MultiPolygon<f64>) -> Vec<Vec<Point2<f64>>> {
 /// The smallest box around a region.
 pub(crate) fn bounds(region: &MultiPolygon<f64>) -> BBox {
     let rect = region.bounding_rect();
-    rect.map_or_else(BBox::default, |r| BBox { x0: r.min().x, y0: r.min().y, x1: r.max().x, y1: r.max().y })
+    rect.map_or_else(BBox::default, |r| BBox {
+        x0: r.min().x,
+        y0: r.min().y,
+        x1: r.max().x,
+        y1: r.max().y,
+    })
 }
 
 fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
@@ -87,7 +105,10 @@ fn clip(polygon: Vec<Vector3<f64>>, side: impl Fn(&Vector3<f64>) -> f64) -> Vec<
 
 fn pixel(p: &Vector3<f64>, camera: &Camera) -> Coord<f64> {
     let (f, c) = (camera.focal_px, camera.principal_px);
-    Coord { x: p.x / p.z * f.x + c.x, y: p.y / p.z * f.y + c.y }
+    Coord {
+        x: p.x / p.z * f.x + c.x,
+        y: p.y / p.z * f.y + c.y,
+    }
 }
 
 fn picture(camera: &Camera) -> Polygon<f64> {
@@ -128,11 +149,19 @@ mod tests {
 
     /// The part of the picture inside an outline on the grid.
     fn on_grid(corners: &[[u32; 2]]) -> MultiPolygon<f64> {
-        let uv = |&[x, y]: &[u32; 2]| Point2::new(f64::from(x) / f64::from(GRID), f64::from(y) / f64::from(GRID));
+        let uv = |&[x, y]: &[u32; 2]| {
+            Point2::new(
+                f64::from(x) / f64::from(GRID),
+                f64::from(y) / f64::from(GRID),
+            )
+        };
         let card = Card {
             id: ObjectId(1),
             class: 0,
-            quad: Quad { world_from_card: Pose::identity(), size: [1.0; 2] },
+            quad: Quad {
+                world_from_card: Pose::identity(),
+                size: [1.0; 2],
+            },
             texture: Image::filled(1, 1, PremulRgba::default()).into(),
             back: None,
             outline_uv: corners.iter().map(uv).collect::<Arc<[_]>>(),
@@ -144,21 +173,26 @@ mod tests {
     /// Times that an outline winds around a point, by crossings of the line to its right.
     fn winding(corners: &[[u32; 2]], p: Point2<f64>) -> i32 {
         let px = |&[x, y]: &[u32; 2]| Point2::new(CELL * f64::from(x), CELL * f64::from(y));
-        corners.iter().zip(corners.iter().cycle().skip(1)).fold(0, |n, (a, b)| {
-            let (a, b) = (px(a), px(b));
-            let is_right = (p.y - a.y) * (b.x - a.x) / (b.y - a.y) + a.x > p.x;
-            match (a.y <= p.y, b.y <= p.y) {
-                (true, false) if is_right => n + 1,
-                (false, true) if is_right => n - 1,
-                _ => n,
-            }
-        })
+        corners
+            .iter()
+            .zip(corners.iter().cycle().skip(1))
+            .fold(0, |n, (a, b)| {
+                let (a, b) = (px(a), px(b));
+                let is_right = (p.y - a.y) * (b.x - a.x) / (b.y - a.y) + a.x > p.x;
+                match (a.y <= p.y, b.y <= p.y) {
+                    (true, false) if is_right => n + 1,
+                    (false, true) if is_right => n - 1,
+                    _ => n,
+                }
+            })
     }
 
     /// Points between pixels' centres, away from every line through two points of the grid by more than rounding.
     fn points() -> impl Iterator<Item = Point2<f64>> {
         let along = |i: u32| f64::from(i) + 0.514_285_7;
-        (0..SIDE as u32).flat_map(move |y| (0..SIDE as u32).map(move |x| Point2::new(along(x), along(y) + 0.003_1)))
+        (0..SIDE as u32).flat_map(move |y| {
+            (0..SIDE as u32).map(move |x| Point2::new(along(x), along(y) + 0.003_1))
+        })
     }
 
     fn outline() -> impl Strategy<Value = Vec<[u32; 2]>> {
@@ -201,8 +235,21 @@ mod tests {
     fn outlines_that_touch_in_an_edge_or_a_corner_share_nothing() {
         let square = |x: u32, y: u32| on_grid(&[[x, y], [x + 2, y], [x + 2, y + 2], [x, y + 2]]);
         let middle = square(3, 3);
-        for (x, y) in [(1, 3), (5, 3), (3, 1), (3, 5), (1, 1), (5, 5), (1, 2), (5, 4)] {
-            assert_eq!(overlap(&middle, &square(x, y)).unsigned_area(), 0.0, "{x} {y}");
+        for (x, y) in [
+            (1, 3),
+            (5, 3),
+            (3, 1),
+            (3, 5),
+            (1, 1),
+            (5, 5),
+            (1, 2),
+            (5, 4),
+        ] {
+            assert_eq!(
+                overlap(&middle, &square(x, y)).unsigned_area(),
+                0.0,
+                "{x} {y}"
+            );
         }
         assert_eq!(overlap(&middle, &square(4, 4)).unsigned_area(), CELL * CELL);
     }

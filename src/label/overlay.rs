@@ -18,24 +18,42 @@ pub fn overlay(frame: &Image<PremulRgba>, labels: &Labels, classes: &[String]) -
     draw_labels(&mut canvas, labels, ObjectLabel::is_topmost);
     for object in labels.objects.iter().filter(|o| o.is_topmost()) {
         let name = classes.get(object.class as usize).cloned();
-        tag(&mut canvas, object, &name.unwrap_or_else(|| object.class.to_string()));
+        tag(
+            &mut canvas,
+            object,
+            &name.unwrap_or_else(|| object.class.to_string()),
+        );
     }
     canvas
 }
 
 /// Draws boxes around the objects of `boxed` and outlines of the others onto a picture of any size.
-pub(crate) fn draw_labels(canvas: &mut Image<Srgb8>, labels: &Labels, boxed: impl Fn(&ObjectLabel) -> bool) {
+pub(crate) fn draw_labels(
+    canvas: &mut Image<Srgb8>,
+    labels: &Labels,
+    boxed: impl Fn(&ObjectLabel) -> bool,
+) {
     let [kx, ky] = [
         canvas.width() as f64 / f64::from(labels.image[0].max(1)),
         canvas.height() as f64 / f64::from(labels.image[1].max(1)),
     ];
-    for ring in labels.objects.iter().filter(|o| !boxed(o)).flat_map(|o| &o.outline_px) {
+    for ring in labels
+        .objects
+        .iter()
+        .filter(|o| !boxed(o))
+        .flat_map(|o| &o.outline_px)
+    {
         let ring: Vec<_> = ring.iter().map(|p| [p.x * kx, p.y * ky].into()).collect();
         draw::outline(canvas, &ring, UNLABELLED);
     }
     for object in labels.objects.iter().filter(|o| boxed(o)) {
         let b = object.amodal_box;
-        let b = BBox { x0: b.x0 * kx, y0: b.y0 * ky, x1: b.x1 * kx, y1: b.y1 * ky };
+        let b = BBox {
+            x0: b.x0 * kx,
+            y0: b.y0 * ky,
+            x1: b.x1 * kx,
+            y1: b.y1 * ky,
+        };
         draw::border(canvas, &b, draw::class_color(object.class), 1);
     }
 }
@@ -46,7 +64,11 @@ fn tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
     let [w, h] = [size.width(name) + 6, size.height()];
     let (left, top) = (object.amodal_box.x0 as isize, object.amodal_box.y0 as isize);
     let x = left.min(canvas.width() as isize - w as isize).max(0);
-    let y = if top >= h as isize { top - h as isize } else { top };
+    let y = if top >= h as isize {
+        top - h as isize
+    } else {
+        top
+    };
     let paper = draw::class_color(object.class);
     draw::fill(canvas, [x, y], [w, h], paper);
     draw::text(canvas, [x + 3, y], name, draw::ink_on(paper), size);

@@ -34,7 +34,10 @@ pub(crate) struct Text {
 impl From<Mask> for Text {
     fn from(mask: Mask) -> Self {
         let [w, h] = mask.size();
-        Self { size: [h, w], counts: encode(mask.runs()) }
+        Self {
+            size: [h, w],
+            counts: encode(mask.runs()),
+        }
     }
 }
 
@@ -50,7 +53,8 @@ impl TryFrom<Text> for Mask {
         }
         let runs = decode(&text.counts).ok_or("counts: not COCO's compressed run lengths")?;
         let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
-        Mask::from_runs([w, h], runs).ok_or_else(|| format!("counts: runs of {sum} pixels in all, expected {w} x {h}"))
+        Mask::from_runs([w, h], runs)
+            .ok_or_else(|| format!("counts: runs of {sum} pixels in all, expected {w} x {h}"))
     }
 }
 
@@ -69,7 +73,9 @@ fn push(text: &mut String, mut number: i64) {
         let group = (number as u8) & (MORE - 1);
         number >>= GROUP;
         let is_last = number == if group & SIGN == 0 { 0 } else { -1 };
-        text.push(char::from(ZERO + if is_last { group } else { group | MORE }));
+        text.push(char::from(
+            ZERO + if is_last { group } else { group | MORE },
+        ));
         if is_last {
             return;
         }
@@ -82,7 +88,11 @@ pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
     let mut bytes = text.bytes();
     while let Some(first) = bytes.next() {
         let number = pull(first, &mut bytes)?;
-        let before = if runs.len() > 2 { runs[runs.len() - 2] } else { 0 };
+        let before = if runs.len() > 2 {
+            runs[runs.len() - 2]
+        } else {
+            0
+        };
         runs.push(u32::try_from(number.checked_add(i64::from(before))?).ok()?);
     }
     Some(runs)
@@ -95,7 +105,11 @@ fn pull(first: u8, rest: &mut impl Iterator<Item = u8>) -> Option<i64> {
         number |= i64::from(group & (MORE - 1)) << shift;
         shift += GROUP;
         if group & MORE == 0 {
-            return Some(if group & SIGN == 0 { number } else { number | -1 << shift });
+            return Some(if group & SIGN == 0 {
+                number
+            } else {
+                number | -1 << shift
+            });
         }
         // A difference of two runs has 33 bits: seven groups.
         byte = rest.next().filter(|_| shift < 7 * GROUP)?;
@@ -138,13 +152,20 @@ mod tests {
     fn a_mask_of_another_size_is_refused() {
         let read = |json: &str| serde_json::from_str::<Mask>(json).map_err(|e| e.to_string());
         assert!(read(r#"{"size":[2,3],"counts":"06"}"#).is_ok());
-        assert!(read(r#"{"size":[2,2],"counts":"06"}"#).unwrap_err().contains("6 pixels in all, expected 2 x 2"));
+        assert!(
+            read(r#"{"size":[2,2],"counts":"06"}"#)
+                .unwrap_err()
+                .contains("6 pixels in all, expected 2 x 2")
+        );
         assert!(read(r#"{"size":[2,3],"counts":"\u0007"}"#).is_err());
         let huge = |h: u32, w: u32| {
             let counts = encode(&[u32::try_from(u64::from(h) * u64::from(w)).unwrap_or(u32::MAX)]);
             read(&serde_json::json!({ "size": [h, w], "counts": counts }).to_string()).unwrap_err()
         };
-        assert!(huge(1, u32::MAX).starts_with("size: 4294967295 x 1 pixels, expected at most 16384 a side"));
+        assert!(
+            huge(1, u32::MAX)
+                .starts_with("size: 4294967295 x 1 pixels, expected at most 16384 a side")
+        );
         assert!(huge(16_384, 16_384).starts_with("size: 16384 x 16384 pixels"));
     }
 }

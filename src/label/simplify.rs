@@ -22,8 +22,9 @@ pub(super) fn simplified(rings: Vec<Ring>, tolerance_px: f64) -> Vec<Ring> {
     }
     let mut border = Border::of(&rings);
     // A cost is not negative, and then its bits are in its order; what costs the same goes in the order of the border.
-    let mut open: BinaryHeap<_> =
-        (0..border.corners.len()).map(|at| Reverse((border.cost(at).to_bits(), at))).collect();
+    let mut open: BinaryHeap<_> = (0..border.corners.len())
+        .map(|at| Reverse((border.cost(at).to_bits(), at)))
+        .collect();
     while let Some(Reverse((cost, at))) = open.pop() {
         let is_old = !border.kept[at] || border.cost(at).to_bits() != cost;
         if is_old || f64::from_bits(cost) > tolerance_px || !border.may_drop(at) {
@@ -56,7 +57,10 @@ impl Border {
         let count = corners.len();
         let bottom = corners.iter().map(|c| c[1] as usize).max().unwrap_or(0);
         let mut rows = vec![Vec::new(); bottom + 1];
-        corners.iter().enumerate().for_each(|(i, c)| rows[c[1] as usize].push(i));
+        corners
+            .iter()
+            .enumerate()
+            .for_each(|(i, c)| rows[c[1] as usize].push(i));
         let (mut before, mut after, mut first, mut length) = (vec![], vec![], vec![], vec![]);
         for ring in rings {
             let (start, n) = (first.len(), ring.len());
@@ -65,7 +69,16 @@ impl Border {
             first.extend(std::iter::repeat_n(start, n));
             length.extend(std::iter::repeat_n(n, n));
         }
-        Self { corners, kept: vec![true; count], before, after, first, left: length.clone(), length, rows }
+        Self {
+            corners,
+            kept: vec![true; count],
+            before,
+            after,
+            first,
+            left: length.clone(),
+            length,
+            rows,
+        }
     }
 
     /// The farthest corner of the first border, between the neighbours of a corner, from the line between those.
@@ -74,7 +87,9 @@ impl Border {
         let (first, length) = (self.first[at], self.length[at]);
         let follower = |i: &usize| Some(first + (i + 1 - first) % length);
         let between = std::iter::successors(follower(&a), follower).take_while(|i| *i != b);
-        between.map(|i| distance(self.corners[i], [self.corners[a], self.corners[b]])).fold(0.0, f64::max)
+        between
+            .map(|i| distance(self.corners[i], [self.corners[a], self.corners[b]]))
+            .fold(0.0, f64::max)
     }
 
     /// Whether the line between its neighbours crosses nothing.
@@ -82,7 +97,11 @@ impl Border {
         let own = [self.before[at], at, self.after[at]];
         let triangle = own.map(|i| self.corners[i]);
         let span = |axis: usize| {
-            triangle.iter().fold([f64::INFINITY, 0.0_f64], |[low, high], c| [low.min(c[axis]), high.max(c[axis])])
+            triangle
+                .iter()
+                .fold([f64::INFINITY, 0.0_f64], |[low, high], c| {
+                    [low.min(c[axis]), high.max(c[axis])]
+                })
         };
         let [[left, right], [top, bottom]] = [span(0), span(1)];
         let near = self.rows[top as usize..=bottom as usize].iter().flatten();
@@ -102,7 +121,10 @@ impl Border {
     fn rings(&self) -> Vec<Ring> {
         let starts = (0..self.corners.len()).filter(|i| self.first[*i] == *i);
         let ring = |start: usize| {
-            (start..start + self.length[start]).filter(|i| self.kept[*i]).map(|i| self.corners[i]).collect()
+            (start..start + self.length[start])
+                .filter(|i| self.kept[*i])
+                .map(|i| self.corners[i])
+                .collect()
         };
         starts.map(ring).collect()
     }
@@ -133,12 +155,21 @@ mod tests {
 
     #[test]
     fn a_staircase_becomes_a_slope() {
-        let steps = (0..20).flat_map(|i| [[f64::from(i), f64::from(i)], [f64::from(i + 1), f64::from(i)]]);
+        let steps = (0..20).flat_map(|i| {
+            [
+                [f64::from(i), f64::from(i)],
+                [f64::from(i + 1), f64::from(i)],
+            ]
+        });
         let stairs: Ring = steps.chain([[20.0, 20.0], [0.0, 20.0]]).collect();
         let slope = simplified(vec![stairs.clone()], 1.0);
         assert!(slope[0].len() <= 5, "{slope:?}");
         let kept = |tolerance: f64| simplified(vec![stairs.clone()], tolerance).concat();
-        assert_eq!([kept(0.0), kept(0.1)], [stairs.clone(), stairs.clone()], "steps are 0.7 deep");
+        assert_eq!(
+            [kept(0.0), kept(0.1)],
+            [stairs.clone(), stairs.clone()],
+            "steps are 0.7 deep"
+        );
     }
 
     #[test]
@@ -147,14 +178,21 @@ mod tests {
         let mut hole = square(4.0, 6.0);
         hole.reverse();
         let rings = simplified(vec![square(0.0, 10.0), hole], 100.0);
-        assert_eq!([rings[0].len(), rings[1].len()], [4, 3], "a triangle would cut through the hole: {rings:?}");
+        assert_eq!(
+            [rings[0].len(), rings[1].len()],
+            [4, 3],
+            "a triangle would cut through the hole: {rings:?}"
+        );
     }
 
     #[test]
     fn rings_that_touch_in_a_corner_keep_it() {
         let square = |low: f64, high: f64| vec![[low, low], [high, low], [high, high], [low, high]];
         let rings = simplified(vec![square(0.0, 3.0), square(3.0, 6.0)], 100.0);
-        assert!(rings.iter().all(|ring| ring.contains(&[3.0, 3.0])), "{rings:?}");
+        assert!(
+            rings.iter().all(|ring| ring.contains(&[3.0, 3.0])),
+            "{rings:?}"
+        );
         assert!(simplified(vec![], 1.0).is_empty());
     }
 }

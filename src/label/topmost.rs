@@ -41,7 +41,11 @@ pub(crate) fn covers(objects: &[Silhouette<'_>], camera: &Camera, iou: f64) -> V
 
 /// The objects that lie in a knot: each lies, through others, over itself (A over B over C over A).
 pub fn knotted(objects: &[ObjectLabel]) -> Vec<ObjectId> {
-    objects.iter().map(|o| o.id).filter(|&id| above(objects, id).contains(&id)).collect()
+    objects
+        .iter()
+        .map(|o| o.id)
+        .filter(|&id| above(objects, id).contains(&id))
+        .collect()
 }
 
 /// All that lies over an object, directly or through others.
@@ -49,7 +53,11 @@ fn above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
     let mut found = BTreeSet::new();
     let mut next = vec![id];
     while let Some(below) = next.pop() {
-        let over = objects.iter().filter(|o| o.id == below).flat_map(|o| &o.covered_by).copied();
+        let over = objects
+            .iter()
+            .filter(|o| o.id == below)
+            .flat_map(|o| &o.covered_by)
+            .copied();
         next.extend(over.filter(|&id| found.insert(id)).collect::<Vec<_>>());
     }
     found

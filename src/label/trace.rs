@@ -60,10 +60,19 @@ impl Grid {
         let b = mask.bounds();
         let [left, top, right, bottom] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as i64);
         let (columns, rows) = (right - left + 1, bottom - top + 1);
-        let mut grid = Self { left, top, columns, rows, leaving: vec![0; (columns * rows) as usize] };
+        let mut grid = Self {
+            left,
+            top,
+            columns,
+            rows,
+            leaving: vec![0; (columns * rows) as usize],
+        };
         for (x, y) in mask.pixels() {
             let (x, y) = (i64::from(x), i64::from(y));
-            [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]].into_iter().zip(0..4).for_each(|(at, d)| grid.meet(at, d));
+            [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]]
+                .into_iter()
+                .zip(0..4)
+                .for_each(|(at, d)| grid.meet(at, d));
         }
         grid
     }
@@ -109,8 +118,16 @@ impl Grid {
             self.leaving[here] &= !(1 << d);
             (at, came) = (step(at, d), d);
             // Another ring may pass through the same corner: this one comes back from below, to turn right.
-            let leaving = if at == start && d == 3 { 0 } else { self.leaving[self.index(at)] };
-            match [1, 0, 3].map(|turn| (d + turn) % 4).into_iter().find(|&d| leaving & 1 << d != 0) {
+            let leaving = if at == start && d == 3 {
+                0
+            } else {
+                self.leaving[self.index(at)]
+            };
+            match [1, 0, 3]
+                .map(|turn| (d + turn) % 4)
+                .into_iter()
+                .find(|&d| leaving & 1 << d != 0)
+            {
                 Some(next) => d = next,
                 None => return ring,
             }
@@ -124,7 +141,10 @@ fn step([x, y]: [i64; 2], d: usize) -> [i64; 2] {
 
 /// Twice the area; negative for a hole.
 fn area2(ring: &Ring) -> f64 {
-    ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum()
+    ring.iter()
+        .zip(ring.iter().cycle().skip(1))
+        .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
+        .sum()
 }
 
 /// From left to right, then from above.
@@ -134,7 +154,11 @@ fn in_order(a: &[f64; 2], b: &[f64; 2]) -> std::cmp::Ordering {
 
 /// The place in the ring and the position of its upper one of the leftmost corners.
 fn leftmost(ring: &Ring) -> (usize, [f64; 2]) {
-    ring.iter().copied().enumerate().min_by(|a, b| in_order(&a.1, &b.1)).unwrap_or_default()
+    ring.iter()
+        .copied()
+        .enumerate()
+        .min_by(|a, b| in_order(&a.1, &b.1))
+        .unwrap_or_default()
 }
 
 /// Joins a hole to the ring whose border is next to its left.
@@ -152,8 +176,16 @@ fn cut_to(parts: &mut [Ring], hole: Ring) {
         }
     }
     if let Some((at, p, i)) = nearest {
-        let around = hole.iter().cycle().skip(first).take(hole.len() + 1).copied();
-        let slit: Ring = std::iter::once([at, y]).chain(around).chain([[at, y]]).collect();
+        let around = hole
+            .iter()
+            .cycle()
+            .skip(first)
+            .take(hole.len() + 1)
+            .copied();
+        let slit: Ring = std::iter::once([at, y])
+            .chain(around)
+            .chain([[at, y]])
+            .collect();
         parts[p].splice(i + 1..i + 1, slit);
         parts[p].dedup();
     }
@@ -161,7 +193,9 @@ fn cut_to(parts: &mut [Ring], hole: Ring) {
 
 /// Joins a part to the corner that is nearest to its first.
 fn join(mut whole: Ring, part: Ring) -> Ring {
-    let Some(&first) = part.first() else { return whole };
+    let Some(&first) = part.first() else {
+        return whole;
+    };
     let distance = |i: usize| (whole[i][0] - first[0]).powi(2) + (whole[i][1] - first[1]).powi(2);
     if let Some(i) = (0..whole.len()).min_by(|&i, &k| distance(i).total_cmp(&distance(k))) {
         let slit: Ring = part.iter().copied().chain([first, whole[i]]).collect();
@@ -176,7 +210,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn area(ring: &[Point2<f64>]) -> f64 {
-        0.5 * ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>()
+        0.5 * ring
+            .iter()
+            .zip(ring.iter().cycle().skip(1))
+            .map(|(a, b)| a.x * b.y - b.x * a.y)
+            .sum::<f64>()
     }
 
     /// Times that a ring winds around the middle of a pixel.
@@ -220,7 +258,10 @@ mod tests {
     }
 
     fn sides(ring: &Ring) -> Vec<[[f64; 2]; 2]> {
-        ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| [*a, *b]).collect()
+        ring.iter()
+            .zip(ring.iter().cycle().skip(1))
+            .map(|(a, b)| [*a, *b])
+            .collect()
     }
 
     fn distance(p: [f64; 2], [a, b]: [[f64; 2]; 2]) -> f64 {

@@ -44,7 +44,13 @@ struct Tally {
 impl Tally {
     fn new(size: [u32; 2]) -> Self {
         let none = Bits::new(size);
-        Self { amodal: none.clone(), visible: none, sums: [0.0; 3], near: f64::INFINITY, far: 0.0 }
+        Self {
+            amodal: none.clone(),
+            visible: none,
+            sums: [0.0; 3],
+            near: f64::INFINITY,
+            far: 0.0,
+        }
     }
 
     #[inline]
@@ -67,10 +73,23 @@ impl Tally {
         let [alpha, visible, depth] = self.sums;
         let (amodal, seen) = (self.amodal.mask(), self.visible.mask());
         if alpha <= 0.0 {
-            return Seen { amodal, visible: seen, ..Seen::default() };
+            return Seen {
+                amodal,
+                visible: seen,
+                ..Seen::default()
+            };
         }
-        let depth = DepthRange { near: self.near, mean: depth / alpha, far: self.far };
-        Seen { amodal, visible: seen, fraction: (visible / alpha).clamp(0.0, 1.0), depth }
+        let depth = DepthRange {
+            near: self.near,
+            mean: depth / alpha,
+            far: self.far,
+        };
+        Seen {
+            amodal,
+            visible: seen,
+            fraction: (visible / alpha).clamp(0.0, 1.0),
+            depth,
+        }
     }
 }
 
@@ -85,11 +104,16 @@ pub(crate) fn fold(deep: &DeepImage, ids: &[ObjectId], options: &LabelOptions) -
         for x in 0..deep.width() {
             looked_at += deep.at(x, y).len();
             for sample in deep.at(x, y) {
-                let Ok(i) = ids.binary_search(&sample.object) else { continue };
+                let Ok(i) = ids.binary_search(&sample.object) else {
+                    continue;
+                };
                 tallies[i].add(x, y, sample, options.alpha_threshold);
             }
         }
     }
-    work::add_all([(Kind::LabelSamples, looked_at as u64), (Kind::Masks, 2 * ids.len() as u64)]);
+    work::add_all([
+        (Kind::LabelSamples, looked_at as u64),
+        (Kind::Masks, 2 * ids.len() as u64),
+    ]);
     tallies.into_iter().map(Tally::seen).collect()
 }

@@ -28,7 +28,11 @@ mod tests {
 
     #[test]
     fn directions_are_unit_and_above_the_horizon() {
-        assert!(ambient_directions(36).iter().all(|d| (d.norm() - 1.0).abs() < 1e-12 && d.z > 0.0));
+        assert!(
+            ambient_directions(36)
+                .iter()
+                .all(|d| (d.norm() - 1.0).abs() < 1e-12 && d.z > 0.0)
+        );
     }
 
     #[test]

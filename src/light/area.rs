@@ -31,11 +31,22 @@ pub struct LightFrame {
 /// instead. A light whose target is its own position shines straight down.
 pub fn frame(light: &AreaLight) -> LightFrame {
     let center = Point3::from(light.position);
-    let back = (center - Point3::from(light.target)).try_normalize(1e-9).unwrap_or_else(Vector3::z);
+    let back = (center - Point3::from(light.target))
+        .try_normalize(1e-9)
+        .unwrap_or_else(Vector3::z);
     // Within 2.6 degrees of the y axis "towards +y" says nothing any more; the limit is that of the reference script.
-    let up = if back.y.abs() < 0.999 { Vector3::y() } else { Vector3::x() };
+    let up = if back.y.abs() < 0.999 {
+        Vector3::y()
+    } else {
+        Vector3::x()
+    };
     let x = up.cross(&back).normalize();
-    LightFrame { center, x, y: back.cross(&x), normal: -back }
+    LightFrame {
+        center,
+        x,
+        y: back.cross(&x),
+        normal: -back,
+    }
 }
 
 impl LightFrame {
@@ -47,7 +58,12 @@ impl LightFrame {
     /// Corners of the rectangle of this `size`, in turn.
     pub fn corners(&self, size: [f64; 2]) -> [Point3<f64>; 4] {
         let [a, b] = size.map(|s| 0.5 * s);
-        [self.point(-a, -b), self.point(a, -b), self.point(a, b), self.point(-a, b)]
+        [
+            self.point(-a, -b),
+            self.point(a, -b),
+            self.point(a, b),
+            self.point(-a, b),
+        ]
     }
 
     /// Corners of a polygon along the ellipse of these diameters, in turn, of the same area.
@@ -102,7 +118,10 @@ pub fn irradiance(light: &AreaLight, point: Point3<f64>, normal: Vector3<f64>) -
         LightShape::Ellipse if (point - frame.center).norm() < a.max(b) => {
             polygon_irradiance(&frame.rim([a, b]), point, normal)
         }
-        LightShape::Ellipse => nodes(light, ELLIPSE_SAMPLES).iter().map(|n| n.irradiance(&frame, point, normal)).sum(),
+        LightShape::Ellipse => nodes(light, ELLIPSE_SAMPLES)
+            .iter()
+            .map(|n| n.irradiance(&frame, point, normal))
+            .sum(),
     };
     radiance(light).scale(factor as f32)
 }
@@ -138,7 +157,10 @@ pub(crate) mod tests {
     #[test]
     fn radiance_is_power_over_pi_area() {
         assert!((radiance(&square()).r - 19.894368).abs() < 2e-5);
-        let disk = AreaLight { shape: LightShape::Ellipse, ..square() };
+        let disk = AreaLight {
+            shape: LightShape::Ellipse,
+            ..square()
+        };
         assert!((radiance(&disk).r - 19.894368 / FRAC_PI_4 as f32).abs() < 3e-5);
     }
 
@@ -147,14 +169,20 @@ pub(crate) mod tests {
         for (at, normal, expected) in lit_points() {
             let e = f64::from(radiance(&square()).r)
                 * polygon_irradiance(&frame(&square()).corners([0.4; 2]), at.into(), normal);
-            assert!((e / expected - 1.0).abs() < 1e-6, "{at:?}: {e} against {expected}");
+            assert!(
+                (e / expected - 1.0).abs() < 1e-6,
+                "{at:?}: {e} against {expected}"
+            );
         }
     }
 
     #[test]
     fn the_frame_is_right_handed_and_aims_at_the_target() {
         for position in [[0.3, 0.2, 0.9], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
-            let f = frame(&AreaLight { position, ..square() });
+            let f = frame(&AreaLight {
+                position,
+                ..square()
+            });
             assert!((f.x.cross(&f.y) + f.normal).norm() < 1e-12);
             assert!((f.center + f.normal * f.center.coords.norm()).coords.norm() < 1e-12);
         }
@@ -162,7 +190,10 @@ pub(crate) mod tests {
 
     #[test]
     fn a_light_aimed_at_itself_shines_down() {
-        let light = AreaLight { target: square().position, ..square() };
+        let light = AreaLight {
+            target: square().position,
+            ..square()
+        };
         assert_eq!(frame(&light).normal, -Vector3::z());
     }
 
@@ -174,14 +205,25 @@ pub(crate) mod tests {
 
     #[test]
     fn an_ellipse_is_the_same_to_a_receiver_just_nearer_and_just_farther_than_it_is_wide() {
-        let light = AreaLight { shape: LightShape::Ellipse, position: [0.0, 0.0, 1.0], size: [1.0, 0.6], ..square() };
-        let [near, far] = [1e-9, -1e-9].map(|z| irradiance(&light, Point3::new(0.0, 0.0, z), Vector3::z()).g);
+        let light = AreaLight {
+            shape: LightShape::Ellipse,
+            position: [0.0, 0.0, 1.0],
+            size: [1.0, 0.6],
+            ..square()
+        };
+        let [near, far] =
+            [1e-9, -1e-9].map(|z| irradiance(&light, Point3::new(0.0, 0.0, z), Vector3::z()).g);
         assert!((near / far - 1.0).abs() < 1e-5, "{near} {far}");
     }
 
     #[test]
     fn a_disk_far_away_is_its_power_over_distance_squared() {
-        let light = AreaLight { shape: LightShape::Ellipse, position: [0.0, 0.0, 10.0], size: [0.1; 2], ..square() };
+        let light = AreaLight {
+            shape: LightShape::Ellipse,
+            position: [0.0, 0.0, 10.0],
+            size: [0.1; 2],
+            ..square()
+        };
         let e = irradiance(&light, Point3::origin(), Vector3::z());
         assert!((e.g - 10.0 / PI as f32 / 100.0).abs() < 1e-5);
     }

@@ -38,8 +38,15 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
         }
     };
     let ratio = wanted / f64::from(white_card(&scene));
-    let match_ev = if ratio > 0.0 && ratio.is_finite() { libm::log2(ratio) } else { 0.0 };
-    Scene { exposure: Exposure::Ev(match_ev + gain_ev), ..scene }
+    let match_ev = if ratio > 0.0 && ratio.is_finite() {
+        libm::log2(ratio)
+    } else {
+        0.0
+    };
+    Scene {
+        exposure: Exposure::Ev(match_ev + gain_ev),
+        ..scene
+    }
 }
 
 /// Luminance of the plate's white: the 99th percentile over all pixels.
@@ -109,7 +116,9 @@ mod tests {
 
     #[test]
     fn a_white_card_gets_the_plate_s_white() {
-        let Exposure::Ev(ev) = expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate()).exposure else {
+        let Exposure::Ev(ev) =
+            expose(scene(Exposure::MatchPlate { gain_ev: 1.0 }), &plate()).exposure
+        else {
             panic!("still unknown")
         };
         let card = 2.975061 / PI + 0.1;
@@ -119,14 +128,19 @@ mod tests {
     #[test]
     fn a_card_as_grey_as_the_surface_gets_the_surface_s_brightness() {
         let plate = Image::filled(40, 30, LinearRgb::grey(0.3));
-        let exposure = Exposure::MatchSurface { albedo: 0.5, gain_ev: 0.0 };
+        let exposure = Exposure::MatchSurface {
+            albedo: 0.5,
+            gain_ev: 0.0,
+        };
         let scene = Scene {
             lights: Vec::new(),
             ambient: LinearRgb::grey(0.2),
             exposure,
             ..crate::light::surface::tests::scene(Default::default())
         };
-        let Exposure::Ev(ev) = expose(scene, &plate).exposure else { panic!("still unknown") };
+        let Exposure::Ev(ev) = expose(scene, &plate).exposure else {
+            panic!("still unknown")
+        };
         assert!((0.2 * 0.5 * libm::exp2(ev) - 0.3).abs() < 1e-6);
     }
 
@@ -138,10 +152,16 @@ mod tests {
 
     #[test]
     fn darkness_and_broken_pixels_leave_the_gain_alone() {
-        let dark =
-            Scene { lights: Vec::new(), ambient: LinearRgb::BLACK, ..scene(Exposure::MatchPlate { gain_ev: 0.5 }) };
+        let dark = Scene {
+            lights: Vec::new(),
+            ambient: LinearRgb::BLACK,
+            ..scene(Exposure::MatchPlate { gain_ev: 0.5 })
+        };
         assert_eq!(expose(dark, &plate()).exposure, Exposure::Ev(0.5));
         let broken = Image::filled(40, 30, LinearRgb::grey(f32::NAN));
-        assert_eq!(expose(scene(Exposure::MatchPlate { gain_ev: 0.5 }), &broken).exposure, Exposure::Ev(0.5));
+        assert_eq!(
+            expose(scene(Exposure::MatchPlate { gain_ev: 0.5 }), &broken).exposure,
+            Exposure::Ev(0.5)
+        );
     }
 }

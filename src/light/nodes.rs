@@ -20,7 +20,11 @@ impl Node {
         let to = self.point - point;
         let r2 = to.norm_squared();
         let cosines = normal.dot(&to).max(0.0) * (-frame.normal.dot(&to)).max(0.0);
-        if r2 > 0.0 { cosines / (r2 * r2) * self.area } else { 0.0 }
+        if r2 > 0.0 {
+            cosines / (r2 * r2) * self.area
+        } else {
+            0.0
+        }
     }
 }
 
@@ -41,7 +45,10 @@ fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
     let (frame, area) = (frame(light), area(light));
     let [half_x, half_y] = sides(light).map(|s| 0.5 * s);
     let row = |&(y, wy): &(f64, f64)| {
-        rule.iter().map(move |&(x, wx)| Node { point: frame.point(x * half_x, y * half_y), area: area * wx * wy / 4.0 })
+        rule.iter().map(move |&(x, wx)| Node {
+            point: frame.point(x * half_x, y * half_y),
+            area: area * wx * wy / 4.0,
+        })
     };
     rule.iter().flat_map(row).collect()
 }
@@ -55,7 +62,10 @@ fn ellipse_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
         (0..steps).map(move |i| {
             let (sin, cos) = libm::sincos(TAU * (i as f64 + 0.5 * (k % 2) as f64) / steps as f64);
             let point = frame.point(radius * half_x * cos, radius * half_y * sin);
-            Node { point, area: area * 0.5 * w / steps as f64 }
+            Node {
+                point,
+                area: area * 0.5 * w / steps as f64,
+            }
         })
     };
     rule.iter().enumerate().flat_map(ring).collect()
@@ -68,11 +78,19 @@ fn ellipse_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
 /// What is left of a rectangle is strips across the side that the plane turns away from fastest, each from the plane to
 /// the rectangle's end, with a Gauss-Legendre rule along them and one across. What is left of an ellipse is a segment of a
 /// disk, stretched: chords at equal angles' cosines.
-pub(crate) fn nodes_above(light: &AreaLight, per_side: usize, point: Point3<f64>, normal: &Vector3<f64>) -> Vec<Node> {
+pub(crate) fn nodes_above(
+    light: &AreaLight,
+    per_side: usize,
+    point: Point3<f64>,
+    normal: &Vector3<f64>,
+) -> Vec<Node> {
     let frame = frame(light);
     let half = sides(light).map(|s| 0.5 * s);
     let middle = normal.dot(&(frame.center - point));
-    let rise = [half[0] * normal.dot(&frame.x), half[1] * normal.dot(&frame.y)];
+    let rise = [
+        half[0] * normal.dot(&frame.x),
+        half[1] * normal.dot(&frame.y),
+    ];
     let [a, b] = rise.map(f64::abs);
     let cut = match light.shape {
         LightShape::Rectangle if middle.abs() < a + b => strips(middle, rise, per_side.max(1)),
@@ -88,7 +106,11 @@ pub(crate) fn nodes_above(light: &AreaLight, per_side: usize, point: Point3<f64>
 
 /// Points and areas in the square -1..1 where `middle + rise . point` is above 0.
 fn strips(middle: f64, rise: [f64; 2], n: usize) -> Vec<([f64; 2], f64)> {
-    let [outer, inner] = if rise[1].abs() >= rise[0].abs() { [0, 1] } else { [1, 0] };
+    let [outer, inner] = if rise[1].abs() >= rise[0].abs() {
+        [0, 1]
+    } else {
+        [1, 0]
+    };
     let rule = gauss_legendre(n);
     let mut points = Vec::with_capacity(n * n);
     for (a, width) in on(above(middle + rise[inner].abs(), rise[outer]), &rule) {
@@ -111,7 +133,12 @@ fn chords(middle: f64, rise: [f64; 2], n: usize) -> Vec<([f64; 2], f64)> {
     let mut points = Vec::with_capacity(2 * n * n);
     for (angle, width) in on([0.0, widest], &across) {
         let (half, at) = libm::sincos(angle);
-        let chord = |&(t, w): &(f64, f64)| ([at * x - half * t * y, at * y + half * t * x], width * half * half * w);
+        let chord = |&(t, w): &(f64, f64)| {
+            (
+                [at * x - half * t * y, at * y + half * t * x],
+                width * half * half * w,
+            )
+        };
         points.extend(along.iter().map(chord));
     }
     points
@@ -130,7 +157,8 @@ fn above(start: f64, slope: f64) -> [f64; 2] {
 /// A rule on an interval: points and weights.
 fn on([from, to]: [f64; 2], rule: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
     let half = 0.5 * (to - from);
-    rule.iter().map(move |(x, w)| (from + half * (1.0 + x), half * w))
+    rule.iter()
+        .map(move |(x, w)| (from + half * (1.0 + x), half * w))
 }
 
 /// Abscissae in -1..1 and weights (sum 2) of the Gauss-Legendre rule of `n` points.
@@ -138,7 +166,14 @@ fn on([from, to]: [f64; 2], rule: &[(f64, f64)]) -> impl Iterator<Item = (f64, f
 /// # Method
 /// Newton's iteration on the Legendre polynomial from Tricomi's estimate of its roots.
 pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
-    (0..n).map(|i| gauss_point(n, libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5)))).collect()
+    (0..n)
+        .map(|i| {
+            gauss_point(
+                n,
+                libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5)),
+            )
+        })
+        .collect()
 }
 
 fn gauss_point(n: usize, estimate: f64) -> (f64, f64) {
@@ -170,7 +205,11 @@ mod tests {
     #[test]
     fn three_points_are_the_textbook_rule() {
         let rule = gauss_legendre(3);
-        let expected = [(-0.6f64.sqrt(), 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.6f64.sqrt(), 5.0 / 9.0)];
+        let expected = [
+            (-0.6f64.sqrt(), 5.0 / 9.0),
+            (0.0, 8.0 / 9.0),
+            (0.6f64.sqrt(), 5.0 / 9.0),
+        ];
         for ((x, w), (ex, ew)) in rule.into_iter().zip(expected) {
             assert!((x - ex).abs() < 1e-14 && (w - ew).abs() < 1e-14);
         }
@@ -179,7 +218,10 @@ mod tests {
     #[test]
     fn n_points_integrate_degree_2n_minus_1() {
         for n in 1..9 {
-            let sum: f64 = gauss_legendre(n).iter().map(|&(x, w)| w * x.powi(2 * n as i32 - 2)).sum();
+            let sum: f64 = gauss_legendre(n)
+                .iter()
+                .map(|&(x, w)| w * x.powi(2 * n as i32 - 2))
+                .sum();
             assert!((sum - 2.0 / (2 * n - 1) as f64).abs() < 1e-13, "{n} points");
         }
     }
@@ -188,15 +230,25 @@ mod tests {
     fn nine_nodes_match_the_closed_form() {
         for (at, normal, expected) in lit_points() {
             let f = frame(&square());
-            let sum: f64 = nodes(&square(), 3).iter().map(|n| n.irradiance(&f, at.into(), normal)).sum();
+            let sum: f64 = nodes(&square(), 3)
+                .iter()
+                .map(|n| n.irradiance(&f, at.into(), normal))
+                .sum();
             let e = sum * f64::from(radiance(&square()).r);
-            assert!((e / expected - 1.0).abs() < 1e-4, "{at:?}: {e} against {expected}");
+            assert!(
+                (e / expected - 1.0).abs() < 1e-4,
+                "{at:?}: {e} against {expected}"
+            );
         }
     }
 
     #[test]
     fn nodes_add_up_to_the_area() {
-        let disk = AreaLight { shape: LightShape::Ellipse, size: [0.4, 0.2], ..square() };
+        let disk = AreaLight {
+            shape: LightShape::Ellipse,
+            size: [0.4, 0.2],
+            ..square()
+        };
         for (light, expected) in [(square(), 0.16), (disk, PI * 0.02)] {
             let sum: f64 = nodes(&light, 4).iter().map(|n| n.area).sum();
             assert!((sum - expected).abs() < 1e-12);
@@ -205,22 +257,40 @@ mod tests {
 
     /// An upright light whose middle is so high above the origin's level plane, turned about its own axis.
     fn standing(shape: LightShape, height: f64, target: [f64; 3]) -> AreaLight {
-        AreaLight { shape, position: [1.0, 0.0, height], target, size: [1.0, 0.8], ..square() }
+        AreaLight {
+            shape,
+            position: [1.0, 0.0, height],
+            target,
+            size: [1.0, 0.8],
+            ..square()
+        }
     }
 
     #[test]
     fn a_light_cut_by_the_horizon_is_summed_over_what_is_left_of_it() {
         for shape in [LightShape::Rectangle, LightShape::Ellipse] {
-            for (height, target) in [(0.0, [0.0; 3]), (0.2, [0.0, 0.3, 0.1]), (-0.25, [0.0, 0.0, 0.2]), (0.3, [0.0; 3])]
-            {
+            for (height, target) in [
+                (0.0, [0.0; 3]),
+                (0.2, [0.0, 0.3, 0.1]),
+                (-0.25, [0.0, 0.0, 0.2]),
+                (0.3, [0.0; 3]),
+            ] {
                 let light = standing(shape, height, target);
                 let f = frame(&light);
                 let nodes = nodes_above(&light, 3, Point3::origin(), &Vector3::z());
                 assert!(nodes.iter().all(|n| n.point.z > 0.0), "{shape:?} {height}");
-                let sum: f64 = nodes.iter().map(|n| n.irradiance(&f, Point3::origin(), Vector3::z())).sum();
-                let fine: f64 =
-                    super::nodes(&light, 400).iter().map(|n| n.irradiance(&f, Point3::origin(), Vector3::z())).sum();
-                assert!((sum / fine - 1.0).abs() < 0.02, "{shape:?} {height}: {sum} against {fine}");
+                let sum: f64 = nodes
+                    .iter()
+                    .map(|n| n.irradiance(&f, Point3::origin(), Vector3::z()))
+                    .sum();
+                let fine: f64 = super::nodes(&light, 400)
+                    .iter()
+                    .map(|n| n.irradiance(&f, Point3::origin(), Vector3::z()))
+                    .sum();
+                assert!(
+                    (sum / fine - 1.0).abs() < 0.02,
+                    "{shape:?} {height}: {sum} against {fine}"
+                );
             }
         }
     }
@@ -229,7 +299,10 @@ mod tests {
     fn what_the_horizon_leaves_has_its_area() {
         let half = |shape| standing(shape, 0.0, [0.0; 3]);
         let area = |light: &AreaLight| -> f64 {
-            nodes_above(light, 3, Point3::origin(), &Vector3::z()).iter().map(|n| n.area).sum()
+            nodes_above(light, 3, Point3::origin(), &Vector3::z())
+                .iter()
+                .map(|n| n.area)
+                .sum()
         };
         assert!((area(&half(LightShape::Rectangle)) - 0.4).abs() < 1e-12);
         assert!((area(&half(LightShape::Ellipse)) - PI * 0.1).abs() < 1e-6);
@@ -238,14 +311,20 @@ mod tests {
             let cut = height / 0.5;
             let expected = 0.2 * (PI - libm::acos(cut) + cut * (1.0 - cut * cut).sqrt());
             let found = area(&standing(LightShape::Ellipse, height, [0.0, 0.0, height]));
-            assert!((found / expected - 1.0).abs() < 1e-3, "{height}: {found} against {expected}");
+            assert!(
+                (found / expected - 1.0).abs() < 1e-3,
+                "{height}: {found} against {expected}"
+            );
         }
     }
 
     #[test]
     fn a_light_that_the_horizon_does_not_cut_has_its_usual_nodes() {
         let light = square();
-        assert_eq!(nodes_above(&light, 3, Point3::origin(), &Vector3::z()), nodes(&light, 3));
+        assert_eq!(
+            nodes_above(&light, 3, Point3::origin(), &Vector3::z()),
+            nodes(&light, 3)
+        );
     }
 
     #[test]

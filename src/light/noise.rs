@@ -62,7 +62,9 @@ fn residual(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32)> 
 fn of_group(group: &[(f32, f32)]) -> [f64; 2] {
     let mean = group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64;
     let mut residuals: Vec<f32> = group.iter().map(|p| p.1).collect();
-    let quarter = *residuals.select_nth_unstable_by(group.len() / 4, f32::total_cmp).1;
+    let quarter = *residuals
+        .select_nth_unstable_by(group.len() / 4, f32::total_cmp)
+        .1;
     let sigma = f64::from(quarter) / (QUARTILE * MASK_GAIN);
     [mean, sigma * sigma]
 }
@@ -71,16 +73,28 @@ fn of_group(group: &[(f32, f32)]) -> [f64; 2] {
 fn fit(groups: &[[f64; 2]]) -> Noise {
     let n = groups.len() as f64;
     let sum = |f: &dyn Fn(&[f64; 2]) -> f64| groups.iter().map(f).sum::<f64>();
-    let (x, y, xx, xy) = (sum(&|g| g[0]), sum(&|g| g[1]), sum(&|g| g[0] * g[0]), sum(&|g| g[0] * g[1]));
+    let (x, y, xx, xy) = (
+        sum(&|g| g[0]),
+        sum(&|g| g[1]),
+        sum(&|g| g[0] * g[0]),
+        sum(&|g| g[0] * g[1]),
+    );
     let spread = n * xx - x * x;
-    let slope = if spread > 0.0 { (n * xy - x * y) / spread } else { 0.0 };
+    let slope = if spread > 0.0 {
+        (n * xy - x * y) / spread
+    } else {
+        0.0
+    };
     let rest = (y - slope * x) / n;
     let (shot, dark) = match (slope > 0.0, rest > 0.0) {
         (true, true) => (slope, rest),
         (true, false) => (xy / xx.max(f64::MIN_POSITIVE), 0.0),
         (false, _) => (0.0, y / n),
     };
-    Noise::Known { shot, read: dark.sqrt() }
+    Noise::Known {
+        shot,
+        read: dark.sqrt(),
+    }
 }
 
 #[cfg(test)]
@@ -100,20 +114,30 @@ mod tests {
 
     #[test]
     fn the_noise_that_was_put_in_is_found() {
-        let Noise::Known { shot, read } = plate_noise(&noisy(0.002, 0.01)) else { panic!("nothing found") };
+        let Noise::Known { shot, read } = plate_noise(&noisy(0.002, 0.01)) else {
+            panic!("nothing found")
+        };
         let at = |v: f64| (shot * v + read * read) / (0.002 * v + 0.0001);
-        assert!([0.1, 0.4, 0.7].iter().all(|&v| (at(v) - 1.0).abs() < 0.15), "{shot} {read}");
+        assert!(
+            [0.1, 0.4, 0.7].iter().all(|&v| (at(v) - 1.0).abs() < 0.15),
+            "{shot} {read}"
+        );
     }
 
     #[test]
     fn a_smooth_picture_has_none_to_speak_of() {
-        let Noise::Known { shot, read } = plate_noise(&noisy(0.0, 0.0)) else { panic!("nothing found") };
+        let Noise::Known { shot, read } = plate_noise(&noisy(0.0, 0.0)) else {
+            panic!("nothing found")
+        };
         assert!(shot < 1e-6 && read < 1e-3, "{shot} {read}");
     }
 
     #[test]
     fn too_little_to_see_is_no_noise() {
         assert_eq!(plate_noise(&Image::new(2, 2)), Noise::None);
-        assert_eq!(plate_noise(&Image::filled(200, 200, LinearRgb::grey(f32::NAN))), Noise::None);
+        assert_eq!(
+            plate_noise(&Image::filled(200, 200, LinearRgb::grey(f32::NAN))),
+            Noise::None
+        );
     }
 }

@@ -10,7 +10,11 @@ use crate::geom::{Point3, Vector3};
 /// # Method
 /// Lambert's formula: half the sum over edges of the angle that the edge subtends, times the cosine between the
 /// receiver's normal and the normal of the edge's fan triangle.
-pub fn polygon_irradiance(corners: &[Point3<f64>], point: Point3<f64>, normal: Vector3<f64>) -> f64 {
+pub fn polygon_irradiance(
+    corners: &[Point3<f64>],
+    point: Point3<f64>,
+    normal: Vector3<f64>,
+) -> f64 {
     let rays = above_horizon(corners.iter().map(|c| c - point).collect(), normal);
     let edges = rays.iter().zip(rays.iter().cycle().skip(1));
     0.5 * edges.map(|(a, b)| edge(a, b, normal)).sum::<f64>().abs()
@@ -20,7 +24,11 @@ fn edge(a: &Vector3<f64>, b: &Vector3<f64>, normal: Vector3<f64>) -> f64 {
     let cross = a.cross(b);
     let length = cross.norm();
     // An edge seen end on subtends nothing.
-    if length > 0.0 { libm::atan2(length, a.dot(b)) * normal.dot(&cross) / length } else { 0.0 }
+    if length > 0.0 {
+        libm::atan2(length, a.dot(b)) * normal.dot(&cross) / length
+    } else {
+        0.0
+    }
 }
 
 /// Sutherland-Hodgman against the plane through the origin.
@@ -44,7 +52,8 @@ mod tests {
     use super::*;
 
     fn square(half: f64, z: f64) -> [Point3<f64>; 4] {
-        [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| Point3::new(x, y, z))
+        [[-half, -half], [half, -half], [half, half], [-half, half]]
+            .map(|[x, y]| Point3::new(x, y, z))
     }
 
     #[test]
@@ -61,7 +70,10 @@ mod tests {
 
     #[test]
     fn nothing_comes_from_below_the_horizon() {
-        assert_eq!(polygon_irradiance(&square(1.0, -1.0), Point3::origin(), Vector3::z()), 0.0);
+        assert_eq!(
+            polygon_irradiance(&square(1.0, -1.0), Point3::origin(), Vector3::z()),
+            0.0
+        );
         assert_eq!(polygon_irradiance(&[], Point3::origin(), Vector3::z()), 0.0);
     }
 }

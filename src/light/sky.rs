@@ -30,7 +30,11 @@ pub fn sky_pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> 
 }
 
 /// The same in even rectangles, about `count` of them: slower to come right, with nothing to go wrong.
-pub(crate) fn sky_cells(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<SkyPiece> {
+pub(crate) fn sky_cells(
+    map: &EnvironmentMap,
+    count: usize,
+    normal: &Vector3<f64>,
+) -> Vec<SkyPiece> {
     let rows = (count as f64 / 2.0).sqrt().ceil() as usize;
     scaled(map, &map.panorama.even(rows), normal)
 }
@@ -42,15 +46,26 @@ fn scaled(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<
     work::add(Kind::MapPieces, pieces.len() as u64);
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
-    let mut seen: Vec<_> = pieces.iter().filter_map(|piece| over(piece, &local)).collect();
+    let mut seen: Vec<_> = pieces
+        .iter()
+        .filter_map(|piece| over(piece, &local))
+        .collect();
     let whole = map.panorama.irradiance(&local);
     if seen.is_empty() && whole.iter().any(|&e| e > 0.0) {
         // A sun has taken all the cuts, on the other side: what little there is here is one piece.
         seen.push((local, whole, HALF_OF_THE_SKY));
     }
-    let sum = seen.iter().fold([0.0; 3], |sum, (_, e, _)| std::array::from_fn(|c| sum[c] + e[c]));
+    let sum = seen.iter().fold([0.0; 3], |sum, (_, e, _)| {
+        std::array::from_fn(|c| sum[c] + e[c])
+    });
     let strength = f64::from(map.strength);
-    let scale: [f64; 3] = std::array::from_fn(|c| if sum[c] > 0.0 { strength * whole[c] / sum[c] } else { 0.0 });
+    let scale: [f64; 3] = std::array::from_fn(|c| {
+        if sum[c] > 0.0 {
+            strength * whole[c] / sum[c]
+        } else {
+            0.0
+        }
+    });
     let piece = |(direction, e, width): (Vector3<f64>, [f64; 3], f64)| SkyPiece {
         direction: turned(&direction, -map.rotation),
         irradiance: std::array::from_fn(|c| (e[c] * scale[c]) as f32).into(),
@@ -63,5 +78,9 @@ fn scaled(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<
 fn over(piece: &Piece, normal: &Vector3<f64>) -> Option<(Vector3<f64>, [f64; 3], f64)> {
     let direction = piece.moments.direction()?;
     let e = piece.moments.irradiance(normal);
-    (direction.dot(normal) > 0.0 && e.iter().any(|&v| v > 0.0)).then_some((direction, e, piece.moments.width()))
+    (direction.dot(normal) > 0.0 && e.iter().any(|&v| v > 0.0)).then_some((
+        direction,
+        e,
+        piece.moments.width(),
+    ))
 }

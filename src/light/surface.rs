@@ -8,7 +8,9 @@ use crate::scene::{CameraSource, Cast, Scene};
 /// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
 /// camera is not known yet, or does not see it.
 pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRgb> {
-    let CameraSource::Known(camera) = scene.camera else { return None };
+    let CameraSource::Known(camera) = scene.camera else {
+        return None;
+    };
     let [w, h] = scene.surface.size.map(|side| 0.5 * side);
     let on_surface = |x: usize, y: usize| {
         let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
@@ -16,8 +18,11 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
         hit.is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
     };
     let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
-    let seen: Vec<LinearRgb> =
-        places.filter(|&(x, y)| on_surface(x, y)).map(|at| plate[at]).filter(|c| c.is_finite()).collect();
+    let seen: Vec<LinearRgb> = places
+        .filter(|&(x, y)| on_surface(x, y))
+        .map(|at| plate[at])
+        .filter(|c| c.is_finite())
+        .collect();
     if seen.is_empty() {
         return None;
     }
@@ -26,7 +31,11 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
         let middle = values.len() / 2;
         *values.select_nth_unstable_by(middle, f32::total_cmp).1
     };
-    Some(LinearRgb::new(median(|c| c.r), median(|c| c.g), median(|c| c.b)))
+    Some(LinearRgb::new(
+        median(|c| c.r),
+        median(|c| c.g),
+        median(|c| c.b),
+    ))
 }
 
 /// Turns [`Cast::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
@@ -34,13 +43,24 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
 /// The surface is taken to be grey: its colour is then that of the light on it. A share below 1 believes half, say, of
 /// that, since trays and tables may have a colour of their own. Luminance stays.
 pub fn match_cast(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let Cast::MatchSurface { share } = scene.cast else { return scene };
+    let Cast::MatchSurface { share } = scene.cast else {
+        return scene;
+    };
     let color = surface_color(&scene, plate).unwrap_or(LinearRgb::WHITE);
     let luminance = color.luminance();
     let lit = color.r > 0.0 && color.g > 0.0 && color.b > 0.0;
-    let channel = |v: f32| if lit { libm::pow(f64::from(v / luminance), share) as f32 } else { 1.0 };
+    let channel = |v: f32| {
+        if lit {
+            libm::pow(f64::from(v / luminance), share) as f32
+        } else {
+            1.0
+        }
+    };
     let tint = color.map(channel);
-    Scene { cast: Cast::Known(tint.scale(1.0 / tint.luminance())), ..scene }
+    Scene {
+        cast: Cast::Known(tint.scale(1.0 / tint.luminance())),
+        ..scene
+    }
 }
 
 #[cfg(test)]
@@ -85,12 +105,16 @@ pub(super) mod tests {
 
     #[test]
     fn the_surface_is_told_from_the_table_and_from_highlights() {
-        assert_eq!(surface_color(&scene(Cast::default()), &plate()), Some(LinearRgb::new(0.4, 0.2, 0.1)));
+        assert_eq!(
+            surface_color(&scene(Cast::default()), &plate()),
+            Some(LinearRgb::new(0.4, 0.2, 0.1))
+        );
     }
 
     #[test]
     fn the_cast_is_the_surface_s_colour_at_luminance_one() {
-        let Cast::Known(tint) = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &plate()).cast else {
+        let Cast::Known(tint) = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &plate()).cast
+        else {
             panic!("still unknown")
         };
         assert!((tint.luminance() - 1.0).abs() < 1e-6 && (tint.r / tint.g - 2.0).abs() < 1e-5);
@@ -102,7 +126,10 @@ pub(super) mod tests {
 
     #[test]
     fn a_black_plate_has_no_cast() {
-        let black = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &Image::filled(40, 30, LinearRgb::BLACK));
+        let black = match_cast(
+            scene(Cast::MatchSurface { share: 1.0 }),
+            &Image::filled(40, 30, LinearRgb::BLACK),
+        );
         assert_eq!(black.cast, Cast::Known(LinearRgb::WHITE));
     }
 }

@@ -135,7 +135,11 @@ fn from_space([x, y, z]: [f32; 3], space: KeySpace) -> [f32; 3] {
     match space {
         KeySpace::Rgb => [x, y, z],
         KeySpace::Hsv => from_hsv([x, y, z]).map(|v| if v > 0.0 { v } else { 0.0 }),
-        KeySpace::Yuv => [x + 1.28033 * z, x - 0.21482 * y - 0.38059 * z, x + 2.12798 * y],
+        KeySpace::Yuv => [
+            x + 1.28033 * z,
+            x - 0.21482 * y - 0.38059 * z,
+            x + 2.12798 * y,
+        ],
         KeySpace::Ycc => from_ycc([x, y, z]),
     }
 }
@@ -155,11 +159,19 @@ fn to_hsv(p: PremulRgba) -> [f32; 3] {
         least = if g < b { g } else { b };
     }
     let chroma = r - least;
-    [(k + (g - b) / (6.0 * chroma + TINY)).abs(), chroma / (r + TINY), r]
+    [
+        (k + (g - b) / (6.0 * chroma + TINY)).abs(),
+        chroma / (r + TINY),
+        r,
+    ]
 }
 
 fn from_hsv([h, s, v]: [f32; 3]) -> [f32; 3] {
     let unit = |n: f32| n.clamp(0.0, 1.0);
-    let n = [(h * 6.0 - 3.0).abs() - 1.0, 2.0 - (h * 6.0 - 2.0).abs(), 2.0 - (h * 6.0 - 4.0).abs()];
+    let n = [
+        (h * 6.0 - 3.0).abs() - 1.0,
+        2.0 - (h * 6.0 - 2.0).abs(),
+        2.0 - (h * 6.0 - 4.0).abs(),
+    ];
     n.map(|n| ((unit(n) - 1.0) * s + 1.0) * v)
 }

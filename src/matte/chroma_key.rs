@@ -22,7 +22,12 @@ pub struct ChromaKeyOptions {
 impl Default for ChromaKeyOptions {
     fn default() -> Self {
         let [tolerance, threshold] = [30.0f32, 10.0].map(f32::to_radians);
-        Self { profile: Profile::default(), tolerance, threshold, gain: 1.0 }
+        Self {
+            profile: Profile::default(),
+            tolerance,
+            threshold,
+            gain: 1.0,
+        }
     }
 }
 
@@ -34,7 +39,11 @@ impl Default for ChromaKeyOptions {
 /// # Method
 /// With the colour differences of BT.709 turned so that the screen lies along `x`, and `z` across: a pixel is inside the
 /// wedge by `g = x - |z| / tan(tolerance / 2)`. Where `g > 0` the matte is `1 - g / gain`, and 0 within `threshold`.
-pub fn chroma_key<P: Photo>(photo: &Image<P>, screen: LinearRgb, opts: &ChromaKeyOptions) -> Image<Coverage> {
+pub fn chroma_key<P: Photo>(
+    photo: &Image<P>,
+    screen: LinearRgb,
+    opts: &ChromaKeyOptions,
+) -> Image<Coverage> {
     let exact = opts.profile == Profile::Blender45;
     let centred = |p| differences(p, exact).map(|v| v * 2.0 - 1.0);
     let (cos, sin) = direction(centred(screen.opaque()), exact);
@@ -46,8 +55,16 @@ pub fn chroma_key<P: Photo>(photo: &Image<P>, screen: LinearRgb, opts: &ChromaKe
         let (x, z) = (c * cos + r * sin, r * cos - c * sin);
         let inside = x - z.abs() / slope;
         let angle = libm::atan2(f64::from(z), f64::from(x)) as f32;
-        let alpha = if angle.abs() < narrowest { 0.0 } else { 1.0 - inside / opts.gain };
-        Coverage(if inside > 0.0 && alpha < p.a { alpha } else { p.a })
+        let alpha = if angle.abs() < narrowest {
+            0.0
+        } else {
+            1.0 - inside / opts.gain
+        };
+        Coverage(if inside > 0.0 && alpha < p.a {
+            alpha
+        } else {
+            p.a
+        })
     })
 }
 
@@ -55,8 +72,15 @@ pub fn chroma_key<P: Photo>(photo: &Image<P>, screen: LinearRgb, opts: &ChromaKe
 fn direction([c, r]: [f32; 2], exact: bool) -> (f32, f32) {
     if exact {
         let length = (c * c + r * r).sqrt();
-        return if length == 0.0 { (0.0, 0.0) } else { (c / length, r / length) };
+        return if length == 0.0 {
+            (0.0, 0.0)
+        } else {
+            (c / length, r / length)
+        };
     }
     let angle = libm::atan2(f64::from(r), f64::from(c)) as f32;
-    (libm::cos(f64::from(angle)) as f32, libm::sin(f64::from(angle)) as f32)
+    (
+        libm::cos(f64::from(angle)) as f32,
+        libm::sin(f64::from(angle)) as f32,
+    )
 }

@@ -94,7 +94,11 @@ pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Imag
             opts.fac.min(1.0) * (c[spill] - opts.ratio * limit)
         };
         let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
-        if excess > 0.0 { PremulRgba::new(r, g, b, p.a) } else { p }
+        if excess > 0.0 {
+            PremulRgba::new(r, g, b, p.a)
+        } else {
+            p
+        }
     })
 }
 

@@ -144,13 +144,23 @@ const RESIDUE: f32 = 0.2;
 const CLIPPED_SCREEN: f32 = 0.1;
 
 /// The remark on a screen that is too bright for the camera; none where the matte does not ask for the screen.
-fn clipped_screen(photo: &Image<LinearRgb>, found: &Segmentation, method: MatteMethod, clipped: f32) -> Option<Remark> {
+fn clipped_screen(
+    photo: &Image<LinearRgb>,
+    found: &Segmentation,
+    method: MatteMethod,
+    clipped: f32,
+) -> Option<Remark> {
     if method == MatteMethod::Outline {
         return None;
     }
-    let outside = photo.pixels().iter().zip(found.mask.pixels()).filter(|(_, m)| m.0 <= 0.0);
-    let (all, count) = outside
-        .fold((0_u64, 0_u64), |(all, count), (p, _)| (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped)));
+    let outside = photo
+        .pixels()
+        .iter()
+        .zip(found.mask.pixels())
+        .filter(|(_, m)| m.0 <= 0.0);
+    let (all, count) = outside.fold((0_u64, 0_u64), |(all, count), (p, _)| {
+        (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped))
+    });
     let share = count as f32 / all.max(1) as f32;
     (share > CLIPPED_SCREEN).then_some(Remark::ClippedScreen(share))
 }
@@ -170,7 +180,11 @@ pub fn cut_out(photo: &Image<LinearRgb>, opts: &CutOutOptions) -> Result<CutOut>
 ///
 /// # Errors
 /// Those of [`cut_out`] and of [`ScreenPlate::from_photo`].
-pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, opts: &CutOutOptions) -> Result<CutOut> {
+pub fn cut_out_on(
+    photo: &Image<LinearRgb>,
+    empty: Option<&Image<LinearRgb>>,
+    opts: &CutOutOptions,
+) -> Result<CutOut> {
     opts.check()?;
     let mut watch = Stopwatch::start();
     let segmentation = segment(photo, &opts.segment).map_err(|e| e.within("segment"))?;
@@ -185,27 +199,43 @@ pub fn cut_out_on(photo: &Image<LinearRgb>, empty: Option<&Image<LinearRgb>>, op
     };
     let roi = trimmed(&segmentation.hull, opts.margin_px, photo.size());
     // There is nothing to solve far from the object; near it blurs must find what they would find in the whole photo.
-    let around = trimmed(&segmentation.hull, opts.margin_px.max(opts.reach_px()), photo.size());
+    let around = trimmed(
+        &segmentation.hull,
+        opts.margin_px.max(opts.reach_px()),
+        photo.size(),
+    );
     let part = photo.crop(around);
     let cut = softened(&whole.crop(around), opts.soften_px);
     watch.lap("cut");
     let matted = match method {
         MatteMethod::Physical => {
-            let known = PartOf { screen, longer_side: photo.width().max(photo.height()) };
+            let known = PartOf {
+                screen,
+                longer_side: photo.width().max(photo.height()),
+            };
             Matted::physical(&part, &plate.crop(around), &cut, known, opts)?
         }
         MatteMethod::Key => Matted::keyed(photo, &plate, &segmentation, &cut, around, opts)?,
         MatteMethod::Outline => Matted::grey(part.zip_map(&cut, |p, m| p.opaque().masked(m)), 0.0),
     };
     watch.lap("matte");
-    let trim = Roi { x: roi.x - around.x, y: roi.y - around.y, ..roi };
+    let trim = Roi {
+        x: roi.x - around.x,
+        y: roi.y - around.y,
+        ..roi
+    };
     let scale = (opts.longest_side as f64 / roi.width.max(roi.height) as f64).min(1.0);
     let corner = Point2::new(roi.x as f64, roi.y as f64);
     let moved = |p: Point2<f64>| Point2::from((p - corner) * scale);
     let mut remarks = segmentation.remarks.clone();
     remarks.extend(matted.remarks);
     remarks.extend((matted.residue > RESIDUE).then_some(Remark::Residue(matted.residue)));
-    remarks.extend(clipped_screen(photo, &segmentation, method, opts.film.clipped));
+    remarks.extend(clipped_screen(
+        photo,
+        &segmentation,
+        method,
+        opts.film.clipped,
+    ));
     let film = reduced(matted.film.crop(trim), scale);
     let transmittance = reduced(matted.transmittance.crop(trim), scale);
     let uncertainty = reduced(matted.uncertainty.crop(trim), scale);
@@ -249,8 +279,14 @@ impl CutOutOptions {
         Bounds::new(0.0, 100.0, "pixels").check("soften_px", self.soften_px.into())?;
         Bounds::new(0.0, 10_000.0, "pixels").check("margin_px", self.margin_px as f64)?;
         Bounds::new(16.0, 32_768.0, "pixels").check("longest_side", self.longest_side as f64)?;
-        if let Some(screen) = self.screen.filter(|c| !c.is_finite() || [c.r, c.g, c.b].iter().any(|v| *v < 0.0)) {
-            let what = format!("{:?}, expected numbers of at least 0", <[f32; 3]>::from(screen));
+        if let Some(screen) = self
+            .screen
+            .filter(|c| !c.is_finite() || [c.r, c.g, c.b].iter().any(|v| *v < 0.0))
+        {
+            let what = format!(
+                "{:?}, expected numbers of at least 0",
+                <[f32; 3]>::from(screen)
+            );
             return Err(Error::value("screen", what));
         }
         Ok(())
@@ -268,10 +304,13 @@ fn plate(
         (Some(empty), _) => ScreenPlate::from_photo(empty, photo, &background, &opts.plate),
         (None, Some(color)) => Ok(ScreenPlate::even(color, photo.size())),
         // A margin around a large object may leave nothing; the mask alone then leaves a rim, which gives a colour.
-        (None, None) if !background.pixels().contains(&true) => {
-            Ok(ScreenPlate::even(screen_color(photo, &found.mask)?, photo.size()))
+        (None, None) if !background.pixels().contains(&true) => Ok(ScreenPlate::even(
+            screen_color(photo, &found.mask)?,
+            photo.size(),
+        )),
+        (None, None) => {
+            ScreenPlate::fit(photo, &background, &opts.plate).map_err(|e| e.within("plate"))
         }
-        (None, None) => ScreenPlate::fit(photo, &background, &opts.plate).map_err(|e| e.within("plate")),
     }
 }
 
@@ -293,10 +332,25 @@ impl Matted {
         known: PartOf,
         opts: &CutOutOptions,
     ) -> Result<Self> {
-        let solved = film_of_part(photo, plate, cut, known, &opts.film).map_err(|e| e.within("film"))?;
-        let FilmMatte { film, transmittance, uncertainty, doubts, remarks, .. } = solved;
+        let solved =
+            film_of_part(photo, plate, cut, known, &opts.film).map_err(|e| e.within("film"))?;
+        let FilmMatte {
+            film,
+            transmittance,
+            uncertainty,
+            doubts,
+            remarks,
+            ..
+        } = solved;
         // Film is empty outside the cut.
-        Ok(Self { film, transmittance, uncertainty, residue: 0.0, doubts: Some(doubts), remarks })
+        Ok(Self {
+            film,
+            transmittance,
+            uncertainty,
+            residue: 0.0,
+            doubts: Some(doubts),
+            remarks,
+        })
     }
 
     fn keyed(
@@ -307,9 +361,14 @@ impl Matted {
         around: Roi,
         opts: &CutOutOptions,
     ) -> Result<Self> {
-        let keyed = Keying::new(photo, Screen::Plate(&plate.image)).run(&opts.key).map_err(|e| e.within("key"))?;
+        let keyed = Keying::new(photo, Screen::Plate(&plate.image))
+            .run(&opts.key)
+            .map_err(|e| e.within("key"))?;
         let residue = mean(&keyed.matte, &screen_pixels(&found.mask));
-        Ok(Self::grey(keyed.cutout.crop(around).zip_map(cut, |p, m| p.masked(m)), residue))
+        Ok(Self::grey(
+            keyed.cutout.crop(around).zip_map(cut, |p, m| p.masked(m)),
+            residue,
+        ))
     }
 
     /// A cut-out of one alpha for all channels, which is taken for the transmittance as well.
@@ -334,15 +393,30 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
 }
 
 fn mean(matte: &Image<Coverage>, set: &Image<bool>) -> f32 {
-    let chosen = matte.pixels().iter().zip(set.pixels()).filter(|(_, inside)| **inside);
-    let (sum, count) = chosen.fold((0.0, 0u64), |(sum, count), (m, _)| (sum + f64::from(m.0), count + 1));
-    if count == 0 { 0.0 } else { (sum / count as f64) as f32 }
+    let chosen = matte
+        .pixels()
+        .iter()
+        .zip(set.pixels())
+        .filter(|(_, inside)| **inside);
+    let (sum, count) = chosen.fold((0.0, 0u64), |(sum, count), (m, _)| {
+        (sum + f64::from(m.0), count + 1)
+    });
+    if count == 0 {
+        0.0
+    } else {
+        (sum / count as f64) as f32
+    }
 }
 
 /// The whole pixels that a hull and a margin around it cover.
 fn trimmed(hull: &[Point2<f64>], margin_px: usize, (w, h): (usize, usize)) -> Roi {
     let range = |along: fn(&Point2<f64>) -> f64, len: usize| {
-        let (low, high) = hull.iter().map(along).fold((f64::MAX, 0.0), |(l, h): (f64, f64), v| (l.min(v), h.max(v)));
+        let (low, high) = hull
+            .iter()
+            .map(along)
+            .fold((f64::MAX, 0.0), |(l, h): (f64, f64), v| {
+                (l.min(v), h.max(v))
+            });
         (low.max(0.0) as usize).min(len)..(high.ceil() as usize).min(len)
     };
     Roi::spanning(range(|p| p.x, w), range(|p| p.y, h)).grown(margin_px, w, h)
@@ -367,7 +441,11 @@ mod tests {
     fn slab(screen: LinearRgb) -> Image<LinearRgb> {
         Image::from_fn(120, 80, |x, y| {
             let inside = (30..90).contains(&x) && (25..55).contains(&y);
-            if inside { LinearRgb::new(0.5, 0.05, 0.05) } else { screen }
+            if inside {
+                LinearRgb::new(0.5, 0.05, 0.05)
+            } else {
+                screen
+            }
         })
     }
 
@@ -380,25 +458,45 @@ mod tests {
         let (w, h) = image.size();
         assert_eq!(image[(0, 0)], PremulRgba::TRANSPARENT);
         assert!((image[(w / 2, h / 2)].a - 1.0).abs() < 1e-5);
-        assert!(w.abs_diff(68) <= 2 && h.abs_diff(38) <= 2, "{w} x {h}: the slab and 4 pixels around it");
+        assert!(
+            w.abs_diff(68) <= 2 && h.abs_diff(38) <= 2,
+            "{w} x {h}: the slab and 4 pixels around it"
+        );
     }
 
     #[test]
     fn a_white_board_leaves_paint_opaque_and_is_a_doubt() {
-        let cut = cut_out(&slab(LinearRgb::new(0.6, 0.62, 0.7)), &CutOutOptions::default()).unwrap();
+        let cut = cut_out(
+            &slab(LinearRgb::new(0.6, 0.62, 0.7)),
+            &CutOutOptions::default(),
+        )
+        .unwrap();
         assert_eq!(cut.method, MatteMethod::Physical);
         let image = cut.to_rgba();
         let centre = image[(image.width() / 2, image.height() / 2)];
-        assert!((centre.a - 1.0).abs() < 1e-3 && (centre.r - 0.5).abs() < 1e-3, "{centre:?}");
+        assert!(
+            (centre.a - 1.0).abs() < 1e-3 && (centre.r - 0.5).abs() < 1e-3,
+            "{centre:?}"
+        );
         assert_eq!(image[(0, 0)].a, 0.0);
-        assert!(cut.remarks.iter().any(|r| matches!(r, Remark::GreyScreen(_)) && r.is_doubt()), "{:?}", cut.remarks);
+        assert!(
+            cut.remarks
+                .iter()
+                .any(|r| matches!(r, Remark::GreyScreen(_)) && r.is_doubt()),
+            "{:?}",
+            cut.remarks
+        );
     }
 
     #[test]
     fn softening_covers_no_pixel_more_than_all() {
         for sigma in [0.3, 0.6, 1.0, 2.5] {
             let soft = softened(&Image::filled(40, 30, Coverage(1.0)), sigma);
-            assert!(soft.pixels().iter().all(|c| (0.0..=1.0).contains(&c.0) && c.0 > 0.999));
+            assert!(
+                soft.pixels()
+                    .iter()
+                    .all(|c| (0.0..=1.0).contains(&c.0) && c.0 > 0.999)
+            );
         }
     }
 
@@ -407,7 +505,10 @@ mod tests {
         let whole = cut_out(&slab(GREEN), &CutOutOptions::default()).unwrap();
         let left = |cut: &CutOut| cut.hull.iter().map(|p| p.x).fold(f64::MAX, f64::min);
         assert!((left(&whole) + whole.roi.x as f64 - 30.0).abs() <= 1.0);
-        let half = CutOutOptions { longest_side: whole.film.width() / 2, ..Default::default() };
+        let half = CutOutOptions {
+            longest_side: whole.film.width() / 2,
+            ..Default::default()
+        };
         let half = cut_out(&slab(GREEN), &half).unwrap();
         assert!((left(&half) - 0.5 * left(&whole)).abs() < 0.1 && (half.scale - 0.5).abs() < 0.01);
     }
@@ -418,10 +519,19 @@ mod tests {
             "method = \"key\"\nwithin = \"hull\"\n[segment]\nlevels = 5\nfirst_threshold = { noise = 8.0 }\n[key]\nclip_black = 0.1\n",
         )
         .unwrap();
-        assert_eq!((opts.within, opts.segment.first_threshold), (Within::Hull, super::super::Threshold::Noise(8.0)));
+        assert_eq!(
+            (opts.within, opts.segment.first_threshold),
+            (Within::Hull, super::super::Threshold::Noise(8.0))
+        );
         let back: CutOutOptions = toml::from_str(&toml::to_string(&opts).unwrap()).unwrap();
         assert_eq!(back, opts);
-        let wrong = CutOutOptions { segment: SegmentOptions { levels: Some(99), ..Default::default() }, ..opts };
+        let wrong = CutOutOptions {
+            segment: SegmentOptions {
+                levels: Some(99),
+                ..Default::default()
+            },
+            ..opts
+        };
         let said = cut_out(&slab(GREEN), &wrong).unwrap_err().to_string();
         assert_eq!(said, "segment.levels: 99, expected 2 to 8");
     }

@@ -20,7 +20,11 @@ pub struct DifferenceKeyOptions {
 
 impl Default for DifferenceKeyOptions {
     fn default() -> Self {
-        Self { profile: Profile::default(), tolerance: 0.1, falloff: 0.1 }
+        Self {
+            profile: Profile::default(),
+            tolerance: 0.1,
+            falloff: 0.1,
+        }
     }
 }
 
@@ -39,14 +43,21 @@ pub fn difference_key<P: Photo>(
 ) -> Result<Image<Coverage>> {
     if photo.size() != clean.size() {
         let ((w, h), (width, height)) = (clean.size(), photo.size());
-        return Err(Error::value("clean plate", format!("{w} x {h} pixels, expected the photo's {width} x {height}")));
+        return Err(Error::value(
+            "clean plate",
+            format!("{w} x {h} pixels, expected the photo's {width} x {height}"),
+        ));
     }
     let (tolerance, falloff) = (opts.tolerance, opts.falloff);
     let late = opts.profile == Profile::Blender45;
     Ok(photo.zip_map(clean, |a, b| {
         let (a, b) = (a.premul(), b.premul());
         let difference = ((a.r - b.r).abs() + (a.g - b.g).abs() + (a.b - b.b).abs()) / 3.0;
-        let m = if late { late_matte(difference, tolerance, falloff) } else { matte(difference, tolerance, falloff) };
+        let m = if late {
+            late_matte(difference, tolerance, falloff)
+        } else {
+            matte(difference, tolerance, falloff)
+        };
         Coverage(m.map_or(a.a, |m| if m < a.a { m } else { a.a }))
     }))
 }
@@ -63,6 +74,10 @@ fn matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
 fn late_matte(difference: f32, tolerance: f32, falloff: f32) -> Option<f32> {
     let beyond = difference - tolerance;
     let beyond = if beyond > 0.0 { beyond } else { 0.0 };
-    let share = if falloff == 0.0 { 0.0 } else { beyond / falloff };
+    let share = if falloff == 0.0 {
+        0.0
+    } else {
+        beyond / falloff
+    };
     (difference <= tolerance + falloff).then_some(share)
 }

@@ -42,7 +42,12 @@ pub struct FilmOptions {
 
 impl Default for FilmOptions {
     fn default() -> Self {
-        Self { flat: None, clipped: 0.98, thickness_spread: 0.35, reflection_error: 0.15 }
+        Self {
+            flat: None,
+            clipped: 0.98,
+            thickness_spread: 0.35,
+            reflection_error: 0.15,
+        }
     }
 }
 
@@ -68,7 +73,8 @@ pub struct FilmMatte {
 impl FilmMatte {
     /// Reflected light F and opacity `1 - T`: the film as it lay on the screen, its shadow included.
     pub fn shaded(&self) -> Image<Film> {
-        self.film.zip_map(&self.transmittance, |film, t| Film::new(film.color, t))
+        self.film
+            .zip_map(&self.transmittance, |film, t| Film::new(film.color, t))
     }
 }
 
@@ -104,7 +110,16 @@ pub fn film(
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
     let longer_side = photo.width().max(photo.height());
-    film_of_part(photo, plate, inside, PartOf { screen: plate.color(), longer_side }, opts)
+    film_of_part(
+        photo,
+        plate,
+        inside,
+        PartOf {
+            screen: plate.color(),
+            longer_side,
+        },
+        opts,
+    )
 }
 
 /// What a part of a photo does not tell of all of it.
@@ -122,19 +137,30 @@ pub(super) fn film_of_part(
     photo: &Image<LinearRgb>,
     plate: &ScreenPlate,
     inside: &Image<Coverage>,
-    PartOf { screen, longer_side }: PartOf,
+    PartOf {
+        screen,
+        longer_side,
+    }: PartOf,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
     opts.check()?;
     let mut watch = Stopwatch::start();
-    assert_eq!(photo.size(), plate.image.size(), "photo and plate differ in size");
+    assert_eq!(
+        photo.size(),
+        plate.image.size(),
+        "photo and plate differ in size"
+    );
     assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
     if !inside.pixels().iter().any(|c| c.0 > 0.0) {
-        return Err(Error::Photo { what: "the mask of the object is empty".into() });
+        return Err(Error::Photo {
+            what: "the mask of the object is empty".into(),
+        });
     }
     if let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) {
         let (x, y) = (i % photo.width(), i / photo.width());
-        return Err(Error::Photo { what: format!("pixel ({x}, {y}) is not a finite number") });
+        return Err(Error::Photo {
+            what: format!("pixel ({x}, {y}) is not a finite number"),
+        });
     }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);
@@ -147,9 +173,17 @@ pub(super) fn film_of_part(
     };
     watch.lap("tint");
     let solver = Solver::new(key, flat, plate.residual, opts);
-    let factor = if grey.is_some() { Solver::guess } else { Solver::solve };
+    let factor = if grey.is_some() {
+        Solver::guess
+    } else {
+        Solver::solve
+    };
     let mut factors = calm.zip3_map(&plate.image, inside, |pixel, screen, inside| {
-        if inside.0 > 0.0 { factor(&solver, pixel.into(), screen.into()) } else { Factor::default() }
+        if inside.0 > 0.0 {
+            factor(&solver, pixel.into(), screen.into())
+        } else {
+            Factor::default()
+        }
     });
     watch.lap("factors");
     let most = flat.into_iter().fold(0.0, f32::max);
@@ -159,9 +193,19 @@ pub(super) fn film_of_part(
     watch.lap("paint");
     let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
     watch.lap("glints");
-    let doubts = ColorDoubts { keyed_away, screen_hue, clipped, guessed, tint };
+    let doubts = ColorDoubts {
+        keyed_away,
+        screen_hue,
+        clipped,
+        guessed,
+        tint,
+    };
     let remarks = grey.into_iter().chain(doubts.remarks()).collect();
-    let matte = FilmMatte { doubts, remarks, ..composed(photo, plate, inside, &factors, flat.into()) };
+    let matte = FilmMatte {
+        doubts,
+        remarks,
+        ..composed(photo, plate, inside, &factors, flat.into())
+    };
     watch.lap("compose");
     watch.log("film");
     Ok(matte)
@@ -170,9 +214,14 @@ pub(super) fn film_of_part(
 impl FilmOptions {
     pub(super) fn check(&self) -> Result<()> {
         if let Some(flat) = self.flat
-            && !<[f32; 3]>::from(flat).iter().all(|t| (0.001..=1.0).contains(t))
+            && !<[f32; 3]>::from(flat)
+                .iter()
+                .all(|t| (0.001..=1.0).contains(t))
         {
-            return Err(Error::value("flat", format!("({}, {}, {}), expected 0.001 to 1", flat.r, flat.g, flat.b)));
+            return Err(Error::value(
+                "flat",
+                format!("({}, {}, {}), expected 0.001 to 1", flat.r, flat.g, flat.b),
+            ));
         }
         let positive = [
             ("clipped", self.clipped),
@@ -212,10 +261,19 @@ fn composed(
     let transmittance = plastic.zip_map(inside, covered);
     let reflected = photo.zip3_map(&plate.image, &transmittance, |p, k, t| without(p, t * k));
     let seen = view(&plastic, flat, inside);
-    let film = reflected.zip3_map(&seen, inside, |f, v, c| Film::new(f.scale(c.0), covered(v, c)));
+    let film = reflected.zip3_map(&seen, inside, |f, v, c| {
+        Film::new(f.scale(c.0), covered(v, c))
+    });
     let most = flat.r.max(flat.g).max(flat.b);
     let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
-    FilmMatte { film, transmittance, uncertainty, flat, doubts: ColorDoubts::default(), remarks: Vec::new() }
+    FilmMatte {
+        film,
+        transmittance,
+        uncertainty,
+        flat,
+        doubts: ColorDoubts::default(),
+        remarks: Vec::new(),
+    }
 }
 
 /// A transmittance that holds for the covered share of a pixel only.
@@ -225,7 +283,11 @@ pub(super) fn covered(t: LinearRgb, Coverage(c): Coverage) -> LinearRgb {
 
 /// Light that is left when some is taken away; not less than none.
 pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
-    LinearRgb::new((light.r - taken.r).max(0.0), (light.g - taken.g).max(0.0), (light.b - taken.b).max(0.0))
+    LinearRgb::new(
+        (light.r - taken.r).max(0.0),
+        (light.g - taken.g).max(0.0),
+        (light.b - taken.b).max(0.0),
+    )
 }
 
 #[cfg(test)]

@@ -43,17 +43,29 @@ pub struct KeyColor {
 /// When the sizes differ.
 ///
 /// [Tukey]: https://doi.org/10.1080/03610927708827533
-pub fn key_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>, average: KeyAverage) -> Result<KeyColor> {
+pub fn key_color(
+    photo: &Image<LinearRgb>,
+    mask: &Image<Coverage>,
+    average: KeyAverage,
+) -> Result<KeyColor> {
     let mean = screen_color(photo, mask)?;
     let far = screen_pixels(mask);
-    let far = if far.pixels().iter().any(|p| *p) { far } else { mask.map(|c| c.0 <= 0.0) };
+    let far = if far.pixels().iter().any(|p| *p) {
+        far
+    } else {
+        mask.map(|c| c.0 <= 0.0)
+    };
     let [r, g, b] = [0, 1, 2].map(|c| robust(photo, &far, c));
     let color = match average {
         KeyAverage::Mean => mean,
         KeyAverage::Robust => LinearRgb::new(r.0, g.0, b.0),
     };
     let remarks = screen_hue(photo, mask, color).into_iter().collect();
-    Ok(KeyColor { color, spread: LinearRgb::new(r.1, g.1, b.1), remarks })
+    Ok(KeyColor {
+        color,
+        spread: LinearRgb::new(r.1, g.1, b.1),
+        remarks,
+    })
 }
 
 /// Pixels that are asked: the median of a noise of 0.01 is known to 1e-4.
@@ -67,10 +79,17 @@ const FINEST: f32 = 1e-3;
 
 /// Centre and standard deviation of a channel.
 fn robust(photo: &Image<LinearRgb>, set: &Image<bool>, channel: usize) -> (f32, f32) {
-    let all: Vec<usize> = (0..photo.pixels().len()).filter(|&i| set.pixels()[i]).collect();
+    let all: Vec<usize> = (0..photo.pixels().len())
+        .filter(|&i| set.pixels()[i])
+        .collect();
     let step = (all.len() / ASKED).max(1);
     let value = |i: usize| <[f32; 3]>::from(photo.pixels()[i])[channel];
-    let values: Vec<f32> = all.into_iter().step_by(step).map(value).filter(|v| v.is_finite()).collect();
+    let values: Vec<f32> = all
+        .into_iter()
+        .step_by(step)
+        .map(value)
+        .filter(|v| v.is_finite())
+        .collect();
     let center = median(values.clone());
     let sigma = SIGMA_OF_MEDIAN * median(values.iter().map(|v| (v - center).abs()).collect());
     let reach = TUKEY * sigma.max(FINEST);
@@ -80,12 +99,23 @@ fn robust(photo: &Image<LinearRgb>, set: &Image<bool>, channel: usize) -> (f32, 
         sum += weight * f64::from(v);
         weights += weight;
     }
-    (if weights > 0.0 { (sum / weights) as f32 } else { center }, sigma)
+    (
+        if weights > 0.0 {
+            (sum / weights) as f32
+        } else {
+            center
+        },
+        sigma,
+    )
 }
 
 fn median(mut values: Vec<f32>) -> f32 {
     let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    if values.is_empty() {
+        0.0
+    } else {
+        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    }
 }
 
 /// The screen's own excess of its strongest channel, uneven light included, is below so many times its mean; see-through
@@ -97,7 +127,11 @@ const RIM: f64 = 0.01;
 const WORTH_SAYING: f32 = 0.002;
 
 /// The remark on an object that has the screen's hue, brighter than the screen.
-fn screen_hue(photo: &Image<LinearRgb>, mask: &Image<Coverage>, screen: LinearRgb) -> Option<Remark> {
+fn screen_hue(
+    photo: &Image<LinearRgb>,
+    mask: &Image<Coverage>,
+    screen: LinearRgb,
+) -> Option<Remark> {
     let key = strongest_channel(screen);
     let excess = |p: LinearRgb| {
         let c: [f32; 3] = p.into();
@@ -108,7 +142,9 @@ fn screen_hue(photo: &Image<LinearRgb>, mask: &Image<Coverage>, screen: LinearRg
     let object = interior.pixels().iter().filter(|p| **p).count();
     let limit = BEYOND_SCREEN * excess(screen);
     let pairs = photo.pixels().iter().zip(interior.pixels());
-    let hued = pairs.filter(|(p, inside)| **inside && excess(**p) > limit).count();
+    let hued = pairs
+        .filter(|(p, inside)| **inside && excess(**p) > limit)
+        .count();
     let share = hued as f32 / object.max(1) as f32;
     (excess(screen) > 0.0 && share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
 }
@@ -137,11 +173,18 @@ mod tests {
     fn an_object_of_the_screens_hue_is_said() {
         let said = |paint| {
             let (photo, mask) = slab(paint);
-            key_color(&photo, &mask, KeyAverage::Robust).unwrap().remarks
+            key_color(&photo, &mask, KeyAverage::Robust)
+                .unwrap()
+                .remarks
         };
-        assert!(matches!(said(LinearRgb::new(0.1, 0.7, 0.15))[..], [Remark::ScreenHue(share)] if share > 0.9));
+        assert!(
+            matches!(said(LinearRgb::new(0.1, 0.7, 0.15))[..], [Remark::ScreenHue(share)] if share > 0.9)
+        );
         assert!(said(LinearRgb::new(0.6, 0.6, 0.6)).is_empty());
-        assert!(said(GREEN.scale(0.6)).is_empty(), "as see-through film would look");
+        assert!(
+            said(GREEN.scale(0.6)).is_empty(),
+            "as see-through film would look"
+        );
     }
 
     #[test]

@@ -32,18 +32,26 @@ pub fn keying_screen(
     smoothness: f64,
 ) -> Result<Image<LinearRgb>> {
     if !(0.0..=1.0).contains(&smoothness) {
-        return Err(Error::value("smoothness", format!("{smoothness}, expected 0 to 1")));
+        return Err(Error::value(
+            "smoothness",
+            format!("{smoothness}, expected 0 to 1"),
+        ));
     }
     let (w, h) = (width as f64, height as f64);
-    let inside = |p: &&ScreenPoint| (0.0..=w).contains(&p.at_px.x) && (0.0..=h).contains(&p.at_px.y);
+    let inside =
+        |p: &&ScreenPoint| (0.0..=w).contains(&p.at_px.x) && (0.0..=h).contains(&p.at_px.y);
     let points: Vec<ScreenPoint> = points.iter().filter(inside).copied().collect();
     if points.is_empty() {
-        return Err(Error::value("points", format!("none inside the {width} x {height} pixels, expected at least 1")));
+        return Err(Error::value(
+            "points",
+            format!("none inside the {width} x {height} pixels, expected at least 1"),
+        ));
     }
     let sigma = SIGMA[0] + SIGMA[1] * smoothness;
     Ok(Image::from_fn(width, height, |x, y| {
         let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
-        let square = |p: &ScreenPoint| ((p.at_px.x - x) / w).powi(2) + ((p.at_px.y - y) / h).powi(2);
+        let square =
+            |p: &ScreenPoint| ((p.at_px.x - x) / w).powi(2) + ((p.at_px.y - y) / h).powi(2);
         // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios are the same.
         let nearest = points.iter().map(square).fold(f64::INFINITY, f64::min);
         let weight = |p: &ScreenPoint| libm::exp((nearest - square(p)) / (sigma * sigma));
@@ -53,7 +61,14 @@ pub fn keying_screen(
 
 fn weighted_mean(parts: impl Iterator<Item = (f64, LinearRgb)>) -> LinearRgb {
     let ([r, g, b], total) = parts.fold(([0.0; 3], 0.0), |([r, g, b], total), (w, c)| {
-        ([r + w * f64::from(c.r), g + w * f64::from(c.g), b + w * f64::from(c.b)], total + w)
+        (
+            [
+                r + w * f64::from(c.r),
+                g + w * f64::from(c.g),
+                b + w * f64::from(c.b),
+            ],
+            total + w,
+        )
     });
     LinearRgb::from([r, g, b].map(|v| (v / total) as f32))
 }
@@ -62,8 +77,14 @@ fn weighted_mean(parts: impl Iterator<Item = (f64, LinearRgb)>) -> LinearRgb {
 mod tests {
     use super::*;
 
-    const LEFT: ScreenPoint = ScreenPoint { at_px: Point2::new(2.0, 5.0), color: LinearRgb::new(0.1, 0.6, 0.2) };
-    const RIGHT: ScreenPoint = ScreenPoint { at_px: Point2::new(18.0, 5.0), color: LinearRgb::new(0.2, 0.8, 0.3) };
+    const LEFT: ScreenPoint = ScreenPoint {
+        at_px: Point2::new(2.0, 5.0),
+        color: LinearRgb::new(0.1, 0.6, 0.2),
+    };
+    const RIGHT: ScreenPoint = ScreenPoint {
+        at_px: Point2::new(18.0, 5.0),
+        color: LinearRgb::new(0.2, 0.8, 0.3),
+    };
 
     #[test]
     fn one_point_makes_an_even_plate() {
@@ -93,7 +114,10 @@ mod tests {
 
     #[test]
     fn a_plate_needs_a_point_in_the_picture() {
-        let outside = ScreenPoint { at_px: Point2::new(-1.0, 0.0), ..LEFT };
+        let outside = ScreenPoint {
+            at_px: Point2::new(-1.0, 0.0),
+            ..LEFT
+        };
         assert!(keying_screen((20, 10), &[outside], 0.0).is_err());
     }
 }

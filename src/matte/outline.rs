@@ -32,9 +32,13 @@ impl Outline {
         let values: Vec<f64> = coverage.pixels().iter().map(|c| f64::from(c.0)).collect();
         let (w, h) = coverage.size();
         // Fails only for values that are not as many as the sides say.
-        let contours = ContourBuilder::new(w, h, true).contours(&values, &[HALF]).unwrap_or_default();
+        let contours = ContourBuilder::new(w, h, true)
+            .contours(&values, &[HALF])
+            .unwrap_or_default();
         let polygons = contours.iter().flat_map(|contour| &contour.geometry().0);
-        let worth = polygons.filter(|p| p.unsigned_area() >= LEAST_AREA_PX).map(|p| p.orient(Direction::Default));
+        let worth = polygons
+            .filter(|p| p.unsigned_area() >= LEAST_AREA_PX)
+            .map(|p| p.orient(Direction::Default));
         let rings = worth.flat_map(|polygon| {
             let (outer, holes) = polygon.into_inner();
             std::iter::once(outer).chain(holes).map(|ring| {
@@ -42,14 +46,20 @@ impl Outline {
                 open.iter().map(|c| Point2::new(c.x, c.y)).collect()
             })
         });
-        Self { rings: rings.collect() }
+        Self {
+            rings: rings.collect(),
+        }
     }
 
     /// The convex hull, clockwise as seen.
     pub fn hull(&self) -> Vec<Point2<f64>> {
         let points = self.rings.iter().flatten().map(|p| Point::new(p.x, p.y));
         let (ring, _) = points.collect::<MultiPoint>().convex_hull().into_inner();
-        ring.0.iter().skip(1).map(|c| Point2::new(c.x, c.y)).collect()
+        ring.0
+            .iter()
+            .skip(1)
+            .map(|c| Point2::new(c.x, c.y))
+            .collect()
     }
 
     /// Area inside, square pixels; holes do not count.
@@ -61,29 +71,48 @@ impl Outline {
     pub fn width(&self) -> f64 {
         let length = |ring: &Vec<Point2<f64>>| {
             let next = ring.iter().cycle().skip(1);
-            ring.iter().zip(next).map(|(a, b)| (b - a).norm()).sum::<f64>()
+            ring.iter()
+                .zip(next)
+                .map(|(a, b)| (b - a).norm())
+                .sum::<f64>()
         };
         let around: f64 = self.rings.iter().map(length).sum();
-        if around > 0.0 { 2.0 * self.area() / around } else { 0.0 }
+        if around > 0.0 {
+            2.0 * self.area() / around
+        } else {
+            0.0
+        }
     }
 
     /// Every point moved by a function.
     pub fn map(&self, f: impl Fn(Point2<f64>) -> Point2<f64>) -> Self {
-        Self { rings: self.rings.iter().map(|ring| ring.iter().map(|p| f(*p)).collect()).collect() }
+        Self {
+            rings: self
+                .rings
+                .iter()
+                .map(|ring| ring.iter().map(|p| f(*p)).collect())
+                .collect(),
+        }
     }
 
     /// The share of every pixel that lies inside.
     pub fn coverage(&self, width: usize, height: usize) -> Image<Coverage> {
         let rows = self.sides_by_row(height);
         let mut image = Image::new(width, height);
-        image.par_rows_mut().zip(&rows).enumerate().for_each(|(y, (row, sides))| {
-            for line in 0..LINES {
-                let at = y as f64 + (line as f64 + HALF) / LINES as f64;
-                let mut xs: Vec<f64> = sides.iter().filter_map(|side| crossing(side, at)).collect();
-                xs.sort_by(f64::total_cmp);
-                xs.chunks_exact(2).for_each(|span| add_span(row, span[0], span[1]));
-            }
-        });
+        image
+            .par_rows_mut()
+            .zip(&rows)
+            .enumerate()
+            .for_each(|(y, (row, sides))| {
+                for line in 0..LINES {
+                    let at = y as f64 + (line as f64 + HALF) / LINES as f64;
+                    let mut xs: Vec<f64> =
+                        sides.iter().filter_map(|side| crossing(side, at)).collect();
+                    xs.sort_by(f64::total_cmp);
+                    xs.chunks_exact(2)
+                        .for_each(|span| add_span(row, span[0], span[1]));
+                }
+            });
         image
     }
 
@@ -92,7 +121,10 @@ impl Outline {
         let mut rows = vec![Vec::new(); height];
         for ring in &self.rings {
             for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-                let (top, bottom) = (a.y.min(b.y).max(0.0) as usize, a.y.max(b.y).max(0.0) as usize);
+                let (top, bottom) = (
+                    a.y.min(b.y).max(0.0) as usize,
+                    a.y.max(b.y).max(0.0) as usize,
+                );
                 for row in rows.iter_mut().take(bottom.saturating_add(1)).skip(top) {
                     row.push([*a, *b]);
                 }
@@ -121,7 +153,9 @@ fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
     // Between its ends a span covers whole pixels.
     let whole = within(x0.ceil())..within(x1);
     let whole = if whole.is_empty() { end..end } else { whole };
-    row[whole.clone()].iter_mut().for_each(|pixel| pixel.0 += LINE);
+    row[whole.clone()]
+        .iter_mut()
+        .for_each(|pixel| pixel.0 += LINE);
     for x in (first..whole.start).chain(whole.end..end) {
         let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
         row[x].0 += overlap.clamp(0.0, 1.0) as f32 * LINE;
@@ -131,7 +165,11 @@ fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
 /// Area of a ring, positive where it goes clockwise as seen (shoelace formula).
 fn signed_area(ring: &[Point2<f64>]) -> f64 {
     let next = ring.iter().cycle().skip(1);
-    HALF * ring.iter().zip(next).map(|(a, b)| a.x * b.y - b.x * a.y).sum::<f64>()
+    HALF * ring
+        .iter()
+        .zip(next)
+        .map(|(a, b)| a.x * b.y - b.x * a.y)
+        .sum::<f64>()
 }
 
 #[cfg(test)]
@@ -151,7 +189,11 @@ mod tests {
         let outline = Outline::around(&ring());
         assert_eq!(outline.rings.len(), 2);
         let area = std::f64::consts::PI * (400.0 - 144.0);
-        assert!((outline.area() / area - 1.0).abs() < 0.01, "{} against {area}", outline.area());
+        assert!(
+            (outline.area() / area - 1.0).abs() < 0.01,
+            "{} against {area}",
+            outline.area()
+        );
         assert!(signed_area(&outline.rings[0]) > 0.0 && signed_area(&outline.rings[1]) < 0.0);
     }
 
@@ -159,31 +201,59 @@ mod tests {
     fn coverage_and_outline_are_each_others_inverse() {
         let there = ring();
         let back = Outline::around(&there).coverage(64, 60);
-        let off = there.pixels().iter().zip(back.pixels()).map(|(a, b)| (a.0 - b.0).abs()).fold(0.0, f32::max);
+        let off = there
+            .pixels()
+            .iter()
+            .zip(back.pixels())
+            .map(|(a, b)| (a.0 - b.0).abs())
+            .fold(0.0, f32::max);
         assert!(off < 0.25, "{off}: the outline is straight inside a pixel");
         let mean = there.zip_map(&back, |a, b| Coverage((a.0 - b.0).abs()));
-        assert!(mean.pixels().iter().map(|c| c.0).sum::<f32>() / mean.pixels().len() as f32 <= 0.005);
+        assert!(
+            mean.pixels().iter().map(|c| c.0).sum::<f32>() / mean.pixels().len() as f32 <= 0.005
+        );
     }
 
     #[test]
     fn the_hull_has_no_hollow() {
         let ell = Image::from_fn(40, 40, |x, y| {
-            Coverage(f32::from(u8::from((5..35).contains(&x) && (5..35).contains(&y) && (x < 15 || y > 25))))
+            Coverage(f32::from(u8::from(
+                (5..35).contains(&x) && (5..35).contains(&y) && (x < 15 || y > 25),
+            )))
         });
-        let hull = Outline { rings: vec![Outline::around(&ell).hull()] };
+        let hull = Outline {
+            rings: vec![Outline::around(&ell).hull()],
+        };
         let [full, corner] = [900.0, 0.5 * 20.0 * 21.0];
-        assert!((hull.area() - (full - corner)).abs() < 40.0, "{}", hull.area());
+        assert!(
+            (hull.area() - (full - corner)).abs() < 40.0,
+            "{}",
+            hull.area()
+        );
     }
 
     #[test]
     fn coverage_sums_to_the_area_also_of_what_lies_outside() {
         let sum = |ring: &[[f64; 2]], side: usize| -> f32 {
-            let outline = Outline { rings: vec![ring.iter().map(|p| Point2::from(*p)).collect()] };
-            outline.coverage(side, side).pixels().iter().map(|c| c.0).sum()
+            let outline = Outline {
+                rings: vec![ring.iter().map(|p| Point2::from(*p)).collect()],
+            };
+            outline
+                .coverage(side, side)
+                .pixels()
+                .iter()
+                .map(|c| c.0)
+                .sum()
         };
         let triangle = sum(&[[1.0, 1.0], [9.0, 2.5], [3.0, 8.0]], 10);
-        assert!((f64::from(triangle) - 0.5 * (8.0 * 7.0 - 2.0 * 1.5)).abs() < 0.1, "{triangle}");
-        assert_eq!(sum(&[[-5.0, -5.0], [2.0, -5.0], [2.0, 2.0], [-5.0, 2.0]], 4), 4.0);
+        assert!(
+            (f64::from(triangle) - 0.5 * (8.0 * 7.0 - 2.0 * 1.5)).abs() < 0.1,
+            "{triangle}"
+        );
+        assert_eq!(
+            sum(&[[-5.0, -5.0], [2.0, -5.0], [2.0, 2.0], [-5.0, 2.0]], 4),
+            4.0
+        );
         let thin = sum(&[[1.25, 0.0], [1.5, 0.0], [1.5, 4.0], [1.25, 4.0]], 4);
         assert_eq!(thin, 1.0);
     }

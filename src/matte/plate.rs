@@ -30,7 +30,12 @@ pub struct PlateOptions {
 
 impl Default for PlateOptions {
     fn default() -> Self {
-        Self { max_degree: 4, least_gain: 0.6, max_shift_px: 8.0, max_mismatch: 0.05 }
+        Self {
+            max_degree: 4,
+            least_gain: 0.6,
+            max_shift_px: 8.0,
+            max_mismatch: 0.05,
+        }
     }
 }
 
@@ -68,12 +73,22 @@ impl ScreenPlate {
     /// When the sizes differ.
     ///
     /// [Tukey]: https://doi.org/10.1080/03610927708827533
-    pub fn fit(photo: &Image<LinearRgb>, background: &Image<bool>, opts: &PlateOptions) -> Result<Self> {
+    pub fn fit(
+        photo: &Image<LinearRgb>,
+        background: &Image<bool>,
+        opts: &PlateOptions,
+    ) -> Result<Self> {
         opts.check()?;
         let cells = cells::means(photo, background);
         let fitted = Polynomial::fit(&cells, photo.size(), opts)?;
         let image = fitted.image(photo.size());
-        Ok(Self::of(image, photo, background, Some(fitted.degree), [0.0; 2]))
+        Ok(Self::of(
+            image,
+            photo,
+            background,
+            Some(fitted.degree),
+            [0.0; 2],
+        ))
     }
 
     /// Takes a photo of the empty screen for the plate.
@@ -95,15 +110,19 @@ impl ScreenPlate {
         opts.check()?;
         if empty.size() != photo.size() {
             let ((w, h), (pw, ph)) = (empty.size(), photo.size());
-            return Err(refused(format!("the empty screen is {w} x {h} pixels, the photo {pw} x {ph}")));
+            return Err(refused(format!(
+                "the empty screen is {w} x {h} pixels, the photo {pw} x {ph}"
+            )));
         }
-        let no_background = || refused("the object leaves no background to check the empty screen on");
+        let no_background =
+            || refused("the object leaves no background to check the empty screen on");
         let on_free = |picture: &Image<LinearRgb>| cells::means(picture, background);
         let gain = cells::gain(&on_free(photo), &on_free(empty)).ok_or_else(no_background)?;
         // The object's edges must not be seen: the filters of the search reach over them into the free screen.
         let without_object = photo.zip_map(background, |p, free| free.then_some(p));
         let without_object = without_object.zip_map(empty, |p, e| p.unwrap_or(e * gain));
-        let Registered { shift_px, .. } = register::shift(&without_object, empty, background, [1.0; 3]);
+        let Registered { shift_px, .. } =
+            register::shift(&without_object, empty, background, [1.0; 3]);
         if shift_px.iter().any(|s| s.abs() > opts.max_shift_px) {
             return Err(refused(format!(
                 "the empty screen lies ({:.1}, {:.1}) pixels off the photo, expected at most {}; did the camera move?",
@@ -124,7 +143,11 @@ impl ScreenPlate {
     /// Those of [`ScreenPlate::fit`].
     /// # Panics
     /// When the sizes differ.
-    pub fn fit_outside(photo: &Image<LinearRgb>, mask: &Image<Coverage>, opts: &PlateOptions) -> Result<Self> {
+    pub fn fit_outside(
+        photo: &Image<LinearRgb>,
+        mask: &Image<Coverage>,
+        opts: &PlateOptions,
+    ) -> Result<Self> {
         Self::fit(photo, &screen_pixels(mask), opts)
     }
 
@@ -146,7 +169,13 @@ impl ScreenPlate {
     /// One colour everywhere: what the paper takes for the screen.
     pub fn even(color: LinearRgb, size: (usize, usize)) -> Self {
         let image = Image::filled(size.0, size.1, color);
-        Self { image, unevenness: 0.0, residual: LinearRgb::BLACK, degree: Some(0), shift_px: [0.0; 2] }
+        Self {
+            image,
+            unevenness: 0.0,
+            residual: LinearRgb::BLACK,
+            degree: Some(0),
+            shift_px: [0.0; 2],
+        }
     }
 
     /// Mean colour of the plate, scene-linear.
@@ -154,7 +183,9 @@ impl ScreenPlate {
         let mut sum = [0.0_f64; 3];
         for p in self.image.pixels() {
             let channels: [f32; 3] = (*p).into();
-            sum.iter_mut().zip(channels).for_each(|(s, c)| *s += f64::from(c));
+            sum.iter_mut()
+                .zip(channels)
+                .for_each(|(s, c)| *s += f64::from(c));
         }
         let n = self.image.pixels().len().max(1) as f64;
         sum.map(|s| (s / n) as f32).into()
@@ -165,8 +196,20 @@ impl ScreenPlate {
     /// # Panics
     /// When `roi` reaches outside the plate.
     pub(super) fn crop(&self, roi: Roi) -> Self {
-        let Self { unevenness, residual, degree, shift_px, .. } = *self;
-        Self { image: self.image.crop(roi), unevenness, residual, degree, shift_px }
+        let Self {
+            unevenness,
+            residual,
+            degree,
+            shift_px,
+            ..
+        } = *self;
+        Self {
+            image: self.image.crop(roi),
+            unevenness,
+            residual,
+            degree,
+            shift_px,
+        }
     }
 
     fn of(
@@ -177,13 +220,27 @@ impl ScreenPlate {
         shift_px: [f64; 2],
     ) -> Self {
         let residual = cells::deviation(photo, &image, background);
-        let mut plate = Self { image, unevenness: 0.0, residual, degree, shift_px };
+        let mut plate = Self {
+            image,
+            unevenness: 0.0,
+            residual,
+            degree,
+            shift_px,
+        };
         plate.unevenness = unevenness(&plate);
         plate
     }
 
-    fn check_mismatch(&self, photo: &Image<LinearRgb>, background: &Image<bool>, opts: &PlateOptions) -> Result<()> {
-        let mismatch = cells::mismatch(&cells::means(photo, background), &cells::means(&self.image, background));
+    fn check_mismatch(
+        &self,
+        photo: &Image<LinearRgb>,
+        background: &Image<bool>,
+        opts: &PlateOptions,
+    ) -> Result<()> {
+        let mismatch = cells::mismatch(
+            &cells::means(photo, background),
+            &cells::means(&self.image, background),
+        );
         if mismatch <= opts.max_mismatch {
             return Ok(());
         }
@@ -204,16 +261,28 @@ const HIGHEST_DEGREE: usize = 6;
 impl PlateOptions {
     pub(super) fn check(&self) -> Result<()> {
         if self.max_degree > HIGHEST_DEGREE {
-            return Err(Error::value("max_degree", format!("{}, expected 0 to {HIGHEST_DEGREE}", self.max_degree)));
+            return Err(Error::value(
+                "max_degree",
+                format!("{}, expected 0 to {HIGHEST_DEGREE}", self.max_degree),
+            ));
         }
         if !(0.0..=1.0).contains(&self.least_gain) {
-            return Err(Error::value("least_gain", format!("{}, expected 0 to 1", self.least_gain)));
+            return Err(Error::value(
+                "least_gain",
+                format!("{}, expected 0 to 1", self.least_gain),
+            ));
         }
         if self.max_shift_px.is_nan() || self.max_shift_px < 0.0 {
-            return Err(Error::value("max_shift_px", format!("{}, expected at least 0", self.max_shift_px)));
+            return Err(Error::value(
+                "max_shift_px",
+                format!("{}, expected at least 0", self.max_shift_px),
+            ));
         }
         if !(0.0..=1.0).contains(&self.max_mismatch) {
-            return Err(Error::value("max_mismatch", format!("{}, expected 0 to 1", self.max_mismatch)));
+            return Err(Error::value(
+                "max_mismatch",
+                format!("{}, expected 0 to 1", self.max_mismatch),
+            ));
         }
         Ok(())
     }
@@ -222,9 +291,19 @@ impl PlateOptions {
 /// 1 minus darkest over brightest of the strongest channel.
 fn unevenness(plate: &ScreenPlate) -> f32 {
     let strongest = strongest_channel(plate.color());
-    let values = plate.image.pixels().iter().map(|p| <[f32; 3]>::from(*p)[strongest]);
-    let (low, high) = values.fold((f32::MAX, 0.0_f32), |(low, high), v| (low.min(v), high.max(v)));
-    if high > 0.0 { 1.0 - (low / high).clamp(0.0, 1.0) } else { 0.0 }
+    let values = plate
+        .image
+        .pixels()
+        .iter()
+        .map(|p| <[f32; 3]>::from(*p)[strongest]);
+    let (low, high) = values.fold((f32::MAX, 0.0_f32), |(low, high), v| {
+        (low.min(v), high.max(v))
+    });
+    if high > 0.0 {
+        1.0 - (low / high).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
 }
 
 fn refused(what: impl Into<String>) -> Error {

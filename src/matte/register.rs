@@ -41,25 +41,43 @@ const SIGNIFICANT: f64 = 3.0;
 /// step.
 ///
 /// [Lucas and Kanade 1981]: https://www.ri.cmu.edu/pub_files/pub3/lucas_bruce_d_1981_2/lucas_bruce_d_1981_2.pdf
-pub(super) fn shift(a: &Image<LinearRgb>, b: &Image<LinearRgb>, mask: &Image<bool>, weights: [f32; 3]) -> Registered {
-    let tone =
-        |image: &Image<LinearRgb>| image.map(|p| Coverage(weights[0] * p.r + weights[1] * p.g + weights[2] * p.b));
+pub(super) fn shift(
+    a: &Image<LinearRgb>,
+    b: &Image<LinearRgb>,
+    mask: &Image<bool>,
+    weights: [f32; 3],
+) -> Registered {
+    let tone = |image: &Image<LinearRgb>| {
+        image.map(|p| Coverage(weights[0] * p.r + weights[1] * p.g + weights[2] * p.b))
+    };
     let mask = mask.map(|set| Coverage(f32::from(u8::from(set))));
     let mut levels = vec![(tone(a), tone(b), mask)];
-    while let Some((a, b, mask)) = levels.last().filter(|(a, ..)| a.width().min(a.height()) >= 2 * SMALLEST) {
+    while let Some((a, b, mask)) = levels
+        .last()
+        .filter(|(a, ..)| a.width().min(a.height()) >= 2 * SMALLEST)
+    {
         if levels.len() == LEVELS {
             break;
         }
         let next = (filter::halve(a), filter::halve(b), filter::halve(mask));
         levels.push(next);
     }
-    let mut found = Registered { shift_px: [0.0; 2], sigma_px: f64::INFINITY, agreement: 0.0 };
+    let mut found = Registered {
+        shift_px: [0.0; 2],
+        sigma_px: f64::INFINITY,
+        agreement: 0.0,
+    };
     for (level, (a, b, mask)) in levels.iter().enumerate().rev() {
         let at_full = f64::from(1 << level);
         let start = found.shift_px.map(|s| s / at_full);
-        let Some((at, last)) = refined(&high_passed(a), &high_passed(b), mask, start.into()) else { continue };
-        found =
-            Registered { shift_px: (at * at_full).into(), sigma_px: last.sigma * at_full, agreement: last.agreement };
+        let Some((at, last)) = refined(&high_passed(a), &high_passed(b), mask, start.into()) else {
+            continue;
+        };
+        found = Registered {
+            shift_px: (at * at_full).into(),
+            sigma_px: last.sigma * at_full,
+            agreement: last.agreement,
+        };
     }
     let unlike = found.agreement < LEAST_AGREEMENT;
     // A search over more than a quarter of the picture has lost its way: there was nothing to hold on to.
@@ -84,7 +102,10 @@ pub(super) fn moved<P: Mix>(image: &Image<P>, [dx, dy]: [f64; 2]) -> Image<P> {
 
 fn high_passed(image: &Image<Coverage>) -> Image<Coverage> {
     let smooth = filter::gaussian_blur(image, HIGH_PASS_PX);
-    filter::gaussian_blur(&image.zip_map(&smooth, |v, mean| Coverage(v.0 - mean.0)), 1.0)
+    filter::gaussian_blur(
+        &image.zip_map(&smooth, |v, mean| Coverage(v.0 - mean.0)),
+        1.0,
+    )
 }
 
 /// Gauss and Newton from a start; the shift and the last step, nothing where there is no structure.
@@ -116,7 +137,8 @@ struct Step {
 fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Option<Step> {
     let (w, h) = a.size();
     let inside = || {
-        let rows = (1..h.saturating_sub(1)).flat_map(|y| (1..w.saturating_sub(1)).map(move |x| (x, y)));
+        let rows =
+            (1..h.saturating_sub(1)).flat_map(|y| (1..w.saturating_sub(1)).map(move |x| (x, y)));
         rows.filter(|&at| mask[at].0 > 0.5)
     };
     let (mut aa, mut ab, mut bb) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -126,7 +148,8 @@ fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Opt
         bb += f64::from(b[at].0 * b[at].0);
     }
     let gain = if bb > 0.0 { ab / bb } else { return None };
-    let (mut normal, mut right, mut square, mut count) = (Matrix2::zeros(), Vector2::zeros(), 0.0, 0.0);
+    let (mut normal, mut right, mut square, mut count) =
+        (Matrix2::zeros(), Vector2::zeros(), 0.0, 0.0);
     for (x, y) in inside() {
         let slope = |p: (usize, usize), q: (usize, usize)| 0.5 * gain * f64::from(b[p].0 - b[q].0);
         let g = Vector2::new(slope((x + 1, y), (x - 1, y)), slope((x, y + 1), (x, y - 1)));
@@ -140,7 +163,11 @@ fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Opt
     let variance = square / count * CORRELATED;
     let agreement = ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE);
     let by: Vector2<f64> = inverse * right;
-    Some(Step { by: by.cap_magnitude(LONGEST_PX), sigma: (variance * inverse.trace()).sqrt(), agreement })
+    Some(Step {
+        by: by.cap_magnitude(LONGEST_PX),
+        sigma: (variance * inverse.trace()).sqrt(),
+        agreement,
+    })
 }
 
 /// Neighbouring pixels that vary together after the blur: the area of its kernel, 4 pi sigma^2.
@@ -155,7 +182,12 @@ mod tests {
         let blobs: Vec<[f64; 4]> = (0..40)
             .map(|i| {
                 let i = f64::from(i);
-                [(37.7 * i) % 120.0, (53.3 * i) % 90.0, 2.5 + (i * 0.71) % 3.0, 0.3 * libm::cos(i)]
+                [
+                    (37.7 * i) % 120.0,
+                    (53.3 * i) % 90.0,
+                    2.5 + (i * 0.71) % 3.0,
+                    0.3 * libm::cos(i),
+                ]
             })
             .collect();
         Image::from_fn(120, 90, |x, y| {
@@ -169,15 +201,25 @@ mod tests {
 
     /// All but a rim that the shift moves out of the picture.
     fn interior() -> Image<bool> {
-        Image::from_fn(120, 90, |x, y| (12..108).contains(&x) && (12..78).contains(&y))
+        Image::from_fn(120, 90, |x, y| {
+            (12..108).contains(&x) && (12..78).contains(&y)
+        })
     }
 
     #[test]
     fn a_shift_is_found_to_a_tenth_of_a_pixel() {
         for (dx, dy) in [(0.0, 0.0), (0.37, -0.61), (2.4, 1.2), (-6.3, 5.5)] {
-            let found = shift(&bumps(dx, dy), &bumps(0.0, 0.0).map(|p| p.scale(0.7)), &interior(), [0.3, 0.4, 0.3]);
+            let found = shift(
+                &bumps(dx, dy),
+                &bumps(0.0, 0.0).map(|p| p.scale(0.7)),
+                &interior(),
+                [0.3, 0.4, 0.3],
+            );
             let [x, y] = found.shift_px;
-            assert!((x - dx).abs() < 0.1 && (y - dy).abs() < 0.1, "{found:?} for {dx}, {dy}");
+            assert!(
+                (x - dx).abs() < 0.1 && (y - dy).abs() < 0.1,
+                "{found:?} for {dx}, {dy}"
+            );
         }
     }
 

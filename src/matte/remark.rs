@@ -52,7 +52,9 @@ pub enum Remark {
     )]
     Hollow,
     /// A side of the box lies so many pixels of the picture that was searched beyond the outline.
-    #[error("the outline is unsure: its box lies {0:.0} pixels beyond its outline, where edges enclose nothing")]
+    #[error(
+        "the outline is unsure: its box lies {0:.0} pixels beyond its outline, where edges enclose nothing"
+    )]
     Strayed(f64),
     /// So many specks lie on the screen.
     #[error(
@@ -60,7 +62,9 @@ pub enum Remark {
     )]
     Specks(usize),
     /// The object is only so many pixels wide.
-    #[error("the object is only {0:.0} pixels wide: its outline is told to a pixel; photograph it from nearer")]
+    #[error(
+        "the object is only {0:.0} pixels wide: its outline is told to a pixel; photograph it from nearer"
+    )]
     Narrow(f64),
     /// This share of the screen is clipped: brighter than the camera can tell.
     #[error("{:.0} % of the screen is clipped: what the object lets through cannot be told; photograph it darker", 100.0 * .0)]
@@ -106,7 +110,11 @@ impl Remark {
     pub fn is_about_color(&self) -> bool {
         matches!(
             self,
-            Self::GreyScreen(_) | Self::ScreenHue(_) | Self::KeyedAway(_) | Self::TintUnsure(_) | Self::Clipped(_)
+            Self::GreyScreen(_)
+                | Self::ScreenHue(_)
+                | Self::KeyedAway(_)
+                | Self::TintUnsure(_)
+                | Self::Clipped(_)
         )
     }
 

@@ -19,7 +19,9 @@ const MARGIN: f64 = 0.02;
 pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<LinearRgb> {
     let far = background(mask, MARGIN);
     let found = mean(photo, &far).or_else(|| mean(photo, &background(mask, 0.0)));
-    found.ok_or_else(|| Error::Photo { what: "the object leaves no background to take the screen colour from".into() })
+    found.ok_or_else(|| Error::Photo {
+        what: "the object leaves no background to take the screen colour from".into(),
+    })
 }
 
 /// The pixels outside a mask and a margin around it.
@@ -36,7 +38,12 @@ fn background(mask: &Image<Coverage>, margin: f64) -> Image<bool> {
 fn mean(photo: &Image<LinearRgb>, set: &Image<bool>) -> Option<LinearRgb> {
     assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
     let (mut sum, mut count) = ([0.0; 3], 0u64);
-    for (p, _) in photo.pixels().iter().zip(set.pixels()).filter(|(_, inside)| **inside) {
+    for (p, _) in photo
+        .pixels()
+        .iter()
+        .zip(set.pixels())
+        .filter(|(_, inside)| **inside)
+    {
         let channels: [f32; 3] = (*p).into();
         for (s, c) in sum.iter_mut().zip(channels) {
             *s += f64::from(c);
@@ -61,7 +68,13 @@ pub(super) fn is_keyable(screen: LinearRgb) -> bool {
 /// Which channel of a colour is the largest; of equal ones the first.
 pub(super) fn strongest_channel(color: LinearRgb) -> usize {
     let channels: [f32; 3] = color.into();
-    (1..3).fold(0, |best, c| if channels[c] > channels[best] { c } else { best })
+    (1..3).fold(0, |best, c| {
+        if channels[c] > channels[best] {
+            c
+        } else {
+            best
+        }
+    })
 }
 
 #[cfg(test)]
@@ -72,8 +85,12 @@ mod tests {
 
     fn disc(size: usize, radius: usize) -> Image<Coverage> {
         let half = size / 2;
-        let inside = |x: usize, y: usize| x.abs_diff(half).pow(2) + y.abs_diff(half).pow(2) <= radius * radius;
-        Image::from_fn(size, size, |x, y| Coverage(f32::from(u8::from(inside(x, y)))))
+        let inside = |x: usize, y: usize| {
+            x.abs_diff(half).pow(2) + y.abs_diff(half).pow(2) <= radius * radius
+        };
+        Image::from_fn(size, size, |x, y| {
+            Coverage(f32::from(u8::from(inside(x, y))))
+        })
     }
 
     #[test]

@@ -72,7 +72,8 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
     let side = |len: usize| (len * WORKING_SIZE.min(longer)).div_ceil(longer).max(1);
     let picture = filter::resize(photo, side(photo.width()), side(photo.height()));
     let scale = photo.width() as f64 / picture.width() as f64;
-    let rough = four_corners(&screen(&picture)?.hull).ok_or_else(|| refused("its outline has no four corners"))?;
+    let rough = four_corners(&screen(&picture)?.hull)
+        .ok_or_else(|| refused("its outline has no four corners"))?;
     let mut corners = rough.map(|p| Point2::from(p.coords * scale));
     let mut sigma_px = 0.0;
     // The second time the probes stand where the sides are.
@@ -80,16 +81,24 @@ pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
         let sides = sides(photo, &corners, scale)?;
         for i in 0..4 {
             let meeting = sides[(i + 3) % 4].line.meeting(&sides[i].line);
-            corners[i] = meeting.ok_or_else(|| refused("two of its sides are parallel that should meet"))?;
+            corners[i] =
+                meeting.ok_or_else(|| refused("two of its sides are parallel that should meet"))?;
         }
-        sigma_px = sides.iter().map(|side| side.off_px).fold(NOISE_PX, f64::max);
+        sigma_px = sides
+            .iter()
+            .map(|side| side.off_px)
+            .fold(NOISE_PX, f64::max);
     }
-    Ok(ScreenCorners { corners_px: from_top_left(corners), sigma_px })
+    Ok(ScreenCorners {
+        corners_px: from_top_left(corners),
+        sigma_px,
+    })
 }
 
 /// The same ring of corners, begun with the one that is nearest to the picture's top left.
 pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
-    let first = (0..4).min_by(|&i, &j| (corners[i].x + corners[i].y).total_cmp(&(corners[j].x + corners[j].y)));
+    let first = (0..4)
+        .min_by(|&i, &j| (corners[i].x + corners[i].y).total_cmp(&(corners[j].x + corners[j].y)));
     let first = first.unwrap_or_default();
     [0, 1, 2, 3].map(|i| corners[(first + i) % 4])
 }
@@ -97,7 +106,9 @@ pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
 fn refused(what: impl std::fmt::Display) -> Error {
     let instead = "photograph all of it on something of another colour, give its corners (`asset add --screen-corners`), \
                    or measure the object's length with a tape";
-    Error::Photo { what: format!("the corners of the screen cannot be found: {what}; {instead}") }
+    Error::Photo {
+        what: format!("the corners of the screen cannot be found: {what}; {instead}"),
+    }
 }
 
 /// A connected region of one hue.
@@ -113,16 +124,25 @@ struct Region {
 /// The region that is a screen.
 fn screen(picture: &Image<LinearRgb>) -> Result<Region> {
     let least = LEAST_SHARE * picture.pixels().len() as f64;
-    let mut regions: Vec<Region> = regions(picture).into_iter().filter(|r| r.pixels as f64 >= least).collect();
+    let mut regions: Vec<Region> = regions(picture)
+        .into_iter()
+        .filter(|r| r.pixels as f64 >= least)
+        .collect();
     regions.sort_by_key(|region| std::cmp::Reverse(region.pixels));
-    let whole = |covered: bool| regions.iter().position(|r| !r.is_cut && r.is_covered == covered);
+    let whole = |covered: bool| {
+        regions
+            .iter()
+            .position(|r| !r.is_cut && r.is_covered == covered)
+    };
     let is_cut = regions.iter().any(|region| region.is_cut);
     // A box on a screen that is not seen as a whole has four corners, too, but nothing lies on it.
     match (whole(true), whole(false)) {
         (Some(covered), _) => Ok(regions.swap_remove(covered)),
         (None, _) if is_cut => Err(refused("it reaches the border of the photo")),
         (None, Some(empty)) => Ok(regions.swap_remove(empty)),
-        (None, None) => Err(refused("no tenth of the photo has one colour such as green or blue")),
+        (None, None) => Err(refused(
+            "no tenth of the photo has one colour such as green or blue",
+        )),
     }
 }
 
@@ -130,7 +150,12 @@ fn screen(picture: &Image<LinearRgb>) -> Result<Region> {
 fn regions(picture: &Image<LinearRgb>) -> Vec<Region> {
     let hues = picture.map(hue);
     let common = common_hues(&hues);
-    let nearest = |hue: usize| common.iter().copied().min_by_key(|&other| apart(hue, other));
+    let nearest = |hue: usize| {
+        common
+            .iter()
+            .copied()
+            .min_by_key(|&other| apart(hue, other))
+    };
     let of = |common: usize| {
         let is_near = |hue: usize| nearest(hue) == Some(common) && apart(hue, common) <= SAME_HUE;
         let set = hues.map(|hue| hue.is_some_and(is_near));
@@ -154,13 +179,23 @@ fn apart(a: usize, b: usize) -> usize {
 /// The hues that a worthwhile share of the picture has, commonest first.
 fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
     let mut counts = [0_usize; HUES];
-    hues.pixels().iter().flatten().for_each(|&hue| counts[hue] += 1);
+    hues.pixels()
+        .iter()
+        .flatten()
+        .for_each(|&hue| counts[hue] += 1);
     let mut common = Vec::new();
     while common.len() < MOST_HUES {
-        let near = |hue: usize, reach: usize| (0..HUES).filter(move |&other| apart(hue, other) <= reach);
-        let around = |hue: usize| near(hue, SAME_HUE).map(|other| counts[other]).sum::<usize>();
+        let near =
+            |hue: usize, reach: usize| (0..HUES).filter(move |&other| apart(hue, other) <= reach);
+        let around = |hue: usize| {
+            near(hue, SAME_HUE)
+                .map(|other| counts[other])
+                .sum::<usize>()
+        };
         // Of windows that hold the same pixels the one around the highest count.
-        let Some(most) = (0..HUES).max_by_key(|&hue| (around(hue), counts[hue])) else { break };
+        let Some(most) = (0..HUES).max_by_key(|&hue| (around(hue), counts[hue])) else {
+            break;
+        };
         if (around(most) as f64) < LEAST_SHARE * hues.pixels().len() as f64 {
             break;
         }
@@ -177,19 +212,34 @@ fn largest_region(set: &Image<bool>) -> Option<Region> {
     let largest = (0..sizes.len()).max_by_key(|&i| sizes[i])?;
     let only = groups.only(|i| i == largest);
     let (w, h) = only.size();
-    let border = (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
+    let border = (0..w)
+        .flat_map(|x| [(x, 0), (x, h - 1)])
+        .chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
     let is_cut = border.into_iter().any(|at| only[at]);
     let hull = Outline::around(&only.map(|inside| Coverage(f32::from(u8::from(inside))))).hull();
     let is_covered = is_covered(&only, &hull);
-    Some(Region { pixels: sizes[largest], hull, is_cut, is_covered })
+    Some(Region {
+        pixels: sizes[largest],
+        hull,
+        is_cut,
+        is_covered,
+    })
 }
 
 /// Something lies within the hull of a region, away from its border.
 fn is_covered(region: &Image<bool>, hull: &[Point2<f64>]) -> bool {
     let (w, h) = region.size();
-    let within = Outline { rings: vec![hull.to_vec()] }.coverage(w, h).map(|c| c.0 > 0.5);
+    let within = Outline {
+        rings: vec![hull.to_vec()],
+    }
+    .coverage(w, h)
+    .map(|c| c.0 > 0.5);
     let free = filter::erode(&within, RIM_PX).zip_map(region, |inside, screen| inside && !screen);
-    let largest = Groups::of(&free).sizes(&free).into_iter().max().unwrap_or(0);
+    let largest = Groups::of(&free)
+        .sizes(&free)
+        .into_iter()
+        .max()
+        .unwrap_or(0);
     largest as f64 > LEAST_OBJECT * within.pixels().iter().filter(|inside| **inside).count() as f64
 }
 
@@ -203,8 +253,11 @@ fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let off = |p: usize, [a, b]: [usize; 2]| (ring[b] - ring[a]).perp(&(ring[p] - ring[a])).abs();
     for i in (0..if n < 4 { 0 } else { MOST_MOVES }).map(|move_| move_ % 4) {
         let [before, after] = [corners[(i + 3) % 4], corners[(i + 1) % 4]];
-        let between = (1..n).map(|step| (before + step) % n).take_while(|&p| p != after);
-        corners[i] = between.max_by(|&p, &q| off(p, [before, after]).total_cmp(&off(q, [before, after])))?;
+        let between = (1..n)
+            .map(|step| (before + step) % n)
+            .take_while(|&p| p != after);
+        corners[i] =
+            between.max_by(|&p, &q| off(p, [before, after]).total_cmp(&off(q, [before, after])))?;
     }
     (n >= 4).then(|| corners.map(|i| ring[i]))
 }
@@ -218,11 +271,22 @@ struct Side {
 }
 
 fn sides(photo: &Image<LinearRgb>, corners: &[Point2<f64>; 4], scale: f64) -> Result<[Side; 4]> {
-    let side = |i: usize| Side::near(photo, [corners[i], corners[(i + 1) % 4]], REACH_PX * scale.max(1.0));
+    let side = |i: usize| {
+        Side::near(
+            photo,
+            [corners[i], corners[(i + 1) % 4]],
+            REACH_PX * scale.max(1.0),
+        )
+    };
     let found: Vec<Side> = (0..4).filter_map(side).collect();
-    let found: [Side; 4] = found.try_into().map_err(|_| refused("a side of it shows no straight border"))?;
+    let found: [Side; 4] = found
+        .try_into()
+        .map_err(|_| refused("a side of it shows no straight border"))?;
     match found.iter().find(|side| side.off_px > CROOKED_PX * scale) {
-        Some(side) => Err(refused(format!("a side of it is crooked by {:.1} pixels", side.off_px))),
+        Some(side) => Err(refused(format!(
+            "a side of it is crooked by {:.1} pixels",
+            side.off_px
+        ))),
         None => Ok(found),
     }
 }
@@ -246,27 +310,41 @@ impl Side {
             points.retain(|p| line.distance(*p).abs() <= most);
         }
         let line = Line::through(&points)?;
-        let squares: f64 = points.iter().map(|p| line.distance(*p) * line.distance(*p)).sum();
+        let squares: f64 = points
+            .iter()
+            .map(|p| line.distance(*p) * line.distance(*p))
+            .sum();
         let off_px = (squares / points.len() as f64).sqrt();
         (points.len() >= PROBES / 2).then_some(Self { line, off_px })
     }
 }
 
 /// How far outwards of a place the colour inside changes to that outside; none where there is no such change.
-fn border(photo: &Image<LinearRgb>, foot: Point2<f64>, outward: Vector2<f64>, reach: f64) -> Option<f64> {
+fn border(
+    photo: &Image<LinearRgb>,
+    foot: Point2<f64>,
+    outward: Vector2<f64>,
+    reach: f64,
+) -> Option<f64> {
     let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
     let step = 2.0 * reach / steps as f64;
-    let color = |t: f64| filter::sample_bilinear_clamped(photo, foot.x + outward.x * t, foot.y + outward.y * t);
+    let color = |t: f64| {
+        filter::sample_bilinear_clamped(photo, foot.x + outward.x * t, foot.y + outward.y * t)
+    };
     let beyond = |side: f64| {
         let samples = (0..steps / 2).map(|k| color(side * (reach + k as f64 * step)));
-        samples.fold(LinearRgb::BLACK, |sum, p| sum + p).scale(2.0 / steps as f32)
+        samples
+            .fold(LinearRgb::BLACK, |sum, p| sum + p)
+            .scale(2.0 / steps as f32)
     };
     let (inside, outside) = (beyond(-1.0), beyond(1.0));
     let change = inside.add_scaled(-1.0, outside);
     let dot = |a: LinearRgb, b: LinearRgb| a.r * b.r + a.g * b.g + a.b * b.b;
     let square = dot(change, change);
     let share = |t: f64| f64::from(dot(color(t).add_scaled(-1.0, outside), change) / square);
-    let within: f64 = (0..steps).map(|k| step * share(-reach + (k as f64 + 0.5) * step)).sum();
+    let within: f64 = (0..steps)
+        .map(|k| step * share(-reach + (k as f64 + 0.5) * step))
+        .sum();
     let at = within - reach;
     (square > LEAST_CHANGE * LEAST_CHANGE && at.abs() < 0.75 * reach).then_some(at)
 }
@@ -277,9 +355,21 @@ mod tests {
     use crate::geom::{Pose, UnitQuaternion, Vector3};
     use crate::{Camera, camera::project_picture, filter::Pyramid};
 
-    const BROWN: LinearRgb = LinearRgb { r: 0.2, g: 0.12, b: 0.06 };
-    const BLUE: LinearRgb = LinearRgb { r: 0.05, g: 0.12, b: 0.35 };
-    const GREEN: LinearRgb = LinearRgb { r: 0.05, g: 0.4, b: 0.1 };
+    const BROWN: LinearRgb = LinearRgb {
+        r: 0.2,
+        g: 0.12,
+        b: 0.06,
+    };
+    const BLUE: LinearRgb = LinearRgb {
+        r: 0.05,
+        g: 0.12,
+        b: 0.35,
+    };
+    const GREEN: LinearRgb = LinearRgb {
+        r: 0.05,
+        g: 0.4,
+        b: 0.1,
+    };
 
     /// A green screen of 0.6 x 0.4 m on a table, unevenly lit, with a red slab on it; and its camera.
     fn photo(tilt: f64, turn: f64, table: LinearRgb) -> (Image<LinearRgb>, Camera) {
@@ -293,18 +383,31 @@ mod tests {
         };
         let screen = Image::from_fn(300, 200, |x, y| {
             let slab = (100..190).contains(&x) && (75..115).contains(&y);
-            if slab { LinearRgb::new(0.6, 0.05, 0.05) } else { GREEN.scale(0.6 + 0.4 * x as f32 / 300.0) }
+            if slab {
+                LinearRgb::new(0.6, 0.05, 0.05)
+            } else {
+                GREEN.scale(0.6 + 0.4 * x as f32 / 300.0)
+            }
         });
         let seen = project_picture(&Pyramid::new(screen), &camera, [0.6, 0.4]);
-        let alpha = project_picture(&Pyramid::new(Image::filled(300, 200, Coverage(1.0))), &camera, [0.6, 0.4]);
-        (seen.zip_map(&alpha, |p, a| p + table.scale(1.0 - a.0)), camera)
+        let alpha = project_picture(
+            &Pyramid::new(Image::filled(300, 200, Coverage(1.0))),
+            &camera,
+            [0.6, 0.4],
+        );
+        (
+            seen.zip_map(&alpha, |p, a| p + table.scale(1.0 - a.0)),
+            camera,
+        )
     }
 
     /// Grain of a sensor: the same for the same pixel.
     fn noisy(photo: &Image<LinearRgb>, sigma: f32) -> Image<LinearRgb> {
         let (w, _) = photo.size();
-        let unit =
-            |seed: u64| ((seed ^ (seed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f32 / 8_388_608.0 - 1.0;
+        let unit = |seed: u64| {
+            ((seed ^ (seed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f32 / 8_388_608.0
+                - 1.0
+        };
         let grain = |seed: u64| 1.73 * sigma * unit(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         Image::from_fn(w, photo.height(), |x, y| {
             let seed = 3 * (y * w + x) as u64 + 1;
@@ -314,13 +417,26 @@ mod tests {
 
     #[test]
     fn corners_are_found_on_tables_of_any_colour() {
-        let views = [(0.0, 0.0, BROWN), (0.3, 0.1, BLUE), (-0.4, -0.3, BROWN), (0.2, 0.2, LinearRgb::grey(0.02))];
+        let views = [
+            (0.0, 0.0, BROWN),
+            (0.3, 0.1, BLUE),
+            (-0.4, -0.3, BROWN),
+            (0.2, 0.2, LinearRgb::grey(0.02)),
+        ];
         for (tilt, turn, table) in views {
             let (photo, camera) = photo(tilt, turn, table);
             let found = screen_corners(&noisy(&photo, 0.01)).unwrap();
-            for (found, [x, y]) in found.corners_px.iter().zip([[-0.3, 0.2], [0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]]) {
+            for (found, [x, y]) in
+                found
+                    .corners_px
+                    .iter()
+                    .zip([[-0.3, 0.2], [0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]])
+            {
                 let (truth, _) = camera.project([x, y, 0.0].into()).unwrap();
-                assert!((found - truth).norm() < 0.25, "{tilt} {turn}: {found} instead of {truth}");
+                assert!(
+                    (found - truth).norm() < 0.25,
+                    "{tilt} {turn}: {found} instead of {truth}"
+                );
             }
             assert!(found.sigma_px < 0.3, "{}", found.sigma_px);
         }
@@ -332,7 +448,12 @@ mod tests {
         let (whole, _) = photo(0.0, 0.0, BROWN);
         // One side beyond the border, and all of them.
         for (x, width) in [(150, 450), (150, 300)] {
-            let near = whole.crop(crate::Roi { x, y: 60, width, height: 330 });
+            let near = whole.crop(crate::Roi {
+                x,
+                y: 60,
+                width,
+                height: 330,
+            });
             assert!(
                 told(&near).contains("it reaches the border of the photo; photograph all of it"),
                 "{}",
@@ -342,16 +463,28 @@ mod tests {
         // Then a box that fills the photo is not taken for it.
         let boxed = Image::from_fn(200, 150, |x, y| {
             let inside = (50..150).contains(&x) && (40..110).contains(&y);
-            if inside { LinearRgb::new(0.6, 0.05, 0.05) } else { GREEN }
+            if inside {
+                LinearRgb::new(0.6, 0.05, 0.05)
+            } else {
+                GREEN
+            }
         });
-        assert!(told(&boxed).contains("it reaches the border"), "{}", told(&boxed));
+        assert!(
+            told(&boxed).contains("it reaches the border"),
+            "{}",
+            told(&boxed)
+        );
         let grey = Image::filled(90, 60, LinearRgb::grey(0.5));
         assert!(told(&grey).contains("no tenth of the photo has one colour"));
         let disc = Image::from_fn(200, 200, |x, y| {
             let inside = (x as f64 - 100.0).hypot(y as f64 - 100.0) < 80.0;
             if inside { GREEN } else { LinearRgb::grey(0.2) }
         });
-        assert!(told(&disc).contains("a side of it shows no straight border"), "{}", told(&disc));
+        assert!(
+            told(&disc).contains("a side of it shows no straight border"),
+            "{}",
+            told(&disc)
+        );
         let nothing: Image<LinearRgb> = Image::new(0, 0);
         assert!(screen_corners(&nothing).is_err());
     }

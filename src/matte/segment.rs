@@ -108,12 +108,17 @@ impl Step {
     /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms as shares of the
     /// largest.
     pub fn shown(&self) -> Image<Coverage> {
-        let most = self.image.pixels().iter().fold(0.0f32, |most, c| most.max(c.0));
+        let most = self
+            .image
+            .pixels()
+            .iter()
+            .fold(0.0f32, |most, c| most.max(c.0));
         if most <= 1.0 {
             return self.image.clone();
         }
         let scale = 1.0 / libm::log1pf(most);
-        self.image.map(|c| Coverage(scale * libm::log1pf(c.0.max(0.0))))
+        self.image
+            .map(|c| Coverage(scale * libm::log1pf(c.0.max(0.0))))
     }
 }
 
@@ -150,22 +155,39 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     watch.lap("search");
     let (found, levels, touches) = (&chosen.pass, chosen.levels, chosen.pass.touches);
     let (w, h) = photo.size();
-    let scale = [w as f64 / found.inside.width() as f64, h as f64 / found.inside.height() as f64];
+    let scale = [
+        w as f64 / found.inside.width() as f64,
+        h as f64 / found.inside.height() as f64,
+    ];
     let reduction = scale[0].max(scale[1]);
     let to_photo = |p: Point2<f64>| Point2::new(p.x * scale[0], p.y * scale[1]);
-    let resized = filter::resize(picture.as_ref(), found.inside.width(), found.inside.height());
+    let resized = filter::resize(
+        picture.as_ref(),
+        found.inside.width(),
+        found.inside.height(),
+    );
     let margin_px = HOLE_MARGIN * longer_side(&resized) as f64;
     let background = holes::around(&found.inside, margin_px);
     let holed = holes::without_holes(&resized, &found.inside, &background);
     let is_hollow = holed != found.inside;
     // What is like a grey board may be clear plastic before it.
-    let solid = if holes::are_told(&resized, &background) { holed } else { found.inside.clone() };
+    let solid = if holes::are_told(&resized, &background) {
+        holed
+    } else {
+        found.inside.clone()
+    };
     let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
     watch.lap("holes");
     let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
     let outline = snap::snapped(&around.map(to_photo), &roots, reduction);
-    let tips: Vec<_> = inset(&found.hull, TIP_INSET_PX).into_iter().map(to_photo).collect();
-    let hull = Outline { rings: outline.rings.iter().cloned().chain([tips]).collect() }.hull();
+    let tips: Vec<_> = inset(&found.hull, TIP_INSET_PX)
+        .into_iter()
+        .map(to_photo)
+        .collect();
+    let hull = Outline {
+        rings: outline.rings.iter().cloned().chain([tips]).collect(),
+    }
+    .hull();
     let confidence = Confidence {
         blur_px: blur::blur_px(&outline, &roots, reduction.max(1.0)),
         width_px: outline.width() / reduction.max(1.0),
@@ -179,12 +201,26 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     remarks.extend((halved > 1.0).then_some(Remark::Noisy(halved)));
     remarks.extend(confidence.remarks());
     watch.lap("outline");
-    let mask = Outline { rings: vec![hull.clone()] }.coverage(w, h);
+    let mask = Outline {
+        rings: vec![hull.clone()],
+    }
+    .coverage(w, h);
     let tight = outline.coverage(w, h);
     let steps = steps(chosen, &picture);
     watch.lap("masks");
     watch.log("segment");
-    Ok(Segmentation { mask, tight, hull, outline, touches, confidence, levels, reduction, remarks, steps })
+    Ok(Segmentation {
+        mask,
+        tight,
+        hull,
+        outline,
+        touches,
+        confidence,
+        levels,
+        reduction,
+        remarks,
+        steps,
+    })
 }
 
 /// Width of the zone around the object that is not asked for the screen, as a share of the longer side: contact shadows.
@@ -198,17 +234,28 @@ const TIP_INSET_PX: f64 = 1.0;
 
 /// A convex polygon's corners moved towards its middle.
 fn inset(hull: &[Point2<f64>], by: f64) -> Vec<Point2<f64>> {
-    let middle = hull.iter().fold(Point2::origin(), |sum, p| sum + p.coords / hull.len() as f64);
+    let middle = hull.iter().fold(Point2::origin(), |sum, p| {
+        sum + p.coords / hull.len() as f64
+    });
     let moved = |p: &Point2<f64>| {
         let inwards = middle - p;
-        if inwards.norm() > by { p + inwards * (by / inwards.norm()) } else { middle }
+        if inwards.norm() > by {
+            p + inwards * (by / inwards.norm())
+        } else {
+            middle
+        }
     };
     hull.iter().map(moved).collect()
 }
 
 /// The pictures (a) to (e) of the paper's Figure 2, and what lies between.
 fn steps(chosen: choose::Chosen, picture: &Image<LinearRgb>) -> Vec<Step> {
-    let choose::Chosen { pass, first, first_binary, .. } = chosen;
+    let choose::Chosen {
+        pass,
+        first,
+        first_binary,
+        ..
+    } = chosen;
     let both = first_binary.zip_map(&pass.last_binary, |a, b| a && b);
     let steps = [
         ("grey", band::root(picture, [1.0; 3])),
@@ -237,9 +284,16 @@ impl SegmentOptions {
         };
         share("ridge", f64::from(self.ridge))?;
         share("join", self.join)?;
-        let weights = if let Tone::Grey(weights) = self.tone { weights } else { [1.0; 3] };
+        let weights = if let Tone::Grey(weights) = self.tone {
+            weights
+        } else {
+            [1.0; 3]
+        };
         if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
-            return Err(Error::value("tone.grey", format!("{weights:?}, expected weights of 0 to 1e6, not all 0")));
+            return Err(Error::value(
+                "tone.grey",
+                format!("{weights:?}, expected weights of 0 to 1e6, not all 0"),
+            ));
         }
         let sizes = Bounds::new(LEAST_WORKING_SIZE as f64, 32_768.0, "pixels");
         sizes.check("working_size", self.working_size as f64)
@@ -257,10 +311,16 @@ const SMALL: [usize; 2] = [128, 256];
 fn check_photo(photo: &Image<LinearRgb>) -> Result<()> {
     let (w, h) = photo.size();
     if w.min(h) < SMALLEST {
-        return Err(refused(format!("the photo is {w} x {h} pixels, expected at least {SMALLEST} x {SMALLEST}")));
+        return Err(refused(format!(
+            "the photo is {w} x {h} pixels, expected at least {SMALLEST} x {SMALLEST}"
+        )));
     }
     match photo.pixels().iter().position(|p| !p.is_finite()) {
-        Some(i) => Err(refused(format!("pixel ({}, {}) is not a finite number", i % w, i / w))),
+        Some(i) => Err(refused(format!(
+            "pixel ({}, {}) is not a finite number",
+            i % w,
+            i / w
+        ))),
         None => Ok(()),
     }
 }
@@ -274,17 +334,32 @@ fn longer_side<P: Copy>(image: &Image<P>) -> usize {
 }
 
 /// The photo, or a copy whose longer side is `working_size`; a small photo enlarged.
-fn reduced(photo: &Image<LinearRgb>, working_size: usize) -> std::borrow::Cow<'_, Image<LinearRgb>> {
+fn reduced(
+    photo: &Image<LinearRgb>,
+    working_size: usize,
+) -> std::borrow::Cow<'_, Image<LinearRgb>> {
     let longer = longer_side(photo);
     if longer < SMALL[0].min(working_size) {
         let times = SMALL[1].div_ceil(longer);
-        return std::borrow::Cow::Owned(filter::resize(photo, times * photo.width(), times * photo.height()));
+        return std::borrow::Cow::Owned(filter::resize(
+            photo,
+            times * photo.width(),
+            times * photo.height(),
+        ));
     }
     if longer <= working_size {
         return std::borrow::Cow::Borrowed(photo);
     }
-    let side = |len: usize| (len * working_size).div_ceil(longer).max(LEAST_WORKING_SIZE);
-    std::borrow::Cow::Owned(filter::resize(photo, side(photo.width()), side(photo.height())))
+    let side = |len: usize| {
+        (len * working_size)
+            .div_ceil(longer)
+            .max(LEAST_WORKING_SIZE)
+    };
+    std::borrow::Cow::Owned(filter::resize(
+        photo,
+        side(photo.width()),
+        side(photo.height()),
+    ))
 }
 
 fn shown(set: &Image<bool>) -> Image<Coverage> {
@@ -296,7 +371,12 @@ const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
 
 /// The remark on an object that the photo cuts off; none for a whole one.
 fn truncation(touches: [bool; 4]) -> Option<Remark> {
-    let reached: Vec<_> = BORDERS.into_iter().zip(touches).filter(|(_, t)| *t).map(|(name, _)| name).collect();
+    let reached: Vec<_> = BORDERS
+        .into_iter()
+        .zip(touches)
+        .filter(|(_, t)| *t)
+        .map(|(name, _)| name)
+        .collect();
     (!reached.is_empty()).then_some(Remark::Truncated(reached))
 }
 

@@ -28,7 +28,11 @@ pub struct TriangulateOptions {
 
 impl Default for TriangulateOptions {
     fn default() -> Self {
-        Self { max_shift_px: 8.0, least_agreement: 0.5, max_sigma: 0.05 }
+        Self {
+            max_shift_px: 8.0,
+            least_agreement: 0.5,
+            max_sigma: 0.05,
+        }
     }
 }
 
@@ -82,19 +86,34 @@ pub fn triangulate(
 ) -> Result<Triangulated> {
     check(shots, inside)?;
     let aligned = aligned(shots, inside, opts)?;
-    let noise = shots.iter().map(|(_, plate)| loudest(plate.residual)).fold(FINEST, f32::max);
+    let noise = shots
+        .iter()
+        .map(|(_, plate)| loudest(plate.residual))
+        .fold(FINEST, f32::max);
     let lines = fitted(&aligned, noise);
     let determined = determined(&lines, inside, opts.max_sigma);
     if determined == [false; 3] {
-        return Err(refused("the screens are too alike in every channel to tell film from background"));
+        return Err(refused(
+            "the screens are too alike in every channel to tell film from background",
+        ));
     }
-    let borrowed = Borrowed::fit(&lines, inside, determined, dye::told(&lines, inside, determined));
+    let borrowed = Borrowed::fit(
+        &lines,
+        inside,
+        determined,
+        dye::told(&lines, inside, determined),
+    );
     let solved = lines.map(|line| borrowed.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|shot| shot.shift_px).collect();
     let moves = (1..).zip(&shift_px).filter(|(_, s)| **s != [0.0; 2]);
     let moved = moves.map(|(photo, &shift_px)| Remark::Moved { photo, shift_px });
-    let names = CHANNELS.into_iter().zip(determined).filter(|(_, told)| !told);
-    let remarks = moved.chain(names.map(|(name, _)| Remark::Undetermined(name))).collect();
+    let names = CHANNELS
+        .into_iter()
+        .zip(determined)
+        .filter(|(_, told)| !told);
+    let remarks = moved
+        .chain(names.map(|(name, _)| Remark::Undetermined(name)))
+        .collect();
     let flat = lines::flat(&solved, inside);
     let transmittance = solved.zip_map(inside, |p, c| covered(p.transmittance, c));
     let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
@@ -124,13 +143,23 @@ struct Shot {
 
 fn check(shots: &[(&Image<LinearRgb>, &ScreenPlate)], inside: &Image<Coverage>) -> Result<()> {
     if shots.len() < 2 {
-        return Err(Error::value("photos", format!("{}, expected at least 2", shots.len())));
+        return Err(Error::value(
+            "photos",
+            format!("{}, expected at least 2", shots.len()),
+        ));
     }
     for (i, (photo, plate)) in shots.iter().enumerate() {
-        assert_eq!(photo.size(), plate.image.size(), "photo {i} and its plate differ in size");
+        assert_eq!(
+            photo.size(),
+            plate.image.size(),
+            "photo {i} and its plate differ in size"
+        );
         if photo.size() != inside.size() {
             let ((w, h), (iw, ih)) = (photo.size(), inside.size());
-            return Err(Error::value(format!("photos[{i}]"), format!("{w} x {h} pixels, expected {iw} x {ih}")));
+            return Err(Error::value(
+                format!("photos[{i}]"),
+                format!("{w} x {h} pixels, expected {iw} x {ih}"),
+            ));
         }
     }
     Ok(())
@@ -146,7 +175,11 @@ fn aligned(
     let (first, first_plate) = shots[0];
     let shot = |(i, &(photo, plate)): (usize, &(&Image<LinearRgb>, &ScreenPlate))| {
         if i == 0 {
-            return Ok(Shot { photo: photo.clone(), screen: plate.image.clone(), shift_px: [0.0; 2] });
+            return Ok(Shot {
+                photo: photo.clone(),
+                screen: plate.image.clone(),
+                shift_px: [0.0; 2],
+            });
         }
         let across = across(first_plate.color(), plate.color());
         let found = register::shift(first, photo, &near, across);
@@ -170,17 +203,32 @@ fn aligned(
                  {MOST_APART_PX}; did it turn?"
             )));
         }
-        let (photo, screen) = (register::moved(photo, [x, y]), register::moved(&plate.image, [x, y]));
+        let (photo, screen) = (
+            register::moved(photo, [x, y]),
+            register::moved(&plate.image, [x, y]),
+        );
         // Told as where the object lay, not as where it was moved.
-        Ok(Shot { photo, screen, shift_px: [0.0 - x, 0.0 - y] })
+        Ok(Shot {
+            photo,
+            screen,
+            shift_px: [0.0 - x, 0.0 - y],
+        })
     };
     shots.iter().enumerate().map(shot).collect()
 }
 
 /// How far the ends of an object moved apart, in pixels, where that is more than they may and surely so.
-fn turned_px(first: &Image<LinearRgb>, photo: &Image<LinearRgb>, near: &Image<bool>, across: [f32; 3]) -> Option<f64> {
+fn turned_px(
+    first: &Image<LinearRgb>,
+    photo: &Image<LinearRgb>,
+    near: &Image<bool>,
+    across: [f32; 3],
+) -> Option<f64> {
     let [low, high] = ends(near).map(|end| register::shift(first, photo, &end, across));
-    let apart = libm::hypot(low.shift_px[0] - high.shift_px[0], low.shift_px[1] - high.shift_px[1]);
+    let apart = libm::hypot(
+        low.shift_px[0] - high.shift_px[0],
+        low.shift_px[1] - high.shift_px[1],
+    );
     let sigma = libm::hypot(low.sigma_px, high.sigma_px);
     (apart > MOST_APART_PX.max(SURE * sigma)).then_some(apart)
 }
@@ -193,15 +241,25 @@ const SURE: f64 = 4.0;
 /// The two halves of an object, cut across the longer side of its box.
 fn ends(mask: &Image<bool>) -> [Image<bool>; 2] {
     let (w, h) = mask.size();
-    let set = || (0..w * h).filter(|&i| mask.pixels()[i]).map(|i| [i % w, i / w]);
+    let set = || {
+        (0..w * h)
+            .filter(|&i| mask.pixels()[i])
+            .map(|i| [i % w, i / w])
+    };
     let span = |side: usize| {
-        let [low, high] = set().fold([usize::MAX, 0], |[low, high], at| [low.min(at[side]), high.max(at[side])]);
+        let [low, high] = set().fold([usize::MAX, 0], |[low, high], at| {
+            [low.min(at[side]), high.max(at[side])]
+        });
         [low.min(high), high]
     };
     let spans = [span(0), span(1)];
     let side = usize::from(spans[1][1] - spans[1][0] > spans[0][1] - spans[0][0]);
     let middle = usize::midpoint(spans[side][0], spans[side][1]);
-    let half = |above: bool| Image::from_fn(w, h, |x, y| mask[(x, y)] && ([x, y][side] > middle) == above);
+    let half = |above: bool| {
+        Image::from_fn(w, h, |x, y| {
+            mask[(x, y)] && ([x, y][side] > middle) == above
+        })
+    };
     [half(false), half(true)]
 }
 
@@ -226,7 +284,8 @@ fn fitted(shots: &[Shot], noise: f32) -> Image<Pixel> {
     Image::from_fn(w, h, |x, y| {
         let mut lines = [Line::default(); 3];
         for shot in shots {
-            let (p, k): ([f32; 3], [f32; 3]) = (shot.photo[(x, y)].into(), shot.screen[(x, y)].into());
+            let (p, k): ([f32; 3], [f32; 3]) =
+                (shot.photo[(x, y)].into(), shot.screen[(x, y)].into());
             (0..3).for_each(|c| lines[c].add(k[c], p[c]));
         }
         Pixel { lines, noise }
@@ -236,7 +295,11 @@ fn fitted(shots: &[Shot], noise: f32) -> Image<Pixel> {
 /// Channels whose slope is told well enough, by the median over the object.
 fn determined(lines: &Image<Pixel>, inside: &Image<Coverage>, max_sigma: f32) -> [bool; 3] {
     [0, 1, 2].map(|c| {
-        let sigmas = lines.pixels().iter().zip(inside.pixels()).filter(|(_, inside)| inside.0 > 0.5);
+        let sigmas = lines
+            .pixels()
+            .iter()
+            .zip(inside.pixels())
+            .filter(|(_, inside)| inside.0 > 0.5);
         lines::median(sigmas.map(|(p, _)| p.sigma(c))).is_some_and(|sigma| sigma <= max_sigma)
     })
 }
@@ -244,15 +307,27 @@ fn determined(lines: &Image<Pixel>, inside: &Image<Coverage>, max_sigma: f32) ->
 fn residual(shots: &[Shot], solved: &Image<lines::Solved>, inside: &Image<Coverage>) -> f32 {
     let (mut square, mut count) = (0.0_f64, 0.0_f64);
     for i in (0..solved.pixels().len()).filter(|&i| inside.pixels()[i].0 > 0.5) {
-        let lines::Solved { transmittance, reflected, .. } = solved.pixels()[i];
+        let lines::Solved {
+            transmittance,
+            reflected,
+            ..
+        } = solved.pixels()[i];
         for shot in shots {
             let told: [f32; 3] = (reflected + transmittance * shot.screen.pixels()[i]).into();
             let seen: [f32; 3] = shot.photo.pixels()[i].into();
-            square += told.iter().zip(seen).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+            square += told
+                .iter()
+                .zip(seen)
+                .map(|(a, b)| f64::from(a - b).powi(2))
+                .sum::<f64>();
             count += 3.0;
         }
     }
-    if count > 0.0 { (square / count).sqrt() as f32 } else { 0.0 }
+    if count > 0.0 {
+        (square / count).sqrt() as f32
+    } else {
+        0.0
+    }
 }
 
 fn loudest(noise: LinearRgb) -> f32 {

@@ -42,9 +42,18 @@ pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let casters = Casters::new(&cards, Sheet::surface(shot.catcher));
     let tinted = casters.tinted;
     let [fine, coarse] = [1.0, 2.0].map(|scale| Lattice::new(&view, scale * options.cell_px));
-    let studio = Studio { fine, coarse, casters, shot, options };
+    let studio = Studio {
+        fine,
+        coarse,
+        casters,
+        shot,
+        options,
+    };
 
-    let looks: Vec<_> = cards.par_iter().map(|(card, sheet)| Look::of(card, sheet, &view, &offsets)).collect();
+    let looks: Vec<_> = cards
+        .par_iter()
+        .map(|(card, sheet)| Look::of(card, sheet, &view, &offsets))
+        .collect();
     let receiver = |k: usize| match looks.get(k) {
         Some(look) => studio.card(k, look.as_ref()?.texture.grid.reach),
         None => studio.surface(),
@@ -54,19 +63,43 @@ pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
 
     let share = lights.pop().flatten();
     let together = cards.iter().zip(looks).zip(receivers.iter().zip(lights));
-    let seen = together.filter_map(|(((card, _), look), (lit, light))| Some((card, lit.as_ref().and(look)?, light)));
-    let layers = seen.map(|(card, look, light)| look.layer(card, light)).collect();
-    let ground = Ground { seen: Seen::of(&studio.casters.surface, &view), share };
-    let stack =
-        Stack { layers, ground, samples: samples(&view, &fine, offsets, &options), exposure: shot.exposure, tinted };
-    assemble(&view, &tiles(&view).into_par_iter().map(|tile| stack.paint(tile)).collect::<Vec<_>>())
+    let seen = together.filter_map(|(((card, _), look), (lit, light))| {
+        Some((card, lit.as_ref().and(look)?, light))
+    });
+    let layers = seen
+        .map(|(card, look, light)| look.layer(card, light))
+        .collect();
+    let ground = Ground {
+        seen: Seen::of(&studio.casters.surface, &view),
+        share,
+    };
+    let stack = Stack {
+        layers,
+        ground,
+        samples: samples(&view, &fine, offsets, &options),
+        exposure: shot.exposure,
+        tinted,
+    };
+    assemble(
+        &view,
+        &tiles(&view)
+            .into_par_iter()
+            .map(|tile| stack.paint(tile))
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// The same in the dark: what objects cover and hide, and how far away they are, without any light.
 ///
 /// All that labels are made from, at a part of the price; bit for bit what [`cast`] says of it.
 pub fn cover(shot: &Shot, options: &RenderOptions) -> DeepImage {
-    let dark = Shot { lights: Vec::new(), ambient: LinearRgb::BLACK, environment: None, plate: None, ..shot.clone() };
+    let dark = Shot {
+        lights: Vec::new(),
+        ambient: LinearRgb::BLACK,
+        environment: None,
+        plate: None,
+        ..shot.clone()
+    };
     cast(&dark, options)
 }
 
@@ -74,7 +107,12 @@ pub fn cover(shot: &Shot, options: &RenderOptions) -> DeepImage {
 fn samples(view: &View, lattice: &Lattice, offsets: Vec<f64>, options: &RenderOptions) -> Samples {
     let each = options.cell_px < 1.0;
     let places = |pixels: usize| lattice.places(pixels, if each { &offsets } else { &[0.0] });
-    Samples { columns: places(view.width), rows: places(view.height), each, offsets }
+    Samples {
+        columns: places(view.width),
+        rows: places(view.height),
+        each,
+        offsets,
+    }
 }
 
 /// A card in the picture, before it is lit.
@@ -95,15 +133,37 @@ impl Look {
         }
         work::add(Kind::Bakes, 1);
         let (seen, texture) = side(card, sheet, seen, view);
-        let texture = Baked::new(texture, &card.grade, level(texture, sheet, &seen, view, offsets));
+        let texture = Baked::new(
+            texture,
+            &card.grade,
+            level(texture, sheet, &seen, view, offsets),
+        );
         let (rows, columns) = rows_and_columns(sheet, texture.grid.reach, view);
-        Some(Self { seen, texture, columns, rows })
+        Some(Self {
+            seen,
+            texture,
+            columns,
+            rows,
+        })
     }
 
     fn layer(self, card: &Card, light: Option<Map>) -> Layer {
-        let Self { seen, texture, columns, rows } = self;
+        let Self {
+            seen,
+            texture,
+            columns,
+            rows,
+        } = self;
         let sides = sides(&seen.u, &seen.v, &seen.w, texture.grid.reach);
-        Layer { id: card.id, seen, texture, light, sides, columns, rows }
+        Layer {
+            id: card.id,
+            seen,
+            texture,
+            light,
+            sides,
+            columns,
+            rows,
+        }
     }
 }
 
@@ -111,7 +171,13 @@ impl Look {
 fn side<'a>(card: &'a Card, sheet: &Sheet, seen: Seen, view: &View) -> (Seen, &'a Texture) {
     let from_behind = sheet.normal.dot(&(view.eye - sheet.center)) < 0.0;
     match &card.back {
-        Some(back) if from_behind => (Seen { u: seen.w - seen.u, ..seen }, back),
+        Some(back) if from_behind => (
+            Seen {
+                u: seen.w - seen.u,
+                ..seen
+            },
+            back,
+        ),
         _ => (seen, &card.texture),
     }
 }
@@ -122,7 +188,8 @@ fn side<'a>(card: &'a Card, sheet: &Sheet, seen: Seen, view: &View) -> (Seen, &'
 fn level(texture: &Texture, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[f64]) -> f64 {
     let (width, height) = texture.size();
     let texels = (width * height) as f64;
-    let per_pixel = seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
+    let per_pixel =
+        seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
     let dense = if offsets.len() >= DENSE { 0.25 } else { 0.0 };
     let level = libm::log2(2.0 * left_over_sigma(offsets) * per_pixel) - dense;
     // A NaN from a card that fills the horizon reads the full texture.
@@ -131,7 +198,9 @@ fn level(texture: &Texture, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[
 
 fn tiles(view: &View) -> Vec<Block> {
     let cuts = |len: usize| (0..len).step_by(TILE).map(move |a| a..(a + TILE).min(len));
-    cuts(view.height).flat_map(|y| cuts(view.width).map(move |x| Block { x, y: y.clone() })).collect()
+    cuts(view.height)
+        .flat_map(|y| cuts(view.width).map(move |x| Block { x, y: y.clone() }))
+        .collect()
 }
 
 /// Puts the tiles' pixels in order.
@@ -155,7 +224,12 @@ mod tests {
 
     #[test]
     fn tiles_cover_every_pixel_once() {
-        let view = View { eye: Vector3::zeros(), ray: nalgebra::Matrix3::identity(), width: 37, height: 17 };
+        let view = View {
+            eye: Vector3::zeros(),
+            ray: nalgebra::Matrix3::identity(),
+            width: 37,
+            height: 17,
+        };
         let area: usize = tiles(&view).iter().map(|t| t.x.len() * t.y.len()).sum();
         assert_eq!(area, 37 * 17);
     }

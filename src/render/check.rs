@@ -19,12 +19,23 @@ pub fn check(shot: &Shot) -> Result<()> {
         && plate.size() != size
     {
         let (w, h) = plate.size();
-        return Err(Error::value("plate", format!("{w} x {h} pixels, expected {} x {}", size.0, size.1)));
+        return Err(Error::value(
+            "plate",
+            format!("{w} x {h} pixels, expected {} x {}", size.0, size.1),
+        ));
     }
     for (i, light) in shot.lights.iter().enumerate() {
-        let numbers = light.position.iter().chain(&light.target).chain(&light.size).chain([&light.power]);
+        let numbers = light
+            .position
+            .iter()
+            .chain(&light.target)
+            .chain(&light.size)
+            .chain([&light.power]);
         if !numbers.into_iter().all(|v| v.is_finite()) || !light.color.is_finite() {
-            return Err(Error::value(format!("lights[{i}]"), "not finite, expected numbers"));
+            return Err(Error::value(
+                format!("lights[{i}]"),
+                "not finite, expected numbers",
+            ));
         }
     }
     if let Some(map) = &shot.environment
@@ -36,17 +47,22 @@ pub fn check(shot: &Shot) -> Result<()> {
         ));
     }
     if !shot.exposure.is_finite() || !shot.ambient.is_finite() {
-        return Err(Error::value("exposure", "exposure or ambient is not finite, expected numbers"));
+        return Err(Error::value(
+            "exposure",
+            "exposure or ambient is not finite, expected numbers",
+        ));
     }
     let mut ids: Vec<_> = shot.cards.iter().map(|c| c.id).collect();
     ids.sort_unstable();
     if let Some(twice) = ids.windows(2).find(|w| w[0] == w[1]) {
-        return Err(Error::value("cards", format!("id {} is used twice, expected one card each", twice[0].0)));
+        return Err(Error::value(
+            "cards",
+            format!("id {} is used twice, expected one card each", twice[0].0),
+        ));
     }
-    shot.cards
-        .iter()
-        .enumerate()
-        .try_for_each(|(i, card)| check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what)))
+    shot.cards.iter().enumerate().try_for_each(|(i, card)| {
+        check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what))
+    })
 }
 
 fn check_card(card: &Card) -> std::result::Result<(), String> {
@@ -54,7 +70,9 @@ fn check_card(card: &Card) -> std::result::Result<(), String> {
         return Err("id 0, expected 1 or more".into());
     }
     check_texture(&card.texture)?;
-    card.back.as_ref().map_or(Ok(()), |back| check_texture(back).map_err(|what| format!("back: {what}")))
+    card.back.as_ref().map_or(Ok(()), |back| {
+        check_texture(back).map_err(|what| format!("back: {what}"))
+    })
 }
 
 fn check_texture(texture: &Texture) -> std::result::Result<(), String> {
@@ -63,10 +81,14 @@ fn check_texture(texture: &Texture) -> std::result::Result<(), String> {
         let texel = texture.texel(x, y);
         let opacity: [f32; 3] = texel.opacity.into();
         if !texel.color.is_finite() || !texel.opacity.is_finite() {
-            return Err(format!("texture has a value that is not finite at ({x}, {y})"));
+            return Err(format!(
+                "texture has a value that is not finite at ({x}, {y})"
+            ));
         }
         if let Some(wrong) = opacity.iter().find(|o| !(0.0..=1.0).contains(*o)) {
-            return Err(format!("texture has alpha {wrong} at ({x}, {y}), expected 0 to 1"));
+            return Err(format!(
+                "texture has alpha {wrong} at ({x}, {y}), expected 0 to 1"
+            ));
         }
     }
     Ok(())

@@ -32,12 +32,22 @@ impl Cryptomatte {
     ///
     /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with least are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
-        let ids: Vec<(ObjectId, f32)> = names.iter().map(|(object, name)| (*object, id_of(name))).collect();
+        let ids: Vec<(ObjectId, f32)> = names
+            .iter()
+            .map(|(object, name)| (*object, id_of(name)))
+            .collect();
         let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); SETS * SET.len()];
         for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
-            let id = |object| ids.iter().find(|(known, _)| *known == object).map(|&(_, id)| id);
-            let seen =
-                deep.at(x, y).iter().filter(|s| s.visible > 0.0).filter_map(|s| Some((id(s.object)?, s.visible)));
+            let id = |object| {
+                ids.iter()
+                    .find(|(known, _)| *known == object)
+                    .map(|&(_, id)| id)
+            };
+            let seen = deep
+                .at(x, y)
+                .iter()
+                .filter(|s| s.visible > 0.0)
+                .filter_map(|s| Some((id(s.object)?, s.visible)));
             let mut ranks: Vec<(f32, f32)> = seen.collect();
             // By id where coverage is the same, so that nothing depends on depth.
             ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
@@ -48,22 +58,35 @@ impl Cryptomatte {
             }
         }
         let name = |i: usize| format!("{layer}{:02}.{}", i / SET.len(), SET[i % SET.len()]);
-        let channels = planes.into_iter().enumerate().map(|(i, plane)| (name(i), plane)).collect();
-        Self { channels, metadata: metadata(layer, names) }
+        let channels = planes
+            .into_iter()
+            .enumerate()
+            .map(|(i, plane)| (name(i), plane))
+            .collect();
+        Self {
+            channels,
+            metadata: metadata(layer, names),
+        }
     }
 }
 
 fn metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
     let key = &format!("{:08x}", murmur3(layer.as_bytes()))[..KEY];
     let hex = |name: &str| format!("{:08x}", id_of(name).to_bits());
-    let manifest: serde_json::Map<_, _> = names.iter().map(|(_, name)| (name.clone(), hex(name).into())).collect();
+    let manifest: serde_json::Map<_, _> = names
+        .iter()
+        .map(|(_, name)| (name.clone(), hex(name).into()))
+        .collect();
     let texts = [
         ("name", layer.to_owned()),
         ("hash", "MurmurHash3_32".to_owned()),
         ("conversion", "uint32_to_float32".to_owned()),
         ("manifest", serde_json::Value::Object(manifest).to_string()),
     ];
-    texts.into_iter().map(|(what, text)| (format!("cryptomatte/{key}/{what}"), text)).collect()
+    texts
+        .into_iter()
+        .map(|(what, text)| (format!("cryptomatte/{key}/{what}"), text))
+        .collect()
 }
 
 /// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals, infinity and NaN.
@@ -77,13 +100,24 @@ pub(crate) fn id_of(name: &str) -> f32 {
 
 /// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
 pub(crate) fn murmur3(bytes: &[u8]) -> u32 {
-    let mix = |word: u32| word.wrapping_mul(0xcc9e_2d51).rotate_left(15).wrapping_mul(0x1b87_3593);
+    let mix = |word: u32| {
+        word.wrapping_mul(0xcc9e_2d51)
+            .rotate_left(15)
+            .wrapping_mul(0x1b87_3593)
+    };
     let mut hash = 0_u32;
     let words = bytes.chunks_exact(4);
-    let rest = words.remainder().iter().rev().fold(0, |word, &byte| word << 8 | u32::from(byte));
+    let rest = words
+        .remainder()
+        .iter()
+        .rev()
+        .fold(0, |word, &byte| word << 8 | u32::from(byte));
     for word in words {
         hash ^= mix(u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
-        hash = hash.rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64);
+        hash = hash
+            .rotate_left(13)
+            .wrapping_mul(5)
+            .wrapping_add(0xe654_6b64);
     }
     hash ^= mix(rest) ^ bytes.len() as u32;
     hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
@@ -125,13 +159,29 @@ mod tests {
 
     #[test]
     fn objects_are_ranked_by_what_is_seen_of_them() {
-        let sample = |id, visible| DeepSample { object: ObjectId(id), visible, alpha: 1.0, ..DeepSample::default() };
-        let pixel = vec![sample(1, 0.25), sample(2, 0.5), sample(3, 0.0), sample(9, 0.1)];
+        let sample = |id, visible| DeepSample {
+            object: ObjectId(id),
+            visible,
+            alpha: 1.0,
+            ..DeepSample::default()
+        };
+        let pixel = vec![
+            sample(1, 0.25),
+            sample(2, 0.5),
+            sample(3, 0.0),
+            sample(9, 0.1),
+        ];
         let deep = DeepImage::from_pixels(Image::filled(1, 1, LinearRgb::WHITE), [pixel]);
         let names = [1, 2, 3].map(|id| (ObjectId(id), format!("object{id}")));
         let found = Cryptomatte::new(&deep, "CryptoObject", &names);
         let values: Vec<_> = found.channels.iter().map(|(_, plane)| plane[0]).collect();
-        assert_eq!(values[..5], [id_of("object2"), 0.5, id_of("object1"), 0.25, 0.0]);
-        assert_eq!((found.channels.len(), found.channels[7].0.as_str()), (12, "CryptoObject01.A"));
+        assert_eq!(
+            values[..5],
+            [id_of("object2"), 0.5, id_of("object1"), 0.25, 0.0]
+        );
+        assert_eq!(
+            (found.channels.len(), found.channels[7].0.as_str()),
+            (12, "CryptoObject01.A")
+        );
     }
 }

@@ -43,7 +43,10 @@ impl DeepImage {
     ///
     /// # Panics
     /// When there is not one list per pixel of `shadow`.
-    pub fn from_pixels(shadow: Image<LinearRgb>, pixels: impl IntoIterator<Item = Vec<DeepSample>>) -> Self {
+    pub fn from_pixels(
+        shadow: Image<LinearRgb>,
+        pixels: impl IntoIterator<Item = Vec<DeepSample>>,
+    ) -> Self {
         let (width, height) = shadow.size();
         let mut starts = Vec::with_capacity(width * height + 1);
         let mut samples = Vec::new();
@@ -52,8 +55,19 @@ impl DeepImage {
             samples.extend(list);
             starts.push(samples.len() as u32);
         }
-        assert_eq!(starts.len(), width * height + 1, "one list of samples per pixel");
-        Self { width, height, starts, samples, tints: Vec::new(), shadow }
+        assert_eq!(
+            starts.len(),
+            width * height + 1,
+            "one list of samples per pixel"
+        );
+        Self {
+            width,
+            height,
+            starts,
+            samples,
+            tints: Vec::new(),
+            shadow,
+        }
     }
 
     /// The same picture with what each sample hides, channel by channel: `visible`, of which that is the mean.
@@ -63,7 +77,10 @@ impl DeepImage {
     /// # Panics
     /// When there is neither none nor one for each sample.
     pub fn with_tints(self, tints: Vec<LinearRgb>) -> Self {
-        assert!(tints.is_empty() || tints.len() == self.samples.len(), "one tint per sample");
+        assert!(
+            tints.is_empty() || tints.len() == self.samples.len(),
+            "one tint per sample"
+        );
         Self { tints, ..self }
     }
 
@@ -83,11 +100,20 @@ impl DeepImage {
         let pixel = |x: u32, y: u32| y as usize * width + x as usize;
         // Counts become starts, then move to ends as each pixel's samples take their places.
         let mut ends = vec![0u32; width * height + 1];
-        samples.clone().for_each(|(x, y, _)| ends[pixel(x, y) + 1] += 1);
+        samples
+            .clone()
+            .for_each(|(x, y, _)| ends[pixel(x, y) + 1] += 1);
         (0..width * height).for_each(|i| ends[i + 1] += ends[i]);
         let mut placed = vec![DeepSample::default(); ends.last().map_or(0, |&n| n as usize)];
         let mut tints = tints.peekable();
-        let mut placed_tints = vec![LinearRgb::BLACK; if tints.peek().is_some() { placed.len() } else { 0 }];
+        let mut placed_tints = vec![
+            LinearRgb::BLACK;
+            if tints.peek().is_some() {
+                placed.len()
+            } else {
+                0
+            }
+        ];
         for (x, y, sample) in samples {
             let next = &mut ends[pixel(x, y)];
             placed[*next as usize] = sample;
@@ -98,7 +124,14 @@ impl DeepImage {
         }
         ends.rotate_right(1);
         ends[0] = 0;
-        Self { width, height, starts: ends, samples: placed, tints: placed_tints, shadow }
+        Self {
+            width,
+            height,
+            starts: ends,
+            samples: placed,
+            tints: placed_tints,
+            shadow,
+        }
     }
 
     /// Number of columns.
@@ -121,20 +154,29 @@ impl DeepImage {
     /// object of the picture is film: every channel is the sample's `visible` then.
     #[inline(always)]
     pub fn tints(&self, x: usize, y: usize) -> &[LinearRgb] {
-        if self.tints.is_empty() { &[] } else { &self.tints[self.range(x, y)] }
+        if self.tints.is_empty() {
+            &[]
+        } else {
+            &self.tints[self.range(x, y)]
+        }
     }
 
     /// All that the objects do to one pixel: their light, and what they hide of what is behind, per channel.
     #[inline(always)]
     pub fn flat(&self, x: usize, y: usize) -> Film {
         let (samples, tints) = (self.at(x, y), self.tints(x, y));
-        let color = samples.iter().fold(LinearRgb::BLACK, |sum, s| sum + s.light);
+        let color = samples
+            .iter()
+            .fold(LinearRgb::BLACK, |sum, s| sum + s.light);
         let hidden = match tints {
             [] => LinearRgb::grey(samples.iter().map(|s| s.visible).sum()),
             tints => tints.iter().fold(LinearRgb::BLACK, |sum, &t| sum + t),
         };
         // A sum of shares that make up a whole may miss it by a rounding.
-        Film { color, opacity: hidden.map(|o| o.min(1.0)) }
+        Film {
+            color,
+            opacity: hidden.map(|o| o.min(1.0)),
+        }
     }
 
     fn range(&self, x: usize, y: usize) -> std::ops::Range<usize> {
@@ -143,7 +185,10 @@ impl DeepImage {
     }
 
     /// The same picture with other factors on the plate, computed from column, row and factor.
-    pub(crate) fn map_shadow(self, f: impl Fn(usize, usize, LinearRgb) -> LinearRgb + Sync) -> Self {
+    pub(crate) fn map_shadow(
+        self,
+        f: impl Fn(usize, usize, LinearRgb) -> LinearRgb + Sync,
+    ) -> Self {
         let shadow = Image::from_fn(self.width, self.height, |x, y| f(x, y, self.shadow[(x, y)]));
         Self { shadow, ..self }
     }

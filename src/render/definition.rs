@@ -35,11 +35,20 @@ fn square_light() -> AreaLight {
     }
 }
 
-fn card(id: u32, center: [f64; 3], rotation: UnitQuaternion<f64>, size: [f64; 2], texture: Image<PremulRgba>) -> Card {
+fn card(
+    id: u32,
+    center: [f64; 3],
+    rotation: UnitQuaternion<f64>,
+    size: [f64; 2],
+    texture: Image<PremulRgba>,
+) -> Card {
     Card {
         id: ObjectId(id),
         class: 0,
-        quad: Quad { world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation), size },
+        quad: Quad {
+            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+            size,
+        },
         texture: texture.into(),
         back: None,
         outline_uv: Arc::new([]),
@@ -49,7 +58,13 @@ fn card(id: u32, center: [f64; 3], rotation: UnitQuaternion<f64>, size: [f64; 2]
 
 /// A level card of one colour, with enough texels that the fade at its edge is nothing.
 fn level(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
-    card(id, center, UnitQuaternion::identity(), [size; 2], Image::filled(256, 256, texel))
+    card(
+        id,
+        center,
+        UnitQuaternion::identity(),
+        [size; 2],
+        Image::filled(256, 256, texel),
+    )
 }
 
 fn grey(alpha: f32) -> PremulRgba {
@@ -58,15 +73,34 @@ fn grey(alpha: f32) -> PremulRgba {
 
 /// One ray per pixel, many light samples.
 fn sharp() -> RenderOptions {
-    RenderOptions { subsamples: 1, light_samples: 64, ambient_samples: 16, cell_px: 0.5 }
+    RenderOptions {
+        subsamples: 1,
+        light_samples: 64,
+        ambient_samples: 16,
+        cell_px: 0.5,
+    }
 }
 
 /// The factor at a point of the surface, looked at from right above.
-fn factor_at(shot: &Shot, options: &RenderOptions, way: fn(&Shot, &RenderOptions) -> DeepImage, x: f64, y: f64) -> f32 {
+fn factor_at(
+    shot: &Shot,
+    options: &RenderOptions,
+    way: fn(&Shot, &RenderOptions) -> DeepImage,
+    x: f64,
+    y: f64,
+) -> f32 {
     let mut camera = above(3, 3, 1e6);
     camera.camera_from_world.translation.vector.x = -x;
     camera.camera_from_world.translation.vector.y = y;
-    way(&Shot { camera, ..shot.clone() }, options).shadow()[(1, 1)].g
+    way(
+        &Shot {
+            camera,
+            ..shot.clone()
+        },
+        options,
+    )
+    .shadow()[(1, 1)]
+        .g
 }
 
 #[test]
@@ -85,7 +119,10 @@ fn shadows_of_a_square_hit_the_published_numbers() {
             let shot = seen_from_the_side(shot.with_card(caster), x, y);
             for way in [cast, reference] {
                 let found = way(&shot, &sharp()).shadow()[(1, 1)].g;
-                assert!((found - s).abs() < 0.01, "({x}, {y}), alpha {alpha}: {found} against {s}");
+                assert!(
+                    (found - s).abs() < 0.01,
+                    "({x}, {y}), alpha {alpha}: {found} against {s}"
+                );
             }
         }
     }
@@ -96,7 +133,10 @@ fn seen_from_the_side(mut shot: Shot, x: f64, y: f64) -> Shot {
     let target = Point3::new(x, y, 0.0);
     let eye = target + Vector3::new(-1.0, -0.8, 0.35);
     let world_from_camera = Pose::face_towards(&eye, &target, &Vector3::new(0.0, 0.0, -1.0));
-    shot.camera = Camera { camera_from_world: world_from_camera.inverse(), ..above(3, 3, 1e5) };
+    shot.camera = Camera {
+        camera_from_world: world_from_camera.inverse(),
+        ..above(3, 3, 1e5)
+    };
     shot.camera.principal_px = Point2::new(1.5, 1.5);
     shot
 }
@@ -107,7 +147,10 @@ fn far_from_any_card_the_factor_is_exactly_one() {
         .with_light(square_light())
         .with_ambient(LinearRgb::new(0.1, 0.2, 0.3))
         .with_card(level(1, [0.06, 0.02, 0.1], 0.1, grey(1.0)));
-    let lit_only = Shot { ambient: LinearRgb::BLACK, ..shot };
+    let lit_only = Shot {
+        ambient: LinearRgb::BLACK,
+        ..shot
+    };
     assert_eq!(factor_at(&lit_only, &sharp(), cast, -0.6, -0.6), 1.0);
     assert_eq!(factor_at(&lit_only, &sharp(), reference, -0.6, -0.6), 1.0);
 }
@@ -124,13 +167,22 @@ fn each_layer_takes_its_share() {
             let deep = way(&shot, &RenderOptions::default());
             let left = 0.8f32.powi(n as i32);
             // All cards cover the whole light: the surface keeps the same share, the eye sees it through the same.
-            assert!((deep.shadow()[(2, 2)].r - left).abs() < 1e-5, "{n} layers, light");
+            assert!(
+                (deep.shadow()[(2, 2)].r - left).abs() < 1e-5,
+                "{n} layers, light"
+            );
             let samples = deep.at(2, 2);
-            assert!((1.0 - samples.iter().map(|s| s.visible).sum::<f32>() - left).abs() < 1e-5, "{n} layers, eye");
+            assert!(
+                (1.0 - samples.iter().map(|s| s.visible).sum::<f32>() - left).abs() < 1e-5,
+                "{n} layers, eye"
+            );
             let ids: Vec<_> = samples.iter().map(|s| s.object.0).collect();
             assert_eq!(ids, (1..=n).rev().collect::<Vec<_>>());
             for (above, s) in samples.iter().enumerate() {
-                assert!((s.visible - 0.2 * 0.8f32.powi(above as i32)).abs() < 1e-5 && (s.alpha - 0.2).abs() < 1e-5);
+                assert!(
+                    (s.visible - 0.2 * 0.8f32.powi(above as i32)).abs() < 1e-5
+                        && (s.alpha - 0.2).abs() < 1e-5
+                );
             }
         }
     }
@@ -138,30 +190,35 @@ fn each_layer_takes_its_share() {
 
 #[test]
 fn a_lit_card_is_as_bright_as_the_closed_form_says() {
-    let shot = Shot::new(above(5, 5, 400.0)).with_light(square_light()).with_card(level(
-        1,
-        [0.0, 0.0, 0.0],
-        1.0,
-        PremulRgba::new(0.4, 0.3, 0.2, 1.0),
-    ));
+    let shot = Shot::new(above(5, 5, 400.0))
+        .with_light(square_light())
+        .with_card(level(
+            1,
+            [0.0, 0.0, 0.0],
+            1.0,
+            PremulRgba::new(0.4, 0.3, 0.2, 1.0),
+        ));
     for way in [cast, reference] {
         let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
         let e = 2.975061 / std::f32::consts::PI;
-        assert!((c.r - 0.4 * e).abs() < 2e-4 && (c.b - 0.2 * e).abs() < 2e-4, "{c:?}");
+        assert!(
+            (c.r - 0.4 * e).abs() < 2e-4 && (c.b - 0.2 * e).abs() < 2e-4,
+            "{c:?}"
+        );
     }
 }
 
 #[test]
 fn ambient_alone_lights_a_card_by_its_albedo() {
-    let shot = Shot::new(above(5, 5, 400.0)).with_ambient(LinearRgb::new(0.5, 1.0, 2.0)).with_card(level(
-        1,
-        [0.0, 0.0, 0.1],
-        1.0,
-        grey(1.0),
-    ));
+    let shot = Shot::new(above(5, 5, 400.0))
+        .with_ambient(LinearRgb::new(0.5, 1.0, 2.0))
+        .with_card(level(1, [0.0, 0.0, 0.1], 1.0, grey(1.0)));
     for way in [cast, reference] {
         let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
-        assert!((c.r - 0.25).abs() < 1e-5 && (c.b - 1.0).abs() < 1e-5, "{c:?}");
+        assert!(
+            (c.r - 0.25).abs() < 1e-5 && (c.b - 1.0).abs() < 1e-5,
+            "{c:?}"
+        );
     }
 }
 
@@ -171,24 +228,44 @@ fn magnified() -> (Shot, Image<PremulRgba>) {
         let v = 0.05 * (4 * y + x) as f32;
         PremulRgba::new(v, 0.8 - v, 0.3, 1.0)
     });
-    let quad = card(1, [0.0; 3], UnitQuaternion::identity(), [0.4; 2], texture.clone());
-    (Shot::new(above(41, 41, 100.0)).with_ambient(LinearRgb::WHITE).with_card(quad), texture)
+    let quad = card(
+        1,
+        [0.0; 3],
+        UnitQuaternion::identity(),
+        [0.4; 2],
+        texture.clone(),
+    );
+    (
+        Shot::new(above(41, 41, 100.0))
+            .with_ambient(LinearRgb::WHITE)
+            .with_card(quad),
+        texture,
+    )
 }
 
 #[test]
 fn textures_follow_the_convention() {
     let (shot, texture) = magnified();
-    let one = RenderOptions { subsamples: 1, ..Preset::High.options() };
+    let one = RenderOptions {
+        subsamples: 1,
+        ..Preset::High.options()
+    };
     for way in [cast, reference] {
         // The card spans 0.5 to 40.5: texel centres lie on pixel centres 5, 15, 25, 35.
         let deep = way(&shot, &one);
         let at = |x: usize, y: usize| deep.at(x, y)[0];
         for (i, j) in [(0, 0), (3, 0), (1, 2), (3, 3)] {
             let (s, t) = (at(5 + 10 * i, 5 + 10 * j), texture[(i, j)]);
-            assert!((s.light.r - t.r).abs() < 1e-5 && (s.light.g - t.g).abs() < 1e-5, "texel {i}, {j}: {s:?}");
+            assert!(
+                (s.light.r - t.r).abs() < 1e-5 && (s.light.g - t.g).abs() < 1e-5,
+                "texel {i}, {j}: {s:?}"
+            );
         }
         let corner = at(0, 0);
-        assert!((corner.alpha - 0.25).abs() < 1e-4 && (corner.light.g - 0.25 * 0.8).abs() < 1e-4, "{corner:?}");
+        assert!(
+            (corner.alpha - 0.25).abs() < 1e-4 && (corner.light.g - 0.25 * 0.8).abs() < 1e-4,
+            "{corner:?}"
+        );
         let between = at(10, 5).light.r;
         assert!((between - 0.5 * (texture[(0, 0)].r + texture[(1, 0)].r)).abs() < 1e-5);
     }
@@ -212,54 +289,92 @@ fn an_edge_is_as_soft_as_the_window() {
         let size = 2.0;
         // Texels of a hundredth of a pixel: the fade of the outermost half is nothing.
         let texture = Image::filled(20_000, 4, grey(1.0));
-        let edge = card(1, [0.01 * t - 0.5 * size, 0.0, 0.0], UnitQuaternion::identity(), [size; 2], texture);
+        let edge = card(
+            1,
+            [0.01 * t - 0.5 * size, 0.0, 0.0],
+            UnitQuaternion::identity(),
+            [size; 2],
+            texture,
+        );
         let shot = Shot::new(above(9, 9, 100.0)).with_card(edge);
         let alpha = |deep: DeepImage| deep.at(4, 4).first().map_or(0.0, |s| s.alpha);
-        let fine = alpha(reference(&shot, &RenderOptions { subsamples: 64, ..sharp() }));
-        assert!((fine - coverage).abs() < 0.01, "{t}: {fine} against {coverage}");
+        let fine = alpha(reference(
+            &shot,
+            &RenderOptions {
+                subsamples: 64,
+                ..sharp()
+            },
+        ));
+        assert!(
+            (fine - coverage).abs() < 0.01,
+            "{t}: {fine} against {coverage}"
+        );
         let coarse = alpha(cast(&shot, &Preset::High.options()));
-        assert!((coarse - coverage).abs() < 0.17, "{t}: {coarse} against {coverage}");
+        assert!(
+            (coarse - coverage).abs() < 0.17,
+            "{t}: {coarse} against {coverage}"
+        );
     }
 }
 
 fn plate(width: usize, height: usize) -> Image<LinearRgb> {
-    Image::from_fn(width, height, |x, y| LinearRgb::new(0.1 + 0.01 * x as f32, 0.3, 0.013 * y as f32))
+    Image::from_fn(width, height, |x, y| {
+        LinearRgb::new(0.1 + 0.01 * x as f32, 0.3, 0.013 * y as f32)
+    })
 }
 
 #[test]
 fn without_cards_the_plate_is_the_picture_bit_for_bit() {
     let plate = plate(33, 21);
-    let shot = Shot::new(above(33, 21, 30.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.2));
+    let shot = Shot::new(above(33, 21, 30.0))
+        .with_light(square_light())
+        .with_ambient(LinearRgb::grey(0.2));
     for way in [cast, reference] {
         let out = composite::frame(&way(&shot, &Preset::Draft.options()), Some(&plate));
-        assert!(out.pixels().iter().zip(plate.pixels()).all(|(a, &b)| *a == b.opaque()));
+        assert!(
+            out.pixels()
+                .iter()
+                .zip(plate.pixels())
+                .all(|(a, &b)| *a == b.opaque())
+        );
     }
 }
 
 #[test]
 fn pixels_that_no_card_can_shadow_keep_the_plate_s_bits() {
     let plate = plate(64, 48);
-    let shot = Shot::new(above(64, 48, 60.0)).with_light(square_light()).with_card(level(
-        1,
-        [-0.1, -0.1, 0.05],
-        0.1,
-        grey(0.7),
-    ));
+    let shot = Shot::new(above(64, 48, 60.0))
+        .with_light(square_light())
+        .with_card(level(1, [-0.1, -0.1, 0.05], 0.1, grey(0.7)));
     let deep = cast(&shot, &Preset::Fast.options());
     let out = composite::frame(&deep, Some(&plate));
     for (x, y) in [(0, 0), (63, 0), (63, 47), (40, 10)] {
         assert_eq!(out[(x, y)], plate[(x, y)].opaque());
     }
-    assert!(deep.shadow().pixels().iter().any(|s| s.r < 0.99), "there is a shadow to tell from");
+    assert!(
+        deep.shadow().pixels().iter().any(|s| s.r < 0.99),
+        "there is a shadow to tell from"
+    );
 }
 
 #[test]
 fn ways_agree_on_a_pile() {
     let shot = pile();
-    let exact = composite::frame(&reference(&shot, &Preset::High.options()), Some(&plate(64, 48)));
-    for (quality, limit) in [(Preset::Draft, 0.012), (Preset::Fast, 0.008), (Preset::High, 0.005)] {
+    let exact = composite::frame(
+        &reference(&shot, &Preset::High.options()),
+        Some(&plate(64, 48)),
+    );
+    for (quality, limit) in [
+        (Preset::Draft, 0.012),
+        (Preset::Fast, 0.008),
+        (Preset::High, 0.005),
+    ] {
         let fast = composite::frame(&cast(&shot, &quality.options()), Some(&plate(64, 48)));
-        let squares = fast.pixels().iter().zip(exact.pixels()).map(|(a, b)| f64::from((a.g - b.g).powi(2)));
+        let squares = fast
+            .pixels()
+            .iter()
+            .zip(exact.pixels())
+            .map(|(a, b)| f64::from((a.g - b.g).powi(2)));
         let rmse = (squares.sum::<f64>() / (64.0 * 48.0)).sqrt();
         assert!(rmse < limit, "{quality:?}: {rmse}");
     }
@@ -274,12 +389,20 @@ fn pile() -> Shot {
             PremulRgba::new(hue * alpha, 0.5 * alpha, (1.0 - hue) * alpha, alpha)
         })
     };
-    let mut shot = Shot::new(above(64, 48, 60.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.3));
+    let mut shot = Shot::new(above(64, 48, 60.0))
+        .with_light(square_light())
+        .with_ambient(LinearRgb::grey(0.3));
     for k in 0..5 {
         let f = f64::from(k);
         let rotation = UnitQuaternion::from_euler_angles(0.3 * (f - 2.0), 0.2 * f - 0.4, 1.3 * f);
         let center = [0.2 * f - 0.45, 0.15 * (f - 2.0), 0.08 + 0.02 * f];
-        shot = shot.with_card(card(k + 1, center, rotation, [0.35, 0.25], blob(0.2 * k as f32)));
+        shot = shot.with_card(card(
+            k + 1,
+            center,
+            rotation,
+            [0.35, 0.25],
+            blob(0.2 * k as f32),
+        ));
     }
     shot
 }
@@ -294,7 +417,10 @@ fn the_order_of_cards_changes_nothing() {
     let shot = pile();
     let mut turned = shot.clone();
     turned.cards.reverse();
-    assert!(same(&cast(&shot, &RenderOptions::default()), &cast(&turned, &RenderOptions::default())));
+    assert!(same(
+        &cast(&shot, &RenderOptions::default()),
+        &cast(&turned, &RenderOptions::default())
+    ));
 }
 
 #[test]
@@ -317,7 +443,9 @@ fn crossing_cards_swap_places_where_they_cross() {
 /// More than any card of a shot may show: whitest texel, nearest to the light, facing it.
 fn brightest(shot: &Shot, light: &AreaLight) -> f32 {
     let corners = shot.cards.iter().flat_map(|c| c.quad.corners());
-    let nearest = corners.map(|c| (c - Point3::from(light.position)).norm()).fold(f64::INFINITY, f64::min);
+    let nearest = corners
+        .map(|c| (c - Point3::from(light.position)).norm())
+        .fold(f64::INFINITY, f64::min);
     let radius = 0.5 * light.size[0].hypot(light.size[1]);
     let from_light = light.power / (PI * (nearest - radius).powi(2));
     (from_light / PI) as f32 + shot.ambient.r
@@ -329,9 +457,18 @@ fn everything_stays_within_its_bounds() {
     let most = brightest(&shot, &square_light());
     for quality in [Preset::Draft, Preset::Fast, Preset::High] {
         let deep = cast(&shot, &quality.options());
-        assert!(deep.shadow().pixels().iter().all(|s| (0.0..=1.0).contains(&s.r) && (0.0..=1.0).contains(&s.b)));
+        assert!(
+            deep.shadow()
+                .pixels()
+                .iter()
+                .all(|s| (0.0..=1.0).contains(&s.r) && (0.0..=1.0).contains(&s.b))
+        );
         for p in composite::frame(&deep, None).pixels() {
-            assert!((0.0..=1.0).contains(&p.a) && (0.0..=most).contains(&p.r) && (0.0..=most).contains(&p.b));
+            assert!(
+                (0.0..=1.0).contains(&p.a)
+                    && (0.0..=most).contains(&p.r)
+                    && (0.0..=most).contains(&p.b)
+            );
         }
         let pixels = (0..48).flat_map(|y| (0..64).map(move |x| (x, y)));
         for s in pixels.flat_map(|(x, y)| deep.at(x, y)) {
@@ -344,7 +481,10 @@ fn everything_stays_within_its_bounds() {
 fn any_number_of_threads_gives_the_same_bits() {
     let shot = pile();
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| cast(&shot, &RenderOptions::default()))
     };
     assert!(same(&with(1), &with(4)));
@@ -353,15 +493,24 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn exposure_scales_the_cards_alone() {
     let shot = pile();
-    let bright = Shot { exposure: 2.0, ..shot.clone() };
-    let (a, b) = (cast(&shot, &RenderOptions::default()), cast(&bright, &RenderOptions::default()));
+    let bright = Shot {
+        exposure: 2.0,
+        ..shot.clone()
+    };
+    let (a, b) = (
+        cast(&shot, &RenderOptions::default()),
+        cast(&bright, &RenderOptions::default()),
+    );
     assert_eq!(a.shadow(), b.shadow());
     assert_eq!(b.at(32, 24)[0].light, a.at(32, 24)[0].light.scale(2.0));
 }
 
 #[test]
 fn a_finite_catcher_ends_the_shadow() {
-    let mut shot = Shot::new(above(21, 21, 20.0)).with_light(AreaLight { position: [0.0, 0.0, 1.0], ..square_light() });
+    let mut shot = Shot::new(above(21, 21, 20.0)).with_light(AreaLight {
+        position: [0.0, 0.0, 1.0],
+        ..square_light()
+    });
     shot = shot.with_card(level(1, [0.0, 0.0, 0.3], 0.3, grey(0.5)));
     shot.catcher = [0.1, 0.1];
     for way in [cast, reference] {
@@ -373,15 +522,34 @@ fn a_finite_catcher_ends_the_shadow() {
 
 /// Shots in which something is missing or of one colour; `petcomp report stability` has those that are hard to look at.
 fn awkward() -> Vec<(&'static str, Shot)> {
-    let base = || Shot::new(above(16, 12, 20.0)).with_light(square_light()).with_ambient(LinearRgb::grey(0.1));
+    let base = || {
+        Shot::new(above(16, 12, 20.0))
+            .with_light(square_light())
+            .with_ambient(LinearRgb::grey(0.1))
+    };
     vec![
-        ("a black map", base().with_environment(surroundings(Image::filled(4, 2, LinearRgb::BLACK), 0.0))),
-        ("a map of one pixel", base().with_environment(surroundings(Image::filled(1, 1, LinearRgb::WHITE), f64::MAX))),
+        (
+            "a black map",
+            base().with_environment(surroundings(Image::filled(4, 2, LinearRgb::BLACK), 0.0)),
+        ),
+        (
+            "a map of one pixel",
+            base().with_environment(surroundings(
+                Image::filled(1, 1, LinearRgb::WHITE),
+                f64::MAX,
+            )),
+        ),
         ("film", tinted(Texture::from)),
-        ("dark", Shot::new(above(16, 12, 20.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8)))),
+        (
+            "dark",
+            Shot::new(above(16, 12, 20.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))),
+        ),
         (
             "no picture",
-            Shot { camera: above(0, 0, 20.0), ..base().with_card(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8))) },
+            Shot {
+                camera: above(0, 0, 20.0),
+                ..base().with_card(level(1, [0.0, 0.0, 0.1], 0.2, grey(0.8)))
+            },
         ),
     ]
 }
@@ -392,8 +560,19 @@ fn awkward_shots_give_defined_pictures() {
         for way in [cast, reference] {
             let deep = way(&shot, &Preset::Fast.options());
             let out = composite::frame(&deep, None);
-            assert!(out.pixels().iter().all(|p| p.color().is_finite() && (0.0..=1.0).contains(&p.a)), "{name}");
-            assert!(deep.shadow().pixels().iter().all(|s| (0.0..=1.0).contains(&s.g)), "{name}");
+            assert!(
+                out.pixels()
+                    .iter()
+                    .all(|p| p.color().is_finite() && (0.0..=1.0).contains(&p.a)),
+                "{name}"
+            );
+            assert!(
+                deep.shadow()
+                    .pixels()
+                    .iter()
+                    .all(|s| (0.0..=1.0).contains(&s.g)),
+                "{name}"
+            );
         }
     }
 }
@@ -401,7 +580,11 @@ fn awkward_shots_give_defined_pictures() {
 /// A card whose film keeps back most of the green, over a card with alpha, with a back of its own.
 fn tinted(make: impl Fn(Image<Film>) -> Texture) -> Shot {
     let film = Image::from_fn(32, 24, |x, y| {
-        let cover = if (4..28).contains(&x) && (3..21).contains(&y) { 1.0 } else { 0.0 };
+        let cover = if (4..28).contains(&x) && (3..21).contains(&y) {
+            1.0
+        } else {
+            0.0
+        };
         Film {
             color: LinearRgb::new(0.1, 0.05, 0.02).scale(cover),
             opacity: LinearRgb::new(0.2, 0.8, 0.5).scale(cover),
@@ -415,29 +598,48 @@ fn tinted(make: impl Fn(Image<Film>) -> Texture) -> Shot {
 
 #[test]
 fn grey_film_gives_the_bits_of_alpha() {
-    let grey = |film: Image<Film>| film.map(|f| Film { opacity: LinearRgb::grey(f.opacity.g), ..f });
+    let grey = |film: Image<Film>| {
+        film.map(|f| Film {
+            opacity: LinearRgb::grey(f.opacity.g),
+            ..f
+        })
+    };
     let as_alpha = tinted(|film| grey(film).into());
     let as_film = tinted(|film| Texture::Film(Arc::new(crate::filter::Pyramid::new(grey(film)))));
     for way in [cast, reference] {
         let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &Preset::Fast.options()));
         assert_eq!(a.shadow(), b.shadow());
-        assert_eq!(composite::frame(&a, Some(&plate(64, 48))), composite::frame(&b, Some(&plate(64, 48))));
-        let tinted = |deep: &DeepImage| (0..48).any(|y| (0..64).any(|x| !deep.tints(x, y).is_empty()));
+        assert_eq!(
+            composite::frame(&a, Some(&plate(64, 48))),
+            composite::frame(&b, Some(&plate(64, 48)))
+        );
+        let tinted =
+            |deep: &DeepImage| (0..48).any(|y| (0..64).any(|x| !deep.tints(x, y).is_empty()));
         assert!(!tinted(&a) && tinted(&b));
     }
 }
 
 #[test]
 fn film_tints_what_is_behind_and_its_shadow() {
-    let film = Film { color: LinearRgb::BLACK, opacity: LinearRgb::new(0.2, 0.8, 0.5) };
+    let film = Film {
+        color: LinearRgb::BLACK,
+        opacity: LinearRgb::new(0.2, 0.8, 0.5),
+    };
     let mut card = level(1, [0.0, 0.0, 0.1], 4.0, grey(1.0));
     card.texture = Image::filled(256, 256, film).into();
-    let shot = Shot::new(above(5, 5, 50.0)).with_light(square_light()).with_card(card);
+    let shot = Shot::new(above(5, 5, 50.0))
+        .with_light(square_light())
+        .with_card(card);
     for way in [cast, reference] {
         let deep = way(&shot, &RenderOptions::default());
         let (s, flat) = (deep.shadow()[(2, 2)], deep.flat(2, 2));
-        assert!((s.r - 0.8).abs() < 1e-5 && (s.g - 0.2).abs() < 1e-5 && (s.b - 0.5).abs() < 1e-5, "{s:?}");
-        assert!((flat.opacity.g - 0.8).abs() < 1e-5 && (deep.at(2, 2)[0].visible - 0.5).abs() < 1e-5);
+        assert!(
+            (s.r - 0.8).abs() < 1e-5 && (s.g - 0.2).abs() < 1e-5 && (s.b - 0.5).abs() < 1e-5,
+            "{s:?}"
+        );
+        assert!(
+            (flat.opacity.g - 0.8).abs() < 1e-5 && (deep.at(2, 2)[0].visible - 0.5).abs() < 1e-5
+        );
         let out = composite::frame(&deep, Some(&Image::filled(5, 5, LinearRgb::WHITE)));
         assert!((out[(2, 2)].r - 0.64).abs() < 1e-4 && (out[(2, 2)].g - 0.04).abs() < 1e-4);
     }
@@ -446,25 +648,31 @@ fn film_tints_what_is_behind_and_its_shadow() {
 #[test]
 fn both_ways_agree_on_film() {
     let shot = tinted(Texture::from);
-    let [a, b] =
-        [cast, reference].map(|way| composite::frame(&way(&shot, &Preset::High.options()), Some(&plate(64, 48))));
+    let [a, b] = [cast, reference]
+        .map(|way| composite::frame(&way(&shot, &Preset::High.options()), Some(&plate(64, 48))));
     assert!(difference(&a, &b) < 0.006, "{}", difference(&a, &b));
 }
 
 fn difference(a: &Image<PremulRgba>, b: &Image<PremulRgba>) -> f64 {
-    let squares = a.pixels().iter().zip(b.pixels()).map(|(a, b)| f64::from((a.g - b.g).powi(2)));
+    let squares = a
+        .pixels()
+        .iter()
+        .zip(b.pixels())
+        .map(|(a, b)| f64::from((a.g - b.g).powi(2)));
     (squares.sum::<f64>() / a.pixels().len() as f64).sqrt()
 }
 
 #[test]
 fn interreflection_brightens_the_surface_under_a_card_alone() {
     // A wide white card of alpha 1/2 sends half of the light back: 1 / (1 - 0.8 * 0.5).
-    let shot = Shot::new(above(21, 21, 100.0)).with_ambient(LinearRgb::WHITE).with_card(level(
-        1,
-        [0.0, 0.0, 0.05],
-        0.1,
-        PremulRgba::new(0.5, 0.25, 0.0, 0.5),
-    ));
+    let shot = Shot::new(above(21, 21, 100.0))
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level(
+            1,
+            [0.0, 0.0, 0.05],
+            0.1,
+            PremulRgba::new(0.5, 0.25, 0.0, 0.5),
+        ));
     let plain = cast(&shot, &RenderOptions::default());
     let bounced = interreflect(plain.clone(), &shot, LinearRgb::grey(0.8));
     let gain = |x: usize| {
@@ -472,7 +680,10 @@ fn interreflection_brightens_the_surface_under_a_card_alone() {
         [a.r / b.r, a.g / b.g, a.b / b.b]
     };
     let middle = gain(10);
-    assert!((middle[0] - 1.0 / 0.6).abs() < 2e-3 && (middle[1] - 1.25).abs() < 2e-3, "{middle:?}");
+    assert!(
+        (middle[0] - 1.0 / 0.6).abs() < 2e-3 && (middle[1] - 1.25).abs() < 2e-3,
+        "{middle:?}"
+    );
     assert!((middle[2] - 1.0).abs() < 1e-6 && (gain(0)[0] - 1.0).abs() < 1e-3);
     let black = interreflect(plain.clone(), &shot, LinearRgb::BLACK);
     assert!(same(&black, &plain), "a black surface sends nothing back");
@@ -488,9 +699,17 @@ fn a_card_turned_over_shows_its_back_the_right_way_round() {
     };
     let over = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), PI);
     let mut turned = card(1, [0.0; 3], over, [0.4; 2], half(0.1, 0.2));
-    let lit = |card: &Card| Shot::new(above(41, 41, 100.0)).with_ambient(LinearRgb::WHITE).with_card(card.clone());
+    let lit = |card: &Card| {
+        Shot::new(above(41, 41, 100.0))
+            .with_ambient(LinearRgb::WHITE)
+            .with_card(card.clone())
+    };
     for way in [cast, reference] {
-        let at = |card: &Card, x: usize| way(&lit(card), &RenderOptions::default()).at(x, 20)[0].light.g;
+        let at = |card: &Card, x: usize| {
+            way(&lit(card), &RenderOptions::default()).at(x, 20)[0]
+                .light
+                .g
+        };
         // Seen through, the front is mirrored.
         turned.back = None;
         assert!((at(&turned, 10) - 0.2).abs() < 1e-4 && (at(&turned, 30) - 0.1).abs() < 1e-4);
@@ -500,7 +719,11 @@ fn a_card_turned_over_shows_its_back_the_right_way_round() {
 }
 
 fn surroundings(image: Image<LinearRgb>, rotation: f64) -> EnvironmentMap {
-    EnvironmentMap { panorama: Arc::new(Panorama::new(image).unwrap()), rotation, strength: 1.0 }
+    EnvironmentMap {
+        panorama: Arc::new(Panorama::new(image).unwrap()),
+        rotation,
+        strength: 1.0,
+    }
 }
 
 #[test]
@@ -510,20 +733,33 @@ fn an_even_map_lights_as_the_constant_environment_does() {
     let shot = shot.with_environment(surroundings(Image::filled(16, 8, radiance), 0.3));
     for way in [cast, reference] {
         let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
-        assert!((c.r - 0.25).abs() < 1e-3 && (c.b - 1.0).abs() < 4e-3, "{c:?}");
+        assert!(
+            (c.r - 0.25).abs() < 1e-3 && (c.b - 1.0).abs() < 4e-3,
+            "{c:?}"
+        );
     }
 }
 
 /// A sun of a few texels at 45 degrees over `+x` in a dim sky.
 fn sun(rotation: f64) -> EnvironmentMap {
-    let value = |x: usize, y: usize| if (255..257).contains(&x) && (63..65).contains(&y) { 4000.0 } else { 0.2 };
-    surroundings(Image::from_fn(512, 256, |x, y| LinearRgb::grey(value(x, y))), rotation)
+    let value = |x: usize, y: usize| {
+        if (255..257).contains(&x) && (63..65).contains(&y) {
+            4000.0
+        } else {
+            0.2
+        }
+    };
+    surroundings(
+        Image::from_fn(512, 256, |x, y| LinearRgb::grey(value(x, y))),
+        rotation,
+    )
 }
 
 #[test]
 fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
     for rotation in [0.0, 0.5 * PI, 2.0] {
-        let shot = Shot::new(above(81, 81, 100.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.1, grey(1.0)));
+        let shot =
+            Shot::new(above(81, 81, 100.0)).with_card(level(1, [0.0, 0.0, 0.1], 0.1, grey(1.0)));
         let shot = shot.with_environment(sun(rotation));
         // A direction of the world is turned by the rotation before it is looked up: the sun stands at minus that.
         let (sin, cos) = libm::sincos(-rotation);
@@ -531,10 +767,17 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
         let pixel = ((40.5 + 100.0 * x) as usize, (40.5 - 100.0 * y) as usize);
         let across = ((40.5 - 100.0 * x) as usize, (40.5 + 100.0 * y) as usize);
         for way in [cast, reference] {
-            let options = RenderOptions { ambient_samples: 128, subsamples: 1, ..Preset::Good.options() };
+            let options = RenderOptions {
+                ambient_samples: 128,
+                subsamples: 1,
+                ..Preset::Good.options()
+            };
             let deep = way(&shot, &options);
             let (dark, bright) = (deep.shadow()[pixel].g, deep.shadow()[across].g);
-            assert!(dark < 0.6 && bright > 0.9, "{rotation}: {dark} and {bright}");
+            assert!(
+                dark < 0.6 && bright > 0.9,
+                "{rotation}: {dark} and {bright}"
+            );
         }
     }
 }
@@ -543,8 +786,16 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
 fn both_ways_agree_under_a_map() {
     let mut shot = pile().with_environment(sun(1.0));
     shot.ambient = LinearRgb::BLACK;
-    let options = RenderOptions { ambient_samples: 400, ..Preset::High.options() };
-    let exact = RenderOptions { ambient_samples: 3200, subsamples: 2, light_samples: 3, cell_px: 1.0 };
+    let options = RenderOptions {
+        ambient_samples: 400,
+        ..Preset::High.options()
+    };
+    let exact = RenderOptions {
+        ambient_samples: 3200,
+        subsamples: 2,
+        light_samples: 3,
+        cell_px: 1.0,
+    };
     let a = composite::frame(&cast(&shot, &options), Some(&plate(64, 48)));
     let b = composite::frame(&reference(&shot, &exact), Some(&plate(64, 48)));
     assert!(difference(&a, &b) < 0.012, "{}", difference(&a, &b));
@@ -552,42 +803,66 @@ fn both_ways_agree_under_a_map() {
 
 #[test]
 fn options_out_of_range_are_brought_into_it() {
-    let none = RenderOptions { subsamples: 0, light_samples: 0, ambient_samples: 0, cell_px: f64::NAN };
+    let none = RenderOptions {
+        subsamples: 0,
+        light_samples: 0,
+        ambient_samples: 0,
+        cell_px: f64::NAN,
+    };
     let deep = cast(&pile(), &none);
-    assert!(composite::frame(&deep, None).pixels().iter().all(|p| p.color().is_finite()));
+    assert!(
+        composite::frame(&deep, None)
+            .pixels()
+            .iter()
+            .all(|p| p.color().is_finite())
+    );
 }
 
 #[test]
 fn what_cannot_be_rendered_is_refused_at_the_door() {
     let message = |shot: &Shot| check(shot).unwrap_err().to_string();
-    let with = |texel: PremulRgba| Shot::new(above(4, 4, 9.0)).with_card(level(1, [0.0; 3], 0.2, texel));
+    let with =
+        |texel: PremulRgba| Shot::new(above(4, 4, 9.0)).with_card(level(1, [0.0; 3], 0.2, texel));
     assert!(check(&with(grey(1.0))).is_ok());
-    assert!(message(&with(PremulRgba::new(f32::NAN, 0.0, 0.0, 1.0))).starts_with("cards[0]: texture has a value"));
+    assert!(
+        message(&with(PremulRgba::new(f32::NAN, 0.0, 0.0, 1.0)))
+            .starts_with("cards[0]: texture has a value")
+    );
     assert!(message(&with(PremulRgba::new(0.0, 0.0, 0.0, 1.5))).contains("alpha 1.5"));
-    let film = Film { color: LinearRgb::BLACK, opacity: LinearRgb::new(0.0, f32::NAN, 0.0) };
+    let film = Film {
+        color: LinearRgb::BLACK,
+        opacity: LinearRgb::new(0.0, f32::NAN, 0.0),
+    };
     let mut backed = with(grey(1.0));
     backed.cards[0].back = Some(Image::filled(2, 2, film).into());
-    assert!(message(&backed).starts_with("cards[0]: back: texture has a value"), "{}", message(&backed));
-    let turned = with(grey(1.0)).with_environment(surroundings(Image::filled(2, 1, LinearRgb::WHITE), f64::NAN));
+    assert!(
+        message(&backed).starts_with("cards[0]: back: texture has a value"),
+        "{}",
+        message(&backed)
+    );
+    let turned = with(grey(1.0)).with_environment(surroundings(
+        Image::filled(2, 1, LinearRgb::WHITE),
+        f64::NAN,
+    ));
     assert!(message(&turned).starts_with("environment"));
     let twice = with(grey(1.0)).with_card(level(1, [0.0; 3], 0.2, grey(1.0)));
     assert!(message(&twice).contains("id 1 is used twice"));
     let mut small = with(grey(1.0));
     small.plate = Some(Arc::new(Image::new(3, 4)));
     assert_eq!(message(&small), "plate: 3 x 4 pixels, expected 4 x 4");
-    let broken = with(grey(1.0)).with_light(AreaLight { power: f64::NAN, ..square_light() });
+    let broken = with(grey(1.0)).with_light(AreaLight {
+        power: f64::NAN,
+        ..square_light()
+    });
     assert!(message(&broken).starts_with("lights[0]"));
 }
 
 #[test]
 fn the_closed_form_is_what_a_bare_surface_gets() {
     // A card of albedo 1 on the surface shows the unshadowed irradiance over pi.
-    let shot = Shot::new(above(5, 5, 400.0)).with_light(square_light()).with_card(level(
-        1,
-        [0.0; 3],
-        1.0,
-        PremulRgba::new(1.0, 1.0, 1.0, 1.0),
-    ));
+    let shot = Shot::new(above(5, 5, 400.0))
+        .with_light(square_light())
+        .with_card(level(1, [0.0; 3], 1.0, PremulRgba::new(1.0, 1.0, 1.0, 1.0)));
     let e = light::irradiance(&square_light(), Point3::origin(), Vector3::z());
     let c = cast(&shot, &Preset::High.options()).at(2, 2)[0].light;
     assert!((c.g - e.g / std::f32::consts::PI).abs() < 1e-5);

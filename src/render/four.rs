@@ -34,13 +34,17 @@ impl Four {
     /// `self` at 0, `o` at 1; exactly the value where both are the same.
     #[inline(always)]
     pub(super) fn lerp(self, o: Self, t: f32) -> Self {
-        Self(std::array::from_fn(|i| self.0[i] + t * (o.0[i] - self.0[i])))
+        Self(std::array::from_fn(|i| {
+            self.0[i] + t * (o.0[i] - self.0[i])
+        }))
     }
 
     /// Between four corners of a cell.
     #[inline(always)]
     pub(super) fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
-        top[0].lerp(top[1], fx).lerp(bottom[0].lerp(bottom[1], fx), fy)
+        top[0]
+            .lerp(top[1], fx)
+            .lerp(bottom[0].lerp(bottom[1], fx), fy)
     }
 }
 

@@ -19,9 +19,20 @@ pub(super) fn span(sides: &[Vector3<f64>], y: f64) -> (f64, f64) {
 }
 
 /// Sides of the shape `0 <= u/w <= 1`, `0 <= v/w <= 1`, `w >= 0`, reaching further out by shares of it.
-pub(super) fn sides(u: &Vector3<f64>, v: &Vector3<f64>, w: &Vector3<f64>, reach: [f64; 2]) -> [Vector3<f64>; 5] {
+pub(super) fn sides(
+    u: &Vector3<f64>,
+    v: &Vector3<f64>,
+    w: &Vector3<f64>,
+    reach: [f64; 2],
+) -> [Vector3<f64>; 5] {
     let [a, b] = reach;
-    [u + w * a, w * (1.0 + a) - u, v + w * b, w * (1.0 + b) - v, *w]
+    [
+        u + w * a,
+        w * (1.0 + a) - u,
+        v + w * b,
+        w * (1.0 + b) - v,
+        *w,
+    ]
 }
 
 /// The same side, `by` further out both along x and along y.
@@ -35,10 +46,18 @@ pub(super) fn meet(a: &std::ops::Range<usize>, b: &std::ops::Range<usize>) -> bo
 }
 
 /// Whole numbers in `low..=high`, cut to `within`.
-pub(super) fn whole(low: f64, high: f64, within: &std::ops::Range<usize>) -> std::ops::Range<usize> {
+pub(super) fn whole(
+    low: f64,
+    high: f64,
+    within: &std::ops::Range<usize>,
+) -> std::ops::Range<usize> {
     // `as` saturates, so infinite ends are cut like all others.
     let start = (low.ceil().max(0.0) as usize).clamp(within.start, within.end);
-    let end = if high >= 0.0 { (high.floor() as usize).saturating_add(1).min(within.end) } else { 0 };
+    let end = if high >= 0.0 {
+        (high.floor() as usize).saturating_add(1).min(within.end)
+    } else {
+        0
+    };
     start..end.max(start)
 }
 
@@ -48,7 +67,11 @@ mod tests {
 
     #[test]
     fn a_square_has_its_rows() {
-        let (u, v, w) = (Vector3::new(0.1, 0.0, -0.2), Vector3::new(0.0, 0.1, -0.2), Vector3::z());
+        let (u, v, w) = (
+            Vector3::new(0.1, 0.0, -0.2),
+            Vector3::new(0.0, 0.1, -0.2),
+            Vector3::z(),
+        );
         let shape = sides(&u, &v, &w, [0.0; 2]);
         let (low, high) = span(&shape, 7.0);
         assert!((low - 2.0).abs() < 1e-12 && (high - 12.0).abs() < 1e-12);

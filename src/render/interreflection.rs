@@ -29,7 +29,9 @@ const MOST_STEPS: f64 = 1024.0;
 pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImage {
     let view = View::of(&shot.camera);
     let seen = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
-    let (Some(seen), Some(above)) = (seen, Above::of(shot)) else { return deep };
+    let (Some(seen), Some(above)) = (seen, Above::of(shot)) else {
+        return deep;
+    };
     deep.map_shadow(|x, y, factor| {
         let p = Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0);
         let w = seen.w.dot(&p);
@@ -53,7 +55,10 @@ impl Above {
     /// None without cards.
     fn of(shot: &Shot) -> Option<Self> {
         let cards = sheets(shot);
-        let corners: Vec<_> = cards.iter().flat_map(|(_, sheet)| sheet.corners()).collect();
+        let corners: Vec<_> = cards
+            .iter()
+            .flat_map(|(_, sheet)| sheet.corners())
+            .collect();
         let side = |axis: usize| {
             let low = corners.iter().map(|c| c[axis]).reduce(f64::min)? - 3.0 * SPREAD;
             let high = corners.iter().map(|c| c[axis]).reduce(f64::max)? + 3.0 * SPREAD;
@@ -62,9 +67,15 @@ impl Above {
         let ((left, width), (bottom, height)) = (side(0)?, side(1)?);
         let step = STEP.max(width.max(height) / MOST_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
-        let at = |i: usize, j: usize| Vector3::new(left + i as f64 * step, bottom + j as f64 * step, 0.0);
+        let at = |i: usize, j: usize| {
+            Vector3::new(left + i as f64 * step, bottom + j as f64 * step, 0.0)
+        };
         let back = Image::from_fn(columns, rows, |i, j| straight_above(&cards, &at(i, j)));
-        Some(Self { corner: [left, bottom], step, back: gaussian_blur(&back, (SPREAD / step) as f32) })
+        Some(Self {
+            corner: [left, bottom],
+            step,
+            back: gaussian_blur(&back, (SPREAD / step) as f32),
+        })
     }
 
     fn at(&self, point: &Vector3<f64>) -> LinearRgb {
@@ -78,8 +89,12 @@ fn straight_above(cards: &[(&Card, Sheet)], point: &Vector3<f64>) -> LinearRgb {
     let hit = |(card, sheet): &(&Card, Sheet)| {
         let height = sheet.normal.dot(&(sheet.center - point)) / sheet.normal.z;
         let local = point + Vector3::z() * height - sheet.center;
-        let uv = [local.dot(&sheet.x) / sheet.size[0] + 0.5, 0.5 - local.dot(&sheet.y) / sheet.size[1]];
-        let inside = height > 0.0 && height.is_finite() && uv.iter().all(|c| (0.0..=1.0).contains(c));
+        let uv = [
+            local.dot(&sheet.x) / sheet.size[0] + 0.5,
+            0.5 - local.dot(&sheet.y) / sheet.size[1],
+        ];
+        let inside =
+            height > 0.0 && height.is_finite() && uv.iter().all(|c| (0.0..=1.0).contains(c));
         inside.then(|| (height, texel(card, sheet, uv, point)))
     };
     let mut hits: Vec<_> = cards.iter().filter_map(hit).collect();

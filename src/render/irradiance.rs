@@ -22,11 +22,24 @@ pub(super) struct Map {
 ///
 /// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number. None in the dark.
 pub(super) fn maps(receivers: &[Option<Lit>]) -> Vec<Option<Map>> {
-    let lit = || receivers.iter().map(|r| r.as_ref().filter(|r| !r.is_dark()));
-    let mut soft: Vec<_> = lit().map(|r| r.map(|r| Map::of(&r.coarse, Four::ZERO))).collect();
-    fill(receivers, &mut soft, |lit, _| &lit.coarse, |lit, _, j, out, buffers| hidden(&lit.coarse, j, out, buffers));
+    let lit = || {
+        receivers
+            .iter()
+            .map(|r| r.as_ref().filter(|r| !r.is_dark()))
+    };
+    let mut soft: Vec<_> = lit()
+        .map(|r| r.map(|r| Map::of(&r.coarse, Four::ZERO)))
+        .collect();
+    fill(
+        receivers,
+        &mut soft,
+        |lit, _| &lit.coarse,
+        |lit, _, j, out, buffers| hidden(&lit.coarse, j, out, buffers),
+    );
     let empty = |lit: &Lit| if lit.relative { Four::ONE } else { Four::ZERO };
-    let mut maps: Vec<_> = lit().map(|r| r.map(|r| Map::of(&r.fine, empty(r)))).collect();
+    let mut maps: Vec<_> = lit()
+        .map(|r| r.map(|r| Map::of(&r.fine, empty(r))))
+        .collect();
     let with_soft = |lit: &Lit, k: usize, j: usize, out: &mut [Four], buffers: &mut Buffers| {
         if let Some(soft) = &soft[k] {
             whole_row(lit, soft, j, out, buffers);
@@ -43,13 +56,24 @@ fn fill(
     part: impl Fn(&Lit, usize) -> &Receiver + Sync,
     row: impl Fn(&Lit, usize, usize, &mut [Four], &mut Buffers) + Sync,
 ) {
-    let pairs = receivers.iter().zip(maps).enumerate().filter_map(|(k, (r, m))| Some((k, r.as_ref()?, m.as_mut()?)));
-    let bands: Vec<_> = pairs.flat_map(|(k, r, m)| m.bands().map(move |(j, band)| (k, r, j, band))).collect();
-    bands.into_par_iter().for_each_init(Buffers::default, |buffers, (k, lit, first, band)| {
-        for (n, out) in band.chunks_exact_mut(part(lit, k).columns.len()).enumerate() {
-            row(lit, k, first + n, out, buffers);
-        }
-    });
+    let pairs = receivers
+        .iter()
+        .zip(maps)
+        .enumerate()
+        .filter_map(|(k, (r, m))| Some((k, r.as_ref()?, m.as_mut()?)));
+    let bands: Vec<_> = pairs
+        .flat_map(|(k, r, m)| m.bands().map(move |(j, band)| (k, r, j, band)))
+        .collect();
+    bands
+        .into_par_iter()
+        .for_each_init(Buffers::default, |buffers, (k, lit, first, band)| {
+            for (n, out) in band
+                .chunks_exact_mut(part(lit, k).columns.len())
+                .enumerate()
+            {
+                row(lit, k, first + n, out, buffers);
+            }
+        });
 }
 
 /// One row of what blockers hide of a receiver's lamps.
@@ -71,10 +95,18 @@ fn whole_row(lit: &Lit, soft: &Map, j: usize, out: &mut [Four], buffers: &mut Bu
     soft.enlarged(j, &asked, &mut buffers.coarse);
     let out = &mut out[asked.start - lit.fine.columns.start..][..asked.len()];
     let first = coarser(asked.start)[0];
-    for (i, (out, (open, hidden))) in out.iter_mut().zip(buffers.open.iter().zip(&buffers.hidden)).enumerate() {
+    for (i, (out, (open, hidden))) in out
+        .iter_mut()
+        .zip(buffers.open.iter().zip(&buffers.hidden))
+        .enumerate()
+    {
         let [a, b] = coarser(asked.start + i).map(|n| buffers.coarse[n - first]);
         let hidden = hidden.add_scaled(1.0, a.lerp(b, 0.5));
-        *out = if lit.relative { share(open, &hidden) } else { left(open, &hidden) };
+        *out = if lit.relative {
+            share(open, &hidden)
+        } else {
+            left(open, &hidden)
+        };
     }
 }
 
@@ -86,7 +118,13 @@ fn left(open: &Four, hidden: &Four) -> Four {
 
 /// The same as a share; exactly 1 where nothing is hidden, and where there is no light.
 fn share(open: &Four, hidden: &Four) -> Four {
-    let channel = |i: usize| if open.0[i] > 0.0 { (1.0 - hidden.0[i] / open.0[i]).clamp(0.0, 1.0) } else { 1.0 };
+    let channel = |i: usize| {
+        if open.0[i] > 0.0 {
+            (1.0 - hidden.0[i] / open.0[i]).clamp(0.0, 1.0)
+        } else {
+            1.0
+        }
+    };
     Four([channel(0), channel(1), channel(2), 1.0])
 }
 
@@ -94,13 +132,20 @@ impl Map {
     fn of(receiver: &Receiver, value: Four) -> Self {
         let (columns, rows) = (receiver.columns.clone(), receiver.rows.clone());
         let values = vec![value; columns.len() * rows.len()];
-        Self { columns, rows, values }
+        Self {
+            columns,
+            rows,
+            values,
+        }
     }
 
     /// Bands of rows, each with its first row's number.
     fn bands(&mut self) -> impl Iterator<Item = (usize, &mut [Four])> {
         let (first, width) = (self.rows.start, self.columns.len().max(1));
-        self.values.chunks_mut(BAND * width).enumerate().map(move |(k, band)| (first + k * BAND, band))
+        self.values
+            .chunks_mut(BAND * width)
+            .enumerate()
+            .map(move |(k, band)| (first + k * BAND, band))
     }
 
     /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around `asked`; 0 outside.
@@ -113,9 +158,13 @@ impl Map {
             if !self.rows.contains(&row) || start >= end {
                 continue;
             }
-            let line = &self.values[(row - self.rows.start) * self.columns.len()..][..self.columns.len()];
+            let line =
+                &self.values[(row - self.rows.start) * self.columns.len()..][..self.columns.len()];
             let line = &line[start - self.columns.start..end - self.columns.start];
-            out[start - first..].iter_mut().zip(line).for_each(|(o, v)| *o = o.add_scaled(0.5, *v));
+            out[start - first..]
+                .iter_mut()
+                .zip(line)
+                .for_each(|(o, v)| *o = o.add_scaled(0.5, *v));
         }
     }
 
@@ -128,7 +177,10 @@ impl Map {
     #[inline(always)]
     pub(super) fn holds(&self, column: Place, row: Place) -> bool {
         let (i, j) = (column.0 as usize, row.0 as usize);
-        i >= self.columns.start && i + 1 < self.columns.end && j >= self.rows.start && j + 1 < self.rows.end
+        i >= self.columns.start
+            && i + 1 < self.columns.end
+            && j >= self.rows.start
+            && j + 1 < self.rows.end
     }
 
     /// The value at a place; at the nearest cell for a place outside.
@@ -137,8 +189,12 @@ impl Map {
     #[inline(always)]
     pub(super) fn at(&self, column: Place, row: Place) -> Four {
         let width = self.columns.len();
-        let i = (column.0 as usize).saturating_sub(self.columns.start).min(width - 2);
-        let j = (row.0 as usize).saturating_sub(self.rows.start).min(self.rows.len() - 2);
+        let i = (column.0 as usize)
+            .saturating_sub(self.columns.start)
+            .min(width - 2);
+        let j = (row.0 as usize)
+            .saturating_sub(self.rows.start)
+            .min(self.rows.len() - 2);
         let top = &self.values[j * width + i..][..2];
         let bottom = &self.values[(j + 1) * width + i..][..2];
         Four::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)

@@ -24,8 +24,12 @@ impl Lattice {
         let pixel_from_node = Matrix3::new(cell, 0.0, -cell, 0.0, cell, -cell, 0.0, 0.0, 1.0);
         // One pixel beyond the picture's end: sub-samples reach over it.
         let count = |pixels: usize| ((pixels as f64 + 1.0) / cell) as usize + 3;
-        let view =
-            View { ray: view.ray * pixel_from_node, width: count(view.width), height: count(view.height), ..*view };
+        let view = View {
+            ray: view.ray * pixel_from_node,
+            width: count(view.width),
+            height: count(view.height),
+            ..*view
+        };
         Self { cell, view }
     }
 
@@ -35,13 +39,19 @@ impl Lattice {
             let node = (at / self.cell + 1.0).max(0.0);
             (node as u32, (node - node.floor()) as f32)
         };
-        (0..pixels).flat_map(|i| offsets.iter().map(move |o| place(i as f64 + 0.5 + o))).collect()
+        (0..pixels)
+            .flat_map(|i| offsets.iter().map(move |o| place(i as f64 + 0.5 + o)))
+            .collect()
     }
 }
 
 /// The two nodes of a lattice of twice the distance around a node, the same one twice where it lies on it.
 pub(super) fn coarser(node: usize) -> [usize; 2] {
-    if node.is_multiple_of(2) { [node / 2, node / 2 + 1] } else { [node.div_ceil(2); 2] }
+    if node.is_multiple_of(2) {
+        [node / 2, node / 2 + 1]
+    } else {
+        [node.div_ceil(2); 2]
+    }
 }
 
 #[cfg(test)]

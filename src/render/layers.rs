@@ -118,7 +118,8 @@ impl Block {
     fn corners(&self) -> [Vector3<f64>; 4] {
         let x = [self.x.start as f64 + 0.5, self.x.end as f64 - 0.5];
         let y = [self.y.start as f64 + 0.5, self.y.end as f64 - 0.5];
-        [[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]].map(|[x, y]| Vector3::new(x, y, 1.0))
+        [[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]]
+            .map(|[x, y]| Vector3::new(x, y, 1.0))
     }
 
     /// Two halves across the longer side.
@@ -126,10 +127,28 @@ impl Block {
         let cut = |r: &Range<usize>| r.start + r.len() / 2;
         if self.x.len() >= self.y.len() {
             let c = cut(&self.x);
-            [Self { x: self.x.start..c, ..self.clone() }, Self { x: c..self.x.end, ..self.clone() }]
+            [
+                Self {
+                    x: self.x.start..c,
+                    ..self.clone()
+                },
+                Self {
+                    x: c..self.x.end,
+                    ..self.clone()
+                },
+            ]
         } else {
             let c = cut(&self.y);
-            [Self { y: self.y.start..c, ..self.clone() }, Self { y: c..self.y.end, ..self.clone() }]
+            [
+                Self {
+                    y: self.y.start..c,
+                    ..self.clone()
+                },
+                Self {
+                    y: c..self.y.end,
+                    ..self.clone()
+                },
+            ]
         }
     }
 }
@@ -148,13 +167,21 @@ impl Layer {
 impl Stack {
     /// Everything that is to know about a block.
     pub(super) fn paint(&self, block: Block) -> Painted {
-        let layers: Vec<_> = (0..self.layers.len()).filter(|&k| self.layers[k].touches(&block)).collect();
+        let layers: Vec<_> = (0..self.layers.len())
+            .filter(|&k| self.layers[k].touches(&block))
+            .collect();
         let mut painting = Painting::default();
-        let mut shadow = self.may_be_shadowed(&block).then(|| vec![LinearRgb::WHITE; block.len()]);
+        let mut shadow = self
+            .may_be_shadowed(&block)
+            .then(|| vec![LinearRgb::WHITE; block.len()]);
         if !layers.is_empty() || shadow.is_some() {
             self.split(&block, &block, &layers, &mut painting, &mut shadow);
         }
-        Painted { block, painting, shadow }
+        Painted {
+            block,
+            painting,
+            shadow,
+        }
     }
 
     fn split(
@@ -165,13 +192,24 @@ impl Stack {
         painting: &mut Painting,
         shadow: &mut Option<Vec<LinearRgb>>,
     ) {
-        let mut layers: Vec<_> = layers.iter().copied().filter(|&k| self.layers[k].touches(part)).collect();
+        let mut layers: Vec<_> = layers
+            .iter()
+            .copied()
+            .filter(|&k| self.layers[k].touches(part))
+            .collect();
         let corners = part.corners();
         let middle = corners.iter().sum::<Vector3<f64>>() / 4.0;
         // A stable sort: cards that coincide stay in the order of their ids.
-        layers.sort_by(|&a, &b| self.layers[b].nearness(&middle).total_cmp(&self.layers[a].nearness(&middle)));
+        layers.sort_by(|&a, &b| {
+            self.layers[b]
+                .nearness(&middle)
+                .total_cmp(&self.layers[a].nearness(&middle))
+        });
         if part.len() > 1 && !self.sorted_everywhere(&layers, &corners) {
-            return part.halves().iter().for_each(|half| self.split(whole, half, &layers, painting, shadow));
+            return part
+                .halves()
+                .iter()
+                .for_each(|half| self.split(whole, half, &layers, painting, shadow));
         }
         let through = self.walk(part, &layers, painting);
         if let Some(shadow) = shadow {
@@ -181,8 +219,11 @@ impl Stack {
     }
 
     fn sorted_everywhere(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
-        let nearer = |a: usize, b: usize, p| self.layers[a].nearness(p) >= self.layers[b].nearness(p);
-        layers.windows(2).all(|pair| corners.iter().all(|p| nearer(pair[0], pair[1], p)))
+        let nearer =
+            |a: usize, b: usize, p| self.layers[a].nearness(p) >= self.layers[b].nearness(p);
+        layers
+            .windows(2)
+            .all(|pair| corners.iter().all(|p| nearer(pair[0], pair[1], p)))
     }
 
     /// Walks a block's layers front to back; returns what passes through all of them.
@@ -202,7 +243,14 @@ impl Stack {
     }
 
     /// One row of one layer: every sub-sample's colour and opacity, added up by pixel.
-    fn walk_row(&self, layer: &Layer, block: &Block, y: usize, through: &mut Through, row: &mut LayerRow) {
+    fn walk_row(
+        &self,
+        layer: &Layer,
+        block: &Block,
+        y: usize,
+        through: &mut Through,
+        row: &mut LayerRow,
+    ) {
         let offsets = &self.samples.offsets;
         let r = offsets.len();
         row.start(block.x.len(), self.tinted);
@@ -240,8 +288,18 @@ impl Stack {
                 Some(_) => row.light[i],
                 None => Four([0.0, 0.0, 0.0, row.light[i].alpha()]),
             };
-            let hidden = if self.tinted { row.hidden[i].rgb() } else { LinearRgb::grey(row.light[i].alpha()) };
-            let (sample, tint) = self.sample(layer, [x, y], light, row.alpha[i] * weight, hidden.scale(weight));
+            let hidden = if self.tinted {
+                row.hidden[i].rgb()
+            } else {
+                LinearRgb::grey(row.light[i].alpha())
+            };
+            let (sample, tint) = self.sample(
+                layer,
+                [x, y],
+                light,
+                row.alpha[i] * weight,
+                hidden.scale(weight),
+            );
             out.samples.push((x as u32, y as u32, sample));
             if self.tinted {
                 out.tints.push(tint);
@@ -265,8 +323,15 @@ impl Stack {
     ) -> (DeepSample, LinearRgb) {
         let r = self.samples.offsets.len();
         let weight = 1.0 / (r * r) as f32;
-        let w = layer.seen.w.dot(&Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0));
-        let depth = if w > 0.0 { (layer.seen.height / w) as f32 } else { f32::MAX };
+        let w = layer
+            .seen
+            .w
+            .dot(&Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0));
+        let depth = if w > 0.0 {
+            (layer.seen.height / w) as f32
+        } else {
+            f32::MAX
+        };
         let alpha = alpha.min(1.0);
         let sample = DeepSample {
             object: layer.id,
@@ -279,29 +344,50 @@ impl Stack {
     }
 
     fn may_be_shadowed(&self, block: &Block) -> bool {
-        let Some(map) = &self.ground.share else { return false };
+        let Some(map) = &self.ground.share else {
+            return false;
+        };
         let n = self.samples.per_side();
-        let places =
-            |range: &Range<usize>, all: &[Place]| [all[range.start * n], all[range.end * n - 1]].map(|p| p.0 as usize);
-        let [x, y] = [places(&block.x, &self.samples.columns), places(&block.y, &self.samples.rows)];
+        let places = |range: &Range<usize>, all: &[Place]| {
+            [all[range.start * n], all[range.end * n - 1]].map(|p| p.0 as usize)
+        };
+        let [x, y] = [
+            places(&block.x, &self.samples.columns),
+            places(&block.y, &self.samples.rows),
+        ];
         // A node more on either side: sub-samples reach beyond the middle of their pixel.
-        map.meets(x[0].saturating_sub(1)..x[1] + 3, y[0].saturating_sub(1)..y[1] + 3)
+        map.meets(
+            x[0].saturating_sub(1)..x[1] + 3,
+            y[0].saturating_sub(1)..y[1] + 3,
+        )
     }
 
     /// What shadows leave of the surface's light: the average over what is seen of it.
     ///
     /// The definition divides average irradiances; the unshadowed one is the same all over a pixel (to about 1e-4 of
     /// it), so that averaging the share itself is the same.
-    fn shade_ground(&self, whole: &Block, block: &Block, through: &Through, shadow: &mut [LinearRgb]) {
-        let (Some(map), Some(seen)) = (&self.ground.share, &self.ground.seen) else { return };
+    fn shade_ground(
+        &self,
+        whole: &Block,
+        block: &Block,
+        through: &Through,
+        shadow: &mut [LinearRgb],
+    ) {
+        let (Some(map), Some(seen)) = (&self.ground.share, &self.ground.seen) else {
+            return;
+        };
         let offsets = &self.samples.offsets;
         let edges = sides(&seen.u, &seen.v, &seen.w, [0.0; 2]);
         let reach = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()));
         for y in block.y.clone() {
-            let spans: Vec<_> = offsets.iter().map(|o| span(&edges, y as f64 + 0.5 + o)).collect();
+            let spans: Vec<_> = offsets
+                .iter()
+                .map(|o| span(&edges, y as f64 + 0.5 + o))
+                .collect();
             let low = spans.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max) + reach;
             let high = spans.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) - reach;
-            let line = &mut shadow[(y - whole.y.start) * whole.x.len() + block.x.start - whole.x.start..];
+            let line =
+                &mut shadow[(y - whole.y.start) * whole.x.len() + block.x.start - whole.x.start..];
             for (i, shadow) in line.iter_mut().take(block.x.len()).enumerate() {
                 let x = block.x.start + i;
                 let inside = x as f64 + 0.5 >= low && x as f64 + 0.5 <= high;
@@ -317,7 +403,11 @@ impl Stack {
     /// The share in the middle of a pixel.
     fn share_at(&self, map: &Map, x: usize, y: usize) -> Four {
         let (column, row) = (self.samples.columns[x], self.samples.rows[y]);
-        if map.holds(column, row) { map.at(column, row) } else { Four::ONE }
+        if map.holds(column, row) {
+            map.at(column, row)
+        } else {
+            Four::ONE
+        }
     }
 
     /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the surface.
@@ -334,9 +424,20 @@ impl Stack {
             let (sx, sy) = (sub % r, sub / r);
             let at = x as f64 + 0.5 + self.samples.offsets[sx];
             let on_ground = at >= spans[sy].0 && at <= spans[sy].1;
-            let place = if self.samples.each { [x * n + sx, y * n + sy] } else { [x, y] };
-            let share = if on_ground { self.share_at(map, place[0], place[1]) } else { Four::ONE };
-            (sum, weight) = (sum.add_scaled(1.0, t.times(share)), weight.add_scaled(1.0, t));
+            let place = if self.samples.each {
+                [x * n + sx, y * n + sy]
+            } else {
+                [x, y]
+            };
+            let share = if on_ground {
+                self.share_at(map, place[0], place[1])
+            } else {
+                Four::ONE
+            };
+            (sum, weight) = (
+                sum.add_scaled(1.0, t.times(share)),
+                weight.add_scaled(1.0, t),
+            );
         }
         ratio(&sum, &weight)
     }
@@ -344,7 +445,13 @@ impl Stack {
 
 /// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
 fn ratio(sum: &Four, weight: &Four) -> LinearRgb {
-    let channel = |c: usize| if weight.0[c] > 0.0 { (sum.0[c] / weight.0[c]).min(1.0) } else { 1.0 };
+    let channel = |c: usize| {
+        if weight.0[c] > 0.0 {
+            (sum.0[c] / weight.0[c]).min(1.0)
+        } else {
+            1.0
+        }
+    };
     LinearRgb::new(channel(0), channel(1), channel(2))
 }
 
@@ -363,12 +470,20 @@ impl Line {
         let first = Vector3::new(left as f64, y, 1.0);
         let linear = |row: &Vector3<f64>| (row.dot(&first) as f32, row.x as f32);
         let relative = |x: f64| (x - left as f64) as f32;
-        Self { low: relative(low), high: relative(high), position: [linear(&u), linear(&v), linear(&seen.w)] }
+        Self {
+            low: relative(low),
+            high: relative(high),
+            position: [linear(&u), linear(&v), linear(&seen.w)],
+        }
     }
 
     /// The pixels whose sub-sample at this offset is on the layer.
     fn pixels(&self, offset: f32, count: usize) -> Range<usize> {
-        whole(f64::from(self.low - offset), f64::from(self.high - offset), &(0..count))
+        whole(
+            f64::from(self.low - offset),
+            f64::from(self.high - offset),
+            &(0..count),
+        )
     }
 
     /// The same line, counted from `x`.
@@ -378,7 +493,11 @@ impl Line {
 }
 
 fn join(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    if a.is_empty() { b.clone() } else { a.start.min(b.start)..a.end.max(b.end) }
+    if a.is_empty() {
+        b.clone()
+    } else {
+        a.start.min(b.start)..a.end.max(b.end)
+    }
 }
 
 fn overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {

@@ -61,7 +61,12 @@ impl Preset {
             Self::High => 0.66,
             Self::Reference => 0.33,
         };
-        RenderOptions { subsamples, light_samples, ambient_samples, cell_px }
+        RenderOptions {
+            subsamples,
+            light_samples,
+            ambient_samples,
+            cell_px,
+        }
     }
 }
 
@@ -91,7 +96,11 @@ impl RenderOptions {
 
     /// The same with every number inside the range that the arithmetic bears: at least one sample, cells of 0.25 to 16 pixels.
     pub(super) fn clamped(self) -> Self {
-        let cell_px = if self.cell_px.is_finite() { self.cell_px.clamp(0.25, 16.0) } else { 1.0 };
+        let cell_px = if self.cell_px.is_finite() {
+            self.cell_px.clamp(0.25, 16.0)
+        } else {
+            1.0
+        };
         Self {
             subsamples: self.subsamples.clamp(1, 64),
             light_samples: self.light_samples.clamp(1, 64),
@@ -125,16 +134,47 @@ mod tests {
 
     #[test]
     fn numbers_without_an_end_or_a_beginning_are_refused() {
-        assert!(Preset::ALL.iter().all(|(_, preset)| preset.options().check().is_ok()));
+        assert!(
+            Preset::ALL
+                .iter()
+                .all(|(_, preset)| preset.options().check().is_ok())
+        );
         let usual = RenderOptions::default();
         let told = |options: RenderOptions| options.check().unwrap_err().to_string();
-        let said = told(RenderOptions { subsamples: 1_000_000, ..usual });
-        assert_eq!(said, "subsamples: 1000000, expected 1 to 16 (the reference preset has 6)");
-        assert!(told(RenderOptions { subsamples: 0, ..usual }).starts_with("subsamples: 0, expected 1 to 16"));
-        assert!(told(RenderOptions { light_samples: usize::MAX, ..usual }).starts_with("light_samples: 1.8"));
-        assert!(told(RenderOptions { ambient_samples: 0, ..usual }).starts_with("ambient_samples: 0"));
+        let said = told(RenderOptions {
+            subsamples: 1_000_000,
+            ..usual
+        });
+        assert_eq!(
+            said,
+            "subsamples: 1000000, expected 1 to 16 (the reference preset has 6)"
+        );
+        assert!(
+            told(RenderOptions {
+                subsamples: 0,
+                ..usual
+            })
+            .starts_with("subsamples: 0, expected 1 to 16")
+        );
+        assert!(
+            told(RenderOptions {
+                light_samples: usize::MAX,
+                ..usual
+            })
+            .starts_with("light_samples: 1.8")
+        );
+        assert!(
+            told(RenderOptions {
+                ambient_samples: 0,
+                ..usual
+            })
+            .starts_with("ambient_samples: 0")
+        );
         for cell_px in [0.0, -1.0, f64::NAN] {
-            assert!(told(RenderOptions { cell_px, ..usual }).starts_with("cell_px: "), "{cell_px}");
+            assert!(
+                told(RenderOptions { cell_px, ..usual }).starts_with("cell_px: "),
+                "{cell_px}"
+            );
         }
     }
 }

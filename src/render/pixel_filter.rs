@@ -15,7 +15,9 @@ const TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
 ///
 /// All samples of a pixel have the same weight then.
 pub(super) fn quantiles(count: usize) -> Vec<f64> {
-    (0..count).map(|i| quantile((i as f64 + 0.5) / count as f64)).collect()
+    (0..count)
+        .map(|i| quantile((i as f64 + 0.5) / count as f64))
+        .collect()
 }
 
 /// What the positions leave of the window's width: the standard deviation that the texture's own filter must add.
@@ -57,11 +59,17 @@ mod tests {
             (&[-0.28821, 0.28821], 0.2993),
             (&[-0.41126, 0.0, 0.41126], 0.2448),
             (&[-0.48698, -0.13667, 0.13667, 0.48697], 0.2115),
-            (&[-0.58171, -0.28821, -0.09031, 0.09031, 0.28821, 0.58171], 0.1716),
+            (
+                &[-0.58171, -0.28821, -0.09031, 0.09031, 0.28821, 0.58171],
+                0.1716,
+            ),
         ];
         for (offsets, sigma) in table {
             let ours = quantiles(offsets.len());
-            assert!(ours.iter().zip(offsets).all(|(a, b)| (a - b).abs() < 2e-5), "{ours:?}");
+            assert!(
+                ours.iter().zip(offsets).all(|(a, b)| (a - b).abs() < 2e-5),
+                "{ours:?}"
+            );
             assert!((left_over_sigma(&ours) - sigma).abs() < 1e-4);
         }
     }

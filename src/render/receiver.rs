@@ -61,7 +61,12 @@ impl Studio<'_> {
     /// What lights a sheet on the side of the eye; none where it is seen edge-on. The normal is that of every lattice.
     fn lamps(&self, sheet: &Sheet) -> Option<Lamps> {
         let seen = Seen::of(sheet, &self.fine.view)?;
-        Some(Lamps::of(self.shot, &self.options, &sheet.center, &seen.normal))
+        Some(Lamps::of(
+            self.shot,
+            &self.options,
+            &sheet.center,
+            &seen.normal,
+        ))
     }
 
     /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.
@@ -69,10 +74,21 @@ impl Studio<'_> {
         let lamps = self.lamps(&self.casters.cards[own].sheet)?;
         let fine = self.card_on(&self.fine, own, reach, &lamps, &lamps.faces)?;
         let coarse = self.card_on(&self.coarse, own, reach, &lamps, &lamps.sky)?;
-        Some(Lit { fine, coarse, relative: false })
+        Some(Lit {
+            fine,
+            coarse,
+            relative: false,
+        })
     }
 
-    fn card_on(&self, lattice: &Lattice, own: usize, reach: [f64; 2], all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
+    fn card_on(
+        &self,
+        lattice: &Lattice,
+        own: usize,
+        reach: [f64; 2],
+        all: &Lamps,
+        some: &[Lamp],
+    ) -> Option<Receiver> {
         let sheet = &self.casters.cards[own].sheet;
         let seen = Seen::of(sheet, &lattice.view)?;
         let (rows, columns) = rows_and_columns(sheet, reach, &lattice.view);
@@ -80,7 +96,10 @@ impl Studio<'_> {
             return None;
         }
         // Two nodes, for the finer lattice's one that lies between them.
-        let outline = sides(&seen.u, &seen.v, &seen.w, reach).iter().map(|s| grown(s, 2.0)).collect();
+        let outline = sides(&seen.u, &seen.v, &seen.w, reach)
+            .iter()
+            .map(|s| grown(s, 2.0))
+            .collect();
         let cell = seen.cell_metres(&lattice.view, &sheet.center);
         let area = (rows, columns);
         let receiver = self.receiver(lattice, (seen, &area), Some(own), cell, (all, some));
@@ -92,12 +111,29 @@ impl Studio<'_> {
         let lamps = self.lamps(&self.casters.surface)?;
         let fine = self.surface_on(&self.fine, &lamps, &lamps.faces)?;
         let coarse = self.surface_on(&self.coarse, &lamps, &lamps.sky)?;
-        let doubled = |r: &Range<usize>| if r.is_empty() { 0..0 } else { (2 * r.start).saturating_sub(2)..2 * r.end };
+        let doubled = |r: &Range<usize>| {
+            if r.is_empty() {
+                0..0
+            } else {
+                (2 * r.start).saturating_sub(2)..2 * r.end
+            }
+        };
         let view = &self.fine.view;
         let rows = cut(union(fine.rows.clone(), doubled(&coarse.rows)), view.height);
-        let columns = cut(union(fine.columns.clone(), doubled(&coarse.columns)), view.width);
+        let columns = cut(
+            union(fine.columns.clone(), doubled(&coarse.columns)),
+            view.width,
+        );
         let seen = rows.len() > 1 && columns.len() > 1;
-        seen.then_some(Lit { fine: Receiver { rows, columns, ..fine }, coarse, relative: true })
+        seen.then_some(Lit {
+            fine: Receiver {
+                rows,
+                columns,
+                ..fine
+            },
+            coarse,
+            relative: true,
+        })
     }
 
     fn surface_on(&self, lattice: &Lattice, all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
@@ -105,9 +141,15 @@ impl Studio<'_> {
         let cell = seen.cell_metres(&lattice.view, &Vector3::zeros());
         let everywhere = (0..lattice.view.height, 0..lattice.view.width);
         let receiver = self.receiver(lattice, (seen, &everywhere), None, cell, (all, some));
-        let blockers = receiver.lamps.iter().flat_map(|(_, beams)| beams).flat_map(|b| &b.blockers);
+        let blockers = receiver
+            .lamps
+            .iter()
+            .flat_map(|(_, beams)| beams)
+            .flat_map(|b| &b.blockers);
         let areas = blockers.map(|b| (b.rows.clone(), b.columns.clone()));
-        let (rows, columns) = areas.reduce(|a, b| (union(a.0, b.0), union(a.1, b.1))).unwrap_or((0..0, 0..0));
+        let (rows, columns) = areas
+            .reduce(|a, b| (union(a.0, b.0), union(a.1, b.1)))
+            .unwrap_or((0..0, 0..0));
         Some(receiver.within(vec![seen.w], rows, columns))
     }
 
@@ -119,7 +161,13 @@ impl Studio<'_> {
         cell: f64,
         (all, some): (&Lamps, &[Lamp]),
     ) -> Receiver {
-        let beams = |lamp: &Lamp| (lamp.radiance, self.casters.beams((&seen, area), &lattice.view, lamp, own, cell));
+        let beams = |lamp: &Lamp| {
+            (
+                lamp.radiance,
+                self.casters
+                    .beams((&seen, area), &lattice.view, lamp, own, cell),
+            )
+        };
         Receiver {
             lamps: some.iter().map(beams).collect(),
             channels: if self.casters.tinted { 3 } else { 1 },
@@ -187,7 +235,12 @@ impl Rays {
 
 impl Receiver {
     fn within(self, outline: Vec<Vector3<f64>>, rows: Range<usize>, columns: Range<usize>) -> Self {
-        Self { outline, rows, columns, ..self }
+        Self {
+            outline,
+            rows,
+            columns,
+            ..self
+        }
     }
 
     /// The nodes of a row that are asked for.
@@ -202,37 +255,73 @@ impl Receiver {
         let LinearRgb { r, g, b } = self.rest;
         refill(&mut buffers.open, n, Four([r, g, b, 0.0]));
         refill(&mut buffers.hidden, n, Four::ZERO);
-        if self.lamps.iter().flat_map(|(_, beams)| beams).any(Beam::is_face) {
+        if self
+            .lamps
+            .iter()
+            .flat_map(|(_, beams)| beams)
+            .any(Beam::is_face)
+        {
             self.positions(j, asked, &mut buffers.position);
         }
         for (radiance, beams) in &self.lamps {
             let is_face = beams.iter().any(Beam::is_face);
             refill(&mut buffers.lamp, if is_face { n } else { 0 }, 0.0);
-            buffers.lost.iter_mut().take(self.channels).for_each(|lost| refill(lost, n, 0.0));
-            let touched = beams.iter().map(|beam| self.beam(beam, j, asked, buffers)).reduce(union);
+            buffers
+                .lost
+                .iter_mut()
+                .take(self.channels)
+                .for_each(|lost| refill(lost, n, 0.0));
+            let touched = beams
+                .iter()
+                .map(|beam| self.beam(beam, j, asked, buffers))
+                .reduce(union);
             add_lamp(&mut buffers.open, &buffers.lamp, (*radiance).into());
             if let Some(touched) = touched.filter(|t| !t.is_empty()) {
                 let lost = |c: usize| &buffers.lost[c.min(self.channels - 1)][touched.clone()];
-                add_lost(&mut buffers.hidden[touched.clone()], [lost(0), lost(1), lost(2)], *radiance);
+                add_lost(
+                    &mut buffers.hidden[touched.clone()],
+                    [lost(0), lost(1), lost(2)],
+                    *radiance,
+                );
             }
         }
         work::add_all(std::mem::take(&mut buffers.rays).counts());
     }
 
     /// Adds up a beam; tells the nodes (counted from the first that is asked for) where something is in its way.
-    fn beam(&self, beam: &Beam, j: usize, asked: &Range<usize>, buffers: &mut Buffers) -> Range<usize> {
-        let Buffers { position, strength, lamp, through, lost, touched, rays, .. } = buffers;
+    fn beam(
+        &self,
+        beam: &Beam,
+        j: usize,
+        asked: &Range<usize>,
+        buffers: &mut Buffers,
+    ) -> Range<usize> {
+        let Buffers {
+            position,
+            strength,
+            lamp,
+            through,
+            lost,
+            touched,
+            rays,
+            ..
+        } = buffers;
         strength.resize(asked.len(), 0.0);
         // What the sky gives in the open is in `rest`.
         if beam.is_face() {
-            beam.strength().fill([&position[0], &position[1], &position[2]], strength);
-            lamp.iter_mut().zip(&*strength).for_each(|(sum, e)| *sum += e);
+            beam.strength()
+                .fill([&position[0], &position[1], &position[2]], strength);
+            lamp.iter_mut()
+                .zip(&*strength)
+                .for_each(|(sum, e)| *sum += e);
             rays.light += asked.len();
         }
         touched.clear();
         let nodes = beam.blockers.iter().map(|b| b.nodes(j, asked)).enumerate();
         touched.extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
-        let Some(all) = touched.iter().map(|(_, nodes)| nodes.clone()).reduce(union) else { return 0..0 };
+        let Some(all) = touched.iter().map(|(_, nodes)| nodes.clone()).reduce(union) else {
+            return 0..0;
+        };
         let here = all.start - asked.start..all.end - asked.start;
         if !beam.is_face() {
             beam.strength().fill([&[]; 3], &mut strength[here.clone()]);
@@ -245,7 +334,11 @@ impl Receiver {
                 let through = &mut through[nodes.start - all.start..nodes.end - all.start];
                 rays.through += beam.blockers[*k].darken(channel, j, nodes, through);
             }
-            lose(&mut lost[channel][here.clone()], &strength[here.clone()], through);
+            lose(
+                &mut lost[channel][here.clone()],
+                &strength[here.clone()],
+                through,
+            );
         }
         here
     }
@@ -279,12 +372,19 @@ fn lose(lost: &mut [f32], strength: &[f32], through: &[f32]) {
 }
 
 fn add_lamp(open: &mut [Four], lamp: &[f32], radiance: Four) {
-    open.iter_mut().zip(lamp).for_each(|(o, &e)| *o = o.add_scaled(e, radiance));
+    open.iter_mut()
+        .zip(lamp)
+        .for_each(|(o, &e)| *o = o.add_scaled(e, radiance));
 }
 
 fn add_lost(hidden: &mut [Four], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
     for (((h, &r), &g), &b) in hidden.iter_mut().zip(r).zip(g).zip(b) {
         let [x, y, z, _] = h.0;
-        *h = Four([x + r * radiance.r, y + g * radiance.g, z + b * radiance.b, 0.0]);
+        *h = Four([
+            x + r * radiance.r,
+            y + g * radiance.g,
+            z + b * radiance.b,
+            0.0,
+        ]);
     }
 }

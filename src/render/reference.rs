@@ -23,11 +23,19 @@ pub fn reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let world = World::of(shot, &options);
     let offsets = quantiles(options.subsamples);
     let (width, height) = (world.view.width, world.view.height);
-    let pixel = |i: usize| world.pixel((i % width) as f64 + 0.5, (i / width) as f64 + 0.5, &offsets);
+    let pixel =
+        |i: usize| world.pixel((i % width) as f64 + 0.5, (i / width) as f64 + 0.5, &offsets);
     let (lists, shadow): (Vec<Vec<(DeepSample, LinearRgb)>>, Vec<_>) =
         (0..width * height).into_par_iter().map(pixel).unzip();
-    let tints = lists.iter().flatten().filter(|_| world.tinted).map(|(_, tint)| *tint).collect();
-    let samples = lists.into_iter().map(|list| list.into_iter().map(|(sample, _)| sample).collect());
+    let tints = lists
+        .iter()
+        .flatten()
+        .filter(|_| world.tinted)
+        .map(|(_, tint)| *tint)
+        .collect();
+    let samples = lists
+        .into_iter()
+        .map(|list| list.into_iter().map(|(sample, _)| sample).collect());
     DeepImage::from_pixels(Image::from_vec(width, height, shadow), samples).with_tints(tints)
 }
 
@@ -55,20 +63,42 @@ impl<'a> World<'a> {
         let facing = |(card, sheet): (&'a Card, Sheet)| {
             let seen = Seen::of(&sheet, &view);
             let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));
-            Facing { card, sheet, seen, lamps }
+            Facing {
+                card,
+                sheet,
+                seen,
+                lamps,
+            }
         };
         let surface = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
         let cards: Vec<_> = sheets(shot).into_iter().map(facing).collect();
-        let is_film = |f: &Facing<'_>| f.card.texture.is_film() || f.card.back.as_ref().is_some_and(Texture::is_film);
+        let is_film = |f: &Facing<'_>| {
+            f.card.texture.is_film() || f.card.back.as_ref().is_some_and(Texture::is_film)
+        };
         let tinted = cards.iter().any(is_film);
-        Self { shot, view, cards, surface, surface_lamps: lit(&Vector3::z()), tinted }
+        Self {
+            shot,
+            view,
+            cards,
+            surface,
+            surface_lamps: lit(&Vector3::z()),
+            tinted,
+        }
     }
 
     /// Samples of one pixel and the factor on its plate.
     fn pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<(DeepSample, LinearRgb)>, LinearRgb) {
-        let mut order: Vec<_> = (0..self.cards.len()).filter_map(|k| Some((k, self.depth(k, x, y)?))).collect();
-        order.sort_by(|a, b| a.1.total_cmp(&b.1).then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id)));
-        let mut samples: Vec<_> = order.iter().map(|&(k, depth)| self.empty_sample(k, depth)).collect();
+        let mut order: Vec<_> = (0..self.cards.len())
+            .filter_map(|k| Some((k, self.depth(k, x, y)?)))
+            .collect();
+        order.sort_by(|a, b| {
+            a.1.total_cmp(&b.1)
+                .then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id))
+        });
+        let mut samples: Vec<_> = order
+            .iter()
+            .map(|&(k, depth)| self.empty_sample(k, depth))
+            .collect();
         let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
         let mut shadow = Ratio::default();
         for oy in offsets {
@@ -78,12 +108,18 @@ impl<'a> World<'a> {
             }
         }
         samples.retain(|(s, _)| s.alpha > 0.0);
-        samples.iter_mut().for_each(|(s, hidden)| s.visible = mean(*hidden));
+        samples
+            .iter_mut()
+            .for_each(|(s, hidden)| s.visible = mean(*hidden));
         (samples, shadow.value())
     }
 
     fn empty_sample(&self, k: usize, depth: f64) -> (DeepSample, LinearRgb) {
-        let sample = DeepSample { object: self.cards[k].card.id, depth: Depth(depth as f32), ..DeepSample::default() };
+        let sample = DeepSample {
+            object: self.cards[k].card.id,
+            depth: Depth(depth as f32),
+            ..DeepSample::default()
+        };
         (sample, LinearRgb::BLACK)
     }
 
@@ -91,7 +127,11 @@ impl<'a> World<'a> {
     fn depth(&self, k: usize, x: f64, y: f64) -> Option<f64> {
         let seen = self.cards[k].seen.as_ref()?;
         let w = seen.w.dot(&Vector3::new(x, y, 1.0));
-        Some(if w > 0.0 { seen.height / w } else { f64::from(f32::MAX) })
+        Some(if w > 0.0 {
+            seen.height / w
+        } else {
+            f64::from(f32::MAX)
+        })
     }
 
     /// Adds what the cards do along one ray, front to back; returns what passes through all of them.
@@ -106,16 +146,22 @@ impl<'a> World<'a> {
         let mut through = LinearRgb::WHITE;
         for (&(k, _), (sample, hidden)) in order.iter().zip(samples) {
             let facing = &self.cards[k];
-            let Some((seen, (uv, depth))) = facing.seen.as_ref().and_then(|s| Some((s, s.hit(x, y)?))) else {
+            let Some((seen, (uv, depth))) =
+                facing.seen.as_ref().and_then(|s| Some((s, s.hit(x, y)?)))
+            else {
                 continue;
             };
             let film = facing.texel(uv, &self.view.eye);
             sample.alpha += weight * mean(film.opacity);
             *hidden = hidden.add_scaled(weight, through * film.opacity);
             let point = self.view.eye + self.view.ray * Vector3::new(x, y, 1.0) * depth;
-            let e = self.irradiance(&point, &seen.normal, &facing.lamps, Some(k)).1;
+            let e = self
+                .irradiance(&point, &seen.normal, &facing.lamps, Some(k))
+                .1;
             let light = through * film.color * e;
-            sample.light = sample.light.add_scaled(weight * self.shot.exposure / PI, light);
+            sample.light = sample
+                .light
+                .add_scaled(weight * self.shot.exposure / PI, light);
             through = through * film.transmittance();
         }
         through
@@ -159,13 +205,22 @@ impl<'a> World<'a> {
 
     /// Share of a source's light that reaches a point.
     fn passes(&self, p: &Vector3<f64>, source: &Source, own: Option<usize>) -> LinearRgb {
-        if own.is_some() && matches!(source.kind, Kind::Sky { .. }) && self.surface_blocks(p, &source.at.xyz()) {
+        if own.is_some()
+            && matches!(source.kind, Kind::Sky { .. })
+            && self.surface_blocks(p, &source.at.xyz())
+        {
             return LinearRgb::BLACK;
         }
-        let others = self.cards.iter().enumerate().filter(|&(k, _)| Some(k) != own);
-        others.fold(LinearRgb::WHITE, |through, (_, facing)| match crossing(&facing.sheet, p, source) {
-            Some(uv) => through * facing.texel(uv, p).transmittance(),
-            None => through,
+        let others = self
+            .cards
+            .iter()
+            .enumerate()
+            .filter(|&(k, _)| Some(k) != own);
+        others.fold(LinearRgb::WHITE, |through, (_, facing)| {
+            match crossing(&facing.sheet, p, source) {
+                Some(uv) => through * facing.texel(uv, p).transmittance(),
+                None => through,
+            }
         })
     }
 
@@ -181,8 +236,15 @@ fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]
     let way = source.at.xyz() - p * source.at.w;
     let s = sheet.normal.dot(&(sheet.center - p)) / sheet.normal.dot(&way);
     let local = p + way * s - sheet.center;
-    let uv = [local.dot(&sheet.x) / sheet.size[0] + 0.5, 0.5 - local.dot(&sheet.y) / sheet.size[1]];
-    let end = if source.at.w > 0.0 { 1.0 } else { f64::INFINITY };
+    let uv = [
+        local.dot(&sheet.x) / sheet.size[0] + 0.5,
+        0.5 - local.dot(&sheet.y) / sheet.size[1],
+    ];
+    let end = if source.at.w > 0.0 {
+        1.0
+    } else {
+        f64::INFINITY
+    };
     (s > 0.0 && s < end && uv.iter().all(|c| (0.0..=1.0).contains(c))).then_some(uv)
 }
 
@@ -207,7 +269,10 @@ pub(super) fn texel(card: &Card, sheet: &Sheet, [u, v]: [f64; 2], from: &Vector3
     };
     let grade = &card.grade;
     let color = crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value);
-    Film { color, opacity: graded_opacity(film.opacity, grade) }
+    Film {
+        color,
+        opacity: graded_opacity(film.opacity, grade),
+    }
 }
 
 /// A ratio of averages, per channel; 1 where there is nothing to average.
@@ -222,11 +287,24 @@ struct Ratio {
 impl Ratio {
     fn value(&self) -> LinearRgb {
         let of = |c: LinearRgb| <[f32; 3]>::from(c);
-        let (shadowed, open, outside, weight) = (of(self.shadowed), of(self.open), of(self.outside), of(self.weight));
+        let (shadowed, open, outside, weight) = (
+            of(self.shadowed),
+            of(self.open),
+            of(self.outside),
+            of(self.weight),
+        );
         let channel = |c: usize| {
-            let share = if weight[c] > 0.0 { 1.0 - outside[c] / weight[c] } else { 0.0 };
+            let share = if weight[c] > 0.0 {
+                1.0 - outside[c] / weight[c]
+            } else {
+                0.0
+            };
             let lit = open[c] > 0.0 && shadowed[c] != open[c];
-            if lit { 1.0 + share * (shadowed[c] / open[c] - 1.0) } else { 1.0 }
+            if lit {
+                1.0 + share * (shadowed[c] / open[c] - 1.0)
+            } else {
+                1.0
+            }
         };
         LinearRgb::new(channel(0), channel(1), channel(2))
     }

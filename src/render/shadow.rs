@@ -131,7 +131,11 @@ impl<'a> Casters<'a> {
         };
         let cards: Vec<_> = cards.iter().map(caster).collect();
         let tinted = known.iter().any(|shades| shades.texture.is_film());
-        Self { cards, surface, tinted }
+        Self {
+            cards,
+            surface,
+            tinted,
+        }
     }
 
     /// The beams of a lamp that reach a receiver from above, with what may be in their way.
@@ -147,11 +151,27 @@ impl<'a> Casters<'a> {
         cell: f64,
     ) -> Vec<Beam> {
         let plane = seen.normal.dot(&view.eye) - seen.height;
-        let above = |k: usize| self.cards[k].sheet.corners().iter().any(|c| seen.normal.dot(c) - plane > TOUCHING);
-        let above: Vec<_> = (0..self.cards.len()).filter(|&k| Some(k) != own && above(k)).collect();
+        let above = |k: usize| {
+            self.cards[k]
+                .sheet
+                .corners()
+                .iter()
+                .any(|c| seen.normal.dot(c) - plane > TOUCHING)
+        };
+        let above: Vec<_> = (0..self.cards.len())
+            .filter(|&k| Some(k) != own && above(k))
+            .collect();
         let beam = |source: &Source| {
             let height = source.at.xyz().dot(&seen.normal) - source.at.w * plane;
-            let shadow = Shadow { seen, area, view, plane, height, source, cell };
+            let shadow = Shadow {
+                seen,
+                area,
+                view,
+                plane,
+                height,
+                source,
+                cell,
+            };
             let from_below = own.is_some() && source.at.w == 0.0 && source.at.z < 0.0;
             let surface = from_below.then(|| shadow.of_surface(&self.surface));
             let cards = above.iter().filter_map(|&k| shadow.of_card(&self.cards[k]));
@@ -167,7 +187,11 @@ impl<'a> Casters<'a> {
 
 impl<'a> Shades<'a> {
     fn new(texture: &'a Texture, grade: Grade) -> Self {
-        Self { texture, grade, levels: (0..texture.levels()).map(|_| OnceLock::new()).collect() }
+        Self {
+            texture,
+            grade,
+            levels: (0..texture.levels()).map(|_| OnceLock::new()).collect(),
+        }
     }
 
     /// Colours do not matter to the alpha of a cut-out.
@@ -184,7 +208,9 @@ impl<'a> Shades<'a> {
     fn at(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<Shade> {
         let (width, height) = self.texture.size();
         let texel = (size[0] * size[1] / (width * height) as f64).sqrt();
-        let level = libm::log2((cell / texel).max(1.0)).floor().max(libm::log2((blur / texel).max(1.0)).round());
+        let level = libm::log2((cell / texel).max(1.0))
+            .floor()
+            .max(libm::log2((blur / texel).max(1.0)).round());
         let level = (level as usize).min(self.levels.len() - 1);
         if let Some(shade) = self.levels[level].get() {
             return shade.clone();
@@ -245,9 +271,20 @@ impl Shadow<'_> {
         // Below the card, seen from the source; w is positive there.
         sides[4] = below;
         sides.push(*depth);
-        let inside = shade.inset().map(|inset| self::sides(&u, &v, &w, inset.map(|by| -by)));
+        let inside = shade
+            .inset()
+            .map(|inset| self::sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = shade.grid.rows(&u, &v, &w);
-        Some(Blocker { rows, columns, sides, u, v, w, shade: Some(shade), inside })
+        Some(Blocker {
+            rows,
+            columns,
+            sides,
+            u,
+            v,
+            w,
+            shade: Some(shade),
+            inside,
+        })
     }
 
     /// How far the piece of light that a source stands for smears a card's shadow, metres on the card, as the side of a
@@ -256,7 +293,11 @@ impl Shadow<'_> {
     /// A square of side b has variance `b^2 / 12`, texels of side t read bilinearly have `t^2 / 4`.
     fn blur(&self, sheet: &Sheet) -> f64 {
         let height = |p: &Vector3<f64>| (self.seen.normal.dot(p) - self.plane).max(0.0);
-        let lowest = sheet.corners().iter().map(height).fold(f64::INFINITY, f64::min);
+        let lowest = sheet
+            .corners()
+            .iter()
+            .map(height)
+            .fold(f64::INFINITY, f64::min);
         // Cards that lean on the receiver are sharp where they touch it and blurred at the other end.
         let way = 0.5 * (lowest + height(&sheet.center)) / self.height;
         SMEAR * self.source.width * way * libm::sqrt(4.0 / 12.0)
@@ -316,7 +357,13 @@ impl Blocker {
     }
 
     /// Multiplies what gets through to these nodes of a row, in one channel; tells what had to be read for it.
-    pub(super) fn darken(&self, channel: usize, j: usize, nodes: &Range<usize>, through: &mut [f32]) -> Readings {
+    pub(super) fn darken(
+        &self,
+        channel: usize,
+        j: usize,
+        nodes: &Range<usize>,
+        through: &mut [f32],
+    ) -> Readings {
         let Some(shade) = &self.shade else {
             through.fill(0.0);
             return Readings::default();
@@ -325,7 +372,10 @@ impl Blocker {
         let line = [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32));
         let Some(inside) = &self.inside else {
             shade.darken(channel, &line, 0, through);
-            return Readings { see_through: nodes.len(), edges: 0 };
+            return Readings {
+                see_through: nodes.len(),
+                edges: 0,
+            };
         };
         let (low, high) = span(inside, j as f64);
         let dark = whole(low, high, nodes);
@@ -333,7 +383,10 @@ impl Blocker {
         through[dark.clone()].fill(0.0);
         shade.darken(channel, &line, 0, &mut through[..dark.start]);
         shade.darken(channel, &line, dark.end, &mut through[dark.end..]);
-        Readings { see_through: 0, edges: nodes.len() - dark.len() }
+        Readings {
+            see_through: 0,
+            edges: nodes.len() - dark.len(),
+        }
     }
 }
 
@@ -383,7 +436,11 @@ impl Strength {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn fill_face(at: [f32; 3], normal: [f32; 3], scale: f32, [x, y, z]: [&[f32]; 3], out: &mut [f32]) {
     for (((e, &x), &y), &z) in out.iter_mut().zip(x).zip(y).zip(z) {
         let (x, y, z) = (x - at[0], y - at[1], z - at[2]);
@@ -441,7 +498,10 @@ mod tests {
             outline_uv: Arc::new([]),
             grade: Grade::default(),
         };
-        Shot::new(camera()).with_light(light()).with_ambient(LinearRgb::WHITE).with_card(card)
+        Shot::new(camera())
+            .with_light(light())
+            .with_ambient(LinearRgb::WHITE)
+            .with_card(card)
     }
 
     #[test]
@@ -451,19 +511,30 @@ mod tests {
             let view = View::of(&shot.camera);
             let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
             let seen = Seen::of(&casters.surface, &view).unwrap();
-            let Lamps { faces, sky } =
-                Lamps::of(&shot, &RenderOptions::default(), &casters.surface.center, &seen.normal);
+            let Lamps { faces, sky } = Lamps::of(
+                &shot,
+                &RenderOptions::default(),
+                &casters.surface.center,
+                &seen.normal,
+            );
             let area = (0..view.height, 0..view.width);
             let (mut edges, mut all) = (0, 0);
             // Fine and coarse levels of the texture.
-            for (lamp, cell) in faces.iter().chain(&sky).flat_map(|lamp| [(lamp, 1e-4), (lamp, 5e-3)]) {
-                let blockers =
-                    casters.beams((&seen, &area), &view, lamp, None, cell).into_iter().flat_map(|beam| beam.blockers);
+            for (lamp, cell) in faces
+                .iter()
+                .chain(&sky)
+                .flat_map(|lamp| [(lamp, 1e-4), (lamp, 5e-3)])
+            {
+                let blockers = casters
+                    .beams((&seen, &area), &view, lamp, None, cell)
+                    .into_iter()
+                    .flat_map(|beam| beam.blockers);
                 for mut blocker in blockers {
                     for j in blocker.rows.clone() {
                         let nodes = blocker.nodes(j, &(0..view.width));
                         let inside = blocker.inside;
-                        let [mut quick, mut read] = [vec![1.0; nodes.len()], vec![1.0; nodes.len()]];
+                        let [mut quick, mut read] =
+                            [vec![1.0; nodes.len()], vec![1.0; nodes.len()]];
                         edges += blocker.darken(0, j, &nodes, &mut quick).edges;
                         blocker.inside = None;
                         all += blocker.darken(0, j, &nodes, &mut read).see_through;
@@ -482,7 +553,13 @@ mod tests {
         let view = View::of(&shot.camera);
         let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
         let seen = Seen::of(&casters.surface, &view).unwrap();
-        let lamps = Lamps::of(&shot, &RenderOptions::default(), &casters.surface.center, &seen.normal).faces;
+        let lamps = Lamps::of(
+            &shot,
+            &RenderOptions::default(),
+            &casters.surface.center,
+            &seen.normal,
+        )
+        .faces;
         let blockers = |area: Area| {
             let beams = casters.beams((&seen, &area), &view, &lamps[0], None, 1e-3);
             beams.iter().map(|beam| beam.blockers.len()).sum::<usize>()

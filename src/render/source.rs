@@ -56,35 +56,58 @@ pub(super) struct Lamps {
 
 impl Lamps {
     /// What lights a receiver with this unit normal, in the plane through `point`.
-    pub(super) fn of(shot: &Shot, options: &RenderOptions, point: &Vector3<f64>, normal: &Vector3<f64>) -> Self {
-        let above = |l: &AreaLight| light::nodes_above(l, options.light_samples, (*point).into(), normal);
+    pub(super) fn of(
+        shot: &Shot,
+        options: &RenderOptions,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Self {
+        let above =
+            |l: &AreaLight| light::nodes_above(l, options.light_samples, (*point).into(), normal);
         let faces = shot.lights.iter().map(|l| face(l, above(l))).collect();
         let ambient = ambient(shot.ambient, options.ambient_samples, normal);
         let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
-        let map = shining.flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
+        let map =
+            shining.flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
         Self::from_parts(faces, ambient, map)
     }
 
     /// The same for a quadrature without cleverness: the map in even rectangles.
     pub(super) fn plain(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
-        let faces = shot.lights.iter().map(|l| face(l, light::nodes(l, options.light_samples))).collect();
+        let faces = shot
+            .lights
+            .iter()
+            .map(|l| face(l, light::nodes(l, options.light_samples)))
+            .collect();
         let ambient = ambient(shot.ambient, options.ambient_samples, normal);
-        let map =
-            shot.environment.iter().flat_map(|map| pieces(light::sky_cells(map, options.ambient_samples, normal)));
+        let map = shot
+            .environment
+            .iter()
+            .flat_map(|map| pieces(light::sky_cells(map, options.ambient_samples, normal)));
         let Self { faces, sky } = Self::from_parts(faces, ambient, map);
         faces.into_iter().chain(sky).collect()
     }
 
     fn from_parts(faces: Vec<Lamp>, ambient: Lamp, map: impl Iterator<Item = Lamp>) -> Self {
         let sky = std::iter::once(ambient).chain(map).collect();
-        let lit = |lamps: Vec<Lamp>| lamps.into_iter().filter(|lamp| lamp.radiance != LinearRgb::BLACK).collect();
-        Self { faces: lit(faces), sky: lit(sky) }
+        let lit = |lamps: Vec<Lamp>| {
+            lamps
+                .into_iter()
+                .filter(|lamp| lamp.radiance != LinearRgb::BLACK)
+                .collect()
+        };
+        Self {
+            faces: lit(faces),
+            sky: lit(sky),
+        }
     }
 
     /// Irradiance of the sky where nothing is in its way.
     pub(super) fn open_sky(&self) -> LinearRgb {
         let shares = |lamp: &Lamp| lamp.sources.iter().map(Source::share).sum::<f64>() as f32;
-        self.sky.iter().fold(LinearRgb::BLACK, |sum, lamp| sum.add_scaled(shares(lamp), lamp.radiance))
+        self.sky.iter().fold(LinearRgb::BLACK, |sum, lamp| {
+            sum.add_scaled(shares(lamp), lamp.radiance)
+        })
     }
 }
 
@@ -93,9 +116,15 @@ fn face(light: &AreaLight, nodes: Vec<light::Node>) -> Lamp {
     let source = |n: light::Node| Source {
         at: n.point.to_homogeneous(),
         width: n.area.sqrt(),
-        kind: Kind::Face { normal, area: n.area },
+        kind: Kind::Face {
+            normal,
+            area: n.area,
+        },
     };
-    Lamp { radiance: light::radiance(light), sources: nodes.into_iter().map(source).collect() }
+    Lamp {
+        radiance: light::radiance(light),
+        sources: nodes.into_iter().map(source).collect(),
+    }
 }
 
 fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {
@@ -106,7 +135,13 @@ fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {
         width: (share / d.z).sqrt(),
         kind: Kind::Sky { share },
     };
-    Lamp { radiance, sources: light::ambient_directions(count).into_iter().map(source).collect() }
+    Lamp {
+        radiance,
+        sources: light::ambient_directions(count)
+            .into_iter()
+            .map(source)
+            .collect(),
+    }
 }
 
 /// The pieces of a map that a receiver sees: a lamp each, since each has a colour of its own.
@@ -124,7 +159,11 @@ fn pieces(pieces: Vec<light::SkyPiece>) -> impl Iterator<Item = Lamp> {
 
 /// Axes of a frame whose `z` is `normal`.
 fn hemisphere(normal: &Vector3<f64>) -> Matrix3<f64> {
-    let helper = if normal.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let helper = if normal.x.abs() < 0.6 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let x = helper.cross(normal).normalize();
     Matrix3::from_columns(&[x, normal.cross(&x), *normal])
 }
@@ -132,7 +171,11 @@ fn hemisphere(normal: &Vector3<f64>) -> Matrix3<f64> {
 impl Source {
     /// Cosine times solid angle of a piece of the sky.
     fn share(&self) -> f64 {
-        if let Kind::Sky { share } = self.kind { share } else { 0.0 }
+        if let Kind::Sky { share } = self.kind {
+            share
+        } else {
+            0.0
+        }
     }
 
     /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below a horizon.
@@ -143,7 +186,11 @@ impl Source {
                 let to = self.at.xyz() - point;
                 let r2 = to.norm_squared();
                 let cosines = normal.dot(&to).max(0.0) * (-face.dot(&to)).max(0.0);
-                if r2 > 0.0 { cosines / (r2 * r2) * area } else { 0.0 }
+                if r2 > 0.0 {
+                    cosines / (r2 * r2) * area
+                } else {
+                    0.0
+                }
             }
         }
     }

@@ -1,6 +1,9 @@
 //! Textures made ready for one picture: one level of detail, a transparent border, the card's colours.
 
-#![expect(clippy::needless_range_loop, reason = "several arrays in step, which vectorises")]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "several arrays in step, which vectorises"
+)]
 #![expect(clippy::manual_clamp, reason = "takes a number that is none to 0")]
 
 use crate::asset::Texture;
@@ -29,13 +32,24 @@ impl Grid {
     fn new((width, height): (usize, usize), level: f64, reach_texels: f64) -> Self {
         let scale = libm::exp2(-level);
         let texels = [width as f64 * scale, height as f64 * scale];
-        Self { texels, reach: texels.map(|n| reach_texels / n) }
+        Self {
+            texels,
+            reach: texels.map(|n| reach_texels / n),
+        }
     }
 
     /// Rows that give positions among bordered texels, from rows that give texture coordinates.
-    pub(super) fn rows(&self, u: &Vector3<f64>, v: &Vector3<f64>, w: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    pub(super) fn rows(
+        &self,
+        u: &Vector3<f64>,
+        v: &Vector3<f64>,
+        w: &Vector3<f64>,
+    ) -> [Vector3<f64>; 2] {
         let first = BORDER as f64 - 0.5;
-        [u * self.texels[0] + w * first, v * self.texels[1] + w * first]
+        [
+            u * self.texels[0] + w * first,
+            v * self.texels[1] + w * first,
+        ]
     }
 }
 
@@ -53,7 +67,11 @@ impl Cells {
     /// Samples `first`, `first + 1` and so on of a line; positions outside count as the nearest inside.
     #[inline(always)]
     pub(super) fn of([u, v, w]: &Linear, first: f32, (width, height): (usize, usize)) -> Self {
-        let mut cells = Self { at: [0; LANES], fx: [0.0; LANES], fy: [0.0; LANES] };
+        let mut cells = Self {
+            at: [0; LANES],
+            fx: [0.0; LANES],
+            fy: [0.0; LANES],
+        };
         let last = [width as f32 - 1.0 - INSIDE, height as f32 - 1.0 - INSIDE];
         let stride = width as u32;
         for lane in 0..LANES {
@@ -82,7 +100,10 @@ const WHOLE: f32 = 8_388_608.0;
 fn whole_and_rest(x: f32, last: f32) -> (u32, f32) {
     let x = x.max(INSIDE).min(last);
     let next = (x + 0.5) + WHOLE;
-    ((next.to_bits() & 0x007f_ffff).wrapping_sub(1), x - (next - WHOLE - 1.0))
+    (
+        (next.to_bits() & 0x007f_ffff).wrapping_sub(1),
+        x - (next - WHOLE - 1.0),
+    )
 }
 
 /// Colour and opacity at the level of detail that a picture asks for.
@@ -104,7 +125,10 @@ impl Baked {
     /// them.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: f64) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
-        let detail = Detail { level: level as usize, step: libm::exp2(level.fract()) };
+        let detail = Detail {
+            level: level as usize,
+            step: libm::exp2(level.fract()),
+        };
         // The full picture ends at its edge; smaller ones fade half a texel out.
         let grid = Grid::new(texture.size(), level, if level > 0.0 { 0.5 } else { 0.0 });
         let (size, texels, opacity) = match texture {
@@ -118,7 +142,13 @@ impl Baked {
                 (size, texels, opacity)
             }
         };
-        let mut baked = Self { grid, width: size.0, height: size.1, texels, opacity };
+        let mut baked = Self {
+            grid,
+            width: size.0,
+            height: size.1,
+            texels,
+            opacity,
+        };
         baked.grade(grade);
         baked
     }
@@ -131,7 +161,10 @@ impl Baked {
     fn grade(&mut self, grade: &Grade) {
         grade_colors(&mut self.texels, grade);
         // Film of another hue lets another hue pass; how bright it reflects is no matter of what passes.
-        let through = Grade { value: 1.0, ..*grade };
+        let through = Grade {
+            value: 1.0,
+            ..*grade
+        };
         if through != Grade::default() {
             for o in self.opacity.iter_mut().filter(|o| **o != Four::ZERO) {
                 *o = graded_opacity(o.rgb(), &through).into();
@@ -155,7 +188,11 @@ pub(super) fn graded_opacity(opacity: LinearRgb, grade: &Grade) -> LinearRgb {
 /// The mean over channels; exactly the channels' value where they are the same.
 #[inline(always)]
 pub(super) fn mean(c: LinearRgb) -> f32 {
-    if c.r == c.g && c.g == c.b { c.r } else { (c.r + c.g + c.b) / 3.0 }
+    if c.r == c.g && c.g == c.b {
+        c.r
+    } else {
+        (c.r + c.g + c.b) / 3.0
+    }
 }
 
 fn grade_colors(texels: &mut [Four], grade: &Grade) {
@@ -164,9 +201,16 @@ fn grade_colors(texels: &mut [Four], grade: &Grade) {
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn shift_colors(texels: &mut [Four], hue_deg: f32, saturation: f32, value: f32) {
-    for run in texels.chunks_mut(LANES).filter(|run| run.iter().any(|t| t.0 != [0.0; 4])) {
+    for run in texels
+        .chunks_mut(LANES)
+        .filter(|run| run.iter().any(|t| t.0 != [0.0; 4]))
+    {
         let mut colors = [[0.0; LANES]; 3];
         for (lane, t) in run.iter().enumerate() {
             (0..3).for_each(|c| colors[c][lane] = t.0[c]);
@@ -197,18 +241,34 @@ impl Detail {
         four: impl Fn(P) -> Four,
     ) -> ((usize, usize), Vec<Four>) {
         let image = level(self.level);
-        let (columns, rows) = (Shares::of(image.width(), self.step), Shares::of(image.height(), self.step));
+        let (columns, rows) = (
+            Shares::of(image.width(), self.step),
+            Shares::of(image.height(), self.step),
+        );
         let (width, height) = (columns.0.len() + 2 * BORDER, rows.0.len() + 2 * BORDER);
         let mut texels = vec![Four::ZERO; width * height];
-        let (mut line, mut sum) = (vec![Four::ZERO; image.width()], vec![Four::ZERO; image.width()]);
-        for (share, out) in rows.0.iter().zip(texels.chunks_exact_mut(width).skip(BORDER)) {
+        let (mut line, mut sum) = (
+            vec![Four::ZERO; image.width()],
+            vec![Four::ZERO; image.width()],
+        );
+        for (share, out) in rows
+            .0
+            .iter()
+            .zip(texels.chunks_exact_mut(width).skip(BORDER))
+        {
             sum.fill(Four::ZERO);
             for (y, weight) in share.weighted() {
-                line.iter_mut().zip(image.row(y)).for_each(|(t, &p)| *t = four(p));
-                sum.iter_mut().zip(&line).for_each(|(s, t)| *s = s.add_scaled(weight, *t));
+                line.iter_mut()
+                    .zip(image.row(y))
+                    .for_each(|(t, &p)| *t = four(p));
+                sum.iter_mut()
+                    .zip(&line)
+                    .for_each(|(s, t)| *s = s.add_scaled(weight, *t));
             }
             for (share, out) in columns.0.iter().zip(&mut out[BORDER..]) {
-                *out = share.weighted().fold(Four::ZERO, |s, (x, weight)| s.add_scaled(weight, sum[x]));
+                *out = share
+                    .weighted()
+                    .fold(Four::ZERO, |s, (x, weight)| s.add_scaled(weight, sum[x]));
             }
         }
         ((width, height), texels)
@@ -229,7 +289,11 @@ impl Shares {
     /// Averages over `step` texels (1 up to 2).
     fn of(len: usize, step: f64) -> Self {
         let count = (len as f64 / step).ceil() as usize;
-        Self((0..count).map(|k| Share::of(k as f64 * step, (k + 1) as f64 * step, len)).collect())
+        Self(
+            (0..count)
+                .map(|k| Share::of(k as f64 * step, (k + 1) as f64 * step, len))
+                .collect(),
+        )
     }
 }
 
@@ -241,12 +305,20 @@ impl Share {
             let at = (first + n) as f64;
             (((at + 1.0).min(end) - at.max(start)).max(0.0) / (end - start)) as f32
         };
-        Self { first, weights: [weight(0), weight(1), weight(2)], count }
+        Self {
+            first,
+            weights: [weight(0), weight(1), weight(2)],
+            count,
+        }
     }
 
     #[inline(always)]
     fn weighted(&self) -> impl Iterator<Item = (usize, f32)> {
-        self.weights.into_iter().take(self.count).enumerate().map(|(n, weight)| (self.first + n, weight))
+        self.weights
+            .into_iter()
+            .take(self.count)
+            .enumerate()
+            .map(|(n, weight)| (self.first + n, weight))
     }
 }
 
@@ -268,11 +340,17 @@ const SURELY: f64 = 1.0 / 8.0;
 impl Shade {
     /// Opacity of a texture halved `level` times, in a card's own colours.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: usize) -> Self {
-        let grid = Grid::new(texture.size(), level as f64, if level > 0 { 0.5 } else { 0.0 });
+        let grid = Grid::new(
+            texture.size(),
+            level as f64,
+            if level > 0 { 0.5 } else { 0.0 },
+        );
         match texture {
             Texture::Rgba(pyramid) => Self::of(grid, pyramid.level(level), &[&|p: PremulRgba| p.a]),
             Texture::Film(pyramid) => {
-                let graded = pyramid.level(level).map(|p: Film| graded_opacity(p.opacity, grade));
+                let graded = pyramid
+                    .level(level)
+                    .map(|p: Film| graded_opacity(p.opacity, grade));
                 let channels: [&dyn Fn(LinearRgb) -> f32; 3] = [&|o| o.r, &|o| o.g, &|o| o.b];
                 Self::of(grid, &graded, &channels)
             }
@@ -290,23 +368,43 @@ impl Shade {
             plane
         };
         let planes = channels.iter().map(plane).collect();
-        let opaque = image.pixels().iter().all(|&p| channels.iter().all(|channel| channel(p) == 1.0));
-        Self { grid, width, height, planes, opaque }
+        let opaque = image
+            .pixels()
+            .iter()
+            .all(|&p| channels.iter().all(|channel| channel(p) == 1.0));
+        Self {
+            grid,
+            width,
+            height,
+            planes,
+            opaque,
+        }
     }
 
     /// How far inside of its sides an opaque texture is surely read as opaque, as shares of it; none for one that is not.
     pub(super) fn inset(&self) -> Option<[f64; 2]> {
-        self.opaque.then(|| self.grid.texels.map(|n| (0.5 + SURELY) / n))
+        self.opaque
+            .then(|| self.grid.texels.map(|n| (0.5 + SURELY) / n))
     }
 
     /// Multiplies what gets through, along a line over bordered texels from its sample `first` on, in one channel.
     pub(super) fn darken(&self, channel: usize, line: &Linear, first: usize, through: &mut [f32]) {
         let plane = &self.planes[channel.min(self.planes.len() - 1)];
-        darken(plane, (self.width, self.height), line, first as f32, through);
+        darken(
+            plane,
+            (self.width, self.height),
+            line,
+            first as f32,
+            through,
+        );
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn darken(opacity: &[f32], size: (usize, usize), line: &Linear, first: f32, through: &mut [f32]) {
     let mut first = first;
     for run in through.chunks_mut(LANES) {
@@ -339,7 +437,10 @@ mod tests {
         for k in 0..4000 {
             let x = 0.02 + k as f32 * 0.013;
             let (i, f) = whole_and_rest(x, 60.0);
-            assert!((0.0..=1.0).contains(&f) && (i as f32 + f - x).abs() < 1e-5, "{x}: {i} + {f}");
+            assert!(
+                (0.0..=1.0).contains(&f) && (i as f32 + f - x).abs() < 1e-5,
+                "{x}: {i} + {f}"
+            );
         }
     }
 
@@ -348,8 +449,14 @@ mod tests {
         for (len, step) in [(7, 1.0), (7, 1.3), (10, 1.999), (1, 1.5)] {
             let shares = Shares::of(len, step).0;
             let mut taken = vec![0.0; len];
-            shares.iter().flat_map(Share::weighted).for_each(|(x, w)| taken[x] += f64::from(w) * step);
-            assert!(taken.iter().all(|t| (t - 1.0).abs() < 1e-6), "{len}, {step}: every texel is used once");
+            shares
+                .iter()
+                .flat_map(Share::weighted)
+                .for_each(|(x, w)| taken[x] += f64::from(w) * step);
+            assert!(
+                taken.iter().all(|t| (t - 1.0).abs() < 1e-6),
+                "{len}, {step}: every texel is used once"
+            );
             assert!(shares.len() == (len as f64 / step).ceil() as usize);
         }
     }
@@ -368,12 +475,26 @@ mod tests {
             let a = 0.1 * x as f32;
             PremulRgba::new(0.5 * a, 0.01 * y as f32 * a, 0.3 * a, a)
         });
-        let film = Texture::Film(std::sync::Arc::new(crate::filter::Pyramid::new(image.map(Film::from))));
+        let film = Texture::Film(std::sync::Arc::new(crate::filter::Pyramid::new(
+            image.map(Film::from),
+        )));
         let alpha = Texture::from(image);
-        let grade = Grade { hue_deg: 40.0, saturation: 0.8, value: 1.2 };
-        let (a, b) = (Baked::new(&alpha, &grade, 0.6), Baked::new(&film, &grade, 0.6));
+        let grade = Grade {
+            hue_deg: 40.0,
+            saturation: 0.8,
+            value: 1.2,
+        };
+        let (a, b) = (
+            Baked::new(&alpha, &grade, 0.6),
+            Baked::new(&film, &grade, 0.6),
+        );
         assert_eq!(a.texels, b.texels);
-        assert!(b.opacity.iter().zip(&a.texels).all(|(o, t)| o.rgb() == LinearRgb::grey(t.alpha())));
+        assert!(
+            b.opacity
+                .iter()
+                .zip(&a.texels)
+                .all(|(o, t)| o.rgb() == LinearRgb::grey(t.alpha()))
+        );
         let (a, b) = (Shade::new(&alpha, &grade, 1), Shade::new(&film, &grade, 1));
         assert!(b.planes.len() == 3 && b.planes.iter().all(|plane| *plane == a.planes[0]));
     }

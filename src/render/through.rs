@@ -75,7 +75,8 @@ impl LayerRow {
     ) {
         self.irradiance.clear();
         self.lit += pixels.len();
-        self.irradiance.extend(pixels.map(|i| light.at(column(i), row)));
+        self.irradiance
+            .extend(pixels.map(|i| light.at(column(i), row)));
     }
 }
 
@@ -85,15 +86,31 @@ impl Through {
         let (width, area) = (block.x.len(), block.len());
         let count = area * r * r;
         let (grey, tints) = if tinted { (0, count) } else { (count, 0) };
-        Self { width, area, grey: vec![1.0; grey], tinted: vec![Four::ONE; tints] }
+        Self {
+            width,
+            area,
+            grey: vec![1.0; grey],
+            tinted: vec![Four::ONE; tints],
+        }
     }
 
     /// The sub-samples of a pixel, row by row.
     #[inline(always)]
     pub(super) fn of(&self, x: usize, y: usize) -> impl Iterator<Item = Four> {
         let i = y * self.width + x;
-        let grey = self.grey.iter().skip(i).step_by(self.area.max(1)).map(|&t| Four([t; 4]));
-        grey.chain(self.tinted.iter().skip(i).step_by(self.area.max(1)).copied())
+        let grey = self
+            .grey
+            .iter()
+            .skip(i)
+            .step_by(self.area.max(1))
+            .map(|&t| Four([t; 4]));
+        grey.chain(
+            self.tinted
+                .iter()
+                .skip(i)
+                .step_by(self.area.max(1))
+                .copied(),
+        )
     }
 
     /// Passes a layer at some pixels of a row, one sub-sample each: adds to the row what is seen of the layer, and takes
@@ -109,17 +126,37 @@ impl Through {
     ) {
         let start = plane * self.area + y * self.width;
         let places = start + pixels.start..start + pixels.end;
-        let (light, alpha) = (&mut row.light[pixels.clone()], &mut row.alpha[pixels.clone()]);
+        let (light, alpha) = (
+            &mut row.light[pixels.clone()],
+            &mut row.alpha[pixels.clone()],
+        );
         if self.tinted.is_empty() {
-            pass_grey(&layer.texture, line, &row.irradiance, &mut self.grey[places], light, alpha);
+            pass_grey(
+                &layer.texture,
+                line,
+                &row.irradiance,
+                &mut self.grey[places],
+                light,
+                alpha,
+            );
         } else {
             let sums = (light, alpha, &mut row.hidden[pixels]);
-            pass_tinted(&layer.texture, line, &row.irradiance, &mut self.tinted[places], sums);
+            pass_tinted(
+                &layer.texture,
+                line,
+                &row.irradiance,
+                &mut self.tinted[places],
+                sums,
+            );
         }
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn pass_grey(
     texture: &Baked,
     line: &Linear,
@@ -129,14 +166,23 @@ fn pass_grey(
     alpha: &mut [f32],
 ) {
     let size = texture.size();
-    let sums = through.chunks_mut(LANES).zip(light.chunks_mut(LANES)).zip(alpha.chunks_mut(LANES));
+    let sums = through
+        .chunks_mut(LANES)
+        .zip(light.chunks_mut(LANES))
+        .zip(alpha.chunks_mut(LANES));
     for (run, ((through, light), alpha)) in sums.enumerate() {
         let cells = Cells::of(line, (run * LANES) as f32, size);
         let irradiance = irradiance.get(run * LANES..).unwrap_or_default();
-        for (lane, ((through, light), alpha)) in through.iter_mut().zip(light).zip(alpha).enumerate() {
+        for (lane, ((through, light), alpha)) in
+            through.iter_mut().zip(light).zip(alpha).enumerate()
+        {
             let texel = bilinear(&texture.texels, size.0, &cells, lane);
             let a = texel.alpha().max(0.0).min(1.0);
-            let lit = if let Some(&e) = irradiance.get(lane) { texel.times(e) } else { texel };
+            let lit = if let Some(&e) = irradiance.get(lane) {
+                texel.times(e)
+            } else {
+                texel
+            };
             *light = light.add_scaled(*through, lit);
             *alpha += a;
             *through *= 1.0 - a;
@@ -152,7 +198,11 @@ fn pass_tinted(
     (light, alpha, hidden): (&mut [Four], &mut [f32], &mut [Four]),
 ) {
     let size = texture.size();
-    let sums = through.iter_mut().zip(light).zip(alpha.iter_mut().zip(hidden)).enumerate();
+    let sums = through
+        .iter_mut()
+        .zip(light)
+        .zip(alpha.iter_mut().zip(hidden))
+        .enumerate();
     let mut cells = Cells::of(line, 0.0, size);
     for (i, ((through, light), (alpha, hidden))) in sums {
         let lane = i % LANES;
@@ -165,12 +215,19 @@ fn pass_tinted(
             film => bilinear(film, size.0, &cells, lane),
         };
         let opacity = Four(opacity.0.map(|o| o.max(0.0).min(1.0)));
-        let lit = if let Some(&e) = irradiance.get(i) { texel.times(e) } else { texel };
+        let lit = if let Some(&e) = irradiance.get(i) {
+            texel.times(e)
+        } else {
+            texel
+        };
         // The fourth number tells whether anything is seen at all.
-        *light =
-            Four(std::array::from_fn(|c| light.0[c] + through.0[c] * if c < 3 { lit.0[c] } else { texel.alpha() }));
+        *light = Four(std::array::from_fn(|c| {
+            light.0[c] + through.0[c] * if c < 3 { lit.0[c] } else { texel.alpha() }
+        }));
         *alpha += mean(opacity.rgb());
-        *hidden = Four(std::array::from_fn(|c| hidden.0[c] + through.0[c] * opacity.0[c]));
+        *hidden = Four(std::array::from_fn(|c| {
+            hidden.0[c] + through.0[c] * opacity.0[c]
+        }));
         *through = Four(std::array::from_fn(|c| through.0[c] * (1.0 - opacity.0[c])));
     }
 }
@@ -179,5 +236,10 @@ fn pass_tinted(
 fn bilinear(texels: &[Four], stride: usize, cells: &Cells, lane: usize) -> Four {
     let at = cells.at[lane] as usize;
     let (top, bottom) = (&texels[at..][..2], &texels[at + stride..][..2]);
-    Four::bilinear([top[0], top[1]], [bottom[0], bottom[1]], cells.fx[lane], cells.fy[lane])
+    Four::bilinear(
+        [top[0], top[1]],
+        [bottom[0], bottom[1]],
+        cells.fx[lane],
+        cells.fy[lane],
+    )
 }

@@ -34,25 +34,48 @@ impl Sheet {
         let center = pose.translation.vector;
         let solid = w > 0.0 && h > 0.0 && w * h > VANISHING && (w * h).is_finite();
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
-        let placed = axes.iter().chain([&center]).all(|v| v.iter().all(|c| c.is_finite()));
-        (solid && placed).then_some(Self { center, x: axes[0], y: axes[1], normal: axes[2], size: [w, h] })
+        let placed = axes
+            .iter()
+            .chain([&center])
+            .all(|v| v.iter().all(|c| c.is_finite()));
+        (solid && placed).then_some(Self {
+            center,
+            x: axes[0],
+            y: axes[1],
+            normal: axes[2],
+            size: [w, h],
+        })
     }
 
     /// The plane `z = 0` as far as it receives shadows.
     pub(super) fn surface(size: [f64; 2]) -> Self {
-        Self { center: Vector3::zeros(), x: Vector3::x(), y: Vector3::y(), normal: Vector3::z(), size }
+        Self {
+            center: Vector3::zeros(),
+            x: Vector3::x(),
+            y: Vector3::y(),
+            normal: Vector3::z(),
+            size,
+        }
     }
 
     /// The same sheet, reaching further out on each side by shares of its size.
     pub(super) fn grown(&self, reach: [f64; 2]) -> Self {
         let grow = |k: usize| self.size[k] * (1.0 + 2.0 * reach[k]);
-        Self { size: [grow(0), grow(1)], ..*self }
+        Self {
+            size: [grow(0), grow(1)],
+            ..*self
+        }
     }
 
     /// The four corners, in turn.
     pub(super) fn corners(&self) -> [Vector3<f64>; 4] {
         let (a, b) = (self.x * (0.5 * self.size[0]), self.y * (0.5 * self.size[1]));
-        [self.center - a + b, self.center + a + b, self.center + a - b, self.center - a - b]
+        [
+            self.center - a + b,
+            self.center + a + b,
+            self.center + a - b,
+            self.center - a - b,
+        ]
     }
 }
 
@@ -72,8 +95,22 @@ pub(super) struct View {
 impl View {
     pub(super) fn of(camera: &Camera) -> Self {
         let (f, c) = (camera.focal_px, camera.principal_px);
-        let from_px = Matrix3::new(1.0 / f.x, 0.0, -c.x / f.x, 0.0, 1.0 / f.y, -c.y / f.y, 0.0, 0.0, 1.0);
-        let rotation = camera.camera_from_world.rotation.inverse().to_rotation_matrix();
+        let from_px = Matrix3::new(
+            1.0 / f.x,
+            0.0,
+            -c.x / f.x,
+            0.0,
+            1.0 / f.y,
+            -c.y / f.y,
+            0.0,
+            0.0,
+            1.0,
+        );
+        let rotation = camera
+            .camera_from_world
+            .rotation
+            .inverse()
+            .to_rotation_matrix();
         Self {
             eye: camera.center().coords,
             ray: rotation.matrix() * from_px,
@@ -83,10 +120,15 @@ impl View {
     }
 
     /// Picture positions `(x, y, 1)` of world points; none where one of them is at or behind the eye.
-    pub(super) fn project<const N: usize>(&self, world: &[Vector3<f64>; N]) -> Option<[Vector3<f64>; N]> {
+    pub(super) fn project<const N: usize>(
+        &self,
+        world: &[Vector3<f64>; N],
+    ) -> Option<[Vector3<f64>; N]> {
         let picture_from_world = self.ray.try_inverse()?;
         let seen = world.map(|point| picture_from_world * (point - self.eye));
-        let in_front = seen.iter().all(|p| p.z > VANISHING && p.iter().all(|c| c.is_finite()));
+        let in_front = seen
+            .iter()
+            .all(|p| p.z > VANISHING && p.iter().all(|c| c.is_finite()));
         in_front.then(|| seen.map(|p| p / p.z))
     }
 }
@@ -112,11 +154,22 @@ impl Seen {
     /// None for a sheet seen edge-on.
     pub(super) fn of(sheet: &Sheet, view: &View) -> Option<Self> {
         let above = sheet.normal.dot(&(view.eye - sheet.center));
-        let (normal, height) = if above >= 0.0 { (sheet.normal, above) } else { (-sheet.normal, -above) };
+        let (normal, height) = if above >= 0.0 {
+            (sheet.normal, above)
+        } else {
+            (-sheet.normal, -above)
+        };
         let w = -(view.ray.transpose() * normal);
         let point = view.eye * w.transpose() + view.ray * height;
         let [u, v] = texture_rows(sheet, &point, &w);
-        (height > VANISHING).then_some(Self { u, v, w, height, point, normal })
+        (height > VANISHING).then_some(Self {
+            u,
+            v,
+            w,
+            height,
+            point,
+            normal,
+        })
     }
 
     /// Side of the square that a pixel (or lattice cell) covers on the sheet's plane, metres, where it shows `target`; in
@@ -141,7 +194,11 @@ impl Seen {
 }
 
 /// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a sheet's plane.
-pub(super) fn texture_rows(sheet: &Sheet, point: &Matrix3<f64>, w: &Vector3<f64>) -> [Vector3<f64>; 2] {
+pub(super) fn texture_rows(
+    sheet: &Sheet,
+    point: &Matrix3<f64>,
+    w: &Vector3<f64>,
+) -> [Vector3<f64>; 2] {
     let along = |axis: &Vector3<f64>| point.transpose() * axis - w * axis.dot(&sheet.center);
     let [a, b] = sheet.size;
     if a.is_finite() && b.is_finite() {
@@ -155,7 +212,9 @@ pub(super) fn texture_rows(sheet: &Sheet, point: &Matrix3<f64>, w: &Vector3<f64>
 /// The cards of a shot that are there at all, in the order of their ids.
 pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, Sheet)> {
     let there = shot.cards.iter().filter(|card| !card.texture.is_empty());
-    let mut sheets: Vec<_> = there.filter_map(|card| Some((card, Sheet::of(card)?))).collect();
+    let mut sheets: Vec<_> = there
+        .filter_map(|card| Some((card, Sheet::of(card)?)))
+        .collect();
     sheets.sort_by_key(|(card, _)| card.id);
     sheets
 }
@@ -186,13 +245,21 @@ mod tests {
                 size: [0.3, 0.2],
             };
             let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|a| rotation * a);
-            let sheet =
-                Sheet { center: Vector3::new(0.1, 0.0, 0.1), x: axes[0], y: axes[1], normal: axes[2], size: quad.size };
+            let sheet = Sheet {
+                center: Vector3::new(0.1, 0.0, 0.1),
+                x: axes[0],
+                y: axes[1],
+                normal: axes[2],
+                size: quad.size,
+            };
             let seen = Seen::of(&sheet, &View::of(&camera)).unwrap();
             let (px, depth) = camera.project(quad.point(0.3, 0.8)).unwrap();
             let ([u, v], t) = seen.hit(px.x, px.y).unwrap();
-            assert!((u - 0.3).abs() < 1e-12 && (v - 0.8).abs() < 1e-12 && (t - depth).abs() < 1e-12);
-            let p = seen.point * Vector3::new(px.x, px.y, 1.0) / seen.w.dot(&Vector3::new(px.x, px.y, 1.0));
+            assert!(
+                (u - 0.3).abs() < 1e-12 && (v - 0.8).abs() < 1e-12 && (t - depth).abs() < 1e-12
+            );
+            let p = seen.point * Vector3::new(px.x, px.y, 1.0)
+                / seen.w.dot(&Vector3::new(px.x, px.y, 1.0));
             assert!((p - quad.point(0.3, 0.8).coords).norm() < 1e-12);
             assert!(seen.normal.dot(&(camera.center().coords - sheet.center)) > 0.0);
         }

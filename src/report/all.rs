@@ -6,7 +6,8 @@
 
 use super::section::{Document, Section};
 use super::{
-    Diagram, camera, color, encode, keying, label, light, machine, matte, peers, render, scale, settle, stability, work,
+    Diagram, camera, color, encode, keying, label, light, machine, matte, peers, render, scale,
+    settle, stability, work,
 };
 use crate::error::Result;
 use crate::quality::Quality;
@@ -50,8 +51,18 @@ struct Amount {
 impl AllOptions {
     fn amount(&self) -> Amount {
         match self.quick {
-            true => Amount { views: 20, bottles: 1, heaps: 2, runs: 1 },
-            false => Amount { views: 200, bottles: 4, heaps: 10, runs: 5 },
+            true => Amount {
+                views: 20,
+                bottles: 1,
+                heaps: 2,
+                runs: 1,
+            },
+            false => Amount {
+                views: 200,
+                bottles: 4,
+                heaps: 10,
+                runs: 5,
+            },
         }
     }
 }
@@ -67,7 +78,12 @@ const STAGES: [Measure; 10] = [
     |_, _| keying::diagrams(),
     |_, amount| Ok(camera::diagrams(amount.views)),
     |_, amount| {
-        let rows = settle::measure(&settle::SettleReportOptions { heaps: amount.heaps }, |_, _| ())?;
+        let rows = settle::measure(
+            &settle::SettleReportOptions {
+                heaps: amount.heaps,
+            },
+            |_, _| (),
+        )?;
         Ok(settle::diagrams(&rows))
     },
     |_, _| light::diagrams(),
@@ -96,13 +112,21 @@ pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Docu
         diagrams.extend(stage(options, &amount)?);
     }
     let others = peers::read(&options.peers)?;
-    let mut sections = vec![about(options), curves(&diagrams), qualities(), beside_others(&others, &options.peers)];
+    let mut sections = vec![
+        about(options),
+        curves(&diagrams),
+        qualities(),
+        beside_others(&others, &options.peers),
+    ];
     for (done, section) in (STAGES.len() as u64..).zip(rest) {
         progress(done, steps);
         sections.push(section()?);
     }
     progress(steps, steps);
-    Ok(Document { title: "petcomp: what it does, how well, and at what cost".into(), sections })
+    Ok(Document {
+        title: "petcomp: what it does, how well, and at what cost".into(),
+        sections,
+    })
 }
 
 /// Measures everything and writes `report.html`, `report.md` and the data of each plot and table (`.csv`) into a folder.
@@ -157,10 +181,18 @@ fn beside_others(comparisons: &[peers::Comparison], folder: &Path) -> Section {
             "There are no measurements in {folder}: `make peers` runs the other programs that can be had."
         ));
     }
-    let notes = comparisons.iter().map(|c| (c.stage.clone(), c.missing())).filter(|(_, text)| !text.is_empty());
-    let section = notes.fold(section, |section, (stage, text)| section.text(format!("{stage}: {text}")));
-    let drawn: Vec<Diagram> =
-        comparisons.iter().map(peers::Comparison::diagram).filter(|d| !d.points.is_empty()).collect();
+    let notes = comparisons
+        .iter()
+        .map(|c| (c.stage.clone(), c.missing()))
+        .filter(|(_, text)| !text.is_empty());
+    let section = notes.fold(section, |section, (stage, text)| {
+        section.text(format!("{stage}: {text}"))
+    });
+    let drawn: Vec<Diagram> = comparisons
+        .iter()
+        .map(peers::Comparison::diagram)
+        .filter(|d| !d.points.is_empty())
+        .collect();
     section
         .text("Measured in one run of `make peers`, on the same cores and the same input.")
         .table("peers", peers::ratios(comparisons))
@@ -172,7 +204,10 @@ fn stability_of_stages() -> Result<Section> {
     let rows = stability::measure(|_, _| ())?;
     let passed = rows.iter().filter(|row| row.outcome.passed).count();
     Ok(Section::new("Stability")
-        .text(format!("{passed} of {} stiff and extreme cases come out as they must.", rows.len()))
+        .text(format!(
+            "{passed} of {} stiff and extreme cases come out as they must.",
+            rows.len()
+        ))
         .table("stability_summary", stability::summary(&rows))
         .table("stability", stability::table(&rows)))
 }
@@ -192,13 +227,18 @@ fn paid_for() -> Result<Section> {
 fn memory_and_scale() -> Result<Section> {
     let measured = scale::measure(&scale::ScaleOptions::default(), |_, _| ())?;
     let tables = scale::tables(&measured)?;
-    let data = tables.first().map(|(_, table)| table.clone()).unwrap_or_default();
-    let section =
-        scale::charts(&measured)?.into_iter().fold(Section::new("Memory and scale"), |section, (svg, caption)| {
-            section.figure("scale_points", svg, caption, data.clone())
-        });
+    let data = tables
+        .first()
+        .map(|(_, table)| table.clone())
+        .unwrap_or_default();
+    let section = scale::charts(&measured)?.into_iter().fold(
+        Section::new("Memory and scale"),
+        |section, (svg, caption)| section.figure("scale_points", svg, caption, data.clone()),
+    );
     Ok(tables.into_iter().fold(section, |section, (title, table)| {
-        section.text(format!("{title}:")).table(format!("scale_{}", file_name(&title)), table)
+        section
+            .text(format!("{title}:"))
+            .table(format!("scale_{}", file_name(&title)), table)
     }))
 }
 

@@ -67,9 +67,15 @@ impl Set {
             (Vec::new(), images)
         };
         if images.is_empty() {
-            return Err(Error::file(folder, "no images, expected a YOLO dataset or a folder of images with labels"));
+            return Err(Error::file(
+                folder,
+                "no images, expected a YOLO dataset or a folder of images with labels",
+            ));
         }
-        let pictures = images.into_par_iter().map(labelled).collect::<Result<_>>()?;
+        let pictures = images
+            .into_par_iter()
+            .map(labelled)
+            .collect::<Result<_>>()?;
         Ok(Self { classes, pictures })
     }
 
@@ -78,7 +84,10 @@ impl Set {
     }
 
     fn boxes(&self) -> impl Iterator<Item = &(u32, [f64; 4])> {
-        self.pictures.iter().filter_map(|picture| picture.boxes.as_ref()).flatten()
+        self.pictures
+            .iter()
+            .filter_map(|picture| picture.boxes.as_ref())
+            .flatten()
     }
 
     fn centres(&self) -> Vec<[f64; 2]> {
@@ -88,28 +97,51 @@ impl Set {
     /// Some of the pictures, evenly spread.
     fn spread(&self, most: usize) -> Vec<&Labelled> {
         let count = most.min(self.pictures.len());
-        (0..count).map(|i| &self.pictures[i * self.pictures.len() / count]).collect()
+        (0..count)
+            .map(|i| &self.pictures[i * self.pictures.len() / count])
+            .collect()
     }
 
     /// What can be compared, by what it is.
     fn measures(&self) -> Vec<(&'static str, Vec<f64>)> {
-        let side = |i: usize| self.boxes().map(|(_, b)| 100.0 * b[i]).collect::<Vec<f64>>();
-        let counts = self.pictures.iter().filter_map(|p| p.boxes.as_ref().map(|boxes| boxes.len() as f64));
-        let area = self.boxes().map(|(_, [_, _, w, h])| 100.0 * (w * h).max(0.0).sqrt());
-        let looks: Vec<Look> =
-            self.spread(READ).into_par_iter().filter_map(|picture| Look::of(&picture.path)).collect();
+        let side = |i: usize| {
+            self.boxes()
+                .map(|(_, b)| 100.0 * b[i])
+                .collect::<Vec<f64>>()
+        };
+        let counts = self
+            .pictures
+            .iter()
+            .filter_map(|p| p.boxes.as_ref().map(|boxes| boxes.len() as f64));
+        let area = self
+            .boxes()
+            .map(|(_, [_, _, w, h])| 100.0 * (w * h).max(0.0).sqrt());
+        let looks: Vec<Look> = self
+            .spread(READ)
+            .into_par_iter()
+            .filter_map(|picture| Look::of(&picture.path))
+            .collect();
         let look = |value: fn(&Look) -> f64| looks.iter().map(value).collect();
         vec![
             ("labels in a picture", counts.collect()),
             ("width of a box, % of the picture", side(2)),
             ("height of a box, % of the picture", side(3)),
-            ("square root of a box's area, % of the picture", area.collect()),
+            (
+                "square root of a box's area, % of the picture",
+                area.collect(),
+            ),
             ("centre of a box from the left, %", side(0)),
             ("centre of a box from the top, %", side(1)),
             ("brightness of a picture, mean code", look(|l| l.brightness)),
-            ("contrast of a picture, standard deviation of codes", look(|l| l.contrast)),
+            (
+                "contrast of a picture, standard deviation of codes",
+                look(|l| l.contrast),
+            ),
             ("saturation of a picture, mean code", look(|l| l.saturation)),
-            ("fine detail of a picture, mean step between pixels", look(|l| l.detail)),
+            (
+                "fine detail of a picture, mean step between pixels",
+                look(|l| l.detail),
+            ),
         ]
     }
 }
@@ -128,7 +160,10 @@ fn walk(folder: &Path, seen: &mut BTreeSet<PathBuf>, images: &mut Vec<PathBuf>) 
             images.push(path);
         }
         if images.len() > MOST_FILES {
-            return Err(Error::file(folder, format!("more than {MOST_FILES} images, expected fewer")));
+            return Err(Error::file(
+                folder,
+                format!("more than {MOST_FILES} images, expected fewer"),
+            ));
         }
     }
     Ok(())
@@ -140,12 +175,19 @@ fn labelled(path: PathBuf) -> Result<Labelled> {
         return Ok(Labelled { path, boxes: None });
     };
     // In a picture of one pixel, pixels are shares.
-    let sheet = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1]).map_err(|what| Error::file(label, what))?;
+    let sheet = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
+        .map_err(|what| Error::file(label, what))?;
     let shares = |t: &eval::TrueBox| {
         let centre = t.bbox.center();
-        (t.class, [centre.x, centre.y, t.bbox.width(), t.bbox.height()])
+        (
+            t.class,
+            [centre.x, centre.y, t.bbox.width(), t.bbox.height()],
+        )
     };
-    Ok(Labelled { path, boxes: Some(sheet.truth.iter().map(shares).collect()) })
+    Ok(Labelled {
+        path,
+        boxes: Some(sheet.truth.iter().map(shares).collect()),
+    })
 }
 
 /// What the pixels of a picture are like as a whole, in codes of 8 bits.
@@ -159,7 +201,9 @@ struct Look {
 impl Look {
     /// None for a picture that cannot be read, which is warned of.
     fn of(path: &Path) -> Option<Self> {
-        let picture = io::read::<LinearRgb>(path).inspect_err(|error| log::warn!("{error}")).ok()?;
+        let picture = io::read::<LinearRgb>(path)
+            .inspect_err(|error| log::warn!("{error}"))
+            .ok()?;
         let (w, h) = picture.size();
         let width = w.min(READ_PX);
         let small = resize(&picture, width, (h * width).div_ceil(w).max(1));
@@ -168,9 +212,14 @@ impl Look {
             [c.r, c.g, c.b].map(f32::from)
         });
         let luma = codes.map(|[r, g, b]| 0.299 * r + 0.587 * g + 0.114 * b);
-        let spread = codes.map(|c| c.into_iter().fold(0.0, f32::max) - c.into_iter().fold(255.0, f32::min));
+        let spread =
+            codes.map(|c| c.into_iter().fold(0.0, f32::max) - c.into_iter().fold(255.0, f32::min));
         let brightness = mean(luma.pixels().iter().copied());
-        let squares = mean(luma.pixels().iter().map(|v| (v - brightness as f32).powi(2)));
+        let squares = mean(
+            luma.pixels()
+                .iter()
+                .map(|v| (v - brightness as f32).powi(2)),
+        );
         Some(Self {
             brightness,
             contrast: squares.sqrt(),
@@ -182,36 +231,63 @@ impl Look {
 
 /// Mean distance of a pixel from the one to its right.
 fn detail(luma: &Image<f32>) -> f64 {
-    mean(luma.rows().flat_map(|row| row.windows(2).map(|pair| (pair[1] - pair[0]).abs())))
+    mean(
+        luma.rows()
+            .flat_map(|row| row.windows(2).map(|pair| (pair[1] - pair[0]).abs())),
+    )
 }
 
 fn mean(values: impl Iterator<Item = f32>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), v| (sum + f64::from(v), count + 1));
+    let (sum, count) = values.fold((0.0, 0_u64), |(sum, count), v| {
+        (sum + f64::from(v), count + 1)
+    });
     sum / count.max(1) as f64
 }
 
 /// Puts the two side by side, what differs most first, with at most `most` of the others' pictures.
 pub(super) fn put_on(page: &mut Page, ours: &Set, theirs: &Set, most: usize) {
     page.heading("Beside your own pictures");
-    let unlabelled = theirs.pictures.iter().filter(|picture| picture.boxes.is_none()).count();
-    let told = if unlabelled > 0 { format!(", {unlabelled} of them without a label file") } else { String::new() };
+    let unlabelled = theirs
+        .pictures
+        .iter()
+        .filter(|picture| picture.boxes.is_none())
+        .count();
+    let told = if unlabelled > 0 {
+        format!(", {unlabelled} of them without a label file")
+    } else {
+        String::new()
+    };
     page.text(&format!(
         "{} pictures of the dataset (blue) and {} of yours (orange){told}. The distance is that of Kolmogorov and Smirnov: \
          0 for the same distribution, 1 for two that have nothing in common; what differs most comes first.",
         ours.pictures.len(),
         theirs.pictures.len()
     ));
-    let mut pairs: Vec<Pair> = ours.measures().into_iter().zip(theirs.measures()).filter_map(Pair::of).collect();
+    let mut pairs: Vec<Pair> = ours
+        .measures()
+        .into_iter()
+        .zip(theirs.measures())
+        .filter_map(Pair::of)
+        .collect();
     pairs.sort_by(|a, b| b.distance.total_cmp(&a.distance));
     page.table(&distances(&pairs));
     let charts: String = pairs.iter().map(Pair::svg).collect();
     let maps = heat_map("centres of the dataset's labels", &ours.centres())
         + &heat_map("centres of your labels", &theirs.centres());
-    page.html(&format!("<div class=\"histograms\">\n{charts}{maps}</div>\n"));
+    page.html(&format!(
+        "<div class=\"histograms\">\n{charts}{maps}</div>\n"
+    ));
     page.subheading("Classes").table(&classes(ours, theirs));
     let shown = theirs.spread(most);
-    let figures: Vec<Figure> = shown.into_par_iter().filter_map(|picture| figure(theirs, picture)).collect();
-    page.subheading(&format!("Your pictures ({} of {})", figures.len(), theirs.pictures.len()));
+    let figures: Vec<Figure> = shown
+        .into_par_iter()
+        .filter_map(|picture| figure(theirs, picture))
+        .collect();
+    page.subheading(&format!(
+        "Your pictures ({} of {})",
+        figures.len(),
+        theirs.pictures.len()
+    ));
     page.html(&gallery("yours", &figures));
 }
 
@@ -219,16 +295,44 @@ fn figure(set: &Set, picture: &Labelled) -> Option<Figure> {
     // Boxes are shares of the picture, which is a square of 100 then; the frame gives it its shape back.
     let header = io::read_header(&picture.path).ok()?;
     let size = [header.width as f64, header.height as f64];
-    let mut figure = Figure::whole(&picture.path, size).inspect_err(|error| log::warn!("{error}")).ok()?;
+    let mut figure = Figure::whole(&picture.path, size)
+        .inspect_err(|error| log::warn!("{error}"))
+        .ok()?;
     let (letter, top) = (figure.letter(), figure.top());
     for (class, [x, y, w, h]) in picture.boxes.iter().flatten() {
-        let b = BBox { x0: x - w / 2.0, y0: y - h / 2.0, x1: x + w / 2.0, y1: y + h / 2.0 };
-        let b = BBox { x0: b.x0 * size[0], y0: b.y0 * size[1], x1: b.x1 * size[0], y1: b.y1 * size[1] };
+        let b = BBox {
+            x0: x - w / 2.0,
+            y0: y - h / 2.0,
+            x1: x + w / 2.0,
+            y1: y + h / 2.0,
+        };
+        let b = BBox {
+            x0: b.x0 * size[0],
+            y0: b.y0 * size[1],
+            x1: b.x1 * size[0],
+            y1: b.y1 * size[1],
+        };
         let color = super::dataset::color_of(*class);
-        figure.drawing += &marked_box(&b, &set.name(*class), letter, top, &color, "stroke-width=\"2\"");
+        figure.drawing += &marked_box(
+            &b,
+            &set.name(*class),
+            letter,
+            top,
+            &color,
+            "stroke-width=\"2\"",
+        );
     }
-    let name = picture.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let count = picture.boxes.as_ref().map_or("no label file".into(), |boxes| format!("{} labels", boxes.len()));
+    let name = picture
+        .path
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
+    let count = picture
+        .boxes
+        .as_ref()
+        .map_or("no label file".into(), |boxes| {
+            format!("{} labels", boxes.len())
+        });
     figure.caption = format!("{name}: {count}");
     Some(figure)
 }
@@ -237,28 +341,51 @@ fn figure(set: &Set, picture: &Labelled) -> Option<Figure> {
 fn classes(ours: &Set, theirs: &Set) -> Table {
     let shares = |set: &Set| -> BTreeMap<String, f64> {
         let mut counts: BTreeMap<String, f64> = BTreeMap::new();
-        set.boxes().for_each(|(class, _)| *counts.entry(set.name(*class)).or_default() += 1.0);
+        set.boxes()
+            .for_each(|(class, _)| *counts.entry(set.name(*class)).or_default() += 1.0);
         let all = counts.values().sum::<f64>().max(1.0);
-        counts.into_iter().map(|(name, count)| (name, 100.0 * count / all)).collect()
+        counts
+            .into_iter()
+            .map(|(name, count)| (name, 100.0 * count / all))
+            .collect()
     };
     let (a, b) = (shares(ours), shares(theirs));
     let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     let mut table = Table::new(["class", "dataset", "yours"]);
     for name in names {
-        let share =
-            |shares: &BTreeMap<String, f64>| shares.get(name).map_or("-".into(), |share| format!("{share:.1} %"));
+        let share = |shares: &BTreeMap<String, f64>| {
+            shares
+                .get(name)
+                .map_or("-".into(), |share| format!("{share:.1} %"))
+        };
         table.push([name.clone(), share(&a), share(&b)]);
     }
     table
 }
 
 fn distances(pairs: &[Pair]) -> Table {
-    let mut table = Table::new(["", "dataset: 5 %, median, 95 %", "yours: 5 %, median, 95 %", "distance"]);
+    let mut table = Table::new([
+        "",
+        "dataset: 5 %, median, 95 %",
+        "yours: 5 %, median, 95 %",
+        "distance",
+    ]);
     let told = |values: &[f64]| {
-        [0.05, 0.5, 0.95].map(|share| quantile(values.to_vec(), share).map(short).unwrap_or_default()).join(" / ")
+        [0.05, 0.5, 0.95]
+            .map(|share| {
+                quantile(values.to_vec(), share)
+                    .map(short)
+                    .unwrap_or_default()
+            })
+            .join(" / ")
     };
     for pair in pairs {
-        table.push([pair.title.to_owned(), told(&pair.ours), told(&pair.theirs), format!("{:.2}", pair.distance)]);
+        table.push([
+            pair.title.to_owned(),
+            told(&pair.ours),
+            told(&pair.theirs),
+            format!("{:.2}", pair.distance),
+        ]);
     }
     table
 }
@@ -278,19 +405,39 @@ impl Pair {
     /// None where one of the two has no value.
     fn of(((title, ours), (_, theirs)): (Named, Named)) -> Option<Self> {
         let some = !ours.is_empty() && !theirs.is_empty();
-        some.then(|| Self { title, distance: distance(ours.clone(), theirs.clone()), ours, theirs })
+        some.then(|| Self {
+            title,
+            distance: distance(ours.clone(), theirs.clone()),
+            ours,
+            theirs,
+        })
     }
 
     /// Shares of each in bins of the same width: ours as bars, the others as steps.
     fn svg(&self) -> String {
         let all = || self.ours.iter().chain(&self.theirs).copied();
-        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
-        let (low, high) = if low < high { (low, high) } else { (low - 0.5, low + 0.5) };
+        let (low, high) = (
+            all().fold(f64::INFINITY, f64::min),
+            all().fold(f64::NEG_INFINITY, f64::max),
+        );
+        let (low, high) = if low < high {
+            (low, high)
+        } else {
+            (low - 0.5, low + 0.5)
+        };
         let [ours, theirs] = [&self.ours, &self.theirs].map(|values| shares(values, low, high));
-        let most = ours.iter().chain(&theirs).copied().fold(0.0, f64::max).max(1e-9);
+        let most = ours
+            .iter()
+            .chain(&theirs)
+            .copied()
+            .fold(0.0, f64::max)
+            .max(1e-9);
         let [w, h] = FRAME;
         let (width, height, wide) = (LEFT + w + 12.0, TOP + h + BELOW, w / BINS as f64);
-        let (x, y) = (|i: usize| LEFT + wide * i as f64, |share: f64| TOP + h * (1.0 - share / most));
+        let (x, y) = (
+            |i: usize| LEFT + wide * i as f64,
+            |share: f64| TOP + h * (1.0 - share / most),
+        );
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" font-family=\"sans-serif\" \
              font-size=\"11\">\n<title>{}</title>\n",
@@ -306,8 +453,11 @@ impl Pair {
                 TOP + h - top
             );
         }
-        let steps: String =
-            theirs.iter().enumerate().map(|(i, share)| format!("V{:.1}H{:.1}", y(*share), x(i + 1))).collect();
+        let steps: String = theirs
+            .iter()
+            .enumerate()
+            .map(|(i, share)| format!("V{:.1}H{:.1}", y(*share), x(i + 1)))
+            .collect();
         let line = TOP + h;
         let _ = writeln!(
             svg,
@@ -319,7 +469,11 @@ impl Pair {
             (LEFT, line + 14.0, "start", short(low)),
             (LEFT + w, line + 14.0, "end", short(high)),
         ] {
-            let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>", escaped(&text));
+            let _ = writeln!(
+                svg,
+                "<text x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
+                escaped(&text)
+            );
         }
         svg + "</svg>\n"
     }
@@ -341,8 +495,12 @@ fn shares(values: &[f64], low: f64, high: f64) -> [f64; BINS] {
 fn distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     a.sort_by(f64::total_cmp);
     b.sort_by(f64::total_cmp);
-    let below = |values: &[f64], x: f64| values.partition_point(|v| *v <= x) as f64 / values.len() as f64;
-    a.iter().chain(&b).map(|&x| (below(&a, x) - below(&b, x)).abs()).fold(0.0, f64::max)
+    let below =
+        |values: &[f64], x: f64| values.partition_point(|v| *v <= x) as f64 / values.len() as f64;
+    a.iter()
+        .chain(&b)
+        .map(|&x| (below(&a, x) - below(&b, x)).abs())
+        .fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -351,7 +509,8 @@ mod tests {
 
     #[test]
     fn the_distance_is_none_for_the_same_and_one_for_others() {
-        let [low, high] = [0.0, 100.0].map(|from| (0..50).map(|i| from + f64::from(i)).collect::<Vec<f64>>());
+        let [low, high] =
+            [0.0, 100.0].map(|from| (0..50).map(|i| from + f64::from(i)).collect::<Vec<f64>>());
         assert_eq!(distance(low.clone(), low.clone()), 0.0);
         assert_eq!(distance(low.clone(), high), 1.0);
         // Half of the values lie above all of the others.
@@ -364,7 +523,10 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let grey = Image::filled(8, 6, LinearRgb::grey(0.2));
         for (file, label) in [
-            ("images/a.png", Some(("labels/a.txt", "1 0.5 0.25 0.5 0.5\n"))),
+            (
+                "images/a.png",
+                Some(("labels/a.txt", "1 0.5 0.25 0.5 0.5\n")),
+            ),
             ("images/deep/b.jpg", Some(("images/deep/b.txt", ""))),
             ("images/c.png", None),
         ] {
@@ -378,9 +540,24 @@ mod tests {
         }
         let set = Set::read(root.path()).unwrap();
         let boxes: Vec<_> = set.pictures.iter().map(|p| p.boxes.clone()).collect();
-        assert_eq!(boxes, [Some(vec![(1, [0.5, 0.25, 0.5, 0.5])]), None, Some(vec![])]);
+        assert_eq!(
+            boxes,
+            [Some(vec![(1, [0.5, 0.25, 0.5, 0.5])]), None, Some(vec![])]
+        );
         std::fs::write(root.path().join("labels/a.txt"), "x\n").unwrap();
-        assert!(Set::read(root.path()).err().unwrap().to_string().contains("a.txt: line 1"));
-        assert!(Set::read(&root.path().join("labels")).err().unwrap().to_string().contains("no images"));
+        assert!(
+            Set::read(root.path())
+                .err()
+                .unwrap()
+                .to_string()
+                .contains("a.txt: line 1")
+        );
+        assert!(
+            Set::read(&root.path().join("labels"))
+                .err()
+                .unwrap()
+                .to_string()
+                .contains("no images")
+        );
     }
 }

@@ -101,13 +101,19 @@ impl Lens {
             Self::Ideal => Scenario::default(),
             Self::Realistic => Scenario::realistic(),
         };
-        Scenario { corner_sigma_px: noise_px, ..usual }
+        Scenario {
+            corner_sigma_px: noise_px,
+            ..usual
+        }
     }
 
     fn priors(self, method: Method) -> Priors {
         match (self, method) {
             (Self::Ideal, _) => Priors::ideal().with_free_focal(),
-            (Self::Realistic, Method::Joint) => Priors { kappa_sigma: 0.01, ..Priors::default() },
+            (Self::Realistic, Method::Joint) => Priors {
+                kappa_sigma: 0.01,
+                ..Priors::default()
+            },
             (Self::Realistic, _) => Priors::default(),
         }
     }
@@ -138,8 +144,16 @@ impl Method {
     }
 
     fn options(self, lens: Lens) -> SolveOptions {
-        let effort = if let Self::Steps(n) = self { Effort::Steps(n) } else { Effort::Whole };
-        SolveOptions { priors: lens.priors(self), effort, ..Default::default() }
+        let effort = if let Self::Steps(n) = self {
+            Effort::Steps(n)
+        } else {
+            Effort::Whole
+        };
+        SolveOptions {
+            priors: lens.priors(self),
+            effort,
+            ..Default::default()
+        }
     }
 
     /// Solves the first of some photos of one camera.
@@ -148,12 +162,20 @@ impl Method {
             return camera::solve(&views[0].label, options).ok();
         }
         let labels: Vec<_> = views.iter().map(|v| v.label.clone()).collect();
-        camera::solve_joint(&labels, options).ok()?.photos.swap_remove(0).ok()
+        camera::solve_joint(&labels, options)
+            .ok()?
+            .photos
+            .swap_remove(0)
+            .ok()
     }
 
     /// How many photos it looks at for one result.
     fn photos(self) -> usize {
-        if self == Self::Joint { PHOTOS_TOGETHER } else { 1 }
+        if self == Self::Joint {
+            PHOTOS_TOGETHER
+        } else {
+            1
+        }
     }
 }
 
@@ -163,10 +185,17 @@ impl Method {
 pub fn measure(options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Vec<Row> {
     let mut rows = Vec::new();
     let total = (Lens::ALL.len() * NOISES.len() * TILTS.len()) as u64;
-    for (lens, noise_px) in Lens::ALL.into_iter().flat_map(|lens| NOISES.map(|noise| (lens, noise))) {
+    for (lens, noise_px) in Lens::ALL
+        .into_iter()
+        .flat_map(|lens| NOISES.map(|noise| (lens, noise)))
+    {
         for tilt_deg in TILTS {
             progress((rows.len() / Method::ALL.len()) as u64, total);
-            let cell = Cell { lens, noise_px, tilt_deg };
+            let cell = Cell {
+                lens,
+                noise_px,
+                tilt_deg,
+            };
             let photos: Vec<_> = (0..options.views).map(|k| cell.photos(k)).collect();
             rows.extend(Method::ALL.map(|method| cell.row(method, &photos)));
         }
@@ -187,7 +216,9 @@ impl Cell {
     fn photos(&self, k: u64) -> Vec<View> {
         let scenario = self.lens.scenario(self.noise_px);
         let mut views = scenario.views(SEED, k, PHOTOS_TOGETHER, [self.tilt_deg; 2]);
-        views.iter_mut().for_each(|v| v.label.surface.id = "tray".into());
+        views
+            .iter_mut()
+            .for_each(|v| v.label.surface.id = "tray".into());
         views
     }
 
@@ -198,8 +229,16 @@ impl Cell {
             let start = cpu_seconds();
             let solution = method.solve(views, &options);
             times.push((cpu_seconds() - start) * 1e6 / method.photos() as f64);
-            focal.push(solution.as_ref().map_or(f64::INFINITY, |s| focal_percent(&views[0], s)));
-            height.push(solution.as_ref().map_or(f64::INFINITY, |s| height_error_px(&views[0], s)));
+            focal.push(
+                solution
+                    .as_ref()
+                    .map_or(f64::INFINITY, |s| focal_percent(&views[0], s)),
+            );
+            height.push(
+                solution
+                    .as_ref()
+                    .map_or(f64::INFINITY, |s| height_error_px(&views[0], s)),
+            );
         }
         let failed = focal.iter().filter(|e| e.is_infinite()).count();
         Row {
@@ -231,7 +270,9 @@ fn height_error_px(view: &View, solution: &Solution) -> f64 {
         let off = (found - distorted(&view.camera, view.kappa, at(view.size))).norm_squared();
         off.is_finite().then_some(off)
     };
-    let sum: f64 = (0..GRID * GRID).map(|i| off(i).unwrap_or(f64::INFINITY)).sum();
+    let sum: f64 = (0..GRID * GRID)
+        .map(|i| off(i).unwrap_or(f64::INFINITY))
+        .sum();
     (sum / (GRID * GRID) as f64).sqrt()
 }
 
@@ -247,7 +288,11 @@ fn spread(mut values: Vec<f64>) -> [f64; 2] {
 ///
 /// # Errors
 /// [`Error::Value`] for no views; files that cannot be written.
-pub fn write(folder: &Path, options: &CameraReportOptions, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn write(
+    folder: &Path,
+    options: &CameraReportOptions,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<Row>> {
     if options.views == 0 {
         return Err(Error::value("views", "0, expected at least 1"));
     }
@@ -255,15 +300,27 @@ pub fn write(folder: &Path, options: &CameraReportOptions, progress: impl Fn(u64
     io::create_folder(folder)?;
     let coverage = coverage::measure(options.views);
     io::write_text(folder.join("camera.csv"), &csv(&rows))?;
-    io::write_text(folder.join("camera_coverage.csv"), &coverage::csv(&coverage))?;
-    io::write_text(folder.join("camera.md"), &(markdown(&rows) + &coverage::markdown(&coverage)))?;
+    io::write_text(
+        folder.join("camera_coverage.csv"),
+        &coverage::csv(&coverage),
+    )?;
+    io::write_text(
+        folder.join("camera.md"),
+        &(markdown(&rows) + &coverage::markdown(&coverage)),
+    )?;
     for lens in Lens::ALL {
         let of_lens: Vec<Row> = rows.iter().filter(|r| r.lens == lens).copied().collect();
         let focal = |r: &Row| r.focal_percent[0];
         let height = |r: &Row| r.height_px[0];
         let name = |what: &str| folder.join(format!("camera_{what}_{}.svg", lens.name()));
-        io::write_text(name("tilt"), &against_tilt(&of_lens, "focal length, median error, %", focal))?;
-        io::write_text(name("height"), &against_tilt(&of_lens, "50 mm up, median error, px", height))?;
+        io::write_text(
+            name("tilt"),
+            &against_tilt(&of_lens, "focal length, median error, %", focal),
+        )?;
+        io::write_text(
+            name("height"),
+            &against_tilt(&of_lens, "50 mm up, median error, px", height),
+        )?;
         io::write_text(name("time"), &against_time(&of_lens))?;
     }
     Ok(rows)
@@ -275,7 +332,10 @@ fn csv(rows: &[Row]) -> String {
     let line = |r: &Row| {
         let ([f, f95], [h, h95]) = (r.focal_percent, r.height_px);
         let (lens, method) = (r.lens.name(), r.method.name().replace(", ", " of "));
-        let kind = format!("{lens},{},{},{method},{},{}", r.noise_px, r.tilt_deg, r.views, r.failed);
+        let kind = format!(
+            "{lens},{},{},{method},{},{}",
+            r.noise_px, r.tilt_deg, r.views, r.failed
+        );
         format!("{kind},{f:.5},{f95:.5},{h:.5},{h95:.5},{:.2}\n", r.time_us)
     };
     head.to_owned() + &rows.iter().map(line).collect::<String>()
@@ -287,33 +347,65 @@ fn markdown(rows: &[Row]) -> String {
         "# Error of the camera solver\n\nFocal length, error in %: median / 95 %. Below: median run time per photo.\n"
             .to_owned();
     for table in rows.chunk_by(|a, b| (a.lens, a.noise_px) == (b.lens, b.noise_px)) {
-        text += &format!("\n## {} camera, corners to {} px\n\n| tilt |", table[0].lens.name(), table[0].noise_px);
+        text += &format!(
+            "\n## {} camera, corners to {} px\n\n| tilt |",
+            table[0].lens.name(),
+            table[0].noise_px
+        );
         text += &Method::ALL.map(|m| format!(" {} |", m.name())).concat();
         text += &format!("\n|{}\n", " --- |".repeat(Method::ALL.len() + 1));
         for line in table.chunk_by(|a, b| a.tilt_deg == b.tilt_deg) {
-            let cells =
-                line.iter().map(|r| format!(" {} / {} |", three(r.focal_percent[0]), three(r.focal_percent[1])));
+            let cells = line.iter().map(|r| {
+                format!(
+                    " {} / {} |",
+                    three(r.focal_percent[0]),
+                    three(r.focal_percent[1])
+                )
+            });
             text += &format!("| {} |{}\n", line[0].tilt_deg, cells.collect::<String>());
         }
-        let time = |method| spread(table.iter().filter(|r| r.method == method).map(|r| r.time_us).collect())[0];
-        text += &format!("| us |{}\n", Method::ALL.map(|m| format!(" {} |", three(time(m)))).concat());
+        let time = |method| {
+            spread(
+                table
+                    .iter()
+                    .filter(|r| r.method == method)
+                    .map(|r| r.time_us)
+                    .collect(),
+            )[0]
+        };
+        text += &format!(
+            "| us |{}\n",
+            Method::ALL
+                .map(|m| format!(" {} |", three(time(m))))
+                .concat()
+        );
     }
     text
 }
 
 /// Three digits that count.
 fn three(value: f64) -> String {
-    let whole_digits = if value >= 1.0 { (libm::floor(libm::log10(value)) as usize).saturating_add(1) } else { 1 };
+    let whole_digits = if value >= 1.0 {
+        (libm::floor(libm::log10(value)) as usize).saturating_add(1)
+    } else {
+        1
+    };
     format!("{value:.*}", 3_usize.saturating_sub(whole_digits))
 }
 
 /// A chart per noise, a curve per method.
 fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> String {
     let up = Axis::over_decades(title, rows.iter().map(&error));
-    let across = Axis { title: "tilt, degrees".into(), range: [0.0, 80.0], logarithmic: false };
+    let across = Axis {
+        title: "tilt, degrees".into(),
+        range: [0.0, 80.0],
+        logarithmic: false,
+    };
     let chart = |noise_px| {
         let curve = |method| -> Curve {
-            let of = rows.iter().filter(|r| r.noise_px == noise_px && r.method == method);
+            let of = rows
+                .iter()
+                .filter(|r| r.noise_px == noise_px && r.method == method);
             of.map(|r| [r.tilt_deg, error(r)]).collect()
         };
         Chart {
@@ -332,10 +424,15 @@ fn against_tilt(rows: &[Row], title: &str, error: impl Fn(&Row) -> f64) -> Strin
 fn against_time(rows: &[Row]) -> String {
     let error = |r: &Row| r.focal_percent[0];
     let up = Axis::over_decades("focal length, median error, %", rows.iter().map(error));
-    let across = Axis::over_decades("run time per photo, microseconds", rows.iter().map(|r| r.time_us));
+    let across = Axis::over_decades(
+        "run time per photo, microseconds",
+        rows.iter().map(|r| r.time_us),
+    );
     let chart = |tilt_deg: f64| {
         let curve = |noise_px| -> Curve {
-            let of = rows.iter().filter(|r| r.noise_px == noise_px && r.tilt_deg == tilt_deg);
+            let of = rows
+                .iter()
+                .filter(|r| r.noise_px == noise_px && r.tilt_deg == tilt_deg);
             of.map(|r| [r.time_us, error(r)]).collect()
         };
         Chart {
@@ -359,7 +456,11 @@ mod tests {
     use super::*;
 
     fn rows(lens: Lens, noise_px: f64, tilt_deg: f64, methods: &[Method]) -> Vec<Row> {
-        let cell = Cell { lens, noise_px, tilt_deg };
+        let cell = Cell {
+            lens,
+            noise_px,
+            tilt_deg,
+        };
         let photos: Vec<_> = (0..100).map(|k| cell.photos(k)).collect();
         methods.iter().map(|&m| cell.row(m, &photos)).collect()
     }
@@ -367,16 +468,32 @@ mod tests {
     #[test]
     fn the_closed_form_is_nearly_as_good_as_the_most_probable_camera() {
         // Section 4 of the specification: 0.73 % against 0.73 % at 20 degrees and 1 px.
-        let found = rows(Lens::Ideal, 1.0, 20.0, &[Method::Steps(0), Method::Steps(5), Method::Whole]);
+        let found = rows(
+            Lens::Ideal,
+            1.0,
+            20.0,
+            &[Method::Steps(0), Method::Steps(5), Method::Whole],
+        );
         let [closed, five, whole] = [0, 1, 2].map(|i| found[i].focal_percent);
         assert!((0.5..1.0).contains(&whole[0]), "{whole:?}");
-        assert!(closed[0] < 1.1 * whole[0] && closed[1] < 1.2 * whole[1], "{closed:?} {whole:?}");
-        assert!((five[0] / whole[0] - 1.0).abs() < 0.01, "{five:?} {whole:?}");
+        assert!(
+            closed[0] < 1.1 * whole[0] && closed[1] < 1.2 * whole[1],
+            "{closed:?} {whole:?}"
+        );
+        assert!(
+            (five[0] / whole[0] - 1.0).abs() < 0.01,
+            "{five:?} {whole:?}"
+        );
     }
 
     #[test]
     fn a_real_camera_from_above_needs_beliefs_and_more_photos_help() {
-        let found = rows(Lens::Realistic, 1.0, 10.0, &[Method::Steps(0), Method::Whole, Method::Joint]);
+        let found = rows(
+            Lens::Realistic,
+            1.0,
+            10.0,
+            &[Method::Steps(0), Method::Whole, Method::Joint],
+        );
         let [closed, whole, joint] = [0, 1, 2].map(|i| found[i].focal_percent);
         assert!(closed[1] > 1.2 * whole[1], "{closed:?} {whole:?}");
         assert!(joint[1] < whole[1], "{joint:?} {whole:?}");
@@ -385,14 +502,20 @@ mod tests {
 
     #[test]
     fn errors_are_the_same_every_time() {
-        let errors =
-            || rows(Lens::Realistic, 0.5, 5.0, &[Method::Whole]).into_iter().map(|r| (r.focal_percent, r.height_px));
+        let errors = || {
+            rows(Lens::Realistic, 0.5, 5.0, &[Method::Whole])
+                .into_iter()
+                .map(|r| (r.focal_percent, r.height_px))
+        };
         assert!(errors().eq(errors()));
     }
 
     #[test]
     fn numbers_have_three_digits_that_count() {
-        assert_eq!([0.01234, 1.234, 12.34, 123.4, 1234.0].map(three), ["0.01", "1.23", "12.3", "123", "1234"]);
+        assert_eq!(
+            [0.01234, 1.234, 12.34, 123.4, 1234.0].map(three),
+            ["0.01", "1.23", "12.3", "123", "1234"]
+        );
         assert_eq!(three(f64::INFINITY), "inf");
     }
 }

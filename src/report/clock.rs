@@ -24,12 +24,16 @@ const MOST_REPEATS: f64 = 1000.0;
 /// # Errors
 /// The first of `work`; a thread that cannot be had.
 pub(super) fn timed<T: Send>(runs: usize, work: impl Fn() -> Result<T> + Sync) -> Result<(T, f64)> {
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::value("threads", e))?;
+    let one = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .map_err(|e| Error::value("threads", e))?;
     let start = cpu_seconds();
     let made = one.install(&work)?;
     let first = cpu_seconds() - start;
     let repeats = (SHORT / first.max(f64::MIN_POSITIVE)).clamp(1.0, MOST_REPEATS) as usize;
-    let many = || (0..repeats).try_for_each(|_| work().map(|made| drop(std::hint::black_box(made))));
+    let many =
+        || (0..repeats).try_for_each(|_| work().map(|made| drop(std::hint::black_box(made))));
     let mut times = vec![first];
     for _ in 1..runs {
         let start = cpu_seconds();
@@ -64,6 +68,13 @@ mod tests {
 
     #[test]
     fn the_median_is_the_middle_one() {
-        assert_eq!((median(vec![3.0, 1.0, 2.0]), median(vec![1.0, 4.0]), median(vec![])), (2.0, 4.0, 0.0));
+        assert_eq!(
+            (
+                median(vec![3.0, 1.0, 2.0]),
+                median(vec![1.0, 4.0]),
+                median(vec![])
+            ),
+            (2.0, 4.0, 0.0)
+        );
     }
 }

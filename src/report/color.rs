@@ -5,7 +5,9 @@
 
 use super::clock::timed;
 use super::{Diagram, Point};
-use crate::color::{Curve, decode_srgb8, decode_srgb16, encode_srgb8, encode_srgb16, linear_to_srgb, srgb_to_linear};
+use crate::color::{
+    Curve, decode_srgb8, decode_srgb16, encode_srgb8, encode_srgb16, linear_to_srgb, srgb_to_linear,
+};
 use crate::error::Result;
 use crate::pixel::{LinearRgb, Srgb8};
 
@@ -32,15 +34,25 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
 fn lights() -> Vec<f32> {
     // An odd multiplier runs through all numbers of as many bits.
     let mixed = |i: usize| i.wrapping_mul(2_654_435_761) & (VALUES.next_power_of_two() - 1);
-    (0..VALUES).map(|i| (mixed(i) as f64 / VALUES.next_power_of_two() as f64) as f32).collect()
+    (0..VALUES)
+        .map(|i| (mixed(i) as f64 / VALUES.next_power_of_two() as f64) as f32)
+        .collect()
 }
 
 fn encoded(light: f64) -> f64 {
-    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+    if light <= 0.003_130_8 {
+        12.92 * light
+    } else {
+        1.055 * light.powf(1.0 / 2.4) - 0.055
+    }
 }
 
 fn decoded(value: f64) -> f64 {
-    if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+    if value <= 0.040_45 {
+        value / 12.92
+    } else {
+        ((value + 0.055) / 1.055).powf(2.4)
+    }
 }
 
 /// Seconds and error of a form that turns values into codes; what those stand for is not timed.
@@ -52,18 +64,29 @@ fn point<T: Send>(
     meant: impl Fn(&T) -> f64,
 ) -> Result<Point> {
     let (made, seconds) = timed(RUNS, || Ok(form(values)))?;
-    let squares = made.iter().zip(values).map(|(m, v)| (meant(m) - right(f64::from(*v))).powi(2));
-    Ok(Point::new(name, setting, seconds, (squares.sum::<f64>() / values.len() as f64).sqrt()))
+    let squares = made
+        .iter()
+        .zip(values)
+        .map(|(m, v)| (meant(m) - right(f64::from(*v))).powi(2));
+    Ok(Point::new(
+        name,
+        setting,
+        seconds,
+        (squares.sum::<f64>() / values.len() as f64).sqrt(),
+    ))
 }
 
 fn encoding() -> Result<Diagram> {
     let lights = lights();
     let table8 = |values: &[f32]| -> Vec<u8> {
-        let triples = values.chunks_exact(3).map(|v| encode_srgb8(LinearRgb::new(v[0], v[1], v[2])));
+        let triples = values
+            .chunks_exact(3)
+            .map(|v| encode_srgb8(LinearRgb::new(v[0], v[1], v[2])));
         triples.flat_map(|c| [c.r, c.g, c.b]).collect()
     };
     let table16 = |values: &[f32]| values.iter().map(|v| encode_srgb16(*v)).collect();
-    let each = |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
+    let each =
+        |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
     let gamma = |v: f32| Curve::Gamma(PLAIN_GAMMA).encode(v);
     let wrong = wrong_codes(&table8(&lights), &lights);
     Ok(Diagram {
@@ -74,12 +97,32 @@ fn encoding() -> Result<Diagram> {
         cost: "CPU seconds per megapixel".into(),
         reference: "closed form of IEC 61966-2-1 in double precision".into(),
         points: vec![
-            point(["table", "8 bits"], &lights, encoded, table8, |c| f64::from(*c) / MOST8)?.used_where(|_| true),
-            point(["table", "16 bits"], &lights, encoded, table16, |c| f64::from(*c) / MOST16)?,
-            point(["formula", "32-bit float"], &lights, encoded, each(linear_to_srgb), |v| f64::from(*v))?,
-            point(["plain power", "gamma 2.2"], &lights, encoded, each(gamma), |v| f64::from(*v))?,
+            point(["table", "8 bits"], &lights, encoded, table8, |c| {
+                f64::from(*c) / MOST8
+            })?
+            .used_where(|_| true),
+            point(["table", "16 bits"], &lights, encoded, table16, |c| {
+                f64::from(*c) / MOST16
+            })?,
+            point(
+                ["formula", "32-bit float"],
+                &lights,
+                encoded,
+                each(linear_to_srgb),
+                |v| f64::from(*v),
+            )?,
+            point(
+                ["plain power", "gamma 2.2"],
+                &lights,
+                encoded,
+                each(gamma),
+                |v| f64::from(*v),
+            )?,
         ],
-        limit: Some((1.01 * ROUNDING / MOST8, "what rounding to 8 bits costs, and 1 % for the few values".into())),
+        limit: Some((
+            1.01 * ROUNDING / MOST8,
+            "what rounding to 8 bits costs, and 1 % for the few values".into(),
+        )),
         why: format!(
             "Pictures have 8 bits, and {wrong} of {} codes differ from the nearest one: the table is the formula, rounded.",
             lights.len()
@@ -92,19 +135,37 @@ fn encoding() -> Result<Diagram> {
 fn wrong_codes(codes: &[u8], lights: &[f32]) -> usize {
     let all = codes.iter().zip(lights);
     // Half a code, and a hair for the closed form's own rounding.
-    all.filter(|(c, v)| (f64::from(**c) - MOST8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9).count()
+    all.filter(|(c, v)| (f64::from(**c) - MOST8 * encoded(f64::from(**v))).abs() > 0.5 + 1e-9)
+        .count()
 }
 
 fn decoding() -> Result<Diagram> {
-    let codes: Vec<u8> = (0..VALUES).map(|i| (i.wrapping_mul(2_654_435_761) >> 8) as u8).collect();
-    let values: Vec<f32> = codes.iter().map(|c| (f64::from(*c) / MOST8) as f32).collect();
+    let codes: Vec<u8> = (0..VALUES)
+        .map(|i| (i.wrapping_mul(2_654_435_761) >> 8) as u8)
+        .collect();
+    let values: Vec<f32> = codes
+        .iter()
+        .map(|c| (f64::from(*c) / MOST8) as f32)
+        .collect();
     // The table takes codes, not values: both stand for the same.
     let table8 = |_: &[f32]| -> Vec<f32> {
-        let triples = codes.chunks_exact(3).map(|c| decode_srgb8(Srgb8 { r: c[0], g: c[1], b: c[2] }));
+        let triples = codes.chunks_exact(3).map(|c| {
+            decode_srgb8(Srgb8 {
+                r: c[0],
+                g: c[1],
+                b: c[2],
+            })
+        });
         triples.flat_map(<[f32; 3]>::from).collect()
     };
-    let table16 = |_: &[f32]| codes.iter().map(|c| decode_srgb16(u16::from(*c) * 257)).collect();
-    let each = |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
+    let table16 = |_: &[f32]| {
+        codes
+            .iter()
+            .map(|c| decode_srgb16(u16::from(*c) * 257))
+            .collect()
+    };
+    let each =
+        |f: fn(f32) -> f32| move |values: &[f32]| values.iter().map(|v| f(*v)).collect::<Vec<_>>();
     let gamma = |v: f32| Curve::Gamma(PLAIN_GAMMA).decode(v);
     let light = |v: &f32| f64::from(*v);
     Ok(Diagram {
@@ -117,8 +178,20 @@ fn decoding() -> Result<Diagram> {
         points: vec![
             point(["table", "8 bits"], &values, decoded, table8, light)?.used_where(|_| true),
             point(["table", "16 bits"], &values, decoded, table16, light)?,
-            point(["formula", "32-bit float"], &values, decoded, each(srgb_to_linear), light)?,
-            point(["plain power", "gamma 2.2"], &values, decoded, each(gamma), light)?,
+            point(
+                ["formula", "32-bit float"],
+                &values,
+                decoded,
+                each(srgb_to_linear),
+                light,
+            )?,
+            point(
+                ["plain power", "gamma 2.2"],
+                &values,
+                decoded,
+                each(gamma),
+                light,
+            )?,
         ],
         limit: Some((f64::from(f32::EPSILON), "rounding of a float".into())),
         ..Diagram::default()
@@ -142,7 +215,10 @@ mod tests {
     fn lights_are_spread_evenly() {
         let lights = lights();
         let mean = lights.iter().map(|v| f64::from(*v)).sum::<f64>() / VALUES as f64;
-        assert!((mean - 0.5).abs() < 1e-3 && lights.iter().all(|v| (0.0..1.0).contains(v)), "{mean}");
+        assert!(
+            (mean - 0.5).abs() < 1e-3 && lights.iter().all(|v| (0.0..1.0).contains(v)),
+            "{mean}"
+        );
     }
 
     #[test]
@@ -155,9 +231,23 @@ mod tests {
 
     #[test]
     fn a_table_of_eight_bits_is_off_by_its_rounding() {
-        let values: Vec<f32> = (0..3 * 4096).map(|i| i as f32 / (3 * 4096) as f32).collect();
-        let round = |values: &[f32]| values.iter().map(|v| (linear_to_srgb(*v) * 255.0).round()).collect();
-        let found = point(["", ""], &values, encoded, round, |code: &f32| f64::from(*code) / MOST8).unwrap();
-        assert!((found.error / (ROUNDING / MOST8) - 1.0).abs() < 0.05, "{}", found.error);
+        let values: Vec<f32> = (0..3 * 4096)
+            .map(|i| i as f32 / (3 * 4096) as f32)
+            .collect();
+        let round = |values: &[f32]| {
+            values
+                .iter()
+                .map(|v| (linear_to_srgb(*v) * 255.0).round())
+                .collect()
+        };
+        let found = point(["", ""], &values, encoded, round, |code: &f32| {
+            f64::from(*code) / MOST8
+        })
+        .unwrap();
+        assert!(
+            (found.error / (ROUNDING / MOST8) - 1.0).abs() < 0.05,
+            "{}",
+            found.error
+        );
     }
 }

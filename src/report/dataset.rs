@@ -56,7 +56,11 @@ pub struct DatasetReportOptions {
 
 impl Default for DatasetReportOptions {
     fn default() -> Self {
-        Self { most: 32, page: None, beside: None }
+        Self {
+            most: 32,
+            page: None,
+            beside: None,
+        }
     }
 }
 
@@ -66,13 +70,27 @@ impl Default for DatasetReportOptions {
 /// As [`Summary::read`]; a picture that cannot be read; a folder beside it without images.
 pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
     let summary = Summary::read(folder)?;
-    let name = std::path::absolute(folder).ok().and_then(|f| f.file_name().map(|n| n.to_string_lossy().into_owned()));
+    let name = std::path::absolute(folder)
+        .ok()
+        .and_then(|f| f.file_name().map(|n| n.to_string_lossy().into_owned()));
     let mut page = Page::new(format!("Dataset {}", name.unwrap_or_default()));
-    page.table(&facts(&summary)).html(gallery::STYLE).html(SAMPLES_STYLE);
+    page.table(&facts(&summary))
+        .html(gallery::STYLE)
+        .html(SAMPLES_STYLE);
     samples(&mut page, folder, &summary, options.most)?;
-    all_pictures(&mut page, folder, &summary, options.page.as_deref().unwrap_or(folder));
+    all_pictures(
+        &mut page,
+        folder,
+        &summary,
+        options.page.as_deref().unwrap_or(folder),
+    );
     if let Some(own) = &options.beside {
-        beside::put_on(&mut page, &as_set(folder, &summary), &Set::read(own)?, options.most.div_ceil(2));
+        beside::put_on(
+            &mut page,
+            &as_set(folder, &summary),
+            &Set::read(own)?,
+            options.most.div_ceil(2),
+        );
     }
     drawn(&mut page, &summary);
     seen(&mut page, &summary);
@@ -83,7 +101,9 @@ pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
     page.heading("Time").table(&times(&summary));
     let recipe = serde_json::to_string_pretty(&summary.identity).unwrap_or_default();
     let recipe: String = recipe.lines().map(|line| escaped(line) + "\n").collect();
-    page.heading("Made from").html(&format!("<details><summary>dataset.json</summary><pre>{recipe}</pre></details>\n"));
+    page.heading("Made from").html(&format!(
+        "<details><summary>dataset.json</summary><pre>{recipe}</pre></details>\n"
+    ));
     Ok(page)
 }
 
@@ -91,21 +111,55 @@ pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
 fn as_set(folder: &Path, summary: &Summary) -> Set {
     let labelled = |glance: &Glance| {
         let [w, h] = glance.image.map(f64::from);
-        let share =
-            |(class, b): &(u32, BBox)| (*class, [b.center().x / w, b.center().y / h, b.width() / w, b.height() / h]);
-        Labelled { path: folder.join(&glance.files[0]), boxes: Some(glance.labels.iter().map(share).collect()) }
+        let share = |(class, b): &(u32, BBox)| {
+            (
+                *class,
+                [
+                    b.center().x / w,
+                    b.center().y / h,
+                    b.width() / w,
+                    b.height() / h,
+                ],
+            )
+        };
+        Labelled {
+            path: folder.join(&glance.files[0]),
+            boxes: Some(glance.labels.iter().map(share).collect()),
+        }
     };
-    Set { classes: summary.classes.clone(), pictures: summary.glances.iter().map(labelled).collect() }
+    Set {
+        classes: summary.classes.clone(),
+        pictures: summary.glances.iter().map(labelled).collect(),
+    }
 }
 
 fn facts(summary: &Summary) -> Table {
     let mut table = Table::new(["", ""]);
-    let text = |name: &str| summary.identity[name].to_string().trim_matches('"').to_owned();
-    let [objects, labels] =
-        summary.balance.iter().flatten().fold([0; 2], |[a, b], [objects, labels]| [a + objects, b + labels]);
+    let text = |name: &str| {
+        summary.identity[name]
+            .to_string()
+            .trim_matches('"')
+            .to_owned()
+    };
+    let [objects, labels] = summary
+        .balance
+        .iter()
+        .flatten()
+        .fold([0; 2], |[a, b], [objects, labels]| {
+            [a + objects, b + labels]
+        });
     let [train, val] = summary.images;
-    table.push(["images".to_owned(), format!("{} ({train} for training, {val} for validation)", train + val)]);
-    table.push(["objects".to_owned(), format!("{objects}, {labels} of them with a label")]);
+    table.push([
+        "images".to_owned(),
+        format!(
+            "{} ({train} for training, {val} for validation)",
+            train + val
+        ),
+    ]);
+    table.push([
+        "objects".to_owned(),
+        format!("{objects}, {labels} of them with a label"),
+    ]);
     table.push(["seed".to_owned(), text("seed")]);
     table.push(["obstructed objects".to_owned(), text("obstructed")]);
     table.push(["made by".to_owned(), format!("petcomp {}", text("petcomp"))]);
@@ -113,10 +167,14 @@ fn facts(summary: &Summary) -> Table {
 }
 
 fn samples(page: &mut Page, folder: &Path, summary: &Summary, most: usize) -> Result<()> {
-    page.heading("Pictures").html(&legend(summary)).html("<div>\n");
+    page.heading("Pictures")
+        .html(&legend(summary))
+        .html("<div>\n");
     for (id, text, on) in SWITCHES {
         let checked = if on { " checked" } else { "" };
-        page.html(&format!("<input type=\"checkbox\" id=\"{id}\"{checked}><label for=\"{id}\">{text}</label>\n"));
+        page.html(&format!(
+            "<input type=\"checkbox\" id=\"{id}\"{checked}><label for=\"{id}\">{text}</label>\n"
+        ));
     }
     let chosen = chosen(&summary.glances, most);
     let strange = chosen.iter().filter(|(_, why)| why.is_some()).count();
@@ -127,20 +185,35 @@ fn samples(page: &mut Page, folder: &Path, summary: &Summary, most: usize) -> Re
         summary.glances.len()
     ));
     let show = |(place, why): &(usize, Option<String>)| {
-        figure(&summary.shown(folder, *place)?, &summary.classes, why.as_deref())
+        figure(
+            &summary.shown(folder, *place)?,
+            &summary.classes,
+            why.as_deref(),
+        )
     };
     let figures: Result<Vec<Figure>> = chosen.par_iter().map(show).collect();
-    page.html("<div class=\"samples\">\n").html(&gallery("picture", &figures?)).html("</div>\n</div>\n");
+    page.html("<div class=\"samples\">\n")
+        .html(&gallery("picture", &figures?))
+        .html("</div>\n</div>\n");
     Ok(())
 }
 
 /// Colours of the classes and kinds of lines.
 fn legend(summary: &Summary) -> String {
     let key = |fill: &str, text: &str| {
-        format!("<span class=\"key\"><i style=\"background:{fill}\"></i>{}</span>\n", escaped(text))
+        format!(
+            "<span class=\"key\"><i style=\"background:{fill}\"></i>{}</span>\n",
+            escaped(text)
+        )
     };
-    let classes: String = (0..).zip(&summary.classes).map(|(class, name)| key(&color_of(class), name)).collect();
-    format!("<p>{classes}{}</p>\n", key(UNLABELLED, "outline of an object without a label"))
+    let classes: String = (0..)
+        .zip(&summary.classes)
+        .map(|(class, name)| key(&color_of(class), name))
+        .collect();
+    format!(
+        "<p>{classes}{}</p>\n",
+        key(UNLABELLED, "outline of an object without a label")
+    )
 }
 
 /// Colour of outlines without a label: seen on light and dark.
@@ -148,19 +221,30 @@ const UNLABELLED: &str = "#c8c8c8";
 
 /// Pictures to show: those unlike the others with what sets them apart, at most half, then others evenly spread.
 fn chosen(glances: &[Glance], most: usize) -> Vec<(usize, Option<String>)> {
-    let feature = |name, value: fn(&Glance) -> f64| Feature { name, values: glances.iter().map(value).collect() };
+    let feature = |name, value: fn(&Glance) -> f64| Feature {
+        name,
+        values: glances.iter().map(value).collect(),
+    };
     let strange = outliers(&[
         feature("objects", |g| g.objects as f64),
         feature("labels", |g| g.labels.len() as f64),
-        feature("objects without a label", |g| (g.objects - g.labels.len()) as f64),
+        feature("objects without a label", |g| {
+            (g.objects - g.labels.len()) as f64
+        }),
         feature("least seen label, %", |g| 100.0 * g.least_visible),
         feature("largest box, px", |g| sides(g).fold(f64::NAN, f64::max)),
         feature("smallest box, px", |g| sides(g).fold(f64::NAN, f64::min)),
         feature("scenes thrown away", |g| g.rejected as f64),
     ]);
-    let mut chosen: Vec<_> = strange.into_iter().take(most / 2).map(|o| (o.row, Some(o.why))).collect();
+    let mut chosen: Vec<_> = strange
+        .into_iter()
+        .take(most / 2)
+        .map(|o| (o.row, Some(o.why)))
+        .collect();
     let known: Vec<usize> = chosen.iter().map(|(row, _)| *row).collect();
-    let rest: Vec<usize> = (0..glances.len()).filter(|row| !known.contains(row)).collect();
+    let rest: Vec<usize> = (0..glances.len())
+        .filter(|row| !known.contains(row))
+        .collect();
     let count = (most - chosen.len()).min(rest.len());
     chosen.extend((0..count).map(|i| (rest[i * rest.len() / count], None)));
     chosen
@@ -177,7 +261,8 @@ fn figure(shown: &Shown, classes: &[String], why: Option<&str>) -> Result<Figure
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
     let (letter, objects) = (figure.letter(), &record.labels.objects);
     let reason = |object: &ObjectLabel| NoLabel::of(object, record);
-    let (mut boxes, mut masks, mut others, mut labelled) = (String::new(), String::new(), String::new(), 0);
+    let (mut boxes, mut masks, mut others, mut labelled) =
+        (String::new(), String::new(), String::new(), 0);
     for object in objects {
         match reason(object) {
             None => {
@@ -188,11 +273,15 @@ fn figure(shown: &Shown, classes: &[String], why: Option<&str>) -> Result<Figure
             Some(reason) => others += &outline_of(object, classes, reason, letter),
         }
     }
-    figure.drawing =
-        format!("<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>");
+    figure.drawing = format!(
+        "<g class=\"masks\">{masks}</g><g class=\"others\">{others}</g><g class=\"boxes\">{boxes}</g>"
+    );
     let why = why.map_or(String::new(), |why| format!("; {why}"));
     let (index, part) = (record.index, record.part.name());
-    figure.caption = format!("{index:06} {part}: {labelled} of {} objects labelled{why}", objects.len());
+    figure.caption = format!(
+        "{index:06} {part}: {labelled} of {} objects labelled{why}",
+        objects.len()
+    );
     Ok(figure)
 }
 
@@ -203,14 +292,23 @@ pub(super) fn color_of(class: u32) -> String {
 
 fn box_of(object: &ObjectLabel, classes: &[String], letter: f64) -> String {
     let BBox { x0, y0, .. } = object.amodal_box;
-    let (width, height, color) = (object.amodal_box.width(), object.amodal_box.height(), color_of(object.class));
+    let (width, height, color) = (
+        object.amodal_box.width(),
+        object.amodal_box.height(),
+        color_of(object.class),
+    );
     let name = escaped(&class_name(object.class, classes));
     let id = object.id.0;
     format!(
         "<rect x=\"{x0}\" y=\"{y0}\" width=\"{width}\" height=\"{height}\" fill=\"none\" pointer-events=\"all\" \
          stroke=\"{color}\" stroke-width=\"2\"><title>{id} {name}: {:.0} % seen</title></rect>",
         100.0 * object.visible_fraction
-    ) + &gallery::words([x0, y0 + letter], &format!("{id} {}", class_name(object.class, classes)), letter, "#222")
+    ) + &gallery::words(
+        [x0, y0 + letter],
+        &format!("{id} {}", class_name(object.class, classes)),
+        letter,
+        "#222",
+    )
 }
 
 fn mask_of(object: &ObjectLabel) -> String {
@@ -221,20 +319,34 @@ fn mask_of(object: &ObjectLabel) -> String {
         }
         path.push('z');
     }
-    format!("<path d=\"{path}\" fill=\"{}\" fill-opacity=\"0.45\"/>", color_of(object.class))
+    format!(
+        "<path d=\"{path}\" fill=\"{}\" fill-opacity=\"0.45\"/>",
+        color_of(object.class)
+    )
 }
 
 /// An outline with the reason why it has no label.
 fn outline_of(object: &ObjectLabel, classes: &[String], reason: NoLabel, letter: f64) -> String {
-    let over: Vec<String> = object.covered_by.iter().map(|id| id.0.to_string()).collect();
+    let over: Vec<String> = object
+        .covered_by
+        .iter()
+        .map(|id| id.0.to_string())
+        .collect();
     let why = match reason {
         NoLabel::Covered => format!("under {}", over.join(", ")),
         reason => in_words(reason).to_owned(),
     };
-    let (id, name, seen) = (object.id.0, class_name(object.class, classes), 100.0 * object.visible_fraction);
+    let (id, name, seen) = (
+        object.id.0,
+        class_name(object.class, classes),
+        100.0 * object.visible_fraction,
+    );
     let told = escaped(&format!("{id} {name}: no label, {why}; {seen:.0} % seen"));
     let ring = |ring: &Vec<crate::geom::Point2<f64>>| {
-        let points: String = ring.iter().map(|p| format!("{:.1},{:.1} ", p.x, p.y)).collect();
+        let points: String = ring
+            .iter()
+            .map(|p| format!("{:.1},{:.1} ", p.x, p.y))
+            .collect();
         format!(
             "<polygon points=\"{}\" fill=\"none\" pointer-events=\"all\" stroke=\"{UNLABELLED}\" stroke-width=\"1.5\">\
              <title>{told}</title></polygon>",
@@ -243,8 +355,17 @@ fn outline_of(object: &ObjectLabel, classes: &[String], reason: NoLabel, letter:
     };
     let rings: String = object.outline_px.iter().map(ring).collect();
     let center = object.amodal_box.center();
-    let label = gallery::words([center.x - 2.0 * letter, center.y], &format!("{id} {why}"), 0.7 * letter, "#555");
-    if rings.is_empty() { rings } else { rings + &label }
+    let label = gallery::words(
+        [center.x - 2.0 * letter, center.y],
+        &format!("{id} {why}"),
+        0.7 * letter,
+        "#555",
+    );
+    if rings.is_empty() {
+        rings
+    } else {
+        rings + &label
+    }
 }
 
 /// Every picture, a hundred behind each heading; they are read from the dataset when a heading is opened.
@@ -266,7 +387,9 @@ fn all_pictures(page: &mut Page, folder: &Path, summary: &Summary, from: &Path) 
     let more = summary.glances.len() - glances.len();
     if more > 0 {
         let address = address(&root.join("images"));
-        page.html(&format!("<p>{more} more are in <a href=\"{address}\">images</a>.</p>\n"));
+        page.html(&format!(
+            "<p>{more} more are in <a href=\"{address}\">images</a>.</p>\n"
+        ));
     }
 }
 
@@ -295,12 +418,18 @@ fn listed(glance: &Glance, root: &Path) -> String {
 /// A relative path as an address, every byte that means something in one written out.
 fn address(path: &Path) -> String {
     let byte = |b: u8| match b {
-        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => char::from(b).to_string(),
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
+            char::from(b).to_string()
+        }
         b => format!("%{b:02X}"),
     };
     let text: String = path.to_string_lossy().bytes().map(byte).collect();
     // Before a colon would stand a scheme.
-    if text.starts_with('/') { text } else { format!("./{text}") }
+    if text.starts_with('/') {
+        text
+    } else {
+        format!("./{text}")
+    }
 }
 
 fn in_words(reason: NoLabel) -> &'static str {
@@ -322,7 +451,11 @@ fn without_label(page: &mut Page, summary: &Summary) {
     let mut table = Table::new(["reason", "objects", "share of all objects"]);
     for (reason, count) in &summary.unlabelled {
         let share = 100.0 * *count as f64 / summary.visible.len().max(1) as f64;
-        table.push([in_words(*reason).to_owned(), count.to_string(), format!("{share:.1} %")]);
+        table.push([
+            in_words(*reason).to_owned(),
+            count.to_string(),
+            format!("{share:.1} %"),
+        ]);
     }
     let policy = summary.identity["obstructed"].as_str().unwrap_or("drop");
     page.table(&table).text(&format!(
@@ -331,7 +464,12 @@ fn without_label(page: &mut Page, summary: &Summary) {
     ));
     histograms(
         page,
-        &[Histogram::of("seen share of objects without a label", &summary.unlabelled_visible, [0.0, 1.0], BINS)],
+        &[Histogram::of(
+            "seen share of objects without a label",
+            &summary.unlabelled_visible,
+            [0.0, 1.0],
+            BINS,
+        )],
     );
 }
 
@@ -347,7 +485,13 @@ fn drawn(page: &mut Page, summary: &Summary) {
         match summary.range(key) {
             Some(([low, high], _)) if low == high => fixed.push([key.clone(), low.to_string()]),
             Some(([low, high], true)) => {
-                let mut h = Histogram::of(key, values, [low - 0.5, high + 0.5], whole_bars([low, high])).uniform();
+                let mut h = Histogram::of(
+                    key,
+                    values,
+                    [low - 0.5, high + 0.5],
+                    whole_bars([low, high]),
+                )
+                .uniform();
                 h.ends = [low.to_string(), high.to_string()];
                 charts.push(h);
             }
@@ -355,7 +499,12 @@ fn drawn(page: &mut Page, summary: &Summary) {
             None => charts.push(Histogram::of(key, values, extremes(values), BINS)),
         }
     }
-    charts.extend(summary.chosen.iter().map(|(what, counts)| choices(what, counts)));
+    charts.extend(
+        summary
+            .chosen
+            .iter()
+            .map(|(what, counts)| choices(what, counts)),
+    );
     histograms(page, &charts);
     if !fixed.rows.is_empty() {
         page.table(&fixed);
@@ -365,33 +514,72 @@ fn drawn(page: &mut Page, summary: &Summary) {
 /// A bar for each whole number, as long as they can be told apart.
 fn whole_bars([low, high]: [f64; 2]) -> usize {
     let numbers = high - low + 1.0;
-    if numbers <= MOST_BARS { numbers as usize } else { BINS }
+    if numbers <= MOST_BARS {
+        numbers as usize
+    } else {
+        BINS
+    }
 }
 
 fn choices(what: &str, counts: &BTreeMap<String, u64>) -> Histogram {
-    let name = |entry: Option<(&String, &u64)>| entry.map_or(String::new(), |(name, _)| name.clone());
+    let name =
+        |entry: Option<(&String, &u64)>| entry.map_or(String::new(), |(name, _)| name.clone());
     let h = Histogram {
         title: format!("{what} ({} of them)", counts.len()),
-        ends: [name(counts.first_key_value()), name(counts.last_key_value())],
+        ends: [
+            name(counts.first_key_value()),
+            name(counts.last_key_value()),
+        ],
         counts: counts.values().copied().collect(),
         expected: None,
     };
-    if what == "photo of the asset" { h } else { h.uniform() }
+    if what == "photo of the asset" {
+        h
+    } else {
+        h.uniform()
+    }
 }
 
 fn extremes(values: &[f64]) -> [f64; 2] {
-    let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [v.min(a), v.max(b)]);
-    if low < high { [low, high] } else { [low - 0.5, low + 0.5] }
+    let [low, high] = values
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
+            [v.min(a), v.max(b)]
+        });
+    if low < high {
+        [low, high]
+    } else {
+        [low - 0.5, low + 0.5]
+    }
 }
 
 /// What can be seen, and how large it is.
 fn seen(page: &mut Page, summary: &Summary) {
-    let side = |i: usize| summary.boxes.iter().map(|sides| sides[i]).collect::<Vec<f64>>();
-    let largest = summary.boxes.iter().flatten().fold(1.0, |a: f64, b| a.max(*b));
+    let side = |i: usize| {
+        summary
+            .boxes
+            .iter()
+            .map(|sides| sides[i])
+            .collect::<Vec<f64>>()
+    };
+    let largest = summary
+        .boxes
+        .iter()
+        .flatten()
+        .fold(1.0, |a: f64, b| a.max(*b));
     let count = |title, of: fn(&Glance) -> usize| {
-        let counts: Vec<f64> = summary.glances.iter().map(|glance| of(glance) as f64).collect();
+        let counts: Vec<f64> = summary
+            .glances
+            .iter()
+            .map(|glance| of(glance) as f64)
+            .collect();
         let most = counts.iter().copied().fold(1.0, f64::max);
-        let mut h = Histogram::of(title, &counts, [-0.5, most + 0.5], (most as usize + 1).min(MOST_BINS));
+        let mut h = Histogram::of(
+            title,
+            &counts,
+            [-0.5, most + 0.5],
+            (most as usize + 1).min(MOST_BINS),
+        );
         h.ends = ["0".into(), most.to_string()];
         h
     };
@@ -401,9 +589,24 @@ fn seen(page: &mut Page, summary: &Summary) {
         &[
             count("objects in a picture", |glance| glance.objects),
             count("labels in a picture", |glance| glance.labels.len()),
-            Histogram::of("seen share of an object", &summary.visible, [0.0, 1.0], BINS),
-            Histogram::of("width of labelled boxes, pixels", &side(0), [0.0, largest], BINS),
-            Histogram::of("height of labelled boxes, pixels", &side(1), [0.0, largest], BINS),
+            Histogram::of(
+                "seen share of an object",
+                &summary.visible,
+                [0.0, 1.0],
+                BINS,
+            ),
+            Histogram::of(
+                "width of labelled boxes, pixels",
+                &side(0),
+                [0.0, largest],
+                BINS,
+            ),
+            Histogram::of(
+                "height of labelled boxes, pixels",
+                &side(1),
+                [0.0, largest],
+                BINS,
+            ),
         ],
     );
     heat(page, summary);
@@ -414,13 +617,20 @@ fn heat(page: &mut Page, summary: &Summary) {
     let set = as_set(Path::new(""), summary);
     let centres = |class: Option<u32>| -> Vec<[f64; 2]> {
         let of = |(own, _): &&(u32, [f64; 4])| class.is_none_or(|class| class == *own);
-        let boxes = set.pictures.iter().filter_map(|picture| picture.boxes.as_ref()).flatten();
+        let boxes = set
+            .pictures
+            .iter()
+            .filter_map(|picture| picture.boxes.as_ref())
+            .flatten();
         boxes.filter(of).map(|(_, [x, y, ..])| [*x, *y]).collect()
     };
     let mut maps = heat_map("centres of all labels", &centres(None));
     if summary.classes.len() > 1 {
         for (class, name) in (0..).zip(&summary.classes).take(MOST_MAPS) {
-            maps += &heat_map(&format!("centres of {}", gallery::clipped(name, 30)), &centres(Some(class)));
+            maps += &heat_map(
+                &format!("centres of {}", gallery::clipped(name, 30)),
+                &centres(Some(class)),
+            );
         }
     }
     page.html(&format!("<div class=\"histograms\">\n{maps}</div>\n"));
@@ -436,9 +646,21 @@ fn histograms(page: &mut Page, charts: &[Histogram]) {
 }
 
 fn balance(summary: &Summary) -> Table {
-    let mut table = Table::new(["class", "objects, train", "labels, train", "objects, val", "labels, val"]);
+    let mut table = Table::new([
+        "class",
+        "objects, train",
+        "labels, train",
+        "objects, val",
+        "labels, val",
+    ]);
     for (name, [[a, b], [c, d]]) in summary.classes.iter().zip(&summary.balance) {
-        table.push([name.clone(), a.to_string(), b.to_string(), c.to_string(), d.to_string()]);
+        table.push([
+            name.clone(),
+            a.to_string(),
+            b.to_string(),
+            c.to_string(),
+            d.to_string(),
+        ]);
     }
     table
 }
@@ -446,11 +668,16 @@ fn balance(summary: &Summary) -> Table {
 /// What was odd about the photos of the place and their cameras.
 fn background_notes(page: &mut Page, summary: &Summary) {
     let notes = summary.identity["recipe"]["notes"].as_object();
-    let Some(notes) = notes.filter(|notes| !notes.is_empty()) else { return };
+    let Some(notes) = notes.filter(|notes| !notes.is_empty()) else {
+        return;
+    };
     let mut table = Table::new(["background", "what to look at"]);
     for (name, texts) in notes {
         let texts = texts.as_array().map_or(&[][..], Vec::as_slice);
-        texts.iter().filter_map(|text| text.as_str()).for_each(|text| table.push([name.clone(), text.to_owned()]));
+        texts
+            .iter()
+            .filter_map(|text| text.as_str())
+            .for_each(|text| table.push([name.clone(), text.to_owned()]));
     }
     page.heading("Backgrounds").table(&table);
 }
@@ -462,12 +689,28 @@ fn rejected(page: &mut Page, summary: &Summary) {
         return;
     }
     let mut table = Table::new(["image", "why"]);
-    summary.rejected.iter().for_each(|(k, why)| table.push([format!("{k:06}"), why.clone()]));
-    page.text(&format!("{} scenes would not come to rest and were drawn again.", summary.rejected.len())).table(&table);
+    summary
+        .rejected
+        .iter()
+        .for_each(|(k, why)| table.push([format!("{k:06}"), why.clone()]));
+    page.text(&format!(
+        "{} scenes would not come to rest and were drawn again.",
+        summary.rejected.len()
+    ))
+    .table(&table);
 }
 
 fn times(summary: &Summary) -> Table {
-    let columns = ["images", "threads", "seconds", "images a second", "settle", "render", "label", "write"];
+    let columns = [
+        "images",
+        "threads",
+        "seconds",
+        "images a second",
+        "settle",
+        "render",
+        "label",
+        "write",
+    ];
     let mut table = Table::new(columns);
     for run in &summary.runs {
         let made = run.made as f64;

@@ -53,24 +53,32 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
     let picture = picture();
     let folder = tempfile::tempdir().map_err(|e| Error::value("scratch folder", e))?;
     let ways = ways();
-    let stored: Vec<Stored> = ways.iter().map(|way| way.store(&picture, folder.path())).collect::<Result<_>>()?;
+    let stored: Vec<Stored> = ways
+        .iter()
+        .map(|way| way.store(&picture, folder.path()))
+        .collect::<Result<_>>()?;
     let pixels = picture.pixels().len() as f64;
-    let diagram = |file: &str, title: &str, cost: &str, of: &dyn Fn(&Stored) -> f64, why: &str| Diagram {
-        file: file.into(),
-        title: title.into(),
-        input: format!(
-            "{CARDS} cards over a noisy plate, {} x {}, values up to {:.2}",
-            SIZE[0],
-            SIZE[1],
-            most(&picture)
-        ),
-        error: "RMS error, scene-linear".into(),
-        cost: cost.into(),
-        reference: "the picture before it is written".into(),
-        points: ways.iter().zip(&stored).map(|(way, s)| way.point(of(s), s.error)).collect(),
-        why: why.into(),
-        ..Diagram::default()
-    };
+    let diagram =
+        |file: &str, title: &str, cost: &str, of: &dyn Fn(&Stored) -> f64, why: &str| Diagram {
+            file: file.into(),
+            title: title.into(),
+            input: format!(
+                "{CARDS} cards over a noisy plate, {} x {}, values up to {:.2}",
+                SIZE[0],
+                SIZE[1],
+                most(&picture)
+            ),
+            error: "RMS error, scene-linear".into(),
+            cost: cost.into(),
+            reference: "the picture before it is written".into(),
+            points: ways
+                .iter()
+                .zip(&stored)
+                .map(|(way, s)| way.point(of(s), s.error))
+                .collect(),
+            why: why.into(),
+            ..Diagram::default()
+        };
     Ok(vec![
         diagram(
             "encode_time",
@@ -92,9 +100,13 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
 /// Why datasets have PNG.
 fn beside_jpeg(ways: &[Way], stored: &[Stored]) -> String {
     let of = |curve: &str, setting: &str| {
-        ways.iter().position(|way| way.curve == curve && way.setting == setting).map(|i| &stored[i])
+        ways.iter()
+            .position(|way| way.curve == curve && way.setting == setting)
+            .map(|i| &stored[i])
     };
-    let (Some(png), Some(jpeg)) = (of(PNG, "fast"), of("JPEG", "95")) else { return String::new() };
+    let (Some(png), Some(jpeg)) = (of(PNG, "fast"), of("JPEG", "95")) else {
+        return String::new();
+    };
     format!(
         "Trainers read files of 8 bits: PNG loses what 8 bits lose, and takes {} of the time of JPEG at 95, which has {} times \
          its error in {} of its bytes. `reference` keeps half floats beside it.",
@@ -110,19 +122,30 @@ fn ways() -> Vec<Way> {
         curve,
         setting: name.into(),
         extension: "exr",
-        options: WriteOptions { bits: Some(bits), compression, ..WriteOptions::default() },
+        options: WriteOptions {
+            bits: Some(bits),
+            compression,
+            ..WriteOptions::default()
+        },
     };
     let png = |curve, name: &str, bits, effort| Way {
         curve,
         setting: name.into(),
         extension: "png",
-        options: WriteOptions { bits: Some(bits), png: effort, ..WriteOptions::default() },
+        options: WriteOptions {
+            bits: Some(bits),
+            png: effort,
+            ..WriteOptions::default()
+        },
     };
     let jpeg = JPEG.map(|quality| Way {
         curve: "JPEG",
         setting: quality.to_string(),
         extension: "jpg",
-        options: WriteOptions { jpeg_quality: quality, ..usual.clone() },
+        options: WriteOptions {
+            jpeg_quality: quality,
+            ..usual.clone()
+        },
     });
     let mut all = vec![
         png(PNG, "least", Bits::Eight, PngEffort::Least),
@@ -143,9 +166,15 @@ impl Way {
     fn store(&self, picture: &Image<LinearRgb>, folder: &Path) -> Result<Stored> {
         let path = folder.join("picture").with_extension(self.extension);
         let ((), seconds) = timed(RUNS, || io::write_with(&path, picture, &self.options))?;
-        let bytes = std::fs::metadata(&path).map_err(|e| Error::file(&path, e))?.len();
+        let bytes = std::fs::metadata(&path)
+            .map_err(|e| Error::file(&path, e))?
+            .len();
         let back: Image<LinearRgb> = io::read(&path)?;
-        Ok(Stored { seconds, bytes, error: rms(&back, picture) })
+        Ok(Stored {
+            seconds,
+            bytes,
+            error: rms(&back, picture),
+        })
     }
 
     /// A PNG as datasets have it, or the EXR that a reference has beside it.
@@ -160,24 +189,37 @@ impl Way {
 
 fn rms(a: &Image<LinearRgb>, b: &Image<LinearRgb>) -> f64 {
     let pairs = a.pixels().iter().zip(b.pixels());
-    let squares = pairs.flat_map(|(a, b)| [a.r - b.r, a.g - b.g, a.b - b.b]).map(|d| f64::from(d).powi(2));
+    let squares = pairs
+        .flat_map(|(a, b)| [a.r - b.r, a.g - b.g, a.b - b.b])
+        .map(|d| f64::from(d).powi(2));
     (squares.sum::<f64>() / (3 * b.pixels().len()) as f64).sqrt()
 }
 
 fn most(picture: &Image<LinearRgb>) -> f32 {
-    picture.pixels().iter().map(|c| c.r.max(c.g).max(c.b)).fold(0.0, f32::max)
+    picture
+        .pixels()
+        .iter()
+        .map(|c| c.r.max(c.g).max(c.b))
+        .fold(0.0, f32::max)
 }
 
 /// A rendered pile over a plate with the noise of a camera.
 fn picture() -> Image<LinearRgb> {
     let (w, h) = (SIZE[0] as usize, SIZE[1] as usize);
     let mut plate = Image::from_fn(w, h, |x, y| {
-        let tile = if (x / 64 + y / 64).is_multiple_of(2) { 0.28 } else { 0.35 };
+        let tile = if (x / 64 + y / 64).is_multiple_of(2) {
+            0.28
+        } else {
+            0.35
+        };
         LinearRgb::new(1.0, 0.9, 0.8).scale(tile * (0.8 + 0.2 * x as f32 / w as f32))
     });
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let mut grain = || GRAIN * (f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5) as f32;
-    plate.pixels_mut().iter_mut().for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
+    plate
+        .pixels_mut()
+        .iter_mut()
+        .for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
     let shot: Shot = pile(CARDS, SIZE).with_plate(Arc::new(plate));
     let deep = cast(&shot, &Quality::default().render());
     composite::frame(&deep, shot.plate.as_deref()).map(PremulRgba::color)
@@ -190,24 +232,38 @@ mod tests {
     #[test]
     fn float_files_lose_nothing_and_eight_bits_lose_what_their_codes_are_apart() {
         let folder = tempfile::tempdir().unwrap();
-        let ramp = Image::from_fn(64, 4, |x, y| LinearRgb::grey((x as f32 + y as f32 / 4.0) / 64.0));
+        let ramp = Image::from_fn(64, 4, |x, y| {
+            LinearRgb::grey((x as f32 + y as f32 / 4.0) / 64.0)
+        });
         let error = |curve: &str, setting: &str| {
-            let way = ways().into_iter().find(|w| w.curve == curve && w.setting == setting).unwrap();
+            let way = ways()
+                .into_iter()
+                .find(|w| w.curve == curve && w.setting == setting)
+                .unwrap();
             way.store(&ramp, folder.path()).unwrap().error
         };
         assert_eq!(error("EXR, float", "ZIP"), 0.0);
         assert!(error(HALF, "ZIP") < 1e-3 && error("PNG, 16 bits", "fast") < 1e-4);
         // A code of sRGB spans at most 0.0098 of light.
-        assert!((1e-4..0.0098 / 2.0).contains(&error(PNG, "fast")), "{}", error(PNG, "fast"));
+        assert!(
+            (1e-4..0.0098 / 2.0).contains(&error(PNG, "fast")),
+            "{}",
+            error(PNG, "fast")
+        );
         assert!(error("JPEG", "50") > error("JPEG", "95"));
     }
 
     #[test]
     fn efforts_only_change_the_bytes() {
         let folder = tempfile::tempdir().unwrap();
-        let picture = Image::from_fn(90, 70, |x, y| LinearRgb::new(x as f32 / 90.0, y as f32 / 70.0, 0.2));
+        let picture = Image::from_fn(90, 70, |x, y| {
+            LinearRgb::new(x as f32 / 90.0, y as f32 / 70.0, 0.2)
+        });
         let all: Vec<_> = ways().into_iter().filter(|w| w.curve == PNG).collect();
-        let stored: Vec<_> = all.iter().map(|w| w.store(&picture, folder.path()).unwrap()).collect();
+        let stored: Vec<_> = all
+            .iter()
+            .map(|w| w.store(&picture, folder.path()).unwrap())
+            .collect();
         assert!(stored.iter().all(|s| s.error == stored[0].error));
         assert!(stored[3].bytes <= stored[0].bytes);
     }

@@ -3,8 +3,8 @@
 use super::{Page, Table, mistakes};
 use crate::error::Result;
 use crate::eval::{
-    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, Interval, Matches, Picture, Scores, Sheet,
-    THRESHOLDS, Tags, thresholds,
+    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, Interval, Matches,
+    Picture, Scores, Sheet, THRESHOLDS, Tags, thresholds,
 };
 use crate::io;
 use serde::{Deserialize, Serialize};
@@ -90,10 +90,24 @@ impl Spread {
         let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
         let resampled = |k| {
             let times = eval::drawn(values.len(), seed, k);
-            values.iter().zip(times).map(|(v, t)| v * f64::from(t)).sum::<f64>() / n
+            values
+                .iter()
+                .zip(times)
+                .map(|(v, t)| v * f64::from(t))
+                .sum::<f64>()
+                / n
         };
         let interval = eval::interval(mean, (0..ROUNDS).map(resampled).collect());
-        Self { runs: values.len(), mean, std: if n > 1.0 { (squares / (n - 1.0)).sqrt() } else { 0.0 }, interval }
+        Self {
+            runs: values.len(),
+            mean,
+            std: if n > 1.0 {
+                (squares / (n - 1.0)).sqrt()
+            } else {
+                0.0
+            },
+            interval,
+        }
     }
 }
 
@@ -113,7 +127,10 @@ impl Metrics {
     /// The scores of a class; none of one that is not in the truth.
     fn class(&self, class: u32) -> Option<&ClassScores> {
         let classes = &self.yolov5.classes;
-        classes.binary_search_by_key(&class, |c| c.class).ok().map(|i| &classes[i])
+        classes
+            .binary_search_by_key(&class, |c| c.class)
+            .ok()
+            .map(|i| &classes[i])
     }
 }
 
@@ -127,7 +144,11 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
     let all: Vec<Metrics> = runs.iter().map(|run| Metrics::of(run, options)).collect();
     io::create_folder(folder)?;
     for (i, metrics) in all.iter().enumerate() {
-        let name = if all.len() == 1 { "metrics.json".into() } else { format!("{}-{}.json", i + 1, metrics.run) };
+        let name = if all.len() == 1 {
+            "metrics.json".into()
+        } else {
+            format!("{}-{}.json", i + 1, metrics.run)
+        };
         io::write_json(folder.join(name), metrics)?;
     }
     let mut page = Page::new("Detections against the truth");
@@ -138,12 +159,23 @@ pub fn write(folder: &Path, runs: &[Run], options: &EvalReportOptions) -> Result
         }
         Ok(())
     };
-    let (scores, classes, factors) =
-        (scores_table(&all, options), classes_table(&all, options), factors_table(runs, options));
-    let confusion = runs.first().map(|run| Confusion::new(&run.sheets, &options.confusion)).unwrap_or_default();
+    let (scores, classes, factors) = (
+        scores_table(&all, options),
+        classes_table(&all, options),
+        factors_table(runs, options),
+    );
+    let confusion = runs
+        .first()
+        .map(|run| Confusion::new(&run.sheets, &options.confusion))
+        .unwrap_or_default();
     let shown = shown_classes(&all, &confusion);
     section("Scores", "scores.csv", &scores, &scores)?;
-    section(&classes_title(&all, &shown), "classes.csv", &classes, &classes_among(&all, options, &shown))?;
+    section(
+        &classes_title(&all, &shown),
+        "classes.csv",
+        &classes,
+        &classes_among(&all, options, &shown),
+    )?;
     section("Factors", "factors.csv", &factors, &factors)?;
     if let Some(run) = runs.first() {
         put_run(folder, &mut page, run, &confusion, &shown, options)?;
@@ -171,16 +203,25 @@ fn put_run(
         io::write_text(folder.join(format!("{name}.svg")), &svg)?;
         page.chart(&svg, &caption);
     }
-    io::write_text(folder.join("confusion.csv"), &confusion_table(confusion, options).csv())?;
+    io::write_text(
+        folder.join("confusion.csv"),
+        &confusion_table(confusion, options).csv(),
+    )?;
     let mistakes = eval::mistakes(&run.sheets, &options.confusion);
-    io::write_text(folder.join("mistakes.csv"), &mistakes::table(run, &mistakes, options).csv())?;
+    io::write_text(
+        folder.join("mistakes.csv"),
+        &mistakes::table(run, &mistakes, options).csv(),
+    )?;
     mistakes::put_on(page, run, &mistakes, options);
     Ok(())
 }
 
 /// All classes in order, or of many those with the most mistakes, those first.
 fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
-    let known = all.iter().flat_map(|m| m.yolov5.classes.iter().map(|c| c.class)).chain(confusion.classes());
+    let known = all
+        .iter()
+        .flat_map(|m| m.yolov5.classes.iter().map(|c| c.class))
+        .chain(confusion.classes());
     let known: BTreeSet<u32> = known.collect();
     if known.len() <= MOST_CLASSES {
         known.into_iter().collect()
@@ -191,17 +232,27 @@ fn shown_classes(all: &[Metrics], confusion: &Confusion) -> Vec<u32> {
 
 fn classes_title(all: &[Metrics], shown: &[u32]) -> String {
     let count = all.first().map_or(0, |m| m.yolov5.classes.len());
-    let seen = all.first().map_or(0, |m| shown.iter().filter(|class| m.class(**class).is_some()).count());
+    let seen = all.first().map_or(0, |m| {
+        shown
+            .iter()
+            .filter(|class| m.class(**class).is_some())
+            .count()
+    });
     match count - seen {
         0 => "Classes".into(),
-        others => format!("Classes: the {seen} with the most mistakes; {others} others are in classes.csv"),
+        others => format!(
+            "Classes: the {seen} with the most mistakes; {others} others are in classes.csv"
+        ),
     }
 }
 
 fn confusion_table(confusion: &Confusion, options: &EvalReportOptions) -> Table {
     let mut table = Table::new(["found", "true", "count"]);
-    let name =
-        |class: Option<u32>| class.map_or("background".into(), |class| eval::class_name(class, &options.classes));
+    let name = |class: Option<u32>| {
+        class.map_or("background".into(), |class| {
+            eval::class_name(class, &options.classes)
+        })
+    };
     for (&[found, truth], count) in &confusion.counts {
         table.push([name(found), name(truth), count.to_string()]);
     }
@@ -210,26 +261,63 @@ fn confusion_table(confusion: &Confusion, options: &EvalReportOptions) -> Table 
 
 /// A row per run, and one over all where there are several.
 pub fn scores_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
-    let mut table = Table::new(["run", "images", "definition", "mAP@0.5", "mAP@0.75", "mAP@0.5:0.95", "95 % interval"]);
+    let mut table = Table::new([
+        "run",
+        "images",
+        "definition",
+        "mAP@0.5",
+        "mAP@0.75",
+        "mAP@0.5:0.95",
+        "95 % interval",
+    ]);
     for m in all {
         let yolov5 = format!("{} to {}", share(m.map.low), share(m.map.high));
-        for (name, scores, interval) in [("yolov5", &m.yolov5, yolov5), ("coco", &m.coco.scores, String::new())] {
+        for (name, scores, interval) in [
+            ("yolov5", &m.yolov5, yolov5),
+            ("coco", &m.coco.scores, String::new()),
+        ] {
             let [half, strict] = [0, 5].map(|t| share(scores.map_at(t)));
-            table.push([&m.run, &m.images.to_string(), name, &half, &strict, &share(scores.map()), &interval]);
+            table.push([
+                &m.run,
+                &m.images.to_string(),
+                name,
+                &half,
+                &strict,
+                &share(scores.map()),
+                &interval,
+            ]);
         }
     }
     if all.len() > 1 {
-        let spread = Spread::of(&all.iter().map(|m| m.yolov5.map()).collect::<Vec<_>>(), options.seed);
-        let interval = format!("{} to {}", share(spread.interval.low), share(spread.interval.high));
+        let spread = Spread::of(
+            &all.iter().map(|m| m.yolov5.map()).collect::<Vec<_>>(),
+            options.seed,
+        );
+        let interval = format!(
+            "{} to {}",
+            share(spread.interval.low),
+            share(spread.interval.high)
+        );
         let mean = format!("{} +- {}", share(spread.mean), share(spread.std));
-        table.push(["mean +- std", &format!("{} runs", spread.runs), "yolov5", "", "", &mean, &interval]);
+        table.push([
+            "mean +- std",
+            &format!("{} runs", spread.runs),
+            "yolov5",
+            "",
+            "",
+            &mean,
+            &interval,
+        ]);
     }
     table
 }
 
 /// Average precision per class and threshold by the definition of YOLOv5.
 pub fn classes_table(all: &[Metrics], options: &EvalReportOptions) -> Table {
-    let classes: BTreeSet<u32> = all.iter().flat_map(|m| m.yolov5.classes.iter().map(|c| c.class)).collect();
+    let classes: BTreeSet<u32> = all
+        .iter()
+        .flat_map(|m| m.yolov5.classes.iter().map(|c| c.class))
+        .collect();
     classes_among(all, options, &classes.into_iter().collect::<Vec<_>>())
 }
 
@@ -251,14 +339,36 @@ pub fn classes_in_brief(all: &[Metrics], options: &EvalReportOptions) -> (Table,
 }
 
 fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) -> Table {
-    let columns = ["run", "class", "objects", "precision", "recall", "AP@0.5:0.95"].map(String::from);
+    let columns = [
+        "run",
+        "class",
+        "objects",
+        "precision",
+        "recall",
+        "AP@0.5:0.95",
+    ]
+    .map(String::from);
     let at = thresholds().map(|t| format!("AP@{t:.2}"));
-    let mut table = Table { columns: columns.into_iter().chain(at).collect(), rows: Vec::new() };
+    let mut table = Table {
+        columns: columns.into_iter().chain(at).collect(),
+        rows: Vec::new(),
+    };
     for m in all {
         for class in classes.iter().filter_map(|&class| m.class(class)) {
-            let name = options.classes.get(class.class as usize).cloned().unwrap_or_else(|| class.class.to_string());
-            let numbers = [class.precision, class.recall, class.mean()].into_iter().chain(class.ap).map(share);
-            table.push([m.run.clone(), name, class.truths.to_string()].into_iter().chain(numbers));
+            let name = options
+                .classes
+                .get(class.class as usize)
+                .cloned()
+                .unwrap_or_else(|| class.class.to_string());
+            let numbers = [class.precision, class.recall, class.mean()]
+                .into_iter()
+                .chain(class.ap)
+                .map(share);
+            table.push(
+                [m.run.clone(), name, class.truths.to_string()]
+                    .into_iter()
+                    .chain(numbers),
+            );
         }
     }
     table
@@ -266,12 +376,22 @@ fn classes_among(all: &[Metrics], options: &EvalReportOptions, classes: &[u32]) 
 
 /// mAP per level of every factor; empty without tags.
 pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
-    let mut table = Table::new(["run", "factor", "level", "images", "yolov5 mAP@0.5:0.95", "coco mAP@0.5:0.95"]);
+    let mut table = Table::new([
+        "run",
+        "factor",
+        "level",
+        "images",
+        "yolov5 mAP@0.5:0.95",
+        "coco mAP@0.5:0.95",
+    ]);
     if options.tags.factors.is_empty() {
         return table;
     }
     let definitions = [Definition::Yolov5, Definition::Coco];
-    let matches: Vec<_> = runs.iter().map(|run| definitions.map(|d| Matches::new(&run.sheets, d))).collect();
+    let matches: Vec<_> = runs
+        .iter()
+        .map(|run| definitions.map(|d| Matches::new(&run.sheets, d)))
+        .collect();
     for (i, factor) in options.tags.factors.iter().enumerate() {
         for level in options.tags.levels(i) {
             for (run, matches) in runs.iter().zip(&matches) {
@@ -279,7 +399,14 @@ pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
                 let weights: Vec<u32> = run.sheets.iter().map(inside).collect();
                 let images = weights.iter().filter(|weight| **weight > 0).count();
                 let [ours, theirs] = matches.each_ref().map(|m| share(m.map(&weights)));
-                table.push([&run.name, factor, level, &images.to_string(), &ours, &theirs]);
+                table.push([
+                    &run.name,
+                    factor,
+                    level,
+                    &images.to_string(),
+                    &ours,
+                    &theirs,
+                ]);
             }
         }
     }
@@ -300,7 +427,10 @@ fn pictures(
          Shades are shares of a column. All counts are in confusion.csv."
     );
     let few = match curves.classes.len() {
-        n if n > eval::CURVES_SHOWN => format!(" The mean of {n} classes, and {} of them.", eval::CURVES_SHOWN),
+        n if n > eval::CURVES_SHOWN => format!(
+            " The mean of {n} classes, and {} of them.",
+            eval::CURVES_SHOWN
+        ),
         _ => String::new(),
     };
     [
@@ -309,8 +439,16 @@ fn pictures(
             format!("Precision over recall.{few}"),
             eval::precision_recall_picture(&curves, names, shown),
         ),
-        ("f1", format!("F1 over confidence.{few}"), eval::f1_picture(&curves, names, shown)),
-        ("confusion", told, eval::confusion_picture(confusion, names, shown)),
+        (
+            "f1",
+            format!("F1 over confidence.{few}"),
+            eval::f1_picture(&curves, names, shown),
+        ),
+        (
+            "confusion",
+            told,
+            eval::confusion_picture(confusion, names, shown),
+        ),
     ]
 }
 
@@ -327,20 +465,43 @@ mod tests {
     use crate::label::BBox;
 
     fn run(name: &str, confidence: f64) -> Run {
-        let bbox = BBox { x0: 0.0, y0: 0.0, x1: 50.0, y1: 40.0 };
-        let truth = TrueBox { class: 0, bbox, area: 2000.0, crowd: false };
+        let bbox = BBox {
+            x0: 0.0,
+            y0: 0.0,
+            x1: 50.0,
+            y1: 40.0,
+        };
+        let truth = TrueBox {
+            class: 0,
+            bbox,
+            area: 2000.0,
+            crowd: false,
+        };
         let sheet = |image: &str, found: &[f64]| Sheet {
             image: image.into(),
             truth: vec![truth],
-            found: found.iter().map(|&confidence| FoundBox { class: 0, bbox, confidence }).collect(),
+            found: found
+                .iter()
+                .map(|&confidence| FoundBox {
+                    class: 0,
+                    bbox,
+                    confidence,
+                })
+                .collect(),
         };
-        Run { name: name.into(), sheets: vec![sheet("a", &[confidence]), sheet("b", &[])] }
+        Run {
+            name: name.into(),
+            sheets: vec![sheet("a", &[confidence]), sheet("b", &[])],
+        }
     }
 
     #[test]
     fn one_run_gives_metrics_tables_and_a_page() {
         let folder = tempfile::tempdir().unwrap();
-        let options = EvalReportOptions { classes: vec!["cap".into()], ..Default::default() };
+        let options = EvalReportOptions {
+            classes: vec!["cap".into()],
+            ..Default::default()
+        };
         write(folder.path(), &[run("best", 0.9)], &options).unwrap();
         let metrics: Metrics = io::read_json(folder.path().join("metrics.json")).unwrap();
         assert_eq!((metrics.images, metrics.yolov5.classes[0].truths), (2, 2));
@@ -353,7 +514,9 @@ mod tests {
     fn several_runs_give_mean_and_spread() {
         let spread = Spread::of(&[1.0, 2.0, 3.0], 0);
         assert_eq!((spread.runs, spread.mean, spread.std), (3, 2.0, 1.0));
-        assert!(spread.interval.low >= 1.0 && spread.interval.high <= 3.0 && spread.interval.low < 2.0);
+        assert!(
+            spread.interval.low >= 1.0 && spread.interval.high <= 3.0 && spread.interval.low < 2.0
+        );
         assert_eq!(Spread::of(&[0.5], 0).std, 0.0);
     }
 }

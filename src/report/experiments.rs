@@ -41,8 +41,8 @@ struct Paper {
 
 /// The paper's values, in its order.
 pub fn paper() -> Vec<PaperRow> {
-    let paper: Paper =
-        toml::from_str(include_str!("paper.toml")).expect("the table is part of this program and tested");
+    let paper: Paper = toml::from_str(include_str!("paper.toml"))
+        .expect("the table is part of this program and tested");
     paper.rows
 }
 
@@ -54,13 +54,21 @@ pub fn paper() -> Vec<PaperRow> {
 pub fn runs(folder: &Path) -> Result<BTreeMap<String, Vec<f64>>> {
     let mut found: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for row in paper() {
-        let Ok(entries) = std::fs::read_dir(folder.join(&row.key)) else { continue };
-        let mut files: Vec<_> =
-            entries.flatten().map(|e| e.path().join("metrics.json")).filter(|p| p.is_file()).collect();
+        let Ok(entries) = std::fs::read_dir(folder.join(&row.key)) else {
+            continue;
+        };
+        let mut files: Vec<_> = entries
+            .flatten()
+            .map(|e| e.path().join("metrics.json"))
+            .filter(|p| p.is_file())
+            .collect();
         files.sort();
         for file in files {
             let metrics: Metrics = io::read_json(&file)?;
-            found.entry(row.key.clone()).or_default().push(100.0 * metrics.yolov5.map());
+            found
+                .entry(row.key.clone())
+                .or_default()
+                .push(100.0 * metrics.yolov5.map());
         }
     }
     if found.is_empty() {
@@ -84,7 +92,9 @@ pub fn welch(a: [f64; 2], n: usize, b: [f64; 2], m: usize) -> Option<f64> {
     }
     let freedom = (va + vb) * (va + vb) / (va * va / (n - 1) as f64 + vb * vb / (m - 1) as f64);
     let t = (a[0] - b[0]).abs() / (va + vb).sqrt();
-    StudentsT::new(0.0, 1.0, freedom).ok().map(|d| 2.0 * d.sf(t))
+    StudentsT::new(0.0, 1.0, freedom)
+        .ok()
+        .map(|d| 2.0 * d.sf(t))
 }
 
 /// Our numbers beside the paper's: a row per value of the paper, ours empty where there is no run.
@@ -109,10 +119,17 @@ pub fn table(ours: &BTreeMap<String, Vec<f64>>) -> Table {
             _ => String::new(),
         };
         let spread = ours.get(&row.key).map(|values| Spread::of(values, 0));
-        let against_paper = spread.zip(theirs).and_then(|(s, b)| welch([s.mean, s.std], s.runs, b, PAPER_RUNS));
+        let against_paper = spread
+            .zip(theirs)
+            .and_then(|(s, b)| welch([s.mean, s.std], s.runs, b, PAPER_RUNS));
         let base = format!("{}/all", row.key.split('/').next().unwrap_or_default());
-        let all = ours.get(&base).filter(|_| base != row.key).map(|values| Spread::of(values, 0));
-        let against_all = spread.zip(all).and_then(|(s, b)| welch([s.mean, s.std], s.runs, [b.mean, b.std], b.runs));
+        let all = ours
+            .get(&base)
+            .filter(|_| base != row.key)
+            .map(|values| Spread::of(values, 0));
+        let against_all = spread
+            .zip(all)
+            .and_then(|(s, b)| welch([s.mean, s.std], s.runs, [b.mean, b.std], b.runs));
         let word = |text: Option<String>| text.unwrap_or_default();
         table.push([
             row.key.clone(),
@@ -122,7 +139,11 @@ pub fn table(ours: &BTreeMap<String, Vec<f64>>) -> Table {
             word(spread.map(|s| format!("{:.1} +- {:.1}", s.mean, s.std))),
             word(spread.map(|s| format!("{:.1} to {:.1}", s.interval.low, s.interval.high))),
             word(spread.map(|s| s.runs.to_string())),
-            word(spread.zip(row.mean).map(|(s, mean)| format!("{:.2}", s.mean / mean))),
+            word(
+                spread
+                    .zip(row.mean)
+                    .map(|(s, mean)| format!("{:.2}", s.mean / mean)),
+            ),
             word(against_paper.map(|p| format!("{p:.3}"))),
             word(against_all.map(|p| format!("{p:.3}"))),
         ]);
@@ -132,7 +153,13 @@ pub fn table(ours: &BTreeMap<String, Vec<f64>>) -> Table {
 
 /// How many epochs of each source alone make as many updates as both together.
 pub fn updates_table(real: u64, synthetic: u64, batch: u64, epochs: u64) -> Table {
-    let mut table = Table::new(["images", "batches an epoch", "updates", "epochs for as many updates", "paper"]);
+    let mut table = Table::new([
+        "images",
+        "batches an epoch",
+        "updates",
+        "epochs for as many updates",
+        "paper",
+    ]);
     let both = Updates::of(real + synthetic, batch, epochs);
     let row = |name: &str, images, paper: String| {
         let batches = batches_per_epoch(images, batch);
@@ -145,7 +172,13 @@ pub fn updates_table(real: u64, synthetic: u64, batch: u64, epochs: u64) -> Tabl
         ]
     };
     let is_papers = [real, synthetic, batch, epochs] == PAPER_TRAINING;
-    let paper = |epochs: u64| if is_papers { epochs.to_string() } else { String::new() };
+    let paper = |epochs: u64| {
+        if is_papers {
+            epochs.to_string()
+        } else {
+            String::new()
+        }
+    };
     table.push(row("both", real + synthetic, paper(epochs)));
     table.push(row("synthetic", synthetic, paper(PAPER_EPOCHS[0])));
     table.push(row("real", real, paper(PAPER_EPOCHS[1])));
@@ -165,7 +198,10 @@ pub fn write(folder: &Path, of: &Path) -> Result<Table> {
     io::write_text(folder.join("experiments.md"), &table.markdown())?;
     io::write_text(folder.join("updates.csv"), &updates.csv())?;
     let mut page = Page::new("Our trainings beside the paper's");
-    page.text("mAP@0.5:0.95 in percent, by the definition of YOLOv5. p: Welch's test of equal means.").table(&table);
+    page.text(
+        "mAP@0.5:0.95 in percent, by the definition of YOLOv5. p: Welch's test of equal means.",
+    )
+    .table(&table);
     page.heading("Equally many updates").table(&updates);
     io::write_text(folder.join("experiments.html"), &page.document())?;
     Ok(table)
@@ -178,9 +214,20 @@ mod tests {
     #[test]
     fn the_papers_table_reads_and_has_its_best_row() {
         let rows = paper();
-        assert_eq!(rows.iter().filter(|row| row.place.contains("Table 1")).count(), 14);
-        let best = rows.iter().max_by(|a, b| a.mean.partial_cmp(&b.mean).unwrap()).unwrap();
-        assert_eq!((best.key.as_str(), best.mean), ("combined/repeat_selections", Some(32.2)));
+        assert_eq!(
+            rows.iter()
+                .filter(|row| row.place.contains("Table 1"))
+                .count(),
+            14
+        );
+        let best = rows
+            .iter()
+            .max_by(|a, b| a.mean.partial_cmp(&b.mean).unwrap())
+            .unwrap();
+        assert_eq!(
+            (best.key.as_str(), best.mean),
+            ("combined/repeat_selections", Some(32.2))
+        );
     }
 
     /// Value of `scipy.stats.ttest_ind_from_stats(10, 2, 6, 13, 3, 5, equal_var=False)`.
@@ -197,15 +244,25 @@ mod tests {
     fn our_runs_stand_beside_the_papers() {
         let ours = BTreeMap::from([("combined/all".to_string(), vec![30.0, 31.0, 32.0])]);
         let table = table(&ours);
-        let row = table.rows.iter().find(|row| row[0] == "combined/all").unwrap();
-        assert_eq!(row[3..8], ["30.7 +- 2.0", "31.0 +- 1.0", &row[5], "3", "1.01"].map(String::from));
+        let row = table
+            .rows
+            .iter()
+            .find(|row| row[0] == "combined/all")
+            .unwrap();
+        assert_eq!(
+            row[3..8],
+            ["30.7 +- 2.0", "31.0 +- 1.0", &row[5], "3", "1.01"].map(String::from)
+        );
         assert!(row[8].parse::<f64>().unwrap() > 0.5);
     }
 
     #[test]
     fn updates_are_those_of_the_paper() {
         let table = updates_table(1624, 4000, 32, 300);
-        assert_eq!(table.rows[0][1..], ["176", "52800", "300.0", "300"].map(String::from));
+        assert_eq!(
+            table.rows[0][1..],
+            ["176", "52800", "300.0", "300"].map(String::from)
+        );
         assert_eq!(table.rows[1][3..], ["422.4", "423"].map(String::from));
         assert_eq!(table.rows[2][3..], ["1035.3", "1035"].map(String::from));
     }
@@ -213,6 +270,11 @@ mod tests {
     #[test]
     fn a_folder_without_runs_says_what_was_expected() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(runs(folder.path()).unwrap_err().to_string().contains("expected KEY/RUN/metrics.json"));
+        assert!(
+            runs(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("expected KEY/RUN/metrics.json")
+        );
     }
 }

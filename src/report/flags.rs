@@ -67,7 +67,13 @@ pub enum End {
 
 impl End {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Right, Self::RightAndFlagged, Self::Told, Self::Refused, Self::SilentlyWrong];
+    pub const ALL: [Self; 5] = [
+        Self::Right,
+        Self::RightAndFlagged,
+        Self::Told,
+        Self::Refused,
+        Self::SilentlyWrong,
+    ];
 
     /// What it is called in tables.
     pub fn name(self) -> &'static str {
@@ -94,7 +100,13 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
         let of = |variant: &Variant| {
             let trial = variant.of(&known, i as u64)?;
             let (found, end, doubts) = trial.run();
-            Some(Row { photo: known.name.clone(), variant: *variant, found, end, doubts })
+            Some(Row {
+                photo: known.name.clone(),
+                variant: *variant,
+                found,
+                end,
+                doubts,
+            })
         };
         rows.extend(Variant::ALL.par_iter().filter_map(of).collect::<Vec<_>>());
     }
@@ -106,13 +118,20 @@ impl Trial {
     pub fn run(&self) -> (Option<[f64; 2]>, End, Vec<String>) {
         let cut = match cut_out(&self.photo, &CutOutOptions::default()) {
             Err(error) => {
-                let end = if self.expected == Expected::Refused { End::Right } else { End::Refused };
+                let end = if self.expected == Expected::Refused {
+                    End::Right
+                } else {
+                    End::Refused
+                };
                 return (None, end, vec![error.to_string()]);
             }
             Ok(cut) => cut,
         };
         // What is judged is the outline.
-        let of_outline = cut.remarks.iter().filter(|r| r.is_doubt() && !r.is_about_color());
+        let of_outline = cut
+            .remarks
+            .iter()
+            .filter(|r| r.is_doubt() && !r.is_about_color());
         let doubts: Vec<String> = of_outline.map(Remark::to_string).collect();
         let [iou, box_px] = self.errors(&cut);
         // Pixels of a reduced search are that much larger.
@@ -129,15 +148,25 @@ impl Trial {
 
     fn errors(&self, cut: &CutOut) -> [f64; 2] {
         let found = sides(&cut.segmentation.hull);
-        let box_px = found.iter().zip(self.box_px).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let box_px = found
+            .iter()
+            .zip(self.box_px)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
         [overlap(&cut.segmentation.tight, &self.mask), box_px]
     }
 }
 
 /// Left, top, right and bottom of a polygon.
 fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
-    let least = |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
-    [least(|p| p.x), least(|p| p.y), -least(|p| -p.x), -least(|p| -p.y)]
+    let least =
+        |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
+    [
+        least(|p| p.x),
+        least(|p| p.y),
+        -least(|p| -p.x),
+        -least(|p| -p.y),
+    ]
 }
 
 /// How the photos of each variant ended, a line per variant.
@@ -157,8 +186,17 @@ pub fn table(rows: &[Row]) -> Table {
 pub fn details(rows: &[Row]) -> Table {
     let mut table = Table::new(["photo", "variant", "iou", "box_px", "end", "doubts"]);
     for row in rows {
-        let number = |i: usize| row.found.map_or_else(String::new, |found| format!("{:.4}", found[i]));
-        let names = [row.photo.clone(), row.variant.name().into(), number(0), number(1), row.end.name().into()];
+        let number = |i: usize| {
+            row.found
+                .map_or_else(String::new, |found| format!("{:.4}", found[i]))
+        };
+        let names = [
+            row.photo.clone(),
+            row.variant.name().into(),
+            number(0),
+            number(1),
+            row.end.name().into(),
+        ];
         table.push(names.into_iter().chain([row.doubts.join("; ")]));
     }
     table
@@ -173,7 +211,10 @@ pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result
     let table = table(&rows);
     io::create_folder(folder)?;
     io::write_text(folder.join("flags.csv"), &details(&rows).csv())?;
-    io::write_text(folder.join("flags.md"), &format!("# Right, or flagged\n\n{}", table.markdown()))?;
+    io::write_text(
+        folder.join("flags.md"),
+        &format!("# Right, or flagged\n\n{}", table.markdown()),
+    )?;
     Ok(table)
 }
 
@@ -195,7 +236,10 @@ mod tests {
         let foreground = solid(LinearRgb::new(0.5, 0.05, 0.05), LinearRgb::BLACK);
         let transmittance = solid(LinearRgb::BLACK, LinearRgb::WHITE);
         let mut photo = foreground.zip_map(&transmittance, |f, t| f + t * GREEN);
-        photo.pixels_mut().iter_mut().for_each(|p| *p = p.map(|v| v + 0.003 * draw() as f32));
+        photo
+            .pixels_mut()
+            .iter_mut()
+            .for_each(|p| *p = p.map(|v| v + 0.003 * draw() as f32));
         Known {
             name: "slab".into(),
             photo,
@@ -205,7 +249,10 @@ mod tests {
             screen: Image::filled(w, h, GREEN),
             mask: Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y))))),
             box_px: [90.0, 60.0, 210.0, 120.0],
-            noise: Noise { shot: 0.0, read: 0.003 },
+            noise: Noise {
+                shot: 0.0,
+                read: 0.003,
+            },
             paint: GREEN,
         }
     }
@@ -216,24 +263,40 @@ mod tests {
 
     #[test]
     fn a_plain_slab_ends_right_on_any_screen() {
-        for variant in [Variant::Plain, Variant::Uneven, Variant::VeryUneven, Variant::OtherScreen, Variant::GreyScreen]
-        {
+        for variant in [
+            Variant::Plain,
+            Variant::Uneven,
+            Variant::VeryUneven,
+            Variant::OtherScreen,
+            Variant::GreyScreen,
+        ] {
             assert_eq!(end(variant), End::Right, "{}", variant.name());
         }
     }
 
     #[test]
     fn what_must_be_told_is_told() {
-        for variant in [Variant::OverBorder, Variant::Two, Variant::Empty, Variant::EmptyUneven] {
+        for variant in [
+            Variant::OverBorder,
+            Variant::Two,
+            Variant::Empty,
+            Variant::EmptyUneven,
+        ] {
             assert_eq!(end(variant), End::Right, "{}", variant.name());
         }
-        assert!(matches!(end(Variant::Blurred), End::RightAndFlagged | End::Told));
+        assert!(matches!(
+            end(Variant::Blurred),
+            End::RightAndFlagged | End::Told
+        ));
     }
 
     #[test]
     fn nothing_ends_silently_wrong() {
         // Not yet held: what strong compression rings around a drawn slab is taken for its edge, and nothing says so.
-        for variant in Variant::ALL.into_iter().filter(|variant| *variant != Variant::Jpeg) {
+        for variant in Variant::ALL
+            .into_iter()
+            .filter(|variant| *variant != Variant::Jpeg)
+        {
             assert_ne!(end(variant), End::SilentlyWrong, "{}", variant.name());
         }
     }
@@ -243,18 +306,33 @@ mod tests {
         let mut trial = Variant::Plain.of(&known(), 1).unwrap();
         trial.box_px[2] += 5.0;
         assert_eq!(trial.run().1, End::SilentlyWrong);
-        let unexpected = Trial { expected: Expected::Refused, ..trial };
+        let unexpected = Trial {
+            expected: Expected::Refused,
+            ..trial
+        };
         assert_eq!(unexpected.run().1, End::SilentlyWrong);
     }
 
     #[test]
     fn rows_become_counts() {
-        let row = |variant, end| Row { photo: "a".into(), variant, found: None, end, doubts: vec!["x; y".into()] };
-        let rows = [row(Variant::Plain, End::Right), row(Variant::Plain, End::SilentlyWrong)];
+        let row = |variant, end| Row {
+            photo: "a".into(),
+            variant,
+            found: None,
+            end,
+            doubts: vec!["x; y".into()],
+        };
+        let rows = [
+            row(Variant::Plain, End::Right),
+            row(Variant::Plain, End::SilentlyWrong),
+        ];
         let table = table(&rows);
         assert_eq!(
             (table.rows.len(), &table.rows[0][1..]),
-            (Variant::ALL.len(), &["2", "1", "0", "0", "0", "1"].map(String::from)[..])
+            (
+                Variant::ALL.len(),
+                &["2", "1", "0", "0", "0", "1"].map(String::from)[..]
+            )
         );
         assert_eq!(details(&rows).rows.len(), 2);
     }

@@ -13,8 +13,12 @@ const TOP: f64 = 22.0;
 /// outside the picture are left out.
 pub(super) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
     let mut counts = vec![0_u64; CELLS[0] * CELLS[1]];
-    for place in places.iter().filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share))) {
-        let [column, row] = [0, 1].map(|i| ((place[i] * CELLS[i] as f64) as usize).min(CELLS[i] - 1));
+    for place in places
+        .iter()
+        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)))
+    {
+        let [column, row] =
+            [0, 1].map(|i| ((place[i] * CELLS[i] as f64) as usize).min(CELLS[i] - 1));
         counts[row * CELLS[0] + column] += 1;
     }
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
@@ -28,7 +32,10 @@ pub(super) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
     );
     let _ = writeln!(svg, "<text x=\"0\" y=\"14\">{}</text>", escaped(title));
     for (i, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let [x, y] = [(i % CELLS[0]) as f64 * CELL, TOP + (i / CELLS[0]) as f64 * CELL];
+        let [x, y] = [
+            (i % CELLS[0]) as f64 * CELL,
+            TOP + (i / CELLS[0]) as f64 * CELL,
+        ];
         // By the square root, so that few are told from none.
         let ink = 0.06 + 0.94 * (count as f64 / most as f64).sqrt();
         let _ = writeln!(
@@ -52,8 +59,21 @@ mod tests {
 
     #[test]
     fn every_place_in_the_picture_is_counted_once() {
-        let svg = heat_map("a & b", &[[0.0, 0.0], [0.01, 0.01], [1.0, 1.0], [1.2, 0.5], [f64::NAN, 0.5]]);
-        assert!(svg.contains("<title>2</title>") && svg.contains("<title>1</title>") && svg.contains("a &amp; b"));
+        let svg = heat_map(
+            "a & b",
+            &[
+                [0.0, 0.0],
+                [0.01, 0.01],
+                [1.0, 1.0],
+                [1.2, 0.5],
+                [f64::NAN, 0.5],
+            ],
+        );
+        assert!(
+            svg.contains("<title>2</title>")
+                && svg.contains("<title>1</title>")
+                && svg.contains("a &amp; b")
+        );
         assert_eq!(svg.matches("<title>").count(), 2);
     }
 }

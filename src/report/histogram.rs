@@ -26,37 +26,63 @@ pub struct Histogram {
 
 impl Histogram {
     /// Counts numbers in `bins` bins over a range; values outside count in the first or last bin.
-    pub fn of(title: impl Into<String>, values: &[f64], [low, high]: [f64; 2], bins: usize) -> Self {
+    pub fn of(
+        title: impl Into<String>,
+        values: &[f64],
+        [low, high]: [f64; 2],
+        bins: usize,
+    ) -> Self {
         let mut counts = vec![0; bins.max(1)];
         for value in values {
             let place = (value - low) / (high - low) * bins as f64;
             let last = counts.len() - 1;
-            counts[if place > 0.0 { (place as usize).min(last) } else { 0 }] += 1;
+            counts[if place > 0.0 {
+                (place as usize).min(last)
+            } else {
+                0
+            }] += 1;
         }
         let expected = None;
-        Self { title: title.into(), ends: [short(low), short(high)], counts, expected }
+        Self {
+            title: title.into(),
+            ends: [short(low), short(high)],
+            counts,
+            expected,
+        }
     }
 
     /// The same with a line at the count of values that are equally likely everywhere.
     pub fn uniform(mut self) -> Self {
-        self.expected = Some(self.counts.iter().sum::<u64>() as f64 / self.counts.len().max(1) as f64);
+        self.expected =
+            Some(self.counts.iter().sum::<u64>() as f64 / self.counts.len().max(1) as f64);
         self
     }
 
     /// Largest distance of a bin from what it should have, in standard deviations (of a binomial count); none where
     /// nothing is expected.
     pub fn worst_deviation(&self) -> Option<f64> {
-        let expected = self.expected.filter(|e| *e > 0.0 && self.counts.len() > 1)?;
+        let expected = self
+            .expected
+            .filter(|e| *e > 0.0 && self.counts.len() > 1)?;
         let share = 1.0 / self.counts.len() as f64;
         let deviation = (expected * (1.0 - share)).sqrt();
-        self.counts.iter().map(|&n| (n as f64 - expected).abs() / deviation).reduce(f64::max)
+        self.counts
+            .iter()
+            .map(|&n| (n as f64 - expected).abs() / deviation)
+            .reduce(f64::max)
     }
 
     /// An SVG document: bars, and a dashed line at what is expected with a band of two standard deviations around it.
     pub fn svg(&self) -> String {
         let [w, h] = FRAME;
         let (width, height) = (LEFT + w + 12.0, TOP + h + BELOW);
-        let most = self.counts.iter().map(|&n| n as f64).chain(self.expected).fold(1.0, f64::max) * 1.1;
+        let most = self
+            .counts
+            .iter()
+            .map(|&n| n as f64)
+            .chain(self.expected)
+            .fold(1.0, f64::max)
+            * 1.1;
         let y = |count: f64| TOP + h * (1.0 - (count / most).clamp(0.0, 1.0));
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"histogram\" width=\"{width}\" height=\"{height}\" \
@@ -84,7 +110,10 @@ impl Histogram {
         }
         if let Some(expected) = self.expected {
             let y = y(expected);
-            let _ = writeln!(svg, "<path d=\"M{LEFT} {y:.1}h{w}\" stroke=\"#d55e00\" stroke-dasharray=\"5 3\"/>");
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{LEFT} {y:.1}h{w}\" stroke=\"#d55e00\" stroke-dasharray=\"5 3\"/>"
+            );
         }
         let line = TOP + h;
         let _ = writeln!(svg, "<path d=\"M{LEFT} {line}h{w}\" stroke=\"#888\"/>");
@@ -109,13 +138,24 @@ fn fitted(text: &str, room: f64) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }
-    text.chars().take(most.saturating_sub(1)).chain(['\u{2026}']).collect()
+    text.chars()
+        .take(most.saturating_sub(1))
+        .chain(['\u{2026}'])
+        .collect()
 }
 
 /// A number with as many digits as help.
 fn short(value: f64) -> String {
-    let text = if value.abs() >= 100.0 { format!("{value:.0}") } else { format!("{value:.3}") };
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    let text = if value.abs() >= 100.0 {
+        format!("{value:.0}")
+    } else {
+        format!("{value:.3}")
+    };
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]
@@ -124,7 +164,12 @@ mod tests {
 
     #[test]
     fn every_value_is_counted_once() {
-        let h = Histogram::of("x", &[0.0, 0.1, 0.5, 0.99, 1.0, -3.0, 9.0, f64::NAN], [0.0, 1.0], 4);
+        let h = Histogram::of(
+            "x",
+            &[0.0, 0.1, 0.5, 0.99, 1.0, -3.0, 9.0, f64::NAN],
+            [0.0, 1.0],
+            4,
+        );
         assert_eq!(h.counts, [4, 0, 1, 3]);
         assert_eq!(h.uniform().expected, Some(2.0));
     }
@@ -133,25 +178,46 @@ mod tests {
     fn a_wrong_distribution_is_far_from_its_line() {
         let even: Vec<f64> = (0..1000).map(|i| f64::from(i) / 1000.0).collect();
         let slanted: Vec<f64> = even.iter().map(|x| x * x).collect();
-        let worst = |values: &[f64]| Histogram::of("x", values, [0.0, 1.0], 10).uniform().worst_deviation().unwrap();
+        let worst = |values: &[f64]| {
+            Histogram::of("x", values, [0.0, 1.0], 10)
+                .uniform()
+                .worst_deviation()
+                .unwrap()
+        };
         assert!(worst(&even) < 0.1 && worst(&slanted) > 5.0);
     }
 
     #[test]
     fn words_stay_in_their_cell() {
         let name = "a_photo_with_a_very_long_name_that_somebody_gave_it";
-        let h = Histogram { title: name.into(), ends: [name.into(), name.into()], counts: vec![1; 3], expected: None };
+        let h = Histogram {
+            title: name.into(),
+            ends: [name.into(), name.into()],
+            counts: vec![1; 3],
+            expected: None,
+        };
         let svg = h.svg();
-        let shown: Vec<&str> = svg.split("<text").skip(1).map(|t| t.split(['>', '<']).nth(1).unwrap_or("")).collect();
+        let shown: Vec<&str> = svg
+            .split("<text")
+            .skip(1)
+            .map(|t| t.split(['>', '<']).nth(1).unwrap_or(""))
+            .collect();
         let lengths: Vec<usize> = shown.iter().map(|text| text.chars().count()).collect();
         assert_eq!(lengths, [43, 3, 20, 20], "{shown:?}");
-        assert_eq!(svg.matches(&format!("<title>{name}</title>")).count(), 3, "the whole is there to be pointed at");
+        assert_eq!(
+            svg.matches(&format!("<title>{name}</title>")).count(),
+            3,
+            "the whole is there to be pointed at"
+        );
     }
 
     #[test]
     fn a_drawing_has_a_bar_for_each_bin_and_no_nonsense() {
         let svg = Histogram::of("a < b", &[], [0.0, 0.0], 5).uniform().svg();
         assert_eq!(svg.matches("<rect").count(), 1 + 5);
-        assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"), "{svg}");
+        assert!(
+            !svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"),
+            "{svg}"
+        );
     }
 }

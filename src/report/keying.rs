@@ -28,16 +28,27 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
     let job = Keying::new(&photo, Screen::Color(SCREEN));
     let sharp = job.matte(&KeyOptions::default())?;
     let mut points = Vec::new();
-    for (blur, name) in [(Blur::Exact, "Blender's order"), (Blur::RunningSum, "running sums")] {
+    for (blur, name) in [
+        (Blur::Exact, "Blender's order"),
+        (Blur::RunningSum, "running sums"),
+    ] {
         for size in SIZES {
-            let options = KeyOptions { blur_post: size, blur, ..KeyOptions::default() };
+            let options = KeyOptions {
+                blur_post: size,
+                blur,
+                ..KeyOptions::default()
+            };
             let (matte, seconds) = timed(RUNS, || job.matte(&options))?;
             let error = rms(&matte, &sharp, size as usize - 1);
             points.push(Point::new(name, format!("size {size}"), seconds, error));
         }
     }
     let ratio = |i: usize| three(points[i].cost / points[SIZES.len() + i].cost);
-    let ratios: Vec<_> = SIZES.iter().enumerate().map(|(i, size)| format!("{} at size {size}", ratio(i))).collect();
+    let ratios: Vec<_> = SIZES
+        .iter()
+        .enumerate()
+        .map(|(i, size)| format!("{} at size {size}", ratio(i)))
+        .collect();
     let why = format!(
         "Sizes are different work, not different precision: compare the two forms at one size. Blender's order takes {} times \
          as long as running sums, and is further from the mean. It is the default all the same: its bits are Blender's, and \
@@ -47,7 +58,10 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
     Ok(vec![Diagram {
         file: "matte_blur".into(),
         title: "matte: blur of the keyer".into(),
-        input: format!("a soft disc before a screen, {} x {}; key and blur", SIZE.0, SIZE.1),
+        input: format!(
+            "a soft disc before a screen, {} x {}; key and blur",
+            SIZE.0, SIZE.1
+        ),
         error: "RMS error of the matte".into(),
         cost: "CPU seconds".into(),
         reference: "mean over the window in double precision (closed form)".into(),
@@ -63,9 +77,16 @@ fn photo() -> Image<LinearRgb> {
     const EDGE: f32 = 8.0;
     const TILE: usize = 40;
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (dx, dy) = (x as f32 - SIZE.0 as f32 / 2.0, y as f32 - SIZE.1 as f32 / 2.0);
+        let (dx, dy) = (
+            x as f32 - SIZE.0 as f32 / 2.0,
+            y as f32 - SIZE.1 as f32 / 2.0,
+        );
         let cover = ((RADIUS - (dx * dx + dy * dy).sqrt()) / EDGE + 0.5).clamp(0.0, 1.0);
-        let front = if (x / TILE + y / TILE).is_multiple_of(2) { [0.6, 0.3, 0.2] } else { [0.75, 0.72, 0.7] };
+        let front = if (x / TILE + y / TILE).is_multiple_of(2) {
+            [0.6, 0.3, 0.2]
+        } else {
+            [0.75, 0.72, 0.7]
+        };
         let light = 0.95 + 0.1 * x as f32 / SIZE.0 as f32;
         (LinearRgb::from(front).scale(cover) + SCREEN.scale(1.0 - cover)).scale(light)
     })
@@ -74,13 +95,23 @@ fn photo() -> Image<LinearRgb> {
 /// Root mean squared difference between a blurred matte and the means of the sharp one's windows, cut off at the border.
 fn rms(blurred: &Image<Coverage>, sharp: &Image<Coverage>, radius: usize) -> f64 {
     let (w, h) = sharp.size();
-    let window = |at: usize, length: usize| at.saturating_sub(radius)..(at + radius + 1).min(length);
-    let places = (0..h).step_by(STRIDE).flat_map(|y| (0..w).step_by(STRIDE).map(move |x| (x, y)));
+    let window =
+        |at: usize, length: usize| at.saturating_sub(radius)..(at + radius + 1).min(length);
+    let places = (0..h)
+        .step_by(STRIDE)
+        .flat_map(|y| (0..w).step_by(STRIDE).map(move |x| (x, y)));
     let (mut squares, mut count) = (0.0, 0.0);
     for (x, y) in places {
         let (columns, rows) = (window(x, w), window(y, h));
         let area = (columns.len() * rows.len()) as f64;
-        let sum: f64 = rows.map(|j| sharp.row(j)[columns.clone()].iter().map(|c| f64::from(c.0)).sum::<f64>()).sum();
+        let sum: f64 = rows
+            .map(|j| {
+                sharp.row(j)[columns.clone()]
+                    .iter()
+                    .map(|c| f64::from(c.0))
+                    .sum::<f64>()
+            })
+            .sum();
         squares += (f64::from(blurred[(x, y)].0) - sum / area).powi(2);
         count += 1.0;
     }
@@ -97,9 +128,22 @@ mod tests {
         let job = Keying::new(&photo, Screen::Color(SCREEN));
         let sharp = job.matte(&KeyOptions::default()).unwrap();
         for blur in [Blur::Exact, Blur::RunningSum] {
-            let blurred = job.matte(&KeyOptions { blur_post: 10, blur, ..KeyOptions::default() }).unwrap();
-            assert!(rms(&blurred, &sharp, 9) < 1e-6, "{blur:?}: {}", rms(&blurred, &sharp, 9));
-            assert!(rms(&blurred, &sharp, 8) > 1e-4, "a window of another size is told apart");
+            let blurred = job
+                .matte(&KeyOptions {
+                    blur_post: 10,
+                    blur,
+                    ..KeyOptions::default()
+                })
+                .unwrap();
+            assert!(
+                rms(&blurred, &sharp, 9) < 1e-6,
+                "{blur:?}: {}",
+                rms(&blurred, &sharp, 9)
+            );
+            assert!(
+                rms(&blurred, &sharp, 8) > 1e-4,
+                "a window of another size is told apart"
+            );
         }
     }
 }

@@ -41,8 +41,14 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
     for size in SIZES {
         let ellipse = Ellipse::seen_by(size);
         let (shot, deep) = (ellipse.shot(USUAL_CORNERS), ellipse.deep());
-        for alpha_threshold in THRESHOLDS.into_iter().filter(|t| size == USUAL || *t == usual_threshold()) {
-            let options = LabelOptions { alpha_threshold, ..LabelOptions::default() };
+        for alpha_threshold in THRESHOLDS
+            .into_iter()
+            .filter(|t| size == USUAL || *t == usual_threshold())
+        {
+            let options = LabelOptions {
+                alpha_threshold,
+                ..LabelOptions::default()
+            };
             let (labels, seconds) = timed(RUNS, || Ok(label(&deep, &shot, &options)))?;
             let mask = mask(&labels);
             let error = 1.0 - ellipse.iou(&mask);
@@ -53,14 +59,40 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
             let is_default = size == USUAL && alpha_threshold == usual_threshold();
             times.push(Point::new("mask", &name, seconds, error).used_where(|_| is_default));
             let (rings, more) = timed(RUNS, || Ok(trace::polygons(&mask, 0.0)))?;
-            times.push(Point::new("polygon along pixels", &name, seconds + more, error));
-            points.push(Point::new("polygon along pixels", &name, corners(&rings), error).used_where(|_| is_default));
-            points.push(Point::new("mask (runs)", &name, mask.runs().len() as f64, error));
+            times.push(Point::new(
+                "polygon along pixels",
+                &name,
+                seconds + more,
+                error,
+            ));
+            points.push(
+                Point::new("polygon along pixels", &name, corners(&rings), error)
+                    .used_where(|_| is_default),
+            );
+            points.push(Point::new(
+                "mask (runs)",
+                &name,
+                mask.runs().len() as f64,
+                error,
+            ));
             for tolerance in TOLERANCES.into_iter().filter(|_| is_default) {
                 let (rings, more) = timed(RUNS, || Ok(trace::polygons(&mask, tolerance)))?;
-                let (error, name) = (1.0 - ellipse.iou_of_rings(&rings), format!("within {tolerance} px"));
-                times.push(Point::new("simplified polygon", &name, seconds + more, error));
-                points.push(Point::new("simplified polygon", &name, corners(&rings), error));
+                let (error, name) = (
+                    1.0 - ellipse.iou_of_rings(&rings),
+                    format!("within {tolerance} px"),
+                );
+                times.push(Point::new(
+                    "simplified polygon",
+                    &name,
+                    seconds + more,
+                    error,
+                ));
+                points.push(Point::new(
+                    "simplified polygon",
+                    &name,
+                    corners(&rings),
+                    error,
+                ));
             }
         }
     }
@@ -71,10 +103,20 @@ pub fn diagrams() -> Result<Vec<Diagram>> {
         let error = 1.0 - rings.iter().map(|ring| area(ring)).sum::<f64>() / ellipse.area();
         let name = format!("{corners} corners");
         times.push(Point::new("projected outline", &name, seconds, error));
-        points.push(Point::new("projected outline", &name, self::corners(&rings), error));
+        points.push(Point::new(
+            "projected outline",
+            &name,
+            self::corners(&rings),
+            error,
+        ));
     }
     Ok(vec![
-        diagram("label_time", "label: polygon and raster, error against time", "CPU seconds of a picture", times),
+        diagram(
+            "label_time",
+            "label: polygon and raster, error against time",
+            "CPU seconds of a picture",
+            times,
+        ),
         diagram(
             "label_points",
             "label: polygon and raster, error against points",
@@ -115,7 +157,11 @@ fn usual_threshold() -> f32 {
 
 /// The mask of the one object.
 fn mask(labels: &Labels) -> Mask {
-    labels.objects.first().map(|object| object.amodal_mask.clone()).unwrap_or_default()
+    labels
+        .objects
+        .first()
+        .map(|object| object.amodal_mask.clone())
+        .unwrap_or_default()
 }
 
 fn corners(rings: &[Vec<Point2<f64>>]) -> f64 {
@@ -130,11 +176,18 @@ fn area(ring: &[Point2<f64>]) -> f64 {
 
 /// The parts of a line along the rows that lie in an odd number of rings.
 fn inside(rings: &[Vec<Point2<f64>>], y: f64) -> Vec<[f64; 2]> {
-    let sides = rings.iter().flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
+    let sides = rings
+        .iter()
+        .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
     let crossed = sides.filter(|(a, b)| (a.y <= y) != (b.y <= y));
-    let mut crossings: Vec<f64> = crossed.map(|(a, b)| a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y)).collect();
+    let mut crossings: Vec<f64> = crossed
+        .map(|(a, b)| a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y))
+        .collect();
     crossings.sort_by(f64::total_cmp);
-    crossings.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()
+    crossings
+        .chunks_exact(2)
+        .map(|pair| [pair[0], pair[1]])
+        .collect()
 }
 
 /// The ellipse in a picture.
@@ -147,7 +200,11 @@ struct Ellipse {
 impl Ellipse {
     fn seen_by(image: [u32; 2]) -> Self {
         let camera = above(image, 1.0);
-        Self { image, center: camera.principal_px, half: HALF.map(|h| h * camera.focal_px.x) }
+        Self {
+            image,
+            center: camera.principal_px,
+            half: HALF.map(|h| h * camera.focal_px.x),
+        }
     }
 
     fn area(&self) -> f64 {
@@ -167,7 +224,12 @@ impl Ellipse {
     fn coverage(&self, x: u32, y: u32) -> f64 {
         let part = |i: usize| (i as f64 + 0.5) / POINTS as f64;
         let inside = (0..POINTS * POINTS)
-            .filter(|i| self.level(f64::from(x) + part(i % POINTS), f64::from(y) + part(i / POINTS)) <= 1.0)
+            .filter(|i| {
+                self.level(
+                    f64::from(x) + part(i % POINTS),
+                    f64::from(y) + part(i / POINTS),
+                ) <= 1.0
+            })
             .count();
         inside as f64 / (POINTS * POINTS) as f64
     }
@@ -196,7 +258,8 @@ impl Ellipse {
     /// Where the ellipse crosses a line along the rows; none where it does not.
     fn chord(&self, y: f64) -> Option<[f64; 2]> {
         // The level is a parabola along the line: through three points of it.
-        let [low, middle, high] = [-1.0, 0.0, 1.0].map(|dx| self.level(self.center.x + dx, y) - 1.0);
+        let [low, middle, high] =
+            [-1.0, 0.0, 1.0].map(|dx| self.level(self.center.x + dx, y) - 1.0);
         let (a, b) = (0.5 * (low + high) - middle, 0.5 * (high - low));
         let discriminant = b * b - 4.0 * a * middle;
         let at = |sign: f64| self.center.x + (sign * discriminant.sqrt() - b) / (2.0 * a);
@@ -206,7 +269,12 @@ impl Ellipse {
     /// A card whose outline has so many corners on the ellipse.
     fn shot(&self, corners: usize) -> Shot {
         let turn = |i: usize| TAU * i as f64 / corners as f64;
-        let on_ellipse = |i: usize| Point2::new(0.5 + 0.5 * libm::cos(turn(i)), 0.5 + 0.5 * libm::sin(turn(i)));
+        let on_ellipse = |i: usize| {
+            Point2::new(
+                0.5 + 0.5 * libm::cos(turn(i)),
+                0.5 + 0.5 * libm::sin(turn(i)),
+            )
+        };
         let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), TURN);
         Shot::new(above(self.image, 1.0)).with_card(Card {
             id: ObjectId(1),
@@ -236,7 +304,10 @@ impl Ellipse {
             }],
         };
         let pixels = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
-        DeepImage::from_pixels(Image::filled(w as usize, h as usize, LinearRgb::WHITE), pixels.map(sample))
+        DeepImage::from_pixels(
+            Image::filled(w as usize, h as usize, LinearRgb::WHITE),
+            pixels.map(sample),
+        )
     }
 }
 
@@ -249,16 +320,31 @@ mod tests {
         let ellipse = Ellipse::seen_by([160, 120]);
         let shot = ellipse.shot(128);
         let ring = &outline_of(&shot.cards[0], &shot.camera)[0];
-        assert!(ring.iter().all(|p| (ellipse.level(p.x, p.y) - 1.0).abs() < 1e-5), "corners lie on it");
+        assert!(
+            ring.iter()
+                .all(|p| (ellipse.level(p.x, p.y) - 1.0).abs() < 1e-5),
+            "corners lie on it"
+        );
         // An inscribed polygon of n corners lacks 1 - sin(2 pi / n) / (2 pi / n) of the area.
         let turn = TAU / 128.0;
         // `geo` snaps corners to 2^-30 of the extent, 1.5e-7 pixels of half lengths of 8 and 24.
         assert!((area(ring) / ellipse.area() - libm::sin(turn) / turn).abs() < 1e-7);
-        let half = LabelOptions { alpha_threshold: 0.5, ..LabelOptions::default() };
+        let half = LabelOptions {
+            alpha_threshold: 0.5,
+            ..LabelOptions::default()
+        };
         let mask = mask(&label(&ellipse.deep(), &shot, &half));
         // A pixel on the border is wrong by at most a half, and by a quarter in the mean.
-        let border: f64 = ring.iter().zip(ring.iter().cycle().skip(1)).map(|(a, b)| (b - a).norm()).sum();
-        assert!(1.0 - ellipse.iou(&mask) < 0.5 * border / ellipse.area(), "{}", ellipse.iou(&mask));
+        let border: f64 = ring
+            .iter()
+            .zip(ring.iter().cycle().skip(1))
+            .map(|(a, b)| (b - a).norm())
+            .sum();
+        assert!(
+            1.0 - ellipse.iou(&mask) < 0.5 * border / ellipse.area(),
+            "{}",
+            ellipse.iou(&mask)
+        );
     }
 
     #[test]
@@ -268,15 +354,26 @@ mod tests {
         // An inscribed polygon shares all of its area; lines are 1/16 of a pixel apart.
         assert!((ellipse.iou_of_rings(&rings) - area(&rings[0]) / ellipse.area()).abs() < 1e-3);
         let y = ellipse.center.y + 3.0;
-        assert!(ellipse.chord(y).unwrap().iter().all(|x| (ellipse.level(*x, y) - 1.0).abs() < 1e-9));
+        assert!(
+            ellipse
+                .chord(y)
+                .unwrap()
+                .iter()
+                .all(|x| (ellipse.level(*x, y) - 1.0).abs() < 1e-9)
+        );
         assert_eq!((ellipse.chord(0.0), ellipse.iou_of_rings(&[])), (None, 0.0));
     }
 
     #[test]
     fn a_looser_polygon_has_fewer_corners() {
         let ellipse = Ellipse::seen_by([160, 120]);
-        let mask = mask(&label(&ellipse.deep(), &ellipse.shot(32), &LabelOptions::default()));
-        let [exact, loose, looser] = [0.0, 1.0, 4.0].map(|tolerance| trace::polygons(&mask, tolerance));
+        let mask = mask(&label(
+            &ellipse.deep(),
+            &ellipse.shot(32),
+            &LabelOptions::default(),
+        ));
+        let [exact, loose, looser] =
+            [0.0, 1.0, 4.0].map(|tolerance| trace::polygons(&mask, tolerance));
         assert!(corners(&exact) > 3.0 * corners(&loose) && corners(&loose) > corners(&looser));
         // The mask's own IoU is by points and this one by lines, both 1/16 of a pixel apart.
         assert!((ellipse.iou_of_rings(&exact) - ellipse.iou(&mask)).abs() < 2e-3);
@@ -287,7 +384,14 @@ mod tests {
         let ellipse = Ellipse::seen_by([160, 120]);
         let (shot, deep) = (ellipse.shot(32), ellipse.deep());
         let at = |alpha_threshold| {
-            ellipse.iou(&mask(&label(&deep, &shot, &LabelOptions { alpha_threshold, ..LabelOptions::default() })))
+            ellipse.iou(&mask(&label(
+                &deep,
+                &shot,
+                &LabelOptions {
+                    alpha_threshold,
+                    ..LabelOptions::default()
+                },
+            )))
         };
         assert!(at(0.02) < at(0.1) && at(0.1) < at(0.5));
         assert_eq!(ellipse.iou(&Mask::default()), 0.0);

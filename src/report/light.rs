@@ -52,27 +52,66 @@ fn diagram(kind: Kind) -> Result<Diagram> {
     let exact = exact(&shot, kind);
     let usual = RenderOptions::default();
     let sampled = |n: usize| match kind {
-        Kind::Area => RenderOptions { light_samples: n, ..usual },
-        Kind::Sky => RenderOptions { ambient_samples: n, ..usual },
+        Kind::Area => RenderOptions {
+            light_samples: n,
+            ..usual
+        },
+        Kind::Sky => RenderOptions {
+            ambient_samples: n,
+            ..usual
+        },
     };
     let counts = if kind == Kind::Area { LIGHT } else { SKY };
-    let name = |n: usize| if kind == Kind::Area { format!("{n} x {n}") } else { n.to_string() };
+    let name = |n: usize| {
+        if kind == Kind::Area {
+            format!("{n} x {n}")
+        } else {
+            n.to_string()
+        }
+    };
     let mut points = Vec::new();
     for n in counts {
-        points.push(measured(("filtered", name(n)), &shot, &exact, &sampled(n), cast)?);
+        points.push(measured(
+            ("filtered", name(n)),
+            &shot,
+            &exact,
+            &sampled(n),
+            cast,
+        )?);
     }
     for cell_px in CELLS.into_iter().filter(|c| *c != usual.cell_px) {
         let options = RenderOptions { cell_px, ..usual };
-        points.push(measured(("filtered, other cells", format!("{cell_px} px")), &shot, &exact, &options, cast)?);
+        points.push(measured(
+            ("filtered, other cells", format!("{cell_px} px")),
+            &shot,
+            &exact,
+            &options,
+            cast,
+        )?);
     }
     for n in counts.into_iter().filter(|n| *n <= MOST_PLAIN) {
         // One sample a pixel: shadows are smooth, and what is compared is the light.
-        let options = RenderOptions { subsamples: 1, ..sampled(n) };
-        points.push(measured(("plain samples", name(n)), &shot, &exact, &options, reference)?);
+        let options = RenderOptions {
+            subsamples: 1,
+            ..sampled(n)
+        };
+        points.push(measured(
+            ("plain samples", name(n)),
+            &shot,
+            &exact,
+            &options,
+            reference,
+        )?);
     }
     for quality in [Quality::Draft, Quality::Reference] {
         let options = quality.render();
-        let point = measured(("all of a quality", String::new()), &shot, &exact, &options, cast)?;
+        let point = measured(
+            ("all of a quality", String::new()),
+            &shot,
+            &exact,
+            &options,
+            cast,
+        )?;
         points.push(point.used_where(|q| q == quality));
     }
     Ok(told(kind, points))
@@ -85,7 +124,11 @@ fn told(kind: Kind, points: Vec<Point>) -> Diagram {
             "shadow: a card under an area light",
             "Lambert's formula for the part of the light that is seen (closed form)",
         ),
-        Kind::Sky => ("shadow_sky", "shadow: a card under an even sky", "form factor of the card (closed form)"),
+        Kind::Sky => (
+            "shadow_sky",
+            "shadow: a card under an even sky",
+            "form factor of the card (closed form)",
+        ),
     };
     Diagram {
         file: file.into(),
@@ -112,11 +155,20 @@ fn measured(
     renderer: Renderer,
 ) -> Result<Point> {
     let (deep, seconds) = timed(RUNS, || Ok(renderer(shot, options)))?;
-    let pairs = deep.shadow().pixels().iter().zip(exact).filter_map(|(p, e)| Some((f64::from(p.g), (*e)?)));
-    let (sum, count) = pairs.fold((0.0, 0.0), |(sum, n), (p, e)| (sum + (p - e).powi(2), n + 1.0));
+    let pairs = deep
+        .shadow()
+        .pixels()
+        .iter()
+        .zip(exact)
+        .filter_map(|(p, e)| Some((f64::from(p.g), (*e)?)));
+    let (sum, count) = pairs.fold((0.0, 0.0), |(sum, n), (p, e)| {
+        (sum + (p - e).powi(2), n + 1.0)
+    });
     let is_default = *options == RenderOptions::default();
-    Ok(Point::new(curve, setting, seconds, (sum / f64::max(count, 1.0)).sqrt())
-        .used_where(|q| is_default && q == Quality::default()))
+    Ok(
+        Point::new(curve, setting, seconds, (sum / f64::max(count, 1.0)).sqrt())
+            .used_where(|q| is_default && q == Quality::default()),
+    )
 }
 
 fn shot(kind: Kind) -> Shot {
@@ -124,7 +176,10 @@ fn shot(kind: Kind) -> Shot {
     let card = Card {
         id: ObjectId(1),
         class: 0,
-        quad: Quad { world_from_card: Pose::from_parts(Vector3::new(0.0, 0.0, HEIGHT).into(), rotation), size: CARD },
+        quad: Quad {
+            world_from_card: Pose::from_parts(Vector3::new(0.0, 0.0, HEIGHT).into(), rotation),
+            size: CARD,
+        },
         // So fine that its border, half a texel soft, is a sharp one.
         texture: Image::filled(512, 256, PremulRgba::new(0.0, 0.0, 0.0, 1.0)).into(),
         back: None,
@@ -149,12 +204,20 @@ fn shot(kind: Kind) -> Shot {
 fn exact(shot: &Shot, kind: Kind) -> Vec<Option<f64>> {
     let quad = &shot.cards[0].quad;
     // A tenth more to each side, for the pixels of its border.
-    let around = Quad { size: quad.size.map(|side| 1.2 * side), ..*quad };
+    let around = Quad {
+        size: quad.size.map(|side| 1.2 * side),
+        ..*quad
+    };
     let (card, [w, h]) = (quad.corners(), shot.camera.image);
     let at = |i: u32| {
-        let ray = shot.camera.ray(Point2::new(f64::from(i % w) + 0.5, f64::from(i / w) + 0.5));
+        let ray = shot
+            .camera
+            .ray(Point2::new(f64::from(i % w) + 0.5, f64::from(i / w) + 0.5));
         let point = ray.at(Plane::surface().intersect(&ray)?);
-        around.intersect(&ray).is_none().then(|| share(shot, kind, &card, point))
+        around
+            .intersect(&ray)
+            .is_none()
+            .then(|| share(shot, kind, &card, point))
     };
     (0..w * h).map(at).collect()
 }
@@ -166,14 +229,20 @@ fn share(shot: &Shot, kind: Kind, card: &[Point3<f64>; 4], point: Point3<f64>) -
             let light = &shot.lights[0];
             let face = frame(light).corners(light.size);
             let hidden = shadowed(&face, card, point);
-            1.0 - polygon_irradiance(&hidden, point, Vector3::z()) / polygon_irradiance(&face, point, Vector3::z())
+            1.0 - polygon_irradiance(&hidden, point, Vector3::z())
+                / polygon_irradiance(&face, point, Vector3::z())
         }
     }
 }
 
 /// The part of a light's face that a card hides from a point: cut by the planes through the point and each side.
-fn shadowed(face: &[Point3<f64>; 4], card: &[Point3<f64>; 4], point: Point3<f64>) -> Vec<Point3<f64>> {
-    let middle = Point3::from(card.iter().map(|c| c.coords).sum::<Vector3<f64>>() / card.len() as f64);
+fn shadowed(
+    face: &[Point3<f64>; 4],
+    card: &[Point3<f64>; 4],
+    point: Point3<f64>,
+) -> Vec<Point3<f64>> {
+    let middle =
+        Point3::from(card.iter().map(|c| c.coords).sum::<Vector3<f64>>() / card.len() as f64);
     let sides = card.iter().zip(card.iter().cycle().skip(1));
     sides.fold(face.to_vec(), |kept, (a, b)| {
         let normal = (a - point).cross(&(b - point));
@@ -212,8 +281,14 @@ mod tests {
             let from = face.point(place(i % N, light.size[0]), place(i / N, light.size[1]));
             let way = from - point;
             let weight = way.z * -face.normal.dot(&way) / way.norm_squared().powi(2);
-            let ray = crate::geom::Ray { origin: point, direction: way };
-            let is_hidden = shot.cards[0].quad.intersect(&ray).is_some_and(|(t, _)| t > 0.0);
+            let ray = crate::geom::Ray {
+                origin: point,
+                direction: way,
+            };
+            let is_hidden = shot.cards[0]
+                .quad
+                .intersect(&ray)
+                .is_some_and(|(t, _)| t > 0.0);
             all += weight;
             open += if is_hidden { 0.0 } else { weight };
         }
@@ -224,9 +299,18 @@ mod tests {
     fn the_closed_form_is_what_many_rays_find() {
         let shot = shot(Kind::Area);
         let card = shot.cards[0].quad.corners();
-        for [x, y] in [[0.0, 0.0], [-0.06, -0.03], [-0.1, 0.02], [0.05, -0.08], [0.3, 0.3]] {
+        for [x, y] in [
+            [0.0, 0.0],
+            [-0.06, -0.03],
+            [-0.1, 0.02],
+            [0.05, -0.08],
+            [0.3, 0.3],
+        ] {
             let point = Point3::new(x, y, 0.0);
-            let (exact, found) = (share(&shot, Kind::Area, &card, point), brute_force(&shot, point));
+            let (exact, found) = (
+                share(&shot, Kind::Area, &card, point),
+                brute_force(&shot, point),
+            );
             assert!((exact - found).abs() < 0.01, "{x} {y}: {exact} {found}");
         }
     }
@@ -235,17 +319,26 @@ mod tests {
     fn more_samples_come_nearer_and_the_default_is_near() {
         let shot = shot(Kind::Area);
         let exact = exact(&shot, Kind::Area);
-        let error =
-            |options: RenderOptions| measured(("", String::new()), &shot, &exact, &options, cast).unwrap().error;
+        let error = |options: RenderOptions| {
+            measured(("", String::new()), &shot, &exact, &options, cast)
+                .unwrap()
+                .error
+        };
         let [draft, normal, best] = Quality::ALL.map(|q| error(q.render()));
-        assert!(draft > normal && normal > best && best < 0.005 && normal < 0.03, "{draft} {normal} {best}");
+        assert!(
+            draft > normal && normal > best && best < 0.005 && normal < 0.03,
+            "{draft} {normal} {best}"
+        );
     }
 
     #[test]
     fn a_card_far_from_the_light_hides_nothing() {
         let shot = shot(Kind::Area);
         let card = shot.cards[0].quad.corners();
-        assert_eq!(share(&shot, Kind::Area, &card, Point3::new(2.0, 2.0, 0.0)), 1.0);
+        assert_eq!(
+            share(&shot, Kind::Area, &card, Point3::new(2.0, 2.0, 0.0)),
+            1.0
+        );
         assert!(share(&shot, Kind::Sky, &card, Point3::new(50.0, 0.0, 0.0)) > 0.999_99);
     }
 }

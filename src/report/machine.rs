@@ -13,20 +13,40 @@ pub(super) fn machine(date: &str) -> Table {
         ("petcomp", Some(env!("CARGO_PKG_VERSION").to_owned())),
         ("processor", line_of("/proc/cpuinfo", "model name")),
         ("cores", Some(cores.to_string())),
-        ("memory", line_of("/proc/meminfo", "MemTotal").and_then(|text| gib(&text))),
-        ("system", line_of("/etc/os-release", "PRETTY_NAME").map(|name| name.trim_matches('"').to_owned())),
-        ("kernel", std::fs::read_to_string("/proc/sys/kernel/osrelease").ok().map(|text| text.trim().to_owned())),
+        (
+            "memory",
+            line_of("/proc/meminfo", "MemTotal").and_then(|text| gib(&text)),
+        ),
+        (
+            "system",
+            line_of("/etc/os-release", "PRETTY_NAME").map(|name| name.trim_matches('"').to_owned()),
+        ),
+        (
+            "kernel",
+            std::fs::read_to_string("/proc/sys/kernel/osrelease")
+                .ok()
+                .map(|text| text.trim().to_owned()),
+        ),
         ("OpenImageIO", openimageio()),
-        ("date", Some(date.to_owned()).filter(|date| !date.is_empty())),
+        (
+            "date",
+            Some(date.to_owned()).filter(|date| !date.is_empty()),
+        ),
     ];
-    rows.into_iter().filter_map(|(what, value)| Some([what.to_owned(), value?])).for_each(|row| table.push(row));
+    rows.into_iter()
+        .filter_map(|(what, value)| Some([what.to_owned(), value?]))
+        .for_each(|row| table.push(row));
     table
 }
 
 /// What stands behind the first line of a file that begins with a name, and a `:` or `=`.
 fn line_of(path: impl AsRef<Path>, name: &str) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;
-    let value = text.lines().find_map(|line| line.strip_prefix(name)?.trim_start().strip_prefix([':', '=']))?;
+    let value = text.lines().find_map(|line| {
+        line.strip_prefix(name)?
+            .trim_start()
+            .strip_prefix([':', '='])
+    })?;
     Some(value.trim().to_owned())
 }
 
@@ -53,10 +73,24 @@ mod tests {
     fn lines_are_found_by_their_names() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("info");
-        std::fs::write(&path, "MemTotalFoo: 1\nMemTotal:  2097152 kB\nPRETTY_NAME=\"A B\"\n").unwrap();
-        assert_eq!(line_of(&path, "MemTotal").and_then(|t| gib(&t)), Some("2.0 GiB".into()));
+        std::fs::write(
+            &path,
+            "MemTotalFoo: 1\nMemTotal:  2097152 kB\nPRETTY_NAME=\"A B\"\n",
+        )
+        .unwrap();
+        assert_eq!(
+            line_of(&path, "MemTotal").and_then(|t| gib(&t)),
+            Some("2.0 GiB".into())
+        );
         assert_eq!(line_of(&path, "PRETTY_NAME"), Some("\"A B\"".into()));
-        assert_eq!((line_of(&path, "nothing"), line_of("nowhere", "a"), gib("much")), (None, None, None));
+        assert_eq!(
+            (
+                line_of(&path, "nothing"),
+                line_of("nowhere", "a"),
+                gib("much")
+            ),
+            (None, None, None)
+        );
     }
 
     #[test]

@@ -81,7 +81,11 @@ pub fn measure(folder: &Path, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
 }
 
 /// Measures every method on so many photos.
-fn measure_known(count: usize, read: impl Fn(usize) -> Result<Known>, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+fn measure_known(
+    count: usize,
+    read: impl Fn(usize) -> Result<Known>,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<Row>> {
     // One thread, so that run times can be compared.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let mut rows = Vec::new();
@@ -90,27 +94,49 @@ fn measure_known(count: usize, read: impl Fn(usize) -> Result<Known>, progress: 
         let known = read(i)?;
         let on = |screen: &Image<LinearRgb>, shot: u64| known.on(screen, SHOTS * i as u64 + shot);
         let shots = [on(&known.screen, 0), on(&known.other_screen(), 1)];
-        let backgrounds: Vec<_> = (0..BACKGROUNDS).map(|k| background(known.photo.size(), k)).collect();
+        let backgrounds: Vec<_> = (0..BACKGROUNDS)
+            .map(|k| background(known.photo.size(), k))
+            .collect();
         for method in Method::ALL {
             let work = || row(method, &known, &shots, &backgrounds);
-            rows.push(one.as_ref().map_or_else(|_| work(), |pool| pool.install(work)));
+            rows.push(
+                one.as_ref()
+                    .map_or_else(|_| work(), |pool| pool.install(work)),
+            );
         }
     }
     Ok(rows)
 }
 
-fn row(method: Method, known: &Known, shots: &[Image<LinearRgb>; 2], backgrounds: &[Image<LinearRgb>]) -> Row {
+fn row(
+    method: Method,
+    known: &Known,
+    shots: &[Image<LinearRgb>; 2],
+    backgrounds: &[Image<LinearRgb>],
+) -> Row {
     let start = cpu_seconds();
     let cut = method.run(known, shots);
     let time_ms = 1e3 * (cpu_seconds() - start);
     let (score, doubts) = match &cut {
         Ok(cut) => {
-            let doubts = cut.found.remarks.iter().filter(|r| r.is_doubt()).map(ToString::to_string).collect();
+            let doubts = cut
+                .found
+                .remarks
+                .iter()
+                .filter(|r| r.is_doubt())
+                .map(ToString::to_string)
+                .collect();
             (Some(Score::of(cut, known, backgrounds)), doubts)
         }
         Err(error) => (None, vec![error.to_string()]),
     };
-    Row { photo: known.name.clone(), method, score, doubts, time_ms }
+    Row {
+        photo: known.name.clone(),
+        method,
+        score,
+        doubts,
+        time_ms,
+    }
 }
 
 /// A background that nobody has seen: patches of random colours and sizes.
@@ -132,17 +158,28 @@ fn background((w, h): (usize, usize), seed: u64) -> Image<LinearRgb> {
 /// Normal numbers: sums of twelve uniform ones.
 pub(super) fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    move || (0..12).map(|_| f64::from(rng.next_u32()) / f64::from(u32::MAX)).sum::<f64>() - 6.0
+    move || {
+        (0..12)
+            .map(|_| f64::from(rng.next_u32()) / f64::from(u32::MAX))
+            .sum::<f64>()
+            - 6.0
+    }
 }
 
 /// Errors over all photos, a line per method.
 pub fn summaries(rows: &[Row]) -> Vec<Summary> {
-    Method::ALL.into_iter().map(|method| summary(rows, method)).collect()
+    Method::ALL
+        .into_iter()
+        .map(|method| summary(rows, method))
+        .collect()
 }
 
 fn summary(rows: &[Row], method: Method) -> Summary {
     let own: Vec<&Row> = rows.iter().filter(|row| row.method == method).collect();
-    let scored: Vec<(&Row, Score)> = own.iter().filter_map(|row| row.score.map(|score| (*row, score))).collect();
+    let scored: Vec<(&Row, Score)> = own
+        .iter()
+        .filter_map(|row| row.score.map(|score| (*row, score)))
+        .collect();
     let values = |of: fn(&Score) -> f64| scored.iter().map(move |(_, s)| of(s));
     let count = scored.len().max(1) as f64;
     let mean = |of: fn(&Score) -> f64| values(of).sum::<f64>() / count;
@@ -163,7 +200,10 @@ fn summary(rows: &[Row], method: Method) -> Summary {
         },
         failed: own.len() - scored.len(),
         box_within_2_px: values(|s| s.box_px).filter(|b| *b <= GOOD_BOX_PX).count() as f64 / count,
-        silently_wrong: scored.iter().filter(|(row, s)| row.doubts.is_empty() && wrong(s)).count(),
+        silently_wrong: scored
+            .iter()
+            .filter(|(row, s)| row.doubts.is_empty() && wrong(s))
+            .count(),
         time_ms: quantile(own.iter().map(|row| row.time_ms), 0.5),
     }
 }
@@ -238,9 +278,25 @@ pub fn details(rows: &[Row]) -> Table {
     ]);
     for row in rows {
         let e = row.score.unwrap_or_default();
-        let errors =
-            [e.mae_lit, e.psnr_lit, e.mae_shaded, e.psnr_shaded, e.sad, e.mse, e.gradient, e.residue, e.iou, e.box_px];
-        let number = |v: f64| if row.score.is_some() { format!("{v:.6}") } else { String::new() };
+        let errors = [
+            e.mae_lit,
+            e.psnr_lit,
+            e.mae_shaded,
+            e.psnr_shaded,
+            e.sad,
+            e.mse,
+            e.gradient,
+            e.residue,
+            e.iou,
+            e.box_px,
+        ];
+        let number = |v: f64| {
+            if row.score.is_some() {
+                format!("{v:.6}")
+            } else {
+                String::new()
+            }
+        };
         let head = [row.photo.clone(), row.method.name().to_owned()];
         let tail = [format!("{:.1}", row.time_ms), row.doubts.join("; ")];
         table.push(head.into_iter().chain(errors.map(number)).chain(tail));
@@ -251,17 +307,27 @@ pub fn details(rows: &[Row]) -> Table {
 /// Error against run time, a point per method: over backgrounds lit by themselves, and in the object's own shadow.
 pub fn chart(summaries: &[Summary]) -> String {
     type Error = fn(&Score) -> f64;
-    let errors: [(&str, Error); 2] =
-        [("new background, lit by itself", |s| s.mae_lit), ("new background, shaded by the object", |s| s.mae_shaded)];
-    let across = Axis::over_decades("run time per photo, one thread, ms", summaries.iter().map(|s| s.time_ms));
-    let both = errors.iter().flat_map(|(_, error)| summaries.iter().map(|s| error(&s.score)));
+    let errors: [(&str, Error); 2] = [
+        ("new background, lit by itself", |s| s.mae_lit),
+        ("new background, shaded by the object", |s| s.mae_shaded),
+    ];
+    let across = Axis::over_decades(
+        "run time per photo, one thread, ms",
+        summaries.iter().map(|s| s.time_ms),
+    );
+    let both = errors
+        .iter()
+        .flat_map(|(_, error)| summaries.iter().map(|s| error(&s.score)));
     let up = Axis::over_decades("mean absolute error, linear light", both);
     let chart = |(title, error): (&str, Error)| Chart {
         title: title.into(),
         names: summaries.iter().map(|s| s.method.name().into()).collect(),
         across: across.clone(),
         up: up.clone(),
-        curves: summaries.iter().map(|s| vec![[s.time_ms, error(&s.score)]]).collect(),
+        curves: summaries
+            .iter()
+            .map(|s| vec![[s.time_ms, error(&s.score)]])
+            .collect(),
         defaults: summaries
             .iter()
             .filter(|s| s.method == Method::Physical)
@@ -281,10 +347,18 @@ pub fn write(truth: &Path, folder: &Path, progress: impl Fn(u64, u64)) -> Result
     let (table, chart) = (table(&summaries), chart(&summaries));
     io::create_folder(folder)?;
     io::write_text(folder.join("matte.csv"), &details(&rows).csv())?;
-    io::write_text(folder.join("matte.md"), &format!("# Error of the mattes\n\n{}", table.markdown()))?;
+    io::write_text(
+        folder.join("matte.md"),
+        &format!("# Error of the mattes\n\n{}", table.markdown()),
+    )?;
     io::write_text(folder.join("matte.svg"), &chart)?;
     let mut page = Page::new("Error of the mattes");
-    page.table(&table).chart(&chart, "Error against run time; the ring is the default method.").table(&details(&rows));
+    page.table(&table)
+        .chart(
+            &chart,
+            "Error against run time; the ring is the default method.",
+        )
+        .table(&details(&rows));
     io::write_text(folder.join("matte.html"), &page.document())?;
     Ok(summaries)
 }

@@ -26,11 +26,26 @@ const MOST_OTHERS: usize = 100;
 
 /// All mistakes of a run, one a row.
 pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
-    let columns = ["image", "mistake", "true class", "found class", "confidence", "iou", "x0", "y0", "x1", "y1"];
+    let columns = [
+        "image",
+        "mistake",
+        "true class",
+        "found class",
+        "confidence",
+        "iou",
+        "x0",
+        "y0",
+        "x1",
+        "y1",
+    ];
     let mut table = Table::new(columns);
     for mistake in mistakes {
         let case = Case::of(run, mistake);
-        let name = |class: Option<u32>| class.map(|class| class_name(class, &options.classes)).unwrap_or_default();
+        let name = |class: Option<u32>| {
+            class
+                .map(|class| class_name(class, &options.classes))
+                .unwrap_or_default()
+        };
         let number = |value: f64, digits: usize| format!("{value:.digits$}");
         let b = case.wrong();
         table.push([
@@ -38,7 +53,9 @@ pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions
             word(mistake.kind).to_owned(),
             name(case.truth.map(|t| t.class)),
             name(case.found.map(|f| f.class)),
-            case.found.map(|f| number(f.confidence, 4)).unwrap_or_default(),
+            case.found
+                .map(|f| number(f.confidence, 4))
+                .unwrap_or_default(),
             number(mistake.iou, 3),
             number(b.x0, 1),
             number(b.y0, 1),
@@ -50,7 +67,12 @@ pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions
 }
 
 /// The worst mistakes as pictures.
-pub(super) fn put_on(page: &mut Page, run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) {
+pub(super) fn put_on(
+    page: &mut Page,
+    run: &Run,
+    mistakes: &[Mistake],
+    options: &EvalReportOptions,
+) {
     let count = |kind| mistakes.iter().filter(|m| m.kind == kind).count();
     let [alarms, wrong, missed] = [Kind::FalseAlarm, Kind::WrongClass, Kind::Missed].map(count);
     page.heading("Mistakes").text(&format!(
@@ -59,21 +81,57 @@ pub(super) fn put_on(page: &mut Page, run: &Run, mistakes: &[Mistake], options: 
         options.confusion.confidence, options.confusion.iou
     ));
     if options.pictures.iter().flatten().next().is_none() {
-        page.text("No pictures of them: the images were not found; say where they are with --images.");
+        page.text(
+            "No pictures of them: the images were not found; say where they are with --images.",
+        );
         return;
     }
     page.html(gallery::STYLE).html(&legend());
-    let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) = mistakes.iter().partition(|m| m.kind == Kind::Missed);
-    put_those(page, "alarm", "False alarms and wrong classes, the surest first", run, &detections, options);
-    put_those(page, "miss", "Boxes that were missed, the largest first", run, &misses, options);
+    let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
+        mistakes.iter().partition(|m| m.kind == Kind::Missed);
+    put_those(
+        page,
+        "alarm",
+        "False alarms and wrong classes, the surest first",
+        run,
+        &detections,
+        options,
+    );
+    put_those(
+        page,
+        "miss",
+        "Boxes that were missed, the largest first",
+        run,
+        &misses,
+        options,
+    );
 }
 
-fn put_those(page: &mut Page, name: &str, title: &str, run: &Run, mistakes: &[&Mistake], options: &EvalReportOptions) {
+fn put_those(
+    page: &mut Page,
+    name: &str,
+    title: &str,
+    run: &Run,
+    mistakes: &[&Mistake],
+    options: &EvalReportOptions,
+) {
     let with_picture = |m: &&&Mistake| options.pictures.get(m.sheet).is_some_and(Option::is_some);
-    let shown: Vec<&Mistake> = mistakes.iter().filter(with_picture).take(options.shown).copied().collect();
-    let figures: Vec<Figure> = shown.par_iter().filter_map(|mistake| figure(run, mistake, options)).collect();
+    let shown: Vec<&Mistake> = mistakes
+        .iter()
+        .filter(with_picture)
+        .take(options.shown)
+        .copied()
+        .collect();
+    let figures: Vec<Figure> = shown
+        .par_iter()
+        .filter_map(|mistake| figure(run, mistake, options))
+        .collect();
     if !figures.is_empty() {
-        page.subheading(&format!("{title} ({} of {})", figures.len(), mistakes.len()));
+        page.subheading(&format!(
+            "{title} ({} of {})",
+            figures.len(),
+            mistakes.len()
+        ));
         page.html(&gallery(name, &figures));
     }
 }
@@ -83,7 +141,9 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
     let case = Case::of(run, mistake);
     let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
     let view = case.view(*size);
-    let mut figure = Figure::of(path, *size, view).inspect_err(|error| log::warn!("{error}")).ok()?;
+    let mut figure = Figure::of(path, *size, view)
+        .inspect_err(|error| log::warn!("{error}"))
+        .ok()?;
     figure.drawing = case.drawing(&view, figure.letter(), figure.top(), options);
     figure.caption = case.caption(options);
     Some(figure)
@@ -100,8 +160,16 @@ struct Case<'a> {
 impl<'a> Case<'a> {
     fn of(run: &'a Run, mistake: &'a Mistake) -> Self {
         let sheet = &run.sheets[mistake.sheet];
-        let (truth, found) = (mistake.truth.map(|t| &sheet.truth[t]), mistake.found.map(|f| &sheet.found[f]));
-        Self { mistake, sheet, truth, found }
+        let (truth, found) = (
+            mistake.truth.map(|t| &sheet.truth[t]),
+            mistake.found.map(|f| &sheet.found[f]),
+        );
+        Self {
+            mistake,
+            sheet,
+            truth,
+            found,
+        }
     }
 
     fn is_miss(&self) -> bool {
@@ -117,11 +185,23 @@ impl<'a> Case<'a> {
     /// The part of the picture around it.
     fn view(&self, [width, height]: [f64; 2]) -> BBox {
         let boxes = [self.truth.map(|t| t.bbox), self.found.map(|f| f.bbox)];
-        let both = boxes.into_iter().flatten().reduce(BBox::hull).unwrap_or_default();
+        let both = boxes
+            .into_iter()
+            .flatten()
+            .reduce(BBox::hull)
+            .unwrap_or_default();
         let side = (AROUND * both.width().max(both.height())).max(LEAST_SHARE * width.max(height));
         let (w, h, middle) = (side.min(width), side.min(height), both.center());
-        let (x0, y0) = ((middle.x - w / 2.0).clamp(0.0, width - w), (middle.y - h / 2.0).clamp(0.0, height - h));
-        BBox { x0, y0, x1: x0 + w, y1: y0 + h }
+        let (x0, y0) = (
+            (middle.x - w / 2.0).clamp(0.0, width - w),
+            (middle.y - h / 2.0).clamp(0.0, height - h),
+        );
+        BBox {
+            x0,
+            y0,
+            x1: x0 + w,
+            y1: y0 + h,
+        }
     }
 
     fn drawing(&self, view: &BBox, letter: f64, top: f64, options: &EvalReportOptions) -> String {
@@ -135,14 +215,32 @@ impl<'a> Case<'a> {
         }
         let name = |class: u32| gallery::clipped(&class_name(class, &options.classes), 24);
         if let Some(truth) = self.truth {
-            let (color, style) = if self.is_miss() { (WRONG, THICK) } else { (TRUTH, THICK) };
-            svg += &marked_box(&truth.bbox, &format!("true: {}", name(truth.class)), letter, top, color, style);
+            let (color, style) = if self.is_miss() {
+                (WRONG, THICK)
+            } else {
+                (TRUTH, THICK)
+            };
+            svg += &marked_box(
+                &truth.bbox,
+                &format!("true: {}", name(truth.class)),
+                letter,
+                top,
+                color,
+                style,
+            );
         }
         if let Some(found) = self.found {
-            let (color, style) = if self.is_miss() { (FOUND, DASHED) } else { (WRONG, THICK_DASHED) };
+            let (color, style) = if self.is_miss() {
+                (FOUND, DASHED)
+            } else {
+                (WRONG, THICK_DASHED)
+            };
             let words = format!("{} {:.2}", name(found.class), found.confidence);
             // Beside the words of the truth, which stand at the upper corner.
-            let below = BBox { y0: found.bbox.y1 + 1.2 * letter, ..found.bbox };
+            let below = BBox {
+                y0: found.bbox.y1 + 1.2 * letter,
+                ..found.bbox
+            };
             svg += &marked_box(&found.bbox, "", letter, top, color, style);
             svg += &gallery::words([below.x0, below.y0], &words, letter, color);
         }
@@ -152,14 +250,27 @@ impl<'a> Case<'a> {
     /// Boxes of the truth in the view that the mistake is not about.
     fn other_boxes(&self, view: &BBox) -> Vec<&'a TrueBox> {
         let other = |t: &&TrueBox| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
-        self.sheet.truth.iter().filter(other).filter(|t| t.bbox.overlaps(view)).take(MOST_OTHERS).collect()
+        self.sheet
+            .truth
+            .iter()
+            .filter(other)
+            .filter(|t| t.bbox.overlaps(view))
+            .take(MOST_OTHERS)
+            .collect()
     }
 
     /// Detections in the view that the mistake is not about, the surest ones.
     fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a FoundBox> {
         let other = |f: &&FoundBox| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
-        let sure = self.sheet.found.iter().filter(|f| f.confidence > confidence);
-        let mut seen: Vec<&FoundBox> = sure.filter(other).filter(|f| f.bbox.overlaps(view)).collect();
+        let sure = self
+            .sheet
+            .found
+            .iter()
+            .filter(|f| f.confidence > confidence);
+        let mut seen: Vec<&FoundBox> = sure
+            .filter(other)
+            .filter(|f| f.bbox.overlaps(view))
+            .collect();
         seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
         seen.truncate(MOST_OTHERS);
         seen
@@ -167,11 +278,16 @@ impl<'a> Case<'a> {
 
     fn caption(&self, options: &EvalReportOptions) -> String {
         let name = |class: u32| class_name(class, &options.classes);
-        let found = self.found.map(|f| format!("{} {:.2}", name(f.class), f.confidence)).unwrap_or_default();
+        let found = self
+            .found
+            .map(|f| format!("{} {:.2}", name(f.class), f.confidence))
+            .unwrap_or_default();
         let truth = self.truth.map(|t| name(t.class)).unwrap_or_default();
         let iou = self.mistake.iou;
         let what = match (self.mistake.kind, self.truth, self.found) {
-            (Kind::Missed, _, Some(_)) => format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}"),
+            (Kind::Missed, _, Some(_)) => {
+                format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}")
+            }
             (Kind::Missed, ..) => format!("{truth} missed; no detection near"),
             (Kind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
             (_, Some(_), _) => format!("false alarm: {found}; nearest box: {truth}, IoU {iou:.2}"),
@@ -203,7 +319,10 @@ fn legend() -> String {
         key(FOUND, DASHED, "other detection"),
         key(CROWD, THIN, "crowd"),
     ];
-    format!("<p>{}Click a picture to enlarge it; Escape and the arrow keys work too.</p>\n", keys.concat())
+    format!(
+        "<p>{}Click a picture to enlarge it; Escape and the arrow keys work too.</p>\n",
+        keys.concat()
+    )
 }
 
 #[cfg(test)]
@@ -213,17 +332,55 @@ mod tests {
     /// Twenty thousand detections of a crowd made each of 48 pictures two megabytes.
     #[test]
     fn a_picture_shows_no_more_than_the_surest_detections_around_a_mistake() {
-        let at = |i: usize| BBox { x0: i as f64, y0: 0.0, x1: i as f64 + 2.0, y1: 2.0 };
-        let found = |i: usize| FoundBox { class: 0, bbox: at(i), confidence: 0.3 + (i % 7) as f64 / 10.0 };
-        let truth = (0..300).map(|i| TrueBox { class: 0, bbox: at(i), area: 4.0, crowd: false }).collect();
-        let sheet = Sheet { image: "a".into(), truth, found: (0..5_000).map(found).collect() };
-        let run = Run { name: "run".into(), sheets: vec![sheet] };
-        let mistake = Mistake { sheet: 0, kind: Kind::FalseAlarm, found: Some(3), truth: None, iou: 0.0 };
+        let at = |i: usize| BBox {
+            x0: i as f64,
+            y0: 0.0,
+            x1: i as f64 + 2.0,
+            y1: 2.0,
+        };
+        let found = |i: usize| FoundBox {
+            class: 0,
+            bbox: at(i),
+            confidence: 0.3 + (i % 7) as f64 / 10.0,
+        };
+        let truth = (0..300)
+            .map(|i| TrueBox {
+                class: 0,
+                bbox: at(i),
+                area: 4.0,
+                crowd: false,
+            })
+            .collect();
+        let sheet = Sheet {
+            image: "a".into(),
+            truth,
+            found: (0..5_000).map(found).collect(),
+        };
+        let run = Run {
+            name: "run".into(),
+            sheets: vec![sheet],
+        };
+        let mistake = Mistake {
+            sheet: 0,
+            kind: Kind::FalseAlarm,
+            found: Some(3),
+            truth: None,
+            iou: 0.0,
+        };
         let case = Case::of(&run, &mistake);
-        let view = BBox { x0: 100.0, y0: 0.0, x1: 1_400.0, y1: 2.0 };
+        let view = BBox {
+            x0: 100.0,
+            y0: 0.0,
+            x1: 1_400.0,
+            y1: 2.0,
+        };
         let (boxes, detections) = (case.other_boxes(&view), case.other_detections(&view, 0.25));
         assert_eq!((boxes.len(), detections.len()), (MOST_OTHERS, MOST_OTHERS));
         assert!(boxes.iter().all(|t| t.bbox.overlaps(&view)));
-        assert!(detections.iter().all(|f| f.bbox.overlaps(&view) && f.confidence > 0.85));
+        assert!(
+            detections
+                .iter()
+                .all(|f| f.bbox.overlaps(&view) && f.confidence > 0.85)
+        );
     }
 }

@@ -20,8 +20,13 @@ pub(super) fn three(value: f64) -> String {
 /// With a power of ten, without zeros at the end of the number before it.
 pub(super) fn power(value: f64) -> String {
     let text = format!("{value:.2e}");
-    let Some((number, exponent)) = text.split_once('e') else { return text };
-    format!("{}e{exponent}", number.trim_end_matches('0').trim_end_matches('.'))
+    let Some((number, exponent)) = text.split_once('e') else {
+        return text;
+    };
+    format!(
+        "{}e{exponent}",
+        number.trim_end_matches('0').trim_end_matches('.')
+    )
 }
 
 #[cfg(test)]
@@ -30,8 +35,24 @@ mod tests {
 
     #[test]
     fn three_digits_count_at_every_size() {
-        let told = [0.0, 0.001_234_9, 0.5, 9.876, 12.34, 123.4, 1234.5, 1e5, 1.2e-7, -0.25, f64::INFINITY].map(three);
-        let right = ["0", "0.00123", "0.500", "9.88", "12.3", "123", "1234", "1e5", "1.2e-7", "-0.250", "inf"];
+        let told = [
+            0.0,
+            0.001_234_9,
+            0.5,
+            9.876,
+            12.34,
+            123.4,
+            1234.5,
+            1e5,
+            1.2e-7,
+            -0.25,
+            f64::INFINITY,
+        ]
+        .map(three);
+        let right = [
+            "0", "0.00123", "0.500", "9.88", "12.3", "123", "1234", "1e5", "1.2e-7", "-0.250",
+            "inf",
+        ];
         assert_eq!(told, right);
     }
 }

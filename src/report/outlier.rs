@@ -36,7 +36,9 @@ const OF_MEAN: f64 = 1.2533;
 pub(super) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
     let mut worst: Vec<Option<Outlier>> = Vec::new();
     for feature in features {
-        let Some((middle, scale)) = middle_and_scale(&feature.values) else { continue };
+        let Some((middle, scale)) = middle_and_scale(&feature.values) else {
+            continue;
+        };
         worst.resize(worst.len().max(feature.values.len()), None);
         for (row, value) in feature.values.iter().enumerate() {
             let deviations = (value - middle).abs() / scale;
@@ -44,10 +46,16 @@ pub(super) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
             let (shown, usual) = (short(*value), short(middle));
             if shown != usual
                 && deviations > FAR
-                && worst[row].as_ref().is_none_or(|known| deviations > known.deviations)
+                && worst[row]
+                    .as_ref()
+                    .is_none_or(|known| deviations > known.deviations)
             {
                 let why = format!("{} {shown}, as a rule {usual}", feature.name);
-                worst[row] = Some(Outlier { row, deviations, why });
+                worst[row] = Some(Outlier {
+                    row,
+                    deviations,
+                    why,
+                });
             }
         }
     }
@@ -62,7 +70,9 @@ fn middle_and_scale(values: &[f64]) -> Option<(f64, f64)> {
     let middle = median(finite.clone())?;
     let off: Vec<f64> = finite.iter().map(|v| (v - middle).abs()).collect();
     let mean = off.iter().sum::<f64>() / off.len() as f64;
-    let scale = Some(OF_MEDIAN * median(off)?).filter(|&scale| scale > 0.0).unwrap_or(OF_MEAN * mean);
+    let scale = Some(OF_MEDIAN * median(off)?)
+        .filter(|&scale| scale > 0.0)
+        .unwrap_or(OF_MEAN * mean);
     (scale > 0.0).then_some((middle, scale))
 }
 
@@ -74,7 +84,9 @@ pub(super) fn median(values: Vec<f64>) -> Option<f64> {
 /// A value that this share of all are below; the upper one of two.
 pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
-    values.get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1))).copied()
+    values
+        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
+        .copied()
 }
 
 /// A number with two decimals at most.
@@ -90,24 +102,56 @@ mod tests {
     #[test]
     fn what_is_far_off_is_named_with_what_is_usual() {
         let values = vec![8.0, 7.0, 9.0, 8.0, 8.0, 40.0, 7.0, f64::NAN];
-        let features = [Feature { name: "objects", values }, Feature { name: "same", values: vec![1.0; 8] }];
+        let features = [
+            Feature {
+                name: "objects",
+                values,
+            },
+            Feature {
+                name: "same",
+                values: vec![1.0; 8],
+            },
+        ];
         let found = outliers(&features);
         assert_eq!(found.len(), 1);
-        assert_eq!((found[0].row, found[0].why.as_str()), (5, "objects 40, as a rule 8"));
-        assert!(outliers(&[]).is_empty() && outliers(&[Feature { name: "", values: vec![] }]).is_empty());
+        assert_eq!(
+            (found[0].row, found[0].why.as_str()),
+            (5, "objects 40, as a rule 8")
+        );
+        assert!(
+            outliers(&[]).is_empty()
+                && outliers(&[Feature {
+                    name: "",
+                    values: vec![]
+                }])
+                .is_empty()
+        );
     }
 
     #[test]
     fn what_reads_the_same_is_not_unlike() {
         let mut values = vec![100.0; 99];
         values.push(99.999);
-        assert_eq!(outliers(&[Feature { name: "seen, %", values }]), []);
+        assert_eq!(
+            outliers(&[Feature {
+                name: "seen, %",
+                values
+            }]),
+            []
+        );
     }
 
     #[test]
     fn one_that_differs_from_all_the_same_is_found() {
         let mut values = vec![0.0; 99];
         values.push(3.0);
-        assert_eq!(outliers(&[Feature { name: "retries", values }])[0].row, 99);
+        assert_eq!(
+            outliers(&[Feature {
+                name: "retries",
+                values
+            }])[0]
+                .row,
+            99
+        );
     }
 }

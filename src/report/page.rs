@@ -21,7 +21,10 @@ const STYLE: &str = "body{font:15px/1.5 sans-serif;max-width:1100px;margin:2em a
 impl Page {
     /// An empty page.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), body: String::new() }
+        Self {
+            title: title.into(),
+            body: String::new(),
+        }
     }
 
     /// Starts a section.
@@ -46,7 +49,10 @@ impl Page {
 
     /// The first rows of a table that may be long, and where the others are.
     pub fn beginning(&mut self, table: &Table, rows: usize, file: &str) -> &mut Self {
-        self.table(&Table { columns: table.columns.clone(), rows: table.rows.iter().take(rows).cloned().collect() });
+        self.table(&Table {
+            columns: table.columns.clone(),
+            rows: table.rows.iter().take(rows).cloned().collect(),
+        });
         match table.rows.len().saturating_sub(rows) {
             0 => self,
             more => self.text(&format!("{more} more rows are in {file}.")),
@@ -55,7 +61,10 @@ impl Page {
 
     /// A drawing with what is to be seen in it; `svg` is an SVG document, e.g. of [`Chart::row`](super::Chart::row).
     pub fn chart(&mut self, svg: &str, caption: &str) -> &mut Self {
-        self.html(&format!("<figure>{svg}<figcaption>{}</figcaption></figure>\n", escaped(caption)))
+        self.html(&format!(
+            "<figure>{svg}<figcaption>{}</figcaption></figure>\n",
+            escaped(caption)
+        ))
     }
 
     /// A picture with what is to be seen in it; `png` are the bytes of a PNG file.
@@ -86,7 +95,11 @@ impl Page {
 
 /// Text as it may stand in HTML and SVG, attributes included; control characters, which SVG does not allow, are written out.
 pub fn escaped(text: &str) -> String {
-    printable(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    printable(text)
+        .replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 /// Bytes in the alphabet of RFC 4648 section 4, padded.
@@ -94,10 +107,17 @@ pub fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {
-        let word = group.iter().fold(0_u32, |word, &b| word << 8 | u32::from(b)) << (8 * (3 - group.len()));
+        let word = group
+            .iter()
+            .fold(0_u32, |word, &b| word << 8 | u32::from(b))
+            << (8 * (3 - group.len()));
         for i in 0..4 {
             let code = ALPHABET[(word >> (18 - 6 * i) & 63) as usize];
-            text.push(if i <= group.len() { char::from(code) } else { '=' });
+            text.push(if i <= group.len() {
+                char::from(code)
+            } else {
+                '='
+            });
         }
     }
     text
@@ -109,14 +129,22 @@ mod tests {
 
     #[test]
     fn base64_is_that_of_the_rfc() {
-        let told = ["", "f", "fo", "foo", "foob", "fooba", "foobar"].map(|text| base64(text.as_bytes()));
-        assert_eq!(told, ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"]);
+        let told =
+            ["", "f", "fo", "foo", "foob", "fooba", "foobar"].map(|text| base64(text.as_bytes()));
+        assert_eq!(
+            told,
+            [
+                "", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"
+            ]
+        );
     }
 
     #[test]
     fn a_page_needs_no_other_file_and_keeps_text_as_text() {
         let mut page = Page::new("a < b");
-        page.heading("one").text("<script>").picture(b"foo", "a \"picture\"");
+        page.heading("one")
+            .text("<script>")
+            .picture(b"foo", "a \"picture\"");
         let html = page.document();
         assert!(html.contains("<title>a &lt; b</title>") && html.contains("&lt;script&gt;"));
         assert!(html.contains("data:image/png;base64,Zm9v") && !html.contains("http"));

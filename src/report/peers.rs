@@ -93,13 +93,19 @@ impl Comparison {
             let curve = format!("{} {}", m.program, m.version);
             Some(Point::new(curve, m.setting.clone(), m.seconds, m.error?))
         };
-        let threads = self.threads.map_or(String::new(), |n| format!("; threads: {n}"));
+        let threads = self
+            .threads
+            .map_or(String::new(), |n| format!("; threads: {n}"));
         Diagram {
             file: format!("peers_{}", file_name(&self.stage)),
             title: format!("{}: petcomp and other programs", self.stage),
             input: format!("{}{threads}", self.input),
             error: self.error.clone(),
-            cost: if self.clock.is_empty() { "seconds, median".into() } else { self.clock.clone() },
+            cost: if self.clock.is_empty() {
+                "seconds, median".into()
+            } else {
+                self.clock.clone()
+            },
             reference: self.reference.clone(),
             points: self.points.iter().filter_map(point).collect(),
             apart: true,
@@ -111,7 +117,9 @@ impl Comparison {
     fn ours(&self, other: &Measured) -> Option<&Measured> {
         let ours = || self.points.iter().filter(|m| m.program == OURS);
         let named = ours().find(|m| !other.beside.is_empty() && m.setting == other.beside);
-        named.or_else(|| ours().find(|m| m.setting.contains(DEFAULT))).or_else(|| ours().next())
+        named
+            .or_else(|| ours().find(|m| m.setting.contains(DEFAULT)))
+            .or_else(|| ours().next())
     }
 
     /// Programs that are not in it, in words; nothing where all are.
@@ -127,7 +135,16 @@ impl Comparison {
 
 /// A stage's name as a file may be called.
 fn file_name(stage: &str) -> String {
-    stage.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect()
+    stage
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '_'
+            }
+        })
+        .collect()
 }
 
 /// Every program beside petcomp's default: how many times its seconds and its error.
@@ -202,8 +219,14 @@ mod tests {
     fn programs_stand_beside_our_default() {
         let found = read(folder().path()).unwrap();
         let ratios = ratios(&found);
-        assert_eq!((ratios.rows[2][4].as_str(), ratios.rows[2][6].as_str()), ("4.00", "2.00"));
-        assert_eq!((ratios.rows[1][4].as_str(), ratios.rows[3][6].as_str()), ("1.00", ""));
+        assert_eq!(
+            (ratios.rows[2][4].as_str(), ratios.rows[2][6].as_str()),
+            ("4.00", "2.00")
+        );
+        assert_eq!(
+            (ratios.rows[1][4].as_str(), ratios.rows[3][6].as_str()),
+            ("1.00", "")
+        );
         let diagram = found[0].diagram();
         assert_eq!(diagram.points.len(), 3, "what has no error has no place");
         assert_eq!(diagram.cost, "seconds, median");
@@ -227,6 +250,11 @@ mod tests {
     fn a_damaged_file_is_named() {
         let folder = folder();
         io::write_text(folder.path().join("bad.json"), "{").unwrap();
-        assert!(read(folder.path()).unwrap_err().to_string().contains("bad.json"));
+        assert!(
+            read(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("bad.json")
+        );
     }
 }

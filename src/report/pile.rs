@@ -48,18 +48,31 @@ pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
         .with_light(lamp(LinearRgb::new(1.0, 0.95, 0.85)))
         .with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
     let textures: Vec<Texture> = (0..TEXTURES).map(|k| bottle(k).into()).collect();
-    (0..cards).map(|k| card(k, &textures)).fold(shot, Shot::with_card)
+    (0..cards)
+        .map(|k| card(k, &textures))
+        .fold(shot, Shot::with_card)
 }
 
 /// Spread by sines of incommensurable steps, each a little higher than the last.
 fn card(k: u32, textures: &[Texture]) -> Card {
     let f = f64::from(k);
-    let rotation = UnitQuaternion::from_euler_angles(0.12 * libm::sin(1.7 * f), 0.12 * libm::cos(2.3 * f), 2.4 * f);
-    let center = Vector3::new(0.17 * libm::sin(3.1 * f), 0.1 * libm::cos(4.7 * f), 0.02 + 0.004 * f);
+    let rotation = UnitQuaternion::from_euler_angles(
+        0.12 * libm::sin(1.7 * f),
+        0.12 * libm::cos(2.3 * f),
+        2.4 * f,
+    );
+    let center = Vector3::new(
+        0.17 * libm::sin(3.1 * f),
+        0.1 * libm::cos(4.7 * f),
+        0.02 + 0.004 * f,
+    );
     Card {
         id: ObjectId(k + 1),
         class: 0,
-        quad: Quad { world_from_card: Pose::from_parts(center.into(), rotation), size: [0.07, 0.21] },
+        quad: Quad {
+            world_from_card: Pose::from_parts(center.into(), rotation),
+            size: [0.07, 0.21],
+        },
         texture: textures[k as usize % textures.len()].clone(),
         back: None,
         outline_uv: Arc::new([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from)),
@@ -74,7 +87,8 @@ fn bottle(k: u32) -> Image<PremulRgba> {
         let (across, along) = (2.0 * x as f32 / w as f32 - 1.0, y as f32 / h as f32);
         let half_width = if along < 0.2 { 0.35 } else { 0.9 };
         let on_label = (0.4..0.6).contains(&along);
-        let alpha = (40.0 * (half_width - across.abs())).clamp(0.0, 1.0) * if on_label { 0.95 } else { 0.5 };
+        let alpha = (40.0 * (half_width - across.abs())).clamp(0.0, 1.0)
+            * if on_label { 0.95 } else { 0.5 };
         let stripe = 0.5 + 0.4 * libm::sinf(along * 60.0 + k as f32);
         PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
     })
@@ -93,7 +107,9 @@ mod tests {
         let deep = cast(&shot, &Quality::Draft.render());
         let mut seen = vec![false; 12];
         for (x, y) in (0..120).flat_map(|y| (0..160).map(move |x| (x, y))) {
-            deep.at(x, y).iter().for_each(|s| seen[s.object.0 as usize - 1] = true);
+            deep.at(x, y)
+                .iter()
+                .for_each(|s| seen[s.object.0 as usize - 1] = true);
         }
         assert!(seen.iter().all(|s| *s), "{seen:?}");
     }

@@ -35,7 +35,12 @@ pub struct RenderReportOptions {
 /// The quadrature is held to a quarter of the picture's sides: it takes a thousand times as long.
 const QUADRATURE_SHRINK: u32 = 4;
 /// How finely the quadrature is sampled: sub-samples, light samples (a side each) and directions of the environment.
-const QUADRATURE: RenderOptions = RenderOptions { subsamples: 6, light_samples: 6, ambient_samples: 196, cell_px: 1.0 };
+const QUADRATURE: RenderOptions = RenderOptions {
+    subsamples: 6,
+    light_samples: 6,
+    ambient_samples: 196,
+    cell_px: 1.0,
+};
 
 /// A picture and its error.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +73,10 @@ pub struct GoldenRow {
 ///
 /// # Errors
 /// A scene or a picture that cannot be read; files that cannot be written.
-pub fn write(folder: impl AsRef<Path>, options: &RenderReportOptions) -> Result<(Vec<Row>, Vec<GoldenRow>)> {
+pub fn write(
+    folder: impl AsRef<Path>,
+    options: &RenderReportOptions,
+) -> Result<(Vec<Row>, Vec<GoldenRow>)> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let rows = measure(options)?;
@@ -77,7 +85,10 @@ pub fn write(folder: impl AsRef<Path>, options: &RenderReportOptions) -> Result<
     io::write_text(folder.join("render.md"), &markdown(&rows, &golden, options))?;
     io::write_text(folder.join("render.svg"), &Chart::row(&charts(&rows)))?;
     if let Some(sheet) = sheet {
-        io::write_text(folder.join("render_golden.csv"), &golden_table(&golden).csv())?;
+        io::write_text(
+            folder.join("render_golden.csv"),
+            &golden_table(&golden).csv(),
+        )?;
         io::write(folder.join("render_golden.png"), &sheet)?;
     }
     Ok((rows, golden))
@@ -89,8 +100,14 @@ pub fn write(folder: impl AsRef<Path>, options: &RenderReportOptions) -> Result<
 /// As [`write()`].
 pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
     let shot = cycles::import(&options.scene, Some(options.size))?;
-    let small = cycles::import(&options.scene, Some(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1))))?;
-    let truth = finished(&composite::frame(&reference(&small, &QUADRATURE), small.plate.as_deref()));
+    let small = cycles::import(
+        &options.scene,
+        Some(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1))),
+    )?;
+    let truth = finished(&composite::frame(
+        &reference(&small, &QUADRATURE),
+        small.plate.as_deref(),
+    ));
     let others = Others::read(&options.cycles)?;
     let best = others.best()?;
     let mut rows = Vec::new();
@@ -112,7 +129,10 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
             program: format!("Cycles {}", others.program),
             setting: format!("{} spp", entry.samples),
             cpu_seconds: entry.cpu_seconds,
-            cycles: best.as_ref().filter(|_| !is_best).and_then(|best| Likeness::of(&picture, best)),
+            cycles: best
+                .as_ref()
+                .filter(|_| !is_best)
+                .and_then(|best| Likeness::of(&picture, best)),
             quadrature: None,
         });
     }
@@ -120,7 +140,10 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
 }
 
 fn render(shot: &Shot, options: &RenderOptions) -> Image<LinearRgb> {
-    finished(&composite::frame(&cast(shot, options), shot.plate.as_deref()))
+    finished(&composite::frame(
+        &cast(shot, options),
+        shot.plate.as_deref(),
+    ))
 }
 
 fn finished(frame: &Image<PremulRgba>) -> Image<LinearRgb> {
@@ -149,7 +172,10 @@ impl Others {
         if !path.exists() {
             return Ok(Self::default());
         }
-        Ok(Self { folder: folder.into(), ..io::read_json(&path)? })
+        Ok(Self {
+            folder: folder.into(),
+            ..io::read_json(&path)?
+        })
     }
 
     fn most(&self) -> Option<u32> {
@@ -171,20 +197,40 @@ impl Others {
 /// # Errors
 /// A scene or a reference that cannot be read.
 pub fn golden(folder: &Path, shown: Preset) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut cases: Vec<PathBuf> = entries.filter(|case| case.join("reference.exr").exists()).collect();
+    let entries = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path());
+    let mut cases: Vec<PathBuf> = entries
+        .filter(|case| case.join("reference.exr").exists())
+        .collect();
     cases.sort();
     let (mut rows, mut strips) = (Vec::new(), Vec::new());
     for case in cases {
         let wanted: Image<LinearRgb> = io::read(case.join("reference.exr"))?;
         let shot = cycles::import(case.join("scene.json"), None)?;
-        let name = case.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = case
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         for (quality_name, quality) in Preset::ALL {
             let picture = render(&shot, &quality.options());
             let likeness = Likeness::of(&picture, &wanted).ok_or_else(|| {
-                Error::file(&case, format!("{:?} pixels, reference has {:?}", picture.size(), wanted.size()))
+                Error::file(
+                    &case,
+                    format!(
+                        "{:?} pixels, reference has {:?}",
+                        picture.size(),
+                        wanted.size()
+                    ),
+                )
             })?;
-            rows.push(GoldenRow { case: name.clone(), quality: quality_name, likeness });
+            rows.push(GoldenRow {
+                case: name.clone(),
+                quality: quality_name,
+                likeness,
+            });
             if quality == shown {
                 strips.push(triple(&wanted, &picture));
             }
@@ -222,9 +268,16 @@ pub fn table(rows: &[Row]) -> Table {
         "RMSE to quadrature",
         "times less CPU than Cycles at that RMSE",
     ]);
-    let number = |v: Option<f64>, digits: usize| v.map_or(String::new(), |v| format!("{v:.digits$}"));
+    let number =
+        |v: Option<f64>, digits: usize| v.map_or(String::new(), |v| format!("{v:.digits$}"));
     for row in rows {
-        let Row { program, setting, cpu_seconds, cycles, quadrature } = row;
+        let Row {
+            program,
+            setting,
+            cpu_seconds,
+            cycles,
+            quadrature,
+        } = row;
         table.push([
             program.clone(),
             setting.clone(),
@@ -265,15 +318,19 @@ pub fn speed_up(row: &Row, rows: &[Row]) -> Option<f64> {
 /// RMSE, FLIP and 1 - SSIM against CPU seconds, both programs' curves in each.
 pub fn charts(rows: &[Row]) -> Vec<Chart> {
     type Measure = fn(&Likeness) -> f64;
-    let measures: [(&str, Measure); 3] =
-        [("RMSE, scene-linear", |l| l.rmse), ("FLIP", |l| l.flip), ("1 - SSIM", |l| 1.0 - l.ssim)];
+    let measures: [(&str, Measure); 3] = [
+        ("RMSE, scene-linear", |l| l.rmse),
+        ("FLIP", |l| l.flip),
+        ("1 - SSIM", |l| 1.0 - l.ssim),
+    ];
     let mut names: Vec<String> = rows.iter().map(|row| row.program.clone()).collect();
     names.dedup();
     let times = || rows.iter().map(|row| row.cpu_seconds);
     let chart = |&(title, measure): &(&str, Measure)| {
         let curve = |name: &String| {
             let own = rows.iter().filter(|row| row.program == *name);
-            own.filter_map(|row| Some([row.cpu_seconds, measure(row.cycles.as_ref()?)])).collect::<Vec<_>>()
+            own.filter_map(|row| Some([row.cpu_seconds, measure(row.cycles.as_ref()?)]))
+                .collect::<Vec<_>>()
         };
         let curves: Vec<_> = names.iter().map(curve).collect();
         Chart {
@@ -295,7 +352,18 @@ pub fn charts(rows: &[Row]) -> Vec<Chart> {
 /// The golden scenes as a table: a row per scene and preset.
 pub fn golden_table(rows: &[GoldenRow]) -> Table {
     let mut table = Table::new(["scene", "quality", "RMSE", "bias", "SSIM", "FLIP"]);
-    for GoldenRow { case, quality, likeness: Likeness { rmse, bias, ssim, flip } } in rows {
+    for GoldenRow {
+        case,
+        quality,
+        likeness:
+            Likeness {
+                rmse,
+                bias,
+                ssim,
+                flip,
+            },
+    } in rows
+    {
         table.push([
             case.clone(),
             quality.to_string(),
@@ -310,7 +378,10 @@ pub fn golden_table(rows: &[GoldenRow]) -> Table {
 
 fn markdown(rows: &[Row], golden: &[GoldenRow], options: &RenderReportOptions) -> String {
     let [w, h] = options.size;
-    let mut text = format!("# Error of the renderer against run time\n\n{}, {w} x {h}\n\n", options.scene.display());
+    let mut text = format!(
+        "# Error of the renderer against run time\n\n{}, {w} x {h}\n\n",
+        options.scene.display()
+    );
     if rows.iter().all(|row| row.program == "petcomp") {
         text += "Cycles' own curve is not there: `tests/benches/peers/render.py` makes it.\n\n";
     }
@@ -327,13 +398,28 @@ mod tests {
     use super::*;
 
     fn row(program: &str, cpu_seconds: f64, rmse: f64) -> Row {
-        let cycles = Some(Likeness { rmse, bias: 0.0, ssim: 0.9, flip: 0.01 });
-        Row { program: program.into(), setting: "fast".into(), cpu_seconds, cycles, quadrature: None }
+        let cycles = Some(Likeness {
+            rmse,
+            bias: 0.0,
+            ssim: 0.9,
+            flip: 0.01,
+        });
+        Row {
+            program: program.into(),
+            setting: "fast".into(),
+            cpu_seconds,
+            cycles,
+            quadrature: None,
+        }
     }
 
     #[test]
     fn speed_is_compared_at_equal_error() {
-        let mut rows = vec![row("petcomp", 0.01, 0.02), row("Cycles", 1.0, 0.04), row("Cycles", 16.0, 0.01)];
+        let mut rows = vec![
+            row("petcomp", 0.01, 0.02),
+            row("Cycles", 1.0, 0.04),
+            row("Cycles", 16.0, 0.01),
+        ];
         assert!((speed_up(&rows[0], &rows).unwrap() - 400.0).abs() < 1e-6);
         rows[0] = row("petcomp", 0.01, 0.001);
         assert_eq!(speed_up(&rows[0], &rows), None);
@@ -354,16 +440,25 @@ mod tests {
         let (rows, golden) = write(folder.path(), &options).unwrap();
         assert_eq!((rows.len(), golden.len()), (Preset::ALL.len(), 0));
         // So small a picture may be done before the system's clock of CPU time moves.
-        assert!(rows.iter().all(|row| row.cpu_seconds >= 0.0 && row.quadrature.unwrap().rmse < 0.1));
+        assert!(
+            rows.iter()
+                .all(|row| row.cpu_seconds >= 0.0 && row.quadrature.unwrap().rmse < 0.1)
+        );
         let text = io::read_text(folder.path().join("render.md")).unwrap();
-        assert!(text.contains("Cycles' own curve is not there") && folder.path().join("render.svg").exists());
+        assert!(
+            text.contains("Cycles' own curve is not there")
+                && folder.path().join("render.svg").exists()
+        );
     }
 
     #[test]
     fn strips_stand_in_two_columns() {
         let strip = |v| Image::filled(3, 2, LinearRgb::grey(v));
         let sheet = stacked(&[strip(0.1), strip(0.2), strip(0.3)]).unwrap();
-        assert_eq!((sheet[(0, 0)].r, sheet[(7, 0)].r, sheet[(0, 6)].r), (0.1, 0.2, 0.3));
+        assert_eq!(
+            (sheet[(0, 0)].r, sheet[(7, 0)].r, sheet[(0, 6)].r),
+            (0.1, 0.2, 0.3)
+        );
         assert_eq!((sheet[(7, 6)], stacked(&[])), (LinearRgb::WHITE, None));
     }
 }

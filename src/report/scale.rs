@@ -39,7 +39,11 @@ pub struct ScaleOptions {
 impl Default for ScaleOptions {
     fn default() -> Self {
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Self { program: std::env::current_exe().unwrap_or_default(), seconds: 1.0, threads }
+        Self {
+            program: std::env::current_exe().unwrap_or_default(),
+            seconds: 1.0,
+            threads,
+        }
     }
 }
 
@@ -81,7 +85,10 @@ pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Me
         process::in_a_child(&options.program, case, options.seconds)
     };
     let points = cases.iter().enumerate().map(of).collect::<Result<_>>()?;
-    let falls = grid::FALLS.iter().map(|&cards| Ok((cards, run::fall_seconds(cards)?))).collect::<Result<_>>()?;
+    let falls = grid::FALLS
+        .iter()
+        .map(|&cards| Ok((cards, run::fall_seconds(cards)?)))
+        .collect::<Result<_>>()?;
     Ok(Measured { points, falls })
 }
 
@@ -89,13 +96,22 @@ pub fn measure(options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Me
 ///
 /// # Errors
 /// As [`measure`]; files that cannot be written.
-pub fn write(folder: impl AsRef<Path>, options: &ScaleOptions, progress: impl Fn(u64, u64)) -> Result<Measured> {
+pub fn write(
+    folder: impl AsRef<Path>,
+    options: &ScaleOptions,
+    progress: impl Fn(u64, u64),
+) -> Result<Measured> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let measured = measure(options, progress)?;
     let tables = tables(&measured)?;
-    let text = tables.iter().map(|(title, table)| format!("## {title}\n\n{}\n", table.markdown()));
-    io::write_text(folder.join("scale.md"), &format!("# Memory and scale\n\n{}", text.collect::<String>()))?;
+    let text = tables
+        .iter()
+        .map(|(title, table)| format!("## {title}\n\n{}\n", table.markdown()));
+    io::write_text(
+        folder.join("scale.md"),
+        &format!("# Memory and scale\n\n{}", text.collect::<String>()),
+    )?;
     if let Some((_, points)) = tables.first() {
         io::write_text(folder.join("scale.csv"), &points.csv())?;
     }

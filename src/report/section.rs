@@ -16,14 +16,25 @@ pub struct Section {
 #[derive(Clone, Debug, PartialEq)]
 enum Part {
     Text(String),
-    Table { file: String, table: Table },
-    Figure { file: String, svg: String, caption: String, data: Table },
+    Table {
+        file: String,
+        table: Table,
+    },
+    Figure {
+        file: String,
+        svg: String,
+        caption: String,
+        data: Table,
+    },
 }
 
 impl Section {
     /// An empty one.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), parts: Vec::new() }
+        Self {
+            title: title.into(),
+            parts: Vec::new(),
+        }
     }
 
     /// A paragraph; nothing for no text.
@@ -38,20 +49,39 @@ impl Section {
     /// A table, also written as `<file>.csv`; one without rows is left out.
     pub fn table(mut self, file: impl Into<String>, table: Table) -> Self {
         if !table.rows.is_empty() {
-            self.parts.push(Part::Table { file: file.into(), table });
+            self.parts.push(Part::Table {
+                file: file.into(),
+                table,
+            });
         }
         self
     }
 
     /// A drawing with its caption and its data, written as `<file>.csv`.
-    pub fn figure(mut self, file: impl Into<String>, svg: String, caption: impl Into<String>, data: Table) -> Self {
-        self.parts.push(Part::Figure { file: file.into(), svg, caption: caption.into(), data });
+    pub fn figure(
+        mut self,
+        file: impl Into<String>,
+        svg: String,
+        caption: impl Into<String>,
+        data: Table,
+    ) -> Self {
+        self.parts.push(Part::Figure {
+            file: file.into(),
+            svg,
+            caption: caption.into(),
+            data,
+        });
         self
     }
 
     /// A work-precision diagram.
     pub fn diagram(self, diagram: &Diagram) -> Self {
-        self.figure(diagram.file.clone(), diagram.svg(), diagram.caption(), diagram.table())
+        self.figure(
+            diagram.file.clone(),
+            diagram.svg(),
+            diagram.caption(),
+            diagram.table(),
+        )
     }
 
     /// Several of them.
@@ -74,12 +104,18 @@ impl Document {
     pub fn html(&self) -> String {
         let mut page = Page::new(&self.title);
         let link = |(i, section): (usize, &Section)| {
-            format!("<li><a href=\"#section{i}\">{}</a></li>\n", escaped(&section.title))
+            format!(
+                "<li><a href=\"#section{i}\">{}</a></li>\n",
+                escaped(&section.title)
+            )
         };
         let links: String = self.sections.iter().enumerate().map(link).collect();
         page.html(&format!("<ol>\n{links}</ol>\n"));
         for (i, section) in self.sections.iter().enumerate() {
-            page.html(&format!("<h2 id=\"section{i}\">{}</h2>\n", escaped(&section.title)));
+            page.html(&format!(
+                "<h2 id=\"section{i}\">{}</h2>\n",
+                escaped(&section.title)
+            ));
             section.parts.iter().for_each(|part| part.put_on(&mut page));
         }
         page.document()
@@ -102,7 +138,11 @@ impl Document {
     pub fn write(&self, folder: &Path) -> Result<()> {
         io::create_folder(folder)?;
         for part in self.sections.iter().flat_map(|section| &section.parts) {
-            if let Part::Table { file, table } | Part::Figure { file, data: table, .. } = part {
+            if let Part::Table { file, table }
+            | Part::Figure {
+                file, data: table, ..
+            } = part
+            {
                 io::write_text(folder.join(format!("{file}.csv")), &table.csv())?;
             }
         }
@@ -116,10 +156,17 @@ impl Part {
         match self {
             Self::Text(text) => page.html(&format!("<p>{}</p>\n", with_code(text))),
             Self::Table { table, .. } => page.table(table),
-            Self::Figure { svg, caption, data, .. } => {
-                let points = format!("<details><summary>Its points</summary>{}</details>\n", data.html());
+            Self::Figure {
+                svg, caption, data, ..
+            } => {
+                let points = format!(
+                    "<details><summary>Its points</summary>{}</details>\n",
+                    data.html()
+                );
                 let caption = with_code(caption);
-                page.html(&format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>\n{points}"))
+                page.html(&format!(
+                    "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n{points}"
+                ))
             }
         };
     }
@@ -156,20 +203,33 @@ mod tests {
             .table("numbers", table.clone())
             .table("none", Table::new(["a"]))
             .figure("plot", Chart::row(&[]), "What is seen.", table);
-        Document { title: "All".into(), sections: vec![section] }
+        Document {
+            title: "All".into(),
+            sections: vec![section],
+        }
     }
 
     #[test]
     fn a_document_is_one_page_and_a_file_of_data_for_each_part() {
         let folder = tempfile::tempdir().unwrap();
         document().write(folder.path()).unwrap();
-        let mut names: Vec<_> =
-            std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<_> = std::fs::read_dir(folder.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
-        assert_eq!(names, ["numbers.csv", "plot.csv", "report.html", "report.md"]);
+        assert_eq!(
+            names,
+            ["numbers.csv", "plot.csv", "report.html", "report.md"]
+        );
         let html = io::read_text(folder.path().join("report.html")).unwrap();
-        assert!(html.contains("One &amp; two") && html.contains("<svg") && html.contains("<td>2</td>"));
-        assert!(!html.contains("src=") && !html.contains("href=\"http"), "needs no other file");
+        assert!(
+            html.contains("One &amp; two") && html.contains("<svg") && html.contains("<td>2</td>")
+        );
+        assert!(
+            !html.contains("src=") && !html.contains("href=\"http"),
+            "needs no other file"
+        );
     }
 
     #[test]
@@ -180,7 +240,10 @@ mod tests {
     #[test]
     fn markdown_has_the_tables_and_says_where_plots_are() {
         let text = document().markdown();
-        assert!(text.starts_with("# All\n\n## One & two\n\nSaid.\n\n| a | b |\n"), "{text}");
+        assert!(
+            text.starts_with("# All\n\n## One & two\n\nSaid.\n\n| a | b |\n"),
+            "{text}"
+        );
         assert!(text.contains("* `plot.csv`: What is seen."));
     }
 }

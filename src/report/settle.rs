@@ -81,7 +81,9 @@ pub struct Row {
 /// None that a caller can cause: the scenes are made here.
 pub fn measure(options: &SettleReportOptions, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
     let settings = settings();
-    let heaps = (0..options.heaps).map(|k| heap(k, CARDS)).collect::<Result<Vec<_>>>()?;
+    let heaps = (0..options.heaps)
+        .map(|k| heap(k, CARDS))
+        .collect::<Result<Vec<_>>>()?;
     let of = |(i, setting): (usize, &SettleOptions)| {
         progress(i as u64, settings.len() as u64);
         row(setting, &heaps)
@@ -90,10 +92,22 @@ pub fn measure(options: &SettleReportOptions, progress: impl Fn(u64, u64)) -> Re
 }
 
 fn settings() -> Vec<SettleOptions> {
-    let usual = SettleOptions { attempts: 1, ..SettleOptions::default() };
-    let pairs = RATES.iter().flat_map(|rate| ITERATIONS.map(|iterations| (*rate, iterations)));
-    let swept = pairs.map(|(rate, iterations)| SettleOptions { step: 1.0 / f64::from(rate), iterations, ..usual });
-    let stops = CCD.into_iter().filter(|ccd| *ccd != usual.ccd).map(|ccd| SettleOptions { ccd, ..usual });
+    let usual = SettleOptions {
+        attempts: 1,
+        ..SettleOptions::default()
+    };
+    let pairs = RATES
+        .iter()
+        .flat_map(|rate| ITERATIONS.map(|iterations| (*rate, iterations)));
+    let swept = pairs.map(|(rate, iterations)| SettleOptions {
+        step: 1.0 / f64::from(rate),
+        iterations,
+        ..usual
+    });
+    let stops = CCD
+        .into_iter()
+        .filter(|ccd| *ccd != usual.ccd)
+        .map(|ccd| SettleOptions { ccd, ..usual });
     swept.chain(stops).collect()
 }
 
@@ -104,13 +118,19 @@ fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<Row> {
         ends.push(settle(scene.clone(), options)?);
         times.push((cpu_seconds() - start) * 1e3);
     }
-    let wrong = SLOPES.iter().map(|slope| slides_rightly(*slope, options)).collect::<Result<Vec<_>>>()?;
+    let wrong = SLOPES
+        .iter()
+        .map(|slope| slides_rightly(*slope, options))
+        .collect::<Result<Vec<_>>>()?;
     Ok(Row {
         rate: libm::round(1.0 / options.step) as u32,
         iterations: options.iterations,
         ccd: options.ccd,
         heaps: ends.len(),
-        rested: ends.iter().filter(|end| end.verdict == Verdict::Rested).count(),
+        rested: ends
+            .iter()
+            .filter(|end| end.verdict == Verdict::Rested)
+            .count(),
         overlap_mm: median_and_worst(ends.iter().map(|end| end.overlap * 1e3)),
         energy_percent: median_and_worst(ends.iter().map(|end| end.energy_rise * 100.0)),
         stack_mm: stack_error(options)? * 1e3,
@@ -132,7 +152,11 @@ fn plates(bottoms: &[f64]) -> Result<Scene> {
     let lay = |(object, bottom): (&mut Object, &f64)| {
         (object.size, object.thickness, object.mass) = ([0.2, 0.08], PLATE, 0.03);
         let (above, height) = ([0.0; 2], bottom + PLATE / 2.0);
-        object.placement = Placement::Drop { above, height, rotation: UnitQuaternion::identity() };
+        object.placement = Placement::Drop {
+            above,
+            height,
+            rotation: UnitQuaternion::identity(),
+        };
     };
     scene.objects.iter_mut().zip(bottoms).for_each(lay);
     Ok(scene)
@@ -140,10 +164,21 @@ fn plates(bottoms: &[f64]) -> Result<Scene> {
 
 /// How far the top of a stack of n plates is from n times their thickness, metres; infinite where it does not rest.
 fn stack_error(options: &SettleOptions) -> Result<f64> {
-    let bottoms: Vec<f64> = (0..PLATES).map(|i| 2.0 * PLATE * i as f64 + PLATE).collect();
+    let bottoms: Vec<f64> = (0..PLATES)
+        .map(|i| 2.0 * PLATE * i as f64 + PLATE)
+        .collect();
     // What is measured is the error, so no error is refused.
-    let end = settle(plates(&bottoms)?, &SettleOptions { max_overlap: 1.0, max_energy_rise: 1000.0, ..*options })?;
-    let error = |object: &Object| height(object).map_or(f64::INFINITY, |z| (z - (PLATES as f64 - 0.5) * PLATE).abs());
+    let end = settle(
+        plates(&bottoms)?,
+        &SettleOptions {
+            max_overlap: 1.0,
+            max_energy_rise: 1000.0,
+            ..*options
+        },
+    )?;
+    let error = |object: &Object| {
+        height(object).map_or(f64::INFINITY, |z| (z - (PLATES as f64 - 0.5) * PLATE).abs())
+    };
     Ok(end.scene.objects.last().map_or(f64::INFINITY, error))
 }
 
@@ -159,16 +194,30 @@ fn slides_rightly(share: f64, options: &SettleOptions) -> Result<bool> {
     let mut scene = plates(&[0.001])?;
     let slope = libm::atan(share * scene.surface.friction);
     let start = -0.15;
-    if let Some(Placement::Drop { above, .. }) = scene.objects.first_mut().map(|object| &mut object.placement) {
+    if let Some(Placement::Drop { above, .. }) = scene
+        .objects
+        .first_mut()
+        .map(|object| &mut object.placement)
+    {
         above[0] = start;
     }
     let gravity = [libm::sin(slope), 0.0, -libm::cos(slope)].map(|x| 9.81 * x);
-    let end = settle(scene, &SettleOptions { gravity, ..*options })?;
+    let end = settle(
+        scene,
+        &SettleOptions {
+            gravity,
+            ..*options
+        },
+    )?;
     // A plate that stays slips while it lands; one that slides stops at the wall, 0.25 m away.
-    let slid = end.scene.objects.first().is_some_and(|object| match object.placement {
-        Placement::At(pose) => pose.translation.x - start > 0.1,
-        Placement::Drop { .. } => share > 1.0,
-    });
+    let slid = end
+        .scene
+        .objects
+        .first()
+        .is_some_and(|object| match object.placement {
+            Placement::At(pose) => pose.translation.x - start > 0.1,
+            Placement::Drop { .. } => share > 1.0,
+        });
     Ok(slid == (share > 1.0))
 }
 
@@ -212,11 +261,19 @@ pub fn charts(rows: &[Row]) -> Vec<Chart> {
     ];
     let chart = |(title, error): (&str, Error)| Chart {
         title: format!("{title}, against time"),
-        names: RATES.map(|rate| format!("1/{rate} s: 1, 2, 4, 8 iterations")).into(),
+        names: RATES
+            .map(|rate| format!("1/{rate} s: 1, 2, 4, 8 iterations"))
+            .into(),
         across: across.clone(),
         up: Axis::over_decades(title, swept.iter().map(|r| error(r))),
         curves: RATES
-            .map(|rate| swept.iter().filter(|r| r.rate == rate).map(|r| [r.cpu_ms, error(r)]).collect())
+            .map(|rate| {
+                swept
+                    .iter()
+                    .filter(|r| r.rate == rate)
+                    .map(|r| [r.cpu_ms, error(r)])
+                    .collect()
+            })
             .into(),
         defaults: swept
             .iter()
@@ -250,7 +307,10 @@ pub fn peer_cases() -> Result<Vec<PeerCase>> {
     const RUNS: usize = 5;
     let options = SettleOptions::default();
     let mut cases = Vec::new();
-    for (cards, k) in [5, 20, 60].into_iter().flat_map(|cards| (0..3).map(move |k| (cards, k))) {
+    for (cards, k) in [5, 20, 60]
+        .into_iter()
+        .flat_map(|cards| (0..3).map(move |k| (cards, k)))
+    {
         let scene = heap(k, cards)?;
         let run = |_| {
             let start = Instant::now();
@@ -260,7 +320,11 @@ pub fn peer_cases() -> Result<Vec<PeerCase>> {
         let runs: Vec<(Scene, f64)> = (0..RUNS).map(run).collect::<Result<_>>()?;
         cases.push(PeerCase {
             name: format!("{cards} cards, heap {k}"),
-            boxes: scene.objects.iter().map(|object| (options.half_body(object) * 2.0).into()).collect(),
+            boxes: scene
+                .objects
+                .iter()
+                .map(|object| (options.half_body(object) * 2.0).into())
+                .collect(),
             settled: runs[0].0.clone(),
             scene,
             wall_ms: runs.iter().map(|run| run.1).collect(),
@@ -273,7 +337,11 @@ pub fn peer_cases() -> Result<Vec<PeerCase>> {
 ///
 /// # Errors
 /// [`Error::Value`] for no heaps; files that cannot be written.
-pub fn write(folder: &Path, options: &SettleReportOptions, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+pub fn write(
+    folder: &Path,
+    options: &SettleReportOptions,
+    progress: impl Fn(u64, u64),
+) -> Result<Vec<Row>> {
     if options.heaps == 0 {
         return Err(Error::value("heaps", "0, expected at least 1"));
     }
@@ -294,14 +362,24 @@ mod tests {
         let options = SettleOptions::default();
         // Contacts hold bodies up to twice their skin of 0.2 mm apart.
         assert!(stack_error(&options).unwrap() < PLATES as f64 * 0.0004);
-        assert!(SLOPES.iter().all(|slope| slides_rightly(*slope, &options).unwrap()));
+        assert!(
+            SLOPES
+                .iter()
+                .all(|slope| slides_rightly(*slope, &options).unwrap())
+        );
     }
 
     #[test]
     fn a_row_is_a_line_and_a_point_and_the_default_has_a_ring() {
-        let usual = SettleOptions { attempts: 1, ..SettleOptions::default() };
+        let usual = SettleOptions {
+            attempts: 1,
+            ..SettleOptions::default()
+        };
         let rows = [row(&usual, &[heap(0, 5).unwrap()]).unwrap()];
-        assert_eq!((rows[0].rate, rows[0].rested, rows[0].wrong_slopes), (480, 1, 0));
+        assert_eq!(
+            (rows[0].rate, rows[0].rested, rows[0].wrong_slopes),
+            (480, 1, 0)
+        );
         assert_eq!(table(&rows).rows.len(), 1);
         assert!(charts(&rows).iter().all(|chart| chart.defaults.len() == 1));
     }

@@ -15,7 +15,10 @@ pub struct Table {
 impl Table {
     /// A table without rows.
     pub fn new<'a>(columns: impl IntoIterator<Item = &'a str>) -> Self {
-        Self { columns: columns.into_iter().map(String::from).collect(), rows: Vec::new() }
+        Self {
+            columns: columns.into_iter().map(String::from).collect(),
+            rows: Vec::new(),
+        }
     }
 
     /// Adds a row.
@@ -32,22 +35,36 @@ impl Table {
     pub fn transposed(&self) -> Self {
         let column = |i: usize| self.lines().map(|row| row[i].clone()).collect();
         let mut columns = (0..self.columns.len()).map(column);
-        Self { columns: columns.next().unwrap_or_default(), rows: columns.collect() }
+        Self {
+            columns: columns.next().unwrap_or_default(),
+            rows: columns.collect(),
+        }
     }
 
     /// As comma-separated values (RFC 4180), the titles first.
     pub fn csv(&self) -> String {
         let cell = |text: &String| {
             let quoted = text.contains([',', '"', '\n', '\r']);
-            if quoted { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.clone() }
+            if quoted {
+                format!("\"{}\"", text.replace('"', "\"\""))
+            } else {
+                text.clone()
+            }
         };
-        self.lines().map(|row| row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n").collect()
+        self.lines()
+            .map(|row| row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n")
+            .collect()
     }
 
     /// As a Markdown table.
     pub fn markdown(&self) -> String {
         let cell = |text: &String| printable(text).replace('|', "\\|");
-        let line = |row: &Vec<String>| format!("| {} |\n", row.iter().map(cell).collect::<Vec<_>>().join(" | "));
+        let line = |row: &Vec<String>| {
+            format!(
+                "| {} |\n",
+                row.iter().map(cell).collect::<Vec<_>>().join(" | ")
+            )
+        };
         let rule = format!("|{}\n", " --- |".repeat(self.columns.len()));
         line(&self.columns) + &rule + &self.rows.iter().map(line).collect::<String>()
     }
@@ -55,11 +72,21 @@ impl Table {
     /// As an HTML table.
     pub fn html(&self) -> String {
         let line = |row: &Vec<String>, tag: &str| {
-            let cells = row.iter().map(|text| format!("<{tag}>{}</{tag}>", escaped(text))).collect::<String>();
+            let cells = row
+                .iter()
+                .map(|text| format!("<{tag}>{}</{tag}>", escaped(text)))
+                .collect::<String>();
             format!("<tr>{cells}</tr>\n")
         };
-        let rows = self.rows.iter().map(|row| line(row, "td")).collect::<String>();
-        format!("<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n", line(&self.columns, "th"))
+        let rows = self
+            .rows
+            .iter()
+            .map(|row| line(row, "td"))
+            .collect::<String>();
+        format!(
+            "<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n",
+            line(&self.columns, "th")
+        )
     }
 
     fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
@@ -89,7 +116,10 @@ mod tests {
     #[test]
     fn awkward_cells_stay_one_cell() {
         assert_eq!(awkward().csv(), "case,\"error, px\"\na|b <c>,\"1\"\"2\"\n");
-        assert_eq!(awkward().markdown(), "| case | error, px |\n| --- | --- |\n| a\\|b <c> | 1\"2 |\n");
+        assert_eq!(
+            awkward().markdown(),
+            "| case | error, px |\n| --- | --- |\n| a\\|b <c> | 1\"2 |\n"
+        );
         assert!(awkward().html().contains("<td>a|b &lt;c&gt;</td>"));
     }
 

@@ -35,7 +35,9 @@ pub struct Row {
 impl Row {
     /// Every promise is kept.
     pub fn is_as_promised(&self) -> bool {
-        self.counts.iter().all(|(kind, count)| *count == 0 || !self.absent.contains(kind))
+        self.counts
+            .iter()
+            .all(|(kind, count)| *count == 0 || !self.absent.contains(kind))
     }
 }
 
@@ -55,11 +57,18 @@ pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
 
 fn row(world: &World, case: &Case) -> Result<Row> {
     let counts = counts(&work_of(world, case)?, allocations_are_told()?);
-    Ok(Row { scene: case.name, about: case.about, counts, absent: case.absent() })
+    Ok(Row {
+        scene: case.name,
+        about: case.about,
+        counts,
+        absent: case.absent(),
+    })
 }
 
 fn counts(work: &Work, with_allocations: bool) -> Vec<(Kind, u64)> {
-    let kinds = Kind::ALL.into_iter().filter(|kind| with_allocations || *kind != Kind::LargeAllocations);
+    let kinds = Kind::ALL
+        .into_iter()
+        .filter(|kind| with_allocations || *kind != Kind::LargeAllocations);
     kinds.map(|kind| (kind, work[kind])).collect()
 }
 
@@ -87,7 +96,13 @@ fn make(world: &World, case: &Case, folder: &Path) -> Result<()> {
         Asked::Labels => io::write_json(folder.join("labels.json"), &studio.label(scene)?),
         Asked::Dataset => {
             let plan = studio.plan(1, 0, folder)?;
-            generate(&plan, |_| studio.take(scene.clone()), &|_| {}, &AtomicBool::new(false)).map(|_| ())
+            generate(
+                &plan,
+                |_| studio.take(scene.clone()),
+                &|_| {},
+                &AtomicBool::new(false),
+            )
+            .map(|_| ())
         }
     }
 }
@@ -127,11 +142,25 @@ fn csv(rows: &[Row]) -> Table {
 }
 
 fn scenes_by_kinds(rows: &[Row], told: impl Fn(&Row, Kind, u64) -> String) -> Table {
-    let kinds: Vec<Kind> = rows.first().map_or(Vec::new(), |row| row.counts.iter().map(|(kind, _)| *kind).collect());
-    let mut table = Table::new(["scene", "what is in it"].into_iter().chain(kinds.iter().map(|kind| kind.name())));
+    let kinds: Vec<Kind> = rows.first().map_or(Vec::new(), |row| {
+        row.counts.iter().map(|(kind, _)| *kind).collect()
+    });
+    let mut table = Table::new(
+        ["scene", "what is in it"]
+            .into_iter()
+            .chain(kinds.iter().map(|kind| kind.name())),
+    );
     for row in rows {
-        let counts = row.counts.iter().map(|(kind, count)| told(row, *kind, *count));
-        table.push([row.scene, row.about].into_iter().map(String::from).chain(counts));
+        let counts = row
+            .counts
+            .iter()
+            .map(|(kind, count)| told(row, *kind, *count));
+        table.push(
+            [row.scene, row.about]
+                .into_iter()
+                .map(String::from)
+                .chain(counts),
+        );
     }
     table
 }
@@ -145,6 +174,8 @@ fn markdown(rows: &[Row]) -> String {
         rows.len()
     );
     let mut kinds = Table::new(["count", "of what"]);
-    Kind::ALL.iter().for_each(|kind| kinds.push([kind.name(), kind.meaning()]));
+    Kind::ALL
+        .iter()
+        .for_each(|kind| kinds.push([kind.name(), kind.meaning()]));
     format!("{head}{}\n{}", table(rows).markdown(), kinds.markdown())
 }

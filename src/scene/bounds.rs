@@ -18,24 +18,34 @@ pub(super) const TILT: Bounds = Bounds::new(-180.0, 180.0, "degrees");
 pub(super) const ACROSS: Bounds = Bounds::new(-1.0, 1.0, "the walls");
 pub(super) const GAP: Bounds = Bounds::metres(1e-6, 1.0, "objects are stacked before they fall");
 pub(super) const GRADE: Bounds = Bounds::new(0.0, 100.0, "a factor");
-pub(super) const LIGHT_HEIGHT: Bounds = Bounds::metres(0.001, 1000.0, "farther off a light is a sun");
+pub(super) const LIGHT_HEIGHT: Bounds =
+    Bounds::metres(0.001, 1000.0, "farther off a light is a sun");
 pub(super) const LIGHT_OFFSET: Bounds = Bounds::metres(0.0, 1000.0, "farther off a light is a sun");
 pub(super) const LIGHT_SIZE: Bounds = Bounds::metres(1e-4, 1000.0, "from a point to a sky");
 pub(super) const RADIANCE: Bounds = Bounds::new(0.0, 1e9, "what single precision adds up");
 /// Temperatures that [`planckian`](crate::color::planckian) knows.
-pub(super) const KELVIN: Bounds = Bounds::new(1667.0, 25_000.0, "kelvin, from a candle to a blue sky");
+pub(super) const KELVIN: Bounds =
+    Bounds::new(1667.0, 25_000.0, "kelvin, from a candle to a blue sky");
 pub(super) const GAIN: Bounds = Bounds::new(1e-6, 1e6, "a factor");
-pub(super) const FRICTION: Bounds = Bounds::new(0.0, 100.0, "a coefficient; plastics have 0.2 to 0.6");
+pub(super) const FRICTION: Bounds =
+    Bounds::new(0.0, 100.0, "a coefficient; plastics have 0.2 to 0.6");
 pub(super) const ALBEDO: Bounds = Bounds::new(0.001, 10.0, "a share of light; 1 is white");
-pub(super) const CAST_SHARE: Bounds = Bounds::new(-10.0, 10.0, "0 is white light, 1 takes the surface for grey");
+pub(super) const CAST_SHARE: Bounds = Bounds::new(
+    -10.0,
+    10.0,
+    "0 is white light, 1 takes the surface for grey",
+);
 pub(super) const SHARPENING: Bounds = Bounds::new(0.0, 100.0, "a share of what a blur takes away");
 pub(super) const NOISE: Bounds = Bounds::new(0.0, 1e3, "scene-linear; 1 is white");
 
 /// Time step of a fall, seconds. Of 150 heaps of 5 to 30 cards, 81 ended wrong at 1/120 s (cards that had passed through
 /// each other, 23 mm deep), and none overlapped by more than 0.3 mm at 1/240 s; at 1/10000 s nothing changes any more that
 /// a picture shows.
-pub(super) const STEP: Bounds =
-    Bounds::new(1e-4, 0.0042, "seconds; longer steps let cards pass through each other, shorter ones only take longer");
+pub(super) const STEP: Bounds = Bounds::new(
+    1e-4,
+    0.0042,
+    "seconds; longer steps let cards pass through each other, shorter ones only take longer",
+);
 pub(super) const TIME_LIMIT: Bounds = Bounds::new(0.01, 600.0, "seconds; heaps rest within a few");
 pub(super) const ATTEMPTS: Bounds = Bounds::new(1.0, 100.0, "what fails so often will not rest");
 pub(super) const ITERATIONS: Bounds = Bounds::new(1.0, 100.0, "contacts are exact with fewer");

@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::geom::UnitQuaternion;
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
-    ALBEDO, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MOST_LIGHTS, MOST_OBJECTS, PHOTO_SIDE, PIXEL, PLACE,
-    RADIANCE, SHARE, TURN,
+    ALBEDO, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MOST_LIGHTS, MOST_OBJECTS, PHOTO_SIDE,
+    PIXEL, PLACE, RADIANCE, SHARE, TURN,
 };
 use crate::scene::hull::turn;
 use crate::scene::{AreaLight, CameraSource, Cast, Exposure, Object, Placement, Scene};
@@ -34,7 +34,9 @@ impl Scene {
         check_count(self.lights.len(), "lights", MOST_LIGHTS)?;
         each(&self.lights, "lights", check_light)?;
         check_color(self.ambient, "ambient")?;
-        self.environment.as_ref().map_or(Ok(()), |map| map.check("environment"))?;
+        self.environment
+            .as_ref()
+            .map_or(Ok(()), |map| map.check("environment"))?;
         check_cast(&self.cast)?;
         self.finish.check("finish")?;
         match self.exposure {
@@ -49,16 +51,28 @@ impl Scene {
 }
 
 fn expect(claim: bool, at: &str, found: impl Debug, expected: impl Display) -> Result<()> {
-    if claim { Ok(()) } else { Err(Error::value(at, format!("{found:?}, expected {expected}"))) }
+    if claim {
+        Ok(())
+    } else {
+        Err(Error::value(at, format!("{found:?}, expected {expected}")))
+    }
 }
 
 fn each<T>(items: &[T], name: &str, check: impl Fn(&T, &str) -> Result<()>) -> Result<()> {
-    items.iter().enumerate().try_for_each(|(i, item)| check(item, &format!("{name}[{i}]")))
+    items
+        .iter()
+        .enumerate()
+        .try_for_each(|(i, item)| check(item, &format!("{name}[{i}]")))
 }
 
 /// All of some numbers within bounds.
 fn within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
-    expect(numbers.iter().all(|&x| bounds.contains(x)), at, numbers, format_args!("within {bounds}"))
+    expect(
+        numbers.iter().all(|&x| bounds.contains(x)),
+        at,
+        numbers,
+        format_args!("within {bounds}"),
+    )
 }
 
 /// A picture that can be held in memory.
@@ -66,7 +80,12 @@ pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
     let [w, h] = image;
     expect(w > 0 && h > 0, "image", image, "two numbers above 0")?;
     let fits = w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS;
-    expect(fits, "image", image, format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all"))
+    expect(
+        fits,
+        "image",
+        image,
+        format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all"),
+    )
 }
 
 /// No more of something than scenes may have.
@@ -84,7 +103,10 @@ fn check_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
     if (norm - 1.0).abs() <= UNIT_TOLERANCE {
         return Ok(());
     }
-    Err(Error::value(at, format!("a quaternion of norm {norm}, expected norm 1")))
+    Err(Error::value(
+        at,
+        format!("a quaternion of norm {norm}, expected norm 1"),
+    ))
 }
 
 pub(super) fn check_cast(cast: &Cast) -> Result<()> {
@@ -97,7 +119,11 @@ pub(super) fn check_cast(cast: &Cast) -> Result<()> {
 fn check_camera(camera: &CameraSource) -> Result<()> {
     match camera {
         CameraSource::Known(camera) => check_known_camera(camera),
-        CameraSource::Rectangle { corners_px, photo, focal_px } => {
+        CameraSource::Rectangle {
+            corners_px,
+            photo,
+            focal_px,
+        } => {
             let at = |field: &str| format!("camera.rectangle.{field}");
             within(corners_px.as_flattened(), &at("corners_px"), &PIXEL)?;
             within(&photo.map(f64::from), &at("photo"), &PHOTO_SIDE)?;
@@ -110,15 +136,28 @@ fn check_known_camera(camera: &Camera) -> Result<()> {
     let at = |field: &str| format!("camera.known.{field}");
     within(&camera.image.map(f64::from), &at("image"), &PHOTO_SIDE)?;
     within(camera.focal_px.as_slice(), &at("focal_px"), &FOCAL)?;
-    within(camera.principal_px.coords.as_slice(), &at("principal_px"), &PIXEL)?;
+    within(
+        camera.principal_px.coords.as_slice(),
+        &at("principal_px"),
+        &PIXEL,
+    )?;
     let pose = &camera.camera_from_world;
-    within(pose.translation.vector.as_slice(), &at("camera_from_world.translation"), &PLACE)?;
+    within(
+        pose.translation.vector.as_slice(),
+        &at("camera_from_world.translation"),
+        &PLACE,
+    )?;
     check_unit(&pose.rotation, &at("camera_from_world.rotation"))
 }
 
 fn check_object(object: &Object, at: &str) -> Result<()> {
     let field = |name: &str| format!("{at}.{name}");
-    expect(!object.asset.is_empty(), &field("asset"), &object.asset, "the name of an asset")?;
+    expect(
+        !object.asset.is_empty(),
+        &field("asset"),
+        &object.asset,
+        "the name of an asset",
+    )?;
     within(&object.size, &field("size"), &LENGTH)?;
     LENGTH.check(&field("thickness"), object.thickness)?;
     check_outline(&object.outline, object.size, &field("outline"))?;
@@ -128,10 +167,18 @@ fn check_object(object: &Object, at: &str) -> Result<()> {
     GRADE.check(&field("grade.value"), object.grade.value.into())?;
     match &object.placement {
         Placement::At(pose) => {
-            within(pose.translation.vector.as_slice(), &field("placement.at.translation"), &PLACE)?;
+            within(
+                pose.translation.vector.as_slice(),
+                &field("placement.at.translation"),
+                &PLACE,
+            )?;
             check_unit(&pose.rotation, &field("placement.at.rotation"))
         }
-        Placement::Drop { above, height, rotation } => {
+        Placement::Drop {
+            above,
+            height,
+            rotation,
+        } => {
             within(above, &field("placement.drop.above"), &PLACE)?;
             LENGTH.check(&field("placement.drop.height"), *height)?;
             check_unit(rotation, &field("placement.drop.rotation"))
@@ -142,17 +189,28 @@ fn check_object(object: &Object, at: &str) -> Result<()> {
 /// A convex polygon inside its card, or nothing.
 fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
     check_count(outline.len(), at, MOST_OUTLINE)?;
-    let inside = |p: &[f64; 2]| (0..2).all(|axis| p[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE));
+    let inside =
+        |p: &[f64; 2]| (0..2).all(|axis| p[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE));
     let around = outline.len() != 1 && outline.len() != 2 && outline.iter().all(inside);
     let left = (0..outline.len()).all(|i| turn(outline, i) > 0.0);
-    expect(around && left, at, outline, "the corners of a convex polygon on the card, counter-clockwise")
+    expect(
+        around && left,
+        at,
+        outline,
+        "the corners of a convex polygon on the card, counter-clockwise",
+    )
 }
 
 fn check_light(light: &AreaLight, at: &str) -> Result<()> {
     let field = |name: &str| format!("{at}.{name}");
     within(&light.position, &field("position"), &PLACE)?;
     within(&light.target, &field("target"), &PLACE)?;
-    expect(light.position != light.target, &field("target"), light.target, "another point than its position")?;
+    expect(
+        light.position != light.target,
+        &field("target"),
+        light.target,
+        "another point than its position",
+    )?;
     within(&light.size, &field("size"), &LENGTH)?;
     RADIANCE.check(&field("power"), light.power)?;
     check_color(light.color, &field("color"))
@@ -176,7 +234,11 @@ mod tests {
             placement: Placement::At(Pose::translation(0.1, 0.0, 0.01)),
             grade: Grade::default(),
         };
-        let falling = Placement::Drop { above: [0.0; 2], height: 0.3, rotation: UnitQuaternion::identity() };
+        let falling = Placement::Drop {
+            above: [0.0; 2],
+            height: 0.3,
+            rotation: UnitQuaternion::identity(),
+        };
         let light = AreaLight {
             shape: LightShape::Rectangle,
             position: [0.0, 0.0, 1.0],
@@ -194,7 +256,13 @@ mod tests {
                 focal_px: None,
             },
             surface: Surface::new([0.4, 0.3]),
-            objects: vec![object.clone(), Object { placement: falling, ..object }],
+            objects: vec![
+                object.clone(),
+                Object {
+                    placement: falling,
+                    ..object
+                },
+            ],
             lights: vec![light],
             ambient: LinearRgb::grey(0.5),
             environment: None,
@@ -214,26 +282,46 @@ mod tests {
     #[test]
     fn a_complaint_names_the_field_the_value_and_what_was_expected() {
         let told = complaint(|s| s.objects[1].size = [0.0, 0.1]);
-        assert_eq!(told, "objects[1].size: [0.0, 0.1], expected within 1e-9 to 1000000 (metres)");
-        assert_eq!(complaint(|s| s.image = [0, 3]), "image: [0, 3], expected two numbers above 0");
+        assert_eq!(
+            told,
+            "objects[1].size: [0.0, 0.1], expected within 1e-9 to 1000000 (metres)"
+        );
+        assert_eq!(
+            complaint(|s| s.image = [0, 3]),
+            "image: [0, 3], expected two numbers above 0"
+        );
         let told = complaint(|s| s.image = [60_000, 40_000]);
-        assert_eq!(told, "image: [60000, 40000], expected at most 16384 a side and 67108864 in all");
+        assert_eq!(
+            told,
+            "image: [60000, 40000], expected at most 16384 a side and 67108864 in all"
+        );
         let told = complaint(|s| s.objects = vec![s.objects[0].clone(); 1_001]);
         assert_eq!(told, "objects: 1001, expected at most 1000");
         let told = complaint(|s| s.surface.restitution = 1.5);
         assert_eq!(told, "surface.restitution: 1.5, expected 0 to 1 (a share)");
         let clockwise = [[0.0, 0.0], [0.0, 0.05], [0.1, 0.0]];
         let told = complaint(|s| s.objects[0].outline = clockwise.into());
-        assert!(told.starts_with("objects[0].outline: [[0.0, 0.0], "), "{told}");
+        assert!(
+            told.starts_with("objects[0].outline: [[0.0, 0.0], "),
+            "{told}"
+        );
         let told = complaint(|s| s.lights[0].power = f64::NAN);
-        assert_eq!(told, "lights[0].power: NaN, expected 0 to 1e9 (what single precision adds up)");
+        assert_eq!(
+            told,
+            "lights[0].power: NaN, expected 0 to 1e9 (what single precision adds up)"
+        );
     }
 
     #[test]
     fn a_quaternion_that_is_no_rotation_is_told() {
         let long = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(2.0, 0.0, 0.0, 0.0));
-        let told = complaint(|s| s.objects[0].placement = Placement::At(Pose::from_parts([0.0; 3].into(), long)));
-        assert_eq!(told, "objects[0].placement.at.rotation: a quaternion of norm 2, expected norm 1");
+        let told = complaint(|s| {
+            s.objects[0].placement = Placement::At(Pose::from_parts([0.0; 3].into(), long))
+        });
+        assert_eq!(
+            told,
+            "objects[0].placement.at.rotation: a quaternion of norm 2, expected norm 1"
+        );
     }
 
     #[test]
@@ -245,17 +333,28 @@ mod tests {
             |s| s.objects[0].grade.value = f32::NAN,
             |s| s.objects[0].placement = Placement::At(Pose::translation(0.0, f64::NAN, 0.0)),
             |s| {
-                s.objects[0].placement =
-                    Placement::Drop { above: [f64::NAN; 2], height: 1.0, rotation: UnitQuaternion::identity() }
+                s.objects[0].placement = Placement::Drop {
+                    above: [f64::NAN; 2],
+                    height: 1.0,
+                    rotation: UnitQuaternion::identity(),
+                }
             },
             |s| s.lights[0].position[0] = f64::NAN,
             |s| s.lights[0].target = s.lights[0].position,
             |s| s.lights[0].size[0] = -1.0,
             |s| s.ambient.g = f32::NAN,
             |s| s.exposure = Exposure::Ev(f64::NAN),
-            |s| s.camera = CameraSource::Rectangle { corners_px: [[f64::NAN; 2]; 4], photo: [1, 1], focal_px: None },
+            |s| {
+                s.camera = CameraSource::Rectangle {
+                    corners_px: [[f64::NAN; 2]; 4],
+                    photo: [1, 1],
+                    focal_px: None,
+                }
+            },
         ];
-        spoils.iter().for_each(|spoil| assert!(complaint(spoil).contains("expected")));
+        spoils
+            .iter()
+            .for_each(|spoil| assert!(complaint(spoil).contains("expected")));
     }
 
     #[test]

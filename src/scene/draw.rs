@@ -77,13 +77,20 @@ impl<'a> Draws<'a> {
 
     /// The same draws, each entered in a log.
     pub fn logged(self, log: &'a DrawLog) -> Self {
-        Self { log: Some(log), ..self }
+        Self {
+            log: Some(log),
+            ..self
+        }
     }
 
     /// Enters a draw in the log, if there is one.
     pub(super) fn note(&self, path: &str, from: Distribution, value: f64) {
         if let Some(DrawLog(log)) = self.log {
-            log.borrow_mut().push(Drawn { path: path.to_owned(), from, value });
+            log.borrow_mut().push(Drawn {
+                path: path.to_owned(),
+                from,
+                value,
+            });
         }
     }
 
@@ -125,7 +132,9 @@ impl<'a> Draws<'a> {
 fn fnv1a_128(bytes: &[u8]) -> u128 {
     const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
     const PRIME: u128 = (1 << 88) + 0x13b;
-    bytes.iter().fold(OFFSET, |hash, &byte| (hash ^ u128::from(byte)).wrapping_mul(PRIME))
+    bytes.iter().fold(OFFSET, |hash, &byte| {
+        (hash ^ u128::from(byte)).wrapping_mul(PRIME)
+    })
 }
 
 #[cfg(test)]
@@ -155,11 +164,17 @@ mod tests {
     fn a_log_changes_nothing_and_forgets_nothing() {
         let log = DrawLog::default();
         let (plain, logged) = (Draws::new(7, 3), Draws::new(7, 3).logged(&log));
-        assert_eq!(plain.choose("background", 4), logged.choose("background", 4));
+        assert_eq!(
+            plain.choose("background", 4),
+            logged.choose("background", 4)
+        );
         let hue = crate::scene::Range::new(-20.0, 20.0);
         assert_eq!(hue.draw(&plain, "hue_deg"), hue.draw(&logged, "hue_deg"));
         let drawn = log.into_draws();
-        let told: Vec<String> = drawn.iter().map(|d| format!("{} {}", d.path, d.from)).collect();
+        let told: Vec<String> = drawn
+            .iter()
+            .map(|d| format!("{} {}", d.path, d.from))
+            .collect();
         assert_eq!(told, ["background one of 4", "hue_deg uniform [-20, 20]"]);
         assert_eq!(drawn[1].value, hue.draw(&plain, "hue_deg"));
     }
@@ -173,7 +188,10 @@ mod tests {
     fn assert_uniform(mut u: Vec<f64>) {
         let n = u.len() as f64;
         u.sort_by(f64::total_cmp);
-        let worst = u.iter().enumerate().map(|(i, u)| (u - i as f64 / n).abs().max((u - (i + 1) as f64 / n).abs()));
+        let worst = u
+            .iter()
+            .enumerate()
+            .map(|(i, u)| (u - i as f64 / n).abs().max((u - (i + 1) as f64 / n).abs()));
         let worst = worst.fold(0.0, f64::max);
         assert!(worst < 1.95 / n.sqrt(), "{worst} from uniform");
     }
@@ -181,7 +199,11 @@ mod tests {
     #[test]
     fn draws_are_uniform_over_indices_paths_and_seeds() {
         assert_uniform((0..10_000).map(|k| Draws::new(0, k).unit("a")).collect());
-        assert_uniform((0..10_000).map(|i| Draws::new(0, 0).unit(&format!("objects[{i}].x"))).collect());
+        assert_uniform(
+            (0..10_000)
+                .map(|i| Draws::new(0, 0).unit(&format!("objects[{i}].x")))
+                .collect(),
+        );
         assert_uniform((0..10_000).map(|s| Draws::new(s, 0).unit("a")).collect());
     }
 
@@ -201,6 +223,9 @@ mod tests {
         let mut counts = [0; 7];
         (0..70_000).for_each(|k| counts[Draws::new(1, k).below("pick", 7)] += 1);
         // Binomial: standard deviation 93.
-        assert!(counts.iter().all(|c| (c - 10_000_i32).abs() < 5 * 93), "{counts:?}");
+        assert!(
+            counts.iter().all(|c| (c - 10_000_i32).abs() < 5 * 93),
+            "{counts:?}"
+        );
     }
 }

@@ -36,7 +36,10 @@ impl Environment {
     /// Fails on the first value that cannot be right.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         if self.file.is_empty() {
-            return Err(Error::value(format!("{at}.file"), "\"\", expected the name of a picture"));
+            return Err(Error::value(
+                format!("{at}.file"),
+                "\"\", expected the name of a picture",
+            ));
         }
         TURN.check(&format!("{at}.rotation_deg"), self.rotation_deg)?;
         RADIANCE.check(&format!("{at}.strength"), self.strength)
@@ -57,12 +60,18 @@ pub struct EnvironmentMap {
 impl EnvironmentMap {
     /// A picture as it is.
     pub fn new(panorama: Arc<Panorama>) -> Self {
-        Self { panorama, rotation: 0.0, strength: 1.0 }
+        Self {
+            panorama,
+            rotation: 0.0,
+            strength: 1.0,
+        }
     }
 
     /// Radiance from a direction of the world.
     pub fn radiance(&self, direction: &Vector3<f64>) -> LinearRgb {
-        self.panorama.radiance(&turned(direction, self.rotation)).scale(self.strength)
+        self.panorama
+            .radiance(&turned(direction, self.rotation))
+            .scale(self.strength)
     }
 }
 
@@ -87,7 +96,11 @@ pub struct EnvironmentRanges {
 
 impl Default for EnvironmentRanges {
     fn default() -> Self {
-        Self { files: Vec::new(), rotation_deg: Range::new(-180.0, 180.0), strength: Range::fixed(1.0) }
+        Self {
+            files: Vec::new(),
+            rotation_deg: Range::new(-180.0, 180.0),
+            strength: Range::fixed(1.0),
+        }
     }
 }
 
@@ -129,25 +142,59 @@ mod tests {
     #[test]
     fn a_file_needs_only_a_name() {
         let read: Environment = toml::from_str("file = 'lab.hdr'").unwrap();
-        assert_eq!(read, Environment { file: "lab.hdr".into(), rotation_deg: 0.0, strength: 1.0 });
+        assert_eq!(
+            read,
+            Environment {
+                file: "lab.hdr".into(),
+                rotation_deg: 0.0,
+                strength: 1.0
+            }
+        );
         assert!(read.check("environment").is_ok());
     }
 
     #[test]
     fn what_cannot_be_right_is_told() {
-        let good = Environment { file: "lab.hdr".into(), rotation_deg: 0.0, strength: 1.0 };
+        let good = Environment {
+            file: "lab.hdr".into(),
+            rotation_deg: 0.0,
+            strength: 1.0,
+        };
         let told = |e: Environment| e.check("environment").unwrap_err().to_string();
-        assert!(told(Environment { file: String::new(), ..good.clone() }).starts_with("environment.file"));
-        assert!(told(Environment { rotation_deg: f64::NAN, ..good.clone() }).starts_with("environment.rotation_deg"));
-        assert!(told(Environment { strength: -1.0, ..good }).starts_with("environment.strength: -1,"));
+        assert!(
+            told(Environment {
+                file: String::new(),
+                ..good.clone()
+            })
+            .starts_with("environment.file")
+        );
+        assert!(
+            told(Environment {
+                rotation_deg: f64::NAN,
+                ..good.clone()
+            })
+            .starts_with("environment.rotation_deg")
+        );
+        assert!(
+            told(Environment {
+                strength: -1.0,
+                ..good
+            })
+            .starts_with("environment.strength: -1,")
+        );
     }
 
     #[test]
     fn no_pictures_are_no_environment() {
         assert_eq!(EnvironmentRanges::default().draw(&Draws::new(1, 2)), None);
-        let ranges = EnvironmentRanges { files: vec!["a.hdr".into(), "b.hdr".into()], ..Default::default() };
-        let files: std::collections::BTreeSet<_> =
-            (0..20).filter_map(|k| ranges.draw(&Draws::new(1, k))).map(|e| e.file).collect();
+        let ranges = EnvironmentRanges {
+            files: vec!["a.hdr".into(), "b.hdr".into()],
+            ..Default::default()
+        };
+        let files: std::collections::BTreeSet<_> = (0..20)
+            .filter_map(|k| ranges.draw(&Draws::new(1, k)))
+            .map(|e| e.file)
+            .collect();
         assert_eq!(files.len(), 2);
     }
 }

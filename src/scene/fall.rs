@@ -3,7 +3,9 @@
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
 use crate::scene::Object;
-use crate::scene::bounds::{ATTEMPTS, CCD, ENERGY, GRAVITY, ITERATIONS, OVERLAP, STEP, THINNEST, TIME_LIMIT, WORK};
+use crate::scene::bounds::{
+    ATTEMPTS, CCD, ENERGY, GRAVITY, ITERATIONS, OVERLAP, STEP, THINNEST, TIME_LIMIT, WORK,
+};
 use nalgebra::Quaternion;
 use serde::{Deserialize, Serialize};
 
@@ -90,10 +92,15 @@ impl SettleOptions {
             ("ccd", self.ccd.into(), CCD),
             ("most_work", self.most_work as f64, WORK),
         ];
-        bounds.iter().try_for_each(|(name, value, bounds)| bounds.check(&format!("settle.{name}"), *value))?;
+        bounds.iter().try_for_each(|(name, value, bounds)| {
+            bounds.check(&format!("settle.{name}"), *value)
+        })?;
         let [x, y, z] = self.gravity;
         if !(z < 0.0 && [x, y, z].iter().all(|g| g.is_finite())) {
-            return Err(Error::value("settle.gravity", format!("{:?}, expected to point down", self.gravity)));
+            return Err(Error::value(
+                "settle.gravity",
+                format!("{:?}, expected to point down", self.gravity),
+            ));
         }
         GRAVITY.check("settle.gravity", libm::hypot(libm::hypot(x, y), z))
     }
@@ -123,7 +130,10 @@ mod tests {
 
     #[test]
     fn the_extent_of_a_turned_box_is_that_of_its_corners() {
-        let (rotation, half) = (UnitQuaternion::from_euler_angles(0.3, -0.7, 2.0), Vector3::new(0.1, 0.04, 0.003));
+        let (rotation, half) = (
+            UnitQuaternion::from_euler_angles(0.3, -0.7, 2.0),
+            Vector3::new(0.1, 0.04, 0.003),
+        );
         let mut most = Vector3::zeros();
         for corner in 0..8 {
             let sign = |bit: i32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
@@ -142,24 +152,71 @@ mod tests {
             assert!((flat * Vector3::z() - expected).norm() < 1e-12);
             assert!((flat.angle_to(&tilted) - normal.angle(&expected)).abs() < 1e-7);
         };
-        [[0.2, 0.1, 1.0], [3.0, 0.1, -2.0], [1.5, 0.0, 0.3], [-2.5, 0.4, 3.0]].into_iter().for_each(seen);
+        [
+            [0.2, 0.1, 1.0],
+            [3.0, 0.1, -2.0],
+            [1.5, 0.0, 0.3],
+            [-2.5, 0.4, 3.0],
+        ]
+        .into_iter()
+        .for_each(seen);
     }
 
     #[test]
     fn options_that_cannot_be_right_are_told() {
         assert!(SettleOptions::default().check().is_ok());
-        let told = |step: f64| SettleOptions { step, ..Default::default() }.check().unwrap_err().to_string();
+        let told = |step: f64| {
+            SettleOptions {
+                step,
+                ..Default::default()
+            }
+            .check()
+            .unwrap_err()
+            .to_string()
+        };
         let why = "seconds; longer steps let cards pass through each other, shorter ones only take longer";
-        for (step, number) in [(f64::NAN, "NaN"), (1e-300, "1e-300"), (1.0 / 64.0, "0.015625")] {
-            assert_eq!(told(step), format!("settle.step: {number}, expected 0.0001 to 0.0042 ({why})"));
+        for (step, number) in [
+            (f64::NAN, "NaN"),
+            (1e-300, "1e-300"),
+            (1.0 / 64.0, "0.015625"),
+        ] {
+            assert_eq!(
+                told(step),
+                format!("settle.step: {number}, expected 0.0001 to 0.0042 ({why})")
+            );
         }
         for never in [0, 1_000_000] {
-            let wrong = SettleOptions { attempts: never, ..Default::default() };
-            assert!(wrong.check().unwrap_err().to_string().starts_with("settle.attempts: "), "{never}");
+            let wrong = SettleOptions {
+                attempts: never,
+                ..Default::default()
+            };
+            assert!(
+                wrong
+                    .check()
+                    .unwrap_err()
+                    .to_string()
+                    .starts_with("settle.attempts: "),
+                "{never}"
+            );
         }
-        let weightless = SettleOptions { gravity: [0.0, 0.0, -1e-300], ..Default::default() };
-        assert!(weightless.check().unwrap_err().to_string().starts_with("settle.gravity: 1e-300, expected 0.01"));
-        let up = SettleOptions { gravity: [0.0, 0.0, 9.81], ..Default::default() };
-        assert_eq!(up.check().unwrap_err().to_string(), "settle.gravity: [0.0, 0.0, 9.81], expected to point down");
+        let weightless = SettleOptions {
+            gravity: [0.0, 0.0, -1e-300],
+            ..Default::default()
+        };
+        assert!(
+            weightless
+                .check()
+                .unwrap_err()
+                .to_string()
+                .starts_with("settle.gravity: 1e-300, expected 0.01")
+        );
+        let up = SettleOptions {
+            gravity: [0.0, 0.0, 9.81],
+            ..Default::default()
+        };
+        assert_eq!(
+            up.check().unwrap_err().to_string(),
+            "settle.gravity: [0.0, 0.0, 9.81], expected to point down"
+        );
     }
 }

@@ -56,8 +56,17 @@ pub enum Noise {
 impl Finish {
     /// Nothing is to be done.
     pub fn is_nothing(&self) -> bool {
-        let Self { exposure_ev, white_balance, noise, noise_seed: _, sharpening } = *self;
-        exposure_ev == 0.0 && white_balance == LinearRgb::WHITE && noise == Noise::None && sharpening == 0.0
+        let Self {
+            exposure_ev,
+            white_balance,
+            noise,
+            noise_seed: _,
+            sharpening,
+        } = *self;
+        exposure_ev == 0.0
+            && white_balance == LinearRgb::WHITE
+            && noise == Noise::None
+            && sharpening == 0.0
     }
 
     /// Fails on the first value that cannot be right.
@@ -70,7 +79,9 @@ impl Finish {
             return Err(Error::value(field("white_balance"), what));
         }
         SHARPENING.check(&field("sharpening"), self.sharpening)?;
-        let Noise::Known { shot, read } = self.noise else { return Ok(()) };
+        let Noise::Known { shot, read } = self.noise else {
+            return Ok(());
+        };
         NOISE.check(&field("noise.known.shot"), shot)?;
         NOISE.check(&field("noise.known.read"), read)
     }
@@ -110,7 +121,11 @@ impl FinishRanges {
             exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
             white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
             noise: self.noise,
-            noise_seed: if self.noise == Noise::None { 0 } else { draws.bits("finish.noise") >> 11 },
+            noise_seed: if self.noise == Noise::None {
+                0
+            } else {
+                draws.bits("finish.noise") >> 11
+            },
             sharpening: self.sharpening.draw(draws, "finish.sharpening"),
         }
     }
@@ -119,7 +134,11 @@ impl FinishRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
-        Finish { noise: self.noise, ..Finish::default() }.check("finish")
+        Finish {
+            noise: self.noise,
+            ..Finish::default()
+        }
+        .check("finish")
     }
 }
 
@@ -147,7 +166,10 @@ mod tests {
     #[test]
     fn a_warm_white_makes_the_frame_bluer() {
         let gains = white_balance(3000.0);
-        assert!(gains.r < 0.8 && gains.g == 1.0 && gains.b > 2.0, "{gains:?}");
+        assert!(
+            gains.r < 0.8 && gains.g == 1.0 && gains.b > 2.0,
+            "{gains:?}"
+        );
         let balanced = planckian(3000.0) * gains;
         let neutral = planckian(NEUTRAL_K);
         assert!((balanced.r / balanced.b - neutral.r / neutral.b).abs() < 1e-5);
@@ -158,9 +180,24 @@ mod tests {
         let told = |f: Finish| f.check("finish").unwrap_err().to_string();
         let good = Finish::default();
         assert!(good.check("finish").is_ok());
-        assert!(told(Finish { exposure_ev: f64::NAN, ..good }).starts_with("finish.exposure_ev: NaN"));
-        assert!(told(Finish { white_balance: LinearRgb::BLACK, ..good }).starts_with("finish.white_balance"));
-        let noise = Noise::Known { shot: -1.0, read: 0.0 };
+        assert!(
+            told(Finish {
+                exposure_ev: f64::NAN,
+                ..good
+            })
+            .starts_with("finish.exposure_ev: NaN")
+        );
+        assert!(
+            told(Finish {
+                white_balance: LinearRgb::BLACK,
+                ..good
+            })
+            .starts_with("finish.white_balance")
+        );
+        let noise = Noise::Known {
+            shot: -1.0,
+            read: 0.0,
+        };
         assert!(told(Finish { noise, ..good }).starts_with("finish.noise.known.shot: -1,"));
         let read: Finish = toml::from_str("noise = 'match_plate'").unwrap();
         assert_eq!(read.noise, Noise::MatchPlate);

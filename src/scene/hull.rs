@@ -12,7 +12,12 @@ pub(super) const MOST_CORNERS: usize = 8;
 /// The corner whose loss takes the least area goes first, until [`MOST_CORNERS`] are left (Visvalingam and Whyatt 1993);
 /// what is left lies inside the outline, so a prism never touches what its outline does not.
 pub(super) fn prism(outline_uv: &[Point2<f64>], [w, h]: [f64; 2]) -> Vec<[f64; 2]> {
-    let on_card = |p: &Point2<f64>| [(p.x.clamp(0.0, 1.0) - 0.5) * w, (0.5 - p.y.clamp(0.0, 1.0)) * h];
+    let on_card = |p: &Point2<f64>| {
+        [
+            (p.x.clamp(0.0, 1.0) - 0.5) * w,
+            (0.5 - p.y.clamp(0.0, 1.0)) * h,
+        ]
+    };
     let mut ring: Vec<[f64; 2]> = outline_uv.iter().map(on_card).collect();
     if doubled_area(&ring) < 0.0 {
         ring.reverse();
@@ -31,7 +36,9 @@ const LEAST_CORNER: f64 = 1e-6;
 
 /// The corner whose triangle with its neighbours is least, and twice the area of that.
 fn least_corner(ring: &[[f64; 2]]) -> Option<(usize, f64)> {
-    (0..ring.len()).map(|i| (i, turn(ring, i))).min_by(|a, b| a.1.total_cmp(&b.1))
+    (0..ring.len())
+        .map(|i| (i, turn(ring, i)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns left.
@@ -42,7 +49,10 @@ pub(super) fn turn(ring: &[[f64; 2]], i: usize) -> f64 {
 
 fn doubled_area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
-    ring.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+    ring.iter()
+        .zip(next)
+        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
+        .sum()
 }
 
 #[cfg(test)]
@@ -50,8 +60,17 @@ mod tests {
     use super::*;
 
     fn circle(n: usize, clockwise: bool) -> Vec<Point2<f64>> {
-        let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64 * if clockwise { 1.0 } else { -1.0 };
-        (0..n).map(|i| Point2::new(0.5 + 0.5 * libm::cos(angle(i)), 0.5 + 0.5 * libm::sin(angle(i)))).collect()
+        let angle = |i: usize| {
+            std::f64::consts::TAU * i as f64 / n as f64 * if clockwise { 1.0 } else { -1.0 }
+        };
+        (0..n)
+            .map(|i| {
+                Point2::new(
+                    0.5 + 0.5 * libm::cos(angle(i)),
+                    0.5 + 0.5 * libm::sin(angle(i)),
+                )
+            })
+            .collect()
     }
 
     #[test]
@@ -74,7 +93,14 @@ mod tests {
     #[test]
     fn straight_and_doubled_corners_go_and_no_area_is_no_prism() {
         let p = |x: f64, y: f64| Point2::new(x, y);
-        let square = [p(0.0, 0.0), p(0.5, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(1.0, 1.0), p(0.0, 1.0)];
+        let square = [
+            p(0.0, 0.0),
+            p(0.5, 0.0),
+            p(1.0, 0.0),
+            p(1.0, 1.0),
+            p(1.0, 1.0),
+            p(0.0, 1.0),
+        ];
         assert_eq!(prism(&square, [2.0, 2.0]).len(), 4);
         assert!(prism(&[], [1.0, 1.0]).is_empty());
         assert!(prism(&[p(0.0, 0.0), p(0.5, 0.5), p(1.0, 1.0)], [1.0, 1.0]).is_empty());

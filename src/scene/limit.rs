@@ -26,7 +26,9 @@ impl TryFrom<LimitInFile> for Limit {
     fn try_from(written: LimitInFile) -> Result<Self, String> {
         match written {
             LimitInFile::Word(word) if word == "all" => Ok(Self::All),
-            LimitInFile::Word(word) => Err(format!("\"{word}\", expected \"all\" or a number above 0")),
+            LimitInFile::Word(word) => {
+                Err(format!("\"{word}\", expected \"all\" or a number above 0"))
+            }
             LimitInFile::Number(0) => Err("0, expected \"all\" or a number above 0".into()),
             LimitInFile::Number(n) => Ok(Self::First(n)),
         }
@@ -59,18 +61,35 @@ mod tests {
     #[test]
     fn a_limit_is_the_start_of_a_list() {
         let list = [1, 2, 3];
-        assert_eq!((Limit::All.of(&list), Limit::First(2).of(&list)), (&list[..], &list[..2]));
-        assert_eq!((Limit::First(9).of(&list), Limit::First(0).of(&list)), (&list[..], &list[..1]));
+        assert_eq!(
+            (Limit::All.of(&list), Limit::First(2).of(&list)),
+            (&list[..], &list[..2])
+        );
+        assert_eq!(
+            (Limit::First(9).of(&list), Limit::First(0).of(&list)),
+            (&list[..], &list[..1])
+        );
         assert!(Limit::First(1).of(&list[..0]).is_empty());
     }
 
     #[test]
     fn a_file_says_all_or_a_number() {
         let read = |text: &str| serde_json::from_str::<Limit>(text);
-        assert_eq!((read("\"all\"").unwrap(), read("3").unwrap()), (Limit::All, Limit::First(3)));
+        assert_eq!(
+            (read("\"all\"").unwrap(), read("3").unwrap()),
+            (Limit::All, Limit::First(3))
+        );
         for wrong in ["0", "\"some\"", "-1"] {
-            assert!(read(wrong).unwrap_err().to_string().contains("expected \"all\" or a number above 0"));
+            assert!(
+                read(wrong)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("expected \"all\" or a number above 0")
+            );
         }
-        assert_eq!(serde_json::to_string(&[Limit::All, Limit::First(2)]).unwrap(), "[\"all\",2]");
+        assert_eq!(
+            serde_json::to_string(&[Limit::All, Limit::First(2)]).unwrap(),
+            "[\"all\",2]"
+        );
     }
 }

@@ -116,7 +116,11 @@ pub struct Surface {
 impl Surface {
     /// A surface of this width and height (metres), with the usual friction and no bounce.
     pub const fn new(size: [f64; 2]) -> Self {
-        Self { size, friction: Self::usual_friction(), restitution: 0.0 }
+        Self {
+            size,
+            friction: Self::usual_friction(),
+            restitution: 0.0,
+        }
     }
 
     /// Between plastics, and between plastic and wood: 0.2 to 0.6 in tables.

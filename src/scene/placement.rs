@@ -63,6 +63,10 @@ pub struct Grade {
 
 impl Default for Grade {
     fn default() -> Self {
-        Self { hue_deg: 0.0, saturation: 1.0, value: 1.0 }
+        Self {
+            hue_deg: 0.0,
+            saturation: 1.0,
+            value: 1.0,
+        }
     }
 }

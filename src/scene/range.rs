@@ -35,7 +35,11 @@ impl From<Written> for Range {
 
 impl From<Range> for Written {
     fn from(range: Range) -> Self {
-        if range.min == range.max { Self::Fixed(range.min) } else { Self::Between([range.min, range.max]) }
+        if range.min == range.max {
+            Self::Fixed(range.min)
+        } else {
+            Self::Between([range.min, range.max])
+        }
     }
 }
 
@@ -65,7 +69,11 @@ impl Range {
     /// The whole number at a path, every one of `min..=max` equally likely.
     pub fn draw_count(&self, draws: &Draws, path: &str) -> usize {
         let count = self.min as usize + draws.below(path, (self.max - self.min) as usize + 1);
-        draws.note(path, Distribution::Whole([self.min, self.max]), count as f64);
+        draws.note(
+            path,
+            Distribution::Whole([self.min, self.max]),
+            count as f64,
+        );
         count
     }
 
@@ -79,7 +87,13 @@ impl Range {
             return Ok(());
         }
         let found = format!("[{}, {}]", number(min), number(max));
-        Err(Error::value(at, format!("{found}, expected [min, max] within {bounds}{}", bounds.question(max))))
+        Err(Error::value(
+            at,
+            format!(
+                "{found}, expected [min, max] within {bounds}{}",
+                bounds.question(max)
+            ),
+        ))
     }
 
     /// Fails unless both ends are whole numbers within bounds.
@@ -88,7 +102,10 @@ impl Range {
         if self.min.fract() == 0.0 && self.max.fract() == 0.0 {
             return Ok(());
         }
-        Err(Error::value(at, format!("[{}, {}], expected whole numbers", self.min, self.max)))
+        Err(Error::value(
+            at,
+            format!("[{}, {}], expected whole numbers", self.min, self.max),
+        ))
     }
 }
 
@@ -107,7 +124,10 @@ mod tests {
         assert_eq!(read("x = 3").unwrap(), Range::fixed(3.0));
         assert_eq!(read("x = [1, 2.5]").unwrap(), Range::new(1.0, 2.5));
         let message = read("x = 'wide'").unwrap_err().to_string();
-        assert!(message.contains("expected a number or [min, max]"), "{message}");
+        assert!(
+            message.contains("expected a number or [min, max]"),
+            "{message}"
+        );
     }
 
     #[test]
@@ -121,27 +141,42 @@ mod tests {
     #[test]
     fn draws_stay_inside_and_reach_both_ends() {
         let range = Range::new(-2.0, 3.0);
-        let all: Vec<f64> = (0..5000).map(|k| range.draw(&Draws::new(0, k), "x")).collect();
+        let all: Vec<f64> = (0..5000)
+            .map(|k| range.draw(&Draws::new(0, k), "x"))
+            .collect();
         assert!(all.iter().all(|x| (-2.0..3.0).contains(x)));
         assert!(all.iter().any(|x| *x < -1.98) && all.iter().any(|x| *x > 2.98));
     }
 
     #[test]
     fn counts_include_both_ends() {
-        let counts: Vec<usize> = (0..200).map(|k| Range::new(2.0, 4.0).draw_count(&Draws::new(0, k), "n")).collect();
-        assert_eq!((counts.iter().min(), counts.iter().max()), (Some(&2), Some(&4)));
+        let counts: Vec<usize> = (0..200)
+            .map(|k| Range::new(2.0, 4.0).draw_count(&Draws::new(0, k), "n"))
+            .collect();
+        assert_eq!(
+            (counts.iter().min(), counts.iter().max()),
+            (Some(&2), Some(&4))
+        );
     }
 
     #[test]
     fn a_range_that_cannot_be_right_is_told() {
-        let (scale, told) = (Bounds::new(0.0, 9.0, ""), |e: Result<()>| e.unwrap_err().to_string());
+        let (scale, told) = (Bounds::new(0.0, 9.0, ""), |e: Result<()>| {
+            e.unwrap_err().to_string()
+        });
         let expected = "scale: [2, 1], expected [min, max] within 0 to 9";
         assert_eq!(told(Range::new(2.0, 1.0).check("scale", &scale)), expected);
-        assert_eq!(told(Range::fixed(-1.0).check("scale", &scale)), "scale: -1, expected 0 to 9");
+        assert_eq!(
+            told(Range::fixed(-1.0).check("scale", &scale)),
+            "scale: -1, expected 0 to 9"
+        );
         assert!(Range::fixed(f64::NAN).check("scale", &scale).is_err());
         let said = told(Range::new(1.0, 2.5).check_count("objects", &scale));
         assert_eq!(said, "objects: [1, 2.5], expected whole numbers");
         let gap = Range::new(5.0, 20.0).check("gap", &Bounds::metres(0.0, 1.0, ""));
-        assert_eq!(told(gap), "gap: [5, 20], expected [min, max] within 0 to 1 m; is it in centimetres?");
+        assert_eq!(
+            told(gap),
+            "gap: [5, 20], expected [min, max] within 0 to 1 m; is it in centimetres?"
+        );
     }
 }

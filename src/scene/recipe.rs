@@ -5,14 +5,14 @@ use crate::color::planckian;
 use crate::error::{Error, Result};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
-    ALBEDO, EV, FRICTION, GRADE, KELVIN, LIGHT_HEIGHT, LIGHT_OFFSET, LIGHT_SIZE, MOST_LIGHTS, MOST_OBJECTS, RADIANCE,
-    SCALE, SHARE, TURN,
+    ALBEDO, EV, FRICTION, GRADE, KELVIN, LIGHT_HEIGHT, LIGHT_OFFSET, LIGHT_SIZE, MOST_LIGHTS,
+    MOST_OBJECTS, RADIANCE, SCALE, SHARE, TURN,
 };
 use crate::scene::check::{check_cast, check_count, check_image};
 use crate::scene::stack::{Column, Start, too_large};
 use crate::scene::{
-    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, FinishRanges, Grade, LightShape,
-    Limit, Object, Range, Scene, SettleOptions, Source, Surface,
+    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure,
+    FinishRanges, Grade, LightShape, Limit, Object, Range, Scene, SettleOptions, Source, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -107,7 +107,9 @@ impl TryFrom<SelectionsInFile> for Selections {
     fn try_from(written: SelectionsInFile) -> std::result::Result<Self, String> {
         match written {
             SelectionsInFile::Word(word) if word == "unique" => Ok(Self::Unique),
-            SelectionsInFile::Word(word) => Err(format!("\"{word}\", expected \"unique\" or a number above 0")),
+            SelectionsInFile::Word(word) => Err(format!(
+                "\"{word}\", expected \"unique\" or a number above 0"
+            )),
             SelectionsInFile::Number(0) => Err("0, expected \"unique\" or a number above 0".into()),
             SelectionsInFile::Number(n) => Ok(Self::Of(n)),
         }
@@ -214,7 +216,11 @@ impl Default for Recipe {
 
 impl Default for GradeRanges {
     fn default() -> Self {
-        Self { hue_deg: Range::new(-20.0, 20.0), saturation: Range::new(0.8, 1.2), value: Range::new(0.8, 1.2) }
+        Self {
+            hue_deg: Range::new(-20.0, 20.0),
+            saturation: Range::new(0.8, 1.2),
+            value: Range::new(0.8, 1.2),
+        }
     }
 }
 
@@ -245,8 +251,15 @@ impl Recipe {
     /// # Errors
     /// A range that cannot be right; no background; no stock while objects are asked for; a card that fits the surface
     /// in no direction.
-    pub fn scene(&self, seed: u64, k: u64, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
-        self.explained(seed, k, backgrounds, stock).map(|(scene, _)| scene)
+    pub fn scene(
+        &self,
+        seed: u64,
+        k: u64,
+        backgrounds: &[Background],
+        stock: &[Choice],
+    ) -> Result<Scene> {
+        self.explained(seed, k, backgrounds, stock)
+            .map(|(scene, _)| scene)
     }
 
     /// Scene `k` and every draw that it was made with, in order.
@@ -266,12 +279,24 @@ impl Recipe {
         Ok((scene, log.into_draws()))
     }
 
-    fn compose(&self, seed: u64, k: u64, log: &DrawLog, backgrounds: &[Background], stock: &[Choice]) -> Result<Scene> {
+    fn compose(
+        &self,
+        seed: u64,
+        k: u64,
+        log: &DrawLog,
+        backgrounds: &[Background],
+        stock: &[Choice],
+    ) -> Result<Scene> {
         self.check()?;
         let draws = Draws::new(seed, k).logged(log);
         let background = pick_background(&draws, backgrounds)?;
-        let empty = self.negatives > 0.0 && Range::new(0.0, 1.0).draw(&draws, "negative") < self.negatives;
-        let mut objects = if empty { Vec::new() } else { self.choose(seed, k, log, stock)? };
+        let empty =
+            self.negatives > 0.0 && Range::new(0.0, 1.0).draw(&draws, "negative") < self.negatives;
+        let mut objects = if empty {
+            Vec::new()
+        } else {
+            self.choose(seed, k, log, stock)?
+        };
         for (i, object) in objects.iter_mut().enumerate() {
             self.vary(object, &draws, &format!("objects[{i}]"));
         }
@@ -281,9 +306,20 @@ impl Recipe {
             restitution: self.restitution.draw(&draws, "restitution"),
         };
         let (start, options, place) = (&self.start, &self.settle, background.name.as_str());
-        Column { place, surface, start, options, draws: &draws }.stack(&mut objects)?;
-        let lights: Vec<AreaLight> =
-            self.lights.iter().enumerate().map(|(i, light)| light.draw(&draws, &format!("lights[{i}]"))).collect();
+        Column {
+            place,
+            surface,
+            start,
+            options,
+            draws: &draws,
+        }
+        .stack(&mut objects)?;
+        let lights: Vec<AreaLight> = self
+            .lights
+            .iter()
+            .enumerate()
+            .map(|(i, light)| light.draw(&draws, &format!("lights[{i}]")))
+            .collect();
         let scene = Scene {
             image: self.image,
             plate: background.name.clone(),
@@ -309,8 +345,13 @@ impl Recipe {
             return Ok(());
         }
         for background in recipe.viewpoints.of(backgrounds) {
-            let photos =
-                stock.iter().flat_map(|choice| recipe.photos.of(&choice.photo_sizes).iter().map(move |s| (choice, s)));
+            let photos = stock.iter().flat_map(|choice| {
+                recipe
+                    .photos
+                    .of(&choice.photo_sizes)
+                    .iter()
+                    .map(move |s| (choice, s))
+            });
             for (choice, size) in photos {
                 let largest = size.map(|side| side * recipe.scale.max);
                 if !recipe.start.has_room(background.size, largest) {
@@ -325,7 +366,10 @@ impl Recipe {
     /// Fails on the first value that cannot be right.
     pub fn check(&self) -> Result<()> {
         check_image(self.image)?;
-        self.objects.check_count("objects", &Bounds::new(0.0, MOST_OBJECTS as f64, "what comes to rest in a heap"))?;
+        self.objects.check_count(
+            "objects",
+            &Bounds::new(0.0, MOST_OBJECTS as f64, "what comes to rest in a heap"),
+        )?;
         SHARE.check("negatives", self.negatives)?;
         self.scale.check("scale", &SCALE)?;
         self.start.check()?;
@@ -333,7 +377,10 @@ impl Recipe {
         self.grade.saturation.check("grade.saturation", &GRADE)?;
         self.grade.value.check("grade.value", &GRADE)?;
         check_count(self.lights.len(), "lights", MOST_LIGHTS)?;
-        self.lights.iter().enumerate().try_for_each(|(i, light)| light.check(&format!("lights[{i}]")))?;
+        self.lights
+            .iter()
+            .enumerate()
+            .try_for_each(|(i, light)| light.check(&format!("lights[{i}]")))?;
         self.ambient.check("ambient", &RADIANCE)?;
         self.environment.check()?;
         self.gain_ev.check("gain_ev", &EV)?;
@@ -364,7 +411,10 @@ impl Recipe {
         let draws = Draws::new(seed, selection).logged(log);
         let count = self.objects.draw_count(&draws, "selection.objects");
         if count > 0 && stock.is_empty() {
-            return Err(Error::value("objects", format!("{count} asked for, but there is no asset to choose from")));
+            return Err(Error::value(
+                "objects",
+                format!("{count} asked for, but there is no asset to choose from"),
+            ));
         }
         let mut left = Vec::new();
         (0..count)
@@ -372,8 +422,14 @@ impl Recipe {
                 if left.is_empty() {
                     left = (0..stock.len()).collect();
                 }
-                let choice = &stock[left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))];
-                choice.object(&draws, &format!("selection[{i}].photo"), self.photos, self.collider)
+                let choice = &stock
+                    [left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))];
+                choice.object(
+                    &draws,
+                    &format!("selection[{i}].photo"),
+                    self.photos,
+                    self.collider,
+                )
             })
             .collect()
     }
@@ -381,21 +437,39 @@ impl Recipe {
     fn vary(&self, object: &mut Object, draws: &Draws, path: &str) {
         let scale = self.scale.draw(draws, &format!("{path}.scale"));
         object.size = object.size.map(|length| length * scale);
-        object.outline.iter_mut().for_each(|corner| *corner = corner.map(|length| length * scale));
+        object
+            .outline
+            .iter_mut()
+            .for_each(|corner| *corner = corner.map(|length| length * scale));
         object.thickness *= scale;
         object.mass *= scale * scale * scale;
         object.grade = Grade {
-            hue_deg: self.grade.hue_deg.draw(draws, &format!("{path}.grade.hue_deg")) as f32,
-            saturation: self.grade.saturation.draw(draws, &format!("{path}.grade.saturation")) as f32,
+            hue_deg: self
+                .grade
+                .hue_deg
+                .draw(draws, &format!("{path}.grade.hue_deg")) as f32,
+            saturation: self
+                .grade
+                .saturation
+                .draw(draws, &format!("{path}.grade.saturation")) as f32,
             value: self.grade.value.draw(draws, &format!("{path}.grade.value")) as f32,
         };
     }
 }
 
 impl Choice {
-    fn object(&self, draws: &Draws, path: &str, photos: Limit, collider: Collider) -> Result<Object> {
+    fn object(
+        &self,
+        draws: &Draws,
+        path: &str,
+        photos: Limit,
+        collider: Collider,
+    ) -> Result<Object> {
         if self.photo_sizes.is_empty() {
-            return Err(Error::value(format!("assets.{}", self.asset), "no photo, expected at least one"));
+            return Err(Error::value(
+                format!("assets.{}", self.asset),
+                "no photo, expected at least one",
+            ));
         }
         let photo = draws.choose(path, photos.of(&self.photo_sizes).len());
         let outline = match collider {
@@ -419,12 +493,21 @@ impl Choice {
 impl LightRanges {
     fn draw(&self, draws: &Draws, path: &str) -> AreaLight {
         let of = |range: &Range, name: &str| range.draw(draws, &format!("{path}.{name}"));
-        let (offset, azimuth) = (of(&self.offset, "offset"), of(&self.azimuth_deg, "azimuth_deg").to_radians());
+        let (offset, azimuth) = (
+            of(&self.offset, "offset"),
+            of(&self.azimuth_deg, "azimuth_deg").to_radians(),
+        );
         let color = [0, 1, 2].map(|c| of(&self.color[c], &format!("color[{c}]")) as f32);
-        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| planckian(of(&range, "temperature_k")));
+        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| {
+            planckian(of(&range, "temperature_k"))
+        });
         AreaLight {
             shape: self.shape,
-            position: [offset * libm::cos(azimuth), offset * libm::sin(azimuth), of(&self.height, "height")],
+            position: [
+                offset * libm::cos(azimuth),
+                offset * libm::sin(azimuth),
+                of(&self.height, "height"),
+            ],
             target: [0.0; 3],
             size: [of(&self.size, "size"); 2],
             power: of(&self.power, "power"),
@@ -435,7 +518,8 @@ impl LightRanges {
     fn check(&self, at: &str) -> Result<()> {
         self.height.check(&format!("{at}.height"), &LIGHT_HEIGHT)?;
         self.offset.check(&format!("{at}.offset"), &LIGHT_OFFSET)?;
-        self.azimuth_deg.check(&format!("{at}.azimuth_deg"), &TURN)?;
+        self.azimuth_deg
+            .check(&format!("{at}.azimuth_deg"), &TURN)?;
         self.size.check(&format!("{at}.size"), &LIGHT_SIZE)?;
         self.power.check(&format!("{at}.power"), &RADIANCE)?;
         if let Some(range) = &self.temperature_k {
@@ -447,7 +531,10 @@ impl LightRanges {
 
 fn pick_background<'a>(draws: &Draws, backgrounds: &'a [Background]) -> Result<&'a Background> {
     match backgrounds.len() {
-        0 => Err(Error::value("backgrounds", "none, expected at least one labelled photo")),
+        0 => Err(Error::value(
+            "backgrounds",
+            "none, expected at least one labelled photo",
+        )),
         n => Ok(&backgrounds[draws.choose("background", n)]),
     }
 }
@@ -465,7 +552,9 @@ fn ambient(lights: &[AreaLight], share: f64) -> LinearRgb {
     lights.iter().fold(LinearRgb::BLACK, |sum, light| {
         let [x, y, h] = light.position;
         let d = (x * x + y * y + h * h).sqrt();
-        sum + light.color.scale((share * light.power * h / (PI * PI * d * d * d)) as f32)
+        sum + light
+            .color
+            .scale((share * light.power * h / (PI * PI * d * d * d)) as f32)
     })
 }
 
@@ -499,11 +588,17 @@ mod tests {
     }
 
     fn scene(recipe: &Recipe, k: u64) -> Scene {
-        recipe.scene(7, k, &[tray("a"), tray("b")], &stock(10)).unwrap()
+        recipe
+            .scene(7, k, &[tray("a"), tray("b")], &stock(10))
+            .unwrap()
     }
 
     fn names(scene: &Scene) -> Vec<(&str, usize)> {
-        scene.objects.iter().map(|o| (o.asset.as_str(), o.photo)).collect()
+        scene
+            .objects
+            .iter()
+            .map(|o| (o.asset.as_str(), o.photo))
+            .collect()
     }
 
     #[test]
@@ -513,20 +608,36 @@ mod tests {
 
     #[test]
     fn negatives_are_empty_and_leave_the_other_scenes_as_they_are() {
-        let recipe = Recipe { negatives: 0.25, ..Recipe::default() };
-        let empty: Vec<u64> = (0..200).filter(|&k| scene(&recipe, k).objects.is_empty()).collect();
+        let recipe = Recipe {
+            negatives: 0.25,
+            ..Recipe::default()
+        };
+        let empty: Vec<u64> = (0..200)
+            .filter(|&k| scene(&recipe, k).objects.is_empty())
+            .collect();
         // Binomial: 50 +- 6.1; four standard deviations.
         assert!((26..=74).contains(&empty.len()), "{}", empty.len());
         let k = (0..200).find(|k| !empty.contains(k)).unwrap();
         assert_eq!(scene(&recipe, k), scene(&Recipe::default(), k));
         assert!(
-            Recipe { negatives: 1.5, ..Recipe::default() }.check().unwrap_err().to_string().starts_with("negatives")
+            Recipe {
+                negatives: 1.5,
+                ..Recipe::default()
+            }
+            .check()
+            .unwrap_err()
+            .to_string()
+            .starts_with("negatives")
         );
     }
 
     #[test]
     fn a_recipe_comes_back_from_toml_as_it_was() {
-        let recipe = Recipe { selections: Selections::Of(50), lights: vec![], ..Recipe::default() };
+        let recipe = Recipe {
+            selections: Selections::Of(50),
+            lights: vec![],
+            ..Recipe::default()
+        };
         for recipe in [recipe, Recipe::default()] {
             let text = toml::to_string(&recipe).unwrap();
             assert_eq!(toml::from_str::<Recipe>(&text).unwrap(), recipe, "{text}");
@@ -535,11 +646,16 @@ mod tests {
 
     #[test]
     fn a_file_says_only_what_it_wants_otherwise() {
-        let text =
-            "objects = 3\nselections = 5\n[start]\ntilt_deg = [0, 90]\n[[lights]]\nsize = 0.1\n[settle]\nmode = 'flat'";
+        let text = "objects = 3\nselections = 5\n[start]\ntilt_deg = [0, 90]\n[[lights]]\nsize = 0.1\n[settle]\nmode = 'flat'";
         let recipe: Recipe = toml::from_str(text).unwrap();
-        assert_eq!((recipe.objects, recipe.selections), (Range::fixed(3.0), Selections::Of(5)));
-        assert_eq!((recipe.lights.len(), recipe.lights[0].size), (1, Range::fixed(0.1)));
+        assert_eq!(
+            (recipe.objects, recipe.selections),
+            (Range::fixed(3.0), Selections::Of(5))
+        );
+        assert_eq!(
+            (recipe.lights.len(), recipe.lights[0].size),
+            (1, Range::fixed(0.1))
+        );
         assert_eq!(recipe.start.gap, Start::default().gap);
     }
 
@@ -559,33 +675,81 @@ mod tests {
     #[test]
     fn nothing_to_choose_from_is_told() {
         let told = |backgrounds: &[Background], stock: &[Choice]| {
-            Recipe::default().scene(0, 0, backgrounds, stock).unwrap_err().to_string()
+            Recipe::default()
+                .scene(0, 0, backgrounds, stock)
+                .unwrap_err()
+                .to_string()
         };
-        assert_eq!(told(&[], &stock(1)), "backgrounds: none, expected at least one labelled photo");
-        assert!(told(&[tray("a")], &[]).ends_with("asked for, but there is no asset to choose from"));
-        let bare = Choice { photo_sizes: vec![], ..stock(1).remove(0) };
-        assert_eq!(told(&[tray("a")], &[bare]), "assets.b0: no photo, expected at least one");
+        assert_eq!(
+            told(&[], &stock(1)),
+            "backgrounds: none, expected at least one labelled photo"
+        );
+        assert!(
+            told(&[tray("a")], &[]).ends_with("asked for, but there is no asset to choose from")
+        );
+        let bare = Choice {
+            photo_sizes: vec![],
+            ..stock(1).remove(0)
+        };
+        assert_eq!(
+            told(&[tray("a")], &[bare]),
+            "assets.b0: no photo, expected at least one"
+        );
     }
 
     #[test]
     fn no_object_asked_for_is_an_empty_scene() {
-        let recipe = Recipe { objects: Range::fixed(0.0), ..Recipe::default() };
-        assert!(recipe.scene(0, 0, &[tray("a")], &[]).unwrap().objects.is_empty());
+        let recipe = Recipe {
+            objects: Range::fixed(0.0),
+            ..Recipe::default()
+        };
+        assert!(
+            recipe
+                .scene(0, 0, &[tray("a")], &[])
+                .unwrap()
+                .objects
+                .is_empty()
+        );
     }
 
     #[test]
     fn one_more_object_re_rolls_nothing_else() {
-        let with = |n| scene(&Recipe { objects: Range::fixed(n), ..Recipe::default() }, 4);
+        let with = |n| {
+            scene(
+                &Recipe {
+                    objects: Range::fixed(n),
+                    ..Recipe::default()
+                },
+                4,
+            )
+        };
         let (few, more) = (with(5.0), with(6.0));
         assert_eq!(more.objects[..5], few.objects);
-        assert_eq!(Scene { objects: few.objects.clone(), ..more }, few);
+        assert_eq!(
+            Scene {
+                objects: few.objects.clone(),
+                ..more
+            },
+            few
+        );
     }
 
     #[test]
     fn another_range_re_rolls_nothing_else() {
         let usual = scene(&Recipe::default(), 4);
-        let grade = GradeRanges { hue_deg: Range::new(0.0, 1.0), ..Default::default() };
-        let mut other = scene(&Recipe { grade, lights: vec![], gain_ev: Range::fixed(1.0), ..Recipe::default() }, 4);
+        let grade = GradeRanges {
+            hue_deg: Range::new(0.0, 1.0),
+            ..Default::default()
+        };
+        let mut other = scene(
+            &Recipe {
+                grade,
+                lights: vec![],
+                gain_ev: Range::fixed(1.0),
+                ..Recipe::default()
+            },
+            4,
+        );
         assert_ne!(other.objects, usual.objects);
         for (a, b) in other.objects.iter_mut().zip(&usual.objects) {
             a.grade.hue_deg = b.grade.hue_deg;
@@ -596,40 +760,83 @@ mod tests {
     #[test]
     fn assets_repeat_only_when_the_stock_is_used_up() {
         for k in 0..30 {
-            let all = scene(&Recipe { objects: Range::fixed(25.0), ..Recipe::default() }, k);
-            let distinct = |part: &[Object]| part.iter().map(|o| o.asset.clone()).collect::<BTreeSet<_>>().len();
-            let parts = [distinct(&all.objects[..10]), distinct(&all.objects[10..20]), distinct(&all.objects[20..])];
+            let all = scene(
+                &Recipe {
+                    objects: Range::fixed(25.0),
+                    ..Recipe::default()
+                },
+                k,
+            );
+            let distinct = |part: &[Object]| {
+                part.iter()
+                    .map(|o| o.asset.clone())
+                    .collect::<BTreeSet<_>>()
+                    .len()
+            };
+            let parts = [
+                distinct(&all.objects[..10]),
+                distinct(&all.objects[10..20]),
+                distinct(&all.objects[20..]),
+            ];
             assert_eq!(parts, [10, 10, 5]);
         }
     }
 
     #[test]
     fn every_asset_photo_and_background_is_used_as_often() {
-        let recipe = Recipe { objects: Range::fixed(2.0), ..Recipe::default() };
+        let recipe = Recipe {
+            objects: Range::fixed(2.0),
+            ..Recipe::default()
+        };
         let scenes: Vec<Scene> = (0..2000).map(|k| scene(&recipe, k)).collect();
-        let share = |claim: &dyn Fn(&Object) -> bool| scenes.iter().filter(|s| claim(&s.objects[1])).count();
+        let share = |claim: &dyn Fn(&Object) -> bool| {
+            scenes.iter().filter(|s| claim(&s.objects[1])).count()
+        };
         // Binomial, 2000 draws: standard deviation 13 at 1/10 and 22 at 1/2.
-        (0..10).for_each(|i| assert!(share(&|o| o.asset == format!("b{i}")).abs_diff(200) < 5 * 13));
+        (0..10)
+            .for_each(|i| assert!(share(&|o| o.asset == format!("b{i}")).abs_diff(200) < 5 * 13));
         assert!(share(&|o| o.photo == 1).abs_diff(1000) < 5 * 22);
-        assert!(scenes.iter().filter(|s| s.plate == "a").count().abs_diff(1000) < 5 * 22);
+        assert!(
+            scenes
+                .iter()
+                .filter(|s| s.plate == "a")
+                .count()
+                .abs_diff(1000)
+                < 5 * 22
+        );
     }
 
     #[test]
     fn so_many_selections_are_made_as_are_asked_for() {
         let distinct = |selections| {
-            let recipe = Recipe { selections, objects: Range::new(4.0, 6.0), ..Recipe::default() };
+            let recipe = Recipe {
+                selections,
+                objects: Range::new(4.0, 6.0),
+                ..Recipe::default()
+            };
             let scenes: Vec<Scene> = (0..60).map(|k| scene(&recipe, k)).collect();
             scenes.iter().map(names).collect::<BTreeSet<_>>().len()
         };
-        assert_eq!((distinct(Selections::Of(7)), distinct(Selections::Unique)), (7, 60));
+        assert_eq!(
+            (distinct(Selections::Of(7)), distinct(Selections::Unique)),
+            (7, 60)
+        );
     }
 
     #[test]
     fn a_selection_used_again_starts_anew() {
-        let recipe = Recipe { selections: Selections::Of(2), ..Recipe::default() };
+        let recipe = Recipe {
+            selections: Selections::Of(2),
+            ..Recipe::default()
+        };
         let (a, b) = (scene(&recipe, 1), scene(&recipe, 3));
         assert_eq!(names(&a), names(&b));
-        assert!(a.objects.iter().zip(&b.objects).all(|(a, b)| a.placement != b.placement && a.grade != b.grade));
+        assert!(
+            a.objects
+                .iter()
+                .zip(&b.objects)
+                .all(|(a, b)| a.placement != b.placement && a.grade != b.grade)
+        );
     }
 
     #[test]
@@ -640,7 +847,10 @@ mod tests {
             assert!((4..=12).contains(&scene.objects.len()));
             for object in &scene.objects {
                 let scale = object.thickness / 0.005;
-                assert!((0.9..=1.1).contains(&scale) && (object.mass / 0.03 - scale.powi(3)).abs() < 1e-12);
+                assert!(
+                    (0.9..=1.1).contains(&scale)
+                        && (object.mass / 0.03 - scale.powi(3)).abs() < 1e-12
+                );
                 assert!(object.grade.hue_deg.abs() <= 20.0);
                 assert!(matches!(object.placement, Placement::Drop { .. }));
             }
@@ -651,11 +861,22 @@ mod tests {
 
     #[test]
     fn friction_and_bounce_are_drawn_for_a_scene() {
-        let recipe = Recipe { friction: Range::new(0.2, 0.6), restitution: Range::new(0.0, 0.3), ..Recipe::default() };
+        let recipe = Recipe {
+            friction: Range::new(0.2, 0.6),
+            restitution: Range::new(0.0, 0.3),
+            ..Recipe::default()
+        };
         let drawn: Vec<Surface> = (0..50).map(|k| scene(&recipe, k).surface).collect();
-        assert!(drawn.iter().all(|s| (0.2..0.6).contains(&s.friction) && (0.0..0.3).contains(&s.restitution)));
+        assert!(
+            drawn
+                .iter()
+                .all(|s| (0.2..0.6).contains(&s.friction) && (0.0..0.3).contains(&s.restitution))
+        );
         assert!(drawn.iter().any(|s| s.friction < 0.25) && drawn.iter().any(|s| s.friction > 0.55));
-        let wrong = Recipe { restitution: Range::new(0.0, 1.2), ..Recipe::default() };
+        let wrong = Recipe {
+            restitution: Range::new(0.0, 1.2),
+            ..Recipe::default()
+        };
         assert_eq!(
             wrong.check().unwrap_err().to_string(),
             "restitution: [0, 1.2], expected [min, max] within 0 to 1 (a share)"
@@ -664,24 +885,53 @@ mod tests {
 
     #[test]
     fn hulls_fall_only_where_they_are_asked_for_and_known_and_grow_with_their_card() {
-        let with = |collider| scene(&Recipe { collider, objects: Range::fixed(9.0), ..Recipe::default() }, 2).objects;
+        let with = |collider| {
+            scene(
+                &Recipe {
+                    collider,
+                    objects: Range::fixed(9.0),
+                    ..Recipe::default()
+                },
+                2,
+            )
+            .objects
+        };
         let (boxes, hulls) = (with(Collider::Box), with(Collider::Hull));
         assert!(boxes.iter().all(|object| object.outline.is_empty()));
-        assert!(hulls.iter().any(|object| object.photo == 0) && hulls.iter().any(|object| object.photo == 1));
+        assert!(
+            hulls.iter().any(|object| object.photo == 0)
+                && hulls.iter().any(|object| object.photo == 1)
+        );
         for object in &hulls {
             let top = object.outline.last().map(|corner| corner[1]);
-            assert_eq!(top, (object.photo == 0).then_some(0.035 * object.size[0] / 0.2), "{object:?}");
+            assert_eq!(
+                top,
+                (object.photo == 0).then_some(0.035 * object.size[0] / 0.2),
+                "{object:?}"
+            );
         }
     }
 
     #[test]
     fn the_ambient_is_a_share_of_the_light_at_the_centre() {
         // 10 W straight above at 1 m: irradiance 10 / pi; half of it from a dome of radiance L: pi L.
-        let light = LightRanges { height: Range::fixed(1.0), offset: Range::fixed(0.0), ..LightRanges::default() };
-        let recipe = Recipe { lights: vec![light], ambient: Range::fixed(0.5), ..Recipe::default() };
+        let light = LightRanges {
+            height: Range::fixed(1.0),
+            offset: Range::fixed(0.0),
+            ..LightRanges::default()
+        };
+        let recipe = Recipe {
+            lights: vec![light],
+            ambient: Range::fixed(0.5),
+            ..Recipe::default()
+        };
         let expected = 0.5 * (10.0 / PI) / PI;
         assert!((f64::from(scene(&recipe, 0).ambient.r) - expected).abs() < 1e-6);
-        let dark = Recipe { lights: vec![], ambient: Range::fixed(0.5), ..Recipe::default() };
+        let dark = Recipe {
+            lights: vec![],
+            ambient: Range::fixed(0.5),
+            ..Recipe::default()
+        };
         assert_eq!(scene(&dark, 0).ambient, LinearRgb::grey(0.5));
     }
 }

@@ -7,7 +7,8 @@ use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
 use crate::scene::{
-    AreaLight, CameraSource, Card, Cast, EnvironmentMap, Exposure, Noise, Object, Placement, Scene, Shot,
+    AreaLight, CameraSource, Card, Cast, EnvironmentMap, Exposure, Noise, Object, Placement, Scene,
+    Shot,
 };
 use std::sync::Arc;
 
@@ -57,20 +58,35 @@ impl Scene {
             Ok(Card {
                 id: ObjectId(id(i)?),
                 class: look.class,
-                quad: Quad { world_from_card, size: object.size },
+                quad: Quad {
+                    world_from_card,
+                    size: object.size,
+                },
                 texture: look.texture,
                 back: look.back,
                 outline_uv: look.outline_uv,
                 grade: object.grade,
             })
         };
-        let cards = self.objects.iter().enumerate().map(card).collect::<Result<_>>()?;
+        let cards = self
+            .objects
+            .iter()
+            .enumerate()
+            .map(card)
+            .collect::<Result<_>>()?;
         Ok(Shot {
             camera,
             plate,
             catcher: self.surface.size.map(|side| CATCHER * side),
             cards,
-            lights: self.lights.iter().map(|light| AreaLight { color: light.color * cast, ..*light }).collect(),
+            lights: self
+                .lights
+                .iter()
+                .map(|light| AreaLight {
+                    color: light.color * cast,
+                    ..*light
+                })
+                .collect(),
             ambient: self.ambient * cast,
             environment: self.environment_map(panorama)?,
             exposure,
@@ -78,20 +94,36 @@ impl Scene {
     }
 
     fn environment_map(&self, panorama: Option<Arc<Panorama>>) -> Result<Option<EnvironmentMap>> {
-        let Some(named) = self.environment.as_ref().filter(|named| named.shines()) else { return Ok(None) };
-        let missing =
-            || Error::value("environment.file", format!("\"{}\", but its picture is not at hand", named.file));
+        let Some(named) = self.environment.as_ref().filter(|named| named.shines()) else {
+            return Ok(None);
+        };
+        let missing = || {
+            Error::value(
+                "environment.file",
+                format!("\"{}\", but its picture is not at hand", named.file),
+            )
+        };
         let panorama = panorama.ok_or_else(missing)?;
         let (rotation, strength) = (named.rotation_deg.to_radians(), named.strength as f32);
-        Ok(Some(EnvironmentMap { panorama, rotation, strength }))
+        Ok(Some(EnvironmentMap {
+            panorama,
+            rotation,
+            strength,
+        }))
     }
 
     fn known_camera(&self) -> Result<Camera> {
         let CameraSource::Known(camera) = self.camera else {
-            return Err(Error::value("camera", "still a rectangle in a photo; locate it first"));
+            return Err(Error::value(
+                "camera",
+                "still a rectangle in a photo; locate it first",
+            ));
         };
         if camera.image != self.image {
-            let what = format!("{:?}, expected the scene's image {:?}", camera.image, self.image);
+            let what = format!(
+                "{:?}, expected the scene's image {:?}",
+                camera.image, self.image
+            );
             return Err(Error::value("camera.known.image", what));
         }
         Ok(camera)
@@ -100,19 +132,26 @@ impl Scene {
     fn known_exposure(&self) -> Result<f32> {
         match self.exposure {
             Exposure::Ev(ev) => Ok(libm::exp2(ev) as f32),
-            Exposure::MatchPlate { .. } | Exposure::MatchSurface { .. } => {
-                Err(Error::value("exposure", "still to be matched to the plate; light it first"))
-            }
+            Exposure::MatchPlate { .. } | Exposure::MatchSurface { .. } => Err(Error::value(
+                "exposure",
+                "still to be matched to the plate; light it first",
+            )),
         }
     }
 
     fn known_cast(&self) -> Result<LinearRgb> {
         if self.finish.noise == Noise::MatchPlate {
-            return Err(Error::value("finish.noise", "still to be matched to the plate; light it first"));
+            return Err(Error::value(
+                "finish.noise",
+                "still to be matched to the plate; light it first",
+            ));
         }
         match self.cast {
             Cast::Known(color) => Ok(color),
-            Cast::MatchSurface { .. } => Err(Error::value("cast", "still to be matched to the plate; light it first")),
+            Cast::MatchSurface { .. } => Err(Error::value(
+                "cast",
+                "still to be matched to the plate; light it first",
+            )),
         }
     }
 
@@ -121,21 +160,31 @@ impl Scene {
         if (w, h) == (self.image[0] as usize, self.image[1] as usize) {
             return Ok(());
         }
-        Err(Error::value("plate", format!("{w} x {h} pixels, expected {} x {}", self.image[0], self.image[1])))
+        Err(Error::value(
+            "plate",
+            format!(
+                "{w} x {h} pixels, expected {} x {}",
+                self.image[0], self.image[1]
+            ),
+        ))
     }
 }
 
 fn at_rest(i: usize, object: &Object) -> Result<Pose> {
     match object.placement {
         Placement::At(pose) => Ok(pose),
-        Placement::Drop { .. } => {
-            Err(Error::value(format!("objects[{i}].placement"), "still falling; settle it first"))
-        }
+        Placement::Drop { .. } => Err(Error::value(
+            format!("objects[{i}].placement"),
+            "still falling; settle it first",
+        )),
     }
 }
 
 fn missing(i: usize, object: &Object) -> Error {
-    let what = format!("\"{}\", photo {}, expected one that the library has", object.asset, object.photo);
+    let what = format!(
+        "\"{}\", photo {}, expected one that the library has",
+        object.asset, object.photo
+    );
     Error::value(format!("objects[{i}].asset"), what)
 }
 
@@ -189,7 +238,12 @@ mod tests {
     fn look(object: &Object) -> Option<Look> {
         let texture = Texture::from(Image::filled(2, 2, PremulRgba::default()));
         let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
-        (object.asset == "b1").then_some(Look { class: 3, texture, back: None, outline_uv })
+        (object.asset == "b1").then_some(Look {
+            class: 3,
+            texture,
+            back: None,
+            outline_uv,
+        })
     }
 
     fn complaint(spoil: impl Fn(&mut Scene)) -> String {
@@ -201,35 +255,67 @@ mod tests {
     #[test]
     fn a_known_scene_becomes_a_shot() {
         let shot = scene().resolve(look, None, None).unwrap();
-        assert_eq!(shot.cards.iter().map(|c| c.id).collect::<Vec<_>>(), [ObjectId(1), ObjectId(2)]);
-        assert_eq!((shot.exposure, shot.catcher, shot.cards[0].class), (2.0, [0.4, 0.3].map(|side| CATCHER * side), 3));
+        assert_eq!(
+            shot.cards.iter().map(|c| c.id).collect::<Vec<_>>(),
+            [ObjectId(1), ObjectId(2)]
+        );
+        assert_eq!(
+            (shot.exposure, shot.catcher, shot.cards[0].class),
+            (2.0, [0.4, 0.3].map(|side| CATCHER * side), 3)
+        );
     }
 
     #[test]
     fn an_unknown_is_told_with_the_stage_that_finds_it() {
-        let falling = Placement::Drop { above: [0.0; 2], height: 0.3, rotation: UnitQuaternion::identity() };
+        let falling = Placement::Drop {
+            above: [0.0; 2],
+            height: 0.3,
+            rotation: UnitQuaternion::identity(),
+        };
         let told = complaint(|s| s.objects[1].placement = falling);
         assert_eq!(told, "objects[1].placement: still falling; settle it first");
         let told = complaint(|s| s.exposure = Exposure::MatchPlate { gain_ev: 0.0 });
-        assert_eq!(told, "exposure: still to be matched to the plate; light it first");
+        assert_eq!(
+            told,
+            "exposure: still to be matched to the plate; light it first"
+        );
         let told = complaint(|s| s.cast = Cast::MatchSurface { share: 1.0 });
-        assert_eq!(told, "cast: still to be matched to the plate; light it first");
+        assert_eq!(
+            told,
+            "cast: still to be matched to the plate; light it first"
+        );
         let told = complaint(|s| s.finish.noise = Noise::MatchPlate);
-        assert_eq!(told, "finish.noise: still to be matched to the plate; light it first");
-        let rectangle = CameraSource::Rectangle { corners_px: [[0.0; 2]; 4], photo: [8, 6], focal_px: None };
-        assert_eq!(complaint(|s| s.camera = rectangle), "camera: still a rectangle in a photo; locate it first");
+        assert_eq!(
+            told,
+            "finish.noise: still to be matched to the plate; light it first"
+        );
+        let rectangle = CameraSource::Rectangle {
+            corners_px: [[0.0; 2]; 4],
+            photo: [8, 6],
+            focal_px: None,
+        };
+        assert_eq!(
+            complaint(|s| s.camera = rectangle),
+            "camera: still a rectangle in a photo; locate it first"
+        );
     }
 
     #[test]
     fn an_asset_that_the_library_lacks_is_told() {
         let told = complaint(|s| s.objects[1].asset = "b9".into());
-        assert_eq!(told, "objects[1].asset: \"b9\", photo 0, expected one that the library has");
+        assert_eq!(
+            told,
+            "objects[1].asset: \"b9\", photo 0, expected one that the library has"
+        );
     }
 
     #[test]
     fn a_plate_of_another_size_is_told() {
         let plate = Arc::new(Image::filled(3, 6, LinearRgb::BLACK));
-        let told = scene().resolve(look, Some(plate), None).unwrap_err().to_string();
+        let told = scene()
+            .resolve(look, Some(plate), None)
+            .unwrap_err()
+            .to_string();
         assert_eq!(told, "plate: 3 x 6 pixels, expected 8 x 6");
     }
 }

@@ -47,7 +47,11 @@ impl Default for Start {
 impl Start {
     /// What an object has before it is stacked.
     pub(super) fn unplaced() -> Placement {
-        Placement::Drop { above: [0.0; 2], height: 0.0, rotation: UnitQuaternion::identity() }
+        Placement::Drop {
+            above: [0.0; 2],
+            height: 0.0,
+            rotation: UnitQuaternion::identity(),
+        }
     }
 
     pub(super) fn check(&self) -> Result<()> {
@@ -94,7 +98,11 @@ impl Column<'_> {
             let [free_x, free_y] = free(self.surface.size, &extent);
             let height = top + self.start.gap.draw(self.draws, &format!("{path}.gap")) + extent.z;
             top = height + extent.z;
-            object.placement = Placement::Drop { above: [x * free_x, y * free_y], height, rotation };
+            object.placement = Placement::Drop {
+                above: [x * free_x, y * free_y],
+                height,
+                rotation,
+            };
         }
         Ok(())
     }
@@ -104,17 +112,31 @@ impl Column<'_> {
     fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
         let mut drawn = (0..TURNS).map(|turn| self.rotation(path, turn));
         let fits = |rotation: &UnitQuaternion<f64>| fits(self.surface.size, half, rotation);
-        drawn.find(|rotation| fits(rotation) && fits(&level(rotation))).or_else(|| {
-            let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
-            (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
-        })
+        drawn
+            .find(|rotation| fits(rotation) && fits(&level(rotation)))
+            .or_else(|| {
+                let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
+                (!turns.is_empty())
+                    .then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
+            })
     }
 
     /// First a turn about the vertical, the `turn`-th drawn for this object, then the tilt.
     fn rotation(&self, path: &str, turn: u32) -> UnitQuaternion<f64> {
-        let radians = |range: &Range, name: &str| range.draw(self.draws, &format!("{path}.{name}")).to_radians();
-        let yaw_name = if turn == 0 { "yaw_deg".into() } else { format!("yaw_deg#{turn}") };
-        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), radians(&self.start.yaw_deg, &yaw_name));
+        let radians = |range: &Range, name: &str| {
+            range
+                .draw(self.draws, &format!("{path}.{name}"))
+                .to_radians()
+        };
+        let yaw_name = if turn == 0 {
+            "yaw_deg".into()
+        } else {
+            format!("yaw_deg#{turn}")
+        };
+        let yaw = UnitQuaternion::from_axis_angle(
+            &Vector3::z_axis(),
+            radians(&self.start.yaw_deg, &yaw_name),
+        );
         let towards = radians(&self.start.tilt_axis_deg, "tilt_axis_deg");
         let axis = Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0));
         UnitQuaternion::from_axis_angle(&axis, radians(&self.start.tilt_deg, "tilt_deg")) * yaw
@@ -124,15 +146,29 @@ impl Column<'_> {
 impl Start {
     /// Whether a card of this size, as thick as it may be, fits between walls in some direction that it may start in.
     pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
-        self.level_turns(surface, &(Vector3::new(w, h, 0.0) / 2.0)).next().is_some()
+        self.level_turns(surface, &(Vector3::new(w, h, 0.0) / 2.0))
+            .next()
+            .is_some()
     }
 
     /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the range.
-    fn level_turns(&self, surface: [f64; 2], half: &Vector3<f64>) -> impl Iterator<Item = UnitQuaternion<f64>> {
+    fn level_turns(
+        &self,
+        surface: [f64; 2],
+        half: &Vector3<f64>,
+    ) -> impl Iterator<Item = UnitQuaternion<f64>> {
         let Range { min, max } = self.yaw_deg;
-        let whole = (0..360).map(move |i| min.ceil() + f64::from(i)).take_while(move |degrees| *degrees < max);
-        let turn = |degrees: f64| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());
-        [min, max].into_iter().chain(whole).map(turn).filter(move |rotation| fits(surface, half, rotation))
+        let whole = (0..360)
+            .map(move |i| min.ceil() + f64::from(i))
+            .take_while(move |degrees| *degrees < max);
+        let turn = |degrees: f64| {
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
+        };
+        [min, max]
+            .into_iter()
+            .chain(whole)
+            .map(turn)
+            .filter(move |rotation| fits(surface, half, rotation))
     }
 }
 
@@ -144,7 +180,9 @@ fn free(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
 /// Whether a body turned so fits between the walls.
 fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
     let free = free(surface, &half_extent(rotation, half));
-    free.iter().zip(surface).all(|(free, side)| *free >= -ROUNDING * side)
+    free.iter()
+        .zip(surface)
+        .all(|(free, side)| *free >= -ROUNDING * side)
 }
 
 /// What is wrong with a card that fits nowhere.
@@ -179,28 +217,51 @@ mod tests {
 
     fn stacked(k: u64, start: &Start, mut objects: Vec<Object>) -> Result<Vec<Object>> {
         let (surface, options) = (Surface::new([0.4, 0.3]), SettleOptions::default());
-        Column { place: "tray", surface, start, options: &options, draws: &Draws::new(3, k) }.stack(&mut objects)?;
+        Column {
+            place: "tray",
+            surface,
+            start,
+            options: &options,
+            draws: &Draws::new(3, k),
+        }
+        .stack(&mut objects)?;
         Ok(objects)
     }
 
     /// Corners of the body as it starts, one by one.
     fn corners(object: &Object) -> Vec<Vector3<f64>> {
-        let Placement::Drop { above: [x, y], height, rotation } = object.placement else { panic!("not dropped") };
+        let Placement::Drop {
+            above: [x, y],
+            height,
+            rotation,
+        } = object.placement
+        else {
+            panic!("not dropped")
+        };
         let half = SettleOptions::default().half_body(object);
-        let signs = (0..8).map(|c| Vector3::from_fn(|axis, _| if c >> axis & 1 == 0 { -1.0 } else { 1.0 }));
-        signs.map(|s| Vector3::new(x, y, height) + rotation * half.component_mul(&s)).collect()
+        let signs =
+            (0..8).map(|c| Vector3::from_fn(|axis, _| if c >> axis & 1 == 0 { -1.0 } else { 1.0 }));
+        signs
+            .map(|s| Vector3::new(x, y, height) + rotation * half.component_mul(&s))
+            .collect()
     }
 
     #[test]
     fn every_card_starts_wholly_above_the_one_before_it() {
         for k in 0..50 {
-            let tilted = Start { tilt_deg: Range::new(0.0, 90.0), ..Start::default() };
+            let tilted = Start {
+                tilt_deg: Range::new(0.0, 90.0),
+                ..Start::default()
+            };
             let objects = stacked(k, &tilted, cards(12, [0.2, 0.08])).unwrap();
             let mut top = 0.0;
             for object in &objects {
                 let z = || corners(object).into_iter().map(|c| c.z);
                 let gap = z().fold(f64::INFINITY, f64::min) - top;
-                assert!((0.005 - 1e-12..=0.02 + 1e-12).contains(&gap), "scene {k}: gap {gap}");
+                assert!(
+                    (0.005 - 1e-12..=0.02 + 1e-12).contains(&gap),
+                    "scene {k}: gap {gap}"
+                );
                 top = z().fold(0.0, f64::max);
             }
         }
@@ -209,8 +270,15 @@ mod tests {
     #[test]
     fn every_card_starts_between_the_walls() {
         for k in 0..200 {
-            for corner in stacked(k, &Start::default(), cards(5, [0.25, 0.2])).unwrap().iter().flat_map(corners) {
-                assert!(corner.x.abs() <= 0.2 + 1e-12 && corner.y.abs() <= 0.15 + 1e-12, "scene {k}: {corner}");
+            for corner in stacked(k, &Start::default(), cards(5, [0.25, 0.2]))
+                .unwrap()
+                .iter()
+                .flat_map(corners)
+            {
+                assert!(
+                    corner.x.abs() <= 0.2 + 1e-12 && corner.y.abs() <= 0.15 + 1e-12,
+                    "scene {k}: {corner}"
+                );
             }
         }
     }
@@ -224,7 +292,9 @@ mod tests {
 
     #[test]
     fn a_card_that_fits_no_way_is_told() {
-        let told = stacked(0, &Start::default(), cards(2, [0.5, 0.31])).unwrap_err().to_string();
+        let told = stacked(0, &Start::default(), cards(2, [0.5, 0.31]))
+            .unwrap_err()
+            .to_string();
         let expected = "objects[0].size: \"b0\", 0.500 x 0.310 m, does not fit between the walls of \"tray\", 0.400 x 0.300 m: \
                         expected a smaller object (scene.scale) or a larger surface";
         assert_eq!(told, expected);
@@ -232,8 +302,13 @@ mod tests {
 
     /// Half extents of the level body, turned as it would lie down.
     fn lying(object: &Object) -> Vector3<f64> {
-        let Placement::Drop { rotation, .. } = object.placement else { panic!("not dropped") };
-        half_extent(&level(&rotation), &SettleOptions::default().half_body(object))
+        let Placement::Drop { rotation, .. } = object.placement else {
+            panic!("not dropped")
+        };
+        half_extent(
+            &level(&rotation),
+            &SettleOptions::default().half_body(object),
+        )
     }
 
     #[test]
@@ -241,7 +316,10 @@ mod tests {
         for k in 0..200 {
             for object in stacked(k, &Start::default(), cards(5, [0.31, 0.1])).unwrap() {
                 let half = lying(&object);
-                assert!(half.x <= 0.2 + 1e-12 && half.y <= 0.15 + 1e-12, "scene {k}: {half}");
+                assert!(
+                    half.x <= 0.2 + 1e-12 && half.y <= 0.15 + 1e-12,
+                    "scene {k}: {half}"
+                );
             }
         }
     }
@@ -251,11 +329,21 @@ mod tests {
         for k in 0..20 {
             // So wide that it does not fit along the diagonal, which a narrow one does.
             let objects = stacked(k, &Start::default(), cards(3, [0.4, 0.28])).unwrap();
-            objects.iter().for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
-            objects.iter().flat_map(corners).for_each(|c| assert!(c.x.abs() <= 0.2 + 1e-12, "scene {k}: {c}"));
+            objects
+                .iter()
+                .for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
+            objects
+                .iter()
+                .flat_map(corners)
+                .for_each(|c| assert!(c.x.abs() <= 0.2 + 1e-12, "scene {k}: {c}"));
         }
-        let one_way = Start { yaw_deg: Range::fixed(30.0), ..Start::default() };
+        let one_way = Start {
+            yaw_deg: Range::fixed(30.0),
+            ..Start::default()
+        };
         assert!(stacked(0, &one_way, cards(1, [0.4, 0.28])).is_err());
-        assert!(one_way.has_room([0.4, 0.3], [0.4, 0.05]) && !one_way.has_room([0.4, 0.3], [0.4, 0.28]));
+        assert!(
+            one_way.has_room([0.4, 0.3], [0.4, 0.05]) && !one_way.has_room([0.4, 0.3], [0.4, 0.28])
+        );
     }
 }

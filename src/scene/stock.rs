@@ -14,7 +14,11 @@ impl From<&Asset> for Choice {
         Self {
             asset: asset.name.clone(),
             photo_sizes: asset.photos.iter().map(|photo| photo.size).collect(),
-            photo_outlines: asset.photos.iter().map(|photo| prism(&photo.outline_uv, photo.size)).collect(),
+            photo_outlines: asset
+                .photos
+                .iter()
+                .map(|photo| prism(&photo.outline_uv, photo.size))
+                .collect(),
             thickness: asset.thickness,
             mass: asset.mass,
         }
@@ -30,6 +34,11 @@ impl Look {
             Some(i) => Some(asset.photos.get(i)?.texture.clone()),
             None => None,
         };
-        Some(Self { class: asset.class, texture: photo.texture.clone(), back, outline_uv: photo.outline_uv.clone() })
+        Some(Self {
+            class: asset.class,
+            texture: photo.texture.clone(),
+            back,
+            outline_uv: photo.outline_uv.clone(),
+        })
     }
 }

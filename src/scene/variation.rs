@@ -25,7 +25,13 @@ pub enum Source {
 
 impl Source {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Colour, Self::Viewpoint, Self::Photo, Self::Light, Self::Selection];
+    pub const ALL: [Self; 5] = [
+        Self::Colour,
+        Self::Viewpoint,
+        Self::Photo,
+        Self::Light,
+        Self::Selection,
+    ];
 }
 
 /// Choices of objects where they repeat (the paper's 50).
@@ -43,28 +49,67 @@ pub struct Ablation {
 impl Ablation {
     /// The paper's datasets, in its order.
     pub const PAPER: [Self; 7] = [
-        Self { name: "all", off: &[] },
-        Self { name: "original_colour", off: &[Source::Colour] },
-        Self { name: "single_viewpoint", off: &[Source::Viewpoint] },
-        Self { name: "single_photo", off: &[Source::Photo] },
-        Self { name: "single_light", off: &[Source::Light] },
-        Self { name: "repeat_selections", off: &[Source::Selection] },
-        Self { name: "all_off", off: &Source::ALL },
+        Self {
+            name: "all",
+            off: &[],
+        },
+        Self {
+            name: "original_colour",
+            off: &[Source::Colour],
+        },
+        Self {
+            name: "single_viewpoint",
+            off: &[Source::Viewpoint],
+        },
+        Self {
+            name: "single_photo",
+            off: &[Source::Photo],
+        },
+        Self {
+            name: "single_light",
+            off: &[Source::Light],
+        },
+        Self {
+            name: "repeat_selections",
+            off: &[Source::Selection],
+        },
+        Self {
+            name: "all_off",
+            off: &Source::ALL,
+        },
     ];
 }
 
 impl Recipe {
     /// The recipe with its switches taken at their word: nothing is `off`, and what was does not vary.
     pub fn narrowed(&self) -> Self {
-        self.off.iter().fold(Self { off: Vec::new(), ..self.clone() }, |recipe, source| recipe.without(*source))
+        self.off.iter().fold(
+            Self {
+                off: Vec::new(),
+                ..self.clone()
+            },
+            |recipe, source| recipe.without(*source),
+        )
     }
 
     fn without(self, source: Source) -> Self {
         match source {
-            Source::Colour => Self { grade: GradeRanges::UNCHANGED, ..self },
-            Source::Viewpoint => Self { viewpoints: Limit::First(1), ..self },
-            Source::Photo => Self { photos: Limit::First(1), ..self },
-            Source::Selection => Self { selections: Selections::Of(REPEATED), ..self },
+            Source::Colour => Self {
+                grade: GradeRanges::UNCHANGED,
+                ..self
+            },
+            Source::Viewpoint => Self {
+                viewpoints: Limit::First(1),
+                ..self
+            },
+            Source::Photo => Self {
+                photos: Limit::First(1),
+                ..self
+            },
+            Source::Selection => Self {
+                selections: Selections::Of(REPEATED),
+                ..self
+            },
             Source::Light => Self {
                 lights: self.lights.iter().map(LightRanges::still).collect(),
                 ambient: self.ambient.middle(),
@@ -78,8 +123,11 @@ impl Recipe {
 
 impl GradeRanges {
     /// Colours as they are in the photo.
-    pub const UNCHANGED: Self =
-        Self { hue_deg: Range::fixed(0.0), saturation: Range::fixed(1.0), value: Range::fixed(1.0) };
+    pub const UNCHANGED: Self = Self {
+        hue_deg: Range::fixed(0.0),
+        saturation: Range::fixed(1.0),
+        value: Range::fixed(1.0),
+    };
 }
 
 impl EnvironmentRanges {
@@ -114,13 +162,20 @@ mod tests {
     use std::collections::BTreeSet;
 
     fn scenes(off: &[Source]) -> Vec<Scene> {
-        let recipe = Recipe { off: off.to_vec(), ..Recipe::default() };
+        let recipe = Recipe {
+            off: off.to_vec(),
+            ..Recipe::default()
+        };
         let camera = CameraSource::Rectangle {
             corners_px: [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]],
             photo: [60, 40],
             focal_px: Some(55.0),
         };
-        let place = |name: &str| Background { name: name.into(), size: [0.6, 0.4], camera };
+        let place = |name: &str| Background {
+            name: name.into(),
+            size: [0.6, 0.4],
+            camera,
+        };
         let choice = |i| Choice {
             asset: format!("b{i}"),
             photo_sizes: vec![[0.2, 0.07]; 3],
@@ -129,18 +184,30 @@ mod tests {
             mass: 0.03,
         };
         let stock: Vec<Choice> = (0..9).map(choice).collect();
-        (0..120).map(|k| recipe.scene(5, k, &[place("a"), place("b")], &stock).unwrap()).collect()
+        (0..120)
+            .map(|k| {
+                recipe
+                    .scene(5, k, &[place("a"), place("b")], &stock)
+                    .unwrap()
+            })
+            .collect()
     }
 
     /// The scene with everything that a source decides set to the same.
     fn apart_from(source: Source, mut scene: Scene) -> Scene {
         match source {
-            Source::Colour => scene.objects.iter_mut().for_each(|object| object.grade = Default::default()),
+            Source::Colour => scene
+                .objects
+                .iter_mut()
+                .for_each(|object| object.grade = Default::default()),
             Source::Viewpoint => scene.plate.clear(),
             Source::Photo => scene.objects.iter_mut().for_each(|object| object.photo = 0),
             Source::Light => {
                 let size = scene.lights[0].size;
-                scene.lights[0] = crate::scene::AreaLight { size, ..scenes(&[])[0].lights[0] };
+                scene.lights[0] = crate::scene::AreaLight {
+                    size,
+                    ..scenes(&[])[0].lights[0]
+                };
                 scene.ambient = Default::default();
                 scene.exposure = Default::default();
             }
@@ -157,7 +224,11 @@ mod tests {
             assert_ne!(off, all, "{source:?} changes nothing");
             // Choices of objects are the same in the first 50 scenes, where none repeats yet.
             for (a, b) in all.iter().zip(&off).take(REPEATED as usize) {
-                assert_eq!(apart_from(source, a.clone()), apart_from(source, b.clone()), "{source:?}");
+                assert_eq!(
+                    apart_from(source, a.clone()),
+                    apart_from(source, b.clone()),
+                    "{source:?}"
+                );
             }
         }
     }
@@ -165,20 +236,39 @@ mod tests {
     #[test]
     fn what_is_off_does_not_vary() {
         let off = scenes(&Source::ALL);
-        let distinct = |of: &dyn Fn(&Scene) -> String| off.iter().map(of).collect::<BTreeSet<_>>().len();
+        let distinct =
+            |of: &dyn Fn(&Scene) -> String| off.iter().map(of).collect::<BTreeSet<_>>().len();
         assert_eq!(distinct(&|s| s.plate.clone()), 1);
-        assert_eq!(distinct(&|s| format!("{:?} {:?}", s.lights[0].position, s.exposure)), 1);
-        let things = |s: &Scene| s.objects.iter().map(|o| (o.asset.clone(), o.photo)).collect::<Vec<_>>();
+        assert_eq!(
+            distinct(&|s| format!("{:?} {:?}", s.lights[0].position, s.exposure)),
+            1
+        );
+        let things = |s: &Scene| {
+            s.objects
+                .iter()
+                .map(|o| (o.asset.clone(), o.photo))
+                .collect::<Vec<_>>()
+        };
         assert_eq!(distinct(&|s| format!("{:?}", things(s))), REPEATED as usize);
-        assert!(off.iter().flat_map(|s| &s.objects).all(|o| o.photo == 0 && o.grade == Default::default()));
-        assert!(distinct(&|s| format!("{:?}", s.lights[0].size)) > 100 && distinct(&|s| format!("{s:?}")) == 120);
+        assert!(
+            off.iter()
+                .flat_map(|s| &s.objects)
+                .all(|o| o.photo == 0 && o.grade == Default::default())
+        );
+        assert!(
+            distinct(&|s| format!("{:?}", s.lights[0].size)) > 100
+                && distinct(&|s| format!("{s:?}")) == 120
+        );
     }
 
     #[test]
     fn a_recipe_without_switches_is_its_narrowed_self() {
         let recipe = Recipe::default();
         assert_eq!(recipe.narrowed(), recipe);
-        let off = Recipe { off: Source::ALL.to_vec(), ..recipe };
+        let off = Recipe {
+            off: Source::ALL.to_vec(),
+            ..recipe
+        };
         assert_eq!(off.narrowed().narrowed(), off.narrowed());
     }
 }

@@ -20,8 +20,10 @@ struct Column {
 /// As [`Drop::fall`].
 pub(super) fn fall(drop: &Drop) -> Result<Fall> {
     let columns = level::columns(drop.scene, drop.options);
-    let mut columns: Vec<Column> =
-        columns.into_iter().map(|members| Column::of(drop, members)).collect::<Result<_>>()?;
+    let mut columns: Vec<Column> = columns
+        .into_iter()
+        .map(|members| Column::of(drop, members))
+        .collect::<Result<_>>()?;
     while let Some((i, j)) = first_that_meet(&columns) {
         let mut members = columns.swap_remove(j).members;
         members.append(&mut columns[i].members);
@@ -47,18 +49,28 @@ fn alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> {
     let reach = options.half_body(&scene.objects[i]).norm();
     let [x, y] = [pose.translation.x, pose.translation.y];
     let swept = [x, y].map(|at| [at - reach, at + reach]);
-    Some(Fall { poses: vec![pose], rests: true, swept, ..Fall::default() })
+    Some(Fall {
+        poses: vec![pose],
+        rests: true,
+        swept,
+        ..Fall::default()
+    })
 }
 
 /// The first two columns whose rooms overlap, in order. What is not a number overlaps all.
 fn first_that_meet(columns: &[Column]) -> Option<(usize, usize)> {
-    let apart = |a: &Fall, b: &Fall| (0..2).any(|i| a.swept[i][1] < b.swept[i][0] || b.swept[i][1] < a.swept[i][0]);
+    let apart = |a: &Fall, b: &Fall| {
+        (0..2).any(|i| a.swept[i][1] < b.swept[i][0] || b.swept[i][1] < a.swept[i][0])
+    };
     let mut pairs = (0..columns.len()).flat_map(|i| (i + 1..columns.len()).map(move |j| (i, j)));
     pairs.find(|&(i, j)| !apart(&columns[i].fall, &columns[j].fall))
 }
 
 fn together(columns: Vec<Column>) -> Fall {
-    let mut all = Fall { rests: true, ..Fall::default() };
+    let mut all = Fall {
+        rests: true,
+        ..Fall::default()
+    };
     let mut poses = Vec::new();
     for Column { members, fall } in columns {
         poses.extend(members.into_iter().zip(fall.poses));
@@ -69,7 +81,11 @@ fn together(columns: Vec<Column>) -> Fall {
     }
     poses.sort_by_key(|(i, _)| *i);
     all.poses = poses.into_iter().map(|(_, pose)| pose).collect();
-    all.samples.sort_by(|a, b| a.seconds.total_cmp(&b.seconds).then(a.object.cmp(&b.object)));
+    all.samples.sort_by(|a, b| {
+        a.seconds
+            .total_cmp(&b.seconds)
+            .then(a.object.cmp(&b.object))
+    });
     all
 }
 
@@ -86,7 +102,14 @@ mod tests {
         heights: &'a [f64],
         allowance: &'a Allowance,
     ) -> Drop<'a> {
-        Drop { scene, options, heights, sample_every: 0, finer: 0, allowance }
+        Drop {
+            scene,
+            options,
+            heights,
+            sample_every: 0,
+            finer: 0,
+            allowance,
+        }
     }
 
     fn heights(scene: &Scene) -> Vec<f64> {
@@ -94,18 +117,30 @@ mod tests {
             Placement::Drop { height, .. } => *height,
             Placement::At(_) => 0.0,
         };
-        scene.objects.iter().map(|object| height(&object.placement)).collect()
+        scene
+            .objects
+            .iter()
+            .map(|object| height(&object.placement))
+            .collect()
     }
 
     #[test]
     fn columns_apart_end_as_if_each_were_the_only_one() {
-        let mut scene = falling(&[([-0.6, 0.0], 0.05), ([-0.62, 0.0], 0.1), ([0.6, 0.1], 0.05), ([0.6, 0.12], 0.2)]);
+        let mut scene = falling(&[
+            ([-0.6, 0.0], 0.05),
+            ([-0.62, 0.0], 0.1),
+            ([0.6, 0.1], 0.05),
+            ([0.6, 0.12], 0.2),
+        ]);
         scene.surface.size = [2.0, 1.0];
         let (options, heights) = (SettleOptions::default(), heights(&scene));
         let allowance = Allowance::new(options.most_work);
         let drop = drop(&scene, &options, &heights, &allowance);
         let of = |members: &[usize]| drop.fall(members).unwrap().poses;
-        assert_eq!(fall(&drop).unwrap().poses, [of(&[0, 1]), of(&[2, 3])].concat());
+        assert_eq!(
+            fall(&drop).unwrap().poses,
+            [of(&[0, 1]), of(&[2, 3])].concat()
+        );
     }
 
     #[test]
@@ -115,13 +150,20 @@ mod tests {
         for (i, object) in scene.objects.iter_mut().enumerate() {
             let side = if i % 2 == 0 { -0.12 } else { 0.12 };
             let rotation = crate::geom::UnitQuaternion::from_euler_angles(0.0, 1.4, 0.0);
-            object.placement = Placement::Drop { above: [side, 0.0], height: 0.15 + 0.12 * i as f64, rotation };
+            object.placement = Placement::Drop {
+                above: [side, 0.0],
+                height: 0.15 + 0.12 * i as f64,
+                rotation,
+            };
             (object.size, object.thickness) = ([0.2, 0.08], 0.01);
         }
         let (options, heights) = (SettleOptions::default(), heights(&scene));
         assert_eq!(level::columns(&scene, &options).len(), 2);
         let allowance = Allowance::new(options.most_work);
         let drop = drop(&scene, &options, &heights, &allowance);
-        assert_eq!(fall(&drop).unwrap().poses, drop.fall(&(0..8).collect::<Vec<_>>()).unwrap().poses);
+        assert_eq!(
+            fall(&drop).unwrap().poses,
+            drop.fall(&(0..8).collect::<Vec<_>>()).unwrap().poses
+        );
     }
 }

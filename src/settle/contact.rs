@@ -20,42 +20,81 @@ pub(super) struct Contact {
 }
 
 /// All contacts of bodies that fell: with the room, and of the pairs that touch; what is nearer than `reach` (metres) does.
-pub(super) fn contacts(solids: &[Solid], touching: &[Touch], surface: [f64; 2], reach: f64) -> Vec<Contact> {
+pub(super) fn contacts(
+    solids: &[Solid],
+    touching: &[Touch],
+    surface: [f64; 2],
+    reach: f64,
+) -> Vec<Contact> {
     let fell = (0..solids.len()).filter(|&i| solids[i].falls);
     let with_room = fell.flat_map(|i| with_room(i, &solids[i], surface, reach));
-    with_room.chain(touching.iter().flat_map(|touch| of_pair(solids, touch, reach))).collect()
+    with_room
+        .chain(
+            touching
+                .iter()
+                .flat_map(|touch| of_pair(solids, touch, reach)),
+        )
+        .collect()
 }
 
 /// Contacts with the floor and the walls.
 fn with_room(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> Vec<Contact> {
     let [x, y] = surface.map(|side| side / 2.0);
-    let planes =
-        [(Vector3::z(), 0.0), (Vector3::x(), -x), (-Vector3::x(), -x), (Vector3::y(), -y), (-Vector3::y(), -y)];
+    let planes = [
+        (Vector3::z(), 0.0),
+        (Vector3::x(), -x),
+        (-Vector3::x(), -x),
+        (Vector3::y(), -y),
+        (-Vector3::y(), -y),
+    ];
     let at = |(normal, plane): (Vector3<f64>, f64)| {
-        let touching = solid.corners().filter(move |corner| corner.dot(&normal) - plane < reach);
-        touching.map(move |point| Contact { body, by: None, point, normal, rough: normal.z > 0.0 })
+        let touching = solid
+            .corners()
+            .filter(move |corner| corner.dot(&normal) - plane < reach);
+        touching.map(move |point| Contact {
+            body,
+            by: None,
+            point,
+            normal,
+            rough: normal.z > 0.0,
+        })
     };
     planes.into_iter().flat_map(at).collect()
 }
 
 /// Contacts of two bodies: the corners of what their faces, edges or corners that are turned to each other share.
 fn of_pair(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
-    let Touch { pair: [i, j], towards, .. } = *touch;
+    let Touch {
+        pair: [i, j],
+        towards,
+        ..
+    } = *touch;
     let (a, b) = (&solids[i], &solids[j]);
     let (u, v) = across(&towards);
-    let [near_a, near_b] = [(a, towards), (b, -towards)].map(|(solid, towards)| nearest(solid, &towards, reach));
+    let [near_a, near_b] =
+        [(a, towards), (b, -towards)].map(|(solid, towards)| nearest(solid, &towards, reach));
     let height = (near_a.height - near_b.height) / 2.0;
-    let [ring_a, ring_b] =
-        [near_a, near_b].map(|near| hull(near.corners.iter().map(|p| [p.dot(&u), p.dot(&v)].into())));
+    let [ring_a, ring_b] = [near_a, near_b]
+        .map(|near| hull(near.corners.iter().map(|p| [p.dot(&u), p.dot(&v)].into())));
     let shared = shared(&ring_a, &ring_b, reach);
     let point = |p: Vector2<f64>| u * p.x + v * p.y + towards * height;
-    let contact = |p| Contact { body: i, by: Some(j), point: point(p), normal: -towards, rough: true };
+    let contact = |p| Contact {
+        body: i,
+        by: Some(j),
+        point: point(p),
+        normal: -towards,
+        rough: true,
+    };
     shared.into_iter().map(contact).collect()
 }
 
 /// Two unit vectors across another one.
 pub(super) fn across(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let helper = if direction.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
+    let helper = if direction.x.abs() < 0.6 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
     let u = helper.cross(direction).normalize();
     (u, direction.cross(&u))
 }
@@ -69,8 +108,17 @@ struct Nearest {
 
 /// The corners that lie farthest in a direction, to `reach`.
 fn nearest(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Nearest {
-    let height = solid.corners().map(|corner| corner.dot(towards)).fold(f64::NEG_INFINITY, f64::max);
-    Nearest { height, corners: solid.corners().filter(|corner| corner.dot(towards) > height - reach).collect() }
+    let height = solid
+        .corners()
+        .map(|corner| corner.dot(towards))
+        .fold(f64::NEG_INFINITY, f64::max);
+    Nearest {
+        height,
+        corners: solid
+            .corners()
+            .filter(|corner| corner.dot(towards) > height - reach)
+            .collect(),
+    }
 }
 
 /// Twice the area of a triangle, above 0 where it turns left.
@@ -92,7 +140,9 @@ fn hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
     let chain = |points: &mut dyn Iterator<Item = &Vector2<f64>>| {
         let mut chain: Vec<Vector2<f64>> = Vec::new();
         for p in points {
-            while chain.len() > 1 && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], p) <= 0.0 {
+            while chain.len() > 1
+                && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], p) <= 0.0
+            {
                 chain.pop();
             }
             chain.push(*p);
@@ -114,7 +164,11 @@ fn shared(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vector2<f64
 
 /// The sides of a ring; one of two points, none of one.
 fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
-    let count = if ring.len() < 3 { ring.len().saturating_sub(1) } else { ring.len() };
+    let count = if ring.len() < 3 {
+        ring.len().saturating_sub(1)
+    } else {
+        ring.len()
+    };
     (0..count).map(|i| [ring[i], ring[(i + 1) % ring.len()]])
 }
 
@@ -150,7 +204,12 @@ mod tests {
         let rotation = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
         let half = Vector3::new(0.1, 0.04, 0.0025);
         let outline = rectangle(half.x, half.y);
-        Solid { world_from_body: Pose::from_parts(at.into(), rotation), half, outline, falls: true }
+        Solid {
+            world_from_body: Pose::from_parts(at.into(), rotation),
+            half,
+            outline,
+            falls: true,
+        }
     }
 
     fn all(solids: &[Solid]) -> Vec<Contact> {
@@ -159,46 +218,76 @@ mod tests {
 
     /// Contacts of two plates with each other, the second over the first.
     fn between(lower: Solid, upper: Solid) -> Vec<Contact> {
-        all(&[lower, upper]).into_iter().filter(|contact| contact.by.is_some()).collect()
+        all(&[lower, upper])
+            .into_iter()
+            .filter(|contact| contact.by.is_some())
+            .collect()
     }
 
     /// Least and greatest x and y of contacts.
     fn spread(contacts: &[Contact]) -> [[f64; 2]; 2] {
         [0, 1].map(|axis| {
             let along = contacts.iter().map(|contact| contact.point[axis]);
-            along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| [l.min(v), h.max(v)])
+            along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| {
+                [l.min(v), h.max(v)]
+            })
         })
     }
 
     fn is_near(found: [[f64; 2]; 2], expected: [[f64; 2]; 2]) -> bool {
-        found.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-9)
+        found
+            .iter()
+            .flatten()
+            .zip(expected.iter().flatten())
+            .all(|(a, b)| (a - b).abs() < 1e-9)
     }
 
     #[test]
     fn a_plate_on_the_floor_touches_it_with_four_corners() {
         let found = all(&[plate([0.0, 0.0, 0.0027], [0.0; 3])]);
-        assert!(found.len() == 4 && found.iter().all(|c| c.normal == Vector3::z() && c.rough && c.by.is_none()));
+        assert!(
+            found.len() == 4
+                && found
+                    .iter()
+                    .all(|c| c.normal == Vector3::z() && c.rough && c.by.is_none())
+        );
         let beside = all(&[plate([0.4, 0.0, 0.1], [0.0; 3])]);
         assert!(beside.len() == 4 && beside.iter().all(|c| c.normal == -Vector3::x() && !c.rough));
     }
 
     #[test]
     fn plates_across_each_other_share_the_square_in_the_middle() {
-        let crossed = between(plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, 0.0054], [0.0, 0.0, FRAC_PI_2]));
+        let crossed = between(
+            plate([0.0; 3], [0.0; 3]),
+            plate([0.0, 0.0, 0.0054], [0.0, 0.0, FRAC_PI_2]),
+        );
         assert!(is_near(spread(&crossed), [[-0.04, 0.04]; 2]), "{crossed:?}");
         // The second is pushed up, by the first.
-        assert!(crossed.iter().all(|c| c.body == 1 && c.by == Some(0) && (c.normal - Vector3::z()).norm() < 1e-9));
+        assert!(
+            crossed
+                .iter()
+                .all(|c| c.body == 1 && c.by == Some(0) && (c.normal - Vector3::z()).norm() < 1e-9)
+        );
         assert!(crossed.iter().all(|c| (c.point.z - 0.0027).abs() < 1e-9));
     }
 
     #[test]
     fn an_edge_on_a_face_touches_along_a_line() {
         let upright = plate([0.0, 0.01, 0.0427], [FRAC_PI_2, 0.0, 0.0]);
-        assert!(is_near(spread(&between(plate([0.0; 3], [0.0; 3]), upright)), [[-0.1, 0.1], [0.0075, 0.0125]]));
+        assert!(is_near(
+            spread(&between(plate([0.0; 3], [0.0; 3]), upright)),
+            [[-0.1, 0.1], [0.0075, 0.0125]]
+        ));
         let height = 0.04 * libm::sin(FRAC_PI_4) + 0.0025 * libm::cos(FRAC_PI_4) + 0.0027;
-        let tilted = between(plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, height], [FRAC_PI_4, 0.0, 0.0]));
+        let tilted = between(
+            plate([0.0; 3], [0.0; 3]),
+            plate([0.0, 0.0, height], [FRAC_PI_4, 0.0, 0.0]),
+        );
         let [x, y] = spread(&tilted);
-        assert!(is_near([x, [0.0; 2]], [[-0.1, 0.1], [0.0; 2]]) && (y[1] - y[0]).abs() < 1e-9, "{tilted:?}");
+        assert!(
+            is_near([x, [0.0; 2]], [[-0.1, 0.1], [0.0; 2]]) && (y[1] - y[0]).abs() < 1e-9,
+            "{tilted:?}"
+        );
     }
 
     #[test]
@@ -209,23 +298,48 @@ mod tests {
         let upper = plate([0.0, 0.0, 2.0 * top + 0.0004], [FRAC_PI_4, 0.0, FRAC_PI_2]);
         let found = between(lower, upper);
         let [x, y] = spread(&found);
-        assert!(!found.is_empty() && x[1] - x[0] < 1e-9 && y[1] - y[0] < 1e-9, "{found:?}");
+        assert!(
+            !found.is_empty() && x[1] - x[0] < 1e-9 && y[1] - y[0] < 1e-9,
+            "{found:?}"
+        );
         assert!(found.iter().all(|c| (c.point.z - top - 0.0002).abs() < 1e-9 && (c.normal.z - 1.0).abs() < 1e-9));
     }
 
     #[test]
     fn what_is_farther_than_the_reach_does_not_touch() {
-        assert!(between(plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, 0.0061], [0.0; 3])).is_empty());
-        let [a, b] =
-            [plate([0.0; 3], [0.0; 3]), plate([0.0, 0.0, 0.0054], [0.0; 3])].map(|p| Solid { falls: false, ..p });
+        assert!(
+            between(
+                plate([0.0; 3], [0.0; 3]),
+                plate([0.0, 0.0, 0.0061], [0.0; 3])
+            )
+            .is_empty()
+        );
+        let [a, b] = [
+            plate([0.0; 3], [0.0; 3]),
+            plate([0.0, 0.0, 0.0054], [0.0; 3]),
+        ]
+        .map(|p| Solid { falls: false, ..p });
         assert!(all(&[a, b]).is_empty());
     }
 
     #[test]
     fn a_hull_goes_round_once_and_leaves_out_what_is_inside() {
         let of = |points: &[[f64; 2]]| hull(points.iter().map(|&p| p.into())).len();
-        assert_eq!(of(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5], [0.5, 0.0]]), 4);
-        assert_eq!((of(&[[0.0, 0.0], [1.0, 1.0]]), of(&[[0.0, 0.0]]), of(&[])), (2, 1, 0));
+        assert_eq!(
+            of(&[
+                [0.0, 0.0],
+                [1.0, 0.0],
+                [1.0, 1.0],
+                [0.0, 1.0],
+                [0.5, 0.5],
+                [0.5, 0.0]
+            ]),
+            4
+        );
+        assert_eq!(
+            (of(&[[0.0, 0.0], [1.0, 1.0]]), of(&[[0.0, 0.0]]), of(&[])),
+            (2, 1, 0)
+        );
         assert_eq!(of(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]), 2);
     }
 }

@@ -10,7 +10,11 @@ pub(super) struct Envelope {
 impl Envelope {
     /// Zeros, with room from each row's first entry.
     pub(super) fn new(first: Vec<usize>) -> Self {
-        let rows = first.iter().enumerate().map(|(i, first)| vec![0.0; i + 1 - first]).collect();
+        let rows = first
+            .iter()
+            .enumerate()
+            .map(|(i, first)| vec![0.0; i + 1 - first])
+            .collect();
         Self { first, rows }
     }
 
@@ -33,7 +37,10 @@ impl Envelope {
             let (from, row) = (self.first[i], &self.rows[i]);
             b[i] /= row[i - from];
             let x = b[i];
-            b[from..i].iter_mut().zip(row).for_each(|(b, entry)| *b -= entry * x);
+            b[from..i]
+                .iter_mut()
+                .zip(row)
+                .for_each(|(b, entry)| *b -= entry * x);
         }
         b
     }
@@ -44,11 +51,16 @@ impl Envelope {
         let row = &mut rest[0];
         for j in from..i {
             let start = from.max(self.first[j]);
-            let known = dot(&row[start - from..j - from], &above[j][start - self.first[j]..j - self.first[j]]);
+            let known = dot(
+                &row[start - from..j - from],
+                &above[j][start - self.first[j]..j - self.first[j]],
+            );
             row[j - from] = (row[j - from] - known) / above[j][j - self.first[j]];
         }
         let (entries, diagonal) = row.split_at_mut(i - from);
-        diagonal[0] = (diagonal[0] - dot(entries, entries)).max(f64::MIN_POSITIVE).sqrt();
+        diagonal[0] = (diagonal[0] - dot(entries, entries))
+            .max(f64::MIN_POSITIVE)
+            .sqrt();
     }
 }
 
@@ -59,7 +71,12 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     for (a, b) in fours {
         (0..4).for_each(|k| sums[k] += a[k] * b[k]);
     }
-    sums.iter().sum::<f64>() + a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a * b).sum::<f64>()
+    sums.iter().sum::<f64>()
+        + a[rest..]
+            .iter()
+            .zip(&b[rest..])
+            .map(|(a, b)| a * b)
+            .sum::<f64>()
 }
 
 #[cfg(test)]
@@ -72,7 +89,9 @@ mod tests {
     fn a_solution_solves_its_equations() {
         let n = 40;
         let draws = Draws::new(1, 0);
-        let first: Vec<usize> = (0..n).map(|i| draws.below(&format!("first[{i}]"), i + 1)).collect();
+        let first: Vec<usize> = (0..n)
+            .map(|i| draws.below(&format!("first[{i}]"), i + 1))
+            .collect();
         let mut a = Envelope::new(first.clone());
         let mut whole = DMatrix::zeros(n, n);
         for i in 0..n {

@@ -21,7 +21,11 @@ pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
         thickness: 0.002 + 0.001 * (i % 10) as f64,
         mass: 0.02 + 0.002 * (i % 10) as f64,
     };
-    let recipe = Recipe { objects: Range::fixed(cards as f64), start: Start::default(), ..Recipe::default() };
+    let recipe = Recipe {
+        objects: Range::fixed(cards as f64),
+        start: Start::default(),
+        ..Recipe::default()
+    };
     recipe.scene(0, k, &[tray], &(0..20).map(choice).collect::<Vec<_>>())
 }
 
@@ -29,5 +33,7 @@ pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
 pub(crate) fn octagon([w, h]: [f64; 2]) -> Vec<[f64; 2]> {
     let (x, y) = (w / 2.0, h / 2.0);
     let half = [[x, -y / 2.0], [x, y / 2.0], [x / 2.0, y], [-x / 2.0, y]];
-    half.into_iter().chain(half.map(|[a, b]| [-a, -b])).collect()
+    half.into_iter()
+        .chain(half.map(|[a, b]| [-a, -b]))
+        .collect()
 }

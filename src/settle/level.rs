@@ -15,8 +15,12 @@ use crate::scene::{Object, Placement, Scene, SettleOptions, level};
 pub(super) fn alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Pose> {
     let bodies = leveled(scene, options);
     let straight_down = options.gravity[..2] == [0.0; 2];
-    let meets = bodies.iter().any(|other| !other.falls && reach_each_other(&bodies[i], other));
-    let squeezed = past_walls(&bodies[i], scene.surface.size).iter().any(|&d| d > 0.0);
+    let meets = bodies
+        .iter()
+        .any(|other| !other.falls && reach_each_other(&bodies[i], other));
+    let squeezed = past_walls(&bodies[i], scene.surface.size)
+        .iter()
+        .any(|&d| d > 0.0);
     (straight_down && !meets && !squeezed).then(|| rested_on(&bodies[i], 0.0))
 }
 
@@ -26,7 +30,11 @@ pub(super) fn columns(scene: &Scene, options: &SettleOptions) -> Vec<Vec<usize>>
     let bodies = leveled(scene, options);
     let mut columns: Vec<Vec<usize>> = Vec::new();
     for i in (0..bodies.len()).filter(|&i| bodies[i].falls) {
-        let meets = |column: &Vec<usize>| column.iter().any(|&j| reach_each_other(&bodies[i], &bodies[j]));
+        let meets = |column: &Vec<usize>| {
+            column
+                .iter()
+                .any(|&j| reach_each_other(&bodies[i], &bodies[j]))
+        };
         let (joined, mut apart): (Vec<_>, Vec<_>) = columns.into_iter().partition(meets);
         let mut column: Vec<usize> = joined.into_iter().flatten().chain([i]).collect();
         column.sort_unstable();
@@ -50,31 +58,51 @@ fn reach_each_other(a: &Solid, b: &Solid) -> bool {
 ///
 /// # Errors
 /// [`Allowance::take`].
-pub(super) fn flat(scene: &Scene, options: &SettleOptions, allowance: &Allowance) -> Result<Vec<Pose>> {
+pub(super) fn flat(
+    scene: &Scene,
+    options: &SettleOptions,
+    allowance: &Allowance,
+) -> Result<Vec<Pose>> {
     let mut bodies = leveled(scene, options);
-    let mut lying: Vec<Solid> = bodies.iter().filter(|solid| !solid.falls).map(upright_box).collect();
+    let mut lying: Vec<Solid> = bodies
+        .iter()
+        .filter(|solid| !solid.falls)
+        .map(upright_box)
+        .collect();
     let mut order: Vec<usize> = (0..bodies.len()).filter(|&i| bodies[i].falls).collect();
     order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
     for i in order {
         allowance.take(1 + lying.len() as u64)?;
         let solid = moved_in(&bodies[i], scene.surface.size);
         let below = lying.iter().filter(|other| footprints_meet(&solid, other));
-        let bottom = below.map(|other| other.center().z + other.half.z).fold(0.0, f64::max);
+        let bottom = below
+            .map(|other| other.center().z + other.half.z)
+            .fold(0.0, f64::max);
         bodies[i].world_from_body = rested_on(&solid, bottom);
         lying.push(bodies[i].clone());
     }
-    Ok(bodies.iter().filter(|solid| solid.falls).map(|solid| solid.world_from_body).collect())
+    Ok(bodies
+        .iter()
+        .filter(|solid| solid.falls)
+        .map(|solid| solid.world_from_body)
+        .collect())
 }
 
 /// The bodies, those that fall turned level where they start.
 fn leveled(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
     let pose = |object: &Object| match object.placement {
         Placement::At(pose) => pose,
-        Placement::Drop { above: [x, y], height, rotation } => {
-            Pose::from_parts([x, y, height].into(), level(&rotation))
-        }
+        Placement::Drop {
+            above: [x, y],
+            height,
+            rotation,
+        } => Pose::from_parts([x, y, height].into(), level(&rotation)),
     };
-    solids(scene, options, &scene.objects.iter().map(pose).collect::<Vec<_>>())
+    solids(
+        scene,
+        options,
+        &scene.objects.iter().map(pose).collect::<Vec<_>>(),
+    )
 }
 
 /// The pose with its underside at this height; that of a card at rest as it is.
@@ -130,19 +158,32 @@ mod tests {
 
     #[test]
     fn cards_that_may_touch_stand_in_one_column() {
-        let columns = |starts: &[([f64; 2], f64)]| columns(&falling(starts), &SettleOptions::default());
+        let columns =
+            |starts: &[([f64; 2], f64)]| columns(&falling(starts), &SettleOptions::default());
         assert_eq!(columns(&[([0.0, 0.0], 0.1), ([0.1, 0.0], 0.3)]), [[0, 1]]);
-        assert_eq!(columns(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3)]), [[0], [1]]);
-        assert_eq!(columns(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3), ([0.0, 0.0], 0.5)]), [[0, 1, 2]]);
+        assert_eq!(
+            columns(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3)]),
+            [[0], [1]]
+        );
+        assert_eq!(
+            columns(&[([-0.15, 0.0], 0.1), ([0.15, 0.0], 0.3), ([0.0, 0.0], 0.5)]),
+            [[0, 1, 2]]
+        );
         assert!(columns(&[]).is_empty());
     }
 
     #[test]
     fn a_card_that_may_touch_a_wall_or_a_card_at_rest_is_not_alone() {
-        let (mut scene, options) = (falling(&[([0.29, 0.0], 0.1), ([-0.1, 0.0], 0.1)]), SettleOptions::default());
+        let (mut scene, options) = (
+            falling(&[([0.29, 0.0], 0.1), ([-0.1, 0.0], 0.1)]),
+            SettleOptions::default(),
+        );
         // Its middle is over the surface, but it would reach through a wall.
         assert!(alone(&scene, &options, 0).is_none() && alone(&scene, &options, 1).is_some());
-        let tilted = SettleOptions { gravity: [1.0, 0.0, -9.0], ..options };
+        let tilted = SettleOptions {
+            gravity: [1.0, 0.0, -9.0],
+            ..options
+        };
         assert!(alone(&scene, &tilted, 1).is_none());
         scene.objects[0].placement = Placement::At(Pose::translation(-0.2, 0.0, 0.01));
         assert!(alone(&scene, &options, 1).is_none());
@@ -154,14 +195,22 @@ mod tests {
             let (scene, options) = (dropped(k, 15), SettleOptions::default());
             // 15 objects and 105 pairs.
             let allowance = Allowance::new(120);
-            let lying = solids(&scene, &options, &flat(&scene, &options, &allowance).unwrap());
+            let lying = solids(
+                &scene,
+                &options,
+                &flat(&scene, &options, &allowance).unwrap(),
+            );
             assert!(allowance.is_spent());
             assert!(deepest(&lying, &touching(&lying, 0.0), scene.surface.size) < 1e-12);
             for (i, solid) in lying.iter().enumerate() {
                 assert!(((solid.world_from_body * Vector3::z()).z.abs() - 1.0).abs() < 1e-12);
                 let bottom = solid.center().z - solid.half.z;
-                let holds = |other: &Solid| (other.center().z + other.half.z - bottom).abs() < 1e-12;
-                let held = lying.iter().enumerate().any(|(j, o)| j != i && holds(o) && footprints_meet(solid, o));
+                let holds =
+                    |other: &Solid| (other.center().z + other.half.z - bottom).abs() < 1e-12;
+                let held = lying
+                    .iter()
+                    .enumerate()
+                    .any(|(j, o)| j != i && holds(o) && footprints_meet(solid, o));
                 assert!(bottom.abs() < 1e-12 || held, "card {i} hangs at {bottom}");
             }
         }

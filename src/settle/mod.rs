@@ -80,9 +80,14 @@ impl Settled {
             Verdict::Escaped(ids) => format!("objects {ids:?} left the surface"),
             Verdict::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
             Verdict::Hanging(ids) => format!("objects {ids:?} hang in the air"),
-            Verdict::Exploded(share) => format!("energy rose by {:.1} % of the drop's in a step", share * 100.0),
+            Verdict::Exploded(share) => format!(
+                "energy rose by {:.1} % of the drop's in a step",
+                share * 100.0
+            ),
         };
-        Err(Error::Unsettled { what: format!("{what}, after {} tries", self.rejected.len() + 1) })
+        Err(Error::Unsettled {
+            what: format!("{what}, after {} tries", self.rejected.len() + 1),
+        })
     }
 }
 
@@ -101,7 +106,11 @@ pub fn settle(scene: Scene, options: &SettleOptions) -> Result<Settled> {
 ///
 /// # Errors
 /// As [`settle`].
-pub fn settle_traced(scene: Scene, options: &SettleOptions, every: usize) -> Result<(Settled, Vec<Sample>)> {
+pub fn settle_traced(
+    scene: Scene,
+    options: &SettleOptions,
+    every: usize,
+) -> Result<(Settled, Vec<Sample>)> {
     settle_within(scene, options, every, &Allowance::new(options.most_work))
 }
 
@@ -124,27 +133,76 @@ pub fn settle_within(
     let mut rejected = Vec::new();
     if !scene.objects.iter().any(is_dropped) {
         let (verdict, seconds, overlap, energy_rise) = (Verdict::Rested, 0.0, 0.0, 0.0);
-        return Ok((Settled { scene, verdict, rejected, seconds, overlap, energy_rise }, Vec::new()));
+        return Ok((
+            Settled {
+                scene,
+                verdict,
+                rejected,
+                seconds,
+                overlap,
+                energy_rise,
+            },
+            Vec::new(),
+        ));
     }
     let mut finer = 0;
     loop {
         let heights = start_heights(&scene, rejected.len());
-        let drop = Drop { scene: &scene, options, heights: &heights, sample_every: every, finer, allowance };
-        let Fall { poses, rests, seconds, energy_rise, samples, .. } = match options.mode {
+        let drop = Drop {
+            scene: &scene,
+            options,
+            heights: &heights,
+            sample_every: every,
+            finer,
+            allowance,
+        };
+        let Fall {
+            poses,
+            rests,
+            seconds,
+            energy_rise,
+            samples,
+            ..
+        } = match options.mode {
             SettleMode::Fall => columns::fall(&drop)?,
-            SettleMode::Flat => {
-                Fall { poses: level::flat(&scene, options, allowance)?, rests: true, ..Fall::default() }
-            }
+            SettleMode::Flat => Fall {
+                poses: level::flat(&scene, options, allowance)?,
+                rests: true,
+                ..Fall::default()
+            },
         };
         let end = with_poses(scene.clone(), &poses);
         let (verdict, overlap) = judge(&scene, &end, options, rests, energy_rise);
-        let last = verdict == Verdict::Rested || seconds == 0.0 || rejected.len() + 1 >= options.attempts as usize;
+        let last = verdict == Verdict::Rested
+            || seconds == 0.0
+            || rejected.len() + 1 >= options.attempts as usize;
         if last {
-            log::debug!("settle: {verdict:?} at try {}, {} of work", rejected.len() + 1, allowance.taken());
-            let scene = if verdict == Verdict::Rested { end } else { scene };
-            return Ok((Settled { scene, verdict, rejected, seconds, overlap, energy_rise }, samples));
+            log::debug!(
+                "settle: {verdict:?} at try {}, {} of work",
+                rejected.len() + 1,
+                allowance.taken()
+            );
+            let scene = if verdict == Verdict::Rested {
+                end
+            } else {
+                scene
+            };
+            return Ok((
+                Settled {
+                    scene,
+                    verdict,
+                    rejected,
+                    seconds,
+                    overlap,
+                    energy_rise,
+                },
+                samples,
+            ));
         }
-        log::debug!("settle: try {} ended badly: {verdict:?}", rejected.len() + 1);
+        log::debug!(
+            "settle: try {} ended badly: {verdict:?}",
+            rejected.len() + 1
+        );
         // What has sunk in needs stiffer contacts, which shorter steps bear; what has gained energy met too hard in one step,
         // and would again from most heights.
         let sank = overlap.is_finite() && overlap > most_overlap(&scene, options);
@@ -172,7 +230,12 @@ pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result
         return Ok(Vec::new());
     }
     let bodies = solids_at_rest(before, after, options);
-    Ok(support::hanging(before, options, &bodies, &overlap::touching(&bodies, reach(before))))
+    Ok(support::hanging(
+        before,
+        options,
+        &bodies,
+        &overlap::touching(&bodies, reach(before)),
+    ))
 }
 
 fn is_dropped(object: &Object) -> bool {
@@ -182,10 +245,16 @@ fn is_dropped(object: &Object) -> bool {
 fn check_starts(scene: &Scene) -> Result<()> {
     let [w, h] = scene.surface.size;
     for (i, object) in scene.objects.iter().enumerate() {
-        let Placement::Drop { above: [x, y], .. } = object.placement else { continue };
+        let Placement::Drop { above: [x, y], .. } = object.placement else {
+            continue;
+        };
         if x.abs() > w / 2.0 || y.abs() > h / 2.0 {
-            let what = format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin");
-            return Err(Error::value(format!("objects[{i}].placement.drop.above"), what));
+            let what =
+                format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin");
+            return Err(Error::value(
+                format!("objects[{i}].placement.drop.above"),
+                what,
+            ));
         }
     }
     Ok(())
@@ -207,7 +276,10 @@ fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
     if attempt == 0 {
         return heights;
     }
-    let (draws, most) = (Draws::new(RETRY_SEED, attempt as u64), MOST_RAISE * world::typical_length(scene));
+    let (draws, most) = (
+        Draws::new(RETRY_SEED, attempt as u64),
+        MOST_RAISE * world::typical_length(scene),
+    );
     let mut order: Vec<usize> = (0..heights.len()).collect();
     order.sort_by(|&a, &b| heights[a].total_cmp(&heights[b]));
     let mut raise = 0.0;
@@ -220,8 +292,13 @@ fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
 
 /// The scene with these poses for the objects that fall, in their order.
 fn with_poses(mut scene: Scene, poses: &[Pose]) -> Scene {
-    let falling = scene.objects.iter_mut().filter(|object| matches!(object.placement, Placement::Drop { .. }));
-    falling.zip(poses).for_each(|(object, pose)| object.placement = Placement::At(*pose));
+    let falling = scene
+        .objects
+        .iter_mut()
+        .filter(|object| matches!(object.placement, Placement::Drop { .. }));
+    falling
+        .zip(poses)
+        .for_each(|(object, pose)| object.placement = Placement::At(*pose));
     scene
 }
 
@@ -240,7 +317,13 @@ fn most_overlap(scene: &Scene, options: &SettleOptions) -> f64 {
 }
 
 /// The verdict on a fall, and the deepest overlap at its end.
-fn judge(start: &Scene, end: &Scene, options: &SettleOptions, rests: bool, energy_rise: f64) -> (Verdict, f64) {
+fn judge(
+    start: &Scene,
+    end: &Scene,
+    options: &SettleOptions,
+    rests: bool,
+    energy_rise: f64,
+) -> (Verdict, f64) {
     let bodies = solids_at_rest(start, end, options);
     let escaped = overlap::outside(&bodies, end.surface.size);
     if !escaped.is_empty() {
@@ -261,21 +344,38 @@ fn judge(start: &Scene, end: &Scene, options: &SettleOptions, rests: bool, energ
 }
 
 /// Whether bodies that lie still are held by what they lie on. Nothing is asked of what was laid without physics.
-fn supported(start: &Scene, options: &SettleOptions, bodies: &[Solid], touching: &[Touch]) -> Verdict {
+fn supported(
+    start: &Scene,
+    options: &SettleOptions,
+    bodies: &[Solid],
+    touching: &[Touch],
+) -> Verdict {
     if options.mode == SettleMode::Flat {
         return Verdict::Rested;
     }
     let hanging = support::hanging(start, options, bodies, touching);
-    if hanging.is_empty() { Verdict::Rested } else { Verdict::Hanging(hanging) }
+    if hanging.is_empty() {
+        Verdict::Rested
+    } else {
+        Verdict::Hanging(hanging)
+    }
 }
 
 /// The bodies at the end of a fall; those fell that fall at its start.
 fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
     let pose = |object: &Object| match object.placement {
         Placement::At(pose) => pose,
-        Placement::Drop { above: [x, y], height, rotation } => Pose::from_parts([x, y, height].into(), rotation),
+        Placement::Drop {
+            above: [x, y],
+            height,
+            rotation,
+        } => Pose::from_parts([x, y, height].into(), rotation),
     };
-    solids(start, options, &end.objects.iter().map(pose).collect::<Vec<_>>())
+    solids(
+        start,
+        options,
+        &end.objects.iter().map(pose).collect::<Vec<_>>(),
+    )
 }
 
 /// The bodies that stand for the objects at these poses, one for each object.
@@ -285,7 +385,11 @@ fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> Vec<Solid> 
         Solid {
             world_from_body: *pose,
             half,
-            outline: if object.outline.is_empty() { rectangle(half.x, half.y) } else { object.outline.clone() },
+            outline: if object.outline.is_empty() {
+                rectangle(half.x, half.y)
+            } else {
+                object.outline.clone()
+            },
             falls: matches!(object.placement, Placement::Drop { .. }),
         }
     };
@@ -314,7 +418,11 @@ mod tests {
         for (object, &(above, height)) in scene.objects.iter_mut().zip(starts) {
             let rotation = UnitQuaternion::from_euler_angles(0.1, -0.05, 0.3);
             (object.size, object.thickness, object.mass) = ([0.2, 0.08], 0.005, 0.03);
-            object.placement = Placement::Drop { above, height, rotation };
+            object.placement = Placement::Drop {
+                above,
+                height,
+                rotation,
+            };
         }
         scene
     }
@@ -326,7 +434,9 @@ mod tests {
     }
 
     fn pose(settled: &Settled, i: usize) -> Pose {
-        let Placement::At(pose) = settled.scene.objects[i].placement else { panic!("object {i} still falls") };
+        let Placement::At(pose) = settled.scene.objects[i].placement else {
+            panic!("object {i} still falls")
+        };
         pose
     }
 
@@ -361,30 +471,46 @@ mod tests {
             finer: 0,
             allowance: &allowance,
         };
-        let (closed, fall) = (pose(&settled(scene.clone()), 0), drop.fall(&[0]).unwrap().poses[0]);
+        let (closed, fall) = (
+            pose(&settled(scene.clone()), 0),
+            drop.fall(&[0]).unwrap().poses[0],
+        );
         assert!((closed.translation.vector - fall.translation.vector).norm() < 0.005);
         assert!(closed.rotation.angle_to(&fall.rotation) < 0.03);
     }
 
     #[test]
     fn a_stack_of_n_plates_rests_at_their_heights() {
-        let mut scene = falling(&[([0.0, 0.0], 0.01), ([0.0, 0.0], 0.02), ([0.0, 0.0], 0.03), ([0.0, 0.0], 0.04)]);
+        let mut scene = falling(&[
+            ([0.0, 0.0], 0.01),
+            ([0.0, 0.0], 0.02),
+            ([0.0, 0.0], 0.03),
+            ([0.0, 0.0], 0.04),
+        ]);
         for object in &mut scene.objects {
-            let Placement::Drop { rotation, .. } = &mut object.placement else { panic!("dropped") };
+            let Placement::Drop { rotation, .. } = &mut object.placement else {
+                panic!("dropped")
+            };
             *rotation = UnitQuaternion::identity();
         }
         let settled = settled(scene);
         for i in 0..4 {
             // Contacts push 0.2 mm before they touch, on either side.
             let (z, plates) = (pose(&settled, i).translation.z, i as f64 + 0.5);
-            assert!((z - 0.005 * plates).abs() < 0.0004 * (plates + 0.5), "plate {i} at {z}");
+            assert!(
+                (z - 0.005 * plates).abs() < 0.0004 * (plates + 0.5),
+                "plate {i} at {z}"
+            );
         }
     }
 
     #[test]
     fn a_card_at_rest_does_not_move_and_is_not_passed_through() {
         let mut scene = falling(&[([0.0, 0.0], 0.05), ([0.02, 0.0], 0.2)]);
-        let fixed = Pose::from_parts(Vector3::new(0.0, 0.0, 0.05).into(), UnitQuaternion::identity());
+        let fixed = Pose::from_parts(
+            Vector3::new(0.0, 0.0, 0.05).into(),
+            UnitQuaternion::identity(),
+        );
         scene.objects[0].placement = Placement::At(fixed);
         let settled = settled(scene);
         assert_eq!(pose(&settled, 0), fixed);
@@ -399,25 +525,40 @@ mod tests {
         for object in &mut large.objects {
             object.size = object.size.map(|x| 8.0 * x);
             object.thickness *= 8.0;
-            let Placement::Drop { above, height, .. } = &mut object.placement else { panic!("dropped") };
+            let Placement::Drop { above, height, .. } = &mut object.placement else {
+                panic!("dropped")
+            };
             (*above, *height) = (above.map(|x| 8.0 * x), 8.0 * *height);
         }
         let (small, large) = (settled(scene), settled(large));
         for i in 0..8 {
             let (a, b) = (pose(&small, i), pose(&large, i));
-            assert_eq!((a.translation.vector * 8.0, a.rotation), (b.translation.vector, b.rotation));
+            assert_eq!(
+                (a.translation.vector * 8.0, a.rotation),
+                (b.translation.vector, b.rotation)
+            );
         }
     }
 
     #[test]
     fn a_fall_that_is_cut_short_is_told_and_leaves_the_scene_falling() {
-        let options = SettleOptions { time_limit: 0.1, attempts: 4, ..Default::default() };
+        let options = SettleOptions {
+            time_limit: 0.1,
+            attempts: 4,
+            ..Default::default()
+        };
         let scene = dropped(0, 5);
         let settled = settle(scene.clone(), &options).unwrap();
-        assert_eq!((&settled.verdict, &settled.scene), (&Verdict::TimedOut, &scene));
+        assert_eq!(
+            (&settled.verdict, &settled.scene),
+            (&Verdict::TimedOut, &scene)
+        );
         assert_eq!(settled.rejected, vec![Verdict::TimedOut; 3]);
         let told = settled.into_scene().unwrap_err().to_string();
-        assert_eq!(told, "settle: something still moves after 0.1 s, after 4 tries");
+        assert_eq!(
+            told,
+            "settle: something still moves after 0.1 s, after 4 tries"
+        );
     }
 
     /// Closed form: on a slope of a a plate stays if tan a < mu, and else slides.
@@ -426,10 +567,24 @@ mod tests {
         let slid = |friction: f64| {
             let mut scene = falling(&[([-0.15, 0.0], 0.006)]);
             scene.surface.friction = friction;
-            scene.objects[0].placement =
-                Placement::Drop { above: [-0.15, 0.0], height: 0.004, rotation: UnitQuaternion::identity() };
-            let g = [9.81 * libm::sin(FRAC_PI_6), 0.0, -9.81 * libm::cos(FRAC_PI_6)];
-            let rest = settle(scene, &SettleOptions { gravity: g, ..Default::default() }).unwrap();
+            scene.objects[0].placement = Placement::Drop {
+                above: [-0.15, 0.0],
+                height: 0.004,
+                rotation: UnitQuaternion::identity(),
+            };
+            let g = [
+                9.81 * libm::sin(FRAC_PI_6),
+                0.0,
+                -9.81 * libm::cos(FRAC_PI_6),
+            ];
+            let rest = settle(
+                scene,
+                &SettleOptions {
+                    gravity: g,
+                    ..Default::default()
+                },
+            )
+            .unwrap();
             assert_eq!(rest.verdict, Verdict::Rested);
             pose(&rest, 0).translation.x + 0.15
         };
@@ -447,7 +602,14 @@ mod tests {
     fn the_strength_of_gravity_sets_the_time_and_nothing_else() {
         let with = |factor: f64| {
             let gravity = [0.0, 0.0, -9.81 * factor];
-            settle(dropped(3, 8), &SettleOptions { gravity, ..Default::default() }).unwrap()
+            settle(
+                dropped(3, 8),
+                &SettleOptions {
+                    gravity,
+                    ..Default::default()
+                },
+            )
+            .unwrap()
         };
         let usual = with(1.0);
         for factor in [0.1, 16.0, 100.0] {
@@ -461,7 +623,10 @@ mod tests {
     fn prisms_lie_closer_than_their_boxes_and_rest() {
         for k in 0..4 {
             let mut scene = dropped(k, 10);
-            scene.objects.iter_mut().for_each(|object| object.outline = octagon(object.size));
+            scene
+                .objects
+                .iter_mut()
+                .for_each(|object| object.outline = octagon(object.size));
             let rest = settled(scene);
             assert!(rest.energy_rise <= SettleOptions::default().max_energy_rise);
         }
@@ -483,15 +648,22 @@ mod tests {
         assert_eq!(rest.verdict, Verdict::Rested);
         let energy = |part: &[Sample]| part.iter().map(|s| s.kinetic + s.potential).sum::<f64>();
         let steps: Vec<&[Sample]> = samples.chunks(6).collect();
-        assert!(steps.iter().all(|step| (1..=6).eq(step.iter().map(|s| s.object))));
+        assert!(
+            steps
+                .iter()
+                .all(|step| (1..=6).eq(step.iter().map(|s| s.object)))
+        );
         let drop = energy(steps[0]) - energy(steps[steps.len() - 1]);
-        assert!(steps.windows(2).all(|pair| energy(pair[1]) - energy(pair[0]) < 0.01 * drop));
+        assert!(
+            steps
+                .windows(2)
+                .all(|pair| energy(pair[1]) - energy(pair[0]) < 0.01 * drop)
+        );
         let last = steps[steps.len() - 1];
         // The last sample may be seven steps before the end.
-        assert!(
-            last.iter()
-                .all(|s| (s.pose.translation.vector - pose(&rest, s.object - 1).translation.vector).norm() < 1e-4)
-        );
+        assert!(last.iter().all(|s| {
+            (s.pose.translation.vector - pose(&rest, s.object - 1).translation.vector).norm() < 1e-4
+        }));
         assert_eq!(trace_csv(&samples).lines().count(), samples.len() + 1);
     }
 
@@ -499,24 +671,47 @@ mod tests {
     fn a_flag_ends_a_fall() {
         let stop = std::sync::atomic::AtomicBool::new(true);
         let options = SettleOptions::default();
-        let end = settle_within(dropped(0, 5), &options, 0, &Allowance::new(options.most_work).stopped_by(&stop));
-        assert_eq!(end.unwrap_err().to_string(), "interrupted: while objects fell");
+        let end = settle_within(
+            dropped(0, 5),
+            &options,
+            0,
+            &Allowance::new(options.most_work).stopped_by(&stop),
+        );
+        assert_eq!(
+            end.unwrap_err().to_string(),
+            "interrupted: while objects fell"
+        );
     }
 
     /// The longest that is within bounds.
     fn endless() -> SettleOptions {
-        let slow = SettleOptions { step: 1e-4, time_limit: 600.0, attempts: 100, ..SettleOptions::default() };
-        SettleOptions { iterations: 100, ccd: 100, ..slow }
+        let slow = SettleOptions {
+            step: 1e-4,
+            time_limit: 600.0,
+            attempts: 100,
+            ..SettleOptions::default()
+        };
+        SettleOptions {
+            iterations: 100,
+            ccd: 100,
+            ..slow
+        }
     }
 
     /// Counted as if all of it lay where it lands.
     #[test]
     fn settings_without_an_end_are_refused_before_a_step_is_made() {
-        let little = SettleOptions { most_work: 1000, ..SettleOptions::default() };
+        let little = SettleOptions {
+            most_work: 1000,
+            ..SettleOptions::default()
+        };
         for options in [endless(), little] {
             let told = || settle(dropped(0, 100), &options).unwrap_err().to_string();
             let (told, work) = crate::work::counted(told).unwrap();
-            assert!(told.starts_with("settle: no rest within the work of one picture, "), "{told}");
+            assert!(
+                told.starts_with("settle: no rest within the work of one picture, "),
+                "{told}"
+            );
             assert_eq!(work[crate::work::Kind::PhysicsSteps], 0);
         }
     }
@@ -525,25 +720,49 @@ mod tests {
     fn settings_without_an_end_end_with_the_work_of_one_picture() {
         let told = || settle(dropped(0, 5), &endless()).unwrap_err().to_string();
         let (told, work) = crate::work::counted(told).unwrap();
-        assert!(told.starts_with("settle: no rest within the work of one picture, 100000000 "), "{told}");
-        assert!((1..10_000).contains(&work[crate::work::Kind::PhysicsSteps]), "{work:?}");
+        assert!(
+            told.starts_with("settle: no rest within the work of one picture, 100000000 "),
+            "{told}"
+        );
+        assert!(
+            (1..10_000).contains(&work[crate::work::Kind::PhysicsSteps]),
+            "{work:?}"
+        );
     }
 
     #[test]
     fn work_is_shared_by_all_tries() {
         // Never at rest: each try takes all of its time.
-        let options = SettleOptions { time_limit: 0.2, attempts: 100, most_work: 20_000, ..Default::default() };
+        let options = SettleOptions {
+            time_limit: 0.2,
+            attempts: 100,
+            most_work: 20_000,
+            ..Default::default()
+        };
         let told = settle(dropped(0, 5), &options).unwrap_err().to_string();
-        assert!(told.starts_with("settle: no rest within the work of one picture, 20000 (settle.most_work)"), "{told}");
+        assert!(
+            told.starts_with(
+                "settle: no rest within the work of one picture, 20000 (settle.most_work)"
+            ),
+            "{told}"
+        );
     }
 
     #[test]
     fn what_sinks_in_is_tried_again_with_shorter_steps() {
         let heap = || dropped(2, 60);
         // Three times as long as they should be for so many.
-        let options = SettleOptions { step: 1.0 / 240.0, iterations: 1, ..Default::default() };
+        let options = SettleOptions {
+            step: 1.0 / 240.0,
+            iterations: 1,
+            ..Default::default()
+        };
         let rest = settle(heap(), &options).unwrap();
-        assert!(matches!(rest.rejected[..], [Verdict::Penetrating(_), ..]), "{:?}", rest.rejected);
+        assert!(
+            matches!(rest.rejected[..], [Verdict::Penetrating(_), ..]),
+            "{:?}",
+            rest.rejected
+        );
         assert_eq!(rest.verdict, Verdict::Rested);
     }
 
@@ -554,19 +773,32 @@ mod tests {
         let mut scene = falling(&[([0.0, 0.0], 0.4), ([0.05, 0.0], 0.6)]);
         scene.surface.size = [0.5, room];
         scene.objects[0].size = [0.1, length];
-        let Placement::Drop { rotation, .. } = &mut scene.objects[0].placement else { panic!("dropped") };
+        let Placement::Drop { rotation, .. } = &mut scene.objects[0].placement else {
+            panic!("dropped")
+        };
         *rotation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt);
         let rest = settled(scene.clone());
-        assert_eq!(hanging(&scene, &rest.scene, &SettleOptions::default()).unwrap(), [0; 0]);
-        let lowest = |pose: Pose| pose.translation.z - 0.5 * length * (pose.rotation * Vector3::y()).z.abs();
+        assert_eq!(
+            hanging(&scene, &rest.scene, &SettleOptions::default()).unwrap(),
+            [0; 0]
+        );
+        let lowest =
+            |pose: Pose| pose.translation.z - 0.5 * length * (pose.rotation * Vector3::y()).z.abs();
         assert!(lowest(pose(&rest, 0)) < 0.02, "{:?}", pose(&rest, 0));
     }
 
     #[test]
     fn a_start_outside_the_walls_is_told() {
-        let told = settle(falling(&[([0.0, 0.0], 0.1), ([0.1, -0.3], 0.1)]), &SettleOptions::default()).unwrap_err();
+        let told = settle(
+            falling(&[([0.0, 0.0], 0.1), ([0.1, -0.3], 0.1)]),
+            &SettleOptions::default(),
+        )
+        .unwrap_err();
         let expected = "[0.1, -0.3], expected over the surface of 0.6 x 0.4 m around the origin";
-        assert_eq!(told.to_string(), format!("objects[1].placement.drop.above: {expected}"));
+        assert_eq!(
+            told.to_string(),
+            format!("objects[1].placement.drop.above: {expected}")
+        );
     }
 
     #[test]
@@ -574,6 +806,13 @@ mod tests {
         let mut scene = falling(&[([0.0, 0.0], 0.1)]);
         scene.objects[0].size = [1.5, 0.9];
         let settled = settle(scene, &SettleOptions::default()).unwrap();
-        assert!(matches!(settled.verdict, Verdict::Penetrating(_) | Verdict::Escaped(_)), "{:?}", settled.verdict);
+        assert!(
+            matches!(
+                settled.verdict,
+                Verdict::Penetrating(_) | Verdict::Escaped(_)
+            ),
+            "{:?}",
+            settled.verdict
+        );
     }
 }

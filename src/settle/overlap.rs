@@ -30,7 +30,9 @@ impl Solid {
     pub(super) fn corners(&self) -> impl Iterator<Item = Vector3<f64>> {
         let [x, y, z] = self.axes();
         let of = move |&[a, b]: &[f64; 2]| self.center() + x * a + y * b;
-        self.outline.iter().flat_map(move |corner| [of(corner) + z * self.half.z, of(corner) - z * self.half.z])
+        self.outline
+            .iter()
+            .flat_map(move |corner| [of(corner) + z * self.half.z, of(corner) - z * self.half.z])
     }
 
     /// Half lengths of the upright box around the box of its card.
@@ -42,15 +44,27 @@ impl Solid {
     fn shadow(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> [f64; 2] {
         let [x, y, z] = axes.map(|axis| axis.dot(direction));
         let at = self.center().dot(direction);
-        let along = self.outline.iter().map(|corner| corner[0] * x + corner[1] * y);
-        let [low, high] = along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
-        [at + low - self.half.z * z.abs(), at + high + self.half.z * z.abs()]
+        let along = self
+            .outline
+            .iter()
+            .map(|corner| corner[0] * x + corner[1] * y);
+        let [low, high] = along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| {
+            [l.min(v), h.max(v)]
+        });
+        [
+            at + low - self.half.z * z.abs(),
+            at + high + self.half.z * z.abs(),
+        ]
     }
 
     /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in the world.
     fn edges(&self, axes: &[Vector3<f64>; 3]) -> Vec<Vector3<f64>> {
         let next = self.outline.iter().cycle().skip(1);
-        let sides = self.outline.iter().zip(next).map(|(a, b)| axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1]));
+        let sides = self
+            .outline
+            .iter()
+            .zip(next)
+            .map(|(a, b)| axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1]));
         let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len());
         for side in sides.map(|side| side.normalize()) {
             if edges.iter().all(|edge| edge.cross(&side).norm() > PARALLEL) {
@@ -66,8 +80,13 @@ const PARALLEL: f64 = 1e-6;
 
 /// Ids (index + 1) of dropped bodies whose centre is not over the surface, below it, or not finite.
 pub(super) fn outside(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
-    let inside = |c: Vector3<f64>| c.x.abs() <= surface[0] / 2.0 && c.y.abs() <= surface[1] / 2.0 && c.z >= 0.0;
-    let ids = solids.iter().enumerate().filter(|(_, s)| s.falls && !inside(s.center()));
+    let inside = |c: Vector3<f64>| {
+        c.x.abs() <= surface[0] / 2.0 && c.y.abs() <= surface[1] / 2.0 && c.z >= 0.0
+    };
+    let ids = solids
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| s.falls && !inside(s.center()));
     ids.map(|(i, _)| i + 1).collect()
 }
 
@@ -87,7 +106,11 @@ pub(super) fn touching(solids: &[Solid], reach: f64) -> Vec<Touch> {
     let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
     let pairs = pairs.filter(|[i, j]| solids[*i].falls || solids[*j].falls);
     let touch = |pair: [usize; 2]| {
-        gap(&solids[pair[0]], &solids[pair[1]], reach).map(|(gap, towards)| Touch { pair, gap, towards })
+        gap(&solids[pair[0]], &solids[pair[1]], reach).map(|(gap, towards)| Touch {
+            pair,
+            gap,
+            towards,
+        })
     };
     pairs.filter_map(touch).collect()
 }
@@ -96,18 +119,24 @@ pub(super) fn touching(solids: &[Solid], reach: f64) -> Vec<Touch> {
 /// metres; 0 when nothing overlaps.
 pub(super) fn deepest(solids: &[Solid], touching: &[Touch], surface: [f64; 2]) -> f64 {
     let falling = solids.iter().filter(|s| s.falls);
-    let edges = falling.map(|s| depth_in_room(s, surface)).fold(0.0, f64::max);
-    touching.iter().map(|touch| -touch.gap).fold(edges, f64::max)
+    let edges = falling
+        .map(|s| depth_in_room(s, surface))
+        .fold(0.0, f64::max);
+    touching
+        .iter()
+        .map(|touch| -touch.gap)
+        .fold(edges, f64::max)
 }
 
 /// How far a body reaches through the floor or a wall, whichever is most; 0 inside.
 fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
     let axes = solid.axes();
     let [bottom, _] = solid.shadow(&axes, &Vector3::z());
-    let past = [(Vector3::x(), surface[0]), (Vector3::y(), surface[1])].map(|(direction, length)| {
-        let [low, high] = solid.shadow(&axes, &direction);
-        high.max(-low) - length / 2.0
-    });
+    let past =
+        [(Vector3::x(), surface[0]), (Vector3::y(), surface[1])].map(|(direction, length)| {
+            let [low, high] = solid.shadow(&axes, &direction);
+            high.max(-low) - length / 2.0
+        });
     past.into_iter().fold((-bottom).max(0.0), f64::max)
 }
 
@@ -140,17 +169,31 @@ pub(super) fn gap(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>
     let (mut edges_a, mut edges_b) = (a.edges(&of_a), b.edges(&of_b));
     let sides_a = edges_a.iter().map(|edge| edge.cross(&of_a[2]));
     let sides_b = edges_b.iter().map(|edge| edge.cross(&of_b[2]));
-    let faces: Vec<Vector3<f64>> = [of_a[2], of_b[2]].into_iter().chain(sides_a).chain(sides_b).collect();
+    let faces: Vec<Vector3<f64>> = [of_a[2], of_b[2]]
+        .into_iter()
+        .chain(sides_a)
+        .chain(sides_b)
+        .collect();
     edges_a.push(of_a[2]);
     edges_b.push(of_b[2]);
-    let pairs = edges_a.iter().flat_map(|e| edges_b.iter().map(move |f| e.cross(f)));
-    let directions = faces.iter().copied().chain(pairs.filter_map(|d| d.try_normalize(PARALLEL)));
+    let pairs = edges_a
+        .iter()
+        .flat_map(|e| edges_b.iter().map(move |f| e.cross(f)));
+    let directions = faces
+        .iter()
+        .copied()
+        .chain(pairs.filter_map(|d| d.try_normalize(PARALLEL)));
     let mut widest = (f64::NEG_INFINITY, Vector3::z());
     for direction in directions {
-        let ([low_a, high_a], [low_b, high_b]) = (a.shadow(&of_a, &direction), b.shadow(&of_b, &direction));
+        let ([low_a, high_a], [low_b, high_b]) =
+            (a.shadow(&of_a, &direction), b.shadow(&of_b, &direction));
         let (ahead, behind) = (low_b - high_a, low_a - high_b);
         if ahead.max(behind) > widest.0 {
-            widest = if ahead > behind { (ahead, direction) } else { (behind, -direction) };
+            widest = if ahead > behind {
+                (ahead, direction)
+            } else {
+                (behind, -direction)
+            };
         }
         if widest.0 >= reach {
             return None;
@@ -170,13 +213,21 @@ mod tests {
         let world_from_body = Pose::from_parts(Vector3::new(x, y, z).into(), rotation);
         let [x, y, _] = half;
         let outline = vec![[-x, -y], [x, -y], [x, y], [-x, y]];
-        Solid { world_from_body, half: half.into(), outline, falls: true }
+        Solid {
+            world_from_body,
+            half: half.into(),
+            outline,
+            falls: true,
+        }
     }
 
     #[test]
     fn level_boxes_overlap_by_the_difference_of_their_heights() {
         let half = [0.1, 0.04, 0.003];
-        let (a, b) = (solid(0.0, 0.0, 0.003, [0.0; 3], half), solid(0.02, 0.01, 0.0085, [0.0, 0.0, 0.4], half));
+        let (a, b) = (
+            solid(0.0, 0.0, 0.003, [0.0; 3], half),
+            solid(0.02, 0.01, 0.0085, [0.0, 0.0, 0.4], half),
+        );
         assert!((depth(&a, &b) - 0.0005).abs() < 1e-15);
         let above = solid(0.02, 0.01, 0.0091, [0.0, 0.0, 0.4], half);
         assert_eq!(depth(&a, &above), 0.0);
@@ -188,7 +239,15 @@ mod tests {
         let quarter = std::f64::consts::FRAC_PI_4;
         // Edge along x, at height sqrt 2, under an edge along y.
         let under = solid(0.0, 0.0, 0.0, [quarter, 0.0, 0.0], half);
-        let over = |gap: f64| solid(0.0, 0.0, 2.0 * 2.0_f64.sqrt() + gap, [0.0, quarter, 0.0], half);
+        let over = |gap: f64| {
+            solid(
+                0.0,
+                0.0,
+                2.0 * 2.0_f64.sqrt() + gap,
+                [0.0, quarter, 0.0],
+                half,
+            )
+        };
         assert_eq!(depth(&under, &over(1e-3)), 0.0);
         assert!((depth(&under, &over(-1e-3)) - 1e-3).abs() < 1e-12);
     }
@@ -201,7 +260,10 @@ mod tests {
             (0..=n).any(|j| {
                 (0..=n).any(|k| {
                     let local = Point3::new(at(i, a.half.x), at(j, a.half.y), at(k, a.half.z));
-                    let p = b.world_from_body.inverse_transform_point(&(a.world_from_body * local)).coords;
+                    let p = b
+                        .world_from_body
+                        .inverse_transform_point(&(a.world_from_body * local))
+                        .coords;
                     (0..3).all(|axis| p[axis].abs() <= b.half[axis])
                 })
             })
@@ -214,8 +276,20 @@ mod tests {
         for case in 0..400 {
             let draws = Draws::new(1, case);
             let u = |name: &str| 2.0 * draws.unit(name) - 1.0;
-            let a = solid(0.0, 0.0, 0.0, [3.0 * u("a"), 3.0 * u("b"), 3.0 * u("c")], [1.0, 0.5, 0.2]);
-            let b = solid(u("x"), u("y"), u("z"), [3.0 * u("d"), 3.0 * u("e"), 3.0 * u("f")], [0.8, 0.4, 0.1]);
+            let a = solid(
+                0.0,
+                0.0,
+                0.0,
+                [3.0 * u("a"), 3.0 * u("b"), 3.0 * u("c")],
+                [1.0, 0.5, 0.2],
+            );
+            let b = solid(
+                u("x"),
+                u("y"),
+                u("z"),
+                [3.0 * u("d"), 3.0 * u("e"), 3.0 * u("f")],
+                [0.8, 0.4, 0.1],
+            );
             let depth = depth(&a, &b);
             let shared = shares_a_point(&a, &b) || shares_a_point(&b, &a);
             // A shared point proves an overlap; a deep overlap (twice the grid's step) must share a point.
@@ -253,7 +327,9 @@ mod tests {
         assert_eq!(depth(&triangle(0.0), &post(0.1, 0.04)), 0.0);
         assert_eq!(depth(&triangle(0.0), &post(0.02, 0.02)), 0.0);
         // The slanted side is x / 0.2 + y / 0.08 = 0; the post's corner (x - 0.01, y - 0.01) lies behind it.
-        let behind = |x: f64, y: f64| -((x - 0.01) / 0.2 + (y - 0.01) / 0.08) / (1.0_f64 / 0.2).hypot(1.0 / 0.08);
+        let behind = |x: f64, y: f64| {
+            -((x - 0.01) / 0.2 + (y - 0.01) / 0.08) / (1.0_f64 / 0.2).hypot(1.0 / 0.08)
+        };
         assert!((depth(&triangle(0.0), &post(0.01, 0.009)) - behind(0.01, 0.009)).abs() < 1e-12);
         // Through the left wall by 0.05, with its vertical side.
         assert!((deepest(&[triangle(-0.15)], &[], [0.4, 0.3]) - 0.05).abs() < 1e-12);
@@ -262,15 +338,30 @@ mod tests {
     #[test]
     fn floor_and_walls_count() {
         let half = [0.1, 0.04, 0.003];
-        assert!((deepest(&[solid(0.0, 0.0, 0.002, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.001).abs() < 1e-15);
-        assert!((deepest(&[solid(0.11, 0.0, 0.1, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.01).abs() < 1e-15);
-        assert_eq!(deepest(&[solid(0.1, 0.0, 0.003, [0.0; 3], half)], &[], [0.4, 0.3]), 0.0);
+        assert!(
+            (deepest(&[solid(0.0, 0.0, 0.002, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.001).abs()
+                < 1e-15
+        );
+        assert!(
+            (deepest(&[solid(0.11, 0.0, 0.1, [0.0; 3], half)], &[], [0.4, 0.3]) - 0.01).abs()
+                < 1e-15
+        );
+        assert_eq!(
+            deepest(&[solid(0.1, 0.0, 0.003, [0.0; 3], half)], &[], [0.4, 0.3]),
+            0.0
+        );
     }
 
     #[test]
     fn what_is_not_a_number_is_outside() {
         let lost = solid(f64::NAN, 0.0, 0.1, [0.0; 3], [0.1; 3]);
         let gone = solid(0.0, 9.0, 0.1, [0.0; 3], [0.1; 3]);
-        assert_eq!(outside(&[gone, solid(0.0, 0.0, 0.1, [0.0; 3], [0.1; 3]), lost], [0.4, 0.3]), [1, 3]);
+        assert_eq!(
+            outside(
+                &[gone, solid(0.0, 0.0, 0.1, [0.0; 3], [0.1; 3]), lost],
+                [0.4, 0.3]
+            ),
+            [1, 3]
+        );
     }
 }

@@ -32,12 +32,22 @@ const GYRATION: f64 = 0.3;
 
 /// Ids (index + 1) of the bodies that fell and that nothing holds where they are; `touching` are the pairs of bodies nearer
 /// than [`reach`].
-pub(super) fn hanging(scene: &Scene, options: &SettleOptions, solids: &[Solid], touching: &[Touch]) -> Vec<usize> {
+pub(super) fn hanging(
+    scene: &Scene,
+    options: &SettleOptions,
+    solids: &[Solid],
+    touching: &[Touch],
+) -> Vec<usize> {
     let contacts = contacts(solids, touching, scene.surface.size, reach(scene));
     let held = Held::of(scene, options, solids, &contacts, typical_length(scene));
     let moved = held.rest();
-    let mut ids: Vec<usize> =
-        held.order.iter().zip(moved.chunks(DOF)).filter(|(_, y)| norm(y) > HANGS).map(|(i, _)| i + 1).collect();
+    let mut ids: Vec<usize> = held
+        .order
+        .iter()
+        .zip(moved.chunks(DOF))
+        .filter(|(_, y)| norm(y) > HANGS)
+        .map(|(i, _)| i + 1)
+        .collect();
     ids.sort_unstable();
     ids
 }
@@ -60,15 +70,30 @@ struct Held {
 }
 
 impl Held {
-    fn of(scene: &Scene, options: &SettleOptions, solids: &[Solid], contacts: &[Contact], typical: f64) -> Self {
+    fn of(
+        scene: &Scene,
+        options: &SettleOptions,
+        solids: &[Solid],
+        contacts: &[Contact],
+        typical: f64,
+    ) -> Self {
         let mut order: Vec<usize> = (0..solids.len()).filter(|&i| solids[i].falls).collect();
         order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
         let mut slots = vec![None; solids.len()];
-        order.iter().enumerate().for_each(|(slot, &i)| slots[i] = Some(slot));
-        let mean = order.iter().map(|&i| scene.objects[i].mass).sum::<f64>() / order.len().max(1) as f64;
-        let masses: Vec<f64> = order.iter().flat_map(|&i| [scene.objects[i].mass / mean; DOF]).collect();
+        order
+            .iter()
+            .enumerate()
+            .for_each(|(slot, &i)| slots[i] = Some(slot));
+        let mean =
+            order.iter().map(|&i| scene.objects[i].mass).sum::<f64>() / order.len().max(1) as f64;
+        let masses: Vec<f64> = order
+            .iter()
+            .flat_map(|&i| [scene.objects[i].mass / mean; DOF])
+            .collect();
         let down = Vector3::from(options.gravity).normalize();
-        let weights = masses.chunks(DOF).flat_map(|m| [m[0] * down.x, m[0] * down.y, m[0] * down.z, 0.0, 0.0, 0.0]);
+        let weights = masses
+            .chunks(DOF)
+            .flat_map(|m| [m[0] * down.x, m[0] * down.y, m[0] * down.z, 0.0, 0.0, 0.0]);
         let centers: Vec<Vector3<f64>> = solids.iter().map(center_of_mass).collect();
         let spring = |contact: &Contact, force: Vector3<f64>| {
             let end = |body: Option<usize>, force: Vector3<f64>| {
@@ -76,12 +101,23 @@ impl Held {
                 let turn = (contact.point - centers[body]).cross(&force) / (GYRATION * typical);
                 Some((slot, [force.x, force.y, force.z, turn.x, turn.y, turn.z]))
             };
-            Spring { ends: [end(Some(contact.body), force), end(contact.by, -force)] }
+            Spring {
+                ends: [end(Some(contact.body), force), end(contact.by, -force)],
+            }
         };
         let cone = |contact| pyramid(contact, GRIP * scene.surface.friction);
-        let springs = contacts.iter().flat_map(|contact| cone(contact).into_iter().map(move |force| (contact, force)));
-        let springs = springs.map(|(contact, force)| spring(contact, force)).collect();
-        Self { weights: weights.collect(), order, masses, springs }
+        let springs = contacts
+            .iter()
+            .flat_map(|contact| cone(contact).into_iter().map(move |force| (contact, force)));
+        let springs = springs
+            .map(|(contact, force)| spring(contact, force))
+            .collect();
+        Self {
+            weights: weights.collect(),
+            order,
+            masses,
+            springs,
+        }
     }
 
     /// How far each body moves, in each way.
@@ -92,9 +128,15 @@ impl Held {
             (y, energy) = (vec![0.0; y.len()], 0.0);
         }
         for _ in 0..STEPS {
-            let pressed: Vec<bool> = self.springs.iter().map(|spring| spring.stretch(&y) < 0.0).collect();
+            let pressed: Vec<bool> = self
+                .springs
+                .iter()
+                .map(|spring| spring.stretch(&y) < 0.0)
+                .collect();
             let to = self.newton(&pressed);
-            let Some((better, less)) = self.towards(&y, &to, energy) else { break };
+            let Some((better, less)) = self.towards(&y, &to, energy) else {
+                break;
+            };
             let gain = energy - less;
             (y, energy) = (better, less);
             if gain <= GAIN * energy.abs() {
@@ -107,8 +149,16 @@ impl Held {
     /// The minimum if just these springs pushed, and pulled.
     fn newton(&self, pressed: &[bool]) -> Vec<f64> {
         let mut matrix = Envelope::new(self.envelope());
-        self.masses.iter().enumerate().for_each(|(i, mass)| matrix.add(i, i, *mass));
-        for (spring, _) in self.springs.iter().zip(pressed).filter(|(_, pressed)| **pressed) {
+        self.masses
+            .iter()
+            .enumerate()
+            .for_each(|(i, mass)| matrix.add(i, i, *mass));
+        for (spring, _) in self
+            .springs
+            .iter()
+            .zip(pressed)
+            .filter(|(_, pressed)| **pressed)
+        {
             spring.stiffen(&mut matrix);
         }
         matrix.solve(self.weights.clone())
@@ -117,25 +167,51 @@ impl Held {
     /// First entry of each row of the matrix: of the lowest body that the row's body touches.
     fn envelope(&self) -> Vec<usize> {
         let mut first: Vec<usize> = (0..self.order.len()).collect();
-        for [a, b] in
-            self.springs.iter().filter_map(|spring| Some([spring.ends[0].as_ref()?.0, spring.ends[1].as_ref()?.0]))
+        for [a, b] in self
+            .springs
+            .iter()
+            .filter_map(|spring| Some([spring.ends[0].as_ref()?.0, spring.ends[1].as_ref()?.0]))
         {
             let (low, high) = (a.min(b), a.max(b));
             first[high] = first[high].min(low);
         }
-        first.into_iter().flat_map(|slot| [DOF * slot; DOF]).collect()
+        first
+            .into_iter()
+            .flat_map(|slot| [DOF * slot; DOF])
+            .collect()
     }
 
     fn energy(&self, y: &[f64]) -> f64 {
-        let own = self.masses.iter().zip(&self.weights).zip(y).map(|((m, w), y)| (0.5 * m * y - w) * y).sum::<f64>();
-        own + 0.5 * STIFF * self.springs.iter().map(|spring| spring.stretch(y).min(0.0).powi(2)).sum::<f64>()
+        let own = self
+            .masses
+            .iter()
+            .zip(&self.weights)
+            .zip(y)
+            .map(|((m, w), y)| (0.5 * m * y - w) * y)
+            .sum::<f64>();
+        own + 0.5
+            * STIFF
+            * self
+                .springs
+                .iter()
+                .map(|spring| spring.stretch(y).min(0.0).powi(2))
+                .sum::<f64>()
     }
 
     /// The first place of less energy on the way, halving it; none where there is none.
     fn towards(&self, from: &[f64], to: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
         let shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0)).take(HALVINGS);
-        let place = |share: f64| from.iter().zip(to).map(|(a, b)| a + share * (b - a)).collect::<Vec<_>>();
-        shares.map(place).map(|y| (self.energy(&y), y)).find(|(less, _)| *less < energy).map(|(less, y)| (y, less))
+        let place = |share: f64| {
+            from.iter()
+                .zip(to)
+                .map(|(a, b)| a + share * (b - a))
+                .collect::<Vec<_>>()
+        };
+        shares
+            .map(place)
+            .map(|y| (self.energy(&y), y))
+            .find(|(less, _)| *less < energy)
+            .map(|(less, y)| (y, less))
     }
 }
 
@@ -145,18 +221,30 @@ const HALVINGS: usize = 30;
 impl Spring {
     /// How far its ends move apart.
     fn stretch(&self, y: &[f64]) -> f64 {
-        let along =
-            |(slot, push): &(usize, [f64; DOF])| y[DOF * slot..].iter().zip(push).map(|(y, p)| y * p).sum::<f64>();
+        let along = |(slot, push): &(usize, [f64; DOF])| {
+            y[DOF * slot..]
+                .iter()
+                .zip(push)
+                .map(|(y, p)| y * p)
+                .sum::<f64>()
+        };
         self.ends.iter().flatten().map(along).sum()
     }
 
     fn stiffen(&self, matrix: &mut Envelope) {
         for (row, of_row) in self.ends.iter().flatten() {
-            for (column, of_column) in self.ends.iter().flatten().filter(|(column, _)| column <= row) {
+            for (column, of_column) in self
+                .ends
+                .iter()
+                .flatten()
+                .filter(|(column, _)| column <= row)
+            {
                 for (i, a) in of_row.iter().enumerate() {
                     let end = if row == column { i + 1 } else { DOF };
                     let line = of_column[..end].iter().enumerate();
-                    line.for_each(|(j, b)| matrix.add(DOF * row + i, DOF * column + j, STIFF * a * b));
+                    line.for_each(|(j, b)| {
+                        matrix.add(DOF * row + i, DOF * column + j, STIFF * a * b)
+                    });
                 }
             }
         }
@@ -174,7 +262,9 @@ fn pyramid(contact: &Contact, friction: f64) -> Vec<Vector3<f64>> {
     }
     let (u, v) = across(&contact.normal);
     let slope = |a: f64, b: f64| contact.normal + (u * a + v * b) * friction;
-    [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]].map(|[a, b]| slope(a, b)).into()
+    [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]]
+        .map(|[a, b]| slope(a, b))
+        .into()
 }
 
 fn center_of_mass(solid: &Solid) -> Vector3<f64> {
@@ -185,11 +275,24 @@ fn center_of_mass(solid: &Solid) -> Vector3<f64> {
 /// Centre of mass of a flat convex ring.
 fn centroid(ring: &[[f64; 2]]) -> [f64; 2] {
     let next = ring.iter().cycle().skip(1);
-    let [area, x, y] = ring.iter().zip(next).fold([0.0; 3], |[area, x, y], (a, b)| {
-        let cross = a[0] * b[1] - a[1] * b[0];
-        [area + cross, x + cross * (a[0] + b[0]), y + cross * (a[1] + b[1])]
-    });
-    [x, y].map(|moment| if area > 0.0 { moment / (3.0 * area) } else { 0.0 })
+    let [area, x, y] = ring
+        .iter()
+        .zip(next)
+        .fold([0.0; 3], |[area, x, y], (a, b)| {
+            let cross = a[0] * b[1] - a[1] * b[0];
+            [
+                area + cross,
+                x + cross * (a[0] + b[0]),
+                y + cross * (a[1] + b[1]),
+            ]
+        });
+    [x, y].map(|moment| {
+        if area > 0.0 {
+            moment / (3.0 * area)
+        } else {
+            0.0
+        }
+    })
 }
 
 #[cfg(test)]
@@ -224,7 +327,10 @@ mod tests {
     #[test]
     fn what_lies_on_the_floor_is_held_and_what_lies_on_air_hangs() {
         assert!(hang(&[([0.0, 0.0, 0.0027], 0.0), ([0.0, 0.0, 0.008], 0.0)]).is_empty());
-        assert_eq!(hang(&[([0.0, 0.0, 0.0027], 0.0), ([0.0, 0.0, 0.02], 0.0)]), [2]);
+        assert_eq!(
+            hang(&[([0.0, 0.0, 0.0027], 0.0), ([0.0, 0.0, 0.02], 0.0)]),
+            [2]
+        );
     }
 
     /// The walls push as hard as one likes, and hold nothing.
@@ -235,7 +341,13 @@ mod tests {
         let room = 0.08 * libm::cos(tilt) + 0.005 * libm::sin(tilt);
         let upper = 0.4 + 0.0053 / libm::cos(tilt);
         assert_eq!(hang_in([0.6, room], &[([0.0, 0.0, 0.4], tilt)]), [1]);
-        assert_eq!(hang_in([0.6, room], &[([0.0, 0.0, 0.4], tilt), ([0.1, 0.0, upper], tilt)]), [1, 2]);
+        assert_eq!(
+            hang_in(
+                [0.6, room],
+                &[([0.0, 0.0, 0.4], tilt), ([0.1, 0.0, upper], tilt)]
+            ),
+            [1, 2]
+        );
         // On the floor the same card leans.
         assert!(hang_in([0.6, room], &[([0.0, 0.0, standing(tilt)], tilt)]).is_empty());
     }
@@ -265,7 +377,13 @@ mod tests {
     fn two_cards_lean_on_each_other_like_a_tent() {
         let tilt: f64 = 1.2;
         let away = 0.04 * libm::cos(tilt) + 0.0025 * libm::sin(tilt) + 0.0002;
-        assert!(hang(&[([0.0, -away, standing(tilt)], tilt), ([0.0, away, standing(tilt)], -tilt)]).is_empty());
+        assert!(
+            hang(&[
+                ([0.0, -away, standing(tilt)], tilt),
+                ([0.0, away, standing(tilt)], -tilt)
+            ])
+            .is_empty()
+        );
         assert_eq!(hang(&[([0.0, -away, standing(tilt)], tilt)]), [1]);
     }
 
@@ -284,14 +402,26 @@ mod tests {
 
     #[test]
     fn nothing_is_asked_of_cards_that_were_laid_without_physics() {
-        let (before, flat) = (dropped(0, 3), SettleOptions { mode: SettleMode::Flat, ..Default::default() });
+        let (before, flat) = (
+            dropped(0, 3),
+            SettleOptions {
+                mode: SettleMode::Flat,
+                ..Default::default()
+            },
+        );
         assert!(hanging(&before, &before, &flat).unwrap().is_empty());
-        assert!(!hanging(&before, &before, &SettleOptions::default()).unwrap().is_empty());
+        assert!(
+            !hanging(&before, &before, &SettleOptions::default())
+                .unwrap()
+                .is_empty()
+        );
     }
 
     #[test]
     fn scenes_of_different_objects_are_told() {
-        let told = hanging(&dropped(0, 3), &dropped(0, 2), &SettleOptions::default()).unwrap_err().to_string();
+        let told = hanging(&dropped(0, 3), &dropped(0, 2), &SettleOptions::default())
+            .unwrap_err()
+            .to_string();
         assert_eq!(told, "objects: 2, but 3 fell");
     }
 }

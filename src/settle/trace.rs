@@ -26,7 +26,19 @@ pub fn csv(samples: &[Sample]) -> String {
     let head = "seconds,object,x,y,z,qw,qx,qy,qz,speed,spin,kinetic,potential\n";
     let line = |s: &Sample| {
         let (t, q) = (s.pose.translation, s.pose.rotation);
-        let numbers = [t.x, t.y, t.z, q.w, q.i, q.j, q.k, s.speed, s.spin, s.kinetic, s.potential];
+        let numbers = [
+            t.x,
+            t.y,
+            t.z,
+            q.w,
+            q.i,
+            q.j,
+            q.k,
+            s.speed,
+            s.spin,
+            s.kinetic,
+            s.potential,
+        ];
         let cells: String = numbers.iter().map(|x| format!(",{x:.7}")).collect();
         format!("{:.6},{}{cells}\n", s.seconds, s.object)
     };

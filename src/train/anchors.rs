@@ -31,24 +31,41 @@ pub struct Anchors {
 /// [Redmon and Farhadi 2017]: https://arxiv.org/abs/1612.08242
 /// [k-means++]: https://dl.acm.org/doi/10.5555/1283383.1283494
 pub fn anchors(boxes: &[[f64; 2]], count: usize, seed: u64) -> Anchors {
-    let boxes: Vec<[f64; 2]> = boxes.iter().copied().filter(|b| b.iter().all(|v| v.is_finite() && *v > 0.0)).collect();
+    let boxes: Vec<[f64; 2]> = boxes
+        .iter()
+        .copied()
+        .filter(|b| b.iter().all(|v| v.is_finite() && *v > 0.0))
+        .collect();
     if boxes.is_empty() || count == 0 {
         return Anchors::default();
     }
-    let mut sizes = spread(&boxes, count.min(boxes.len()), &mut ChaCha8Rng::seed_from_u64(seed));
+    let mut sizes = spread(
+        &boxes,
+        count.min(boxes.len()),
+        &mut ChaCha8Rng::seed_from_u64(seed),
+    );
     let mut before = Vec::new();
     for _ in 0..ROUNDS {
         let nearest: Vec<usize> = boxes.iter().map(|b| nearest(b, &sizes).0).collect();
         if nearest == before {
             break;
         }
-        sizes = (0..sizes.len()).map(|k| mean_of(&boxes, &nearest, k).unwrap_or(sizes[k])).collect();
+        sizes = (0..sizes.len())
+            .map(|k| mean_of(&boxes, &nearest, k).unwrap_or(sizes[k]))
+            .collect();
         before = nearest;
     }
     sizes.sort_by(|a, b| (a[0] * a[1]).total_cmp(&(b[0] * b[1])));
     let mean_iou = boxes.iter().map(|b| nearest(b, &sizes).1).sum::<f64>() / boxes.len() as f64;
-    let reached = boxes.iter().filter(|b| sizes.iter().any(|a| in_reach(b, a))).count();
-    Anchors { sizes, mean_iou, best_possible_recall: reached as f64 / boxes.len() as f64 }
+    let reached = boxes
+        .iter()
+        .filter(|b| sizes.iter().any(|a| in_reach(b, a)))
+        .count();
+    Anchors {
+        sizes,
+        mean_iou,
+        best_possible_recall: reached as f64 / boxes.len() as f64,
+    }
 }
 
 /// Starting points far from each other: each drawn with the square of its distance to those before.
@@ -56,7 +73,10 @@ fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2
     let uniform = |rng: &mut ChaCha8Rng| (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     let mut sizes = vec![boxes[(uniform(rng) * boxes.len() as f64) as usize]];
     while sizes.len() < count {
-        let squares: Vec<f64> = boxes.iter().map(|b| (1.0 - nearest(b, &sizes).1).powi(2)).collect();
+        let squares: Vec<f64> = boxes
+            .iter()
+            .map(|b| (1.0 - nearest(b, &sizes).1).powi(2))
+            .collect();
         let mut left = uniform(rng) * squares.iter().sum::<f64>();
         let drawn = squares.iter().position(|s| {
             left -= s;
@@ -69,7 +89,9 @@ fn spread(boxes: &[[f64; 2]], count: usize, rng: &mut ChaCha8Rng) -> Vec<[f64; 2
 
 fn nearest(b: &[f64; 2], sizes: &[[f64; 2]]) -> (usize, f64) {
     let fits = sizes.iter().map(|a| fit(a, b)).enumerate();
-    fits.fold((0, f64::NEG_INFINITY), |best, (k, fit)| if fit > best.1 { (k, fit) } else { best })
+    fits.fold((0, f64::NEG_INFINITY), |best, (k, fit)| {
+        if fit > best.1 { (k, fit) } else { best }
+    })
 }
 
 /// Intersection over union about one centre.
@@ -79,8 +101,14 @@ fn fit(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 }
 
 fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> {
-    let members = boxes.iter().zip(nearest).filter(|(_, n)| **n == k).map(|(b, _)| b);
-    let (sum, count) = members.fold(([0.0; 2], 0.0), |(sum, n), b| ([sum[0] + b[0], sum[1] + b[1]], n + 1.0));
+    let members = boxes
+        .iter()
+        .zip(nearest)
+        .filter(|(_, n)| **n == k)
+        .map(|(b, _)| b);
+    let (sum, count) = members.fold(([0.0; 2], 0.0), |(sum, n), b| {
+        ([sum[0] + b[0], sum[1] + b[1]], n + 1.0)
+    });
     (count > 0.0).then(|| sum.map(|s| s / count))
 }
 
@@ -110,7 +138,17 @@ mod tests {
 
     #[test]
     fn boxes_out_of_reach_lower_the_recall() {
-        let found = anchors(&[[10.0, 10.0], [10.0, 10.0], [10.0, 10.0], [10.0, 10.0], [1000.0, 10.0]], 1, 1);
+        let found = anchors(
+            &[
+                [10.0, 10.0],
+                [10.0, 10.0],
+                [10.0, 10.0],
+                [10.0, 10.0],
+                [1000.0, 10.0],
+            ],
+            1,
+            1,
+        );
         assert!(found.best_possible_recall < 1.0);
     }
 
@@ -124,7 +162,9 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_anchors() {
-        let boxes: Vec<[f64; 2]> = (1..200).map(|i| [f64::from(i % 37 + 1), f64::from(i % 23 + 1)]).collect();
+        let boxes: Vec<[f64; 2]> = (1..200)
+            .map(|i| [f64::from(i % 37 + 1), f64::from(i % 23 + 1)])
+            .collect();
         assert_eq!(anchors(&boxes, 9, 4), anchors(&boxes, 9, 4));
     }
 }

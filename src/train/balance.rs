@@ -26,7 +26,10 @@ pub struct Weights {
 
 impl Default for Balance {
     fn default() -> Self {
-        Self { alpha: 0.5, normalize: false }
+        Self {
+            alpha: 0.5,
+            normalize: false,
+        }
     }
 }
 
@@ -46,16 +49,25 @@ impl Balance {
     /// ```
     pub fn weights(&self, real: u64, synthetic: u64) -> Result<Weights> {
         if !(0.0..=1.0).contains(&self.alpha) {
-            return Err(Error::value("alpha", format!("{}, expected 0 to 1", self.alpha)));
+            return Err(Error::value(
+                "alpha",
+                format!("{}, expected 0 to 1", self.alpha),
+            ));
         }
         for (at, count) in [("real", real), ("synthetic", synthetic)] {
             if count == 0 {
-                return Err(Error::value(at, "no images, expected at least one of each source"));
+                return Err(Error::value(
+                    at,
+                    "no images, expected at least one of each source",
+                ));
             }
         }
         let (r, s) = (real as f64, synthetic as f64);
         let scale = (s + r) * if self.normalize { 1.0 } else { 0.5 };
-        Ok(Weights { real: scale / r * self.alpha, synthetic: scale / s * (1.0 - self.alpha) })
+        Ok(Weights {
+            real: scale / r * self.alpha,
+            synthetic: scale / s * (1.0 - self.alpha),
+        })
     }
 }
 
@@ -66,31 +78,76 @@ mod tests {
     #[test]
     fn the_numbers_of_the_paper() {
         let plain = Balance::default().weights(1624, 4000).unwrap();
-        assert!((plain.real - 0.8658).abs() < 5e-5 && (plain.synthetic - 0.3515).abs() < 5e-5, "{plain:?}");
-        let twice = Balance { normalize: true, ..Balance::default() }.weights(1624, 4000).unwrap();
-        assert_eq!((twice.real, twice.synthetic), (2.0 * plain.real, 2.0 * plain.synthetic));
+        assert!(
+            (plain.real - 0.8658).abs() < 5e-5 && (plain.synthetic - 0.3515).abs() < 5e-5,
+            "{plain:?}"
+        );
+        let twice = Balance {
+            normalize: true,
+            ..Balance::default()
+        }
+        .weights(1624, 4000)
+        .unwrap();
+        assert_eq!(
+            (twice.real, twice.synthetic),
+            (2.0 * plain.real, 2.0 * plain.synthetic)
+        );
     }
 
     #[test]
     fn the_natural_share_is_concatenation_when_normalised_and_half_of_it_otherwise() {
         let alpha = 1624.0 / 5624.0;
-        let one = Balance { alpha, normalize: true }.weights(1624, 4000).unwrap();
+        let one = Balance {
+            alpha,
+            normalize: true,
+        }
+        .weights(1624, 4000)
+        .unwrap();
         assert!((one.real - 1.0).abs() < 1e-12 && (one.synthetic - 1.0).abs() < 1e-12);
-        let half = Balance { alpha, normalize: false }.weights(1624, 4000).unwrap();
+        let half = Balance {
+            alpha,
+            normalize: false,
+        }
+        .weights(1624, 4000)
+        .unwrap();
         assert!((half.real - 0.5).abs() < 1e-12 && (half.synthetic - 0.5).abs() < 1e-12);
     }
 
     #[test]
     fn the_ends_leave_one_source_out() {
-        let only = |alpha| Balance { alpha, normalize: false }.weights(10, 30).unwrap();
+        let only = |alpha| {
+            Balance {
+                alpha,
+                normalize: false,
+            }
+            .weights(10, 30)
+            .unwrap()
+        };
         assert_eq!((only(0.0).real, only(1.0).synthetic), (0.0, 0.0));
     }
 
     #[test]
     fn impossible_balances_are_refused() {
-        assert!(Balance { alpha: 1.5, normalize: false }.weights(1, 1).is_err());
-        assert!(Balance { alpha: f64::NAN, normalize: false }.weights(1, 1).is_err());
+        assert!(
+            Balance {
+                alpha: 1.5,
+                normalize: false
+            }
+            .weights(1, 1)
+            .is_err()
+        );
+        assert!(
+            Balance {
+                alpha: f64::NAN,
+                normalize: false
+            }
+            .weights(1, 1)
+            .is_err()
+        );
         let said = Balance::default().weights(0, 5).unwrap_err().to_string();
-        assert_eq!(said, "real: no images, expected at least one of each source");
+        assert_eq!(
+            said,
+            "real: no images, expected at least one of each source"
+        );
     }
 }

@@ -48,7 +48,10 @@ pub fn batches(real: usize, synthetic: usize, epoch: u64, options: &BatchOptions
     for (source, count) in [(Source::Real, real), (Source::Synthetic, synthetic)] {
         let mut images: Vec<usize> = (0..count).collect();
         shuffle(&mut images, &mut rng);
-        all.extend(images.chunks(options.size.max(1)).map(|images| Batch { source, images: images.to_vec() }));
+        all.extend(images.chunks(options.size.max(1)).map(|images| Batch {
+            source,
+            images: images.to_vec(),
+        }));
     }
     shuffle(&mut all, &mut rng);
     all
@@ -71,7 +74,11 @@ mod tests {
         let all = batches(1624, 4000, 3, &BatchOptions::default());
         assert_eq!(all.len(), 176);
         for (source, count) in [(Source::Real, 1624), (Source::Synthetic, 4000)] {
-            let mut images: Vec<_> = all.iter().filter(|b| b.source == source).flat_map(|b| b.images.clone()).collect();
+            let mut images: Vec<_> = all
+                .iter()
+                .filter(|b| b.source == source)
+                .flat_map(|b| b.images.clone())
+                .collect();
             images.sort_unstable();
             assert_eq!(images, (0..count).collect::<Vec<_>>());
         }
@@ -80,7 +87,10 @@ mod tests {
     #[test]
     fn sources_are_mixed_over_the_epoch() {
         let all = batches(320, 320, 0, &BatchOptions::default());
-        let changes = all.windows(2).filter(|pair| pair[0].source != pair[1].source).count();
+        let changes = all
+            .windows(2)
+            .filter(|pair| pair[0].source != pair[1].source)
+            .count();
         assert!(changes > 3, "{changes}");
     }
 

@@ -9,7 +9,12 @@
 pub fn decode(t: [f64; 4], cell: [f64; 2], anchor: [f64; 2]) -> [f64; 4] {
     let twice = t.map(|v| 2.0 * sigmoid(v));
     let size = |i: usize| anchor[i] * twice[2 + i] * twice[2 + i];
-    [twice[0] - 0.5 + cell[0], twice[1] - 0.5 + cell[1], size(0), size(1)]
+    [
+        twice[0] - 0.5 + cell[0],
+        twice[1] - 0.5 + cell[1],
+        size(0),
+        size(1),
+    ]
 }
 
 /// The numbers that [`decode`] takes to a box; none for a box that it cannot reach: a centre more than half a cell
@@ -33,12 +38,20 @@ mod tests {
 
     #[test]
     fn zeros_are_the_middle_of_the_cell_and_the_anchor_itself() {
-        assert_eq!(decode([0.0; 4], [3.0, 5.0], [2.0, 4.0]), [3.5, 5.5, 2.0, 4.0]);
+        assert_eq!(
+            decode([0.0; 4], [3.0, 5.0], [2.0, 4.0]),
+            [3.5, 5.5, 2.0, 4.0]
+        );
     }
 
     #[test]
     fn boxes_out_of_reach_have_no_numbers() {
-        for bbox in [[2.4, 5.5, 2.0, 4.0], [3.5, 5.5, 0.0, 4.0], [3.5, 5.5, 8.0, 4.0], [f64::NAN, 5.5, 2.0, 4.0]] {
+        for bbox in [
+            [2.4, 5.5, 2.0, 4.0],
+            [3.5, 5.5, 0.0, 4.0],
+            [3.5, 5.5, 8.0, 4.0],
+            [f64::NAN, 5.5, 2.0, 4.0],
+        ] {
             assert_eq!(encode(bbox, [3.0, 5.0], [2.0, 4.0]), None, "{bbox:?}");
         }
     }

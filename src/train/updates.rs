@@ -18,7 +18,10 @@ impl Updates {
     /// Those of `epochs` over `images` in batches of `batch`.
     pub fn of(images: u64, batch: u64, epochs: u64) -> Self {
         let batches = batches_per_epoch(images, batch);
-        Self { batches, total: batches * epochs }
+        Self {
+            batches,
+            total: batches * epochs,
+        }
     }
 
     /// How many epochs of `batches` batches make as many updates; rarely whole.
@@ -35,7 +38,10 @@ mod tests {
     fn the_numbers_of_the_paper() {
         let concatenated = Updates::of(1624 + 4000, 32, 300);
         assert_eq!((concatenated.batches, concatenated.total), (176, 52_800));
-        assert_eq!((batches_per_epoch(4000, 32), batches_per_epoch(1624, 32)), (125, 51));
+        assert_eq!(
+            (batches_per_epoch(4000, 32), batches_per_epoch(1624, 32)),
+            (125, 51)
+        );
         // 422.4 and 1035.3: the paper rounds the one up to 423 and the other down to 1035.
         assert_eq!(concatenated.epochs_of(125).ceil(), 423.0);
         assert_eq!(concatenated.epochs_of(51).floor(), 1035.0);

@@ -13,7 +13,10 @@ const SIZE: (usize, usize) = (1250, 800);
 /// A grainy, see-through ellipse with an opaque band, on a grainy green screen.
 fn photo() -> Image<LinearRgb> {
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-        let (u, v) = (x as f32 / SIZE.0 as f32 - 0.5, y as f32 / SIZE.1 as f32 - 0.5);
+        let (u, v) = (
+            x as f32 / SIZE.0 as f32 - 0.5,
+            y as f32 / SIZE.1 as f32 - 0.5,
+        );
         let grain = ((x * 7919 + y * 104_729) % 1009) as f32 / 1009.0 - 0.5;
         let screen = LinearRgb::new(0.045, 0.42, 0.085).scale(1.0 - 0.2 * u);
         let wall = ((x / 9) % 5) as f32 * 0.02;
@@ -27,7 +30,11 @@ fn photo() -> Image<LinearRgb> {
 }
 
 fn add(photo: &Path, folder: &Path) -> petcomp::Result<Image<petcomp::Srgb8>> {
-    let added = add_photo(folder, photo, &AddPhoto::new("bottle", "cap_label", Scale::Length(0.25)))?;
+    let added = add_photo(
+        folder,
+        photo,
+        &AddPhoto::new("bottle", "cap_label", Scale::Length(0.25)),
+    )?;
     Ok(contact_sheet(&Library::open_with(folder, &[added])?))
 }
 
@@ -35,9 +42,14 @@ fn asset(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("a folder for the bench");
     let file = folder.path().join("photo.png");
     io::write(&file, &photo()).expect("the photo is written");
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+    let one = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("a thread");
     let out = folder.path().join("assets");
-    c.bench_function("asset/add/1250x800", |b| b.iter(|| one.install(|| add(&file, &out)).expect("a cut-out")));
+    c.bench_function("asset/add/1250x800", |b| {
+        b.iter(|| one.install(|| add(&file, &out)).expect("a cut-out"))
+    });
 }
 
 criterion_group!(benches, asset);

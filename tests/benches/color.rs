@@ -24,23 +24,41 @@ fn benches(c: &mut Criterion) {
     let matrix = ColorMatrix::acescg_from_linear();
 
     let mut whole = c.benchmark_group("color/3840x2160");
-    whole.throughput(Throughput::Elements((SIZE.0 * SIZE.1) as u64)).sample_size(10);
-    whole.bench_function("to_srgb8", |b| b.iter(|| color::to_srgb8(black_box(&light))));
-    whole.bench_function("from_srgb8", |b| b.iter(|| color::from_srgb8(black_box(&codes))));
+    whole
+        .throughput(Throughput::Elements((SIZE.0 * SIZE.1) as u64))
+        .sample_size(10);
+    whole.bench_function("to_srgb8", |b| {
+        b.iter(|| color::to_srgb8(black_box(&light)))
+    });
+    whole.bench_function("from_srgb8", |b| {
+        b.iter(|| color::from_srgb8(black_box(&codes)))
+    });
     whole.bench_function("shift_hsv", |b| {
         b.iter(|| black_box(&light).map(|c| color::shift_hsv(c, 20.0, 1.1, 0.9)));
     });
     whole.finish();
 
     let mut rows = c.benchmark_group("color/row-3840");
-    rows.throughput(Throughput::Elements(row.len() as u64)).sample_size(20);
+    rows.throughput(Throughput::Elements(row.len() as u64))
+        .sample_size(20);
     let mut out = codes.row(0).to_vec();
-    rows.bench_function("encode_row", |b| b.iter(|| color::encode_row(black_box(row), &mut out)));
+    rows.bench_function("encode_row", |b| {
+        b.iter(|| color::encode_row(black_box(row), &mut out))
+    });
     let mut back = row.to_vec();
-    rows.bench_function("decode_row", |b| b.iter(|| color::decode_row(black_box(&out), &mut back)));
-    rows.bench_function("matrix", |b| b.iter(|| matrix.apply_row(black_box(&mut back))));
+    rows.bench_function("decode_row", |b| {
+        b.iter(|| color::decode_row(black_box(&out), &mut back))
+    });
+    rows.bench_function("matrix", |b| {
+        b.iter(|| matrix.apply_row(black_box(&mut back)))
+    });
     rows.bench_function("linear_to_srgb", |b| {
-        b.iter(|| black_box(row).iter().map(|c| color::linear_to_srgb(c.g)).sum::<f32>());
+        b.iter(|| {
+            black_box(row)
+                .iter()
+                .map(|c| color::linear_to_srgb(c.g))
+                .sum::<f32>()
+        });
     });
     rows.finish();
 }

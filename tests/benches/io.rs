@@ -8,7 +8,11 @@ use std::hint::black_box;
 fn frame() -> Image<Srgb8> {
     Image::from_fn(640, 480, |x, y| {
         let grain = (x * 7919 + y * 104_729) % 8;
-        Srgb8 { r: (x * 240 / 640 + grain) as u8, g: (y * 240 / 480 + grain) as u8, b: (128 + grain) as u8 }
+        Srgb8 {
+            r: (x * 240 / 640 + grain) as u8,
+            g: (y * 240 / 480 + grain) as u8,
+            b: (128 + grain) as u8,
+        }
     })
 }
 

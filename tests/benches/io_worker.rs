@@ -11,13 +11,18 @@ const ROUNDS: usize = 15;
 /// A smooth picture with some grain, as a rendered frame has.
 fn frame() -> Image<PremulRgba> {
     let grain = |x: usize, y: usize| ((x * 7919 + y * 104_729) % 97) as f32 * 1e-3;
-    Image::from_fn(WIDTH, HEIGHT, |x, y| PremulRgba::new(x as f32 / 3840.0 + grain(x, y), y as f32 / 2160.0, 0.5, 1.0))
+    Image::from_fn(WIDTH, HEIGHT, |x, y| {
+        PremulRgba::new(x as f32 / 3840.0 + grain(x, y), y as f32 / 2160.0, 0.5, 1.0)
+    })
 }
 
 fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("4k.exr");
-    let options = WriteOptions { bits: Some(Bits::Half), ..Default::default() };
+    let options = WriteOptions {
+        bits: Some(Bits::Half),
+        ..Default::default()
+    };
     io::write_with(&path, &frame(), &options).expect("written");
     let read = ReadOptions::default();
     let here = || io::oiio::read::<PremulRgba>(&path).expect("read here");
@@ -39,7 +44,10 @@ fn main() {
         inside * 1e3,
         outside * 1e3
     );
-    println!("the worker costs {:.1} % more (at most 25 % wanted)", (outside / inside - 1.0) * 100.0);
+    println!(
+        "the worker costs {:.1} % more (at most 25 % wanted)",
+        (outside / inside - 1.0) * 100.0
+    );
 }
 
 fn timed<T>(call: impl FnOnce() -> T) -> Duration {

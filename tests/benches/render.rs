@@ -14,7 +14,8 @@ fn texture(k: usize) -> Image<PremulRgba> {
     Image::from_fn(384, 1152, |x, y| {
         let (x, y) = (x as f32 / 192.0 - 1.0, y as f32 / 1152.0);
         let half_width = if y < 0.2 { 0.35 } else { 0.9 };
-        let alpha = (40.0 * (half_width - x.abs())).clamp(0.0, 1.0) * if y > 0.4 && y < 0.6 { 0.95 } else { 0.5 };
+        let alpha = (40.0 * (half_width - x.abs())).clamp(0.0, 1.0)
+            * if y > 0.4 && y < 0.6 { 0.95 } else { 0.5 };
         let stripe = 0.5 + 0.4 * (y * 60.0 + k as f32).sin();
         PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
     })
@@ -39,19 +40,36 @@ fn shot() -> Shot {
         color: LinearRgb::new(1.0, 0.95, 0.85),
     };
     let textures: Vec<_> = (0..5).map(|k| Texture::from(texture(k))).collect();
-    let shot = Shot::new(camera).with_light(light).with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
+    let shot = Shot::new(camera)
+        .with_light(light)
+        .with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
     (0..20).fold(shot, |shot, k| {
         let f = f64::from(k);
-        let rotation = UnitQuaternion::from_euler_angles(0.12 * (1.7 * f).sin(), 0.12 * (2.3 * f).cos(), 2.4 * f);
-        let center = Vector3::new(0.17 * (3.1 * f).sin(), 0.1 * (4.7 * f).cos(), 0.012 + 0.009 * f);
+        let rotation = UnitQuaternion::from_euler_angles(
+            0.12 * (1.7 * f).sin(),
+            0.12 * (2.3 * f).cos(),
+            2.4 * f,
+        );
+        let center = Vector3::new(
+            0.17 * (3.1 * f).sin(),
+            0.1 * (4.7 * f).cos(),
+            0.012 + 0.009 * f,
+        );
         shot.with_card(Card {
             id: ObjectId(k + 1),
             class: 0,
-            quad: Quad { world_from_card: Pose::from_parts(center.into(), rotation), size: [0.07, 0.21] },
+            quad: Quad {
+                world_from_card: Pose::from_parts(center.into(), rotation),
+                size: [0.07, 0.21],
+            },
             texture: textures[k as usize % textures.len()].clone(),
             back: None,
             outline_uv: Arc::new([]),
-            grade: Grade { hue_deg: 7.0 * k as f32, saturation: 0.9, value: 1.1 },
+            grade: Grade {
+                hue_deg: 7.0 * k as f32,
+                saturation: 0.9,
+                value: 1.1,
+            },
         })
     })
 }
@@ -59,16 +77,30 @@ fn shot() -> Shot {
 fn presets(c: &mut Criterion) {
     let shot = shot();
     let plate = Image::filled(640, 480, LinearRgb::grey(0.2));
-    let single = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread can be had");
-    let all = rayon::ThreadPoolBuilder::new().build().expect("threads can be had");
+    let single = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .expect("one thread can be had");
+    let all = rayon::ThreadPoolBuilder::new()
+        .build()
+        .expect("threads can be had");
     let mut group = c.benchmark_group("render/640x480/20_cards");
     group.sample_size(10);
-    let presets = [("draft", Preset::Draft), ("fast", Preset::Fast), ("good", Preset::Good), ("high", Preset::High)];
+    let presets = [
+        ("draft", Preset::Draft),
+        ("fast", Preset::Fast),
+        ("good", Preset::Good),
+        ("high", Preset::High),
+    ];
     for (name, quality) in presets {
         let options = quality.options();
         let render = || composite::frame(&cast(black_box(&shot), &options), Some(&plate));
-        group.bench_function(format!("{name}/one_thread"), |b| b.iter(|| single.install(render)));
-        group.bench_function(format!("{name}/all_threads"), |b| b.iter(|| all.install(render)));
+        group.bench_function(format!("{name}/one_thread"), |b| {
+            b.iter(|| single.install(render))
+        });
+        group.bench_function(format!("{name}/all_threads"), |b| {
+            b.iter(|| all.install(render))
+        });
     }
     group.finish();
 }

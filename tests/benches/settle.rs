@@ -22,8 +22,13 @@ fn scene(cards: u32, k: u64) -> Scene {
         thickness: 0.006,
         mass: 0.03,
     };
-    let recipe = Recipe { objects: Range::fixed(cards.into()), ..Recipe::default() };
-    recipe.scene(0, k, &[tray], &[bottle]).expect("the bottle fits the tray")
+    let recipe = Recipe {
+        objects: Range::fixed(cards.into()),
+        ..Recipe::default()
+    };
+    recipe
+        .scene(0, k, &[tray], &[bottle])
+        .expect("the bottle fits the tray")
 }
 
 fn fall(c: &mut Criterion) {
@@ -37,7 +42,11 @@ fn fall(c: &mut Criterion) {
                 scene(cards, k)
             };
             let options = SettleOptions::default();
-            b.iter_batched(next, |scene| settle::settle(scene, &options), BatchSize::SmallInput);
+            b.iter_batched(
+                next,
+                |scene| settle::settle(scene, &options),
+                BatchSize::SmallInput,
+            );
         });
     }
 }

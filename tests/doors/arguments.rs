@@ -62,11 +62,21 @@ fn changed(line: &str, chance: &mut Chance) -> Vec<String> {
             }
             let parts: Vec<&str> = words[i].split(['=', ',', '/', '[']).collect();
             let part = (*chance.pick(&parts)).trim_end_matches(']').to_owned();
-            words[i] = if part.is_empty() { new.into() } else { words[i].replacen(&part, new, 1) };
+            words[i] = if part.is_empty() {
+                new.into()
+            } else {
+                words[i].replacen(&part, new, 1)
+            };
         }
     }
     if chance.below(4) == 0 {
-        let extra = ["-j", "--limit=side", "--limit=pixels", "--limit=seconds", "--limit=document_depth"];
+        let extra = [
+            "-j",
+            "--limit=side",
+            "--limit=pixels",
+            "--limit=seconds",
+            "--limit=document_depth",
+        ];
         let name = chance.pick(&extra);
         let number = chance.pick(AWKWARD).trim_matches('"');
         match name.strip_prefix("--") {
@@ -84,7 +94,9 @@ fn is_long(line: &str, number: &str) -> bool {
 }
 
 fn is_file(word: &str) -> bool {
-    [".toml", ".png", ".json", ".exr", ".html", ".jsonl"].iter().any(|ending| word.ends_with(ending))
+    [".toml", ".png", ".json", ".exr", ".html", ".jsonl"]
+        .iter()
+        .any(|ending| word.ends_with(ending))
 }
 
 #[test]
@@ -97,7 +109,10 @@ fn every_command_line_ends_in_a_result_or_an_error() {
     // Starting a program takes as long as ten documents.
     let count = (draws() / 10).max(LINES.len() as u64);
     let failures: Vec<Failure> = (0..count).filter_map(|draw| run(&world, draw)).collect();
-    println!("{count} command lines in {:.1} s", began.elapsed().as_secs_f64());
+    println!(
+        "{count} command lines in {:.1} s",
+        began.elapsed().as_secs_f64()
+    );
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
@@ -106,7 +121,11 @@ fn run(world: &World, draw: u64) -> Option<Failure> {
     let args = changed(line, &mut Chance::new("arguments", draw));
     let _ = std::fs::remove_dir_all(world.path("out"));
     let mut child = Command::new("sh")
-        .args(["-c", "ulimit -v 8388608; ulimit -c 0; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_petcomp")])
+        .args([
+            "-c",
+            "ulimit -v 8388608; ulimit -c 0; exec \"$0\" \"$@\"",
+            env!("CARGO_BIN_EXE_petcomp"),
+        ])
         .args(&args)
         .current_dir(world.root())
         .stdin(Stdio::null())
@@ -119,7 +138,11 @@ fn run(world: &World, draw: u64) -> Option<Failure> {
     let began = Instant::now();
     let failure = |how: String| {
         println!("{args:?}: {how}");
-        Some(Failure { door: args.join(" "), draw, how })
+        Some(Failure {
+            door: args.join(" "),
+            draw,
+            how,
+        })
     };
     let status = loop {
         if let Some(status) = child.try_wait().unwrap() {
@@ -133,6 +156,7 @@ fn run(world: &World, draw: u64) -> Option<Failure> {
         std::thread::sleep(Duration::from_millis(5));
     };
     let told = errors.join().unwrap();
-    let died = status.signal().is_some() || status.code() == Some(101) || told.contains("panicked at");
+    let died =
+        status.signal().is_some() || status.code() == Some(101) || told.contains("panicked at");
     died.then(|| failure(format!("{status}: {told}"))).flatten()
 }

@@ -33,10 +33,17 @@ pub(crate) struct World {
 impl World {
     pub(crate) fn new() -> Self {
         let own = tempfile::tempdir().unwrap();
-        let world = Self { folder: own.path().into(), _own: Some(own) };
+        let world = Self {
+            folder: own.path().into(),
+            _own: Some(own),
+        };
         let slab = Image::from_fn(120, 80, |x, y| {
             let inside = (30..90).contains(&x) && (25..55).contains(&y);
-            if inside { LinearRgb::new(0.6, 0.05, 0.05) } else { LinearRgb::new(0.04, 0.4, 0.08) }
+            if inside {
+                LinearRgb::new(0.6, 0.05, 0.05)
+            } else {
+                LinearRgb::new(0.04, 0.4, 0.08)
+            }
         });
         for name in ["slab.png", "two.png"] {
             io::write(world.path(name), &slab).unwrap();
@@ -45,11 +52,16 @@ impl World {
             let add = AddPhoto::new(name, "cap", Scale::Length(length));
             asset::add_photo(world.path("assets"), world.path("slab.png"), &add).unwrap();
         }
-        let place = Image::from_fn(96, 72, |x, y| LinearRgb::grey(0.2 + 0.01 * ((7 * x + 13 * y) % 11) as f32));
+        let place = Image::from_fn(96, 72, |x, y| {
+            LinearRgb::grey(0.2 + 0.01 * ((7 * x + 13 * y) % 11) as f32)
+        });
         io::create_folder(world.path("backgrounds")).unwrap();
         io::write(world.path("backgrounds/a.png"), &place).unwrap();
         world.write("backgrounds/a.label.json", LABEL);
-        world.write("recipe.toml", "[scene]\nimage = [64, 48]\nobjects = [1, 3]\n");
+        world.write(
+            "recipe.toml",
+            "[scene]\nimage = [64, 48]\nobjects = [1, 3]\n",
+        );
         world.write("scene.toml", "");
         world.dataset();
         world
@@ -57,7 +69,10 @@ impl World {
 
     /// The world that another process has made.
     pub(crate) fn at(folder: &str) -> Self {
-        Self { folder: folder.into(), _own: None }
+        Self {
+            folder: folder.into(),
+            _own: None,
+        }
     }
 
     /// A dataset in all formats, the shards of another, and a scene of it for the reference renderer.
@@ -68,11 +83,20 @@ impl World {
         let make = |folder: &str, numbers: Numbers| {
             let mut plan = studio.plan(3, 0, self.path(folder)).unwrap();
             plan.numbers = numbers;
-            generate(&plan, |k| studio.sample(0, k), &|_| {}, &AtomicBool::new(false)).unwrap();
+            generate(
+                &plan,
+                |k| studio.sample(0, k),
+                &|_| {},
+                &AtomicBool::new(false),
+            )
+            .unwrap();
         };
         make("dataset", Numbers::All);
         for index in [1, 2] {
-            make(&format!("shard-{index}"), Numbers::Shard(Shard::new(index, 2).unwrap()));
+            make(
+                &format!("shard-{index}"),
+                Numbers::Shard(Shard::new(index, 2).unwrap()),
+            );
         }
         let sample = studio.sample(0, 1).unwrap();
         io::write_toml(self.path("scene.toml"), &sample.drawn).unwrap();

@@ -59,12 +59,16 @@ struct Tolerance {
 }
 
 pub(crate) fn run(case: &Case) -> Result<(), String> {
-    let text = std::fs::read_to_string(case.dir.join("reference.json")).map_err(|e| e.to_string())?;
+    let text =
+        std::fs::read_to_string(case.dir.join("reference.json")).map_err(|e| e.to_string())?;
     let reference: Reference = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-    let tolerance: Tolerance =
-        case.table["tolerance"].clone().try_into().map_err(|e: toml::de::Error| e.to_string())?;
+    let tolerance: Tolerance = case.table["tolerance"]
+        .clone()
+        .try_into()
+        .map_err(|e: toml::de::Error| e.to_string())?;
     for (i, view) in reference.cases.iter().enumerate() {
-        view.check(&tolerance).map_err(|e| format!("view {i}: {e}"))?;
+        view.check(&tolerance)
+            .map_err(|e| format!("view {i}: {e}"))?;
     }
     Ok(())
 }
@@ -77,22 +81,52 @@ impl View {
             limit.blender_camera_check_px,
         )?;
         let known = self.solve(self.corners_px, Some(self.focal_px))?;
-        within("position with a known focal length", self.position_error(&known), limit.known_position)?;
-        within("angle with a known focal length", self.angle_deg(&known), limit.known_angle_deg)?;
-        within("check points with a known focal length", self.worst_check_px(&known), limit.known_check_px)?;
+        within(
+            "position with a known focal length",
+            self.position_error(&known),
+            limit.known_position,
+        )?;
+        within(
+            "angle with a known focal length",
+            self.angle_deg(&known),
+            limit.known_angle_deg,
+        )?;
+        within(
+            "check points with a known focal length",
+            self.worst_check_px(&known),
+            limit.known_check_px,
+        )?;
         let known = self.solve(self.corners_px_blender, Some(self.focal_px))?;
-        within("check points from Blender's corners", self.worst_check_px(&known), limit.known_blender_check_px)?;
+        within(
+            "check points from Blender's corners",
+            self.worst_check_px(&known),
+            limit.known_blender_check_px,
+        )?;
 
-        let (Some(focal), Some(check), Some(blender)) =
-            (limit.flat_focal, limit.flat_check_px, limit.flat_blender_check_px)
-        else {
+        let (Some(focal), Some(check), Some(blender)) = (
+            limit.flat_focal,
+            limit.flat_check_px,
+            limit.flat_blender_check_px,
+        ) else {
             return Ok(());
         };
         let flat = self.solve(self.corners_px, None)?;
-        within("focal length", (flat.focal_px.x / self.focal_px - 1.0).abs(), focal)?;
-        within("check points with a free focal length", self.worst_check_px(&flat), check)?;
+        within(
+            "focal length",
+            (flat.focal_px.x / self.focal_px - 1.0).abs(),
+            focal,
+        )?;
+        within(
+            "check points with a free focal length",
+            self.worst_check_px(&flat),
+            check,
+        )?;
         let flat = self.solve(self.corners_px_blender, None)?;
-        within("check points from Blender's corners alone", self.worst_check_px(&flat), blender)
+        within(
+            "check points from Blender's corners alone",
+            self.worst_check_px(&flat),
+            blender,
+        )
     }
 
     fn solve(&self, corners_px: [[f64; 2]; 4], focal_px: Option<f64>) -> Result<Camera, String> {
@@ -101,12 +135,22 @@ impl View {
         label.camera.principal_point_px = Some(self.principal_px);
         label.camera.focal_px = focal_px;
         label.camera.focal_fixed = focal_px.is_some();
-        let options = SolveOptions { priors: Priors::ideal().with_free_focal(), ..Default::default() };
+        let options = SolveOptions {
+            priors: Priors::ideal().with_free_focal(),
+            ..Default::default()
+        };
         let solution = camera::solve(&label, &options).map_err(|e| e.to_string())?;
-        let expected = if focal_px.is_some() { FocalSource::Fixed } else { FocalSource::Measured };
+        let expected = if focal_px.is_some() {
+            FocalSource::Fixed
+        } else {
+            FocalSource::Measured
+        };
         match solution.focal_source == expected {
             true => Ok(solution.camera),
-            false => Err(format!("focal length is {:?}, expected {expected:?}", solution.focal_source)),
+            false => Err(format!(
+                "focal length is {:?}, expected {expected:?}",
+                solution.focal_source
+            )),
         }
     }
 
@@ -147,11 +191,22 @@ impl View {
     }
 
     fn worst_check_px(&self, camera: &Camera) -> f64 {
-        let error = |c: &Check| camera.project(Point3::from(c.point)).map(|(px, _)| (px - Point2::from(c.px)).norm());
-        self.checks.iter().map(|c| error(c).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
+        let error = |c: &Check| {
+            camera
+                .project(Point3::from(c.point))
+                .map(|(px, _)| (px - Point2::from(c.px)).norm())
+        };
+        self.checks
+            .iter()
+            .map(|c| error(c).unwrap_or(f64::INFINITY))
+            .fold(0.0, f64::max)
     }
 }
 
 fn within(what: &str, error: f64, limit: f64) -> Result<(), String> {
-    if error <= limit { Ok(()) } else { Err(format!("{what}: off by {error:.3e}, allowed {limit:.0e}")) }
+    if error <= limit {
+        Ok(())
+    } else {
+        Err(format!("{what}: off by {error:.3e}, allowed {limit:.0e}"))
+    }
 }

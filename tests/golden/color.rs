@@ -9,7 +9,8 @@ use serde_json::Value;
 pub(crate) fn run(case: &Case) -> Result<(), String> {
     let path = case.dir.join("reference.json");
     let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let reference: Value = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let reference: Value =
+        serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
     match case.name.as_str() {
         "curves" => curves(case, &reference),
         "spaces" => spaces(case, &reference),
@@ -29,21 +30,46 @@ struct Tolerance {
 
 impl Tolerance {
     fn of(case: &Case, table: &str) -> Self {
-        let bound = |key| case.table[table].get(key).and_then(toml::Value::as_float).unwrap_or(0.0);
-        Self { fail: bound("fail"), fail_relative: bound("fail_relative") }
+        let bound = |key| {
+            case.table[table]
+                .get(key)
+                .and_then(toml::Value::as_float)
+                .unwrap_or(0.0)
+        };
+        Self {
+            fail: bound("fail"),
+            fail_relative: bound("fail_relative"),
+        }
     }
 
-    fn check(self, what: &str, ours: impl IntoIterator<Item = f64>, theirs: &[f64]) -> Result<(), String> {
+    fn check(
+        self,
+        what: &str,
+        ours: impl IntoIterator<Item = f64>,
+        theirs: &[f64],
+    ) -> Result<(), String> {
         let ours: Vec<f64> = ours.into_iter().collect();
         if ours.len() != theirs.len() {
-            return Err(format!("{what}: {} values, expected {}", ours.len(), theirs.len()));
+            return Err(format!(
+                "{what}: {} values, expected {}",
+                ours.len(),
+                theirs.len()
+            ));
         }
         let far = |(a, b): &(&f64, &f64)| {
             let error = (*a - *b).abs();
             !(error <= self.fail || error <= self.fail_relative * b.abs())
         };
-        match ours.iter().zip(theirs).enumerate().find(|(_, pair)| far(pair)) {
-            Some((i, (a, b))) => Err(format!("{what}: value {i} is {a:e}, expected {b:e}, {:e} apart", (a - b).abs())),
+        match ours
+            .iter()
+            .zip(theirs)
+            .enumerate()
+            .find(|(_, pair)| far(pair))
+        {
+            Some((i, (a, b))) => Err(format!(
+                "{what}: value {i} is {a:e}, expected {b:e}, {:e} apart",
+                (a - b).abs()
+            )),
             None => Ok(()),
         }
     }
@@ -61,26 +87,48 @@ fn curves(case: &Case, reference: &Value) -> Result<(), String> {
     for (name, curve) in ours {
         let theirs = &reference["curves"][name];
         let encoded = samples.iter().map(|&x| curve.encode(x as f32).into());
-        near.check(&format!("{name} encoded"), encoded, &floats(&theirs["encoded"]))?;
+        near.check(
+            &format!("{name} encoded"),
+            encoded,
+            &floats(&theirs["encoded"]),
+        )?;
         let decoded = samples.iter().map(|&x| curve.decode(x as f32).into());
-        near.check(&format!("{name} decoded"), decoded, &floats(&theirs["decoded"]))?;
+        near.check(
+            &format!("{name} decoded"),
+            decoded,
+            &floats(&theirs["decoded"]),
+        )?;
     }
     Ok(())
 }
 
 fn spaces(case: &Case, reference: &Value) -> Result<(), String> {
     let exact = Tolerance::of(case, "matrices");
-    for (name, matrix) in reference["matrices"].as_object().ok_or("matrices: not a table")? {
+    for (name, matrix) in reference["matrices"]
+        .as_object()
+        .ok_or("matrices: not a table")?
+    {
         let ours = matrix_named(name).ok_or_else(|| format!("no matrix {name}"))?;
         exact.check(name, ours.transpose().iter().copied(), &floats(matrix))?;
     }
     let near = Tolerance::of(case, "tolerance");
     let colors = &reference["colors"];
-    for (name, matrix) in [("xyz", ColorMatrix::xyz_from_linear()), ("acescg", ColorMatrix::acescg_from_linear())] {
-        near.check(name, each_color(&colors["linear"], |c| matrix.apply(c)), &floats(&colors[name]))?;
+    for (name, matrix) in [
+        ("xyz", ColorMatrix::xyz_from_linear()),
+        ("acescg", ColorMatrix::acescg_from_linear()),
+    ] {
+        near.check(
+            name,
+            each_color(&colors["linear"], |c| matrix.apply(c)),
+            &floats(&colors[name]),
+        )?;
     }
     let back = ColorMatrix::linear_from_acescg();
-    near.check("linear_from_acescg", each_color(&colors["acescg"], |c| back.apply(c)), &floats(&colors["linear"]))
+    near.check(
+        "linear_from_acescg",
+        each_color(&colors["acescg"], |c| back.apply(c)),
+        &floats(&colors["linear"]),
+    )
 }
 
 /// The matrix of a name like `acescg_from_rec709`.
@@ -107,26 +155,42 @@ fn hsv(case: &Case, reference: &Value) -> Result<(), String> {
         [h, s, v]
     });
     near.check("rgb_to_hsv", polar, &floats(&reference["hsv_of_rgb"]))?;
-    let rgb = each_color(&reference["hsv"], |[h, s, v]| color::hsv_to_rgb(Hsv { h, s, v }).into());
+    let rgb = each_color(&reference["hsv"], |[h, s, v]| {
+        color::hsv_to_rgb(Hsv { h, s, v }).into()
+    });
     near.check("hsv_to_rgb", rgb, &floats(&reference["rgb_of_hsv"]))
 }
 
 fn shift_hsv(case: &Case, reference: &Value) -> Result<(), String> {
     let near = Tolerance::of(case, "tolerance");
     for shift in reference["shifts"].as_array().ok_or("shifts: not a list")? {
-        let [hue, saturation, value] =
-            ["hue_deg", "saturation", "value"].map(|key| shift[key].as_f64().unwrap_or(f64::NAN) as f32);
-        let ours = each_color(&reference["rgb"], |c| color::shift_hsv(c.into(), hue, saturation, value).into());
-        near.check(&format!("hue {hue}, saturation {saturation}, value {value}"), ours, &floats(&shift["rgb"]))?;
+        let [hue, saturation, value] = ["hue_deg", "saturation", "value"]
+            .map(|key| shift[key].as_f64().unwrap_or(f64::NAN) as f32);
+        let ours = each_color(&reference["rgb"], |c| {
+            color::shift_hsv(c.into(), hue, saturation, value).into()
+        });
+        near.check(
+            &format!("hue {hue}, saturation {saturation}, value {value}"),
+            ours,
+            &floats(&shift["rgb"]),
+        )?;
     }
     Ok(())
 }
 
 fn ycbcr(case: &Case, reference: &Value) -> Result<(), String> {
     let near = Tolerance::of(case, "tolerance");
-    for (kind, weights) in [("BT.601", Ycbcr::BT601), ("BT.709", Ycbcr::BT709), ("BT.2020", Ycbcr::BT2020)] {
+    for (kind, weights) in [
+        ("BT.601", Ycbcr::BT601),
+        ("BT.709", Ycbcr::BT709),
+        ("BT.2020", Ycbcr::BT2020),
+    ] {
         let video = |bits| CodeRange::Video { bits };
-        for (name, range) in [("full", CodeRange::Full), ("video_8", video(8)), ("video_10", video(10))] {
+        for (name, range) in [
+            ("full", CodeRange::Full),
+            ("video_8", video(8)),
+            ("video_10", video(10)),
+        ] {
             let name = format!("{kind}/{name}");
             let ours = each_color(&reference["rgb"], |rgb| weights.encode(rgb, range));
             near.check(&name, ours, &floats(&reference["ycbcr"][&name]))?;
@@ -146,5 +210,9 @@ fn floats(value: &Value) -> Vec<f64> {
 /// The channels of a list of colours after a function of each.
 fn each_color(colors: &Value, f: impl Fn([f32; 3]) -> [f32; 3]) -> Vec<f64> {
     let channels = floats(colors);
-    channels.chunks_exact(3).flat_map(|c| f([c[0] as f32, c[1] as f32, c[2] as f32])).map(f64::from).collect()
+    channels
+        .chunks_exact(3)
+        .flat_map(|c| f([c[0] as f32, c[1] as f32, c[2] as f32]))
+        .map(f64::from)
+        .collect()
 }

@@ -39,7 +39,9 @@ struct Yolov5 {
 pub(crate) fn run(case: &Case) -> Result<(), String> {
     let boxes: Boxes = json(&case.dir.join("boxes.json"))?;
     let reference: Reference = json(&case.dir.join("reference.json"))?;
-    let fail = case.table["tolerance"]["fail"].as_float().ok_or("tolerance.fail: expected a number")?;
+    let fail = case.table["tolerance"]["fail"]
+        .as_float()
+        .ok_or("tolerance.fail: expected a number")?;
     let sheets = sheets(&boxes);
     coco(&sheets, &reference.coco, fail)?;
     yolov5(&sheets, &reference.yolov5, fail)
@@ -52,12 +54,26 @@ fn json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
 
 fn sheets(boxes: &Boxes) -> Vec<Sheet> {
     let mut sheets = vec![Sheet::default(); boxes.images];
-    let bbox = |x, y, w, h| BBox { x0: x, y0: y, x1: x + w, y1: y + h };
+    let bbox = |x, y, w, h| BBox {
+        x0: x,
+        y0: y,
+        x1: x + w,
+        y1: y + h,
+    };
     for &(i, class, x, y, w, h, crowd) in &boxes.truth {
-        sheets[i].truth.push(TrueBox { class, bbox: bbox(x, y, w, h), area: w * h, crowd: crowd == 1 });
+        sheets[i].truth.push(TrueBox {
+            class,
+            bbox: bbox(x, y, w, h),
+            area: w * h,
+            crowd: crowd == 1,
+        });
     }
     for &(i, class, x, y, w, h, confidence) in &boxes.found {
-        sheets[i].found.push(FoundBox { class, bbox: bbox(x, y, w, h), confidence });
+        sheets[i].found.push(FoundBox {
+            class,
+            bbox: bbox(x, y, w, h),
+            confidence,
+        });
     }
     sheets
 }
@@ -65,19 +81,64 @@ fn sheets(boxes: &Boxes) -> Vec<Sheet> {
 fn coco(sheets: &[Sheet], theirs: &Coco, fail: f64) -> Result<(), String> {
     let ours = eval::coco(sheets, &[]);
     let some = |v: Option<f64>| v.unwrap_or(-1.0);
-    let over = |value: f64| if ours.scores.classes.is_empty() { -1.0 } else { value };
-    let ap = [over(ours.scores.map()), over(ours.scores.map_at(0)), over(ours.scores.map_at(5))];
-    let rest = ours.ap_by_area.into_iter().chain(ours.ar_by_count).chain(ours.ar_by_area).map(some);
-    near("coco stats", ap.into_iter().chain(rest), &theirs.stats, fail)?;
-    let there: Vec<(usize, &Vec<f64>)> = theirs.ap.iter().enumerate().filter(|(_, ap)| ap[0] >= 0.0).collect();
-    per_class("coco", &ours.scores, there.iter().map(|&(c, ap)| (c as u32, ap)), fail)
+    let over = |value: f64| {
+        if ours.scores.classes.is_empty() {
+            -1.0
+        } else {
+            value
+        }
+    };
+    let ap = [
+        over(ours.scores.map()),
+        over(ours.scores.map_at(0)),
+        over(ours.scores.map_at(5)),
+    ];
+    let rest = ours
+        .ap_by_area
+        .into_iter()
+        .chain(ours.ar_by_count)
+        .chain(ours.ar_by_area)
+        .map(some);
+    near(
+        "coco stats",
+        ap.into_iter().chain(rest),
+        &theirs.stats,
+        fail,
+    )?;
+    let there: Vec<(usize, &Vec<f64>)> = theirs
+        .ap
+        .iter()
+        .enumerate()
+        .filter(|(_, ap)| ap[0] >= 0.0)
+        .collect();
+    per_class(
+        "coco",
+        &ours.scores,
+        there.iter().map(|&(c, ap)| (c as u32, ap)),
+        fail,
+    )
 }
 
 fn yolov5(sheets: &[Sheet], theirs: &Yolov5, fail: f64) -> Result<(), String> {
     let ours = eval::yolov5(sheets, &[]);
-    per_class("yolov5", &ours, theirs.classes.iter().copied().zip(&theirs.ap), fail)?;
-    near("yolov5 precision", ours.classes.iter().map(|c| c.precision), &theirs.precision, fail)?;
-    near("yolov5 recall", ours.classes.iter().map(|c| c.recall), &theirs.recall, fail)
+    per_class(
+        "yolov5",
+        &ours,
+        theirs.classes.iter().copied().zip(&theirs.ap),
+        fail,
+    )?;
+    near(
+        "yolov5 precision",
+        ours.classes.iter().map(|c| c.precision),
+        &theirs.precision,
+        fail,
+    )?;
+    near(
+        "yolov5 recall",
+        ours.classes.iter().map(|c| c.recall),
+        &theirs.recall,
+        fail,
+    )
 }
 
 fn per_class<'a>(
@@ -100,11 +161,29 @@ fn per_class<'a>(
         .try_for_each(|(c, (class, ap))| near(&format!("{what} class {class}"), c.ap, ap, fail))
 }
 
-fn near(what: &str, ours: impl IntoIterator<Item = f64>, theirs: &[f64], fail: f64) -> Result<(), String> {
+fn near(
+    what: &str,
+    ours: impl IntoIterator<Item = f64>,
+    theirs: &[f64],
+    fail: f64,
+) -> Result<(), String> {
     let ours: Vec<f64> = ours.into_iter().collect();
     if ours.len() != theirs.len() {
-        return Err(format!("{what}: {} values, expected {}", ours.len(), theirs.len()));
+        return Err(format!(
+            "{what}: {} values, expected {}",
+            ours.len(),
+            theirs.len()
+        ));
     }
-    let far = ours.iter().zip(theirs).enumerate().find(|(_, (a, b))| (*a - *b).abs() > fail || a.is_nan());
-    far.map_or(Ok(()), |(i, (a, b))| Err(format!("{what}: value {i} is {a}, expected {b}, {:e} apart", (a - b).abs())))
+    let far = ours
+        .iter()
+        .zip(theirs)
+        .enumerate()
+        .find(|(_, (a, b))| (*a - *b).abs() > fail || a.is_nan());
+    far.map_or(Ok(()), |(i, (a, b))| {
+        Err(format!(
+            "{what}: value {i} is {a}, expected {b}, {:e} apart",
+            (a - b).abs()
+        ))
+    })
 }

@@ -3,7 +3,9 @@
 use crate::case::Case;
 use petcomp::io::exr::read_channels;
 use petcomp::matte::key::{KeyOptions, Keying, Photo, Screen};
-use petcomp::matte::{ChannelKeyed, ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen};
+use petcomp::matte::{
+    ChannelKeyed, ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen,
+};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
 use serde::de::DeserializeOwned;
 
@@ -17,14 +19,22 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
         }
         "channel_key" => {
             let ChannelKeyed { matte, cutout } = channel_key(&photo(case)?, &options(case)?);
-            all([same_matte(case, "reference_matte.exr", &matte), same_image(case, "reference.exr", &cutout)])
+            all([
+                same_matte(case, "reference_matte.exr", &matte),
+                same_image(case, "reference.exr", &cutout),
+            ])
         }
         "difference_key" => {
             let clean = input(case, "second")?.ok_or("second: missing")?;
-            let matte = difference_key(&photo(case)?, &clean, &options(case)?).map_err(|e| e.to_string())?;
+            let matte = difference_key(&photo(case)?, &clean, &options(case)?)
+                .map_err(|e| e.to_string())?;
             same_cut(case, &matte)
         }
-        "color_spill" => same_image(case, "reference.exr", &color_spill(&photo(case)?, &options(case)?)),
+        "color_spill" => same_image(
+            case,
+            "reference.exr",
+            &color_spill(&photo(case)?, &options(case)?),
+        ),
         "keying_screen" => screen(case),
         other => Err(format!("node: \"{other}\" is not known")),
     }
@@ -65,17 +75,50 @@ fn screen(case: &Case) -> Result<(), String> {
     struct Tolerance {
         hard_fail: f32,
     }
-    let given: Given = case.table.clone().try_into().map_err(|e: toml::de::Error| e.to_string())?;
-    let points: Vec<_> = given.points.iter().map(|p| ScreenPoint { at_px: p.at_px.into(), color: p.color }).collect();
+    let given: Given = case
+        .table
+        .clone()
+        .try_into()
+        .map_err(|e: toml::de::Error| e.to_string())?;
+    let points: Vec<_> = given
+        .points
+        .iter()
+        .map(|p| ScreenPoint {
+            at_px: p.at_px.into(),
+            color: p.color,
+        })
+        .collect();
     let plate = keying_screen(given.size, &points, given.smoothness).map_err(|e| e.to_string())?;
     let [r, g, b, _] = rgba(case, "reference.exr")?;
-    let want = r.iter().zip(&g).zip(&b).map(|((r, g), b)| LinearRgb::new(*r, *g, *b));
+    let want = r
+        .iter()
+        .zip(&g)
+        .zip(&b)
+        .map(|((r, g), b)| LinearRgb::new(*r, *g, *b));
     if plate.pixels().len() != r.len() {
-        return Err(format!("{} pixels, expected {}", plate.pixels().len(), r.len()));
+        return Err(format!(
+            "{} pixels, expected {}",
+            plate.pixels().len(),
+            r.len()
+        ));
     }
-    let apart = |a: &LinearRgb, b: LinearRgb| (a.r - b.r).abs().max((a.g - b.g).abs()).max((a.b - b.b).abs());
-    let most = plate.pixels().iter().zip(want).map(|(a, b)| apart(a, b)).fold(0.0, f32::max);
-    if most <= given.tolerance.hard_fail { Ok(()) } else { Err(format!("differs by {most:e}")) }
+    let apart = |a: &LinearRgb, b: LinearRgb| {
+        (a.r - b.r)
+            .abs()
+            .max((a.g - b.g).abs())
+            .max((a.b - b.b).abs())
+    };
+    let most = plate
+        .pixels()
+        .iter()
+        .zip(want)
+        .map(|(a, b)| apart(a, b))
+        .fold(0.0, f32::max);
+    if most <= given.tolerance.hard_fail {
+        Ok(())
+    } else {
+        Err(format!("differs by {most:e}"))
+    }
 }
 
 fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, opts: &KeyOptions) -> Result<(), String> {
@@ -92,24 +135,44 @@ fn check<P: Photo>(case: &Case, job: &Keying<'_, P>, opts: &KeyOptions) -> Resul
 
 fn all<const N: usize>(results: [Result<(), String>; N]) -> Result<(), String> {
     let wrong: Vec<String> = results.into_iter().filter_map(Result::err).collect();
-    if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
+    if wrong.is_empty() {
+        Ok(())
+    } else {
+        Err(wrong.join("; "))
+    }
 }
 
 /// A matte, and the photo seen through it.
 fn same_cut(case: &Case, matte: &Image<Coverage>) -> Result<(), String> {
     let cutout = photo(case)?.zip_map(matte, PremulRgba::masked);
-    all([same_matte(case, "reference_matte.exr", matte), same_image(case, "reference.exr", &cutout)])
+    all([
+        same_matte(case, "reference_matte.exr", matte),
+        same_image(case, "reference.exr", &cutout),
+    ])
 }
 
 fn same_matte(case: &Case, file: &str, got: &Image<Coverage>) -> Result<(), String> {
     let want = channels(case, file)?;
-    same_bits(file, got.width(), &[("matte", got.pixels().iter().map(|m| m.0).collect(), &want[0])])
+    same_bits(
+        file,
+        got.width(),
+        &[(
+            "matte",
+            got.pixels().iter().map(|m| m.0).collect(),
+            &want[0],
+        )],
+    )
 }
 
 fn same_image(case: &Case, file: &str, got: &Image<PremulRgba>) -> Result<(), String> {
     let [r, g, b, a] = rgba(case, file)?;
     let of = |channel: fn(&PremulRgba) -> f32| got.pixels().iter().map(channel).collect();
-    let pairs = [("R", of(|p| p.r), &r), ("G", of(|p| p.g), &g), ("B", of(|p| p.b), &b), ("A", of(|p| p.a), &a)];
+    let pairs = [
+        ("R", of(|p| p.r), &r),
+        ("G", of(|p| p.g), &g),
+        ("B", of(|p| p.b), &b),
+        ("A", of(|p| p.a), &a),
+    ];
     same_bits(file, got.width(), &pairs)
 }
 
@@ -118,33 +181,64 @@ fn same(a: f32, b: f32) -> bool {
     a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
 }
 
-fn same_bits(file: &str, width: usize, pairs: &[(&str, Vec<f32>, &Vec<f32>)]) -> Result<(), String> {
+fn same_bits(
+    file: &str,
+    width: usize,
+    pairs: &[(&str, Vec<f32>, &Vec<f32>)],
+) -> Result<(), String> {
     let (mut differing, mut first) = (0, String::new());
     for (name, got, want) in pairs {
         if got.len() != want.len() {
-            return Err(format!("{file}: {} values of {name}, expected {}", got.len(), want.len()));
+            return Err(format!(
+                "{file}: {} values of {name}, expected {}",
+                got.len(),
+                want.len()
+            ));
         }
-        let wrong = got.iter().zip(*want).enumerate().filter(|(_, (a, b))| !same(**a, **b));
+        let wrong = got
+            .iter()
+            .zip(*want)
+            .enumerate()
+            .filter(|(_, (a, b))| !same(**a, **b));
         for (i, (a, b)) in wrong {
             if differing == 0 {
-                first = format!("{name} at ({}, {}) is {a:?}, expected {b:?}", i % width, i / width);
+                first = format!(
+                    "{name} at ({}, {}) is {a:?}, expected {b:?}",
+                    i % width,
+                    i / width
+                );
             }
             differing += 1;
         }
     }
-    if differing == 0 { Ok(()) } else { Err(format!("{file}: {differing} floats differ; first {first}")) }
+    if differing == 0 {
+        Ok(())
+    } else {
+        Err(format!("{file}: {differing} floats differ; first {first}"))
+    }
 }
 
 fn options<T: DeserializeOwned>(case: &Case) -> Result<T, String> {
-    case.table.get("options").ok_or("options: missing")?.clone().try_into().map_err(|e| format!("options: {e}"))
+    case.table
+        .get("options")
+        .ok_or("options: missing")?
+        .clone()
+        .try_into()
+        .map_err(|e| format!("options: {e}"))
 }
 
 fn text<'c>(case: &'c Case, key: &str) -> Result<&'c str, String> {
-    case.table.get(key).and_then(toml::Value::as_str).ok_or_else(|| format!("{key}: missing"))
+    case.table
+        .get(key)
+        .and_then(toml::Value::as_str)
+        .ok_or_else(|| format!("{key}: missing"))
 }
 
 fn color(case: &Case, key: &str) -> Result<LinearRgb, String> {
-    let value = case.table.get(key).ok_or_else(|| format!("{key}: missing"))?;
+    let value = case
+        .table
+        .get(key)
+        .ok_or_else(|| format!("{key}: missing"))?;
     value.clone().try_into().map_err(|e| format!("{key}: {e}"))
 }
 
@@ -154,8 +248,12 @@ fn photo(case: &Case) -> Result<Image<PremulRgba>, String> {
 
 /// A picture that the case names, if it does.
 fn input(case: &Case, key: &str) -> Result<Option<Image<PremulRgba>>, String> {
-    let Some(path) = case.table.get(key).and_then(toml::Value::as_str) else { return Ok(None) };
-    petcomp::io::read(case.dir.join(path)).map(Some).map_err(|e| e.to_string())
+    let Some(path) = case.table.get(key).and_then(toml::Value::as_str) else {
+        return Ok(None);
+    };
+    petcomp::io::read(case.dir.join(path))
+        .map(Some)
+        .map_err(|e| e.to_string())
 }
 
 /// The float channels of a reference in the order of their names.
@@ -165,6 +263,8 @@ fn channels(case: &Case, file: &str) -> Result<Vec<Vec<f32>>, String> {
 }
 
 fn rgba(case: &Case, file: &str) -> Result<[Vec<f32>; 4], String> {
-    let [a, b, g, r] = channels(case, file)?.try_into().map_err(|_| format!("{file}: expected A, B, G, R"))?;
+    let [a, b, g, r] = channels(case, file)?
+        .try_into()
+        .map_err(|_| format!("{file}: expected A, B, G, R"))?;
     Ok([r, g, b, a])
 }

@@ -13,11 +13,21 @@ use petcomp::{Image, LinearRgb, PremulRgba, Shot, composite, io};
 pub(crate) fn run(case: &Case) -> Result<(), String> {
     let shot = cycles::import(case.dir.join("scene.json"), None).map_err(|e| e.to_string())?;
     check(&shot).map_err(|e| e.to_string())?;
-    let reference: Image<LinearRgb> = io::read(case.dir.join("reference.exr")).map_err(|e| e.to_string())?;
-    let limits = case.table.get("limits").and_then(toml::Value::as_table).ok_or("case.toml: no table `limits`")?;
+    let reference: Image<LinearRgb> =
+        io::read(case.dir.join("reference.exr")).map_err(|e| e.to_string())?;
+    let limits = case
+        .table
+        .get("limits")
+        .and_then(toml::Value::as_table)
+        .ok_or("case.toml: no table `limits`")?;
     for (name, limit) in limits {
-        let limit = limit.as_float().ok_or_else(|| format!("limits.{name}: expected a number"))?;
-        let options = name.parse::<Preset>().map_err(|e| format!("limits: {e}"))?.options();
+        let limit = limit
+            .as_float()
+            .ok_or_else(|| format!("limits.{name}: expected a number"))?;
+        let options = name
+            .parse::<Preset>()
+            .map_err(|e| format!("limits: {e}"))?
+            .options();
         judge(case, name, &render(&shot, &options), &reference, limit)?;
     }
     Ok(())
@@ -35,19 +45,40 @@ fn judge(
     rmse: f64,
 ) -> Result<(), String> {
     if ours.size() != theirs.size() {
-        return Err(format!("{:?} pixels, reference has {:?}", ours.size(), theirs.size()));
+        return Err(format!(
+            "{:?} pixels, reference has {:?}",
+            ours.size(),
+            theirs.size()
+        ));
     }
     let pairs = ours.pixels().iter().zip(theirs.pixels());
-    let differences: Vec<f64> = pairs.flat_map(|(a, b)| [a.r - b.r, a.g - b.g, a.b - b.b]).map(f64::from).collect();
+    let differences: Vec<f64> = pairs
+        .flat_map(|(a, b)| [a.r - b.r, a.g - b.g, a.b - b.b])
+        .map(f64::from)
+        .collect();
     let count = differences.len() as f64;
     let bias = differences.iter().sum::<f64>() / count;
     let error = (differences.iter().map(|d| d * d).sum::<f64>() / count).sqrt();
-    let number = |key: &str| case.table["tolerance"].get(key).and_then(toml::Value::as_float).unwrap_or(0.0);
+    let number = |key: &str| {
+        case.table["tolerance"]
+            .get(key)
+            .and_then(toml::Value::as_float)
+            .unwrap_or(0.0)
+    };
     let worst = differences.iter().fold(0.0, |m: f64, d| m.max(d.abs()));
-    let over = 100.0 * differences.iter().filter(|d| d.abs() > number("fail")).count() as f64 / count;
-    let measured = format!("{name}: rmse {error:.5}, bias {bias:+.6}, {over:.2} % over, worst {worst:.3}");
+    let over = 100.0
+        * differences
+            .iter()
+            .filter(|d| d.abs() > number("fail"))
+            .count() as f64
+        / count;
+    let measured =
+        format!("{name}: rmse {error:.5}, bias {bias:+.6}, {over:.2} % over, worst {worst:.3}");
     if std::env::var_os("PETCOMP_GOLDEN_VERBOSE").is_some() {
-        #[expect(clippy::print_stderr, reason = "the numbers behind a pass, for whoever asks for them")]
+        #[expect(
+            clippy::print_stderr,
+            reason = "the numbers behind a pass, for whoever asks for them"
+        )]
         {
             eprintln!("{}: {measured}", case.name);
         }

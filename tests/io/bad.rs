@@ -11,14 +11,23 @@ use std::path::Path;
 fn refusal(path: &Path) -> String {
     let (read, _) = quickly(&path.to_string_lossy(), || io::read::<PremulRgba>(path));
     let message = read.expect_err("a picture out of a bad file").to_string();
-    assert!(!message.contains('\n') && message.len() < 400, "{message:?}");
+    assert!(
+        !message.contains('\n') && message.len() < 400,
+        "{message:?}"
+    );
     let front = format!("{}: ", path.display());
-    message.strip_prefix(&front).unwrap_or_else(|| panic!("{message} does not start with {front}")).to_string()
+    message
+        .strip_prefix(&front)
+        .unwrap_or_else(|| panic!("{message} does not start with {front}"))
+        .to_string()
 }
 
 /// A whole small file of each format.
 fn valid(folder: &Folder) -> Vec<(&'static str, Vec<u8>)> {
-    let float = WriteOptions { bits: Some(Bits::Float), ..Default::default() };
+    let float = WriteOptions {
+        bits: Some(Bits::Float),
+        ..Default::default()
+    };
     io::write(folder.file("a.png"), &codes(20, 14)).unwrap();
     io::write(folder.file("a.jpg"), &opaque_codes(20, 14)).unwrap();
     io::write(folder.file("a.exr"), &light(20, 14)).unwrap();
@@ -30,7 +39,9 @@ fn valid(folder: &Folder) -> Vec<(&'static str, Vec<u8>)> {
         .collect();
     let pixels: Vec<_> = (0..280).map(|i| image::Rgb([i as f32, 0.5, 2.0])).collect();
     let mut hdr = Vec::new();
-    image::codecs::hdr::HdrEncoder::new(&mut hdr).encode(&pixels, 20, 14).unwrap();
+    image::codecs::hdr::HdrEncoder::new(&mut hdr)
+        .encode(&pixels, 20, 14)
+        .unwrap();
     files.push(("a.hdr", hdr));
     files
 }
@@ -40,13 +51,18 @@ fn what_is_no_picture_is_named() {
     let folder = Folder::new();
     assert_eq!(refusal(&folder.file("none.png")), "no such file");
     assert_eq!(refusal(folder.path()), "is a folder, expected a picture");
-    assert_eq!(refusal(&folder.with("empty.png", b"")), "empty file (0 bytes), expected a picture");
+    assert_eq!(
+        refusal(&folder.with("empty.png", b"")),
+        "empty file (0 bytes), expected a picture"
+    );
     assert_eq!(
         refusal(&folder.with("plate.png", b"hello, world")),
         "not a picture petcomp reads (starts with \"hello, world\"), expected EXR, PNG, JPEG, TIFF or HDR"
     );
     assert!(refusal(&folder.with("a.exr", &[0, 1, 2, 255])).contains("starts with 00 01 02 ff"));
-    assert!(refusal(&folder.with("file", b"x").join("a.png")).contains("part of the path is a file"));
+    assert!(
+        refusal(&folder.with("file", b"x").join("a.png")).contains("part of the path is a file")
+    );
 }
 
 #[cfg(unix)]
@@ -54,7 +70,13 @@ fn what_is_no_picture_is_named() {
 fn a_pipe_is_refused_without_waiting() {
     let folder = Folder::new();
     let path = folder.file("pipe.png");
-    assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(&path)
+            .status()
+            .unwrap()
+            .success()
+    );
     assert_eq!(refusal(&path), "not a regular file, expected a picture");
 }
 
@@ -79,10 +101,16 @@ fn truncated_files_are_errors() {
 #[test]
 fn a_truncated_jpeg_says_so() {
     let folder = Folder::new();
-    let jpeg = valid(&folder).into_iter().find(|(name, _)| *name == "a.jpg").unwrap().1;
+    let jpeg = valid(&folder)
+        .into_iter()
+        .find(|(name, _)| *name == "a.jpg")
+        .unwrap()
+        .1;
     let path = folder.with("cut.jpg", &jpeg[..jpeg.len() - 2]);
     assert_eq!(refusal(&path), "truncated JPEG (no end marker)");
-    assert!(io::read::<PremulRgba>(folder.with("more.jpg", &[&jpeg[..], b"trailer"].concat())).is_ok());
+    assert!(
+        io::read::<PremulRgba>(folder.with("more.jpg", &[&jpeg[..], b"trailer"].concat())).is_ok()
+    );
 }
 
 #[test]
@@ -99,10 +127,18 @@ fn headers_that_ask_for_too_much_are_refused_by_name() {
 
     let mut exr = bytes("a.exr");
     for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
-        let at = exr.windows(window.len()).position(|w| w == window.as_bytes()).unwrap() + window.len() + 4;
+        let at = exr
+            .windows(window.len())
+            .position(|w| w == window.as_bytes())
+            .unwrap()
+            + window.len()
+            + 4;
         exr[at + 8..at + 16].copy_from_slice(&[0x3f, 0x0d, 3, 0, 0x3f, 0x0d, 3, 0]);
     }
-    assert!(refusal(&folder.with("bomb.exr", &exr)).contains("Limits::side"), "200,000 x 200,000");
+    assert!(
+        refusal(&folder.with("bomb.exr", &exr)).contains("Limits::side"),
+        "200,000 x 200,000"
+    );
 
     let grey = |width: u32, height: u32| {
         let tags = [
@@ -135,29 +171,68 @@ fn limits_are_the_callers() {
     let folder = Folder::new();
     io::write(folder.file("a.png"), &codes(20, 14)).unwrap();
     let under = |limits: Limits| {
-        let options = ReadOptions { limits, ..Default::default() };
-        io::read_with::<PremulRgba>(folder.file("a.png"), &options).unwrap_err().to_string()
+        let options = ReadOptions {
+            limits,
+            ..Default::default()
+        };
+        io::read_with::<PremulRgba>(folder.file("a.png"), &options)
+            .unwrap_err()
+            .to_string()
     };
-    let e = under(Limits { side: 19, ..Default::default() });
-    assert!(e.ends_with("20 pixels along a side, over the limit of 19 (Limits::side; --limit side=N)"), "{e}");
-    assert!(under(Limits { file_bytes: 9, ..Default::default() }).contains("Limits::file_bytes"));
+    let e = under(Limits {
+        side: 19,
+        ..Default::default()
+    });
+    assert!(
+        e.ends_with("20 pixels along a side, over the limit of 19 (Limits::side; --limit side=N)"),
+        "{e}"
+    );
+    assert!(
+        under(Limits {
+            file_bytes: 9,
+            ..Default::default()
+        })
+        .contains("Limits::file_bytes")
+    );
     #[cfg(target_os = "linux")]
     {
-        let e = under(Limits { memory_percent: 0, ..Default::default() });
-        assert!(e.contains("20 x 14 pixels x 4 channels x 12 bytes = ") && e.contains("Limits::memory_percent"), "{e}");
+        let e = under(Limits {
+            memory_percent: 0,
+            ..Default::default()
+        });
+        assert!(
+            e.contains("20 x 14 pixels x 4 channels x 12 bytes = ")
+                && e.contains("Limits::memory_percent"),
+            "{e}"
+        );
     }
 }
 
 #[test]
 fn nothing_half_written_is_left() {
     let folder = Folder::new();
-    let e = io::write(folder.file("a.gif"), &codes(2, 2)).unwrap_err().to_string();
-    assert!(e.contains("expected the extension .exr, .png, .jpg or .tif"), "{e}");
-    let e = io::write(folder.file("no/a.png"), &codes(2, 2)).unwrap_err().to_string();
+    let e = io::write(folder.file("a.gif"), &codes(2, 2))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        e.contains("expected the extension .exr, .png, .jpg or .tif"),
+        "{e}"
+    );
+    let e = io::write(folder.file("no/a.png"), &codes(2, 2))
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("no folder"), "{e}");
-    let e = io::write(folder.file("a.png"), &codes(0, 2)).unwrap_err().to_string();
-    assert!(e.ends_with("a.png: 0 x 2 pixels, expected at least 1 x 1"), "{e}");
-    let half = WriteOptions { bits: Some(Bits::Half), ..Default::default() };
+    let e = io::write(folder.file("a.png"), &codes(0, 2))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        e.ends_with("a.png: 0 x 2 pixels, expected at least 1 x 1"),
+        "{e}"
+    );
+    let half = WriteOptions {
+        bits: Some(Bits::Half),
+        ..Default::default()
+    };
     assert!(io::write_with(folder.file("a.png"), &codes(2, 2), &half).is_err());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
@@ -167,6 +242,9 @@ fn a_wrong_extension_is_read_by_content() {
     let folder = Folder::new();
     io::write(folder.file("a.png"), &opaque_codes(4, 4)).unwrap();
     std::fs::rename(folder.file("a.png"), folder.file("a.jpg")).unwrap();
-    assert_eq!(io::read_header(folder.file("a.jpg")).unwrap().format, io::Format::Png);
+    assert_eq!(
+        io::read_header(folder.file("a.jpg")).unwrap().format,
+        io::Format::Png
+    );
     assert!(io::read::<LinearRgb>(folder.file("a.jpg")).is_ok());
 }

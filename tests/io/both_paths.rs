@@ -6,27 +6,50 @@ use petcomp::{Coverage, Image, LinearRgb, PremulRgba, Srgb8, StraightRgba, color
 use std::path::Path;
 
 fn with_bits(bits: Bits) -> WriteOptions {
-    WriteOptions { bits: Some(bits), ..Default::default() }
+    WriteOptions {
+        bits: Some(bits),
+        ..Default::default()
+    }
 }
 
 /// A file by each writer, read by each reader: four times the same pixels, to the last bit.
 fn agree<P: FromFile + PartialEq>(name: &str, image: &Image<impl ToFile>, options: &WriteOptions) {
     let folder = Folder::new();
-    let (ours, theirs) = (folder.file(&format!("ours-{name}")), folder.file(&format!("theirs-{name}")));
+    let (ours, theirs) = (
+        folder.file(&format!("ours-{name}")),
+        folder.file(&format!("theirs-{name}")),
+    );
     io::write_with(&ours, image, options).unwrap();
     io::oiio::write_with(&theirs, image, options).unwrap();
     let reference = io::read::<P>(&ours).unwrap();
-    let others = [io::oiio::read::<P>(&ours), io::read::<P>(&theirs), io::oiio::read::<P>(&theirs)];
-    for (who, other) in ["ours, read by theirs", "theirs, read by ours", "theirs, read by theirs"].iter().zip(others) {
-        assert!(other.unwrap().pixels() == reference.pixels(), "{name} {options:?}: {who}");
+    let others = [
+        io::oiio::read::<P>(&ours),
+        io::read::<P>(&theirs),
+        io::oiio::read::<P>(&theirs),
+    ];
+    for (who, other) in [
+        "ours, read by theirs",
+        "theirs, read by ours",
+        "theirs, read by theirs",
+    ]
+    .iter()
+    .zip(others)
+    {
+        assert!(
+            other.unwrap().pixels() == reference.pixels(),
+            "{name} {options:?}: {who}"
+        );
     }
 }
 
 #[test]
 fn integers_with_alpha_mean_the_same() {
-    for (name, bits) in
-        [("a.png", Bits::Eight), ("a.png", Bits::Sixteen), ("a.tif", Bits::Eight), ("a.tif", Bits::Sixteen)]
-    {
+    for (name, bits) in [
+        ("a.png", Bits::Eight),
+        ("a.png", Bits::Sixteen),
+        ("a.tif", Bits::Eight),
+        ("a.tif", Bits::Sixteen),
+    ] {
         agree::<PremulRgba>(name, &codes(23, 11), &with_bits(bits));
         agree::<StraightRgba>(name, &codes(23, 11), &with_bits(bits));
     }
@@ -34,16 +57,23 @@ fn integers_with_alpha_mean_the_same() {
 
 #[test]
 fn integers_without_alpha_mean_the_same() {
-    for (name, bits) in
-        [("a.png", Bits::Eight), ("a.png", Bits::Sixteen), ("a.tif", Bits::Eight), ("a.tif", Bits::Sixteen)]
-    {
+    for (name, bits) in [
+        ("a.png", Bits::Eight),
+        ("a.png", Bits::Sixteen),
+        ("a.tif", Bits::Eight),
+        ("a.tif", Bits::Sixteen),
+    ] {
         agree::<LinearRgb>(name, &opaque_codes(23, 11), &with_bits(bits));
     }
 }
 
 #[test]
 fn floats_mean_the_same_with_and_without_alpha() {
-    for (name, bits) in [("a.tif", Bits::Float), ("a.exr", Bits::Half), ("a.exr", Bits::Float)] {
+    for (name, bits) in [
+        ("a.tif", Bits::Float),
+        ("a.exr", Bits::Half),
+        ("a.exr", Bits::Float),
+    ] {
         agree::<PremulRgba>(name, &light(23, 11), &with_bits(bits));
         let opaque = light(23, 11).map(PremulRgba::color);
         agree::<LinearRgb>(name, &opaque, &with_bits(bits));
@@ -53,9 +83,12 @@ fn floats_mean_the_same_with_and_without_alpha() {
 #[test]
 fn mattes_mean_the_same() {
     let matte = Image::from_fn(9, 4, |x, y| Coverage((x * y) as f32 / 24.0));
-    for (name, bits) in
-        [("m.png", Bits::Eight), ("m.png", Bits::Sixteen), ("m.tif", Bits::Sixteen), ("m.exr", Bits::Half)]
-    {
+    for (name, bits) in [
+        ("m.png", Bits::Eight),
+        ("m.png", Bits::Sixteen),
+        ("m.tif", Bits::Sixteen),
+        ("m.exr", Bits::Half),
+    ] {
         agree::<Coverage>(name, &matte, &with_bits(bits));
     }
 }
@@ -66,9 +99,17 @@ fn codes_apart(image: &Image<impl ToFile>) -> Vec<u8> {
     let path = folder.file("a.jpg");
     io::write(&path, image).unwrap();
     let shown = |image: Image<LinearRgb>| image.map(color::encode_srgb8);
-    let (ours, theirs) = (shown(io::read(&path).unwrap()), shown(io::oiio::read(&path).unwrap()));
-    let apart = |(p, q): (&Srgb8, &Srgb8)| [p.r.abs_diff(q.r), p.g.abs_diff(q.g), p.b.abs_diff(q.b)];
-    ours.pixels().iter().zip(theirs.pixels()).flat_map(apart).collect()
+    let (ours, theirs) = (
+        shown(io::read(&path).unwrap()),
+        shown(io::oiio::read(&path).unwrap()),
+    );
+    let apart =
+        |(p, q): (&Srgb8, &Srgb8)| [p.r.abs_diff(q.r), p.g.abs_diff(q.g), p.b.abs_diff(q.b)];
+    ours.pixels()
+        .iter()
+        .zip(theirs.pixels())
+        .flat_map(apart)
+        .collect()
 }
 
 /// JPEG lets decoders differ by a code in each of Y, Cb and Cr (ISO/IEC 10918-2); blue is Y + 1.772 Cb, so two codes of
@@ -79,21 +120,42 @@ fn jpegs_differ_by_a_code_of_each_component_at_most() {
     assert!(codes_apart(&grey).iter().all(|&d| d <= 1));
     let apart = codes_apart(&opaque_codes(64, 48));
     assert!(apart.iter().all(|&d| d <= 2));
-    assert!(apart.iter().filter(|&&d| d > 1).count() * 50 < apart.len(), "more than 2 % are off by two codes");
+    assert!(
+        apart.iter().filter(|&&d| d > 1).count() * 50 < apart.len(),
+        "more than 2 % are off by two codes"
+    );
 }
 
 /// OpenImageIO's writer gives the lossy DWA compression that our own does not have.
 #[test]
 fn dwa_compressed_exrs_are_read() {
     let folder = Folder::new();
-    let smooth = Image::from_fn(64, 64, |x, y| LinearRgb::new(x as f32 / 64.0, y as f32 / 64.0, 0.5));
+    let smooth = Image::from_fn(64, 64, |x, y| {
+        LinearRgb::new(x as f32 / 64.0, y as f32 / 64.0, 0.5)
+    });
     for compression in ["dwaa:45", "dwab:45", "piz", "pxr24", "b44", "rle", "zips"] {
         let path = folder.file("a.exr");
         let metadata = vec![("compression".to_string(), compression.to_string())];
-        io::oiio::write_with(&path, &smooth, &WriteOptions { metadata, ..Default::default() }).unwrap();
-        let (ours, theirs) = (io::read::<LinearRgb>(&path).unwrap(), io::oiio::read::<LinearRgb>(&path).unwrap());
+        io::oiio::write_with(
+            &path,
+            &smooth,
+            &WriteOptions {
+                metadata,
+                ..Default::default()
+            },
+        )
+        .unwrap();
+        let (ours, theirs) = (
+            io::read::<LinearRgb>(&path).unwrap(),
+            io::oiio::read::<LinearRgb>(&path).unwrap(),
+        );
         let apart = |(p, q): (&LinearRgb, &LinearRgb)| (p.r - q.r).abs().max((p.g - q.g).abs());
-        let worst = ours.pixels().iter().zip(theirs.pixels()).map(apart).fold(0.0, f32::max);
+        let worst = ours
+            .pixels()
+            .iter()
+            .zip(theirs.pixels())
+            .map(apart)
+            .fold(0.0, f32::max);
         // Two half floats next to each other below 1 are 1/2048 apart.
         assert!(worst <= 1.0 / 1024.0, "{compression}: {worst}");
     }

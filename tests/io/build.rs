@@ -5,7 +5,13 @@ use std::io::Write;
 /// The checksum of PNG chunks (ISO 3309), bit by bit.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0_u32, |crc, &b| {
-        (0..8).fold(crc ^ u32::from(b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 })
+        (0..8).fold(crc ^ u32::from(b), |c, _| {
+            if c & 1 == 1 {
+                0xedb8_8320 ^ (c >> 1)
+            } else {
+                c >> 1
+            }
+        })
     })
 }
 
@@ -24,7 +30,13 @@ pub(crate) fn png(chunks: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
 }
 
 /// `IHDR`: size, bits, colour kind, interlacing.
-pub(crate) fn ihdr(width: u32, height: u32, bits: u8, color: u8, interlace: u8) -> (&'static [u8; 4], Vec<u8>) {
+pub(crate) fn ihdr(
+    width: u32,
+    height: u32,
+    bits: u8,
+    color: u8,
+    interlace: u8,
+) -> (&'static [u8; 4], Vec<u8>) {
     let mut data = [width.to_be_bytes(), height.to_be_bytes()].concat();
     data.extend([bits, color, 0, 0, interlace]);
     (b"IHDR", data)
@@ -65,7 +77,9 @@ pub(crate) fn with(file: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
 
 /// Where a text begins.
 pub(crate) fn find(file: &[u8], text: &[u8]) -> usize {
-    file.windows(text.len()).position(|w| w == text).unwrap_or_else(|| panic!("{:?}", String::from_utf8_lossy(text)))
+    file.windows(text.len())
+        .position(|w| w == text)
+        .unwrap_or_else(|| panic!("{:?}", String::from_utf8_lossy(text)))
 }
 
 /// Where the places of an EXR's blocks are: behind the zero that ends its attributes.
@@ -120,6 +134,8 @@ pub(crate) fn tags(width: u32, height: u32, others: &[Tag]) -> Vec<Tag> {
     }
     all.sort_unstable();
     let strip = super::make::behind(all.len());
-    all.iter_mut().filter(|tag| tag.0 == 273 && tag.3 == 0).for_each(|tag| tag.3 = strip);
+    all.iter_mut()
+        .filter(|tag| tag.0 == 273 && tag.3 == 0)
+        .for_each(|tag| tag.3 = strip);
     all
 }

@@ -13,7 +13,10 @@ struct Mount(PathBuf);
 impl Mount {
     fn new(place: PathBuf, options: &str) -> Option<Self> {
         std::fs::create_dir_all(&place).unwrap();
-        let done = Command::new("mount").args(["-t", "tmpfs", "-o", options, "petcomp-test"]).arg(&place).output();
+        let done = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", options, "petcomp-test"])
+            .arg(&place)
+            .output();
         let mounted = done.is_ok_and(|output| output.status.success());
         if !mounted {
             eprintln!("skipped: no right to mount a small file system here");
@@ -29,8 +32,11 @@ impl Drop for Mount {
 }
 
 fn files(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> =
-        std::fs::read_dir(folder).unwrap().flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .flatten()
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
     names.sort();
     names
 }
@@ -38,27 +44,47 @@ fn files(folder: &Path) -> Vec<String> {
 #[test]
 fn a_full_disk_is_named_and_the_old_file_stays() {
     let folder = Folder::new();
-    let Some(mount) = Mount::new(folder.file("disk"), "size=64k") else { return };
+    let Some(mount) = Mount::new(folder.file("disk"), "size=64k") else {
+        return;
+    };
     let path = mount.0.join("a.png");
     io::write(&path, &codes(8, 8)).unwrap();
     let old = std::fs::read(&path).unwrap();
-    let noise =
-        petcomp::Image::from_fn(400, 400, |x, y| LinearRgb::grey(((x * 7919 + y * 104_729) % 97) as f32 / 97.0));
+    let noise = petcomp::Image::from_fn(400, 400, |x, y| {
+        LinearRgb::grey(((x * 7919 + y * 104_729) % 97) as f32 / 97.0)
+    });
     let e = io::write(&path, &noise).unwrap_err().to_string();
-    assert!(e.ends_with("a.png: cannot be written: no space left on the disk"), "{e}");
+    assert!(
+        e.ends_with("a.png: cannot be written: no space left on the disk"),
+        "{e}"
+    );
     assert_eq!(std::fs::read(&path).unwrap(), old);
     let text = "x".repeat(1 << 20);
-    assert!(io::write_text(mount.0.join("a.txt"), &text).unwrap_err().to_string().contains("no space left"));
+    assert!(
+        io::write_text(mount.0.join("a.txt"), &text)
+            .unwrap_err()
+            .to_string()
+            .contains("no space left")
+    );
     assert_eq!(files(&mount.0), ["a.png"]);
 }
 
 #[test]
 fn a_folder_that_may_not_be_written_is_named() {
     let folder = Folder::new();
-    let Some(mount) = Mount::new(folder.file("disk"), "ro,size=64k") else { return };
-    let e = io::write(mount.0.join("a.png"), &codes(8, 8)).unwrap_err().to_string();
+    let Some(mount) = Mount::new(folder.file("disk"), "ro,size=64k") else {
+        return;
+    };
+    let e = io::write(mount.0.join("a.png"), &codes(8, 8))
+        .unwrap_err()
+        .to_string();
     assert!(e.contains("a.png: cannot be written: read-only"), "{e}");
-    assert!(io::create_folder(mount.0.join("sub")).unwrap_err().to_string().contains("read-only"));
+    assert!(
+        io::create_folder(mount.0.join("sub"))
+            .unwrap_err()
+            .to_string()
+            .contains("read-only")
+    );
 }
 
 #[cfg(unix)]
@@ -69,7 +95,11 @@ fn a_link_in_the_way_is_replaced_and_not_followed() {
     std::os::unix::fs::symlink(&elsewhere, folder.file("a.txt")).unwrap();
     io::write_text(folder.file("a.txt"), "theirs").unwrap();
     assert_eq!(std::fs::read(&elsewhere).unwrap(), b"mine");
-    assert!(!std::fs::symlink_metadata(folder.file("a.txt")).unwrap().is_symlink());
+    assert!(
+        !std::fs::symlink_metadata(folder.file("a.txt"))
+            .unwrap()
+            .is_symlink()
+    );
 }
 
 /// EXIF data with a place (GPS latitude) and a serial number (BodySerialNumber, 0xA431).
@@ -111,7 +141,10 @@ fn places_and_serial_numbers_stay_behind() {
         io::write(folder.file(name), &read).unwrap();
         let bytes = std::fs::read(folder.file(name)).unwrap();
         let holds = |text: &[u8]| bytes.windows(text.len()).any(|w| w == text);
-        assert!(!holds(b"SN0123456789") && !holds(b"Exif") && !holds(b"GPS"), "{name}");
+        assert!(
+            !holds(b"SN0123456789") && !holds(b"Exif") && !holds(b"GPS"),
+            "{name}"
+        );
     }
     let told = format!("{:?}", io::read_header(&photo).unwrap());
     assert!(!told.contains("SN0123456789"), "{told}");

@@ -9,13 +9,12 @@ use std::time::{Duration, Instant};
 const LABEL: &str = r#"{"format": "plane-label", "version": 1, "image": {"file": "a.jpg", "width": 640, "height": 480},
     "surface": {"id": "tray", "width_m": 0.6, "height_m": 0.4, "corners_px": [[100, 100], [500, 110], [510, 400], [90, 390]]},
     "camera": {"focal_px": 800.0}, "points": [], "_remark": null}"#;
-const RECIPE: &str = "assets = \"a\"\n[scene]\nobjects = [4, 12]\nscale = [0.9, 1.1]\n[split]\nval = 0.2\n[yolo]\n";
+const RECIPE: &str =
+    "assets = \"a\"\n[scene]\nobjects = [4, 12]\nscale = [0.9, 1.1]\n[split]\nval = 0.2\n[yolo]\n";
 const JOURNAL: &str = r#"{"k":0,"part":"train","classes":[[3,2]],"knotted":0,"retries":0,"files":[{"path":"images/train/000000.jpg","bytes":1,"crc32":2}]}
 "#;
-const DATA_YAML: &str =
-    "# a\npath: set\ntrain: images/train\nval: images/val\nnc: 2\nnames:\n  0: \"cap\"\n  1: none\n";
-const YOLO: &str =
-    "0 0.5 0.5 0.2 0.4\n1 0.1 0.1 0.3 0.1 0.3 0.3\n===\n0 0.5 0.51 0.2 0.4 0.9\n1 0.2 0.2 0.2 0.2 0.31\n";
+const DATA_YAML: &str = "# a\npath: set\ntrain: images/train\nval: images/val\nnc: 2\nnames:\n  0: \"cap\"\n  1: none\n";
+const YOLO: &str = "0 0.5 0.5 0.2 0.4\n1 0.1 0.1 0.3 0.1 0.3 0.3\n===\n0 0.5 0.51 0.2 0.4 0.9\n1 0.2 0.2 0.2 0.2 0.31\n";
 const COCO: &str = r#"{"images": [{"id": 3, "file_name": "a/b.png", "width": 640, "height": 480}],
     "categories": [{"id": 10, "name": "cap"}, {"id": 20, "name": "none"}],
     "annotations": [{"image_id": 3, "category_id": 20, "bbox": [1, 2, 30, 4.5], "area": 6.5, "iscrowd": 1},
@@ -29,7 +28,10 @@ type Door = (&'static str, fn(&[u8]), Vec<Vec<u8>>);
 
 fn doors() -> Vec<Door> {
     let text = |text: &str| vec![text.as_bytes().to_vec()];
-    let pictures = valid::all().into_iter().map(|(_, bytes)| bytes[..bytes.len().min(2_000)].to_vec()).collect();
+    let pictures = valid::all()
+        .into_iter()
+        .map(|(_, bytes)| bytes[..bytes.len().min(2_000)].to_vec())
+        .collect();
     vec![
         ("label", fuzzing::label, text(LABEL)),
         ("recipe", fuzzing::recipe, text(RECIPE)),
@@ -95,7 +97,10 @@ fn knock(goes_on: impl Fn(u64, Duration) -> bool) {
             slowest = slowest.max(quickly(name, || door(&bytes)).1);
             count += 1;
         }
-        println!("{name}: {count} inputs in {:?}, slowest {slowest:?}", start.elapsed());
+        println!(
+            "{name}: {count} inputs in {:?}, slowest {slowest:?}",
+            start.elapsed()
+        );
     }
 }
 

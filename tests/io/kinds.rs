@@ -29,7 +29,9 @@ const FILES: [(&str, u8); 16] = [
 ];
 
 fn file(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/io/files").join(name)
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/io/files")
+        .join(name)
 }
 
 /// Display codes, alpha with them.
@@ -46,8 +48,15 @@ fn both_ways_of_reading_agree_on_every_kind() {
     let mut wrong = Vec::new();
     for (name, tolerance) in FILES {
         let ours = codes(&io::read::<StraightRgba>(file(name)).unwrap());
-        let theirs = codes(&io::read_in_worker::<StraightRgba>(file(name), &ReadOptions::default()).unwrap());
-        let worst = ours.iter().flatten().zip(theirs.iter().flatten()).map(|(p, q)| p.abs_diff(*q)).max();
+        let theirs = codes(
+            &io::read_in_worker::<StraightRgba>(file(name), &ReadOptions::default()).unwrap(),
+        );
+        let worst = ours
+            .iter()
+            .flatten()
+            .zip(theirs.iter().flatten())
+            .map(|(p, q)| p.abs_diff(*q))
+            .max();
         println!("{name}: apart by {worst:?}");
         if worst.is_none_or(|worst| worst > tolerance) || ours.len() != 24 * 16 {
             wrong.push(format!("{name}: {worst:?}"));
@@ -66,7 +75,16 @@ fn what_was_written_is_what_is_read() {
         for (i, code) in codes.iter().enumerate() {
             let (x, y) = (i % 24, i / 24);
             let (red, green) = (255 * x / 23, 255 * y / 15);
-            assert_eq!(*code, [red as u8, green as u8, ((x * 11 + y * 7) % 256) as u8, green as u8], "{name} {x} {y}");
+            assert_eq!(
+                *code,
+                [
+                    red as u8,
+                    green as u8,
+                    ((x * 11 + y * 7) % 256) as u8,
+                    green as u8
+                ],
+                "{name} {x} {y}"
+            );
         }
     }
 }
@@ -79,7 +97,10 @@ fn cmyk_is_what_the_inks_leave() {
         for (i, code) in codes.iter().enumerate() {
             let expected = [255 * (i % 24) / 23, 255 * (i / 24) / 15, 128].map(|v| v as u8);
             let apart = code.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
-            assert!(apart <= Some(JPEG + 2 * CMYK), "{name} {i}: {code:?}, expected {expected:?}");
+            assert!(
+                apart <= Some(JPEG + 2 * CMYK),
+                "{name} {i}: {code:?}, expected {expected:?}"
+            );
         }
     }
 }

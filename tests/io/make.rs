@@ -98,6 +98,10 @@ pub(crate) fn palette_tiff() -> Vec<u8> {
     ];
     let mut palette = [0_u16; 768];
     (palette[0], palette[256 + 1], palette[512 + 1]) = (0xffff, 0x8080, 0xffff);
-    let strip: Vec<u8> = palette.iter().flat_map(|v| v.to_le_bytes()).chain([0, 1]).collect();
+    let strip: Vec<u8> = palette
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .chain([0, 1])
+        .collect();
     tiff(&tags, &strip)
 }

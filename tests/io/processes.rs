@@ -9,8 +9,14 @@ pub(crate) fn workers() -> Vec<u32> {
         let mut rest = stat.rsplit(") ").next().unwrap_or_default().split(' ');
         rest.next() != Some("Z") && rest.next() == Some(&own) && stat.contains("(petcomp-oiio-wo")
     };
-    let Ok(processes) = std::fs::read_dir("/proc") else { return Vec::new() };
-    processes.flatten().filter_map(|p| p.file_name().to_str()?.parse().ok()).filter(started_here).collect()
+    let Ok(processes) = std::fs::read_dir("/proc") else {
+        return Vec::new();
+    };
+    processes
+        .flatten()
+        .filter_map(|p| p.file_name().to_str()?.parse().ok())
+        .filter(started_here)
+        .collect()
 }
 
 /// What the system says of a process.

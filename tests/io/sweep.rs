@@ -23,7 +23,10 @@ enum Picture {
 fn read(path: &Path, options: &ReadOptions) -> Result<Picture, String> {
     let color = io::read_with(path, options).map(Picture::Color);
     let coverage = |_| io::read_with(path, options).map(Picture::Coverage);
-    color.or_else(coverage).or_else(|_| io::read_with(path, options).map(Picture::Depth)).map_err(|e| e.to_string())
+    color
+        .or_else(coverage)
+        .or_else(|_| io::read_with(path, options).map(Picture::Depth))
+        .map_err(|e| e.to_string())
 }
 
 #[test]
@@ -38,9 +41,16 @@ fn a_cut_file_is_refused_or_loses_nothing() {
             let path = folder.with(name, &bytes[..length]);
             let (outcome, time) = quickly(name, || read(&path, &ReadOptions::default()));
             match outcome {
-                Ok(cut) => assert!(cut == whole, "{name}, {length} of {} bytes: another picture", bytes.len()),
+                Ok(cut) => assert!(
+                    cut == whole,
+                    "{name}, {length} of {} bytes: another picture",
+                    bytes.len()
+                ),
                 Err(e) => {
-                    assert!(!e.contains('\n') && !e.contains("gave up"), "{name}, {length} bytes: {e}");
+                    assert!(
+                        !e.contains('\n') && !e.contains("gave up"),
+                        "{name}, {length} bytes: {e}"
+                    );
                     refused += 1;
                 }
             }
@@ -49,8 +59,14 @@ fn a_cut_file_is_refused_or_loses_nothing() {
             cuts += 1;
         }
     }
-    println!("{cuts} cut files: {refused} refused, {} whole without their end; slowest {slowest:?}", cuts - refused);
-    assert!(refused * 10 > cuts * 9, "only {refused} of {cuts} cuts were noticed");
+    println!(
+        "{cuts} cut files: {refused} refused, {} whole without their end; slowest {slowest:?}",
+        cuts - refused
+    );
+    assert!(
+        refused * 10 > cuts * 9,
+        "only {refused} of {cuts} cuts were noticed"
+    );
 }
 
 /// Knuth's MMIX constants.
@@ -58,7 +74,10 @@ pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
     pub(crate) fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) as usize % bound
     }
 
@@ -67,7 +86,11 @@ impl Random {
         let mut bytes = whole.to_vec();
         for _ in 0..=self.below(4) {
             // Half of the changes hit the first bytes, where headers are.
-            let reach = if self.below(2) == 0 { bytes.len() } else { bytes.len().min(400) };
+            let reach = if self.below(2) == 0 {
+                bytes.len()
+            } else {
+                bytes.len().min(400)
+            };
             let at = self.below(reach);
             bytes[at] = [0, 255, 127, 128, self.below(256) as u8][self.below(5)];
         }
@@ -80,8 +103,17 @@ fn damaged_files(count: usize, seed: u64) {
     let folder = Folder::new();
     let mut random = Random(seed);
     let files = valid::all();
-    let quick = ReadOptions { limits: Limits { seconds: 5, ..Default::default() }, ..Default::default() };
-    let alone = ReadOptions { fallback: Fallback::Nothing, ..Default::default() };
+    let quick = ReadOptions {
+        limits: Limits {
+            seconds: 5,
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    let alone = ReadOptions {
+        fallback: Fallback::Nothing,
+        ..Default::default()
+    };
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut slowest = (Duration::ZERO, String::new());
     for i in 0..count {
@@ -103,7 +135,10 @@ fn damaged_files(count: usize, seed: u64) {
             }
         };
         *counts.entry(kind).or_default() += 1;
-        let header = io::read_header(&path).err().map(|e| e.to_string()).unwrap_or_default();
+        let header = io::read_header(&path)
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default();
         assert!(!header.contains("gave up"), "{name} ({i}): {header}");
     }
     println!("{count} damaged files: {counts:?}; slowest {slowest:?}");

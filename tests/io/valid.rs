@@ -10,12 +10,21 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
     let folder = Folder::new();
     let (w, h) = (40, 30);
     let mut files = Vec::new();
-    let mut add =
-        |name: &'static str, bits: Option<Bits>, compression, write: &dyn Fn(&std::path::Path, &WriteOptions)| {
-            let path = folder.file(name);
-            write(&path, &WriteOptions { bits, compression, ..Default::default() });
-            files.push((name, std::fs::read(path).unwrap()));
-        };
+    let mut add = |name: &'static str,
+                   bits: Option<Bits>,
+                   compression,
+                   write: &dyn Fn(&std::path::Path, &WriteOptions)| {
+        let path = folder.file(name);
+        write(
+            &path,
+            &WriteOptions {
+                bits,
+                compression,
+                ..Default::default()
+            },
+        );
+        files.push((name, std::fs::read(path).unwrap()));
+    };
     fn to<P: ToFile>(image: &Image<P>) -> impl Fn(&std::path::Path, &WriteOptions) {
         move |path, options| io::write_with(path, image, options).unwrap()
     }
@@ -30,7 +39,12 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
     add("rgb.jpg", None, zip, &to(&rgb));
     add("grey.jpg", None, zip, &to(&matte));
     add("half.exr", Some(Bits::Half), zip, &to(&lights));
-    add("float.exr", Some(Bits::Float), Compression::None, &to(&lights));
+    add(
+        "float.exr",
+        Some(Bits::Float),
+        Compression::None,
+        &to(&lights),
+    );
     add("piz.exr", Some(Bits::Half), Compression::Piz, &to(&lights));
     add("grey.exr", Some(Bits::Half), zip, &to(&matte));
     add("depth.exr", Some(Bits::Float), zip, &to(&depth));
@@ -43,9 +57,16 @@ pub(crate) fn all() -> Vec<(&'static str, Vec<u8>)> {
     files.push(("palette.png", palette_png()));
     files.push((
         "interlaced.png",
-        png(&[ihdr(2, 2, 8, 0, 1), (b"IDAT", stored(&[0, 1, 0, 2, 0, 3, 4])), (b"IEND", vec![])]),
+        png(&[
+            ihdr(2, 2, 8, 0, 1),
+            (b"IDAT", stored(&[0, 1, 0, 2, 0, 3, 4])),
+            (b"IEND", vec![]),
+        ]),
     ));
-    files.push(("tags.tif", tiff(&tags(8, 8, &[]), &(0..64).collect::<Vec<u8>>())));
+    files.push((
+        "tags.tif",
+        tiff(&tags(8, 8, &[]), &(0..64).collect::<Vec<u8>>()),
+    ));
     files
 }
 
@@ -55,13 +76,22 @@ pub(crate) fn named(name: &str) -> (&'static str, Vec<u8>) {
 }
 
 fn hdr(w: usize, h: usize) -> Vec<u8> {
-    let pixels: Vec<_> = (0..w * h).map(|i| image::Rgb([i as f32, 0.5, 2.0])).collect();
+    let pixels: Vec<_> = (0..w * h)
+        .map(|i| image::Rgb([i as f32, 0.5, 2.0]))
+        .collect();
     let mut out = Vec::new();
-    image::codecs::hdr::HdrEncoder::new(&mut out).encode(&pixels, w, h).unwrap();
+    image::codecs::hdr::HdrEncoder::new(&mut out)
+        .encode(&pixels, w, h)
+        .unwrap();
     out
 }
 
 fn palette_png() -> Vec<u8> {
     let rows = [0, 0, 1, 0, 1, 0];
-    png(&[ihdr(2, 2, 8, 3, 0), (b"PLTE", vec![255, 0, 0, 0, 0, 255]), (b"IDAT", stored(&rows)), (b"IEND", vec![])])
+    png(&[
+        ihdr(2, 2, 8, 3, 0),
+        (b"PLTE", vec![255, 0, 0, 0, 0, 255]),
+        (b"IDAT", stored(&rows)),
+        (b"IEND", vec![]),
+    ])
 }

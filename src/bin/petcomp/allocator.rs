@@ -1,6 +1,9 @@
 //! The system's allocator, which tells the library of large pieces, for `petcomp report work`.
 
-#![expect(unsafe_code, reason = "an allocator cannot be written without; every call goes to the system's as it came")]
+#![expect(
+    unsafe_code,
+    reason = "an allocator cannot be written without; every call goes to the system's as it came"
+)]
 
 use petcomp::work::allocated;
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -101,7 +101,12 @@ struct ScaleArgs {
 impl ScaleArgs {
     /// What is told; `corners` are those of the screen.
     fn scale(&self, corners: Option<[[f64; 2]; 4]>) -> Scale {
-        match (self.scale, self.size.as_deref(), self.screen_size, self.marker_size) {
+        match (
+            self.scale,
+            self.size.as_deref(),
+            self.screen_size,
+            self.marker_size,
+        ) {
             (Some(px_per_metre), ..) => Scale::PxPerMetre(px_per_metre),
             (None, Some(&[w, h]), ..) => Scale::Size([w.max(h), w.min(h)]),
             (None, _, Some(size), _) => Scale::Screen(size, corners),
@@ -113,7 +118,8 @@ impl ScaleArgs {
 
 /// Four places from `X,Y X,Y X,Y X,Y`.
 fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
-    let wrong = || format!("\"{text}\", expected four corners as in \"12,8 630,10 628,470 14,466\"");
+    let wrong =
+        || format!("\"{text}\", expected four corners as in \"12,8 630,10 628,470 14,466\"");
     let place = |pair: &str| {
         let (x, y) = pair.split_once(',')?;
         Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
@@ -128,7 +134,10 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Add(args) => add(args, common),
         Command::List { folder } => list(folder),
         Command::Check { folder, strict } => check(folder, *strict),
-        Command::Sheet { folder, output } => Ok(io::write(output, &asset::contact_sheet(&Library::open(folder)?))?),
+        Command::Sheet { folder, output } => Ok(io::write(
+            output,
+            &asset::contact_sheet(&Library::open(folder)?),
+        )?),
     }
 }
 
@@ -137,16 +146,33 @@ const SHEET: &str = "contact_sheet.png";
 
 fn check(folder: &Path, strict: bool) -> anyhow::Result<()> {
     let library = Library::open(folder)?;
-    let photos: Vec<_> = library.assets.iter().flat_map(|asset| &asset.photos).collect();
-    let doubted: Vec<_> = photos.iter().filter(|photo| !photo.record.doubts.is_empty()).collect();
+    let photos: Vec<_> = library
+        .assets
+        .iter()
+        .flat_map(|asset| &asset.photos)
+        .collect();
+    let doubted: Vec<_> = photos
+        .iter()
+        .filter(|photo| !photo.record.doubts.is_empty())
+        .collect();
     for photo in &doubted {
-        print::line(format_args!("look at {}: {}", photo.record.file, photo.record.doubts.join("; ")));
+        print::line(format_args!(
+            "look at {}: {}",
+            photo.record.file,
+            photo.record.doubts.join("; ")
+        ));
     }
-    let counts =
-        format!("{} assets, {} cut-outs, all whole, {} to look at", library.assets.len(), photos.len(), doubted.len());
+    let counts = format!(
+        "{} assets, {} cut-outs, all whole, {} to look at",
+        library.assets.len(),
+        photos.len(),
+        doubted.len()
+    );
     print::line(format_args!("{}: {counts}", folder.display()));
     match doubted.len() {
-        n if strict && n > 0 => Err(NeedsReview(format!("{}: {n} cut-outs to look at", folder.display())).into()),
+        n if strict && n > 0 => {
+            Err(NeedsReview(format!("{}: {n} cut-outs to look at", folder.display())).into())
+        }
         _ => Ok(()),
     }
 }
@@ -154,13 +180,28 @@ fn check(folder: &Path, strict: bool) -> anyhow::Result<()> {
 /// Cuts out all photos of a list, showing progress.
 pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("cut-outs");
-    let built = asset::build(list, folder, &|done, total| progress.at(done as u64, total as u64))?;
+    let built = asset::build(list, folder, &|done, total| {
+        progress.at(done as u64, total as u64)
+    })?;
     drop(progress);
-    built.refused.iter().for_each(|refusal| log::warn!("{refusal}"));
-    built.doubtful.iter().for_each(|doubt| common.say(format_args!("look at {doubt}")));
-    common.say(format_args!("{}: {} photos, {} assets", folder.display(), built.photos, built.assets));
+    built
+        .refused
+        .iter()
+        .for_each(|refusal| log::warn!("{refusal}"));
+    built
+        .doubtful
+        .iter()
+        .for_each(|doubt| common.say(format_args!("look at {doubt}")));
+    common.say(format_args!(
+        "{}: {} photos, {} assets",
+        folder.display(),
+        built.photos,
+        built.assets
+    ));
     let (lengths, errors) = spread(&built.lengths);
-    common.say(format_args!("objects are {lengths} mm long, to {errors} mm; `petcomp asset list` shows each"));
+    common.say(format_args!(
+        "objects are {lengths} mm long, to {errors} mm; `petcomp asset list` shows each"
+    ));
     tell_classes(&built.classes, "`classes = [...]` in the list", common);
     sheet(folder, &[], common)
 }
@@ -168,25 +209,48 @@ pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Resu
 /// Writes the contact sheet of a folder; what was just added need not be read.
 fn sheet(folder: &Path, added: &[Photo], common: &Common) -> anyhow::Result<()> {
     let path = folder.join(SHEET);
-    io::write(&path, &asset::contact_sheet(&Library::open_with(folder, added)?))?;
+    io::write(
+        &path,
+        &asset::contact_sheet(&Library::open_with(folder, added)?),
+    )?;
     common.say(format_args!("look at {}", path.display()));
     Ok(())
 }
 
 fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
     let scale = args.scale.scale(args.screen_corners);
-    let first = args.photos.first().and_then(|photo| photo.file_stem()).unwrap_or_default();
-    let name = args.name.clone().unwrap_or_else(|| first.to_string_lossy().into_owned());
-    let add =
-        AddPhoto { screen: args.screen.clone(), thickness: args.thickness, ..AddPhoto::new(name, &args.class, scale) };
-    let add = AddPhoto { options: args.quality.cut_out(add.options), classes: args.classes.clone(), ..add };
+    let first = args
+        .photos
+        .first()
+        .and_then(|photo| photo.file_stem())
+        .unwrap_or_default();
+    let name = args
+        .name
+        .clone()
+        .unwrap_or_else(|| first.to_string_lossy().into_owned());
+    let add = AddPhoto {
+        screen: args.screen.clone(),
+        thickness: args.thickness,
+        ..AddPhoto::new(name, &args.class, scale)
+    };
+    let add = AddPhoto {
+        options: args.quality.cut_out(add.options),
+        classes: args.classes.clone(),
+        ..add
+    };
     let mut added = Vec::new();
     for photo in &args.photos {
         let photo = asset::add_photo(&args.output, photo, &add)?;
         let record = &photo.record;
         let ([length, width], error) = (record.object_m.map(|m| m * 1e3), record.error_m * 1e3);
-        common.say(format_args!("{}: {length:.1} x {width:.1} mm (+- {error:.1})", record.file));
-        record.doubts.iter().for_each(|doubt| common.say(format_args!("look at {}: {doubt}", record.file)));
+        common.say(format_args!(
+            "{}: {length:.1} x {width:.1} mm (+- {error:.1})",
+            record.file
+        ));
+        record
+            .doubts
+            .iter()
+            .for_each(|doubt| common.say(format_args!("look at {}: {doubt}", record.file)));
         added.push(photo);
     }
     tell_classes(&Manifest::read(&args.output)?.classes, "--classes", common);
@@ -196,16 +260,24 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
 /// Smallest and largest of lengths, and the same of their errors, millimetres.
 fn spread(lengths: &[[f64; 2]]) -> (String, String) {
     let of = |i: usize| {
-        let ends = lengths.iter().fold([f64::MAX, 0.0], |[low, high], l| [l[i].min(low), l[i].max(high)]);
+        let ends = lengths.iter().fold([f64::MAX, 0.0], |[low, high], l| {
+            [l[i].min(low), l[i].max(high)]
+        });
         ends.map(|metres| 1e3 * metres)
     };
     let ([short, long], [fine, coarse]) = (of(0), of(1));
-    (format!("{short:.0} to {long:.0}"), format!("{fine:.1} to {coarse:.1}"))
+    (
+        format!("{short:.0} to {long:.0}"),
+        format!("{fine:.1} to {coarse:.1}"),
+    )
 }
 
 /// Says which number each class has, and what says it otherwise.
 fn tell_classes(classes: &[String], how: &str, common: &Common) {
-    let numbered = classes.iter().enumerate().map(|(i, class)| format!("{i} {class}"));
+    let numbered = classes
+        .iter()
+        .enumerate()
+        .map(|(i, class)| format!("{i} {class}"));
     let list = numbered.collect::<Vec<_>>().join(", ");
     common.say(format_args!("classes {list}; another order: {how}"));
 }
@@ -215,9 +287,17 @@ fn list(folder: &Path) -> anyhow::Result<()> {
         for photo in &asset.photos {
             let [length, width] = photo.object_m.map(|m| m * 1e3);
             let (name, class, sure) = (&asset.name, &asset.class, photo.outline_confidence);
-            let color = photo.color_confidence.map_or_else(|| "   -".into(), |color| format!("{color:.2}"));
-            let size = format!("{length:4.0} x {width:3.0} mm (+- {:.1})", photo.error_m * 1e3);
-            print::line(format_args!("{name:12} {class:10} {size}  {sure:.2}  {color}  {}", photo.file));
+            let color = photo
+                .color_confidence
+                .map_or_else(|| "   -".into(), |color| format!("{color:.2}"));
+            let size = format!(
+                "{length:4.0} x {width:3.0} mm (+- {:.1})",
+                photo.error_m * 1e3
+            );
+            print::line(format_args!(
+                "{name:12} {class:10} {size}  {sure:.2}  {color}  {}",
+                photo.file
+            ));
         }
     }
     Ok(())

@@ -149,8 +149,15 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
 }
 
 fn init(args: &InitArgs, common: &Common) -> anyhow::Result<()> {
-    let path = args.output.clone().unwrap_or_else(|| label_beside(&args.photo));
-    anyhow::ensure!(args.force || !path.exists(), "{}: is there already, and --force is not given", path.display());
+    let path = args
+        .output
+        .clone()
+        .unwrap_or_else(|| label_beside(&args.photo));
+    anyhow::ensure!(
+        args.force || !path.exists(),
+        "{}: is there already, and --force is not given",
+        path.display()
+    );
     let like = args.like.as_deref().map(camera::read_label).transpose()?;
     let mut label = camera::init_label(&args.photo, &path, like.as_ref())?;
     if let Some([w, h]) = args.size {
@@ -169,20 +176,30 @@ fn init(args: &InitArgs, common: &Common) -> anyhow::Result<()> {
         (Some(_), _) => "corners as given".into(),
         _ => "fill in surface.corners_px (top left, top right, bottom right, bottom left)".into(),
     };
-    common.say(format_args!("{}: {corners}; then `petcomp camera solve {}`", path.display(), path.display()));
+    common.say(format_args!(
+        "{}: {corners}; then `petcomp camera solve {}`",
+        path.display(),
+        path.display()
+    ));
     Ok(())
 }
 
 /// `photos/bg.label.json` of `photos/bg.jpg`.
 fn label_beside(photo: &Path) -> PathBuf {
-    let stem = photo.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = photo
+        .file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned())
+        .unwrap_or_default();
     photo.with_file_name(format!("{stem}.label.json"))
 }
 
 impl LabelArgs {
     /// All labels of all files.
     fn read(&self) -> anyhow::Result<Vec<Labelled>> {
-        let files = self.labels.iter().map(|path| camera::read_labels(path, self.size));
+        let files = self
+            .labels
+            .iter()
+            .map(|path| camera::read_labels(path, self.size));
         Ok(files.collect::<petcomp::Result<Vec<_>>>()?.concat())
     }
 
@@ -196,7 +213,9 @@ impl LabelArgs {
         let mut batch = Batch::default();
         for path in &self.labels {
             match camera::read_labels(path, self.size) {
-                Ok(labels) => labels.iter().for_each(|labelled| batch.count(act(labelled))),
+                Ok(labels) => labels
+                    .iter()
+                    .for_each(|labelled| batch.count(act(labelled))),
                 Err(error) => batch.count(Err(error.into())),
             }
         }
@@ -211,14 +230,26 @@ fn solve(args: &SolveArgs, common: &Common) -> anyhow::Result<()> {
     }
     args.labels.each(|labelled| {
         let solution = accepted(solved(labelled)?, labelled, args.force)?;
-        let target = args.output.clone().unwrap_or_else(|| labelled.beside("camera.json"));
-        write(&target, labelled, &CameraFile::new(&labelled.label, &solution), &solution, common)
+        let target = args
+            .output
+            .clone()
+            .unwrap_or_else(|| labelled.beside("camera.json"));
+        write(
+            &target,
+            labelled,
+            &CameraFile::new(&labelled.label, &solution),
+            &solution,
+            common,
+        )
     })
 }
 
 fn joint(args: &JointArgs, common: &Common) -> anyhow::Result<()> {
     let labels = args.labels.read()?;
-    let all: Vec<Label> = labels.iter().map(|labelled| labelled.label.clone()).collect();
+    let all: Vec<Label> = labels
+        .iter()
+        .map(|labelled| labelled.label.clone())
+        .collect();
     let mut batch = Batch::default();
     for group in camera::one_camera(&all) {
         let members: Vec<&Labelled> = group.iter().map(|&i| &labels[i]).collect();
@@ -228,9 +259,15 @@ fn joint(args: &JointArgs, common: &Common) -> anyhow::Result<()> {
 }
 
 /// Photos of one camera.
-fn joint_camera(members: &[&Labelled], force: bool, common: &Common, batch: &mut Batch) -> anyhow::Result<()> {
+fn joint_camera(
+    members: &[&Labelled],
+    force: bool,
+    common: &Common,
+    batch: &mut Batch,
+) -> anyhow::Result<()> {
     let labels: Vec<Label> = members.iter().map(|member| member.label.clone()).collect();
-    let joint = camera::solve_joint(&labels, &SolveOptions::default()).map_err(|e| located(e, members[0]))?;
+    let joint = camera::solve_joint(&labels, &SolveOptions::default())
+        .map_err(|e| located(e, members[0]))?;
     for warning in &joint.warnings {
         common.warn(named(warning, members));
     }
@@ -241,7 +278,13 @@ fn joint_camera(members: &[&Labelled], force: bool, common: &Common, batch: &mut
             if let Some(from) = file.solved_from.as_mut().filter(|_| members.len() > 1) {
                 from.together = camera::together(members.iter().copied());
             }
-            write(&member.beside("camera.json"), member, &file, &solution, common)
+            write(
+                &member.beside("camera.json"),
+                member,
+                &file,
+                &solution,
+                common,
+            )
         };
         batch.count(one());
     }
@@ -252,7 +295,10 @@ fn joint_camera(members: &[&Labelled], force: bool, common: &Common, batch: &mut
 fn named(warning: &camera::Warning, members: &[&Labelled]) -> String {
     match warning {
         camera::Warning::OutlierPhoto { photo, chi2 } if *photo < members.len() => {
-            format!("{}: contradicts the other photos (chi squared {chi2:.1}) and was left out", members[*photo])
+            format!(
+                "{}: contradicts the other photos (chi squared {chi2:.1}) and was left out",
+                members[*photo]
+            )
         }
         other => format!("photos of {}: {other}", members[0]),
     }
@@ -262,16 +308,26 @@ fn doctor(args: &LabelArgs) -> anyhow::Result<()> {
     args.each(|labelled| {
         let solution = solved(labelled)?;
         print::line(labelled);
-        print::text(camera::doctor(&labelled.label, &solution, &SolveOptions::default()));
+        print::text(camera::doctor(
+            &labelled.label,
+            &solution,
+            &SolveOptions::default(),
+        ));
         accepted(solution, labelled, false).map(drop)
     })
 }
 
 fn export(args: &ExportArgs) -> anyhow::Result<()> {
-    let files = args.cameras.iter().map(io::read_json::<CameraFile>).collect::<petcomp::Result<Vec<_>>>()?;
+    let files = args
+        .cameras
+        .iter()
+        .map(io::read_json::<CameraFile>)
+        .collect::<petcomp::Result<Vec<_>>>()?;
     let text = match args.to {
         Words::Colmap => return export_colmap(args, &files),
-        _ if files.len() != 1 => anyhow::bail!("{} cameras, expected one for this format", files.len()),
+        _ if files.len() != 1 => {
+            anyhow::bail!("{} cameras, expected one for this format", files.len())
+        }
         Words::Blender => files[0].camera().to_blender_script(),
         Words::Opencv => serde_json::to_string_pretty(&files[0].camera().to_opencv())? + "\n",
     };
@@ -283,9 +339,14 @@ fn export(args: &ExportArgs) -> anyhow::Result<()> {
 }
 
 fn export_colmap(args: &ExportArgs, files: &[CameraFile]) -> anyhow::Result<()> {
-    let folder =
-        args.output.as_ref().ok_or_else(|| anyhow::anyhow!("-o: missing, expected a folder for COLMAP's files"))?;
-    let cameras: Vec<_> = files.iter().map(|f| (f.image.file.as_str(), f.camera())).collect();
+    let folder = args
+        .output
+        .as_ref()
+        .ok_or_else(|| anyhow::anyhow!("-o: missing, expected a folder for COLMAP's files"))?;
+    let cameras: Vec<_> = files
+        .iter()
+        .map(|f| (f.image.file.as_str(), f.camera()))
+        .collect();
     let model = ColmapModel::new(cameras.iter().map(|(name, camera)| (*name, camera)));
     io::create_folder(folder)?;
     io::write_text(folder.join("cameras.txt"), &model.cameras)?;
@@ -299,7 +360,11 @@ fn markers(args: &MarkersArgs, common: &Common) -> anyhow::Result<()> {
     let photo: Image<LinearRgb> = io::read(&args.photo)?;
     let label = camera::with_markers(label, &photo).map_err(|e| e.in_file(&args.map))?;
     io::write_json(&args.output, &label)?;
-    common.say(format_args!("{}: {} marker corners", args.output.display(), label.points.len() - known));
+    common.say(format_args!(
+        "{}: {} marker corners",
+        args.output.display(),
+        label.points.len() - known
+    ));
     Ok(())
 }
 
@@ -307,25 +372,39 @@ fn rectify(args: &RectifyArgs) -> anyhow::Result<()> {
     let labelled = only(&args.label, args.size)?;
     let solution = accepted(solved(&labelled)?, &labelled, args.force)?;
     let header = io::read_header(&args.photo)?;
-    let seen = solution.camera.resized([header.width as u32, header.height as u32]);
+    let seen = solution
+        .camera
+        .resized([header.width as u32, header.height as u32]);
     if let Some(picture) = &args.back {
         let picture = Pyramid::new(io::read::<PremulRgba>(picture)?);
-        return Ok(io::write(&args.output, &camera::project_picture(&picture, &seen, solution.size))?);
+        return Ok(io::write(
+            &args.output,
+            &camera::project_picture(&picture, &seen, solution.size),
+        )?);
     }
     let px_per_metre = args.px_per_metre.unwrap_or(solution.fit.px_per_metre);
     let photo = Pyramid::new(io::read::<LinearRgb>(&args.photo)?);
-    Ok(io::write(&args.output, &camera::rectify(&photo, &seen, solution.size, px_per_metre)?)?)
+    Ok(io::write(
+        &args.output,
+        &camera::rectify(&photo, &seen, solution.size, px_per_metre)?,
+    )?)
 }
 
 /// The only label of a file.
 fn only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<Labelled> {
     let mut labels = camera::read_labels(path, size)?;
-    anyhow::ensure!(labels.len() == 1, "{}: {} labels, expected one", path.display(), labels.len());
+    anyhow::ensure!(
+        labels.len() == 1,
+        "{}: {} labels, expected one",
+        path.display(),
+        labels.len()
+    );
     Ok(labels.remove(0))
 }
 
 fn solved(labelled: &Labelled) -> petcomp::Result<Solution> {
-    let solution = camera::solve(&labelled.label, &SolveOptions::default()).map_err(|e| located(e, labelled))?;
+    let solution = camera::solve(&labelled.label, &SolveOptions::default())
+        .map_err(|e| located(e, labelled))?;
     camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
     Ok(solution)
 }
@@ -333,9 +412,11 @@ fn solved(labelled: &Labelled) -> petcomp::Result<Solution> {
 /// A solution that fits its label, or any where that is asked for.
 fn accepted(solution: Solution, labelled: &Labelled, force: bool) -> anyhow::Result<Solution> {
     match solution.misfit() {
-        Some(error) if !force => {
-            Err(Error::file(&labelled.source, format!("{error}; --force takes it nevertheless")).into())
-        }
+        Some(error) if !force => Err(Error::file(
+            &labelled.source,
+            format!("{error}; --force takes it nevertheless"),
+        )
+        .into()),
         _ => Ok(solution),
     }
 }
@@ -355,10 +436,16 @@ fn write(
     io::write_json(target, file)?;
     if let Some(photo) = labelled.photo() {
         let photo: Image<LinearRgb> = io::read(photo)?;
-        let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = target
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
         let stem = name.strip_suffix(".json").unwrap_or(&name);
         let stem = stem.strip_suffix(".camera").unwrap_or(stem);
-        io::write(target.with_file_name(format!("{stem}.overlay.png")), &camera::overlay(&photo, solution))?;
+        io::write(
+            target.with_file_name(format!("{stem}.overlay.png")),
+            &camera::overlay(&photo, solution),
+        )?;
     }
     report(labelled, solution, common);
     Ok(())
@@ -383,18 +470,32 @@ fn report(labelled: &Labelled, solution: &Solution, common: &Common) {
 
 /// Four places of two numbers each.
 fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
-    let wrong = || format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"");
+    let wrong =
+        || format!("\"{text}\", expected four corners as in \"120,80 900,85 905,600 110,590\"");
     let place = |part: &str| {
         let (x, y) = part.split_once(',')?;
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
         Some([number(x)?, number(y)?])
     };
-    let places = text.split([' ', ';']).filter(|part| !part.is_empty()).map(place).collect::<Option<Vec<_>>>();
-    places.and_then(|places| places.try_into().ok()).ok_or_else(wrong)
+    let places = text
+        .split([' ', ';'])
+        .filter(|part| !part.is_empty())
+        .map(place)
+        .collect::<Option<Vec<_>>>();
+    places
+        .and_then(|places| places.try_into().ok())
+        .ok_or_else(wrong)
 }
 
 pub(crate) fn dimensions(text: &str) -> Result<[f64; 2], String> {
-    let side = |part: &str| part.trim().parse::<f64>().ok().filter(|side| side.is_finite() && *side > 0.0);
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([side(w)?, side(h)?]));
+    let side = |part: &str| {
+        part.trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|side| side.is_finite() && *side > 0.0)
+    };
+    let sides = text
+        .split_once(['x', 'X'])
+        .and_then(|(w, h)| Some([side(w)?, side(h)?]));
     sides.ok_or_else(|| format!("\"{text}\", expected WIDTHxHEIGHT in metres as in 0.6x0.4"))
 }

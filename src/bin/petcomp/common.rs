@@ -43,22 +43,35 @@ const GLOBAL_HEADING: &str = "Global options";
 
 /// The same program, its global options a line at the end of every subcommand's help.
 pub(crate) fn with_short_help(program: clap::Command) -> clap::Command {
-    let global: Vec<clap::Arg> = program.get_arguments().filter(|arg| arg.is_global_set()).cloned().collect();
+    let global: Vec<clap::Arg> = program
+        .get_arguments()
+        .filter(|arg| arg.is_global_set())
+        .cloned()
+        .collect();
     let names: Vec<String> = global.iter().map(flag).collect();
-    let line = format!("{GLOBAL_HEADING} (see `petcomp --help`): {}", names.join(", "));
+    let line = format!(
+        "{GLOBAL_HEADING} (see `petcomp --help`): {}",
+        names.join(", ")
+    );
     program.mut_subcommands(|command| shortened(command, &global, &line))
 }
 
 /// What clap would copy from the program is there already, and hidden.
 fn shortened(command: clap::Command, global: &[clap::Arg], line: &str) -> clap::Command {
     let hidden = global.iter().map(|arg| arg.clone().hide(true));
-    command.args(hidden).after_help(line.to_owned()).mut_subcommands(|inner| shortened(inner, global, line))
+    command
+        .args(hidden)
+        .after_help(line.to_owned())
+        .mut_subcommands(|inner| shortened(inner, global, line))
 }
 
 /// `-j` or, where it has no letter, `--limit`.
 fn flag(arg: &clap::Arg) -> String {
     let long = || arg.get_long().map(|long| format!("--{long}"));
-    arg.get_short().map(|short| format!("-{short}")).or_else(long).unwrap_or_default()
+    arg.get_short()
+        .map(|short| format!("-{short}"))
+        .or_else(long)
+        .unwrap_or_default()
 }
 
 /// A number of things within a range: more of them would take days, or all of the memory.
@@ -113,14 +126,30 @@ impl Common {
             _ => log::LevelFilter::Debug,
         };
         let mut logger = env_logger::Builder::new();
-        logger.filter_module("petcomp", level).format(|out, record| {
-            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), printable(&record.args().to_string()))
-        });
+        logger
+            .filter_module("petcomp", level)
+            .format(|out, record| {
+                writeln!(
+                    out,
+                    "{}: {}",
+                    record.level().as_str().to_lowercase(),
+                    printable(&record.args().to_string())
+                )
+            });
         logger.init();
         // Fails only if a pool exists already, and then that pool serves.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build_global();
-        let limits = self.limits.iter().try_fold(Limits::default(), Limits::with)?;
-        let options = ReadOptions { limits, fallback: self.oiio.fallback()?, ..Default::default() };
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build_global();
+        let limits = self
+            .limits
+            .iter()
+            .try_fold(Limits::default(), Limits::with)?;
+        let options = ReadOptions {
+            limits,
+            fallback: self.oiio.fallback()?,
+            ..Default::default()
+        };
         Ok(options.make_default()?)
     }
 
@@ -200,13 +229,28 @@ impl Progress {
         let drawn = terminal && !quiet && !json;
         // Of no length yet, it would be drawn full.
         let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::hidden());
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {per_sec}  {eta} left");
+        let style =
+            ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}  {per_sec}  {eta} left");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(what);
-        let every = if json { Self::JSON_EVERY } else { Self::LINE_EVERY };
-        let lines = Lines { json, every, began: None, last: Instant::now() };
+        let every = if json {
+            Self::JSON_EVERY
+        } else {
+            Self::LINE_EVERY
+        };
+        let lines = Lines {
+            json,
+            every,
+            began: None,
+            last: Instant::now(),
+        };
         let told = json || (!terminal && !quiet);
-        Self { bar, drawn, lines: told.then(|| std::sync::Mutex::new(lines)), what }
+        Self {
+            bar,
+            drawn,
+            lines: told.then(|| std::sync::Mutex::new(lines)),
+            what,
+        }
     }
 
     /// So many steps of so many are done; the first call tells what was done before.
@@ -238,10 +282,17 @@ impl Lines {
         let left = total.saturating_sub(done) as f64 / rate;
         // JSON has no infinity: what is not known yet is null.
         if self.json {
-            let (rate, left) = (rate.is_finite().then_some(rate), left.is_finite().then_some(left));
-            print::aside(serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left }));
+            let (rate, left) = (
+                rate.is_finite().then_some(rate),
+                left.is_finite().then_some(left),
+            );
+            print::aside(
+                serde_json::json!({ "job": what, "done": done, "of": total, "per_s": rate, "left_s": left }),
+            );
         } else if rate > 0.0 {
-            print::aside(format_args!("{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left"));
+            print::aside(format_args!(
+                "{what}: {done} of {total}, {rate:.1} a second, {left:.0} s left"
+            ));
         } else {
             print::aside(format_args!("{what}: {done} of {total}"));
         }
@@ -317,7 +368,11 @@ pub(crate) struct Incomplete(Batch);
 
 impl std::fmt::Display for Incomplete {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} of {} files could not be used; the rest is done", self.0.failed, self.0.files)
+        write!(
+            f,
+            "{} of {} files could not be used; the rest is done",
+            self.0.failed, self.0.files
+        )
     }
 }
 

@@ -36,9 +36,17 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     asset::build(&list, &args.output.join("assets"), common)?;
     let folder = args.output.join("dataset");
     let studio = Studio::open(Setup::read(&recipe, &[])?)?;
-    let report = dataset::make(&studio, &studio.plan(args.count, args.seed, &folder)?, &args.consent, common)?;
+    let report = dataset::make(
+        &studio,
+        &studio.plan(args.count, args.seed, &folder)?,
+        &args.consent,
+        common,
+    )?;
     let sheet = args.output.join("contact_sheet.png");
-    io::write(&sheet, &contact_sheet_of(&folder, args.count as usize, &Default::default())?)?;
+    io::write(
+        &sheet,
+        &contact_sheet_of(&folder, args.count as usize, &Default::default())?,
+    )?;
     dataset::tell(&report);
     print::line(format_args!("look at      {}", sheet.display()));
     for path in dataset::for_trainers(&report, &folder) {
@@ -51,7 +59,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
 /// A recipe file that says nothing but where its folders are.
 fn write_recipe(args: &Args) -> anyhow::Result<PathBuf> {
     let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
-    let backgrounds = io::relative(&absolute(&args.samples.join("backgrounds"))?, &absolute(&args.output)?);
+    let backgrounds = io::relative(
+        &absolute(&args.samples.join("backgrounds"))?,
+        &absolute(&args.output)?,
+    );
     // A JSON string is a TOML string.
     let backgrounds = serde_json::Value::from(backgrounds.to_string_lossy());
     let text = format!("assets = \"assets\"\nbackgrounds = {backgrounds}\n");

@@ -74,7 +74,12 @@ const SINGLE_DASH: [&str; 11] = [
 /// The command line with `idiff`'s spelling turned into ours, for the `diff` subcommand only.
 pub(crate) fn accept_idiff_spelling(args: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let mut args: Vec<OsString> = args.collect();
-    if args.iter().skip(1).find(|a| !a.as_encoded_bytes().starts_with(b"-")).is_some_and(|first| first == "diff") {
+    if args
+        .iter()
+        .skip(1)
+        .find(|a| !a.as_encoded_bytes().starts_with(b"-"))
+        .is_some_and(|first| first == "diff")
+    {
         for arg in &mut args {
             if let Some(known) = SINGLE_DASH.into_iter().find(|known| arg == known) {
                 *arg = format!("-{known}").into();
@@ -100,12 +105,22 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
         false => compare(&rows(&a, opaque), &rows(&b, opaque), &thresholds),
     };
     let different = report.max_error > 0.0 && report.verdict != Verdict::Incomparable;
-    if let Some(path) = args.output.as_ref().filter(|_| different || !args.only_different)
+    if let Some(path) = args
+        .output
+        .as_ref()
+        .filter(|_| different || !args.only_different)
         && report.verdict != Verdict::Incomparable
     {
-        io::write(path, &absolute_difference(&rows(&a, opaque), &rows(&b, opaque), args.scale))?;
+        io::write(
+            path,
+            &absolute_difference(&rows(&a, opaque), &rows(&b, opaque), args.scale),
+        )?;
     }
-    common.say(format_args!("Comparing \"{}\" and \"{}\"", args.a.display(), args.b.display()));
+    common.say(format_args!(
+        "Comparing \"{}\" and \"{}\"",
+        args.a.display(),
+        args.b.display()
+    ));
     print::text(&report);
     if let Some(likeness) = (!common.quiet()).then(|| likeness(&a, &b)).flatten() {
         common.say(format_args!("Scene-linear {likeness}"));
@@ -116,7 +131,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
 /// What the two are to the eye, over black: the second is what the first should be.
 fn likeness(a: &Picture, b: &Picture) -> Option<Likeness> {
     let light = |picture: &Picture, rows| picture.rows::<PremulRgba>(rows).map(PremulRgba::color);
-    let [a, b] = [a, b].map(|picture| RowsBy { size: picture.size(), make: move |rows| light(picture, rows) });
+    let [a, b] = [a, b].map(|picture| RowsBy {
+        size: picture.size(),
+        make: move |rows| light(picture, rows),
+    });
     Likeness::of(&a, &b)
 }
 
@@ -126,16 +144,28 @@ fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
 
 /// The values of a picture's rows, made into pixels.
 fn rows<P: Copy + Send>(picture: &Picture, pixel: impl Fn([f32; 4]) -> P + Sync) -> impl Rows<P> {
-    RowsBy { size: picture.size(), make: move |rows| stored_values(picture, rows).map(&pixel) }
+    RowsBy {
+        size: picture.size(),
+        make: move |rows| stored_values(picture, rows).map(&pixel),
+    }
 }
 
 /// The values as the file stores them, which is what `idiff` compares: codes of integer formats as shares of full scale,
 /// floats as they are.
 fn stored_values(picture: &Picture, rows: Range<usize>) -> Image<[f32; 4]> {
     if matches!(picture.format(), Format::Exr | Format::Hdr) {
-        return picture.rows::<PremulRgba>(rows).map(|p| [p.r, p.g, p.b, p.a]);
+        return picture
+            .rows::<PremulRgba>(rows)
+            .map(|p| [p.r, p.g, p.b, p.a]);
     }
-    let shown = |p: StraightRgba| [linear_to_srgb(p.r), linear_to_srgb(p.g), linear_to_srgb(p.b), p.a];
+    let shown = |p: StraightRgba| {
+        [
+            linear_to_srgb(p.r),
+            linear_to_srgb(p.g),
+            linear_to_srgb(p.b),
+            p.a,
+        ]
+    };
     picture.rows::<StraightRgba>(rows).map(shown)
 }
 

@@ -15,8 +15,11 @@ pub(crate) fn run(_: &Args) -> anyhow::Result<ExitCode> {
         "blender  {}",
         version_of("blender").unwrap_or_else(|| "not found (only `make golden` needs it)".into())
     ));
-    let checks: [(&str, anyhow::Result<String>); 3] =
-        [("oiio", openimageio()), ("png", png_alpha()), ("exr", exr_round_trip())];
+    let checks: [(&str, anyhow::Result<String>); 3] = [
+        ("oiio", openimageio()),
+        ("png", png_alpha()),
+        ("exr", exr_round_trip()),
+    ];
     let mut healthy = true;
     for (name, outcome) in checks {
         match outcome {
@@ -27,13 +30,20 @@ pub(crate) fn run(_: &Args) -> anyhow::Result<ExitCode> {
             }
         }
     }
-    Ok(if healthy { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if healthy {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 /// First line of `program --version`.
 fn version_of(program: &str) -> Option<String> {
     let output = Command::new(program).arg("--version").output().ok()?;
-    String::from_utf8_lossy(&output.stdout).lines().next().map(str::to_owned)
+    String::from_utf8_lossy(&output.stdout)
+        .lines()
+        .next()
+        .map(str::to_owned)
 }
 
 /// The worker that reads what only OpenImageIO can.
@@ -49,10 +59,26 @@ fn temporary() -> petcomp::Result<tempfile::TempDir> {
 fn png_alpha() -> anyhow::Result<String> {
     let folder = temporary()?;
     let path = folder.path().join("half.png");
-    io::write(&path, &Image::filled(1, 1, Srgba8 { r: 255, g: 255, b: 255, a: 128 }))?;
+    io::write(
+        &path,
+        &Image::filled(
+            1,
+            1,
+            Srgba8 {
+                r: 255,
+                g: 255,
+                b: 255,
+                a: 128,
+            },
+        ),
+    )?;
     let pixel = io::read::<PremulRgba>(&path)?[(0, 0)];
     let display = petcomp::color::encode_srgb8(pixel.color());
-    anyhow::ensure!(display.r == 188, "half-transparent white reads as {}/255, expected 188", display.r);
+    anyhow::ensure!(
+        display.r == 188,
+        "half-transparent white reads as {}/255, expected 188",
+        display.r
+    );
     Ok("alpha is premultiplied in linear light".into())
 }
 

@@ -4,7 +4,8 @@ use crate::common::{Common, count};
 use crate::print;
 use petcomp::dataset::YoloSet;
 use petcomp::eval::{
-    ConfusionOptions, Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found, read_yolo_truth,
+    ConfusionOptions, Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found,
+    read_yolo_truth,
 };
 use petcomp::report::eval::{self, EvalReportOptions, Run};
 use std::path::{Path, PathBuf};
@@ -44,42 +45,69 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let (truth, predictions) = args.paths.split_last().ok_or_else(|| anyhow::anyhow!("expected PREDICTIONS TRUTH"))?;
+    let (truth, predictions) = args
+        .paths
+        .split_last()
+        .ok_or_else(|| anyhow::anyhow!("expected PREDICTIONS TRUTH"))?;
     let mut options = EvalReportOptions {
         classes: args.classes.clone(),
-        tags: args.tags.as_deref().map_or_else(|| Ok(Tags::default()), read_tags)?,
+        tags: args
+            .tags
+            .as_deref()
+            .map_or_else(|| Ok(Tags::default()), read_tags)?,
         rounds: args.rounds,
         seed: args.seed,
-        confusion: ConfusionOptions { confidence: args.confidence, ..Default::default() },
+        confusion: ConfusionOptions {
+            confidence: args.confidence,
+            ..Default::default()
+        },
         shown: args.most,
         pictures: Vec::new(),
     };
     let runs: Vec<Run> = predictions
         .iter()
-        .map(|path| Ok(Run { name: name(path), sheets: sheets(path, truth, args, &mut options)? }))
+        .map(|path| {
+            Ok(Run {
+                name: name(path),
+                sheets: sheets(path, truth, args, &mut options)?,
+            })
+        })
         .collect::<anyhow::Result<_>>()?;
     let metrics = match &args.output {
         Some(folder) => eval::write(folder, &runs, &options)?,
-        None => runs.iter().map(|run| eval::Metrics::of(run, &options)).collect(),
+        None => runs
+            .iter()
+            .map(|run| eval::Metrics::of(run, &options))
+            .collect(),
     };
     print::text(eval::scores_table(&metrics, &options).markdown());
     let (classes, others) = eval::classes_in_brief(&metrics, &options);
     print::text(classes.markdown());
     if others > 0 {
-        common.say(format_args!("the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"));
+        common.say(format_args!(
+            "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
+        ));
     }
     let factors = eval::factors_table(&runs, &options);
     if !factors.rows.is_empty() {
         print::text(factors.markdown());
     }
     if let Some(folder) = &args.output {
-        common.say(format_args!("look at {}", folder.join("eval.html").display()));
+        common.say(format_args!(
+            "look at {}",
+            folder.join("eval.html").display()
+        ));
     }
     Ok(())
 }
 
 /// Truth and detections; the options hear of names of classes and of pictures.
-fn sheets(found: &Path, truth: &Path, args: &Args, options: &mut EvalReportOptions) -> anyhow::Result<Vec<Sheet>> {
+fn sheets(
+    found: &Path,
+    truth: &Path,
+    args: &Args,
+    options: &mut EvalReportOptions,
+) -> anyhow::Result<Vec<Sheet>> {
     let classes = &mut options.classes;
     if truth.extension().is_some_and(|e| e == "json") {
         let mut all = read_coco_truth(truth)?;
@@ -94,7 +122,10 @@ fn sheets(found: &Path, truth: &Path, args: &Args, options: &mut EvalReportOptio
     read_yolo_found(found, &mut all)?;
     if classes.is_empty() {
         // labels/val of a dataset lie two folders below its data.yaml.
-        let set = truth.parent().and_then(Path::parent).and_then(|folder| YoloSet::open(folder).ok());
+        let set = truth
+            .parent()
+            .and_then(Path::parent)
+            .and_then(|folder| YoloSet::open(folder).ok());
         *classes = set.map(|set| set.classes).unwrap_or_default();
     }
     options.pictures = all.pictures;
@@ -104,10 +135,19 @@ fn sheets(found: &Path, truth: &Path, args: &Args, options: &mut EvalReportOptio
 fn size(text: &str) -> Result<[u32; 2], String> {
     let expected = || format!("\"{text}\", expected WIDTHxHEIGHT as in 640x480");
     let (w, h) = text.split_once(['x', ',']).ok_or_else(expected)?;
-    let side = |side: &str| side.trim().parse().ok().filter(|&side| side > 0).ok_or_else(expected);
+    let side = |side: &str| {
+        side.trim()
+            .parse()
+            .ok()
+            .filter(|&side| side > 0)
+            .ok_or_else(expected)
+    };
     Ok([side(w)?, side(h)?])
 }
 
 fn name(path: &Path) -> String {
-    path.file_stem().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+    path.file_stem().map_or_else(
+        || path.display().to_string(),
+        |n| n.to_string_lossy().into_owned(),
+    )
 }

@@ -29,16 +29,26 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         None => studio.label(scene).map_err(|e| e.in_file(&args.scene))?,
         Some(path) => {
             let sample = studio.take(scene).map_err(|e| e.in_file(&args.scene))?;
-            io::write(path, &label::overlay(&sample.frame, &sample.labels, &studio.library().classes))?;
+            io::write(
+                path,
+                &label::overlay(&sample.frame, &sample.labels, &studio.library().classes),
+            )?;
             sample.labels
         }
     };
     io::write_json(&args.output, &labels)?;
     if let Some(path) = &args.polygons {
-        io::write_json(path, &label::borders(&labels, studio.setup().labels.simplify))?;
+        io::write_json(
+            path,
+            &label::borders(&labels, studio.setup().labels.simplify),
+        )?;
     }
     let objects = &labels.objects;
     let topmost = objects.iter().filter(|o| o.is_topmost()).count();
-    common.say(format_args!("{}: {} objects, {topmost} on top", args.output.display(), objects.len()));
+    common.say(format_args!(
+        "{}: {} objects, {topmost} on top",
+        args.output.display(),
+        objects.len()
+    ));
     Ok(())
 }

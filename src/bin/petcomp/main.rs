@@ -30,7 +30,12 @@ use std::process::ExitCode;
 /// Photos on a green or blue screen become cut-outs (matte, asset); a photo of a place with four marked corners becomes
 /// a camera (camera); a recipe becomes scenes (scene), which settle, are rendered over the photo and labelled (dataset).
 #[derive(Parser)]
-#[command(name = "petcomp", version, propagate_version = true, infer_subcommands = false)]
+#[command(
+    name = "petcomp",
+    version,
+    propagate_version = true,
+    infer_subcommands = false
+)]
 struct Cli {
     #[command(flatten)]
     common: common::Common,

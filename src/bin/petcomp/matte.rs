@@ -2,7 +2,9 @@
 
 use crate::common::Common;
 use crate::{matte_film, matte_key, matte_nodes};
-use petcomp::matte::{CutOutOptions, PlateOptions, Remark, ScreenPlate, SegmentOptions, cut_out, segment};
+use petcomp::matte::{
+    CutOutOptions, PlateOptions, Remark, ScreenPlate, SegmentOptions, cut_out, segment,
+};
 use petcomp::{Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
 
@@ -46,36 +48,65 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Film(args) => args.run(common)?,
         Command::Triangulate(args) => args.run(common)?,
         Command::Node(command) => matte_nodes::run(command)?,
-        Command::Segment { photo, output, options } => {
-            let options: SegmentOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
+        Command::Segment {
+            photo,
+            output,
+            options,
+        } => {
+            let options: SegmentOptions = options
+                .as_ref()
+                .map(io::read_toml)
+                .transpose()?
+                .unwrap_or_default();
             let picture: Image<LinearRgb> = io::read(photo)?;
             let found = segment(&picture, &options).map_err(|e| e.in_file(photo))?;
             io::create_folder(output)?;
             warn(photo, &found.remarks);
             let steps = found.steps.iter().map(|step| (step.name, step.shown()));
-            let outcome = [("hull", found.mask.clone()), ("outline", found.tight.clone())];
+            let outcome = [
+                ("hull", found.mask.clone()),
+                ("outline", found.tight.clone()),
+            ];
             // An object that leaves no screen has no plate, and what is opaque of it is not known.
-            let plate = ScreenPlate::fit_outside(&picture, &found.mask, &PlateOptions::default()).ok();
+            let plate =
+                ScreenPlate::fit_outside(&picture, &found.mask, &PlateOptions::default()).ok();
             let mattes = plate.map(|plate| found.mattes(&picture, &plate.image));
-            let mattes = mattes.into_iter().flat_map(|[garbage, core]| [("garbage", garbage), ("core", core)]);
+            let mattes = mattes
+                .into_iter()
+                .flat_map(|[garbage, core]| [("garbage", garbage), ("core", core)]);
             for (i, (name, picture)) in steps.chain(outcome).chain(mattes).enumerate() {
                 let path = output.join(format!("{i}_{name}.png"));
                 io::write(&path, &picture)?;
                 common.say(path.display());
             }
         }
-        Command::Cut { photo, output, options } => {
-            let options: CutOutOptions = options.as_ref().map(io::read_toml).transpose()?.unwrap_or_default();
-            let cut = cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
+        Command::Cut {
+            photo,
+            output,
+            options,
+        } => {
+            let options: CutOutOptions = options
+                .as_ref()
+                .map(io::read_toml)
+                .transpose()?
+                .unwrap_or_default();
+            let cut =
+                cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
             io::write(output, &cut.to_rgba())?;
             warn(photo, &cut.remarks);
             let (w, h) = cut.film.size();
-            common.say(format_args!("{}: {w} x {h}, matte by {}", output.display(), cut.method));
+            common.say(format_args!(
+                "{}: {w} x {h}, matte by {}",
+                output.display(),
+                cut.method
+            ));
         }
     }
     Ok(())
 }
 
 pub(crate) fn warn(photo: &Path, remarks: &[Remark]) {
-    remarks.iter().for_each(|remark| log::warn!("{}: {remark}", photo.display()));
+    remarks
+        .iter()
+        .for_each(|remark| log::warn!("{}: {remark}", photo.display()));
 }

@@ -5,7 +5,9 @@ use crate::matte::warn;
 use crate::matte_key::write;
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
-use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, film, film_planes, segment, triangulate};
+use petcomp::matte::{
+    PlateOptions, ScreenPlate, SegmentOptions, film, film_planes, segment, triangulate,
+};
 use petcomp::{Coverage, Film as FilmPixel, Image, LinearRgb};
 use std::path::{Path, PathBuf};
 
@@ -57,22 +59,45 @@ impl Film {
         let options = from_overrides("film", &self.files.settings)?;
         let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(&self.photo))?;
         warn(&self.photo, &found.remarks);
-        self.files.write(&plate, &found.film, &found.transmittance, &found.uncertainty)?;
-        common.say(format_args!("{}: {}", self.files.output.display(), told(&plate, found.flat)));
+        self.files.write(
+            &plate,
+            &found.film,
+            &found.transmittance,
+            &found.uncertainty,
+        )?;
+        common.say(format_args!(
+            "{}: {}",
+            self.files.output.display(),
+            told(&plate, found.flat)
+        ));
         Ok(())
     }
 }
 
 impl Triangulate {
     pub(crate) fn run(&self, common: &Common) -> Result<()> {
-        let photos: Vec<Image<LinearRgb>> = self.photos.iter().map(io::read).collect::<Result<_, _>>()?;
+        let photos: Vec<Image<LinearRgb>> =
+            self.photos.iter().map(io::read).collect::<Result<_, _>>()?;
         let inside = self.files.inside(&self.photos[0], &photos[0])?;
         let plate = |(i, photo)| self.files.plate(i, &self.photos[i], photo, &inside);
-        let plates: Vec<ScreenPlate> = photos.iter().enumerate().map(plate).collect::<Result<_>>()?;
+        let plates: Vec<ScreenPlate> = photos
+            .iter()
+            .enumerate()
+            .map(plate)
+            .collect::<Result<_>>()?;
         let shots: Vec<_> = photos.iter().zip(&plates).collect();
-        let found = triangulate(&shots, &inside, &from_overrides("film", &self.files.settings)?)?;
+        let found = triangulate(
+            &shots,
+            &inside,
+            &from_overrides("film", &self.files.settings)?,
+        )?;
         warn(&self.photos[0], &found.remarks);
-        self.files.write(&plates[0], &found.film, &found.transmittance, &found.uncertainty)?;
+        self.files.write(
+            &plates[0],
+            &found.film,
+            &found.transmittance,
+            &found.uncertainty,
+        )?;
         let residual = found.residual;
         common.say(format_args!(
             "{}: {}; residual {residual:.4}",
@@ -99,10 +124,18 @@ impl Files {
         Ok(found.tight)
     }
 
-    fn plate(&self, i: usize, path: &Path, photo: &Image<LinearRgb>, inside: &Image<Coverage>) -> Result<ScreenPlate> {
+    fn plate(
+        &self,
+        i: usize,
+        path: &Path,
+        photo: &Image<LinearRgb>,
+        inside: &Image<Coverage>,
+    ) -> Result<ScreenPlate> {
         let options = PlateOptions::default();
         let plate = match self.plates.get(i) {
-            Some(empty) => ScreenPlate::from_photo_outside(&io::read(empty)?, photo, inside, &options),
+            Some(empty) => {
+                ScreenPlate::from_photo_outside(&io::read(empty)?, photo, inside, &options)
+            }
             None => ScreenPlate::fit_outside(photo, inside, &options),
         };
         Ok(plate.map_err(|e| e.in_file(path))?)
@@ -116,17 +149,28 @@ impl Files {
         uncertainty: &Image<Coverage>,
     ) -> Result<()> {
         let planes = film_planes(film, transmittance);
-        let planes: Vec<(&str, &[f32])> = planes.iter().map(|(name, plane)| (*name, &plane[..])).collect();
+        let planes: Vec<(&str, &[f32])> = planes
+            .iter()
+            .map(|(name, plane)| (*name, &plane[..]))
+            .collect();
         io::exr::write_channels(&self.output, film.size(), &planes, &[])?;
-        self.plate_out.as_ref().map(|path| write(path, &plate.image)).transpose()?;
-        self.uncertainty.as_ref().map(|path| write(path, uncertainty)).transpose()?;
+        self.plate_out
+            .as_ref()
+            .map(|path| write(path, &plate.image))
+            .transpose()?;
+        self.uncertainty
+            .as_ref()
+            .map(|path| write(path, uncertainty))
+            .transpose()?;
         Ok(())
     }
 }
 
 /// The screen and the plastic in a few words.
 fn told(plate: &ScreenPlate, flat: LinearRgb) -> String {
-    let fitted = plate.degree.map_or("photographed".into(), |degree| format!("fitted by degree {degree}"));
+    let fitted = plate.degree.map_or("photographed".into(), |degree| {
+        format!("fitted by degree {degree}")
+    });
     let uneven = 100.0 * plate.unevenness;
     format!(
         "screen {fitted}, {uneven:.0} % uneven; flat plastic lets through {:.2} {:.2} {:.2}",

@@ -48,38 +48,55 @@ impl Args {
     /// Garbage and core matte, those that there are.
     fn mattes(&self, plate: Option<&Image<LinearRgb>>) -> Result<[Option<Image<Coverage>>; 2]> {
         if !self.auto_mattes {
-            let [garbage, core] = [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
+            let [garbage, core] =
+                [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
             return Ok([garbage?, core?]);
         }
         let photo: Image<LinearRgb> = io::read(&self.input)?;
-        let found = segment(&photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
+        let found =
+            segment(&photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
         crate::matte::warn(&self.input, &found.remarks);
         let [garbage, core] = match plate {
             Some(plate) => found.mattes(&photo, plate),
-            None => {
-                found.mattes(&photo, &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image)
-            }
+            None => found.mattes(
+                &photo,
+                &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image,
+            ),
         };
         Ok([Some(garbage), Some(core)])
     }
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let opts = KeyOptions { profile: args.profile, ..io::from_overrides("key", &args.settings)? };
+    let opts = KeyOptions {
+        profile: args.profile,
+        ..io::from_overrides("key", &args.settings)?
+    };
     let photo: Image<PremulRgba> = io::read(&args.input)?;
     let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
     let [garbage, core] = args.mattes(plate.as_ref())?;
-    let screen = plate.as_ref().map_or(Screen::Color(args.screen.unwrap_or_default()), Screen::Plate);
+    let screen = plate.as_ref().map_or(
+        Screen::Color(args.screen.unwrap_or_default()),
+        Screen::Plate,
+    );
     let mut job = Keying::new(&photo, screen);
-    job = garbage.iter().fold(job, |job, matte| job.with_garbage(matte));
+    job = garbage
+        .iter()
+        .fold(job, |job, matte| job.with_garbage(matte));
     job = core.iter().fold(job, |job, matte| job.with_core(matte));
     let keyed = job.run(&opts)?;
     if keyed.deviations != Deviations::default() {
         log::warn!("{}: {}", args.input.display(), keyed.deviations);
     }
     write(&args.output, &keyed.cutout)?;
-    args.matte.as_ref().map(|path| write(path, &keyed.matte)).transpose()?;
-    args.edges.as_ref().map(|path| write(path, &job.edges(&opts)?)).transpose()?;
+    args.matte
+        .as_ref()
+        .map(|path| write(path, &keyed.matte))
+        .transpose()?;
+    args.edges
+        .as_ref()
+        .map(|path| write(path, &job.edges(&opts)?))
+        .transpose()?;
     Ok(())
 }
 
@@ -87,12 +104,19 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 pub(crate) fn color(text: &str) -> Result<LinearRgb, String> {
     let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
     let channels: Result<[f32; 3], _> = numbers.map_err(|e| e.to_string())?.try_into();
-    channels.map(LinearRgb::from).map_err(|n| format!("{} numbers, expected R,G,B", n.len()))
+    channels
+        .map(LinearRgb::from)
+        .map_err(|n| format!("{} numbers, expected R,G,B", n.len()))
 }
 
 /// Writes a picture, in an EXR with all its bits.
 pub(crate) fn write<P: ToFile>(path: &Path, image: &Image<P>) -> Result<()> {
-    let is_exr = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let options = WriteOptions { bits: is_exr.then_some(Bits::Float), ..WriteOptions::default() };
+    let is_exr = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    let options = WriteOptions {
+        bits: is_exr.then_some(Bits::Float),
+        ..WriteOptions::default()
+    };
     Ok(io::write_with(path, image, &options)?)
 }

@@ -4,7 +4,9 @@ use crate::matte_key::{color, write};
 use anyhow::Result;
 use nalgebra::Point2;
 use petcomp::io::{Override, from_overrides};
-use petcomp::matte::{ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen};
+use petcomp::matte::{
+    ScreenPoint, channel_key, chroma_key, color_spill, difference_key, keying_screen,
+};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba, io};
 use std::path::PathBuf;
 
@@ -64,25 +66,43 @@ pub(crate) enum Command {
 
 pub(crate) fn run(command: &Command) -> Result<()> {
     match command {
-        Command::ChromaKey { pictures, screen } => {
-            pictures.cut(|photo, given| Ok(chroma_key(photo, *screen, &from_overrides("key", given)?)))
-        }
+        Command::ChromaKey { pictures, screen } => pictures
+            .cut(|photo, given| Ok(chroma_key(photo, *screen, &from_overrides("key", given)?))),
         Command::DifferenceKey { pictures, clean } => {
             let clean: Image<PremulRgba> = io::read(clean)?;
-            pictures.cut(|photo, given| Ok(difference_key(photo, &clean, &from_overrides("key", given)?)?))
+            pictures.cut(|photo, given| {
+                Ok(difference_key(
+                    photo,
+                    &clean,
+                    &from_overrides("key", given)?,
+                )?)
+            })
         }
         Command::ChannelKey(pictures) => {
-            let keyed =
-                channel_key(&io::read::<PremulRgba>(&pictures.input)?, &from_overrides("key", &pictures.settings)?);
+            let keyed = channel_key(
+                &io::read::<PremulRgba>(&pictures.input)?,
+                &from_overrides("key", &pictures.settings)?,
+            );
             pictures.write(&keyed.cutout, &keyed.matte)
         }
         Command::ColorSpill(pictures) => {
             let photo: Image<PremulRgba> = io::read(&pictures.input)?;
-            write(&pictures.output, &color_spill(&photo, &from_overrides("key", &pictures.settings)?))
+            write(
+                &pictures.output,
+                &color_spill(&photo, &from_overrides("key", &pictures.settings)?),
+            )
         }
-        Command::KeyingScreen { input, output, points, smoothness } => {
+        Command::KeyingScreen {
+            input,
+            output,
+            points,
+            smoothness,
+        } => {
             let photo: Image<PremulRgba> = io::read(input)?;
-            let seen = points.iter().map(|&at| seen(&photo, at)).collect::<Result<Vec<_>>>()?;
+            let seen = points
+                .iter()
+                .map(|&at| seen(&photo, at))
+                .collect::<Result<Vec<_>>>()?;
             write(output, &keying_screen(photo.size(), &seen, *smoothness)?)
         }
     }
@@ -90,7 +110,10 @@ pub(crate) fn run(command: &Command) -> Result<()> {
 
 impl Pictures {
     /// Writes the picture seen through a matte.
-    fn cut(&self, matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>) -> Result<()> {
+    fn cut(
+        &self,
+        matte: impl Fn(&Image<PremulRgba>, &[Override]) -> Result<Image<Coverage>>,
+    ) -> Result<()> {
         let photo: Image<PremulRgba> = io::read(&self.input)?;
         let matte = matte(&photo, &self.settings)?;
         self.write(&photo.zip_map(&matte, |p, m| p.masked(m)), &matte)
@@ -98,7 +121,10 @@ impl Pictures {
 
     fn write(&self, cutout: &Image<PremulRgba>, matte: &Image<Coverage>) -> Result<()> {
         write(&self.output, cutout)?;
-        self.matte.as_ref().map(|path| write(path, matte)).transpose()?;
+        self.matte
+            .as_ref()
+            .map(|path| write(path, matte))
+            .transpose()?;
         Ok(())
     }
 }
@@ -106,12 +132,21 @@ impl Pictures {
 /// The screen where it is seen.
 fn seen(photo: &Image<PremulRgba>, [x, y]: [usize; 2]) -> Result<ScreenPoint> {
     let (width, height) = photo.size();
-    anyhow::ensure!(x < width && y < height, "--point {x},{y}: outside the picture of {width} x {height} pixels");
-    Ok(ScreenPoint { at_px: Point2::new(x as f64 + 0.5, y as f64 + 0.5), color: photo[(x, y)].color() })
+    anyhow::ensure!(
+        x < width && y < height,
+        "--point {x},{y}: outside the picture of {width} x {height} pixels"
+    );
+    Ok(ScreenPoint {
+        at_px: Point2::new(x as f64 + 0.5, y as f64 + 0.5),
+        color: photo[(x, y)].color(),
+    })
 }
 
 /// A pixel from `X,Y`.
 fn point(text: &str) -> Result<[usize; 2], String> {
     let numbers: Result<Vec<usize>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    numbers.map_err(|e| e.to_string())?.try_into().map_err(|_| "expected X,Y".into())
+    numbers
+        .map_err(|e| e.to_string())?
+        .try_into()
+        .map_err(|_| "expected X,Y".into())
 }

@@ -28,7 +28,11 @@ pub(crate) fn usage(said: &clap::Error) -> ExitCode {
     let plain = said.render().to_string();
     let shown = lines(&plain);
     // With its colours, unless an argument brings some of its own.
-    let done = if shown == plain { said.print() } else { std::io::stderr().write_all(shown.as_bytes()) };
+    let done = if shown == plain {
+        said.print()
+    } else {
+        std::io::stderr().write_all(shown.as_bytes())
+    };
     match done {
         Err(error) if !said.use_stderr() => gone(&error),
         _ => ExitCode::from(u8::try_from(said.exit_code()).unwrap_or(u8::MAX)),
@@ -37,7 +41,10 @@ pub(crate) fn usage(said: &clap::Error) -> ExitCode {
 
 /// Printable lines.
 fn lines(text: &str) -> String {
-    text.split('\n').map(printable).collect::<Vec<_>>().join("\n")
+    text.split('\n')
+        .map(printable)
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 fn out(text: &str) {
@@ -52,6 +59,9 @@ fn gone(error: &std::io::Error) -> ! {
     if error.kind() == ErrorKind::BrokenPipe {
         std::process::exit(READER_GONE);
     }
-    aside(format_args!("error: {}", Error::file("standard output", error)));
+    aside(format_args!(
+        "error: {}",
+        Error::file("standard output", error)
+    ));
     std::process::exit(crate::common::FILE.into());
 }

@@ -45,7 +45,11 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
             if extension(&args.output) != "exr" {
                 bail!("{}: parts need a file called .exr", args.output.display());
             }
-            write_parts(&args.output, frame.size(), &composite::parts(aovs, &deep, &shot, &frame))?;
+            write_parts(
+                &args.output,
+                frame.size(),
+                &composite::parts(aovs, &deep, &shot, &frame),
+            )?;
         }
     }
     if let Some(path) = &args.preview {
@@ -55,7 +59,11 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         io::write_document(path, &scene)?;
     }
     let (w, h) = frame.size();
-    common.say(format_args!("{}: {w} x {h}, {} objects", args.output.display(), scene.objects.len()));
+    common.say(format_args!(
+        "{}: {w} x {h}, {} objects",
+        args.output.display(),
+        scene.objects.len()
+    ));
     Ok(())
 }
 
@@ -63,7 +71,10 @@ fn write(path: &Path, frame: &Image<PremulRgba>) -> anyhow::Result<()> {
     match extension(path).as_str() {
         "exr" | "tif" | "tiff" => io::write(path, frame)?,
         "png" | "jpg" | "jpeg" => io::write(path, &displayed(frame))?,
-        _ => bail!("{}: no format for this extension, expected .png, .jpg, .exr or .tif", path.display()),
+        _ => bail!(
+            "{}: no format for this extension, expected .png, .jpg, .exr or .tif",
+            path.display()
+        ),
     }
     Ok(())
 }
@@ -74,5 +85,7 @@ fn displayed(frame: &Image<PremulRgba>) -> Image<LinearRgb> {
 }
 
 fn extension(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default()
+    path.extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
 }

@@ -59,7 +59,12 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
         Command::Draw(args) => {
             let scene = args.recipe.studio()?.draw(args.seed, args.index)?;
             io::write_document(&args.output, &scene)?;
-            common.say(format_args!("{}: {} objects over {}", args.output.display(), scene.objects.len(), scene.plate));
+            common.say(format_args!(
+                "{}: {} objects over {}",
+                args.output.display(),
+                scene.objects.len(),
+                scene.plate
+            ));
         }
         Command::Check { scene: path } => {
             let scene: Scene = io::read_document(path)?;
@@ -74,10 +79,17 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
 fn export(args: &Export, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
     let Renderer::Cycles = args.to;
-    let (scene, shot) = args.recipe.studio()?.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
+    let (scene, shot) = args
+        .recipe
+        .studio()?
+        .resolve(scene)
+        .map_err(|e| e.in_file(&args.scene))?;
     cycles::export(&shot, scene.surface.size, &args.folder)?;
     let folder = args.folder.display();
-    common.say(format_args!("{folder}: {} cards; render it with", shot.cards.len()));
+    common.say(format_args!(
+        "{folder}: {} cards; render it with",
+        shot.cards.len()
+    ));
     common.say(format_args!(
         "  blender -b --factory-startup --python-use-system-env -P {folder}/{} -- \
          {folder}/scene.json --out {folder}/cycles --preview",

@@ -32,10 +32,13 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         Some(path) => read_options(path)?,
         None => SettleOptions::default(),
     };
-    let options = args.quality.map_or(options, |quality| quality.settle(options));
+    let options = args
+        .quality
+        .map_or(options, |quality| quality.settle(options));
     // 60 a second at the default step.
     let every = if args.trace.is_some() { 8 } else { 0 };
-    let (settled, samples) = settle_traced(scene, &options, every).map_err(|e| e.in_file(&args.scene))?;
+    let (settled, samples) =
+        settle_traced(scene, &options, every).map_err(|e| e.in_file(&args.scene))?;
     // Written for a bad end too: it shows what went wrong.
     if let Some(path) = &args.trace {
         io::write_text(path, &trace_csv(&samples))?;
@@ -46,7 +49,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(path) = &args.preview {
         io::write(path, &preview(&rest, &options))?;
     }
-    common.say(format_args!("{}: at rest after {seconds:.2} s, {rejected} tries thrown away", args.output.display()));
+    common.say(format_args!(
+        "{}: at rest after {seconds:.2} s, {rejected} tries thrown away",
+        args.output.display()
+    ));
     Ok(())
 }
 

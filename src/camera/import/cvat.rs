@@ -16,8 +16,15 @@ pub(super) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
         return Ok(None);
     }
     let images = root.children().filter(|node| node.has_tag_name("image"));
-    let all: Result<Vec<Drawing>> = images.enumerate().map(|(i, node)| drawing(node, i)).collect();
-    Ok(Some(all?.into_iter().filter(|drawing| !drawing.shapes.is_empty()).collect()))
+    let all: Result<Vec<Drawing>> = images
+        .enumerate()
+        .map(|(i, node)| drawing(node, i))
+        .collect();
+    Ok(Some(
+        all?.into_iter()
+            .filter(|drawing| !drawing.shapes.is_empty())
+            .collect(),
+    ))
 }
 
 /// CVAT's pixels are ours: 0 is the edge of the picture.
@@ -25,10 +32,18 @@ fn drawing(image: Node<'_, '_>, index: usize) -> Result<Drawing> {
     let at = |e: Error| e.within(&format!("image[{index}]"));
     let side = |name: &str| number(image, name).map(|px| px as u32);
     let size = [side("width").map_err(at)?, side("height").map_err(at)?];
-    let shapes: Result<Vec<Option<Shape>>> =
-        image.children().filter(Node::is_element).map(|node| shape(node).map_err(at)).collect();
+    let shapes: Result<Vec<Option<Shape>>> = image
+        .children()
+        .filter(Node::is_element)
+        .map(|node| shape(node).map_err(at))
+        .collect();
     Ok(Drawing {
-        files: vec![image.attribute("name").unwrap_or_default().replace('\\', "/")],
+        files: vec![
+            image
+                .attribute("name")
+                .unwrap_or_default()
+                .replace('\\', "/"),
+        ],
         size: Some(size),
         shapes: shapes?.into_iter().flatten().collect(),
         source: "cvat",
@@ -43,7 +58,14 @@ fn shape(node: Node<'_, '_>) -> Result<Option<Shape>> {
         "box" => {
             let side = |name| number(node, name);
             let corners = between([side("xtl")?, side("ytl")?], [side("xbr")?, side("ybr")?]);
-            (Kind::Rectangle, turned(corners, node.attribute("rotation").map_or(Ok(0.0), |_| side("rotation"))?))
+            (
+                Kind::Rectangle,
+                turned(
+                    corners,
+                    node.attribute("rotation")
+                        .map_or(Ok(0.0), |_| side("rotation"))?,
+                ),
+            )
         }
         _ => return Ok(None),
     };
@@ -59,12 +81,18 @@ fn points(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
         let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong(part));
         Ok([number(x)?, number(y)?])
     };
-    text.split(';').filter(|part| !part.trim().is_empty()).map(one).collect()
+    text.split(';')
+        .filter(|part| !part.trim().is_empty())
+        .map(one)
+        .collect()
 }
 
 fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {
-    let text = node.attribute(name).ok_or_else(|| Error::value(name, "missing, expected a number"))?;
-    text.parse().map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
+    let text = node
+        .attribute(name)
+        .ok_or_else(|| Error::value(name, "missing, expected a number"))?;
+    text.parse()
+        .map_err(|_| Error::value(name, format!("\"{text}\", expected a number")))
 }
 
 /// The corners of a rectangle that was turned clockwise about its middle.
@@ -73,7 +101,10 @@ fn turned(corners: Vec<[f64; 2]>, degrees: f64) -> Vec<[f64; 2]> {
         return corners;
     }
     let middle = [0, 1].map(|axis| (corners[0][axis] + corners[2][axis]) / 2.0);
-    let (sin, cos) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
+    let (sin, cos) = (
+        libm::sin(degrees.to_radians()),
+        libm::cos(degrees.to_radians()),
+    );
     let turn = |[x, y]: [f64; 2]| {
         let [u, v] = [x - middle[0], y - middle[1]];
         [middle[0] + u * cos - v * sin, middle[1] + u * sin + v * cos]
@@ -99,29 +130,52 @@ mod tests {
     #[test]
     fn pictures_with_a_polygon_are_labels() {
         let drawing = only(XML);
-        assert_eq!((drawing.size, drawing.files.as_slice()), (Some([200, 100]), &["bg0.jpg".to_owned()][..]));
+        assert_eq!(
+            (drawing.size, drawing.files.as_slice()),
+            (Some([200, 100]), &["bg0.jpg".to_owned()][..])
+        );
         let label = drawing.label().unwrap();
-        assert_eq!(label.surface.corners_px, Some([[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]]));
+        assert_eq!(
+            label.surface.corners_px,
+            Some([[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]])
+        );
     }
 
     #[test]
     fn points_and_boxes_are_read() {
         let with = |shape: &str| {
-            let text = format!(r#"<annotations><image name="a" width="9" height="9">{shape}</image></annotations>"#);
+            let text = format!(
+                r#"<annotations><image name="a" width="9" height="9">{shape}</image></annotations>"#
+            );
             only(&text).label().unwrap().surface.corners_px.unwrap()
         };
-        assert_eq!(with(r#"<points label="c" points="1,2;3,4;5,6;7,8"/>"#)[3], [7.0, 8.0]);
-        assert_eq!(with(r#"<box label="c" xtl="1" ytl="2" xbr="5" ybr="8"/>"#)[2], [5.0, 8.0]);
+        assert_eq!(
+            with(r#"<points label="c" points="1,2;3,4;5,6;7,8"/>"#)[3],
+            [7.0, 8.0]
+        );
+        assert_eq!(
+            with(r#"<box label="c" xtl="1" ytl="2" xbr="5" ybr="8"/>"#)[2],
+            [5.0, 8.0]
+        );
         let [x, y] = with(r#"<box label="c" xtl="1" ytl="2" xbr="5" ybr="8" rotation="90"/>"#)[0];
-        assert!((x - 6.0).abs() < 1e-12 && (y - 3.0).abs() < 1e-12, "{x} {y}");
+        assert!(
+            (x - 6.0).abs() < 1e-12 && (y - 3.0).abs() < 1e-12,
+            "{x} {y}"
+        );
     }
 
     #[test]
     fn what_is_wrong_is_named() {
         let error = |text: &str| drawings(text).unwrap_err().to_string();
-        assert!(error(&XML.replace("110.00,22.00", "110.00")).contains("image[0].points: \"110.00\", expected x,y"));
+        assert!(
+            error(&XML.replace("110.00,22.00", "110.00"))
+                .contains("image[0].points: \"110.00\", expected x,y")
+        );
         assert!(error(&XML.replace("width=\"200\"", "")).contains("image[0].width: missing"));
-        assert!(error("<!DOCTYPE a [<!ENTITY b \"c\">]><annotations/>").contains("document"), "no document types");
+        assert!(
+            error("<!DOCTYPE a [<!ENTITY b \"c\">]><annotations/>").contains("document"),
+            "no document types"
+        );
         assert!(error("<annotations>").contains("document"));
     }
 }

@@ -33,8 +33,8 @@ pub(super) fn is_one(value: &Value) -> bool {
 
 /// LabelMe's pixels are ours: 0 is the edge of the picture.
 pub(super) fn drawing(value: Value) -> Result<Drawing> {
-    let file: LabelMe =
-        serde_path_to_error::deserialize(value).map_err(|e| Error::value(e.path().to_string(), e.inner()))?;
+    let file: LabelMe = serde_path_to_error::deserialize(value)
+        .map_err(|e| Error::value(e.path().to_string(), e.inner()))?;
     Ok(Drawing {
         files: vec![file.image_path.replace('\\', "/")],
         size: file.image_width.zip(file.image_height).map(|(w, h)| [w, h]),
@@ -43,7 +43,13 @@ pub(super) fn drawing(value: Value) -> Result<Drawing> {
     })
 }
 
-fn shape(Drawn { label: name, shape_type, points }: Drawn) -> Shape {
+fn shape(
+    Drawn {
+        label: name,
+        shape_type,
+        points,
+    }: Drawn,
+) -> Shape {
     let (kind, points) = match (shape_type.as_str(), points.as_slice()) {
         ("rectangle", [a, b]) => (Kind::Rectangle, between(*a, *b)),
         ("rectangle", _) => (Kind::Rectangle, points),
@@ -66,24 +72,49 @@ mod tests {
     #[test]
     fn the_polygon_becomes_the_rectangle() {
         let label = from_labelme(FILE, [0.6, 0.4]).unwrap();
-        assert_eq!((label.image_size(), label.image.file.as_str()), ([200, 100], "a.jpg"));
+        assert_eq!(
+            (label.image_size(), label.image.file.as_str()),
+            ([200, 100], "a.jpg")
+        );
         assert_eq!(label.surface.corners_px.unwrap()[2], [108.0, 90.0]);
-        assert_eq!((label.surface.id.as_str(), label.surface.width_m), ("tray", Some(0.6)));
+        assert_eq!(
+            (label.surface.id.as_str(), label.surface.width_m),
+            ("tray", Some(0.6))
+        );
     }
 
     #[test]
     fn two_corners_of_a_rectangle_are_four() {
-        let text = FILE.replace("[[10, 20], [110, 22], [108, 90], [9, 88]]", "[[110, 90], [10, 20]]");
-        let label = from_labelme(&text.replace("\"polygon\"", "\"rectangle\""), [0.6, 0.4]).unwrap();
-        assert_eq!(label.surface.corners_px, Some([[10.0, 20.0], [110.0, 20.0], [110.0, 90.0], [10.0, 90.0]]));
+        let text = FILE.replace(
+            "[[10, 20], [110, 22], [108, 90], [9, 88]]",
+            "[[110, 90], [10, 20]]",
+        );
+        let label =
+            from_labelme(&text.replace("\"polygon\"", "\"rectangle\""), [0.6, 0.4]).unwrap();
+        assert_eq!(
+            label.surface.corners_px,
+            Some([[10.0, 20.0], [110.0, 20.0], [110.0, 90.0], [10.0, 90.0]])
+        );
     }
 
     #[test]
     fn another_number_of_polygons_is_an_error() {
         let none = FILE.replace(", [9, 88]]", "]");
-        assert!(from_labelme(&none, [0.6, 0.4]).unwrap_err().to_string().contains("0 polygons of four points"));
-        assert!(from_labelme("{}", [0.6, 0.4]).unwrap_err().to_string().contains("shapes"));
-        let wrong = from_labelme(&FILE.replace("[10, 20]", "[10]"), [0.6, 0.4]).unwrap_err().to_string();
+        assert!(
+            from_labelme(&none, [0.6, 0.4])
+                .unwrap_err()
+                .to_string()
+                .contains("0 polygons of four points")
+        );
+        assert!(
+            from_labelme("{}", [0.6, 0.4])
+                .unwrap_err()
+                .to_string()
+                .contains("shapes")
+        );
+        let wrong = from_labelme(&FILE.replace("[10, 20]", "[10]"), [0.6, 0.4])
+            .unwrap_err()
+            .to_string();
         assert!(wrong.contains("shapes[0].points[0]"), "{wrong}");
     }
 }

@@ -50,7 +50,9 @@ pub(crate) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
     if text.trim_start().starts_with('<') {
         return cvat::drawings(text);
     }
-    let Ok(value) = io::parse_json::<Value>(text) else { return Ok(None) };
+    let Ok(value) = io::parse_json::<Value>(text) else {
+        return Ok(None);
+    };
     if labelme::is_one(&value) {
         return labelme::drawing(value).map(|drawing| Some(vec![drawing]));
     }
@@ -77,21 +79,33 @@ impl Drawing {
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
         (label.surface.width_m, label.surface.height_m) = (None, None);
         label.image.file = self.files.first().cloned().unwrap_or_default();
-        label.surface.id = if name.is_empty() { "surface".into() } else { name };
+        label.surface.id = if name.is_empty() {
+            "surface".into()
+        } else {
+            name
+        };
         label.surface.source = Some(self.source.into());
         Ok(label)
     }
 
     /// Name and corners of the only shape that can be the surface.
     fn rectangle(&self) -> Result<(String, [[f64; 2]; 4])> {
-        if self.shapes.iter().flat_map(|s| s.points.as_flattened()).any(|v| !v.is_finite()) {
+        if self
+            .shapes
+            .iter()
+            .flat_map(|s| s.points.as_flattened())
+            .any(|v| !v.is_finite())
+        {
             return Err(Error::value("shapes", "a point is not finite"));
         }
         let of = |kind: Kind| self.shapes.iter().filter(move |shape| shape.kind == kind);
-        let four = |shape: &Shape| Some((shape.name.clone(), opened(&shape.points).try_into().ok()?));
+        let four =
+            |shape: &Shape| Some((shape.name.clone(), opened(&shape.points).try_into().ok()?));
         let quads: Vec<_> = of(Kind::Polygon).filter_map(four).collect();
         let boxes: Vec<_> = of(Kind::Rectangle).filter_map(four).collect();
-        let points: Vec<_> = of(Kind::Points).flat_map(|s| s.points.iter().map(|p| (&s.name, *p))).collect();
+        let points: Vec<_> = of(Kind::Points)
+            .flat_map(|s| s.points.iter().map(|p| (&s.name, *p)))
+            .collect();
         match (quads.as_slice(), boxes.as_slice(), points.as_slice()) {
             ([quad], ..) => Ok(quad.clone()),
             ([], [one], _) => Ok(one.clone()),
@@ -116,7 +130,9 @@ impl Drawing {
 /// A polygon without a last point that repeats the first.
 fn opened(points: &[[f64; 2]]) -> &[[f64; 2]] {
     match points {
-        [first, rest @ .., last] if first == last && !rest.is_empty() => &points[..points.len() - 1],
+        [first, rest @ .., last] if first == last && !rest.is_empty() => {
+            &points[..points.len() - 1]
+        }
         _ => points,
     }
 }
@@ -143,7 +159,14 @@ fn four_points(points: [(&String, [f64; 2]); 4]) -> (String, [[f64; 2]; 4]) {
         return ("surface".into(), named);
     }
     let one_name = points.iter().all(|(name, _)| *name == points[0].0);
-    (if one_name { points[0].0.clone() } else { "surface".into() }, corners)
+    (
+        if one_name {
+            points[0].0.clone()
+        } else {
+            "surface".into()
+        },
+        corners,
+    )
 }
 
 /// The corners of an upright rectangle between two opposite ones, clockwise from the top left.
@@ -163,54 +186,101 @@ pub(crate) mod tests {
     }
 
     fn shape(kind: Kind, name: &str, points: &[[f64; 2]]) -> Shape {
-        Shape { kind, name: name.into(), points: points.to_vec() }
+        Shape {
+            kind,
+            name: name.into(),
+            points: points.to_vec(),
+        }
     }
 
     const QUAD: [[f64; 2]; 4] = [[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]];
 
     fn corners(shapes: Vec<Shape>) -> std::result::Result<[[f64; 2]; 4], String> {
-        let drawing = Drawing { shapes, ..Default::default() };
-        drawing.label().map(|l| l.surface.corners_px.unwrap()).map_err(|e| e.to_string())
+        let drawing = Drawing {
+            shapes,
+            ..Default::default()
+        };
+        drawing
+            .label()
+            .map(|l| l.surface.corners_px.unwrap())
+            .map_err(|e| e.to_string())
     }
 
     #[test]
     fn a_quadrangle_comes_before_a_rectangle_and_that_before_points() {
         let quad = shape(Kind::Polygon, "tray", &QUAD);
-        let rectangle = shape(Kind::Rectangle, "tray", &between([100.0, 80.0], [10.0, 20.0]));
+        let rectangle = shape(
+            Kind::Rectangle,
+            "tray",
+            &between([100.0, 80.0], [10.0, 20.0]),
+        );
         let dots = QUAD.map(|p| shape(Kind::Points, "dot", &[p])).to_vec();
-        let all: Vec<Shape> = dots.iter().cloned().chain([rectangle.clone(), quad]).collect();
+        let all: Vec<Shape> = dots
+            .iter()
+            .cloned()
+            .chain([rectangle.clone(), quad])
+            .collect();
         assert_eq!(corners(all).unwrap(), QUAD);
         let without: Vec<Shape> = dots.iter().cloned().chain([rectangle]).collect();
-        assert_eq!(corners(without).unwrap(), [[10.0, 20.0], [100.0, 20.0], [100.0, 80.0], [10.0, 80.0]]);
+        assert_eq!(
+            corners(without).unwrap(),
+            [[10.0, 20.0], [100.0, 20.0], [100.0, 80.0], [10.0, 80.0]]
+        );
         assert_eq!(corners(dots).unwrap(), QUAD);
     }
 
     #[test]
     fn points_that_are_called_by_their_corner_are_put_in_order() {
         let named = [(2, "BR"), (0, "top_left"), (3, "bottom-left"), (1, "tr")];
-        let shapes = named.map(|(i, name)| shape(Kind::Points, name, &[QUAD[i]])).to_vec();
+        let shapes = named
+            .map(|(i, name)| shape(Kind::Points, name, &[QUAD[i]]))
+            .to_vec();
         assert_eq!(corners(shapes).unwrap(), QUAD);
     }
 
     #[test]
     fn a_closed_polygon_has_one_point_less() {
         let closed: Vec<[f64; 2]> = QUAD.into_iter().chain([QUAD[0]]).collect();
-        assert_eq!(corners(vec![shape(Kind::Polygon, "", &closed)]).unwrap(), QUAD);
+        assert_eq!(
+            corners(vec![shape(Kind::Polygon, "", &closed)]).unwrap(),
+            QUAD
+        );
     }
 
     #[test]
     fn anything_else_is_counted_in_the_message() {
-        let two = vec![shape(Kind::Polygon, "a", &QUAD), shape(Kind::Polygon, "b", &QUAD)];
-        assert!(corners(two).unwrap_err().contains("2 polygons of four points"));
+        let two = vec![
+            shape(Kind::Polygon, "a", &QUAD),
+            shape(Kind::Polygon, "b", &QUAD),
+        ];
+        assert!(
+            corners(two)
+                .unwrap_err()
+                .contains("2 polygons of four points")
+        );
         let three = vec![shape(Kind::Polygon, "a", &QUAD[..3])];
         assert!(corners(three).unwrap_err().contains("1 of another number"));
         assert!(corners(vec![]).unwrap_err().contains("0 points"));
-        assert!(corners(vec![shape(Kind::Polygon, "a", &[[f64::NAN, 0.0]; 4])]).unwrap_err().contains("finite"));
+        assert!(
+            corners(vec![shape(Kind::Polygon, "a", &[[f64::NAN, 0.0]; 4])])
+                .unwrap_err()
+                .contains("finite")
+        );
     }
 
     #[test]
     fn other_documents_are_of_no_program() {
-        for text in ["{}", "[]", "[1]", "3", "{\"format\": \"plane-label\"}", "<html></html>", "<a>", "{", ""] {
+        for text in [
+            "{}",
+            "[]",
+            "[1]",
+            "3",
+            "{\"format\": \"plane-label\"}",
+            "<html></html>",
+            "<a>",
+            "{",
+            "",
+        ] {
             assert_eq!(drawings(text).unwrap(), None, "{text}");
         }
     }

@@ -18,13 +18,22 @@ const FORGIVEN: usize = 1;
 ///
 /// One thread and no decimation: the same corners every time, and the best.
 pub(super) fn find(photo: &Image<LinearRgb>, artwork: Artwork) -> Vec<Marker> {
-    let Some(grey) = grey(photo) else { return Vec::new() };
-    let Ok(mut detector) = Detector::builder().add_family_bits(Family::tag_36h11(), FORGIVEN).build() else {
+    let Some(grey) = grey(photo) else {
+        return Vec::new();
+    };
+    let Ok(mut detector) = Detector::builder()
+        .add_family_bits(Family::tag_36h11(), FORGIVEN)
+        .build()
+    else {
         return Vec::new();
     };
     detector.set_thread_number(1);
     detector.set_decimation(1.0);
-    detector.detect(&grey).iter().filter_map(|tag| marker(tag, artwork)).collect()
+    detector
+        .detect(&grey)
+        .iter()
+        .filter_map(|tag| marker(tag, artwork))
+        .collect()
 }
 
 /// The photo in bytes, as bright as fits, and linear: an edge then is where half of the light is. (Display-encoded, white
@@ -35,7 +44,11 @@ fn grey(photo: &Image<LinearRgb>) -> Option<apriltag::Image> {
         return None;
     }
     let light = |p: &LinearRgb| p.luminance().clamp(0.0, 1.0);
-    let brightest = photo.pixels().iter().map(light).fold(f32::MIN_POSITIVE, f32::max);
+    let brightest = photo
+        .pixels()
+        .iter()
+        .map(light)
+        .fold(f32::MIN_POSITIVE, f32::max);
     let mut grey = apriltag::Image::zeros_with_stride(width, height, width).ok()?;
     for (to, from) in grey.as_slice_mut().iter_mut().zip(photo.pixels()) {
         *to = (255.0 * light(from) / brightest).round() as u8;
@@ -61,7 +74,9 @@ fn marker(tag: &Detection, artwork: Artwork) -> Option<Marker> {
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::camera::{self, Label, MarkerMap, SolveOptions, Warning, project_picture, with_markers};
+    use crate::camera::{
+        self, Label, MarkerMap, SolveOptions, Warning, project_picture, with_markers,
+    };
     use crate::filter::Pyramid;
     use crate::geom::Point3;
     use crate::pixel::PremulRgba;
@@ -70,8 +85,8 @@ mod tests {
     /// eight by eight cells (tag36h11.c of the AprilTag library).
     const CODES: [u64; 4] = [0xd_7e00_984b, 0xd_da66_4ca7, 0xd_c4a1_c821, 0xe_17b4_70e9];
     const ROW_AND_COLUMN: [u8; 36] = [
-        11, 12, 13, 14, 15, 22, 23, 24, 33, 16, 26, 36, 46, 56, 25, 35, 45, 34, 66, 65, 64, 63, 62, 55, 54, 53, 44, 61,
-        51, 41, 31, 21, 52, 42, 32, 43,
+        11, 12, 13, 14, 15, 22, 23, 24, 33, 16, 26, 36, 46, 56, 25, 35, 45, 34, 66, 65, 64, 63, 62,
+        55, 54, 53, 44, 61, 51, 41, 31, 21, 52, 42, 32, 43,
     ];
     const BOARD: [f64; 2] = [0.6, 0.4];
     const TAG: f64 = 0.08;
@@ -80,7 +95,9 @@ mod tests {
     const PRINT: f64 = 2000.0;
 
     fn is_white(id: usize, row: usize, column: usize) -> bool {
-        let bit = ROW_AND_COLUMN.iter().position(|&at| usize::from(at) == 10 * row + column);
+        let bit = ROW_AND_COLUMN
+            .iter()
+            .position(|&at| usize::from(at) == 10 * row + column);
         bit.is_some_and(|bit| CODES[id] >> (35 - bit) & 1 == 1)
     }
 
@@ -88,33 +105,72 @@ mod tests {
     fn board(tags: usize, artwork: Artwork) -> Image<PremulRgba> {
         let [w, h] = BOARD.map(|s| (s * PRINT).round() as usize);
         Image::from_fn(w, h, |x, y| {
-            let (x, y) = ((x as f64 + 0.5) / PRINT - BOARD[0] / 2.0, BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT);
+            let (x, y) = (
+                (x as f64 + 0.5) / PRINT - BOARD[0] / 2.0,
+                BOARD[1] / 2.0 - (y as f64 + 0.5) / PRINT,
+            );
             let ink = (0..tags).any(|id| {
-                let [u, v] = [(x - CENTERS[id][0]) / TAG + 0.5, 0.5 - (y - CENTERS[id][1]) / TAG];
-                let [u, v] = if artwork == Artwork::Opencv { [1.0 - u, 1.0 - v] } else { [u, v] };
+                let [u, v] = [
+                    (x - CENTERS[id][0]) / TAG + 0.5,
+                    0.5 - (y - CENTERS[id][1]) / TAG,
+                ];
+                let [u, v] = if artwork == Artwork::Opencv {
+                    [1.0 - u, 1.0 - v]
+                } else {
+                    [u, v]
+                };
                 let inside = (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v);
                 inside && !is_white(id, (8.0 * v) as usize, (8.0 * u) as usize)
             });
             let grey = if ink { 0.03 } else { 0.8 };
-            PremulRgba { r: grey, g: grey, b: grey, a: 1.0 }
+            PremulRgba {
+                r: grey,
+                g: grey,
+                b: grey,
+                a: 1.0,
+            }
         })
     }
 
     /// A photo of the board on a grey table, and its camera.
-    fn photo(tags: usize, artwork: Artwork, tilt: f64, k: u64) -> (Image<LinearRgb>, crate::Camera) {
-        let scenario = Scenario { image: [1280, 960], focal_px: 1000.0, size: BOARD, ..Scenario::default() };
+    fn photo(
+        tags: usize,
+        artwork: Artwork,
+        tilt: f64,
+        k: u64,
+    ) -> (Image<LinearRgb>, crate::Camera) {
+        let scenario = Scenario {
+            image: [1280, 960],
+            focal_px: 1000.0,
+            size: BOARD,
+            ..Scenario::default()
+        };
         let camera = scenario.tilted(tilt).view(8, k).camera;
         let seen = project_picture(&Pyramid::new(board(tags, artwork)), &camera, BOARD);
         let over_table = |p: PremulRgba| 0.25 * (1.0 - p.a);
-        (seen.map(|p| LinearRgb { r: p.r + over_table(p), g: p.g + over_table(p), b: p.b + over_table(p) }), camera)
+        (
+            seen.map(|p| LinearRgb {
+                r: p.r + over_table(p),
+                g: p.g + over_table(p),
+                b: p.b + over_table(p),
+            }),
+            camera,
+        )
     }
 
     fn label(artwork: Artwork, camera: &crate::Camera) -> Label {
         let mut label = Label::new(camera.image, [[0.0; 2]; 4], BOARD);
         label.surface.corners_px = None;
         label.camera.focal_px = Some(camera.focal_px.x);
-        let map = (0..4).map(|id| (id, [CENTERS[id as usize][0], CENTERS[id as usize][1], 0.0])).collect();
-        label.markers = Some(MarkerMap { family: FAMILY.into(), artwork, size_m: TAG, map });
+        let map = (0..4)
+            .map(|id| (id, [CENTERS[id as usize][0], CENTERS[id as usize][1], 0.0]))
+            .collect();
+        label.markers = Some(MarkerMap {
+            family: FAMILY.into(),
+            artwork,
+            size_m: TAG,
+            map,
+        });
         label
     }
 
@@ -126,7 +182,11 @@ mod tests {
                 let (photo, camera) = photo(4, artwork, tilt, k as u64);
                 let mut found = find(&photo, artwork);
                 found.sort_by_key(|m| m.id);
-                assert_eq!(found.iter().map(|m| m.id).collect::<Vec<_>>(), [0, 1, 2, 3], "{tilt}");
+                assert_eq!(
+                    found.iter().map(|m| m.id).collect::<Vec<_>>(),
+                    [0, 1, 2, 3],
+                    "{tilt}"
+                );
                 for (marker, [x, y]) in found.iter().zip(CENTERS) {
                     let half = TAG / 2.0;
                     let printed = [[-half, half], [half, half], [half, -half], [-half, -half]];
@@ -145,16 +205,26 @@ mod tests {
 
     #[test]
     fn a_wrong_artwork_is_seen_and_put_right() {
-        for (printed, told) in [(Artwork::Opencv, Artwork::Apriltag), (Artwork::Apriltag, Artwork::Apriltag)] {
+        for (printed, told) in [
+            (Artwork::Opencv, Artwork::Apriltag),
+            (Artwork::Apriltag, Artwork::Apriltag),
+        ] {
             let (photo, camera) = photo(4, printed, 25.0, 7);
             let label = with_markers(label(told, &camera), &photo).unwrap();
             let solution = camera::solve(&label, &SolveOptions::default()).unwrap();
             for corner in [[-0.3, 0.2], [0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]] {
-                let at = |c: &crate::Camera| c.project(Point3::new(corner[0], corner[1], 0.0)).unwrap().0;
+                let at = |c: &crate::Camera| {
+                    c.project(Point3::new(corner[0], corner[1], 0.0)).unwrap().0
+                };
                 let error = (at(&solution.camera) - at(&camera)).norm();
                 assert!(error < 0.3, "{printed:?}: {error}");
             }
-            assert!(!solution.warnings.iter().any(|w| matches!(w, Warning::LoneMarker { .. })));
+            assert!(
+                !solution
+                    .warnings
+                    .iter()
+                    .any(|w| matches!(w, Warning::LoneMarker { .. }))
+            );
         }
     }
 
@@ -163,6 +233,13 @@ mod tests {
         let (photo, camera) = photo(1, Artwork::Apriltag, 10.0, 9);
         let label = with_markers(label(Artwork::Apriltag, &camera), &photo).unwrap();
         let solution = camera::solve(&label, &SolveOptions::default()).unwrap();
-        assert!(solution.warnings.iter().any(|w| matches!(w, Warning::LoneMarker { .. })), "{:?}", solution.warnings);
+        assert!(
+            solution
+                .warnings
+                .iter()
+                .any(|w| matches!(w, Warning::LoneMarker { .. })),
+            "{:?}",
+            solution.warnings
+        );
     }
 }

@@ -23,10 +23,15 @@ pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
         return Vec::new();
     }
     let tone = photo.map(|p| Coverage(linear_to_srgb(p.luminance())));
-    let radius = (WINDOW * photo.width().max(photo.height()) as f64).ceil().max(5.0) as usize;
+    let radius = (WINDOW * photo.width().max(photo.height()) as f64)
+        .ceil()
+        .max(5.0) as usize;
     let ground = box_blur(&tone, radius);
     let dark = tone.zip_map(&ground, |t, g| t.0 < g.0 - DARKER);
-    regions(dark).into_iter().filter_map(|region| quad(&region)).collect()
+    regions(dark)
+        .into_iter()
+        .filter_map(|region| quad(&region))
+        .collect()
 }
 
 /// The outermost pixels of every connected dark region, row by row: its left and right ends.
@@ -38,7 +43,10 @@ fn regions(mut dark: Image<bool>) -> Vec<Vec<Point2<f64>>> {
         if !dark.pixels()[start] {
             continue;
         }
-        let (mut pixels, mut ends) = (0, std::collections::BTreeMap::<usize, (usize, usize)>::new());
+        let (mut pixels, mut ends) = (
+            0,
+            std::collections::BTreeMap::<usize, (usize, usize)>::new(),
+        );
         dark.pixels_mut()[start] = false;
         stack.push(start);
         while let Some(at) = stack.pop() {
@@ -46,8 +54,12 @@ fn regions(mut dark: Image<bool>) -> Vec<Vec<Point2<f64>>> {
             pixels += 1;
             let end = ends.entry(y).or_insert((x, x));
             *end = (end.0.min(x), end.1.max(x));
-            let next =
-                [(x > 0, at.wrapping_sub(1)), (x + 1 < w, at + 1), (y > 0, at.wrapping_sub(w)), (y + 1 < h, at + w)];
+            let next = [
+                (x > 0, at.wrapping_sub(1)),
+                (x + 1 < w, at + 1),
+                (y > 0, at.wrapping_sub(w)),
+                (y + 1 < h, at + w),
+            ];
             for (_, neighbour) in next.into_iter().filter(|(inside, _)| *inside) {
                 if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
                     stack.push(neighbour);
@@ -73,14 +85,27 @@ fn outer_corners(ends: &std::collections::BTreeMap<usize, (usize, usize)>) -> Ve
 
 /// The four corners of a region that is nearly a quadrangle.
 fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
-    let mean = outline.iter().fold(Vector2::zeros(), |sum, p| sum + p.coords) / outline.len() as f64;
-    let farthest =
-        |from: Point2<f64>| outline.iter().copied().max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()));
+    let mean = outline
+        .iter()
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords)
+        / outline.len() as f64;
+    let farthest = |from: Point2<f64>| {
+        outline
+            .iter()
+            .copied()
+            .max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()))
+    };
     let a = farthest(mean.into())?;
     let c = farthest(a)?;
     let beside = |p: &Point2<f64>| (c - a).perp(&(p - a));
-    let b = outline.iter().copied().min_by(|p, q| beside(p).total_cmp(&beside(q)))?;
-    let d = outline.iter().copied().max_by(|p, q| beside(p).total_cmp(&beside(q)))?;
+    let b = outline
+        .iter()
+        .copied()
+        .min_by(|p, q| beside(p).total_cmp(&beside(q)))?;
+    let d = outline
+        .iter()
+        .copied()
+        .max_by(|p, q| beside(p).total_cmp(&beside(q)))?;
     // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs down.
     let corners = [a, b, c, d];
     let sides = [0, 1, 2, 3].map(|i| (corners[(i + 1) % 4] - corners[i]).norm());
@@ -90,7 +115,11 @@ fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
 }
 
 fn polygon_area(corners: &[Point2<f64>]) -> f64 {
-    let twice = (0..corners.len()).map(|i| corners[i].coords.perp(&corners[(i + 1) % corners.len()].coords));
+    let twice = (0..corners.len()).map(|i| {
+        corners[i]
+            .coords
+            .perp(&corners[(i + 1) % corners.len()].coords)
+    });
     twice.sum::<f64>() / 2.0
 }
 

@@ -19,10 +19,11 @@ const OVEREXPOSED: f32 = 0.95;
 /// `DICT_4X4_50` of OpenCV 5.0 (`getPredefinedDictionary`, `getBitsFromByteList`): row by row from the top left, the
 /// highest bit first, 1 is white.
 const DICT_4X4_50: [u16; 50] = [
-    0xb532, 0x0f9a, 0x332d, 0x9946, 0x549e, 0x79cd, 0x9e2e, 0xc4f2, 0xfeda, 0xcf56, 0xf991, 0x11a7, 0x0eb7, 0x2a0f,
-    0x24b1, 0x263e, 0x4665, 0x6600, 0x6c5e, 0x76af, 0x868b, 0xb02b, 0xccd5, 0xdd82, 0xfe47, 0x9471, 0xace4, 0xa554,
-    0x2123, 0x346f, 0x4415, 0x57b2, 0x9ecf, 0xf0cb, 0x08ae, 0x0929, 0x1875, 0x04ff, 0x0df6, 0x1c5a, 0x1718, 0x2a28,
-    0x328c, 0x38b2, 0x24e8, 0x2eeb, 0x2d3f, 0x4b64, 0x502e, 0x5013,
+    0xb532, 0x0f9a, 0x332d, 0x9946, 0x549e, 0x79cd, 0x9e2e, 0xc4f2, 0xfeda, 0xcf56, 0xf991, 0x11a7,
+    0x0eb7, 0x2a0f, 0x24b1, 0x263e, 0x4665, 0x6600, 0x6c5e, 0x76af, 0x868b, 0xb02b, 0xccd5, 0xdd82,
+    0xfe47, 0x9471, 0xace4, 0xa554, 0x2123, 0x346f, 0x4415, 0x57b2, 0x9ecf, 0xf0cb, 0x08ae, 0x0929,
+    0x1875, 0x04ff, 0x0df6, 0x1c5a, 0x1718, 0x2a28, 0x328c, 0x38b2, 0x24e8, 0x2eeb, 0x2d3f, 0x4b64,
+    0x502e, 0x5013,
 ];
 
 /// A cell of the printed sheet (marker and a white margin of one cell) is white.
@@ -51,11 +52,19 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Rea
     let mut cells = [[0.0; CELLS]; CELLS];
     for (row, line) in cells.iter_mut().enumerate() {
         for (column, cell) in line.iter_mut().enumerate() {
-            *cell = cell_mean(light, |u, v| photo_from_square.map(Point2::new(u, v)), column, row)?;
+            *cell = cell_mean(
+                light,
+                |u, v| photo_from_square.map(Point2::new(u, v)),
+                column,
+                row,
+            )?;
         }
     }
     let all = cells.as_flattened();
-    let (dark, bright) = (all.iter().copied().fold(f32::MAX, f32::min), all.iter().copied().fold(0.0, f32::max));
+    let (dark, bright) = (
+        all.iter().copied().fold(f32::MAX, f32::min),
+        all.iter().copied().fold(0.0, f32::max),
+    );
     let middle = (dark + bright) / 2.0;
     let white = cells.map(|line| line.map(|cell| cell > middle));
     let border = |i: usize| i == 0 || i == CELLS - 1;
@@ -69,12 +78,26 @@ pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Rea
             }
         }
     }
-    let (id, turns) = if bright < CONTRAST * dark { None } else { lookup(code) }?;
-    Some(Reading { id, turns, white, is_overexposed: bright >= OVEREXPOSED })
+    let (id, turns) = if bright < CONTRAST * dark {
+        None
+    } else {
+        lookup(code)
+    }?;
+    Some(Reading {
+        id,
+        turns,
+        white,
+        is_overexposed: bright >= OVEREXPOSED,
+    })
 }
 
 /// The mean of nine samples inside a cell.
-fn cell_mean(light: &Image<f32>, place: impl Fn(f64, f64) -> Point2<f64>, column: usize, row: usize) -> Option<f32> {
+fn cell_mean(
+    light: &Image<f32>,
+    place: impl Fn(f64, f64) -> Point2<f64>,
+    column: usize,
+    row: usize,
+) -> Option<f32> {
     let mut sum = 0.0;
     for i in 0..9 {
         let inside = |cell: usize, k: usize| (cell as f64 + 0.3 + 0.2 * k as f64) / CELLS as f64;

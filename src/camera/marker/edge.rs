@@ -44,7 +44,10 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
     let mut corners = *rough;
     // From the second time on the probes stand where the sides are.
     for _ in 0..MOST_ROUNDS {
-        let mut lines = [Line { normal: Vector2::zeros(), offset: 0.0 }; 4];
+        let mut lines = [Line {
+            normal: Vector2::zeros(),
+            offset: 0.0,
+        }; 4];
         for (i, line) in lines.iter_mut().enumerate() {
             *line = side(light, &corners, i)?;
         }
@@ -77,7 +80,10 @@ pub(super) fn by_cells(
     let lines = [0, 1, 2, 3].map(|i| {
         let along = corners[(i + 1) % 4] - corners[i];
         let normal = Vector2::new(along.y, -along.x).normalize();
-        Line { normal, offset: normal.dot(&corners[i].coords) + growth }
+        Line {
+            normal,
+            offset: normal.dot(&corners[i].coords) + growth,
+        }
     });
     let mut px = *corners;
     for i in 0..4 {
@@ -85,8 +91,14 @@ pub(super) fn by_cells(
     }
     let off = cells.off(growth);
     // Lines that meet at an acute angle meet far away when one is off.
-    let spread = (0..4).map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2)).sum::<f64>() / 4.0;
-    Some(Corners { px, sigma_px: libm::hypot(LEAST_SIGMA_PX, SIDE_SHARE * off * spread.sqrt()) })
+    let spread = (0..4)
+        .map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2))
+        .sum::<f64>()
+        / 4.0;
+    Some(Corners {
+        px,
+        sigma_px: libm::hypot(LEAST_SIGMA_PX, SIDE_SHARE * off * spread.sqrt()),
+    })
 }
 
 /// How far the edges between the cells of a marker are from where its corners put them.
@@ -100,30 +112,59 @@ impl Cells {
     fn of(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &[[bool; CELLS]; CELLS]) -> Self {
         let photo_from_square = square_from_corners(corners);
         let place = |edge: &InnerEdge, along: f64| {
-            let (along, across) = (along / CELLS as f64, (edge.across as f64 + 0.5) / CELLS as f64);
-            photo_from_square.map(if edge.upright { Point2::new(across, along) } else { Point2::new(along, across) })
+            let (along, across) = (
+                along / CELLS as f64,
+                (edge.across as f64 + 0.5) / CELLS as f64,
+            );
+            photo_from_square.map(if edge.upright {
+                Point2::new(across, along)
+            } else {
+                Point2::new(along, across)
+            })
         };
         let moved = |edge: &InnerEdge| {
             let along = edge.along as f64;
-            let (foot, step) = (place(edge, along), place(edge, along + 0.5) - place(edge, along - 0.5));
+            let (foot, step) = (
+                place(edge, along),
+                place(edge, along + 0.5) - place(edge, along - 0.5),
+            );
             let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
             let moved = crossing(light, foot, step.normalize() * edge.rising, reach)?;
-            Some([2.0 * along / CELLS as f64 - edge.rising - 1.0, moved * edge.rising])
+            Some([
+                2.0 * along / CELLS as f64 - edge.rising - 1.0,
+                moved * edge.rising,
+            ])
         };
-        Self { moved: inner_edges(white).iter().filter_map(moved).collect() }
+        Self {
+            moved: inner_edges(white).iter().filter_map(moved).collect(),
+        }
     }
 
     /// How far white has grown over black, pixels; 0 where too few edges tell.
     fn growth(&self) -> f64 {
-        let (xy, xx) = self.moved.iter().fold((0.0, 0.0), |(xy, xx), [x, y]| (xy + x * y, xx + x * x));
-        if self.moved.len() < FEWEST_EDGES { 0.0 } else { (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX) }
+        let (xy, xx) = self
+            .moved
+            .iter()
+            .fold((0.0, 0.0), |(xy, xx), [x, y]| (xy + x * y, xx + x * x));
+        if self.moved.len() < FEWEST_EDGES {
+            0.0
+        } else {
+            (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX)
+        }
     }
 
     /// Root mean square distance of the edges from their places when white has grown so far, pixels; of too few edges a
     /// pixel.
     fn off(&self, growth: f64) -> f64 {
-        let squares = self.moved.iter().map(|[x, y]| (y - growth * x) * (y - growth * x));
-        if self.moved.len() < FEWEST_EDGES { 1.0 } else { (squares.sum::<f64>() / self.moved.len() as f64).sqrt() }
+        let squares = self
+            .moved
+            .iter()
+            .map(|[x, y]| (y - growth * x) * (y - growth * x));
+        if self.moved.len() < FEWEST_EDGES {
+            1.0
+        } else {
+            (squares.sum::<f64>() / self.moved.len() as f64).sqrt()
+        }
     }
 }
 
@@ -141,12 +182,24 @@ struct InnerEdge {
 
 fn inner_edges(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerEdge> {
     let mut edges = Vec::new();
-    for (upright, across, along) in
-        [false, true].into_iter().flat_map(|u| (1..CELLS - 1).flat_map(move |x| (1..CELLS).map(move |a| (u, x, a))))
+    for (upright, across, along) in [false, true]
+        .into_iter()
+        .flat_map(|u| (1..CELLS - 1).flat_map(move |x| (1..CELLS).map(move |a| (u, x, a))))
     {
-        let cell = |i: usize| if upright { white[i][across] } else { white[across][i] };
+        let cell = |i: usize| {
+            if upright {
+                white[i][across]
+            } else {
+                white[across][i]
+            }
+        };
         if cell(along - 1) != cell(along) {
-            edges.push(InnerEdge { upright, across, along, rising: if cell(along) { 1.0 } else { -1.0 } });
+            edges.push(InnerEdge {
+                upright,
+                across,
+                along,
+                rising: if cell(along) { 1.0 } else { -1.0 },
+            });
         }
     }
     edges
@@ -170,11 +223,20 @@ fn side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<
         let line = Line::through(&points)?;
         points.retain(|p| line.distance(*p).abs() < OFF_LINE_PX);
     }
-    if points.len() < PROBES / 2 { None } else { Line::through(&points) }
+    if points.len() < PROBES / 2 {
+        None
+    } else {
+        Line::through(&points)
+    }
 }
 
 /// Where the light rises along a direction: the centre of gravity of its slope, which blur does not move.
-fn crossing(light: &Image<f32>, foot: Point2<f64>, direction: Vector2<f64>, reach: f64) -> Option<f64> {
+fn crossing(
+    light: &Image<f32>,
+    foot: Point2<f64>,
+    direction: Vector2<f64>,
+    reach: f64,
+) -> Option<f64> {
     let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
     let place = |i: f64| -reach + 2.0 * reach * i / steps as f64;
     let value = |i: usize| {

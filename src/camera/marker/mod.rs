@@ -47,12 +47,25 @@ pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
         .into_iter()
         .filter_map(|rough| {
             let fine = edge::refined(&light, &rough)?;
-            let dictionary::Reading { id, turns, white, is_overexposed } = dictionary::read(&light, &fine)?;
-            let edge::Corners { px, sigma_px } = edge::by_cells(&light, &fine, &white, is_overexposed)?;
-            Some(Marker { id, corners_px: [0, 1, 2, 3].map(|i| px[(i + turns) % 4]), sigma_px })
+            let dictionary::Reading {
+                id,
+                turns,
+                white,
+                is_overexposed,
+            } = dictionary::read(&light, &fine)?;
+            let edge::Corners { px, sigma_px } =
+                edge::by_cells(&light, &fine, &white, is_overexposed)?;
+            Some(Marker {
+                id,
+                corners_px: [0, 1, 2, 3].map(|i| px[(i + turns) % 4]),
+                sigma_px,
+            })
         })
         .collect();
-    found.sort_by(|a, b| a.id.cmp(&b.id).then(a.corners_px[0].x.total_cmp(&b.corners_px[0].x)));
+    found.sort_by(|a, b| {
+        a.id.cmp(&b.id)
+            .then(a.corners_px[0].x.total_cmp(&b.corners_px[0].x))
+    });
     found
 }
 
@@ -65,7 +78,10 @@ pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
             return tags;
         }
     }
-    let floored = |marker: Marker| Marker { sigma_px: marker.sigma_px.max(LEAST_SIGMA_PX), ..marker };
+    let floored = |marker: Marker| Marker {
+        sigma_px: marker.sigma_px.max(LEAST_SIGMA_PX),
+        ..marker
+    };
     find_markers(photo).into_iter().map(floored).collect()
 }
 
@@ -79,12 +95,18 @@ pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
 /// its markers.
 pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
     let Some(map) = &label.markers else {
-        return Err(Error::value("markers", "missing, expected family, size_m and map"));
+        return Err(Error::value(
+            "markers",
+            "missing, expected family, size_m and map",
+        ));
     };
     let (mut found, least_px) = find_family(map, photo)?;
     found.retain(|marker| map.map.contains_key(&marker.id));
     if found.is_empty() {
-        return Err(Error::value("markers", "none of them was found in the photo"));
+        return Err(Error::value(
+            "markers",
+            "none of them was found in the photo",
+        ));
     }
     let turned = |turns| with_points(&label, map, &found, least_px, turns);
     let turns = turns_that_fit(turned);
@@ -104,20 +126,39 @@ fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>
         #[cfg(feature = "markers")]
         april::FAMILY => Ok((april::find(photo, map.artwork), april::CORNER_SIGMA_PX)),
         #[cfg(not(feature = "markers"))]
-        "tag36h11" => {
-            Err(Error::value("markers.family", "\"tag36h11\", but petcomp was built without the feature markers"))
-        }
-        other => Err(Error::value("markers.family", format!("\"{other}\", expected \"{FAMILY}\" or \"tag36h11\""))),
+        "tag36h11" => Err(Error::value(
+            "markers.family",
+            "\"tag36h11\", but petcomp was built without the feature markers",
+        )),
+        other => Err(Error::value(
+            "markers.family",
+            format!("\"{other}\", expected \"{FAMILY}\" or \"tag36h11\""),
+        )),
     }
 }
 
 /// The label with the corners of some markers as points, each marker turned by so many right angles.
-fn with_points(label: &Label, map: &MarkerMap, found: &[Marker], least_px: f64, turns: usize) -> Label {
+fn with_points(
+    label: &Label,
+    map: &MarkerMap,
+    found: &[Marker],
+    least_px: f64,
+    turns: usize,
+) -> Label {
     let mut label = label.clone();
     let half = map.size_m / 2.0;
-    let offset = if label.pixel_origin == PixelOrigin::Center { 0.5 } else { 0.0 };
+    let offset = if label.pixel_origin == PixelOrigin::Center {
+        0.5
+    } else {
+        0.0
+    };
     for (marker, [x, y, z]) in found.iter().filter_map(|m| Some((m, map.map.get(&m.id)?))) {
-        let places = [[x - half, y + half], [x + half, y + half], [x + half, y - half], [x - half, y - half]];
+        let places = [
+            [x - half, y + half],
+            [x + half, y + half],
+            [x + half, y - half],
+            [x - half, y - half],
+        ];
         for (i, [x, y]) in places.into_iter().enumerate() {
             let px = marker.corners_px[(i + turns) % 4];
             label.points.push(LabelPoint {
@@ -134,14 +175,21 @@ fn with_points(label: &Label, map: &MarkerMap, found: &[Marker], least_px: f64, 
 /// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where the
 /// photo does not tell.
 fn turns_that_fit(turned: impl Fn(usize) -> Label) -> usize {
-    let chi2 = |turns| super::solve(&turned(turns), &SolveOptions::default()).map_or(f64::INFINITY, |s| s.fit.chi2);
+    let chi2 = |turns| {
+        super::solve(&turned(turns), &SolveOptions::default()).map_or(f64::INFINITY, |s| s.fit.chi2)
+    };
     let straight = super::solve(&turned(0), &SolveOptions::default()).ok();
-    if straight.as_ref().is_some_and(|s| s.fit.p_value.is_none_or(|p| p >= IMPROBABLE)) {
+    if straight
+        .as_ref()
+        .is_some_and(|s| s.fit.p_value.is_none_or(|p| p >= IMPROBABLE))
+    {
         return 0;
     }
     let straight = straight.map_or(f64::INFINITY, |s| s.fit.chi2);
     let others = (1..4).map(|turns| (turns, chi2(turns)));
-    let best = others.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, chi2)| chi2 + TELLING < straight);
+    let best = others
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .filter(|(_, chi2)| chi2 + TELLING < straight);
     best.map_or(0, |(turns, _)| turns)
 }
 
@@ -156,14 +204,29 @@ mod tests {
 
     /// Marker `id` as printed, with a margin of one cell, `cell` pixels to the cell.
     pub(crate) fn printed(id: u32, cell: usize) -> Image<LinearRgb> {
-        let grey = |x: usize, y: usize| if dictionary::is_white(id, x / cell, y / cell) { 0.8 } else { 0.04 };
-        Image::from_fn(8 * cell, 8 * cell, |x, y| LinearRgb { r: grey(x, y), g: grey(x, y), b: grey(x, y) })
+        let grey = |x: usize, y: usize| {
+            if dictionary::is_white(id, x / cell, y / cell) {
+                0.8
+            } else {
+                0.04
+            }
+        };
+        Image::from_fn(8 * cell, 8 * cell, |x, y| LinearRgb {
+            r: grey(x, y),
+            g: grey(x, y),
+            b: grey(x, y),
+        })
     }
 
     #[test]
     fn printed_markers_are_found_to_a_tenth_of_a_pixel() {
         for (id, tilt) in [(0, 0.0), (7, 20.0), (23, 40.0), (49, 55.0)] {
-            let scenario = Scenario { image: [400, 300], focal_px: 320.0, size: [0.4, 0.4], ..Scenario::default() };
+            let scenario = Scenario {
+                image: [400, 300],
+                focal_px: 320.0,
+                size: [0.4, 0.4],
+                ..Scenario::default()
+            };
             let camera = scenario.tilted(tilt).view(5, u64::from(id)).camera;
             let sheet = Pyramid::new(printed(id, 24));
             let photo = super::super::project_picture(&sheet, &camera, [0.4, 0.4]);
@@ -172,8 +235,15 @@ mod tests {
             let alpha = super::super::project_picture(&alpha, &camera, [0.4, 0.4]);
             let photo = photo.zip_map(&alpha, |p, a| p.add_scaled_grey(0.3 * (1.0 - a.0)));
             let found = find_markers(&photo);
-            assert_eq!(found.iter().map(|m| m.id).collect::<Vec<_>>(), [id], "{tilt}");
-            for (i, [x, y]) in [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]].into_iter().enumerate() {
+            assert_eq!(
+                found.iter().map(|m| m.id).collect::<Vec<_>>(),
+                [id],
+                "{tilt}"
+            );
+            for (i, [x, y]) in [[-0.15, 0.15], [0.15, 0.15], [0.15, -0.15], [-0.15, -0.15]]
+                .into_iter()
+                .enumerate()
+            {
                 let (truth, _) = camera.project([x, y, 0.0].into()).unwrap();
                 let error = (found[0].corners_px[i] - truth).norm();
                 assert!(error < 0.15, "{id} at {tilt}, corner {i}: {error}");
@@ -183,7 +253,13 @@ mod tests {
 
     /// A photo of one marker on a grey table, and its camera.
     fn photo(id: u32, tilt: f64, fill: f64, k: u64) -> (Image<LinearRgb>, crate::Camera) {
-        let scenario = Scenario { image: [320, 240], focal_px: 300.0, size: [0.4, 0.4], fill, ..Scenario::default() };
+        let scenario = Scenario {
+            image: [320, 240],
+            focal_px: 300.0,
+            size: [0.4, 0.4],
+            fill,
+            ..Scenario::default()
+        };
         let camera = scenario.tilted(tilt).view(11, k).camera;
         let sheet = Pyramid::new(printed(id, 16));
         let seen = super::super::project_picture(&sheet, &camera, [0.4, 0.4]);
@@ -201,7 +277,10 @@ mod tests {
             ((seed ^ (seed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40) as f32 / 16_777_216.0
         };
         Image::from_fn(width, photo.height(), |x, y| {
-            let noise = (0..12).map(|i| uniform(12 * (y * width + x) + i)).sum::<f32>() - 6.0;
+            let noise = (0..12)
+                .map(|i| uniform(12 * (y * width + x) + i))
+                .sum::<f32>()
+                - 6.0;
             photo[(x, y)].add_scaled_grey(sigma * noise)
         })
     }
@@ -223,8 +302,16 @@ mod tests {
             for (k, fill) in (0..8).zip([0.9, 0.3].into_iter().cycle()) {
                 let (sharp, camera) = photo(k as u32 * 6, tilt, fill, k);
                 for (blur, all) in [0.0, 0.7, 1.2].into_iter().zip(&mut all) {
-                    let photo = if blur > 0.0 { crate::filter::gaussian_blur(&sharp, blur) } else { sharp.clone() };
-                    all.extend(find_markers(&noisy(&photo, 0.01)).iter().flat_map(|found| ratios(found, &camera)));
+                    let photo = if blur > 0.0 {
+                        crate::filter::gaussian_blur(&sharp, blur)
+                    } else {
+                        sharp.clone()
+                    };
+                    all.extend(
+                        find_markers(&noisy(&photo, 0.01))
+                            .iter()
+                            .flat_map(|found| ratios(found, &camera)),
+                    );
                 }
             }
             for (blur, all) in ["sharp", "soft", "blurred"].into_iter().zip(&all) {
@@ -249,7 +336,11 @@ mod tests {
 
     impl Grey for LinearRgb {
         fn add_scaled_grey(self, grey: f32) -> Self {
-            Self { r: self.r + grey, g: self.g + grey, b: self.b + grey }
+            Self {
+                r: self.r + grey,
+                g: self.g + grey,
+                b: self.b + grey,
+            }
         }
     }
 

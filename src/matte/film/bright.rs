@@ -36,7 +36,9 @@ pub(super) fn make_opaque(
     inside: &Image<Coverage>,
     longer_side: usize,
 ) -> f32 {
-    let bright = factors.zip3_map(photo, plate, |f, p, k| f.raw > PAINTED && !is_screen(p.into(), k.into()));
+    let bright = factors.zip3_map(photo, plate, |f, p, k| {
+        f.raw > PAINTED && !is_screen(p.into(), k.into())
+    });
     let painted = factors.zip_map(&bright, |f, bright| f.coloured || bright);
     if !painted.pixels().iter().any(|p| *p) {
         return 0.0;
@@ -49,7 +51,11 @@ pub(super) fn make_opaque(
         factor.value *= 1.0 - paint;
         factor.sigma = factor.sigma.max(*paint);
     }
-    let of_hue = paint.pixels().iter().zip(bright.pixels()).map(|(paint, bright)| *bright && *paint > 0.5);
+    let of_hue = paint
+        .pixels()
+        .iter()
+        .zip(bright.pixels())
+        .map(|(paint, bright)| *bright && *paint > 0.5);
     share(of_hue, inside)
 }
 
@@ -78,12 +84,22 @@ pub(super) fn fill_glints(
     inside: &Image<Coverage>,
     clipped_at: f32,
 ) -> f32 {
-    let clipped = photo.zip_map(inside, |p, c| c.0 > 0.0 && p.r.max(p.g).max(p.b) >= clipped_at);
-    let hidden = factors.zip_map(&clipped, |f, clipped| if clipped { 1.0 } else { hides(f.reflected) });
+    let clipped = photo.zip_map(inside, |p, c| {
+        c.0 > 0.0 && p.r.max(p.g).max(p.b) >= clipped_at
+    });
+    let hidden = factors.zip_map(
+        &clipped,
+        |f, clipped| if clipped { 1.0 } else { hides(f.reflected) },
+    );
     // Weight and weighted factor ride in one picture: one blur for both.
     let told = hidden.zip_map(inside, |hidden, c| (1.0 - hidden) * c.0);
     let weighted = told.zip_map(factors, |w, f| LinearRgb::new(w, w * f.value, 0.0));
-    let side = inside.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>().sqrt() as f32;
+    let side = inside
+        .pixels()
+        .iter()
+        .map(|c| f64::from(c.0))
+        .sum::<f64>()
+        .sqrt() as f32;
     // Half the size is enough for what is smooth.
     let around = filter::gaussian_blur(&filter::halve(&weighted), (FILL * side).max(FILL_PX) / 2.0);
     factors.par_rows_mut().enumerate().for_each(|(y, row)| {
@@ -99,7 +115,11 @@ pub(super) fn fill_glints(
 
 fn fill(factor: &mut Factor, hidden: f32, around: f32) {
     let more = around - factor.value;
-    factor.value += if hidden < 1.0 { hidden * more.max(0.0) } else { more };
+    factor.value += if hidden < 1.0 {
+        hidden * more.max(0.0)
+    } else {
+        more
+    };
     factor.sigma = factor.sigma.max(hidden * FILLED_SIGMA);
 }
 
@@ -114,6 +134,14 @@ const FILLED_SIGMA: f32 = 0.35;
 /// The share of the object that a set of pixels has.
 pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
     let object: f64 = inside.pixels().iter().map(|c| f64::from(c.0)).sum();
-    let chosen: f64 = set.zip(inside.pixels()).filter(|(set, _)| *set).map(|(_, c)| f64::from(c.0)).sum();
-    if object > 0.0 { (chosen / object) as f32 } else { 0.0 }
+    let chosen: f64 = set
+        .zip(inside.pixels())
+        .filter(|(set, _)| *set)
+        .map(|(_, c)| f64::from(c.0))
+        .sum();
+    if object > 0.0 {
+        (chosen / object) as f32
+    } else {
+        0.0
+    }
 }

@@ -29,16 +29,29 @@ impl ColorDoubts {
     /// cap, a label or their tint to the screen; the most of the others is 0.0022, one of which had lost some, too. The tint
     /// of 9 of 10 bottles of the screen's own hue is less sure, that of no other by more than 0.024. Hue: caps and labels (a
     /// fifth of a bottle) are taken for opaque, which they are; where more has it, it is the plastic itself.
-    pub const LOOK: Self = Self { keyed_away: 0.005, screen_hue: 0.25, clipped: 0.3, guessed: 0.5, tint: 0.04 };
+    pub const LOOK: Self = Self {
+        keyed_away: 0.005,
+        screen_hue: 0.25,
+        clipped: 0.3,
+        guessed: 0.5,
+        tint: 0.04,
+    };
 
     /// How far colour and transmittance can be believed, 0 to 1: 0.5 where one doubt reaches [`LOOK`](Self::LOOK).
     pub fn confidence(self) -> f64 {
         let all = self.causes().into_iter().zip(Self::LOOK.causes());
-        all.map(|(doubt, look)| f64::from(look) / (f64::from(look) + f64::from(doubt))).product()
+        all.map(|(doubt, look)| f64::from(look) / (f64::from(look) + f64::from(doubt)))
+            .product()
     }
 
     fn causes(self) -> [f32; 5] {
-        [self.keyed_away, self.screen_hue, self.clipped, self.guessed, self.tint]
+        [
+            self.keyed_away,
+            self.screen_hue,
+            self.clipped,
+            self.guessed,
+            self.tint,
+        ]
     }
 
     /// What a person should know.
@@ -63,24 +76,48 @@ const BARE: f32 = 0.85;
 
 /// The share of the object that looks like bare screen, away from its rim, and was left see-through. `flat` is what flat
 /// plastic passes in the screen's channel, `longer_side` that of the whole photo, pixels.
-pub(super) fn keyed_away(factors: &Image<Factor>, inside: &Image<Coverage>, flat: f32, longer_side: usize) -> f32 {
+pub(super) fn keyed_away(
+    factors: &Image<Factor>,
+    inside: &Image<Coverage>,
+    flat: f32,
+    longer_side: usize,
+) -> f32 {
     let bare = factors.map(|f| f.value * flat > BARE);
     if !bare.pixels().contains(&true) {
         return 0.0;
     }
     let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px(longer_side));
-    share(bare.pixels().iter().zip(interior.pixels()).map(|(bare, interior)| *bare && *interior), inside)
+    share(
+        bare.pixels()
+            .iter()
+            .zip(interior.pixels())
+            .map(|(bare, interior)| *bare && *interior),
+        inside,
+    )
 }
 
 /// How much of the transmittance is the prior's, mean over the object: nothing of it where there is paint. `spread` is the deviation of the prior, `flat` the
 /// most that flat plastic passes.
-pub(super) fn guessed(factors: &Image<Factor>, inside: &Image<Coverage>, spread: f32, flat: f32) -> f32 {
+pub(super) fn guessed(
+    factors: &Image<Factor>,
+    inside: &Image<Coverage>,
+    spread: f32,
+    flat: f32,
+) -> f32 {
     let weighted = factors.pixels().iter().zip(inside.pixels());
     let (sum, area) = weighted.fold((0.0, 0.0), |(sum, area), (f, c)| {
-        let prior = if f.coloured { 0.0 } else { f64::from((f.sigma / spread).min(1.0)) };
+        let prior = if f.coloured {
+            0.0
+        } else {
+            f64::from((f.sigma / spread).min(1.0))
+        };
         (sum + f64::from(c.0) * prior * prior, area + f64::from(c.0))
     });
-    if area > 0.0 { flat * (sum / area) as f32 } else { 0.0 }
+    if area > 0.0 {
+        flat * (sum / area) as f32
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]
@@ -90,20 +127,60 @@ mod tests {
     #[test]
     fn a_doubt_that_is_worth_a_look_halves_the_confidence() {
         assert_eq!(ColorDoubts::default().confidence(), 1.0);
-        let tint = ColorDoubts { tint: ColorDoubts::LOOK.tint, ..ColorDoubts::default() };
+        let tint = ColorDoubts {
+            tint: ColorDoubts::LOOK.tint,
+            ..ColorDoubts::default()
+        };
         assert!((tint.confidence() - 0.5).abs() < 1e-6);
-        let both = ColorDoubts { keyed_away: 0.1, ..tint };
-        assert!(both.confidence() < 0.1 && ColorDoubts { guessed: 0.56, ..both }.confidence() < 0.05);
+        let both = ColorDoubts {
+            keyed_away: 0.1,
+            ..tint
+        };
+        assert!(
+            both.confidence() < 0.1
+                && ColorDoubts {
+                    guessed: 0.56,
+                    ..both
+                }
+                .confidence()
+                    < 0.05
+        );
     }
 
     #[test]
     fn what_was_keyed_away_is_not_said_to_be_opaque() {
-        let said = |doubts: ColorDoubts| doubts.remarks().iter().map(ToString::to_string).collect::<Vec<_>>();
-        let keyed = said(ColorDoubts { keyed_away: 0.1, ..ColorDoubts::default() });
-        assert!(matches!(&keyed[..], [one] if one.contains("keyed away") && !one.contains("opaque")), "{keyed:?}");
-        let painted = said(ColorDoubts { screen_hue: 0.1, ..ColorDoubts::default() });
-        assert!(matches!(&painted[..], [one] if one.contains("taken for opaque")), "{painted:?}");
-        let tint = ColorDoubts { tint: 0.1, ..ColorDoubts::default() }.remarks();
-        assert!(matches!(tint[..], [Remark::TintUnsure(_)]) && tint[0].is_doubt() && tint[0].is_about_color());
+        let said = |doubts: ColorDoubts| {
+            doubts
+                .remarks()
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+        };
+        let keyed = said(ColorDoubts {
+            keyed_away: 0.1,
+            ..ColorDoubts::default()
+        });
+        assert!(
+            matches!(&keyed[..], [one] if one.contains("keyed away") && !one.contains("opaque")),
+            "{keyed:?}"
+        );
+        let painted = said(ColorDoubts {
+            screen_hue: 0.1,
+            ..ColorDoubts::default()
+        });
+        assert!(
+            matches!(&painted[..], [one] if one.contains("taken for opaque")),
+            "{painted:?}"
+        );
+        let tint = ColorDoubts {
+            tint: 0.1,
+            ..ColorDoubts::default()
+        }
+        .remarks();
+        assert!(
+            matches!(tint[..], [Remark::TintUnsure(_)])
+                && tint[0].is_doubt()
+                && tint[0].is_about_color()
+        );
     }
 }

@@ -69,7 +69,9 @@ impl Solver {
 
     /// The factor on a screen with a hue.
     pub(super) fn solve(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
-        self.drawn(pixel, screen, |reflected, _| self.expected(pixel, reflected))
+        self.drawn(pixel, screen, |reflected, _| {
+            self.expected(pixel, reflected)
+        })
     }
 
     /// The factor on a screen that has too little hue to tell much: that of flat plastic unless more light is left than
@@ -77,12 +79,23 @@ impl Solver {
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
         let left = |through: [f32; 3]| (0..3).map(|c| pixel[c] - through[c]).fold(0.0, f32::max);
         let factor = self.drawn(pixel, screen, |_, through| plastic(left(through)));
-        Factor { raw: factor.value, sigma: factor.sigma / self.spread, ..factor }
+        Factor {
+            raw: factor.value,
+            sigma: factor.sigma / self.spread,
+            ..factor
+        }
     }
 
     /// What the photo says, drawn to what is expected from the reflected light, or from the screen behind flat plastic.
-    fn drawn(&self, pixel: [f32; 3], screen: [f32; 3], expected: impl Fn(f32, [f32; 3]) -> f32) -> Factor {
-        let mixed = |of: [f32; 3]| self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]];
+    fn drawn(
+        &self,
+        pixel: [f32; 3],
+        screen: [f32; 3],
+        expected: impl Fn(f32, [f32; 3]) -> f32,
+    ) -> Factor {
+        let mixed = |of: [f32; 3]| {
+            self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]]
+        };
         let through: [f32; 3] = std::array::from_fn(|c| self.flat[c] * screen[c]);
         let reflected = mixed(pixel).max(0.0);
         let gain = (through[self.key] - mixed(through)).max(LEAST_GAIN);
@@ -92,7 +105,9 @@ impl Solver {
         let prior = self.spread * self.spread;
         let drawn = (raw * prior + expected(reflected, through) * variance) / (prior + variance);
         // Nothing reflects less than no light: no channel shows more screen than light.
-        let bound = (0..3).map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE)).fold(f32::MAX, f32::min);
+        let bound = (0..3)
+            .map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE))
+            .fold(f32::MAX, f32::min);
         let most = 1.0 / self.flat.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         let value = drawn.min(bound).clamp(0.0, most);
         let [a, b] = self.others.map(|c| pixel[c] - value * through[c]);
@@ -107,14 +122,20 @@ impl Solver {
 
     /// Plastic reflects neutrally, scatters in its own tint, or both: what lies beyond is paint.
     fn is_coloured(&self, a: f32, b: f32) -> bool {
-        let [least, most] = if self.cast < 1.0 { [self.cast * a, a] } else { [a, self.cast * a] };
+        let [least, most] = if self.cast < 1.0 {
+            [self.cast * a, a]
+        } else {
+            [a, self.cast * a]
+        };
         let beyond = (least - b).max(b - most);
         beyond > COLOURED_LEAST + COLOURED * a.abs().max(b.abs())
     }
 
     /// The factor of a pixel of which nothing but its brightness is known: plastic, or paint.
     fn expected(&self, pixel: [f32; 3], reflected: f32) -> f32 {
-        let brightest = pixel[self.others[0]].max(pixel[self.others[1]]).max(reflected);
+        let brightest = pixel[self.others[0]]
+            .max(pixel[self.others[1]])
+            .max(reflected);
         plastic(brightest)
     }
 }
@@ -129,7 +150,8 @@ fn plastic(brightest: f32) -> f32 {
 fn shares(key: usize, [a, b]: [usize; 2], body: [f32; 3]) -> [f32; 2] {
     let soft = TELLING * body.iter().copied().fold(0.0, f32::max);
     let differ = body[a] - body[b];
-    let share = (differ * (body[key] - body[b]) + 0.5 * soft * soft) / (differ * differ + soft * soft);
+    let share =
+        (differ * (body[key] - body[b]) + 0.5 * soft * soft) / (differ * differ + soft * soft);
     let share = share.clamp(0.0, 1.0);
     [share, 1.0 - share]
 }
@@ -141,7 +163,12 @@ mod tests {
     const GREEN: [f32; 3] = [0.045, 0.42, 0.085];
 
     fn clear() -> Solver {
-        Solver::new(1, [CLEAR; 3], LinearRgb::grey(0.001), &FilmOptions::default())
+        Solver::new(
+            1,
+            [CLEAR; 3],
+            LinearRgb::grey(0.001),
+            &FilmOptions::default(),
+        )
     }
 
     #[test]
@@ -149,7 +176,10 @@ mod tests {
         for (u, glint) in [(1.0, 0.0), (0.8, 0.1), (0.3, 0.05), (1.2, 0.12)] {
             let pixel = GREEN.map(|k| u * CLEAR * k + glint);
             let found = clear().solve(pixel, GREEN);
-            assert!((found.value - u).abs() < 0.02, "{found:?} for {u} and {glint}");
+            assert!(
+                (found.value - u).abs() < 0.02,
+                "{found:?} for {u} and {glint}"
+            );
         }
     }
 
@@ -171,9 +201,20 @@ mod tests {
 
     #[test]
     fn what_the_photo_does_not_tell_is_uncertain() {
-        let dark = Solver::new(2, [0.01, 0.2, 0.02], LinearRgb::grey(0.002), &FilmOptions::default());
+        let dark = Solver::new(
+            2,
+            [0.01, 0.2, 0.02],
+            LinearRgb::grey(0.002),
+            &FilmOptions::default(),
+        );
         let screen = [0.03, 0.09, 0.5];
-        let (sure, unsure) = (clear().solve([0.05, 0.25, 0.07], GREEN), dark.solve([0.1, 0.12, 0.11], screen));
-        assert!(sure.sigma < 0.05 && unsure.sigma > 0.2, "{sure:?} {unsure:?}");
+        let (sure, unsure) = (
+            clear().solve([0.05, 0.25, 0.07], GREEN),
+            dark.solve([0.1, 0.12, 0.11], screen),
+        );
+        assert!(
+            sure.sigma < 0.05 && unsure.sigma > 0.2,
+            "{sure:?} {unsure:?}"
+        );
     }
 }

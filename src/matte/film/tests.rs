@@ -11,7 +11,9 @@ const BLUE: LinearRgb = LinearRgb::new(0.03, 0.095, 0.52);
 const CLEAR: LinearRgb = LinearRgb::grey(0.55);
 
 fn inside() -> Image<Coverage> {
-    Image::from_fn(SIZE.0, SIZE.1, |x, y| Coverage(f32::from(u8::from(is_inside(x, y)))))
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        Coverage(f32::from(u8::from(is_inside(x, y))))
+    })
 }
 
 fn is_inside(x: usize, y: usize) -> bool {
@@ -36,7 +38,14 @@ struct World {
 
 impl Default for World {
     fn default() -> Self {
-        Self { flat: CLEAR, label: LinearRgb::grey(0.5), glint: 0.15, screen: GREEN, uneven: 0.15, noise: 0.003 }
+        Self {
+            flat: CLEAR,
+            label: LinearRgb::grey(0.5),
+            glint: 0.15,
+            screen: GREEN,
+            uneven: 0.15,
+            noise: 0.003,
+        }
     }
 }
 
@@ -67,7 +76,10 @@ impl World {
             let (f, t) = self.truth(x, y);
             f + t * self.plate(x, y)
         });
-        photo.pixels_mut().iter_mut().for_each(|p| *p = p.map(|v| (v + grain()).clamp(0.0, 1.0)));
+        photo
+            .pixels_mut()
+            .iter_mut()
+            .for_each(|p| *p = p.map(|v| (v + grain()).clamp(0.0, 1.0)));
         photo
     }
 
@@ -86,9 +98,15 @@ impl World {
         for y in 0..SIZE.1 {
             for x in (0..SIZE.0).filter(|&x| is_inside(x, y) && of(x)) {
                 let (f, t) = self.truth(x, y);
-                let (told, real): ([f32; 3], [f32; 3]) =
-                    (shaded[(x, y)].over_color(behind).into(), (f + t * behind).into());
-                sum += told.iter().zip(real).map(|(a, b)| (a - b).abs()).sum::<f32>();
+                let (told, real): ([f32; 3], [f32; 3]) = (
+                    shaded[(x, y)].over_color(behind).into(),
+                    (f + t * behind).into(),
+                );
+                sum += told
+                    .iter()
+                    .zip(real)
+                    .map(|(a, b)| (a - b).abs())
+                    .sum::<f32>();
                 count += 3.0;
             }
         }
@@ -99,18 +117,36 @@ impl World {
 #[test]
 fn clear_plastic_and_a_white_label_are_recomposited() {
     for screen in [GREEN, BLUE] {
-        let world = World { screen, ..World::default() };
+        let world = World {
+            screen,
+            ..World::default()
+        };
         let found = world.solved();
-        let (film, label) = (world.error(&found, |x| !is_label(x)), world.error(&found, is_label));
+        let (film, label) = (
+            world.error(&found, |x| !is_label(x)),
+            world.error(&found, is_label),
+        );
         assert!(film < 0.012 && label < 0.012, "{film} {label}");
-        assert!((found.flat.r - CLEAR.r).abs() < 0.02 && found.remarks.is_empty(), "{:?}", found.remarks);
+        assert!(
+            (found.flat.r - CLEAR.r).abs() < 0.02 && found.remarks.is_empty(),
+            "{:?}",
+            found.remarks
+        );
     }
 }
 
 #[test]
 fn tinted_plastic_keeps_its_tint() {
-    for (flat, screen) in [([0.17, 0.38, 0.54], GREEN), ([0.05, 0.3, 0.09], BLUE), ([0.17, 0.05, 0.015], GREEN)] {
-        let world = World { flat: flat.into(), screen, ..World::default() };
+    for (flat, screen) in [
+        ([0.17, 0.38, 0.54], GREEN),
+        ([0.05, 0.3, 0.09], BLUE),
+        ([0.17, 0.05, 0.015], GREEN),
+    ] {
+        let world = World {
+            flat: flat.into(),
+            screen,
+            ..World::default()
+        };
         let found = world.solved();
         let error = world.error(&found, |x| !is_label(x));
         assert!(error < 0.03, "{error} for {flat:?}");
@@ -119,11 +155,17 @@ fn tinted_plastic_keeps_its_tint() {
 
 #[test]
 fn nothing_of_the_screen_is_left_in_the_reflected_light() {
-    let found = World { noise: 0.0, ..World::default() }.solved();
-    let casts = (0..SIZE.0).filter(|&x| inside()[(x, 60)].0 > 0.5 && !is_label(x)).map(|x| {
-        let f = found.film[(x, 60)].color;
-        f.g - 0.5 * (f.r + f.b)
-    });
+    let found = World {
+        noise: 0.0,
+        ..World::default()
+    }
+    .solved();
+    let casts = (0..SIZE.0)
+        .filter(|&x| inside()[(x, 60)].0 > 0.5 && !is_label(x))
+        .map(|x| {
+            let f = found.film[(x, 60)].color;
+            f.g - 0.5 * (f.r + f.b)
+        });
     let worst = casts.fold(0.0, f32::max);
     assert!(worst < 0.005, "green cast of {worst}");
 }
@@ -131,7 +173,11 @@ fn nothing_of_the_screen_is_left_in_the_reflected_light() {
 #[test]
 fn outside_there_is_nothing_even_where_the_screen_is_uneven() {
     for uneven in [0.15, 0.6] {
-        let found = World { uneven, ..World::default() }.solved();
+        let found = World {
+            uneven,
+            ..World::default()
+        }
+        .solved();
         let outside = found
             .film
             .pixels()
@@ -148,8 +194,19 @@ fn outside_there_is_nothing_even_where_the_screen_is_uneven() {
 fn bare_screen_within_a_mask_that_is_too_wide_is_nearly_nothing() {
     let world = World::default();
     let photo = world.photo();
-    let plate = ScreenPlate::fit(&photo, &inside().map(|c| c.0 == 0.0), &PlateOptions::default()).unwrap();
-    let found = film(&photo, &plate, &Image::filled(SIZE.0, SIZE.1, Coverage(1.0)), &FilmOptions::default()).unwrap();
+    let plate = ScreenPlate::fit(
+        &photo,
+        &inside().map(|c| c.0 == 0.0),
+        &PlateOptions::default(),
+    )
+    .unwrap();
+    let found = film(
+        &photo,
+        &plate,
+        &Image::filled(SIZE.0, SIZE.1, Coverage(1.0)),
+        &FilmOptions::default(),
+    )
+    .unwrap();
     let outside = inside()
         .pixels()
         .iter()
@@ -165,7 +222,10 @@ fn bare_screen_within_a_mask_that_is_too_wide_is_nearly_nothing() {
 #[test]
 fn a_screen_uneven_by_60_percent_costs_little() {
     let error = |uneven| {
-        let world = World { uneven, ..World::default() };
+        let world = World {
+            uneven,
+            ..World::default()
+        };
         world.error(&world.solved(), |_| true)
     };
     let (even, uneven) = (error(0.0), error(0.6));
@@ -174,7 +234,10 @@ fn a_screen_uneven_by_60_percent_costs_little() {
 
 #[test]
 fn noise_of_3_percent_is_survived_and_told() {
-    let world = World { noise: 0.03, ..World::default() };
+    let world = World {
+        noise: 0.03,
+        ..World::default()
+    };
     let found = world.solved();
     let error = world.error(&found, |_| true);
     assert!(error < 0.045, "{error}");
@@ -184,45 +247,80 @@ fn noise_of_3_percent_is_survived_and_told() {
 
 #[test]
 fn clipped_glints_do_not_turn_plastic_opaque() {
-    let world = World { glint: 3.0, ..World::default() };
+    let world = World {
+        glint: 3.0,
+        ..World::default()
+    };
     let photo = world.photo();
     let found = world.solved();
-    let clipped = (0..photo.pixels().len()).filter(|&i| photo.pixels()[i].g >= 1.0 && !is_label(i % SIZE.0));
-    let opaque = clipped.clone().filter(|&i| found.transmittance.pixels()[i].g < 0.2).count();
+    let clipped =
+        (0..photo.pixels().len()).filter(|&i| photo.pixels()[i].g >= 1.0 && !is_label(i % SIZE.0));
+    let opaque = clipped
+        .clone()
+        .filter(|&i| found.transmittance.pixels()[i].g < 0.2)
+        .count();
     assert!(opaque * 5 < clipped.count(), "{opaque}");
 }
 
 #[test]
 fn a_label_of_the_screens_hue_is_opaque_and_said() {
-    let world = World { label: LinearRgb::new(0.15, 0.6, 0.2), ..World::default() };
+    let world = World {
+        label: LinearRgb::new(0.15, 0.6, 0.2),
+        ..World::default()
+    };
     let found = world.solved();
     assert!(world.error(&found, is_label) < 0.08);
-    assert!(found.remarks.iter().any(|r| matches!(r, Remark::ScreenHue(share) if *share > 0.1)), "{:?}", found.remarks);
+    assert!(
+        found
+            .remarks
+            .iter()
+            .any(|r| matches!(r, Remark::ScreenHue(share) if *share > 0.1)),
+        "{:?}",
+        found.remarks
+    );
 }
 
 #[test]
 fn a_label_of_a_hue_beside_the_screens_is_opaque() {
     // Lime on green, sky on blue: as bright in the screen's channel as the screen through plastic.
     for (label, screen) in [([0.3, 0.4, 0.04], GREEN), ([0.04, 0.25, 0.45], BLUE)] {
-        let world = World { label: label.into(), screen, ..World::default() };
+        let world = World {
+            label: label.into(),
+            screen,
+            ..World::default()
+        };
         let found = world.solved();
         // Seen through it would be 0.2; what is left are its edges, 3 of 30 columns.
         let error = world.error(&found, is_label);
         assert!(error < 0.03, "{error}");
-        assert!(found.film[(95, 60)].opacity.g > 0.98 && found.remarks.is_empty(), "{:?}", found.remarks);
+        assert!(
+            found.film[(95, 60)].opacity.g > 0.98 && found.remarks.is_empty(),
+            "{:?}",
+            found.remarks
+        );
     }
 }
 
 #[test]
 fn dyed_plastic_is_seen_through_under_a_glint_as_beside_it() {
     let flat = LinearRgb::new(0.17, 0.38, 0.54);
-    let world = World { flat, glint: 0.0, noise: 0.0, ..World::default() };
+    let world = World {
+        flat,
+        glint: 0.0,
+        noise: 0.0,
+        ..World::default()
+    };
     let (glint, plain) = ((50, 60), world.solved());
     let mut photo = world.photo();
     for y in 58..=62 {
         (48..=52).for_each(|x| photo[(x, y)] = photo[(x, y)] + LinearRgb::grey(0.7));
     }
-    let plate = ScreenPlate::fit(&photo, &inside().map(|c| c.0 == 0.0), &PlateOptions::default()).unwrap();
+    let plate = ScreenPlate::fit(
+        &photo,
+        &inside().map(|c| c.0 == 0.0),
+        &PlateOptions::default(),
+    )
+    .unwrap();
     let found = film(&photo, &plate, &inside(), &FilmOptions::default()).unwrap();
     let off = found.film[glint].opacity.g - plain.film[glint].opacity.g;
     assert!(off.abs() < 0.1 && found.film[glint].color.g > 0.6, "{off}");
@@ -230,47 +328,130 @@ fn dyed_plastic_is_seen_through_under_a_glint_as_beside_it() {
 
 #[test]
 fn on_a_board_without_a_hue_film_is_guessed_and_said_and_better_than_a_slab_or_the_keyer() {
-    for board in [0.15, 0.3, 0.7].map(LinearRgb::grey).into_iter().chain([LinearRgb::new(0.7, 0.62, 0.55)]) {
-        let world = World { screen: board, ..World::default() };
+    for board in [0.15, 0.3, 0.7]
+        .map(LinearRgb::grey)
+        .into_iter()
+        .chain([LinearRgb::new(0.7, 0.62, 0.55)])
+    {
+        let world = World {
+            screen: board,
+            ..World::default()
+        };
         let (photo, found) = (world.photo(), world.solved());
-        assert!(matches!(found.remarks[..], [Remark::GreyScreen(_)]), "{:?}", found.remarks);
-        assert!(found.uncertainty[(50, 60)].0 > 0.1 && found.doubts.confidence() < 0.7, "{:?}", found.doubts);
+        assert!(
+            matches!(found.remarks[..], [Remark::GreyScreen(_)]),
+            "{:?}",
+            found.remarks
+        );
+        assert!(
+            found.uncertainty[(50, 60)].0 > 0.1 && found.doubts.confidence() < 0.7,
+            "{:?}",
+            found.doubts
+        );
         let cut = |cutout: Image<PremulRgba>| {
             let film: Image<Film> = cutout.zip_map(&inside(), |p, m| p.masked(m).into());
-            FilmMatte { transmittance: film.map(|f| f.opacity.map(|o| 1.0 - o)), film, ..found.clone() }
+            FilmMatte {
+                transmittance: film.map(|f| f.opacity.map(|o| 1.0 - o)),
+                film,
+                ..found.clone()
+            }
         };
         let key = Screen::Color(screen_color(&photo, &inside()).unwrap());
-        let paper = cut(Keying::new(&photo, key).run(&KeyOptions::default()).unwrap().cutout);
+        let paper = cut(Keying::new(&photo, key)
+            .run(&KeyOptions::default())
+            .unwrap()
+            .cutout);
         let slab = cut(photo.map(LinearRgb::opaque));
         let [guess, paper, slab] = [&found, &paper, &slab].map(|of| world.error(of, |_| true));
-        assert!(guess < 0.75 * paper && guess < 0.75 * slab, "{board:?}: {guess}, keyer {paper}, slab {slab}");
+        assert!(
+            guess < 0.75 * paper && guess < 0.75 * slab,
+            "{board:?}: {guess}, keyer {paper}, slab {slab}"
+        );
         // Paint no brighter than the board through plastic is taken for plastic.
-        assert!(board.r > 0.5 || world.error(&found, is_label) < 0.1, "{board:?}");
+        assert!(
+            board.r > 0.5 || world.error(&found, is_label) < 0.1,
+            "{board:?}"
+        );
     }
 }
 
 #[test]
 fn awkward_input_is_named_not_a_panic() {
-    let (photo, plate) = (Image::filled(20, 20, GREEN), ScreenPlate::even(GREEN, (20, 20)));
+    let (photo, plate) = (
+        Image::filled(20, 20, GREEN),
+        ScreenPlate::even(GREEN, (20, 20)),
+    );
     let empty = film(&photo, &plate, &Image::new(20, 20), &FilmOptions::default()).unwrap_err();
-    assert!(empty.to_string().contains("the mask of the object is empty"));
-    let wrong = FilmOptions { thickness_spread: 0.0, ..FilmOptions::default() };
-    let said = film(&photo, &plate, &Image::filled(20, 20, Coverage(1.0)), &wrong).unwrap_err().to_string();
+    assert!(
+        empty
+            .to_string()
+            .contains("the mask of the object is empty")
+    );
+    let wrong = FilmOptions {
+        thickness_spread: 0.0,
+        ..FilmOptions::default()
+    };
+    let said = film(
+        &photo,
+        &plate,
+        &Image::filled(20, 20, Coverage(1.0)),
+        &wrong,
+    )
+    .unwrap_err()
+    .to_string();
     assert_eq!(said, "thickness_spread: 0, expected more than 0");
     let strange = Image::filled(20, 20, LinearRgb::new(f32::NAN, 0.5, 0.5));
-    let refused = film(&strange, &plate, &Image::filled(20, 20, Coverage(1.0)), &FilmOptions::default()).unwrap_err();
-    assert!(refused.to_string().contains("pixel (0, 0) is not a finite number"));
+    let refused = film(
+        &strange,
+        &plate,
+        &Image::filled(20, 20, Coverage(1.0)),
+        &FilmOptions::default(),
+    )
+    .unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .contains("pixel (0, 0) is not a finite number")
+    );
 }
 
 #[test]
 fn a_label_of_the_screens_colour_is_keyed_away_and_that_is_said() {
     for screen in [GREEN, BLUE] {
-        let plain = World { screen, uneven: 0.0, ..World::default() };
-        let painted = World { label: screen, ..World { screen, uneven: 0.0, ..World::default() } };
+        let plain = World {
+            screen,
+            uneven: 0.0,
+            ..World::default()
+        };
+        let painted = World {
+            label: screen,
+            ..World {
+                screen,
+                uneven: 0.0,
+                ..World::default()
+            }
+        };
         let [plain, painted] = [plain.solved(), painted.solved()];
-        let keyed = |found: &FilmMatte| found.remarks.iter().any(|r| matches!(r, Remark::KeyedAway(_)) && r.is_doubt());
-        assert!(keyed(&painted) && !keyed(&plain), "{:?} {:?}", painted.remarks, plain.remarks);
-        assert!(!painted.remarks.iter().any(|r| matches!(r, Remark::ScreenHue(_))), "{:?}", painted.remarks);
+        let keyed = |found: &FilmMatte| {
+            found
+                .remarks
+                .iter()
+                .any(|r| matches!(r, Remark::KeyedAway(_)) && r.is_doubt())
+        };
+        assert!(
+            keyed(&painted) && !keyed(&plain),
+            "{:?} {:?}",
+            painted.remarks,
+            plain.remarks
+        );
+        assert!(
+            !painted
+                .remarks
+                .iter()
+                .any(|r| matches!(r, Remark::ScreenHue(_))),
+            "{:?}",
+            painted.remarks
+        );
         let sure = [plain.doubts.confidence(), painted.doubts.confidence()];
         assert!(sure[0] > 0.7 && sure[1] < 0.2, "{sure:?}");
     }

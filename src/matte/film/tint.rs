@@ -61,11 +61,25 @@ pub(super) fn fit(
 ) -> ([f32; 3], f32) {
     let pixels = darkest(photo, plate, inside, key, asked);
     let clear = judged([CLEAR; 3], &pixels, 0.0);
-    let tints = dyed().filter(|flat| flat[key] >= LEAST).map(|flat| judged(flat, &pixels, DYED));
+    let tints = dyed()
+        .filter(|flat| flat[key] >= LEAST)
+        .map(|flat| judged(flat, &pixels, DYED));
     let tints: Vec<Tint> = std::iter::once(clear).chain(tints).collect();
-    let best = tints.iter().fold(clear, |best, tint| if tint.misfit < best.misfit { *tint } else { best });
-    let alike = tints.iter().filter(|tint| tint.misfit <= best.misfit + ALIKE);
-    let differs = |tint: &Tint| (0..3).map(|c| (tint.flat[c] - best.flat[c]).abs()).fold(0.0, f32::max);
+    let best = tints.iter().fold(clear, |best, tint| {
+        if tint.misfit < best.misfit {
+            *tint
+        } else {
+            best
+        }
+    });
+    let alike = tints
+        .iter()
+        .filter(|tint| tint.misfit <= best.misfit + ALIKE);
+    let differs = |tint: &Tint| {
+        (0..3)
+            .map(|c| (tint.flat[c] - best.flat[c]).abs())
+            .fold(0.0, f32::max)
+    };
     (best.flat, alike.map(differs).fold(0.0, f32::max))
 }
 
@@ -101,7 +115,11 @@ fn darkest(
         let p: [f32; 3] = photo.pixels()[i].into();
         p[(key + 1) % 3] + p[(key + 2) % 3]
     };
-    let mut asked: Vec<(f32, usize)> = whole.into_iter().step_by(step).map(|i| (others(i), i)).collect();
+    let mut asked: Vec<(f32, usize)> = whole
+        .into_iter()
+        .step_by(step)
+        .map(|i| (others(i), i))
+        .collect();
     asked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     asked.truncate((asked.len() as f64 * share).ceil() as usize);
     let step = (asked.len() / ASKED[1]).max(1);
@@ -114,10 +132,16 @@ pub(in crate::matte) const WHOLE: f32 = 0.99;
 
 fn judged(flat: [f32; 3], pixels: &[Pair], handicap: f32) -> Tint {
     let scattered = body(flat);
-    let fits: Vec<(f32, f32)> = pixels.iter().map(|pixel| explained(pixel, flat, scattered)).collect();
+    let fits: Vec<(f32, f32)> = pixels
+        .iter()
+        .map(|pixel| explained(pixel, flat, scattered))
+        .collect();
     let misfit = median(fits.iter().map(|fit| fit.0));
     let thickness = median(fits.iter().map(|fit| fit.1));
-    Tint { flat, misfit: misfit + THICKNESS * (thickness - 1.0).powi(2) + handicap }
+    Tint {
+        flat,
+        misfit: misfit + THICKNESS * (thickness - 1.0).powi(2) + handicap,
+    }
 }
 
 /// Squared misfit of a pixel and its thickness factor, by least squares with neither coefficient negative.
@@ -127,13 +151,19 @@ fn explained((pixel, screen): &Pair, flat: [f32; 3], scattered: [f32; 3]) -> (f3
     let body: [f32; 3] = std::array::from_fn(|c| scattered[c] / noise[c]);
     let seen: [f32; 3] = std::array::from_fn(|c| pixel[c] / noise[c]);
     let dot = |a: &[f32; 3], b: &[f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (aa, bb, ab) = (dot(&through, &through), dot(&body, &body), dot(&through, &body));
+    let (aa, bb, ab) = (
+        dot(&through, &through),
+        dot(&body, &body),
+        dot(&through, &body),
+    );
     let (sa, sb) = (dot(&seen, &through), dot(&seen, &body));
     let determinant = (aa * bb - ab * ab).max(f32::MIN_POSITIVE);
     let u = ((sa * bb - sb * ab) / determinant).clamp(0.0, THICKEST);
     let f = ((sb - u * ab) / bb.max(f32::MIN_POSITIVE)).max(0.0);
     let u = ((sa - f * ab) / aa.max(f32::MIN_POSITIVE)).clamp(0.0, THICKEST);
-    let misfit: f32 = (0..3).map(|c| (seen[c] - u * through[c] - f * body[c]).powi(2)).sum();
+    let misfit: f32 = (0..3)
+        .map(|c| (seen[c] - u * through[c] - f * body[c]).powi(2))
+        .sum();
     (misfit.min(OUTLIER), u)
 }
 
@@ -143,7 +173,11 @@ const THICKEST: f32 = 1.3;
 fn median(values: impl Iterator<Item = f32>) -> f32 {
     let mut values: Vec<f32> = values.collect();
     let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    if values.is_empty() {
+        0.0
+    } else {
+        *values.select_nth_unstable_by(middle, f32::total_cmp).1
+    }
 }
 
 #[cfg(test)]
@@ -165,7 +199,14 @@ mod tests {
 
     fn found(flat: [f32; 3], screen: LinearRgb, key: usize) -> [f32; 3] {
         let plate = ScreenPlate::even(screen, (60, 40));
-        fit(&photo(flat, screen), &plate, &Image::filled(60, 40, Coverage(1.0)), key, DARKEST).0
+        fit(
+            &photo(flat, screen),
+            &plate,
+            &Image::filled(60, 40, Coverage(1.0)),
+            key,
+            DARKEST,
+        )
+        .0
     }
 
     #[test]
@@ -178,7 +219,14 @@ mod tests {
     fn the_tint_of_plastic_of_the_screens_hue_is_unsure_and_known_to_be() {
         let unsure = |flat: [f32; 3], screen, key| {
             let plate = ScreenPlate::even(screen, (60, 40));
-            fit(&photo(flat, screen), &plate, &Image::filled(60, 40, Coverage(1.0)), key, DARKEST).1
+            fit(
+                &photo(flat, screen),
+                &plate,
+                &Image::filled(60, 40, Coverage(1.0)),
+                key,
+                DARKEST,
+            )
+            .1
         };
         for green in [[0.05, 0.3, 0.09], [0.03, 0.27, 0.06]] {
             let [on_green, on_blue] = [unsure(green, GREEN, 1), unsure(green, BLUE, 2)];
@@ -189,11 +237,16 @@ mod tests {
 
     #[test]
     fn dyes_are_told_apart_where_they_are_not_the_screens() {
-        for (flat, screen, key) in
-            [([0.17, 0.38, 0.54], GREEN, 1), ([0.05, 0.3, 0.09], BLUE, 2), ([0.17, 0.05, 0.015], GREEN, 1)]
-        {
+        for (flat, screen, key) in [
+            ([0.17, 0.38, 0.54], GREEN, 1),
+            ([0.05, 0.3, 0.09], BLUE, 2),
+            ([0.17, 0.05, 0.015], GREEN, 1),
+        ] {
             let told = found(flat, screen, key);
-            assert!((0..3).all(|c| (told[c] - flat[c]).abs() < 0.06), "{told:?} for {flat:?}");
+            assert!(
+                (0..3).all(|c| (told[c] - flat[c]).abs() < 0.06),
+                "{told:?} for {flat:?}"
+            );
         }
     }
 

@@ -38,23 +38,38 @@ pub(in crate::matte) fn view(
     flat: LinearRgb,
     inside: &Image<Coverage>,
 ) -> Image<LinearRgb> {
-    let side = inside.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>().sqrt() as f32;
+    let side = inside
+        .pixels()
+        .iter()
+        .map(|c| f64::from(c.0))
+        .sum::<f64>()
+        .sqrt() as f32;
     let depths = filter::depth(&inside.map(|c| c.0 >= 0.5));
-    let weighted = transmittance.zip_map(inside, |t, c| PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0));
+    let weighted = transmittance.zip_map(inside, |t, c| {
+        PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0)
+    });
     let smooth = filter::gaussian_blur(&weighted, GRAIN * side);
     smooth.zip3_map(&depths, transmittance, |smooth, depth, t| {
-        let smooth = smooth.color().scale(smooth.a.max(f32::MIN_POSITIVE).recip());
+        let smooth = smooth
+            .color()
+            .scale(smooth.a.max(f32::MIN_POSITIVE).recip());
         // Outside the object, where nothing is asked, there is nothing to smooth either.
         if smooth == LinearRgb::BLACK {
             return smooth;
         }
         let inner = flatness(depth / side.max(f32::MIN_POSITIVE));
         let channel = |smooth: f32, flat: f32, t: f32| {
-            let plastic = (FLAT * flat.sqrt() * relative(smooth / flat.max(f32::MIN_POSITIVE), inner)).clamp(0.0, 1.0);
+            let plastic =
+                (FLAT * flat.sqrt() * relative(smooth / flat.max(f32::MIN_POSITIVE), inner))
+                    .clamp(0.0, 1.0);
             let bare = ((t - BARE.start()) / (BARE.end() - BARE.start())).clamp(0.0, 1.0);
             plastic + bare * (1.0 - plastic)
         };
-        LinearRgb::new(channel(smooth.r, flat.r, t.r), channel(smooth.g, flat.g, t.g), channel(smooth.b, flat.b, t.b))
+        LinearRgb::new(
+            channel(smooth.r, flat.r, t.r),
+            channel(smooth.g, flat.g, t.g),
+            channel(smooth.b, flat.b, t.b),
+        )
     })
 }
 
@@ -82,7 +97,9 @@ mod tests {
 
     fn slab() -> Image<Coverage> {
         Image::from_fn(SIZE.0, SIZE.1, |x, y| {
-            Coverage(f32::from(u8::from((10..80).contains(&x) && (10..50).contains(&y))))
+            Coverage(f32::from(u8::from(
+                (10..80).contains(&x) && (10..50).contains(&y),
+            )))
         })
     }
 
@@ -96,7 +113,10 @@ mod tests {
     fn flat_plastic_is_seen_through_by_the_root_of_what_is_measured() {
         let flat = LinearRgb::new(0.55, 0.3, 0.1);
         let [middle, _] = seen(flat, flat);
-        assert!((middle.r - 0.55_f32.sqrt()).abs() < 0.04 && (middle.b - 0.1_f32.sqrt()).abs() < 0.03, "{middle:?}");
+        assert!(
+            (middle.r - 0.55_f32.sqrt()).abs() < 0.04 && (middle.b - 0.1_f32.sqrt()).abs() < 0.03,
+            "{middle:?}"
+        );
     }
 
     #[test]
@@ -123,7 +143,11 @@ mod tests {
     #[test]
     fn an_empty_object_is_no_trouble() {
         let nothing = Image::filled(4, 3, Coverage(0.0));
-        let view = view(&Image::filled(4, 3, LinearRgb::grey(0.5)), LinearRgb::grey(0.5), &nothing);
+        let view = view(
+            &Image::filled(4, 3, LinearRgb::grey(0.5)),
+            LinearRgb::grey(0.5),
+            &nothing,
+        );
         assert!(view.pixels().iter().all(|v| v.is_finite()));
     }
 }

@@ -7,7 +7,12 @@ use super::rows::{Pad, Rows, Source, Window, around, window_rows};
 use super::running_blur::{Reach, RunningBlur};
 
 /// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
-pub(super) fn blurred<'a>(source: impl Rows + 'a, opts: &KeyOptions, size: u32, picture: (usize, usize)) -> Source<'a> {
+pub(super) fn blurred<'a>(
+    source: impl Rows + 'a,
+    opts: &KeyOptions,
+    size: u32,
+    picture: (usize, usize),
+) -> Source<'a> {
     let (behaviour, size) = (opts.profile.behaviour(), size as usize);
     match opts.blur {
         Blur::Exact => Box::new(BoxBlur::new(source, behaviour, size, picture)),
@@ -48,16 +53,27 @@ impl Kernel {
         }
         // Beyond the picture's own size a window that is cut off at the border finds nothing more.
         let radius = (size - 1).min(width.max(height) - 1);
-        Self::CutOff { radius, columns: (0..width).map(|x| around(x, radius, width).len() as f32).collect() }
+        Self::CutOff {
+            radius,
+            columns: (0..width)
+                .map(|x| around(x, radius, width).len() as f32)
+                .collect(),
+        }
     }
 
     /// The samples whose weight is not 0.
     fn reach(&self) -> Reach {
         match self {
-            Self::CutOff { radius, .. } => Reach { radius: *radius, repeat: false },
+            Self::CutOff { radius, .. } => Reach {
+                radius: *radius,
+                repeat: false,
+            },
             Self::Repeat { weights, .. } => {
                 let radius = weights.iter().filter(|w| **w > 0.0).count() - 1;
-                Reach { radius, repeat: true }
+                Reach {
+                    radius,
+                    repeat: true,
+                }
             }
         }
     }
@@ -74,7 +90,8 @@ impl Kernel {
 fn weights(size: usize) -> Vec<f32> {
     let radius = size as f32 / 2.0;
     let scale = 1.0 / radius;
-    let taps = (1..=radius.ceil() as usize).map(|i| if i as f32 * scale <= 1.0 { 1.0 } else { 0.0 });
+    let taps =
+        (1..=radius.ceil() as usize).map(|i| if i as f32 * scale <= 1.0 { 1.0 } else { 0.0 });
     let mut weights: Vec<f32> = std::iter::once(1.0).chain(taps).collect();
     let total: f32 = 1.0 + 2.0 * weights[1..].iter().sum::<f32>();
     weights.iter_mut().for_each(|w| *w /= total);
@@ -100,7 +117,15 @@ impl<S: Rows> BoxBlur<S> {
 
 impl<S: Rows> Rows for BoxBlur<S> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        let Self { source, kernel, height, padded, window, calm_source, calm } = self;
+        let Self {
+            source,
+            kernel,
+            height,
+            padded,
+            window,
+            calm_source,
+            calm,
+        } = self;
         window.cover(around(y, kernel.radius(), *height), |y, row| {
             let inside = kernel.radius()..kernel.radius() + row.len();
             source.row(y, &mut padded[inside.clone()]);
@@ -115,14 +140,27 @@ impl<S: Rows> Rows for BoxBlur<S> {
 impl Kernel {
     /// A plane of 0 stays what it is, and so nearly does a plane of 1.
     fn settled(&self, near: Extremes) -> Option<f32> {
-        let is = |v: f32| near.least.to_bits() == v.to_bits() && near.greatest.to_bits() == v.to_bits();
-        let of_ones = if let Self::Repeat { of_ones, .. } = self { *of_ones } else { 1.0 };
-        if is(0.0) { Some(0.0) } else { is(1.0).then_some(of_ones) }
+        let is =
+            |v: f32| near.least.to_bits() == v.to_bits() && near.greatest.to_bits() == v.to_bits();
+        let of_ones = if let Self::Repeat { of_ones, .. } = self {
+            *of_ones
+        } else {
+            1.0
+        };
+        if is(0.0) {
+            Some(0.0)
+        } else {
+            is(1.0).then_some(of_ones)
+        }
     }
 
     fn along_x(&self, padded: &mut [f32], calm: &mut Calm, out: &mut [f32]) {
         let radius = self.radius();
-        let pad = if let Self::CutOff { .. } = self { Pad::Value(0.0) } else { Pad::Repeat };
+        let pad = if let Self::CutOff { .. } = self {
+            Pad::Value(0.0)
+        } else {
+            Pad::Repeat
+        };
         pad.fill(padded, radius);
         calm.fill(
             out,
@@ -131,11 +169,15 @@ impl Kernel {
             |columns, out| {
                 let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
                 match self {
-                    Self::CutOff { columns: counts, .. } => {
+                    Self::CutOff {
+                        columns: counts, ..
+                    } => {
                         mean(out, 2 * radius + 1, at, &counts[columns.clone()]);
                     }
                     Self::Repeat { weights, .. } => {
-                        weigh(out, weights, at(radius), |i| [at(radius + i), at(radius - i)]);
+                        weigh(out, weights, at(radius), |i| {
+                            [at(radius + i), at(radius - i)]
+                        });
                     }
                 }
             },
@@ -143,7 +185,13 @@ impl Kernel {
     }
 
     /// Blender counts rows from the bottom, so sums run upwards.
-    fn along_y(&self, window: &Window, calm: &mut Calm, (y, height): (usize, usize), out: &mut [f32]) {
+    fn along_y(
+        &self,
+        window: &Window,
+        calm: &mut Calm,
+        (y, height): (usize, usize),
+        out: &mut [f32],
+    ) {
         let rows = around(y, self.radius(), height);
         calm.fill(
             out,
@@ -154,10 +202,17 @@ impl Kernel {
                 match self {
                     Self::CutOff { .. } => {
                         let counts = [rows.len() as f32; RUN];
-                        mean(out, rows.len(), |i| at(rows.end - 1 - i), &counts[..columns.len()]);
+                        mean(
+                            out,
+                            rows.len(),
+                            |i| at(rows.end - 1 - i),
+                            &counts[..columns.len()],
+                        );
                     }
                     Self::Repeat { weights, .. } => {
-                        weigh(out, weights, at(y), |i| [at(y.saturating_sub(i)), at((y + i).min(height - 1))]);
+                        weigh(out, weights, at(y), |i| {
+                            [at(y.saturating_sub(i)), at((y + i).min(height - 1))]
+                        });
                     }
                 }
             },
@@ -169,12 +224,20 @@ impl Kernel {
 const AT_ONCE: usize = 4;
 
 /// Adds up `count` rows in order, over how many samples of each sum lie inside the picture.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn mean<'a, F: Fn(usize) -> &'a [f32]>(out: &mut [f32], count: usize, row: F, inside: &[f32]) {
     out.fill(0.0);
     let whole = count - count % AT_ONCE;
     for i in (0..whole).step_by(AT_ONCE) {
-        let rows = row(i).iter().zip(row(i + 1)).zip(row(i + 2)).zip(row(i + 3));
+        let rows = row(i)
+            .iter()
+            .zip(row(i + 1))
+            .zip(row(i + 2))
+            .zip(row(i + 3));
         for (o, (((a, b), c), d)) in out.iter_mut().zip(rows) {
             *o = *o + a + b + c + d;
         }
@@ -188,8 +251,17 @@ fn mean<'a, F: Fn(usize) -> &'a [f32]>(out: &mut [f32], count: usize, row: F, in
 }
 
 /// Adds up weighted rows: the centre, then at each distance the one ahead and the one behind.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn weigh<'a, F: Fn(usize) -> [&'a [f32]; 2]>(out: &mut [f32], weights: &[f32], centre: &[f32], pair: F) {
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn weigh<'a, F: Fn(usize) -> [&'a [f32]; 2]>(
+    out: &mut [f32],
+    weights: &[f32],
+    centre: &[f32],
+    pair: F,
+) {
     let w = weights[0];
     out.iter_mut().zip(centre).for_each(|(o, c)| *o = w * c);
     for (i, &w) in weights.iter().enumerate().skip(1) {

@@ -37,7 +37,14 @@ impl Calm {
     pub(super) fn new(width: usize, capacity: usize) -> Self {
         let count = width.div_ceil(BLOCK);
         let rows = vec![0; count * capacity];
-        Self { width, capacity, count, least: rows.clone(), greatest: rows, over: [vec![0; count], vec![0; count]] }
+        Self {
+            width,
+            capacity,
+            count,
+            least: rows.clone(),
+            greatest: rows,
+            over: [vec![0; count], vec![0; count]],
+        }
     }
 
     /// Notes the extremes of row `y`.
@@ -58,8 +65,14 @@ impl Calm {
         greatest.fill(i32::MIN);
         for y in rows {
             let slot = self.slot(y);
-            least.iter_mut().zip(&self.least[slot.clone()]).for_each(|(a, b)| *a = (*a).min(*b));
-            greatest.iter_mut().zip(&self.greatest[slot]).for_each(|(a, b)| *a = (*a).max(*b));
+            least
+                .iter_mut()
+                .zip(&self.least[slot.clone()])
+                .for_each(|(a, b)| *a = (*a).min(*b));
+            greatest
+                .iter_mut()
+                .zip(&self.greatest[slot])
+                .for_each(|(a, b)| *a = (*a).max(*b));
         }
         self.over = [least, greatest];
     }
@@ -70,7 +83,10 @@ impl Calm {
         let [least, greatest] = &self.over;
         let least = least[columns.clone()].iter().min();
         let greatest = greatest[columns].iter().max();
-        Extremes { least: value(*least.unwrap_or(&0)), greatest: value(*greatest.unwrap_or(&0)) }
+        Extremes {
+            least: value(*least.unwrap_or(&0)),
+            greatest: value(*greatest.unwrap_or(&0)),
+        }
     }
 
     /// Fills row `y` of a result. `settled` is told the extremes of every block and of the window `rows` x `reach` around
@@ -92,14 +108,21 @@ impl Calm {
         let mut open = 0..0;
         for (block, start) in (0..self.width).step_by(BLOCK).enumerate() {
             let columns = start..(start + BLOCK).min(self.width);
-            let own = Extremes { least: value(self.least[row + block]), greatest: value(self.greatest[row + block]) };
+            let own = Extremes {
+                least: value(self.least[row + block]),
+                greatest: value(self.greatest[row + block]),
+            };
             let known = settled(own, self.near(block, reach));
             if known.is_none() && open.end == start && open.len() + BLOCK <= RUN {
                 open.end = columns.end;
                 continue;
             }
             compute(open, out);
-            open = if known.is_some() { columns.end..columns.end } else { columns.clone() };
+            open = if known.is_some() {
+                columns.end..columns.end
+            } else {
+                columns.clone()
+            };
             known.into_iter().for_each(|v| out[columns.clone()].fill(v));
         }
         compute(open, out);
@@ -118,7 +141,11 @@ fn value(key: i32) -> f32 {
     f32::from_bits((key ^ ((key >> 31) & i32::MAX)) as u32)
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn note_blocks(row: &[f32], least: &mut [i32], greatest: &mut [i32]) {
     for ((values, least), greatest) in row.chunks(BLOCK).zip(least).zip(greatest) {
         (*least, *greatest) = (i32::MAX, i32::MIN);
@@ -135,16 +162,33 @@ mod tests {
 
     #[test]
     fn keys_keep_the_order_of_floats() {
-        let rising = [-f32::NAN, f32::NEG_INFINITY, -1.0, -1e-42, -0.0, 0.0, 1e-42, 1.0, f32::INFINITY, f32::NAN];
+        let rising = [
+            -f32::NAN,
+            f32::NEG_INFINITY,
+            -1.0,
+            -1e-42,
+            -0.0,
+            0.0,
+            1e-42,
+            1.0,
+            f32::INFINITY,
+            f32::NAN,
+        ];
         assert!(rising.windows(2).all(|p| key(p[0]) < key(p[1])));
-        assert!(rising.iter().all(|&v| value(key(v)).to_bits() == v.to_bits()));
+        assert!(
+            rising
+                .iter()
+                .all(|&v| value(key(v)).to_bits() == v.to_bits())
+        );
     }
 
     #[test]
     fn every_column_is_either_settled_or_computed_once() {
         let width = 1500;
         let mut calm = Calm::new(width, 1);
-        let row: Vec<f32> = (0..width).map(|x| if (x / 100) % 5 == 2 { x as f32 } else { 1.0 }).collect();
+        let row: Vec<f32> = (0..width)
+            .map(|x| if (x / 100) % 5 == 2 { x as f32 } else { 1.0 })
+            .collect();
         calm.note(0, &row);
         let mut out = vec![0.0; width];
         let flat = |own: Extremes, _| (own.least == own.greatest).then_some(7.0);

@@ -33,18 +33,30 @@ fn signal(p: PremulRgba, w: [f32; 3], offset: f32) -> f32 {
 /// Code values to unit scale.
 #[inline(always)]
 fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
-    if behaviour == Behaviour::V45 { code / FULL } else { code * PER_FULL }
+    if behaviour == Behaviour::V45 {
+        code / FULL
+    } else {
+        code * PER_FULL
+    }
 }
 
 /// Blue and red difference of a colour in unit scale, 128/255 being neutral.
 pub(in crate::matte) fn differences(p: PremulRgba, is_late: bool) -> [f32; 2] {
-    let behaviour = if is_late { Behaviour::V45 } else { Behaviour::V34 };
+    let behaviour = if is_late {
+        Behaviour::V45
+    } else {
+        Behaviour::V34
+    };
     DIFFERENCES.map(|w| to_unit(signal(p, w, NEUTRAL), behaviour))
 }
 
 /// All three signals of a colour in unit scale.
 pub(in crate::matte) fn to_ycc(p: PremulRgba, is_late: bool) -> [f32; 3] {
-    let behaviour = if is_late { Behaviour::V45 } else { Behaviour::V34 };
+    let behaviour = if is_late {
+        Behaviour::V45
+    } else {
+        Behaviour::V34
+    };
     let [cb, cr] = differences(p, is_late);
     [to_unit(signal(p, LUMA, FOOT), behaviour), cb, cr]
 }
@@ -80,19 +92,42 @@ struct Difference<'a, P> {
 
 impl<P: Photo> Rows for Difference<'_, P> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        difference_row(self.photo.row(y), out, self.weights, self.behaviour, self.careful);
+        difference_row(
+            self.photo.row(y),
+            out,
+            self.weights,
+            self.behaviour,
+            self.careful,
+        );
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn difference_row<P: Photo>(pixels: &[P], out: &mut [f32], weights: [f32; 3], behaviour: Behaviour, careful: bool) {
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn difference_row<P: Photo>(
+    pixels: &[P],
+    out: &mut [f32],
+    weights: [f32; 3],
+    behaviour: Behaviour,
+    careful: bool,
+) {
     for (p, d) in pixels.iter().zip(out) {
-        *d = to_unit(signal(seen(p.premul(), careful), weights, NEUTRAL), behaviour);
+        *d = to_unit(
+            signal(seen(p.premul(), careful), weights, NEUTRAL),
+            behaviour,
+        );
     }
 }
 
 /// The pixels of a row with other colour differences.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn recolored_row<P: Photo>(
     pixels: &[P],
     [cb, cr]: [&[f32]; 2],
@@ -104,7 +139,11 @@ fn recolored_row<P: Photo>(
         let p = seen(p.premul(), careful);
         let luma = signal(p, LUMA, FOOT);
         // Blender 4.5 alone leaves brightness out of the journey to unit scale and back.
-        let luma = if behaviour == Behaviour::V45 { luma } else { luma * PER_FULL * FULL };
+        let luma = if behaviour == Behaviour::V45 {
+            luma
+        } else {
+            luma * PER_FULL * FULL
+        };
         *o = color(luma, cb * FULL, cr * FULL, p.a);
     }
 }
@@ -122,11 +161,22 @@ impl<'a, P: Photo> ChromaBlur<'a, P> {
     pub(super) fn new(photo: &'a Image<P>, opts: &KeyOptions) -> Self {
         let (behaviour, careful) = (opts.profile.behaviour(), opts.profile == Profile::Robust);
         let planes = DIFFERENCES.map(|weights| {
-            let plane = Difference { photo, careful, weights, behaviour };
+            let plane = Difference {
+                photo,
+                careful,
+                weights,
+                behaviour,
+            };
             blurred(plane, opts, opts.blur_pre, photo.size())
         });
         let rows = [vec![0.0; photo.width()], vec![0.0; photo.width()]];
-        Self { photo, careful, behaviour, blurred: planes, rows }
+        Self {
+            photo,
+            careful,
+            behaviour,
+            blurred: planes,
+            rows,
+        }
     }
 
     /// Writes row `y`.
@@ -135,6 +185,12 @@ impl<'a, P: Photo> ChromaBlur<'a, P> {
             blurred.row(y, row);
         }
         let [cb, cr] = &self.rows;
-        recolored_row(self.photo.row(y), [cb, cr], out, self.behaviour, self.careful);
+        recolored_row(
+            self.photo.row(y),
+            [cb, cr],
+            out,
+            self.behaviour,
+            self.careful,
+        );
     }
 }

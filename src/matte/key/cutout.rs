@@ -18,10 +18,19 @@ pub(super) struct Despill {
 impl Despill {
     /// One pixel of the cut-out, premultiplied.
     #[inline(always)]
-    pub(super) fn cutout<M: Model, const PRIMARY: usize>(&self, p: PremulRgba, m: f32, key: LinearRgb) -> PremulRgba {
+    pub(super) fn cutout<M: Model, const PRIMARY: usize>(
+        &self,
+        p: PremulRgba,
+        m: f32,
+        key: LinearRgb,
+    ) -> PremulRgba {
         let p = M::seen(p);
         let c = PremulRgba::new(p.r * m, p.g * m, p.b * m, p.a * m);
-        if self.subtract { without_screen(p, m, key) } else { self.despilled::<M, PRIMARY>(c) }
+        if self.subtract {
+            without_screen(p, m, key)
+        } else {
+            self.despilled::<M, PRIMARY>(c)
+        }
     }
 
     /// The primary channel loses its excess over the mix of the others.
@@ -61,5 +70,10 @@ fn without_screen(p: PremulRgba, m: f32, key: LinearRgb) -> PremulRgba {
         let left = c - (1.0 - m) * k;
         if left > 0.0 { left } else { 0.0 }
     };
-    PremulRgba::new(rest(p.r, key.r), rest(p.g, key.g), rest(p.b, key.b), p.a * m)
+    PremulRgba::new(
+        rest(p.r, key.r),
+        rest(p.g, key.g),
+        rest(p.b, key.b),
+        p.a * m,
+    )
 }

@@ -58,10 +58,17 @@ impl Extreme {
 }
 
 impl<'a> Dilate<'a> {
-    pub(super) fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
+    pub(super) fn new(
+        source: Source<'a>,
+        (width, height): (usize, usize),
+        opts: &KeyOptions,
+    ) -> Self {
         let distance = opts.dilate_distance.unsigned_abs() as usize;
         let unlimited = opts.profile.behaviour() == Behaviour::V45;
-        let shape = Disc { distance, lopsided: !unlimited && opts.profile != Profile::Robust };
+        let shape = Disc {
+            distance,
+            lopsided: !unlimited && opts.profile != Profile::Robust,
+        };
         let largest = opts.dilate_distance > 0;
         let start = match (unlimited, largest) {
             (true, true) => f32::MIN,
@@ -71,30 +78,53 @@ impl<'a> Dilate<'a> {
         };
         let runs = (2 * distance + 1).ilog2() as usize + 1;
         let window = Window::new((width + 2 * distance) * runs, window_rows(distance, height));
-        Self { source, shape, extreme: Extreme { largest, start }, height, window, width }
+        Self {
+            source,
+            shape,
+            extreme: Extreme { largest, start },
+            height,
+            window,
+            width,
+        }
     }
 }
 
 impl Rows for Dilate<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        let Self { source, shape, extreme, height, window, width } = self;
+        let Self {
+            source,
+            shape,
+            extreme,
+            height,
+            window,
+            width,
+        } = self;
         let margin = shape.distance;
         let stride = *width + 2 * margin;
         window.cover(around(y, margin, *height), |y, runs| {
             let row = &mut runs[..stride];
             source.row(y, &mut row[margin..margin + *width]);
-            row[margin..margin + *width].iter_mut().for_each(|v| *v = extreme.of(extreme.start, *v));
+            row[margin..margin + *width]
+                .iter_mut()
+                .for_each(|v| *v = extreme.of(extreme.start, *v));
             Pad::Value(extreme.start).fill(row, margin);
             double_runs(runs, stride, *extreme);
         });
         out.fill(extreme.start);
         for near in around(y, margin, *height) {
-            let Some((left, right)) = shape.reach(y as isize - near as isize) else { continue };
+            let Some((left, right)) = shape.reach(y as isize - near as isize) else {
+                continue;
+            };
             let length = left + right + 1;
             let level = length.ilog2() as usize;
             let runs = &window.row(near)[level * stride..][..stride];
             let (first, second) = (margin - left, margin + right + 1 - (1 << level));
-            widen(out, &runs[first..first + *width], &runs[second..second + *width], *extreme);
+            widen(
+                out,
+                &runs[first..first + *width],
+                &runs[second..second + *width],
+                *extreme,
+            );
         }
     }
 }
@@ -105,18 +135,31 @@ fn double_runs(runs: &mut [f32], stride: usize, extreme: Extreme) {
         let (shorter, longer) = runs.split_at_mut(level * stride);
         let shorter = &shorter[(level - 1) * stride..];
         let half = 1 << (level - 1);
-        pair(&mut longer[..stride - half], &shorter[..stride - half], &shorter[half..], extreme);
+        pair(
+            &mut longer[..stride - half],
+            &shorter[..stride - half],
+            &shorter[half..],
+            extreme,
+        );
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn pair(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
     for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
         *o = extreme.of(*a, *b);
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn widen(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
     for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
         *o = extreme.of(*o, extreme.of(*a, *b));
@@ -136,12 +179,17 @@ mod tests {
     }
 
     fn dilated_dot(profile: Profile, distance: i32) -> Vec<String> {
-        let opts = KeyOptions { dilate_distance: distance, ..KeyOptions::of(profile) };
+        let opts = KeyOptions {
+            dilate_distance: distance,
+            ..KeyOptions::of(profile)
+        };
         let mut dilate = Dilate::new(Box::new(Dot), (11, 11), &opts);
         let mut row = [0.0; 11];
         let picture = |y| {
             dilate.row(y, &mut row);
-            row.map(|v| if v > 0.0 { '#' } else { '.' }).iter().collect()
+            row.map(|v| if v > 0.0 { '#' } else { '.' })
+                .iter()
+                .collect()
         };
         (0..11).map(picture).collect()
     }

@@ -45,12 +45,27 @@ impl<'a> EdgeSearch<'a> {
     fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
         let behaviour = opts.profile.behaviour();
         let reach = Reach::of(behaviour, opts.edge_kernel_radius as usize);
-        let half = if let Reach::Window(half) = reach { half } else { 0 };
-        let columns = (0..width).map(|x| around(x, half, width).len() as f32).collect();
+        let half = if let Reach::Window(half) = reach {
+            half
+        } else {
+            0
+        };
+        let columns = (0..width)
+            .map(|x| around(x, half, width).len() as f32)
+            .collect();
         let capacity = window_rows(half, height);
         let window = Window::new(width + 2 * half, capacity);
         let calm = Calm::new(width, capacity);
-        Self { source, behaviour, tolerance: opts.edge_kernel_tolerance, reach, height, window, calm, columns }
+        Self {
+            source,
+            behaviour,
+            tolerance: opts.edge_kernel_tolerance,
+            reach,
+            height,
+            window,
+            calm,
+            columns,
+        }
     }
 
     /// Writes row `y` of the searched matte, and 1 at its edges, 0 elsewhere.
@@ -66,7 +81,11 @@ impl<'a> EdgeSearch<'a> {
 
     fn search(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
         let (width, height, repeat) = (matte.len(), self.height, self.behaviour.repeats_border());
-        let pad = if repeat { Pad::Repeat } else { Pad::Value(f32::NAN) };
+        let pad = if repeat {
+            Pad::Repeat
+        } else {
+            Pad::Value(f32::NAN)
+        };
         self.window.cover(around(y, half, height), |y, row| {
             self.source.row(y, &mut row[half..half + width]);
             self.calm.note(y, &row[half..half + width]);
@@ -75,18 +94,30 @@ impl<'a> EdgeSearch<'a> {
         matte.copy_from_slice(&self.window.row(y)[half..half + width]);
         let rows = around(y, half, height);
         // Where the whole window is alike no pixel is an edge; a lone pixel has no neighbours to be like.
-        let alike =
-            |_, near: Extremes| (near.greatest - near.least < self.tolerance && width * height > 1).then_some(0.0);
+        let alike = |_, near: Extremes| {
+            (near.greatest - near.least < self.tolerance && width * height > 1).then_some(0.0)
+        };
         let seen = rows.len() as f32;
-        self.calm.fill(edges, (y, rows, half), alike, |columns, edges| {
-            edges.fill(0.0);
-            for near in looked_at(y, half, height, repeat) {
-                let samples = &self.window.row(near)[columns.start..columns.end + 2 * half];
-                count_alike(edges, &matte[columns.clone()], samples, self.tolerance);
-            }
-            let window = Seen { rows: seen, columns: &self.columns[columns.clone()], half };
-            judge(edges, &matte[columns], &window, self.tolerance, self.behaviour);
-        });
+        self.calm
+            .fill(edges, (y, rows, half), alike, |columns, edges| {
+                edges.fill(0.0);
+                for near in looked_at(y, half, height, repeat) {
+                    let samples = &self.window.row(near)[columns.start..columns.end + 2 * half];
+                    count_alike(edges, &matte[columns.clone()], samples, self.tolerance);
+                }
+                let window = Seen {
+                    rows: seen,
+                    columns: &self.columns[columns.clone()],
+                    half,
+                };
+                judge(
+                    edges,
+                    &matte[columns],
+                    &window,
+                    self.tolerance,
+                    self.behaviour,
+                );
+            });
     }
 }
 
@@ -108,7 +139,11 @@ fn alike(a: f32, b: f32, tolerance: f32) -> f32 {
 }
 
 /// Counts, for every pixel of a row, the samples of a padded row that lie in its window and are like it.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32) {
     for samples in padded.windows(matte.len()) {
         for ((count, m), s) in counts.iter_mut().zip(matte).zip(samples) {
@@ -118,7 +153,11 @@ fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32
 }
 
 /// Turns numbers of alike samples into 1 at edges and 0 elsewhere.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn judge(counts: &mut [f32], matte: &[f32], seen: &Seen<'_>, tolerance: f32, behaviour: Behaviour) {
     let pixels = counts.iter_mut().zip(matte).zip(seen.columns);
     let all = ((2 * seen.half + 1) * (2 * seen.half + 1)) as f32;
@@ -131,7 +170,9 @@ fn judge(counts: &mut [f32], matte: &[f32], seen: &Seen<'_>, tolerance: f32, beh
         Behaviour::V42 => pixels.for_each(|((count, _), columns)| {
             *count = edge(*count < (ALIKE_SHARE * (columns * seen.rows)).ceil());
         }),
-        Behaviour::V45 => pixels.for_each(|((count, _), _)| *count = edge(*count < ALIKE_SHARE * all)),
+        Behaviour::V45 => {
+            pixels.for_each(|((count, _), _)| *count = edge(*count < ALIKE_SHARE * all))
+        }
     }
 }
 
@@ -146,31 +187,58 @@ pub(super) struct Clip<'a> {
 impl<'a> Clip<'a> {
     /// Whether the levels can change anything.
     pub(super) fn is_wanted(opts: &KeyOptions) -> bool {
-        let levels_differ = opts.profile.behaviour() != Behaviour::V45 || opts.clip_black != opts.clip_white;
+        let levels_differ =
+            opts.profile.behaviour() != Behaviour::V45 || opts.clip_black != opts.clip_white;
         (opts.clip_black > 0.0 || opts.clip_white < 1.0) && levels_differ
     }
 
     pub(super) fn new(source: Source<'a>, size: (usize, usize), opts: &KeyOptions) -> Self {
         let search = EdgeSearch::new(source, size, opts);
-        Self { search, black: opts.clip_black, white: opts.clip_white, edges: vec![0.0; size.0] }
+        Self {
+            search,
+            black: opts.clip_black,
+            white: opts.clip_white,
+            edges: vec![0.0; size.0],
+        }
     }
 }
 
 impl Rows for Clip<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         self.search.row(y, out, &mut self.edges);
-        clip_row(out, &self.edges, [self.black, self.white], self.search.behaviour);
+        clip_row(
+            out,
+            &self.edges,
+            [self.black, self.white],
+            self.search.behaviour,
+        );
     }
 }
 
 /// Clips all pixels of a row that are not edges.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn clip_row(matte: &mut [f32], edges: &[f32], [black, white]: [f32; 2], behaviour: Behaviour) {
     let pixels = matte.iter_mut().zip(edges);
     if behaviour == Behaviour::V45 {
-        pixels.for_each(|(m, e)| *m = if *e > 0.0 { *m } else { remapped(*m, black, white) });
+        pixels.for_each(|(m, e)| {
+            *m = if *e > 0.0 {
+                *m
+            } else {
+                remapped(*m, black, white)
+            }
+        });
     } else {
-        pixels.for_each(|(m, e)| *m = if *e > 0.0 { *m } else { levelled(*m, black, white) });
+        pixels.for_each(|(m, e)| {
+            *m = if *e > 0.0 {
+                *m
+            } else {
+                levelled(*m, black, white)
+            }
+        });
     }
 }
 
@@ -198,7 +266,10 @@ pub(super) struct Edges<'a> {
 
 impl<'a> Edges<'a> {
     pub(super) fn new(source: Source<'a>, size: (usize, usize), opts: &KeyOptions) -> Self {
-        Self { search: EdgeSearch::new(source, size, opts), searched: vec![0.0; size.0] }
+        Self {
+            search: EdgeSearch::new(source, size, opts),
+            searched: vec![0.0; size.0],
+        }
     }
 }
 

@@ -43,18 +43,32 @@ impl Kernel {
         let step = 1.0 / distance as f32;
         let behaviour = opts.profile.behaviour();
         let mut gauss: Vec<f32> = (0..=distance).map(|i| gaussian(i as f32 * step)).collect();
-        let total = if behaviour.repeats_border() { total_from_centre(&gauss) } else { total_from_left(&gauss) };
+        let total = if behaviour.repeats_border() {
+            total_from_centre(&gauss)
+        } else {
+            total_from_left(&gauss)
+        };
         match behaviour {
             Behaviour::V45 => gauss.iter_mut().for_each(|g| *g /= total),
             Behaviour::V34 | Behaviour::V42 => gauss.iter_mut().for_each(|g| *g *= 1.0 / total),
         }
-        let falloff = (0..=distance).map(|i| fall(opts.feather_falloff, 1.0 - i as f32 * step)).collect();
+        let falloff = (0..=distance)
+            .map(|i| fall(opts.feather_falloff, 1.0 - i as f32 * step))
+            .collect();
         let radius = distance as isize;
         let order = match behaviour {
-            Behaviour::V45 => std::iter::once(0).chain((1..=radius).flat_map(|i| [-i, i])).collect(),
+            Behaviour::V45 => std::iter::once(0)
+                .chain((1..=radius).flat_map(|i| [-i, i]))
+                .collect(),
             Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
         };
-        Self { gauss, falloff, order, behaviour, inward: opts.feather_distance < 0 }
+        Self {
+            gauss,
+            falloff,
+            order,
+            behaviour,
+            inward: opts.feather_distance < 0,
+        }
     }
 
     fn radius(&self) -> usize {
@@ -67,7 +81,11 @@ fn total_from_centre(gauss: &[f32]) -> f32 {
 }
 
 fn total_from_left(gauss: &[f32]) -> f32 {
-    gauss.iter().rev().chain(&gauss[1..]).fold(0.0, |sum, g| sum + g)
+    gauss
+        .iter()
+        .rev()
+        .chain(&gauss[1..])
+        .fold(0.0, |sum, g| sum + g)
 }
 
 /// The Gaussian at a share `t` of the feather distance, single precision but for the exponential, which is rounded once.
@@ -90,7 +108,11 @@ fn fall(curve: Falloff, u: f32) -> f32 {
 }
 
 impl<'a> Feather<'a> {
-    pub(super) fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
+    pub(super) fn new(
+        source: Source<'a>,
+        (width, height): (usize, usize),
+        opts: &KeyOptions,
+    ) -> Self {
         let kernel = Kernel::new(opts);
         let margined = vec![0.0; width + 2 * kernel.radius()];
         let capacity = window_rows(kernel.radius(), height);
@@ -110,7 +132,17 @@ impl<'a> Feather<'a> {
 
 impl Rows for Feather<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
-        let Self { source, kernel, height, candidates, samples, columns, window, calm_source, calm } = self;
+        let Self {
+            source,
+            kernel,
+            height,
+            candidates,
+            samples,
+            columns,
+            window,
+            calm_source,
+            calm,
+        } = self;
         let radius = kernel.radius();
         window.cover(around(y, radius, *height), |y, row| {
             source.row(y, row);
@@ -144,22 +176,34 @@ impl Kernel {
         let (radius, repeat) = (self.radius(), self.behaviour.repeats_border());
         for (padded, value) in [(candidates, f32::NAN), (samples, 0.0)] {
             padded[radius..radius + row.len()].copy_from_slice(row);
-            let pad = if repeat { Pad::Repeat } else { Pad::Value(value) };
+            let pad = if repeat {
+                Pad::Repeat
+            } else {
+                Pad::Value(value)
+            };
             pad.fill(padded, radius);
         }
     }
 
     /// The Gaussian weights whose samples lie inside the picture, added up in the order of the visit.
     fn weight_inside(&self, at: usize, length: usize) -> f32 {
-        around(at, self.radius(), length).fold(0.0, |sum, other| sum + self.gauss[other.abs_diff(at)])
+        around(at, self.radius(), length)
+            .fold(0.0, |sum, other| sum + self.gauss[other.abs_diff(at)])
     }
 
     /// Nothing can beat a block that is all at the greatest value of its window.
     fn settled(own: Extremes, near: Extremes) -> Option<f32> {
-        (own.least >= near.greatest && near.least >= 0.0 && near.greatest < f32::INFINITY).then_some(own.least + 0.0)
+        (own.least >= near.greatest && near.least >= 0.0 && near.greatest < f32::INFINITY)
+            .then_some(own.least + 0.0)
     }
 
-    fn along_x(&self, [candidates, samples]: [&[f32]; 2], totals: &[f32], calm: &mut Calm, out: &mut [f32]) {
+    fn along_x(
+        &self,
+        [candidates, samples]: [&[f32]; 2],
+        totals: &[f32],
+        calm: &mut Calm,
+        out: &mut [f32],
+    ) {
         let radius = self.radius();
         calm.fill(out, (0, 0..1, radius), Self::settled, |columns, out| {
             let shifted = |side: isize| {
@@ -172,33 +216,58 @@ impl Kernel {
     }
 
     /// Blender counts rows from the bottom, so an offset of 1 is one row up.
-    fn along_y(&self, window: &Window, calm: &mut Calm, (y, height): (usize, usize), out: &mut [f32]) {
+    fn along_y(
+        &self,
+        window: &Window,
+        calm: &mut Calm,
+        (y, height): (usize, usize),
+        out: &mut [f32],
+    ) {
         let up = height - 1 - y;
         let total = self.weight_inside(up, height);
         // Windows that are cut off keep the middle of the order, which runs upwards for them.
         let order = match self.behaviour {
             Behaviour::V45 => &self.order[..],
-            _ => &self.order[self.radius().saturating_sub(up)..][..around(up, self.radius(), height).len()],
+            _ => {
+                &self.order[self.radius().saturating_sub(up)..]
+                    [..around(up, self.radius(), height).len()]
+            }
         };
-        calm.fill(out, (y, around(y, self.radius(), height), 0), Self::settled, |columns, out| {
-            let row = |side: isize| {
-                let row = &window.row(y.saturating_add_signed(-side).min(height - 1))[columns.clone()];
-                [row, row]
-            };
-            self.visit(order, row, &[total; RUN][..columns.len()], out);
-        });
+        calm.fill(
+            out,
+            (y, around(y, self.radius(), height), 0),
+            Self::settled,
+            |columns, out| {
+                let row = |side: isize| {
+                    let row = &window.row(y.saturating_add_signed(-side).min(height - 1))
+                        [columns.clone()];
+                    [row, row]
+                };
+                self.visit(order, row, &[total; RUN][..columns.len()], out);
+            },
+        );
     }
 
     /// Visits every sample of the window in order, and blends: the best candidate where there was one, elsewhere more and
     /// more of the Gaussian mean.
-    fn visit<'r>(&self, order: &[isize], row: impl Fn(isize) -> [&'r [f32]; 2], totals: &[f32], out: &mut [f32]) {
+    fn visit<'r>(
+        &self,
+        order: &[isize],
+        row: impl Fn(isize) -> [&'r [f32]; 2],
+        totals: &[f32],
+        out: &mut [f32],
+    ) {
         let tap = |side: isize| -> Tap<'r> {
             let i = side.unsigned_abs();
             (row(side), [self.falloff[i], self.gauss[i]])
         };
         let len = out.len();
         let mut found = ([0.0; RUN], [1.0; RUN], [0.0; RUN]);
-        let (best, weight, blur) = (&mut found.0[..len], &mut found.1[..len], &mut found.2[..len]);
+        let (best, weight, blur) = (
+            &mut found.0[..len],
+            &mut found.1[..len],
+            &mut found.2[..len],
+        );
         best.copy_from_slice(row(0)[0]);
         let state = [best, weight, blur];
         if self.behaviour == Behaviour::V45 {
@@ -212,9 +281,19 @@ impl Kernel {
 }
 
 /// `best weight + blur (1 - weight)`, the blur being a sum over the total of its weights.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn blend((best, weight, blur): &([f32; RUN], [f32; RUN], [f32; RUN]), totals: &[f32], out: &mut [f32]) {
-    for ((((o, best), weight), blur), total) in out.iter_mut().zip(best).zip(weight).zip(blur).zip(totals) {
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn blend(
+    (best, weight, blur): &([f32; RUN], [f32; RUN], [f32; RUN]),
+    totals: &[f32],
+    out: &mut [f32],
+) {
+    for ((((o, best), weight), blur), total) in
+        out.iter_mut().zip(best).zip(weight).zip(blur).zip(totals)
+    {
         *o = best * weight + blur / total * (1.0 - weight);
     }
 }
@@ -223,8 +302,16 @@ fn blend((best, weight, blur): &([f32; RUN], [f32; RUN], [f32; RUN]), totals: &[
 const AT_ONCE: usize = 4;
 
 /// Offers all taps in order to the pixels of a row: best candidate, its weight, sum of the blur.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn offer_all<'r, const LIMITED: bool, F: Fn(isize) -> Tap<'r>>(state: [&mut [f32]; 3], order: &[isize], tap: F) {
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn offer_all<'r, const LIMITED: bool, F: Fn(isize) -> Tap<'r>>(
+    state: [&mut [f32]; 3],
+    order: &[isize],
+    tap: F,
+) {
     let [best, weight, blur] = state;
     let groups = order.chunks_exact(AT_ONCE);
     let rest = groups.remainder();
@@ -266,12 +353,24 @@ fn offer<const LIMITED: bool, const N: usize>(
 mod tests {
     use super::*;
 
-    #[expect(clippy::excessive_precision, reason = "numbers with the nine digits that Blender prints")]
+    #[expect(
+        clippy::excessive_precision,
+        reason = "numbers with the nine digits that Blender prints"
+    )]
     #[test]
     fn the_tables_are_the_published_ones() {
-        let opts = KeyOptions { feather_distance: 3, ..KeyOptions::default() };
+        let opts = KeyOptions {
+            feather_distance: 3,
+            ..KeyOptions::default()
+        };
         let unscaled: Vec<f32> = (0..=3).map(|i| gaussian(i as f32 * (1.0 / 3.0))).collect();
-        assert_eq!(unscaled, [0.249338925, 0.151231691, 0.0337443464, 0.00276990514]);
-        assert_eq!(Kernel::new(&opts).falloff, [1.0, 0.740740657, 0.259259224, 0.0]);
+        assert_eq!(
+            unscaled,
+            [0.249338925, 0.151231691, 0.0337443464, 0.00276990514]
+        );
+        assert_eq!(
+            Kernel::new(&opts).falloff,
+            [1.0, 0.740740657, 0.259259224, 0.0]
+        );
     }
 }

@@ -9,7 +9,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A value as the profile is willing to see it.
 fn seen(m: Coverage, careful: bool) -> f32 {
-    if careful && !is_usable_matte(m) { 0.0 } else { m.0 }
+    if careful && !is_usable_matte(m) {
+        0.0
+    } else {
+        m.0
+    }
 }
 
 /// The matte, at most `1 - garbage`.
@@ -61,9 +65,10 @@ impl Rows for Core<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         self.source.row(y, out);
         match self.core {
-            Some(core) => {
-                out.iter_mut().zip(core.row(y)).for_each(|(m, c)| *m = self.larger(*m, seen(*c, self.careful)))
-            }
+            Some(core) => out
+                .iter_mut()
+                .zip(core.row(y))
+                .for_each(|(m, c)| *m = self.larger(*m, seen(*c, self.careful))),
             None => out.iter_mut().for_each(|m| *m = self.larger(*m, 0.0)),
         }
     }
@@ -100,7 +105,8 @@ impl Rows for Clamp<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         self.source.row(y, out);
         let outside = out.iter().filter(|m| !(0.0..=1.0).contains(*m)).count();
-        out.iter_mut().for_each(|m| *m = if *m > 0.0 { m.min(1.0) } else { 0.0 });
+        out.iter_mut()
+            .for_each(|m| *m = if *m > 0.0 { m.min(1.0) } else { 0.0 });
         self.clamped.fetch_add(outside, Ordering::Relaxed);
     }
 }

@@ -160,17 +160,28 @@ pub struct Keying<'a, P> {
 impl<'a, P: Photo> Keying<'a, P> {
     /// A photo before a screen.
     pub fn new(photo: &'a Image<P>, screen: Screen<'a>) -> Self {
-        Self { photo, screen, garbage: None, core: None }
+        Self {
+            photo,
+            screen,
+            garbage: None,
+            core: None,
+        }
     }
 
     /// With a garbage matte, the photo's size: 1 where there is surely no foreground.
     pub fn with_garbage(self, garbage: &'a Image<Coverage>) -> Self {
-        Self { garbage: Some(garbage), ..self }
+        Self {
+            garbage: Some(garbage),
+            ..self
+        }
     }
 
     /// With a core matte, the photo's size: 1 where there is surely foreground.
     pub fn with_core(self, core: &'a Image<Coverage>) -> Self {
-        Self { core: Some(core), ..self }
+        Self {
+            core: Some(core),
+            ..self
+        }
     }
 
     /// The matte and the cut-out.
@@ -232,28 +243,48 @@ impl<'a, P: Photo> Keying<'a, P> {
     ) -> Result<Deviations> {
         self.check(opts)?;
         let filled = robust::settle(self.screen, opts)?;
-        let screen = filled.as_ref().map_or(self.screen, |f| Screen::Plate(&f.plate));
-        let stream = Stream::new(Keying { screen, ..*self }, filled.as_ref().map(|f| f.channel), opts);
+        let screen = filled
+            .as_ref()
+            .map_or(self.screen, |f| Screen::Plate(&f.plate));
+        let stream = Stream::new(
+            Keying { screen, ..*self },
+            filled.as_ref().map(|f| f.channel),
+            opts,
+        );
         let deviations = stream.compute(plane, matte, cutout);
-        Ok(Deviations { filled_plate: filled.as_ref().map_or(0, |f| f.count), ..deviations })
+        Ok(Deviations {
+            filled_plate: filled.as_ref().map_or(0, |f| f.count),
+            ..deviations
+        })
     }
 
     fn check(&self, opts: &KeyOptions) -> Result<()> {
         opts.check()?;
         robust::warn(opts);
-        let plate = if let Screen::Plate(p) = self.screen { Some(p.size()) } else { None };
-        let others =
-            [("plate", plate), ("garbage", self.garbage.map(Image::size)), ("core", self.core.map(Image::size))];
+        let plate = if let Screen::Plate(p) = self.screen {
+            Some(p.size())
+        } else {
+            None
+        };
+        let others = [
+            ("plate", plate),
+            ("garbage", self.garbage.map(Image::size)),
+            ("core", self.core.map(Image::size)),
+        ];
         for (name, size) in others {
             if let Some((w, h)) = size.filter(|&s| s != self.photo.size()) {
                 let (width, height) = self.photo.size();
-                return Err(Error::value(name, format!("{w} x {h} pixels, expected the photo's {width} x {height}")));
+                return Err(Error::value(
+                    name,
+                    format!("{w} x {h} pixels, expected the photo's {width} x {height}"),
+                ));
             }
         }
         match self.screen {
-            Screen::Color(c) if !c.is_finite() => {
-                Err(Error::value("screen", format!("{:?}, expected finite numbers", <[f32; 3]>::from(c))))
-            }
+            Screen::Color(c) if !c.is_finite() => Err(Error::value(
+                "screen",
+                format!("{:?}, expected finite numbers", <[f32; 3]>::from(c)),
+            )),
             Screen::Color(c) => robust::check_color(c, opts),
             Screen::Plate(_) => Ok(()),
         }
@@ -262,7 +293,12 @@ impl<'a, P: Photo> Keying<'a, P> {
 
 impl std::fmt::Display for Deviations {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { unusable_pixels, filled_plate, unusable_mattes, clamped } = self;
+        let Self {
+            unusable_pixels,
+            filled_plate,
+            unusable_mattes,
+            clamped,
+        } = self;
         write!(
             f,
             "{unusable_pixels} unusable pixels made transparent, {filled_plate} pixels of the plate filled, \

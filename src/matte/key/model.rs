@@ -55,7 +55,11 @@ impl Model for V45 {
 impl Model for Robust {
     #[inline(always)]
     fn seen(p: PremulRgba) -> PremulRgba {
-        if is_usable(p) { p } else { PremulRgba::TRANSPARENT }
+        if is_usable(p) {
+            p
+        } else {
+            PremulRgba::TRANSPARENT
+        }
     }
 }
 
@@ -73,7 +77,11 @@ pub(super) fn is_usable(p: PremulRgba) -> bool {
 pub(super) fn primary(key: LinearRgb) -> usize {
     let LinearRgb { r, g, b } = key;
     let after_red = if g > b { 1 } else { 2 };
-    if r > g { if r > b { 0 } else { 2 } } else { after_red }
+    if r > g {
+        if r > b { 0 } else { 2 }
+    } else {
+        after_red
+    }
 }
 
 impl Profile {
@@ -108,7 +116,12 @@ mod tests {
 
     #[test]
     fn ties_between_channels_go_to_the_later_one() {
-        let cases = [([1.0, 1.0, 1.0], 2), ([0.0, 1.0, 1.0], 2), ([1.0, 1.0, 0.0], 1), ([1.0, 0.0, 1.0], 2)];
+        let cases = [
+            ([1.0, 1.0, 1.0], 2),
+            ([0.0, 1.0, 1.0], 2),
+            ([1.0, 1.0, 0.0], 1),
+            ([1.0, 0.0, 1.0], 2),
+        ];
         for (key, want) in cases {
             assert_eq!(primary(key.into()), want, "{key:?}");
         }

@@ -38,7 +38,9 @@ impl std::str::FromStr for Profile {
     fn from_str(name: &str) -> Result<Self> {
         let names = Self::ALL.map(|(n, _)| n).join(", ");
         let found = Self::ALL.iter().find(|(n, _)| *n == name);
-        found.map(|&(_, p)| p).ok_or_else(|| Error::value("profile", format!("\"{name}\", expected one of {names}")))
+        found
+            .map(|&(_, p)| p)
+            .ok_or_else(|| Error::value("profile", format!("\"{name}\", expected one of {names}")))
     }
 }
 
@@ -153,7 +155,10 @@ const DISTANCE_MAX: i32 = 100;
 impl KeyOptions {
     /// The default settings of another profile.
     pub fn of(profile: Profile) -> Self {
-        Self { profile, ..Self::default() }
+        Self {
+            profile,
+            ..Self::default()
+        }
     }
 
     /// Whether every setting lies in its range and the robust profile can keep its promise.
@@ -162,10 +167,19 @@ impl KeyOptions {
     /// [`Error::Value`] with the setting's name, its value and what was expected.
     pub fn check(&self) -> Result<()> {
         let near = self.clamped();
-        self.fractions().iter().zip(near.fractions()).try_for_each(|(&(at, v), (_, n))| inside(at, v, n, "0 to 1"))?;
-        self.sizes().iter().zip(near.sizes()).try_for_each(|(&(at, v, range), (_, n, _))| inside(at, v, n, range))?;
+        self.fractions()
+            .iter()
+            .zip(near.fractions())
+            .try_for_each(|(&(at, v), (_, n))| inside(at, v, n, "0 to 1"))?;
+        self.sizes()
+            .iter()
+            .zip(near.sizes())
+            .try_for_each(|(&(at, v, range), (_, n, _))| inside(at, v, n, range))?;
         if self.profile == Profile::Robust && self.clip_white <= self.clip_black {
-            let what = format!("{}, expected more than clip_black ({})", self.clip_white, self.clip_black);
+            let what = format!(
+                "{}, expected more than clip_black ({})",
+                self.clip_white, self.clip_black
+            );
             return Err(Error::value("key.clip_white", what));
         }
         Ok(())
@@ -204,16 +218,37 @@ impl KeyOptions {
     fn sizes(&self) -> [(&'static str, i64, &'static str); 5] {
         [
             ("key.blur_pre", self.blur_pre.into(), "0 to 2048"),
-            ("key.edge_kernel_radius", self.edge_kernel_radius.into(), "0 to 100"),
+            (
+                "key.edge_kernel_radius",
+                self.edge_kernel_radius.into(),
+                "0 to 100",
+            ),
             ("key.blur_post", self.blur_post.into(), "0 to 2048"),
-            ("key.dilate_distance", self.dilate_distance.into(), "-100 to 100"),
-            ("key.feather_distance", self.feather_distance.into(), "-100 to 100"),
+            (
+                "key.dilate_distance",
+                self.dilate_distance.into(),
+                "-100 to 100",
+            ),
+            (
+                "key.feather_distance",
+                self.feather_distance.into(),
+                "-100 to 100",
+            ),
         ]
     }
 }
 
-fn inside<T: PartialEq + std::fmt::Display>(at: &str, value: T, nearest: T, range: &str) -> Result<()> {
-    if value == nearest { Ok(()) } else { Err(Error::value(at, format!("{value}, expected {range}"))) }
+fn inside<T: PartialEq + std::fmt::Display>(
+    at: &str,
+    value: T,
+    nearest: T,
+    range: &str,
+) -> Result<()> {
+    if value == nearest {
+        Ok(())
+    } else {
+        Err(Error::value(at, format!("{value}, expected {range}")))
+    }
 }
 
 #[cfg(test)]
@@ -241,15 +276,31 @@ mod tests {
 
     #[test]
     fn a_setting_out_of_range_is_named() {
-        let opts = KeyOptions { feather_distance: -101, ..KeyOptions::default() };
-        assert_eq!(opts.check().unwrap_err().to_string(), "key.feather_distance: -101, expected -100 to 100");
-        let opts = KeyOptions { screen_balance: f32::NAN, ..KeyOptions::default() };
-        assert_eq!(opts.check().unwrap_err().to_string(), "key.screen_balance: NaN, expected 0 to 1");
+        let opts = KeyOptions {
+            feather_distance: -101,
+            ..KeyOptions::default()
+        };
+        assert_eq!(
+            opts.check().unwrap_err().to_string(),
+            "key.feather_distance: -101, expected -100 to 100"
+        );
+        let opts = KeyOptions {
+            screen_balance: f32::NAN,
+            ..KeyOptions::default()
+        };
+        assert_eq!(
+            opts.check().unwrap_err().to_string(),
+            "key.screen_balance: NaN, expected 0 to 1"
+        );
     }
 
     #[test]
     fn only_the_robust_profile_refuses_levels_in_the_wrong_order() {
-        let levels = |profile| KeyOptions { clip_black: 0.5, clip_white: 0.5, ..KeyOptions::of(profile) };
+        let levels = |profile| KeyOptions {
+            clip_black: 0.5,
+            clip_white: 0.5,
+            ..KeyOptions::of(profile)
+        };
         assert!(levels(Profile::Blender34).check().is_ok());
         assert!(levels(Profile::Robust).check().is_err());
     }

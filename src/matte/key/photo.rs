@@ -34,7 +34,8 @@ type MatteRowAgainst<P> = fn(&[P], &[LinearRgb], Option<usize>, &mut [f32], Term
 /// A row of the cut-out from rows of pixels and matte.
 type CutoutRow<P> = fn(&[P], &[Coverage], LinearRgb, &mut [PremulRgba], Despill);
 /// A row of the cut-out, every pixel against its own key.
-type CutoutRowAgainst<P> = fn(&[P], &[Coverage], &[LinearRgb], Option<usize>, &mut [PremulRgba], Despill);
+type CutoutRowAgainst<P> =
+    fn(&[P], &[Coverage], &[LinearRgb], Option<usize>, &mut [PremulRgba], Despill);
 
 /// The row loops of one profile for one kind of pixel.
 #[derive(Clone, Copy)]
@@ -59,9 +60,17 @@ impl<P: Photo> Loops<P> {
     fn of_model<M: Model>() -> Self {
         Self {
             terms: [Terms::of::<M, 0>, Terms::of::<M, 1>, Terms::of::<M, 2>],
-            matte: [matte_row::<P, M, 0>, matte_row::<P, M, 1>, matte_row::<P, M, 2>],
+            matte: [
+                matte_row::<P, M, 0>,
+                matte_row::<P, M, 1>,
+                matte_row::<P, M, 2>,
+            ],
             matte_against: matte_row_against::<P, M>,
-            cutout: [cutout_row::<P, M, 0>, cutout_row::<P, M, 1>, cutout_row::<P, M, 2>],
+            cutout: [
+                cutout_row::<P, M, 0>,
+                cutout_row::<P, M, 1>,
+                cutout_row::<P, M, 2>,
+            ],
             cutout_against: cutout_row_against::<P, M>,
         }
     }
@@ -86,24 +95,53 @@ impl<'a, P: Photo> Keyer<'a, P> {
             Screen::Plate(_) => (screen, LinearRgb::BLACK),
         };
         let terms = loops.terms[primary(color)](color, opts.screen_balance, opts.ignore_brightness);
-        let (factor, balance, subtract) = (opts.despill_factor, opts.despill_balance, opts.subtract_screen);
-        Self { screen, channel, terms, despill: Despill { factor, balance, subtract }, loops }
+        let (factor, balance, subtract) = (
+            opts.despill_factor,
+            opts.despill_balance,
+            opts.subtract_screen,
+        );
+        Self {
+            screen,
+            channel,
+            terms,
+            despill: Despill {
+                factor,
+                balance,
+                subtract,
+            },
+            loops,
+        }
     }
 
     /// Row `y` of the raw matte.
     pub(super) fn matte_row(&self, y: usize, pixels: &[P], out: &mut [f32]) {
         match self.screen {
             Screen::Color(c) => self.loops.matte[primary(c)](pixels, out, self.terms),
-            Screen::Plate(plate) => (self.loops.matte_against)(pixels, plate.row(y), self.channel, out, self.terms),
+            Screen::Plate(plate) => {
+                (self.loops.matte_against)(pixels, plate.row(y), self.channel, out, self.terms)
+            }
         }
     }
 
     /// Row `y` of the cut-out.
-    pub(super) fn cutout_row(&self, y: usize, pixels: &[P], matte: &[Coverage], out: &mut [PremulRgba]) {
+    pub(super) fn cutout_row(
+        &self,
+        y: usize,
+        pixels: &[P],
+        matte: &[Coverage],
+        out: &mut [PremulRgba],
+    ) {
         match self.screen {
             Screen::Color(c) => self.loops.cutout[primary(c)](pixels, matte, c, out, self.despill),
             Screen::Plate(plate) => {
-                (self.loops.cutout_against)(pixels, matte, plate.row(y), self.channel, out, self.despill);
+                (self.loops.cutout_against)(
+                    pixels,
+                    matte,
+                    plate.row(y),
+                    self.channel,
+                    out,
+                    self.despill,
+                );
             }
         }
     }
@@ -114,14 +152,26 @@ pub(super) fn socket(key: LinearRgb) -> LinearRgb {
     key.map(|v| if v > 0.0 { v } else { 0.0 })
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
-fn matte_row<P: Photo, M: Model, const PRIMARY: usize>(pixels: &[P], out: &mut [f32], terms: Terms) {
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn matte_row<P: Photo, M: Model, const PRIMARY: usize>(
+    pixels: &[P],
+    out: &mut [f32],
+    terms: Terms,
+) {
     for (p, m) in pixels.iter().zip(out) {
         *m = terms.matte::<M, PRIMARY>(p.premul());
     }
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn cutout_row<P: Photo, M: Model, const PRIMARY: usize>(
     pixels: &[P],
     matte: &[Coverage],

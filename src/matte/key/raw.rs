@@ -17,9 +17,20 @@ pub(super) struct Terms {
 impl Terms {
     /// The terms of a key colour whose primary channel is `PRIMARY`.
     #[inline(always)]
-    pub(super) fn of<M: Model, const PRIMARY: usize>(key: LinearRgb, balance: f32, ignore_brightness: bool) -> Self {
-        let unkeyed = Self { balance, ignore_brightness, saturation: 0.0 };
-        Self { saturation: unkeyed.saturation_of::<M, PRIMARY>(key.opaque()), ..unkeyed }
+    pub(super) fn of<M: Model, const PRIMARY: usize>(
+        key: LinearRgb,
+        balance: f32,
+        ignore_brightness: bool,
+    ) -> Self {
+        let unkeyed = Self {
+            balance,
+            ignore_brightness,
+            saturation: 0.0,
+        };
+        Self {
+            saturation: unkeyed.saturation_of::<M, PRIMARY>(key.opaque()),
+            ..unkeyed
+        }
     }
 
     /// `(C[p] - v) |1 - v|`: the excess of the primary channel over the mix of the others.
@@ -27,7 +38,11 @@ impl Terms {
     fn saturation_of<M: Model, const PRIMARY: usize>(&self, p: PremulRgba) -> f32 {
         let (main, lo, hi) = split::<PRIMARY>(p);
         let v = M::mix(self.balance, lo, hi);
-        let brightness = if self.ignore_brightness { 1.0 } else { (1.0 - v).abs() };
+        let brightness = if self.ignore_brightness {
+            1.0
+        } else {
+            (1.0 - v).abs()
+        };
         (main - v) * brightness
     }
 
@@ -38,14 +53,27 @@ impl Terms {
         let s = self.saturation_of::<M, PRIMARY>(p);
         let ratio = 1.0 - s / self.saturation;
         let inside = if s >= self.saturation { 0.0 } else { ratio };
-        if M::overexposed(p) | (s < 0.0) { 1.0 } else { inside }
+        if M::overexposed(p) | (s < 0.0) {
+            1.0
+        } else {
+            inside
+        }
     }
 }
 
 /// The raw matte of one pixel against a screen of its own; the primary channel is the screen's, or the one given.
 #[inline(always)]
-pub(super) fn matte_against<M: Model>(p: PremulRgba, key: LinearRgb, fixed: Option<usize>, terms: Terms) -> f32 {
-    let Terms { balance, ignore_brightness: flat, .. } = terms;
+pub(super) fn matte_against<M: Model>(
+    p: PremulRgba,
+    key: LinearRgb,
+    fixed: Option<usize>,
+    terms: Terms,
+) -> f32 {
+    let Terms {
+        balance,
+        ignore_brightness: flat,
+        ..
+    } = terms;
     match fixed.unwrap_or_else(|| primary(key)) {
         0 => Terms::of::<M, 0>(key, balance, flat).matte::<M, 0>(p),
         1 => Terms::of::<M, 1>(key, balance, flat).matte::<M, 1>(p),

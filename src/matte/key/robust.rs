@@ -51,9 +51,13 @@ pub(super) fn warn(opts: &KeyOptions) {
         return;
     }
     if opts.edge_kernel_radius == 1 {
-        log::warn!("key.edge_kernel_radius: 1 makes every pixel an edge, so the levels do nothing; 0 clips all pixels");
+        log::warn!(
+            "key.edge_kernel_radius: 1 makes every pixel an edge, so the levels do nothing; 0 clips all pixels"
+        );
     } else if opts.edge_kernel_radius > 0 && opts.edge_kernel_tolerance == 0.0 {
-        log::warn!("key.edge_kernel_tolerance: 0 makes every pixel an edge, so the levels do nothing");
+        log::warn!(
+            "key.edge_kernel_tolerance: 0 makes every pixel an edge, so the levels do nothing"
+        );
     }
 }
 
@@ -75,9 +79,16 @@ pub(super) struct Filled {
 pub(super) fn fill(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled> {
     let channel = primary(mean(plate));
     let is_strong = |c: LinearRgb| {
-        is_usable(c.opaque()) && (opts.accept_weak_key || strength(c, channel, opts.screen_balance) >= LEAST_STRENGTH)
+        is_usable(c.opaque())
+            && (opts.accept_weak_key || strength(c, channel, opts.screen_balance) >= LEAST_STRENGTH)
     };
-    let known = plate.map(|c| if is_strong(c) { c.opaque() } else { PremulRgba::TRANSPARENT });
+    let known = plate.map(|c| {
+        if is_strong(c) {
+            c.opaque()
+        } else {
+            PremulRgba::TRANSPARENT
+        }
+    });
     let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
     if count == plate.pixels().len() && count > 0 {
         let what = format!(
@@ -88,21 +99,41 @@ pub(super) fn fill(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled
         return Err(Error::value("plate", what));
     }
     let levels = Pyramid::new(known);
-    let plate = Image::from_fn(plate.width(), plate.height(), |x, y| nearest_known(&levels, x, y));
-    Ok(Filled { plate, channel, count })
+    let plate = Image::from_fn(plate.width(), plate.height(), |x, y| {
+        nearest_known(&levels, x, y)
+    });
+    Ok(Filled {
+        plate,
+        channel,
+        count,
+    })
 }
 
 fn nearest_known(levels: &Pyramid<PremulRgba>, x: usize, y: usize) -> LinearRgb {
     let at = |level| levels.level(level)[(x >> level, y >> level)];
-    let known = (0..levels.levels()).map(at).find(|p| p.a > 0.0).unwrap_or_default();
-    if known.a == 1.0 { known.color() } else { known.color().scale(1.0 / known.a) }
+    let known = (0..levels.levels())
+        .map(at)
+        .find(|p| p.a > 0.0)
+        .unwrap_or_default();
+    if known.a == 1.0 {
+        known.color()
+    } else {
+        known.color().scale(1.0 / known.a)
+    }
 }
 
 /// Mean of the usable pixels; black where there is none.
 fn mean(plate: &Image<LinearRgb>) -> LinearRgb {
     let usable = plate.pixels().iter().filter(|c| is_usable(c.opaque()));
     let (sum, count) = usable.fold(([0.0f64; 3], 0.0), |(sum, count), c| {
-        ([sum[0] + f64::from(c.r), sum[1] + f64::from(c.g), sum[2] + f64::from(c.b)], count + 1.0)
+        (
+            [
+                sum[0] + f64::from(c.r),
+                sum[1] + f64::from(c.g),
+                sum[2] + f64::from(c.b),
+            ],
+            count + 1.0,
+        )
     });
     LinearRgb::from(sum.map(|s| (s / f64::max(count, 1.0)) as f32))
 }
@@ -113,14 +144,27 @@ pub(super) fn is_usable_matte(m: Coverage) -> bool {
 }
 
 /// Counts what the robust profile replaces in some rows of the photo and its mattes.
-pub(super) fn unusable<P: Photo>(keying: &Keying<'_, P>, opts: &KeyOptions, rows: Range<usize>) -> Deviations {
+pub(super) fn unusable<P: Photo>(
+    keying: &Keying<'_, P>,
+    opts: &KeyOptions,
+    rows: Range<usize>,
+) -> Deviations {
     if opts.profile != Profile::Robust {
         return Deviations::default();
     }
-    let pixels = |y| keying.photo.row(y).iter().filter(|p| !is_usable(p.premul())).count();
+    let pixels = |y| {
+        keying
+            .photo
+            .row(y)
+            .iter()
+            .filter(|p| !is_usable(p.premul()))
+            .count()
+    };
     let mattes = |y| {
         let given = [keying.garbage, keying.core].into_iter().flatten();
-        given.map(|m| m.row(y).iter().filter(|&&m| !is_usable_matte(m)).count()).sum::<usize>()
+        given
+            .map(|m| m.row(y).iter().filter(|&&m| !is_usable_matte(m)).count())
+            .sum::<usize>()
     };
     Deviations {
         unusable_pixels: rows.clone().map(pixels).sum(),
@@ -164,9 +208,23 @@ mod tests {
     #[test]
     fn a_grey_key_is_refused_with_advice() {
         let opts = KeyOptions::of(Profile::Robust);
-        let message = check_color(LinearRgb::grey(0.5), &opts).unwrap_err().to_string();
-        assert!(message.starts_with("screen: 0.5,0.5,0.5 is too grey") && message.contains("accept_weak_key"));
+        let message = check_color(LinearRgb::grey(0.5), &opts)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.starts_with("screen: 0.5,0.5,0.5 is too grey")
+                && message.contains("accept_weak_key")
+        );
         assert!(check_color(GREEN, &opts).is_ok());
-        assert!(check_color(LinearRgb::grey(0.5), &KeyOptions { accept_weak_key: true, ..opts }).is_ok());
+        assert!(
+            check_color(
+                LinearRgb::grey(0.5),
+                &KeyOptions {
+                    accept_weak_key: true,
+                    ..opts
+                }
+            )
+            .is_ok()
+        );
     }
 }

@@ -32,7 +32,12 @@ pub(super) struct Window {
 impl Window {
     /// Room for `capacity` rows of `row_len` values.
     pub(super) fn new(row_len: usize, capacity: usize) -> Self {
-        Self { row_len, capacity, next: 0, values: vec![0.0; row_len * capacity] }
+        Self {
+            row_len,
+            capacity,
+            next: 0,
+            values: vec![0.0; row_len * capacity],
+        }
     }
 
     /// Makes the rows of a range present; those that are missing are made, the oldest forgotten.
@@ -75,13 +80,21 @@ pub(super) fn looked_at(
 ) -> impl DoubleEndedIterator<Item = usize> {
     let (y, radius, last) = (y as isize, radius as isize, height as isize - 1);
     let (first, end) = (y - radius, y + radius);
-    let rows = if repeat { first..=end } else { first.max(0)..=end.min(last) };
+    let rows = if repeat {
+        first..=end
+    } else {
+        first.max(0)..=end.min(last)
+    };
     rows.map(move |row| row.clamp(0, last) as usize)
 }
 
 /// Rows a window must hold for that radius.
 pub(super) fn window_rows(radius: usize, height: usize) -> usize {
-    radius.saturating_mul(2).saturating_add(1).min(height).max(1)
+    radius
+        .saturating_mul(2)
+        .saturating_add(1)
+        .min(height)
+        .max(1)
 }
 
 /// What stands beside a row where a window reaches over the picture's border.
@@ -137,7 +150,10 @@ mod tests {
     #[test]
     fn a_window_is_cut_off_or_repeats_the_border() {
         assert_eq!(looked_at(0, 2, 2, false).collect::<Vec<_>>(), [0, 1]);
-        assert_eq!(looked_at(0, 2, 2, true).collect::<Vec<_>>(), [0, 0, 0, 1, 1]);
+        assert_eq!(
+            looked_at(0, 2, 2, true).collect::<Vec<_>>(),
+            [0, 0, 0, 1, 1]
+        );
     }
 
     #[test]

@@ -24,7 +24,11 @@ impl Reach {
     /// How many samples around `at` count.
     fn count(self, at: usize, length: usize) -> f64 {
         let inside = around(at, self.radius, length).len();
-        (if self.repeat { 2 * self.radius + 1 } else { inside }) as f64
+        (if self.repeat {
+            2 * self.radius + 1
+        } else {
+            inside
+        }) as f64
     }
 }
 
@@ -60,7 +64,15 @@ impl<S: Rows> RunningBlur<S> {
 
     /// Moves the sums to other rows. Sums are exact, so that starting anew gives the same ones.
     fn sum(&mut self, rows: std::ops::Range<usize>) {
-        let Self { source, reach, padded, window, sums, shares, .. } = self;
+        let Self {
+            source,
+            reach,
+            padded,
+            window,
+            sums,
+            shares,
+            ..
+        } = self;
         window.cover(rows.clone(), |y, row| {
             let inside = reach.radius..reach.radius + row.len();
             source.row(y, &mut padded[inside.clone()]);
@@ -85,14 +97,26 @@ impl<S: Rows> Rows for RunningBlur<S> {
         let (radius, height) = (self.reach.radius, self.height);
         self.sum(around(y, radius, height));
         let share = 1.0 / self.reach.count(y, height);
-        let beyond = |missing: usize| if self.reach.repeat { missing as f64 } else { 0.0 };
-        let (above, below) = (beyond(radius.saturating_sub(y)), beyond((y + radius).saturating_sub(height - 1)));
+        let beyond = |missing: usize| {
+            if self.reach.repeat {
+                missing as f64
+            } else {
+                0.0
+            }
+        };
+        let (above, below) = (
+            beyond(radius.saturating_sub(y)),
+            beyond((y + radius).saturating_sub(height - 1)),
+        );
         if above + below == 0.0 {
-            out.iter_mut().zip(&self.sums).for_each(|(o, s)| *o = (s * share) as f32);
+            out.iter_mut()
+                .zip(&self.sums)
+                .for_each(|(o, s)| *o = (s * share) as f32);
             return;
         }
         // Only windows that reach over the border need its rows, and those hold them.
-        let border = |missing: f64, row: usize| self.window.row(if missing > 0.0 { row } else { y });
+        let border =
+            |missing: f64, row: usize| self.window.row(if missing > 0.0 { row } else { y });
         let borders = border(above, 0).iter().zip(border(below, height - 1));
         for ((o, sum), (first, last)) in out.iter_mut().zip(&self.sums).zip(borders) {
             *o = ((sum + above * f64::from(*first) + below * f64::from(*last)) * share) as f32;
@@ -101,7 +125,11 @@ impl<S: Rows> Rows for RunningBlur<S> {
 }
 
 /// Puts samples on the grid; what is no number becomes 0.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn hold(samples: &mut [f32]) {
     for s in samples {
         *s = held(f64::from(*s));
@@ -117,15 +145,25 @@ fn held(v: f64) -> f32 {
     ((inside + GRID) - GRID) as f32
 }
 
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn add(sums: &mut [f64], row: &[f32], sign: f64) {
-    sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += sign * f64::from(*v));
+    sums.iter_mut()
+        .zip(row)
+        .for_each(|(sum, v)| *sum += sign * f64::from(*v));
 }
 
 /// Blurs a row between margins; the last sample of `padded` is never counted.
 fn along_x(padded: &mut [f32], reach: Reach, shares: &[f64], out: &mut [f32]) {
     let (diameter, end) = (2 * reach.radius + 1, padded.len() - 1);
-    let pad = if reach.repeat { Pad::Repeat } else { Pad::Value(0.0) };
+    let pad = if reach.repeat {
+        Pad::Repeat
+    } else {
+        Pad::Value(0.0)
+    };
     pad.fill(&mut padded[..end], reach.radius);
     let mut sum: f64 = padded[..diameter].iter().map(|v| f64::from(*v)).sum();
     let steps = padded[diameter..].iter().zip(&padded[..]);
@@ -144,7 +182,9 @@ mod tests {
     struct Plane(fn(usize, usize) -> f32);
     impl Rows for Plane {
         fn row(&mut self, y: usize, out: &mut [f32]) {
-            out.iter_mut().enumerate().for_each(|(x, v)| *v = (self.0)(x, y));
+            out.iter_mut()
+                .enumerate()
+                .for_each(|(x, v)| *v = (self.0)(x, y));
         }
     }
 
@@ -166,13 +206,22 @@ mod tests {
     #[test]
     fn a_running_sum_is_the_mean_of_its_window() {
         for (radius, repeat) in [(0, false), (1, false), (3, true), (8, false), (20, true)] {
-            for (y, row) in blurred(uneven, Reach { radius, repeat }, 0).iter().enumerate() {
+            for (y, row) in blurred(uneven, Reach { radius, repeat }, 0)
+                .iter()
+                .enumerate()
+            {
                 for (x, v) in row.iter().enumerate() {
-                    let near = |at: usize, length: usize| super::super::rows::looked_at(at, radius, length, repeat);
-                    let samples: Vec<f64> =
-                        near(y, SIZE.1).flat_map(|j| near(x, SIZE.0).map(move |i| f64::from(uneven(i, j)))).collect();
+                    let near = |at: usize, length: usize| {
+                        super::super::rows::looked_at(at, radius, length, repeat)
+                    };
+                    let samples: Vec<f64> = near(y, SIZE.1)
+                        .flat_map(|j| near(x, SIZE.0).map(move |i| f64::from(uneven(i, j))))
+                        .collect();
                     let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-                    assert!((f64::from(*v) - mean).abs() < 3e-7, "{radius} {repeat} {x} {y}");
+                    assert!(
+                        (f64::from(*v) - mean).abs() < 3e-7,
+                        "{radius} {repeat} {x} {y}"
+                    );
                 }
             }
         }
@@ -181,14 +230,24 @@ mod tests {
     #[test]
     fn sums_are_the_same_wherever_they_start() {
         let wide = |x: usize, y: usize| uneven(x, y) * if x > 6 { 3e4 } else { 1e-7 };
-        let reach = Reach { radius: 2, repeat: false };
+        let reach = Reach {
+            radius: 2,
+            repeat: false,
+        };
         assert_eq!(blurred(wide, reach, 0)[4..], blurred(wide, reach, 4)[..]);
     }
 
     #[test]
     fn what_is_no_number_leaves_no_trace() {
         let odd = |x: usize, y: usize| if (x, y) == (4, 4) { f32::NAN } else { 0.5 };
-        let rows = blurred(odd, Reach { radius: 1, repeat: false }, 0);
+        let rows = blurred(
+            odd,
+            Reach {
+                radius: 1,
+                repeat: false,
+            },
+            0,
+        );
         assert_eq!(rows[2], [0.5; 13]);
         assert_eq!((rows[6][4], rows[4][7]), (0.5, 0.5));
         assert!(rows.iter().flatten().all(|v| v.is_finite()));

@@ -69,7 +69,12 @@ pub(super) struct Stream<'a, P> {
 impl<'a, P: Photo> Stream<'a, P> {
     /// A keying whose primary channel is given where it does not follow each pixel's own key.
     pub(super) fn new(keying: Keying<'a, P>, channel: Option<usize>, opts: &'a KeyOptions) -> Self {
-        Self { keying, channel, opts, clamped: AtomicUsize::new(0) }
+        Self {
+            keying,
+            channel,
+            opts,
+            clamped: AtomicUsize::new(0),
+        }
     }
 
     /// Computes a plane, and the cut-out that it makes unless the picture for it is empty.
@@ -92,10 +97,19 @@ impl<'a, P: Photo> Stream<'a, P> {
             self.band(&mut *self.source(plane), first, matte, cutout);
             robust::unusable(&self.keying, self.opts, first..first + matte.len() / width)
         });
-        Deviations { clamped: self.clamped.load(Ordering::Relaxed), ..seen.sum() }
+        Deviations {
+            clamped: self.clamped.load(Ordering::Relaxed),
+            ..seen.sum()
+        }
     }
 
-    fn band(&self, plane: &mut dyn Rows, first: usize, matte: &mut [Coverage], cutout: &mut [PremulRgba]) {
+    fn band(
+        &self,
+        plane: &mut dyn Rows,
+        first: usize,
+        matte: &mut [Coverage],
+        cutout: &mut [PremulRgba],
+    ) {
         let width = self.keying.photo.width();
         let keyer = self.keyer();
         let mut cutout = cutout.chunks_exact_mut(width);
@@ -131,20 +145,35 @@ impl<'a, P: Photo> Stream<'a, P> {
     fn raw(&self) -> Source<'_> {
         let photo = self.keying.photo;
         if self.opts.blur_pre == 0 {
-            return Box::new(RawMatte { photo, keyer: self.keyer() });
+            return Box::new(RawMatte {
+                photo,
+                keyer: self.keyer(),
+            });
         }
         let pixels = vec![PremulRgba::default(); photo.width()];
-        Box::new(BlurredMatte { blur: ChromaBlur::new(photo, self.opts), keyer: self.keyer(), pixels })
+        Box::new(BlurredMatte {
+            blur: ChromaBlur::new(photo, self.opts),
+            keyer: self.keyer(),
+            pixels,
+        })
     }
 
     fn clipped(&self) -> Source<'_> {
         let raw = self.raw();
-        if Clip::is_wanted(self.opts) { Box::new(Clip::new(raw, self.size(), self.opts)) } else { raw }
+        if Clip::is_wanted(self.opts) {
+            Box::new(Clip::new(raw, self.size(), self.opts))
+        } else {
+            raw
+        }
     }
 
     /// The edges: Blender up to 4.3 looks for them in the clipped matte, later ones in the raw one.
     fn edges(&self) -> Source<'_> {
-        let searched = if self.behaviour() == Behaviour::V45 { self.raw() } else { self.clipped() };
+        let searched = if self.behaviour() == Behaviour::V45 {
+            self.raw()
+        } else {
+            self.clipped()
+        };
         Box::new(Edges::new(searched, self.size(), self.opts))
     }
 
@@ -153,11 +182,21 @@ impl<'a, P: Photo> Stream<'a, P> {
         let (behaviour, careful) = (self.behaviour(), self.opts.profile == Profile::Robust);
         let mut source = self.clipped();
         if let Some(garbage) = garbage {
-            source = Box::new(Garbage { source, garbage, behaviour, careful });
+            source = Box::new(Garbage {
+                source,
+                garbage,
+                behaviour,
+                careful,
+            });
         }
         // Blender 4.5 applies a core matte of 0 where none is given, which matters below a garbage matte above 1.
         if core.is_some() || (garbage.is_some() && behaviour == Behaviour::V45) {
-            source = Box::new(Core { source, core, behaviour, careful });
+            source = Box::new(Core {
+                source,
+                core,
+                behaviour,
+                careful,
+            });
         }
         source
     }
@@ -176,7 +215,10 @@ impl<'a, P: Photo> Stream<'a, P> {
             source = Box::new(Feather::new(source, size, o));
         }
         if o.profile == Profile::Robust {
-            source = Box::new(Clamp { source, clamped: &self.clamped });
+            source = Box::new(Clamp {
+                source,
+                clamped: &self.clamped,
+            });
         }
         source
     }
@@ -194,7 +236,11 @@ impl<'a, P: Photo> Stream<'a, P> {
 /// 4K pictures on one thread takes several times as long as keying.
 pub(super) fn fit<Q: Zeroable + Copy>(image: &mut Image<Q>, width: usize, height: usize) {
     if image.size() != (width, height) {
-        *image = Image::from_vec(width, height, bytemuck::allocation::zeroed_vec(width * height));
+        *image = Image::from_vec(
+            width,
+            height,
+            bytemuck::allocation::zeroed_vec(width * height),
+        );
     }
 }
 

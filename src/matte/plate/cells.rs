@@ -21,37 +21,63 @@ pub(super) struct Cell {
 
 /// The cells of a picture where it shows the screen, row by row.
 pub(super) fn means(photo: &Image<LinearRgb>, background: &Image<bool>) -> Vec<Cell> {
-    assert_eq!(photo.size(), background.size(), "photo and background differ in size");
+    assert_eq!(
+        photo.size(),
+        background.size(),
+        "photo and background differ in size"
+    );
     let (w, h) = photo.size();
     let side = w.max(h).div_ceil(ALONG).max(1);
     let columns = w.div_ceil(side);
-    (0..columns * h.div_ceil(side)).filter_map(|i| mean(photo, background, [i % columns, i / columns], side)).collect()
+    (0..columns * h.div_ceil(side))
+        .filter_map(|i| mean(photo, background, [i % columns, i / columns], side))
+        .collect()
 }
 
-fn mean(photo: &Image<LinearRgb>, background: &Image<bool>, index: [usize; 2], side: usize) -> Option<Cell> {
+fn mean(
+    photo: &Image<LinearRgb>,
+    background: &Image<bool>,
+    index: [usize; 2],
+    side: usize,
+) -> Option<Cell> {
     let (w, h) = photo.size();
     let [x0, y0] = index.map(|i| i * side);
     let (x1, y1) = ((x0 + side).min(w), (y0 + side).min(h));
     let (mut count, mut at_px, mut color) = (0_u32, [0.0; 2], [0.0; 3]);
     for y in y0..y1 {
         let row = photo.row(y)[x0..x1].iter().zip(&background.row(y)[x0..x1]);
-        for (x, (p, _)) in (x0..x1).zip(row).filter(|(_, (p, free))| **free && p.is_finite()) {
+        for (x, (p, _)) in (x0..x1)
+            .zip(row)
+            .filter(|(_, (p, free))| **free && p.is_finite())
+        {
             count += 1;
             at_px[0] += x as f64 + 0.5;
             at_px[1] += y as f64 + 0.5;
             let channels: [f32; 3] = (*p).into();
-            color.iter_mut().zip(channels).for_each(|(sum, c): (&mut f64, f32)| *sum += f64::from(c));
+            color
+                .iter_mut()
+                .zip(channels)
+                .for_each(|(sum, c): (&mut f64, f32)| *sum += f64::from(c));
         }
     }
     let n = f64::from(count);
     let enough = count > 0 && n >= LEAST_SHARE * ((x1 - x0) * (y1 - y0)) as f64;
-    enough.then(|| Cell { at_px: at_px.map(|v: f64| v / n), color: color.map(|v| v / n), index })
+    enough.then(|| Cell {
+        at_px: at_px.map(|v: f64| v / n),
+        color: color.map(|v| v / n),
+        index,
+    })
 }
 
 /// The factor per channel from the second picture's cells to the first's: the median of their quotients.
 pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
-    let of =
-        |c: usize| median(pairs(photo, plate).filter(|(_, b)| b.color[c] > 0.0).map(|(a, b)| a.color[c] / b.color[c]));
+    let of = |c: usize| {
+        median(
+            pairs(photo, plate)
+                .filter(|(_, b)| b.color[c] > 0.0)
+                .map(|(a, b)| a.color[c] / b.color[c]),
+        )
+    };
     Some([of(0)? as f32, of(1)? as f32, of(2)? as f32].into())
 }
 
@@ -59,7 +85,12 @@ pub(super) fn gain(photo: &[Cell], plate: &[Cell]) -> Option<LinearRgb> {
 pub(super) fn mismatch(photo: &[Cell], plate: &[Cell]) -> f32 {
     let differs = pairs(photo, plate).map(|(a, b)| {
         let brightest = b.color.into_iter().fold(f64::MIN_POSITIVE, f64::max);
-        a.color.iter().zip(b.color).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / brightest
+        a.color
+            .iter()
+            .zip(b.color)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+            / brightest
     });
     median(differs).unwrap_or(0.0) as f32
 }
@@ -83,9 +114,17 @@ pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// Standard deviation of a photo around a plate where the screen is free, channel by channel, by the median of the
 /// absolute differences: what is not screen after all does not count.
-pub(super) fn deviation(photo: &Image<LinearRgb>, plate: &Image<LinearRgb>, background: &Image<bool>) -> LinearRgb {
+pub(super) fn deviation(
+    photo: &Image<LinearRgb>,
+    plate: &Image<LinearRgb>,
+    background: &Image<bool>,
+) -> LinearRgb {
     let step = (photo.pixels().len() / SAMPLES).max(1);
-    let free = || (0..photo.pixels().len()).step_by(step).filter(|&i| background.pixels()[i]);
+    let free = || {
+        (0..photo.pixels().len())
+            .step_by(step)
+            .filter(|&i| background.pixels()[i])
+    };
     let channel = |c: usize| {
         let differs = free().map(|i| {
             let [a, b] = [photo, plate].map(|image| <[f32; 3]>::from(image.pixels()[i])[c]);

@@ -41,37 +41,60 @@ impl Polynomial {
     pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
         let samples = samples(cells, size, opts.max_degree)?;
         let most = |degree: usize| samples.len() >= CELLS_A_COEFFICIENT * terms(degree);
-        let degrees: Vec<usize> = (0..=opts.max_degree).filter(|&d| d == 0 || most(d)).collect();
-        let (left, asked): (Vec<_>, Vec<_>) = samples.iter().enumerate().partition(|(i, _)| i % LEFT_OUT == 0);
-        let strip = |part: Vec<(usize, _)>| part.into_iter().map(|(_, s)| s).collect::<Vec<&Sample>>();
+        let degrees: Vec<usize> = (0..=opts.max_degree)
+            .filter(|&d| d == 0 || most(d))
+            .collect();
+        let (left, asked): (Vec<_>, Vec<_>) = samples
+            .iter()
+            .enumerate()
+            .partition(|(i, _)| i % LEFT_OUT == 0);
+        let strip =
+            |part: Vec<(usize, _)>| part.into_iter().map(|(_, s)| s).collect::<Vec<&Sample>>();
         let (left, asked) = (strip(left), strip(asked));
-        let errors: Vec<f64> = degrees.iter().map(|&degree| left_out_error(&asked, &left, degree)).collect();
+        let errors: Vec<f64> = degrees
+            .iter()
+            .map(|&degree| left_out_error(&asked, &left, degree))
+            .collect();
         let all: Vec<&Sample> = samples.iter().collect();
         let best = errors.iter().copied().fold(f64::MAX, f64::min).max(FINEST);
-        let enough = errors.iter().position(|e| *e <= best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE));
+        let enough = errors
+            .iter()
+            .position(|e| *e <= best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE));
         let degree = degrees[enough.unwrap_or(degrees.len() - 1)];
-        Ok(Self { degree, coefficients: [0, 1, 2].map(|c| robust(&all, degree, c)) })
+        Ok(Self {
+            degree,
+            coefficients: [0, 1, 2].map(|c| robust(&all, degree, c)),
+        })
     }
 
     /// The screen in every pixel.
     pub(super) fn image(&self, size: (usize, usize)) -> Image<LinearRgb> {
         let (w, h) = size;
         let mut out = Image::new(w, h);
-        let u: Vec<f32> = (0..w).map(|x| place([x as f64 + 0.5, 0.0], size)[0] as f32).collect();
-        out.par_rows_mut().enumerate().for_each(|(y, row): (usize, &mut [LinearRgb])| {
-            let v = place([0.0, y as f64 + 0.5], size)[1];
-            let [r, g, b] = [0, 1, 2].map(|c| exponentials(&self.along(c, v), &u));
-            for (pixel, (r, (g, b))) in row.iter_mut().zip(r.into_iter().zip(g.into_iter().zip(b))) {
-                *pixel = LinearRgb::new(r, g, b);
-            }
-        });
+        let u: Vec<f32> = (0..w)
+            .map(|x| place([x as f64 + 0.5, 0.0], size)[0] as f32)
+            .collect();
+        out.par_rows_mut()
+            .enumerate()
+            .for_each(|(y, row): (usize, &mut [LinearRgb])| {
+                let v = place([0.0, y as f64 + 0.5], size)[1];
+                let [r, g, b] = [0, 1, 2].map(|c| exponentials(&self.along(c, v), &u));
+                for (pixel, (r, (g, b))) in
+                    row.iter_mut().zip(r.into_iter().zip(g.into_iter().zip(b)))
+                {
+                    *pixel = LinearRgb::new(r, g, b);
+                }
+            });
         out
     }
 
     /// Coefficients of the polynomial in x that is left of a channel in one row.
     fn along(&self, channel: usize, v: f64) -> Vec<f32> {
         let mut along = vec![0.0_f64; self.degree + 1];
-        for (&[i, j], k) in exponents(self.degree).iter().zip(self.coefficients[channel].iter()) {
+        for (&[i, j], k) in exponents(self.degree)
+            .iter()
+            .zip(self.coefficients[channel].iter())
+        {
             along[i] += k * v.powi(j as i32);
         }
         along.into_iter().map(|k| k as f32).collect()
@@ -82,7 +105,10 @@ impl Polynomial {
 fn exponentials(coefficients: &[f32], at: &[f32]) -> Vec<f32> {
     let mut values = vec![0.0_f32; at.len()];
     for k in coefficients.iter().rev() {
-        values.iter_mut().zip(at).for_each(|(value, u)| *value = *value * u + k);
+        values
+            .iter_mut()
+            .zip(at)
+            .for_each(|(value, u)| *value = *value * u + k);
     }
     values.iter_mut().for_each(|value| *value = exp(*value));
     values
@@ -102,7 +128,15 @@ fn exp(x: f32) -> f32 {
     let x = x.clamp(EXP_RANGE[0], EXP_RANGE[1]);
     let k = x * std::f32::consts::LOG2_E + ROUNDER - ROUNDER;
     let r = x - k * LN_2[0] - k * LN_2[1];
-    let series = [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0];
+    let series = [
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        0.5,
+        1.0,
+        1.0,
+    ];
     let small = series.into_iter().fold(0.0, |sum, factor| sum * r + factor);
     // The bits of 2^k: the exponent of a float stands above its 23 others, 127 too large.
     small * f32::from_bits(((k as i32).wrapping_add(127) as u32) << 23)
@@ -114,7 +148,9 @@ fn terms(degree: usize) -> usize {
 
 /// The powers of x and y up to a total degree.
 fn exponents(degree: usize) -> Vec<[usize; 2]> {
-    (0..=degree).flat_map(|total| (0..=total).map(move |j| [total - j, j])).collect()
+    (0..=degree)
+        .flat_map(|total| (0..=total).map(move |j| [total - j, j]))
+        .collect()
 }
 
 /// A position in units of half the longer side, from the centre.
@@ -126,16 +162,23 @@ fn place([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
 fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Vec<Sample>> {
     let brightest = cells.iter().flat_map(|cell| cell.color).fold(0.0, f64::max);
     if cells.is_empty() {
-        return Err(refused("the object leaves no background to fit the screen to"));
+        return Err(refused(
+            "the object leaves no background to fit the screen to",
+        ));
     }
     if brightest <= 0.0 {
-        return Err(refused("the background is black; a screen plate needs light on the screen"));
+        return Err(refused(
+            "the background is black; a screen plate needs light on the screen",
+        ));
     }
     let exponents = exponents(max_degree);
     let sample = |cell: &Cell| {
         let [u, v] = place(cell.at_px, size);
         Sample {
-            basis: exponents.iter().map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32)).collect(),
+            basis: exponents
+                .iter()
+                .map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32))
+                .collect(),
             log: cell.color.map(|c| libm::log(c.max(DARKEST * brightest))),
         }
     };
@@ -149,7 +192,13 @@ fn left_out_error(asked: &[&Sample], left: &[&Sample], degree: usize) -> f64 {
         return f64::MAX;
     }
     let brightness = |c: usize| asked.iter().map(|s| s.log[c]).sum::<f64>();
-    let brightest = (1..3).fold(0, |best, c| if brightness(c) > brightness(best) { c } else { best });
+    let brightest = (1..3).fold(0, |best, c| {
+        if brightness(c) > brightness(best) {
+            c
+        } else {
+            best
+        }
+    });
     let k = robust(asked, degree, brightest);
     median(left.iter().map(|s| (s.log[brightest] - value(&k, s)).abs())).unwrap_or(f64::MAX)
 }
@@ -165,14 +214,20 @@ fn robust(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
     let mut k = DVector::zeros(terms(degree));
     for _ in 0..ROUNDS {
         k = solved(samples, channel, &weights, terms(degree));
-        let residuals: Vec<f64> = samples.iter().map(|s| s.log[channel] - value(&k, s)).collect();
+        let residuals: Vec<f64> = samples
+            .iter()
+            .map(|s| s.log[channel] - value(&k, s))
+            .collect();
         let spread = |set: &dyn Fn(f64) -> bool| {
             let chosen = residuals.iter().filter(|r| set(**r)).map(|r| r.abs());
             (SIGMA_OF_MEDIAN * median(chosen).unwrap_or(0.0)).max(FINEST)
         };
         let (above, below) = (TUKEY * spread(&|_| true), SHADOWED * spread(&|r| r > 0.0));
         let reach = |r: f64| if r > 0.0 { above } else { below };
-        weights = residuals.iter().map(|r| (1.0 - (r / reach(*r)).powi(2)).max(0.0).powi(2)).collect();
+        weights = residuals
+            .iter()
+            .map(|r| (1.0 - (r / reach(*r)).powi(2)).max(0.0).powi(2))
+            .collect();
     }
     k
 }
@@ -180,7 +235,11 @@ fn robust(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
 /// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
 fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
     let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE, DVector::zeros(n));
-    for (sample, weight) in samples.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+    for (sample, weight) in samples
+        .iter()
+        .zip(weights)
+        .filter(|(_, weight)| **weight > 0.0)
+    {
         for i in 0..n {
             let scaled = weight * sample.basis[i];
             right[i] += scaled * sample.log[channel];
@@ -188,7 +247,9 @@ fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVe
             (0..=i).for_each(|j| normal[(i, j)] += scaled * sample.basis[j]);
         }
     }
-    normal.cholesky().map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
+    normal
+        .cholesky()
+        .map_or_else(|| DVector::zeros(n), |c| c.solve(&right))
 }
 
 /// Far below what a single cell adds.
@@ -203,7 +264,10 @@ mod tests {
         for i in -8600..8700 {
             let x = i as f32 * 0.01 + 0.001;
             let (found, expected) = (f64::from(exp(x)), libm::exp(f64::from(x)));
-            assert!((found / expected - 1.0).abs() < 2.5e-7, "e^{x}: {found}, expected {expected}");
+            assert!(
+                (found / expected - 1.0).abs() < 2.5e-7,
+                "e^{x}: {found}, expected {expected}"
+            );
         }
         assert!(exp(f32::INFINITY) < 2e38 && exp(f32::NEG_INFINITY) > 0.0 && exp(0.0) == 1.0);
     }

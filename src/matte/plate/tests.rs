@@ -8,15 +8,22 @@ const GREEN: LinearRgb = LinearRgb::new(0.045, 0.42, 0.085);
 /// A screen in the light of a lamp above its corner, `uneven` between darkest and brightest.
 fn screen(uneven: f32) -> Image<LinearRgb> {
     let fall = |x: usize, y: usize| {
-        let (u, v) = (x as f32 / SIZE.0 as f32 - 0.2, y as f32 / SIZE.1 as f32 - 0.1);
+        let (u, v) = (
+            x as f32 / SIZE.0 as f32 - 0.2,
+            y as f32 / SIZE.1 as f32 - 0.1,
+        );
         libm::powf(1.0 + 1.5 * (u * u + v * v), -1.5)
     };
     let darkest = fall(SIZE.0 - 1, SIZE.1 - 1);
-    Image::from_fn(SIZE.0, SIZE.1, |x, y| GREEN.scale(1.0 - uneven * (1.0 - fall(x, y)) / (1.0 - darkest)))
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        GREEN.scale(1.0 - uneven * (1.0 - fall(x, y)) / (1.0 - darkest))
+    })
 }
 
 fn free() -> Image<bool> {
-    Image::from_fn(SIZE.0, SIZE.1, |x, y| !((30..210).contains(&x) && (30..130).contains(&y)))
+    Image::from_fn(SIZE.0, SIZE.1, |x, y| {
+        !((30..210).contains(&x) && (30..130).contains(&y))
+    })
 }
 
 /// The screen with an object on it, its shadow below and noise.
@@ -26,9 +33,16 @@ fn photo(plate: &Image<LinearRgb>, noise: f32) -> Image<LinearRgb> {
     let free = free();
     let mut photo = Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let shadow = (130..140).contains(&y) && (60..200).contains(&x);
-        if free[(x, y)] { plate[(x, y)].scale(if shadow { 0.8 } else { 1.0 }) } else { LinearRgb::grey(0.6) }
+        if free[(x, y)] {
+            plate[(x, y)].scale(if shadow { 0.8 } else { 1.0 })
+        } else {
+            LinearRgb::grey(0.6)
+        }
     });
-    photo.pixels_mut().iter_mut().for_each(|p| *p = p.map(|v| v + grain()));
+    photo
+        .pixels_mut()
+        .iter_mut()
+        .for_each(|p| *p = p.map(|v| v + grain()));
     photo
 }
 
@@ -42,16 +56,32 @@ fn worst(found: &ScreenPlate, truth: &Image<LinearRgb>) -> f32 {
 fn an_uneven_screen_is_found_under_the_object_and_beside_its_shadow() {
     for (uneven, tolerance) in [(0.0, 0.005), (0.15, 0.05), (0.6, 0.07)] {
         let truth = screen(uneven);
-        let found = ScreenPlate::fit(&photo(&truth, 0.004), &free(), &PlateOptions::default()).unwrap();
-        assert!(worst(&found, &truth) < tolerance, "{} at {uneven}", worst(&found, &truth));
-        assert!((found.unevenness - uneven).abs() < 0.06, "{}", found.unevenness);
+        let found =
+            ScreenPlate::fit(&photo(&truth, 0.004), &free(), &PlateOptions::default()).unwrap();
+        assert!(
+            worst(&found, &truth) < tolerance,
+            "{} at {uneven}",
+            worst(&found, &truth)
+        );
+        assert!(
+            (found.unevenness - uneven).abs() < 0.06,
+            "{}",
+            found.unevenness
+        );
     }
 }
 
 #[test]
 fn the_degree_is_no_higher_than_needed() {
-    let degree =
-        |uneven| ScreenPlate::fit(&photo(&screen(uneven), 0.004), &free(), &PlateOptions::default()).unwrap().degree;
+    let degree = |uneven| {
+        ScreenPlate::fit(
+            &photo(&screen(uneven), 0.004),
+            &free(),
+            &PlateOptions::default(),
+        )
+        .unwrap()
+        .degree
+    };
     assert_eq!(degree(0.0), Some(0));
     assert!(degree(0.6) >= Some(2), "{:?}", degree(0.6));
 }
@@ -67,11 +97,20 @@ fn noise_of_3_percent_is_survived() {
 fn dirty(clean: &Image<LinearRgb>, [dx, dy]: [f64; 2]) -> Image<LinearRgb> {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let (w, h) = (SIZE.0 as f64, SIZE.1 as f64);
-    let blobs: Vec<[f64; 3]> =
-        (0..150).map(|_| [w * rng.random::<f64>(), h * rng.random::<f64>(), 1.5 + 2.0 * rng.random::<f64>()]).collect();
+    let blobs: Vec<[f64; 3]> = (0..150)
+        .map(|_| {
+            [
+                w * rng.random::<f64>(),
+                h * rng.random::<f64>(),
+                1.5 + 2.0 * rng.random::<f64>(),
+            ]
+        })
+        .collect();
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let (x, y) = (x as f64 + 0.5 - dx, y as f64 + 0.5 - dy);
-        let blob = |[u, v, r]: &[f64; 3]| 0.3 * libm::exp(-((x - u).powi(2) + (y - v).powi(2)) / (2.0 * r * r));
+        let blob = |[u, v, r]: &[f64; 3]| {
+            0.3 * libm::exp(-((x - u).powi(2) + (y - v).powi(2)) / (2.0 * r * r))
+        };
         let light = 1.0 - blobs.iter().map(blob).sum::<f64>().min(0.6);
         clean[(x as usize % SIZE.0, y as usize % SIZE.1)].scale(light as f32)
     })
@@ -83,13 +122,27 @@ fn a_photographed_screen_is_aligned_and_its_exposure_matched() {
     for shift in [[0.0, 0.0], [3.0, 2.0], [-1.6, 0.7]] {
         // The empty screen was photographed darker, and lies so far off.
         let empty = dirty(&screen(0.0), shift.map(|s: f64| -s)).map(|p| p.scale(0.9));
-        let found = ScreenPlate::from_photo(&empty, &photo(&truth, 0.002), &free(), &PlateOptions::default()).unwrap();
+        let found = ScreenPlate::from_photo(
+            &empty,
+            &photo(&truth, 0.002),
+            &free(),
+            &PlateOptions::default(),
+        )
+        .unwrap();
         let [dx, dy] = found.shift_px;
-        assert!((dx - shift[0]).abs() < 0.2 && (dy - shift[1]).abs() < 0.2, "{:?}, expected {shift:?}", found.shift_px);
+        assert!(
+            (dx - shift[0]).abs() < 0.2 && (dy - shift[1]).abs() < 0.2,
+            "{:?}, expected {shift:?}",
+            found.shift_px
+        );
         assert_eq!(found.degree, None);
-        let mean =
-            |image: &Image<LinearRgb>| image.pixels().iter().map(|p| p.g).sum::<f32>() / (SIZE.0 * SIZE.1) as f32;
-        assert!((mean(&found.image) / mean(&truth) - 1.0).abs() < 0.02, "the exposure is matched");
+        let mean = |image: &Image<LinearRgb>| {
+            image.pixels().iter().map(|p| p.g).sum::<f32>() / (SIZE.0 * SIZE.1) as f32
+        };
+        assert!(
+            (mean(&found.image) / mean(&truth) - 1.0).abs() < 0.02,
+            "the exposure is matched"
+        );
     }
 }
 
@@ -97,7 +150,13 @@ fn a_photographed_screen_is_aligned_and_its_exposure_matched() {
 fn a_photographed_screen_without_dirt_is_taken_as_it_lies() {
     let truth = screen(0.3);
     let empty = truth.map(|p| p.scale(0.9));
-    let found = ScreenPlate::from_photo(&empty, &photo(&truth, 0.002), &free(), &PlateOptions::default()).unwrap();
+    let found = ScreenPlate::from_photo(
+        &empty,
+        &photo(&truth, 0.002),
+        &free(),
+        &PlateOptions::default(),
+    )
+    .unwrap();
     assert_eq!((found.degree, found.shift_px), (None, [0.0; 2]));
     // The border of the blur is flat where the screen slopes.
     assert!(worst(&found, &truth) < 0.03, "{}", worst(&found, &truth));
@@ -106,30 +165,62 @@ fn a_photographed_screen_without_dirt_is_taken_as_it_lies() {
 #[test]
 fn an_empty_screen_that_lies_too_far_off_is_refused() {
     let empty = dirty(&screen(0.0), [-6.0, 0.0]);
-    let near = PlateOptions { max_shift_px: 4.0, ..PlateOptions::default() };
+    let near = PlateOptions {
+        max_shift_px: 4.0,
+        ..PlateOptions::default()
+    };
     let photo = photo(&dirty(&screen(0.0), [0.0; 2]), 0.002);
-    let said = ScreenPlate::from_photo(&empty, &photo, &free(), &near).unwrap_err().to_string();
+    let said = ScreenPlate::from_photo(&empty, &photo, &free(), &near)
+        .unwrap_err()
+        .to_string();
     assert!(said.contains("did the camera move?"), "{said}");
 }
 
 #[test]
 fn another_screen_is_not_taken_for_the_empty_one() {
     let photo = photo(&screen(0.0), 0.002);
-    let other = Image::from_fn(SIZE.0, SIZE.1, |x, _| GREEN.scale(if x < 120 { 0.5 } else { 1.5 }));
-    let said = ScreenPlate::from_photo(&other, &photo, &free(), &PlateOptions::default()).unwrap_err().to_string();
+    let other = Image::from_fn(SIZE.0, SIZE.1, |x, _| {
+        GREEN.scale(if x < 120 { 0.5 } else { 1.5 })
+    });
+    let said = ScreenPlate::from_photo(&other, &photo, &free(), &PlateOptions::default())
+        .unwrap_err()
+        .to_string();
     assert!(said.contains("did the light change?"), "{said}");
-    let small = ScreenPlate::from_photo(&Image::new(8, 8), &photo, &free(), &PlateOptions::default());
-    assert!(small.unwrap_err().to_string().contains("8 x 8 pixels, the photo 240 x 160"));
+    let small =
+        ScreenPlate::from_photo(&Image::new(8, 8), &photo, &free(), &PlateOptions::default());
+    assert!(
+        small
+            .unwrap_err()
+            .to_string()
+            .contains("8 x 8 pixels, the photo 240 x 160")
+    );
 }
 
 #[test]
 fn no_background_or_no_light_is_refused() {
     let photo = Image::filled(64, 64, GREEN);
-    let none = ScreenPlate::fit(&photo, &Image::filled(64, 64, false), &PlateOptions::default());
-    assert!(none.unwrap_err().to_string().contains("leaves no background"));
-    let dark = ScreenPlate::fit(&Image::new(64, 64), &Image::filled(64, 64, true), &PlateOptions::default());
+    let none = ScreenPlate::fit(
+        &photo,
+        &Image::filled(64, 64, false),
+        &PlateOptions::default(),
+    );
+    assert!(
+        none.unwrap_err()
+            .to_string()
+            .contains("leaves no background")
+    );
+    let dark = ScreenPlate::fit(
+        &Image::new(64, 64),
+        &Image::filled(64, 64, true),
+        &PlateOptions::default(),
+    );
     assert!(dark.unwrap_err().to_string().contains("black"));
-    let wrong = PlateOptions { max_degree: 9, ..PlateOptions::default() };
-    let said = ScreenPlate::fit(&photo, &Image::filled(64, 64, true), &wrong).unwrap_err().to_string();
+    let wrong = PlateOptions {
+        max_degree: 9,
+        ..PlateOptions::default()
+    };
+    let said = ScreenPlate::fit(&photo, &Image::filled(64, 64, true), &wrong)
+        .unwrap_err()
+        .to_string();
     assert_eq!(said, "max_degree: 9, expected 0 to 6");
 }

@@ -32,17 +32,29 @@ impl Bands {
     pub(super) fn of(photo: &Image<LinearRgb>, tone: Tone, count: usize) -> Self {
         let pictures = match tone {
             Tone::Channels => {
-                vec![root(photo, [1.0, 0.0, 0.0]), root(photo, [0.0, 1.0, 0.0]), root(photo, [0.0, 0.0, 1.0])]
+                vec![
+                    root(photo, [1.0, 0.0, 0.0]),
+                    root(photo, [0.0, 1.0, 0.0]),
+                    root(photo, [0.0, 0.0, 1.0]),
+                ]
             }
             Tone::Grey(weights) => vec![root(photo, weights)],
         };
-        let mut channels: Vec<_> = pictures.into_iter().map(|picture| magnitudes(picture, count).into_iter()).collect();
-        let mut bands = (0..count).map(|_| joined(channels.iter_mut().filter_map(Iterator::next).collect()));
+        let mut channels: Vec<_> = pictures
+            .into_iter()
+            .map(|picture| magnitudes(picture, count).into_iter())
+            .collect();
+        let mut bands =
+            (0..count).map(|_| joined(channels.iter_mut().filter_map(Iterator::next).collect()));
         let first = bands.next().unwrap_or_default();
         let coarser: Vec<_> = bands.map(|band| largest_around(&band, 1)).collect();
         let mut sizes = vec![first.size()];
         sizes.extend(coarser.iter().map(Image::size));
-        Self { first, coarser, sizes }
+        Self {
+            first,
+            coarser,
+            sizes,
+        }
     }
 
     /// What is about `2^level` pixels wide, brought to the photo's size; `level` is 2 or more.
@@ -146,7 +158,12 @@ fn noise(magnitudes: &Image<Coverage>) -> f32 {
         true => row.to_vec(),
         false => [&row[..left], &row[right..]].concat(),
     };
-    let mut values: Vec<f32> = magnitudes.rows().enumerate().flat_map(on_frame).map(|c| c.0).collect();
+    let mut values: Vec<f32> = magnitudes
+        .rows()
+        .enumerate()
+        .flat_map(on_frame)
+        .map(|c| c.0)
+        .collect();
     let rank = (values.len() as f64 * QUIET) as usize;
     if rank >= values.len() {
         return ROUNDING;
@@ -167,7 +184,13 @@ mod tests {
 
     fn noisy(size: usize, sigma: f32) -> Image<Coverage> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-        Image::from_vec(size, size, (0..size * size).map(|_| Coverage((sigma * normal(&mut rng)).abs())).collect())
+        Image::from_vec(
+            size,
+            size,
+            (0..size * size)
+                .map(|_| Coverage((sigma * normal(&mut rng)).abs()))
+                .collect(),
+        )
     }
 
     #[test]
@@ -179,33 +202,60 @@ mod tests {
     #[test]
     fn noise_does_not_see_an_object_even_at_two_borders() {
         let quiet = noisy(200, 0.02);
-        let busy = Image::from_fn(200, 200, |x, y| if x < 90 || y < 50 { Coverage(0.5) } else { quiet[(x, y)] });
+        let busy = Image::from_fn(200, 200, |x, y| {
+            if x < 90 || y < 50 {
+                Coverage(0.5)
+            } else {
+                quiet[(x, y)]
+            }
+        });
         // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the noise, 3.7 times its own.
         assert!(noise(&busy) < 4.0 * noise(&quiet));
     }
 
     #[test]
     fn the_largest_around_a_pixel_is_found_up_to_the_border() {
-        let band = Image::from_fn(7, 5, |x, y| Coverage(((x * 7919 + y * 104_729) % 31) as f32));
+        let band = Image::from_fn(7, 5, |x, y| {
+            Coverage(((x * 7919 + y * 104_729) % 31) as f32)
+        });
         for reach in [1, 2, 9] {
             let found = largest_around(&band, reach);
             for (x, y) in (0..35_usize).map(|i| (i % 7, i / 7)) {
-                let near = (0..35_usize).filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
-                assert_eq!(found[(x, y)].0, near.map(|i| band.pixels()[i].0).fold(0.0, f32::max));
+                let near = (0..35_usize)
+                    .filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
+                assert_eq!(
+                    found[(x, y)].0,
+                    near.map(|i| band.pixels()[i].0).fold(0.0, f32::max)
+                );
             }
         }
     }
 
     #[test]
     fn a_constant_has_no_bands() {
-        let bands = Bands::of(&Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)), Tone::Channels, 4);
-        assert!(bands.first.pixels().iter().chain(bands.last(4).pixels()).all(|c| c.0 < 0.01));
+        let bands = Bands::of(
+            &Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)),
+            Tone::Channels,
+            4,
+        );
+        assert!(
+            bands
+                .first
+                .pixels()
+                .iter()
+                .chain(bands.last(4).pixels())
+                .all(|c| c.0 < 0.01)
+        );
     }
 
     #[test]
     fn channels_see_what_grey_does_not() {
         let photo = Image::from_fn(64, 64, |x, _| {
-            if x < 32 { LinearRgb::new(0.25, 0.04, 0.0) } else { LinearRgb::new(0.04, 0.25, 0.0) }
+            if x < 32 {
+                LinearRgb::new(0.25, 0.04, 0.0)
+            } else {
+                LinearRgb::new(0.04, 0.25, 0.0)
+            }
         });
         let seen = |tone| Bands::of(&photo, tone, 4).first[(32, 32)].0;
         assert!(seen(Tone::Grey([1.0; 3])) < 0.01 && seen(Tone::Channels) > 50.0);

@@ -25,9 +25,15 @@ const STEEPEST: f64 = 0.398_942;
 /// Along profiles across the outline, the steepest change over one pixel as a share of the whole change: `1 / (sqrt(2 pi)
 /// sigma)` for a blurred step. The median over the outline.
 pub(super) fn blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> f64 {
-    let points: Vec<_> =
-        outline.rings.iter().flat_map(|ring| across(&evenly(ring, SPACING * scale.max(1.0)))).collect();
-    let mut slopes: Vec<f32> = points.par_iter().filter_map(|(at, normal)| slope(roots, *at, *normal, scale)).collect();
+    let points: Vec<_> = outline
+        .rings
+        .iter()
+        .flat_map(|ring| across(&evenly(ring, SPACING * scale.max(1.0))))
+        .collect();
+    let mut slopes: Vec<f32> = points
+        .par_iter()
+        .filter_map(|(at, normal)| slope(roots, *at, *normal, scale))
+        .collect();
     let middle = slopes.len() / 2;
     if slopes.is_empty() {
         return 0.0;
@@ -39,16 +45,31 @@ pub(super) fn blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -
 /// The points of a ring and the normals there.
 fn across(ring: &[crate::geom::Point2<f64>]) -> Vec<(crate::geom::Point2<f64>, Vector2<f64>)> {
     let n = ring.len();
-    (0..n).map(|i| (ring[i], normal(ring[(i + n - 1) % n], ring[(i + 1) % n]))).collect()
+    (0..n)
+        .map(|i| (ring[i], normal(ring[(i + n - 1) % n], ring[(i + 1) % n])))
+        .collect()
 }
 
 /// The steepest change over a pixel, as a share of the whole change; nothing where hardly anything changes.
-fn slope(roots: &Image<LinearRgb>, at: crate::geom::Point2<f64>, normal: Vector2<f64>, scale: f64) -> Option<f32> {
-    let values: Vec<LinearRgb> =
-        (-2 * REACH..=2 * REACH).map(|k| lanes(roots, at, normal, 0.5 * f64::from(k), scale)).collect();
-    let pairs = values.iter().enumerate().flat_map(|(i, a)| values[i..].iter().map(move |b| distance(*a, *b)));
+fn slope(
+    roots: &Image<LinearRgb>,
+    at: crate::geom::Point2<f64>,
+    normal: Vector2<f64>,
+    scale: f64,
+) -> Option<f32> {
+    let values: Vec<LinearRgb> = (-2 * REACH..=2 * REACH)
+        .map(|k| lanes(roots, at, normal, 0.5 * f64::from(k), scale))
+        .collect();
+    let pairs = values
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| values[i..].iter().map(move |b| distance(*a, *b)));
     let whole = pairs.fold(0.0, f32::max);
-    let steepest = values.iter().zip(values.iter().skip(2)).map(|(a, b)| distance(*a, *b)).fold(0.0, f32::max);
+    let steepest = values
+        .iter()
+        .zip(values.iter().skip(2))
+        .map(|(a, b)| distance(*a, *b))
+        .fold(0.0, f32::max);
     (whole > LEAST_CHANGE).then(|| steepest / whole)
 }
 
@@ -61,17 +82,27 @@ mod tests {
     #[test]
     fn the_blur_of_a_disc_is_measured() {
         let disc = |x: usize, y: usize| (x as f64 + 0.5 - 50.0).hypot(y as f64 + 0.5 - 45.0) < 30.0;
-        let sharp = Image::from_fn(100, 90, |x, y| LinearRgb::grey(if disc(x, y) { 0.9 } else { 0.4 }));
+        let sharp = Image::from_fn(100, 90, |x, y| {
+            LinearRgb::grey(if disc(x, y) { 0.9 } else { 0.4 })
+        });
         let at = |i: usize| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * i as f64 / 200.0);
             Point2::new(50.0 + 30.0 * cos, 45.0 + 30.0 * sin)
         };
-        let circle = Outline { rings: vec![(0..200).map(at).collect()] };
+        let circle = Outline {
+            rings: vec![(0..200).map(at).collect()],
+        };
         for sigma in [1.0f32, 1.5, 2.0] {
             let found = blur_px(&circle, &filter::gaussian_blur(&sharp, sigma), 1.0);
             // The slope is taken over a pixel, and pixels and sampling blur by about half of one themselves.
-            assert!((found - f64::from(sigma)).abs() < 0.3, "{found} for {sigma}");
+            assert!(
+                (found - f64::from(sigma)).abs() < 0.3,
+                "{found} for {sigma}"
+            );
         }
-        assert_eq!(blur_px(&circle, &Image::filled(100, 90, LinearRgb::grey(0.4)), 1.0), 0.0);
+        assert_eq!(
+            blur_px(&circle, &Image::filled(100, 90, LinearRgb::grey(0.4)), 1.0),
+            0.0
+        );
     }
 }

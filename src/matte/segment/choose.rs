@@ -50,18 +50,38 @@ pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<
     let failed = searched.iter().filter(|s| s.pass.is_err()).count();
     if 2 * failed > searched.len() {
         let first = searched.iter().position(|s| s.pass.is_err()).unwrap_or(0);
-        return searched.swap_remove(first).chosen(scales, Confidence::default());
+        return searched
+            .swap_remove(first)
+            .chosen(scales, Confidence::default());
     }
-    let outlines: Vec<Option<Image<bool>>> = searched.iter().map(|s| s.compared(picture.size())).collect();
+    let outlines: Vec<Option<Image<bool>>> = searched
+        .iter()
+        .map(|s| s.compared(picture.size()))
+        .collect();
     let beliefs: Vec<Confidence> = searched
         .iter()
         .enumerate()
-        .map(|(i, s)| Confidence { support: s.support(), agreement: agreement(&outlines, i), ..Default::default() })
+        .map(|(i, s)| Confidence {
+            support: s.support(),
+            agreement: agreement(&outlines, i),
+            ..Default::default()
+        })
         .collect();
-    let wanted = |i: usize| opts.levels.is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels);
-    let most = (0..searched.len()).filter(|&i| wanted(i)).map(|i| beliefs[i].value()).fold(0.0, f64::max);
-    let pick = (0..searched.len()).find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most).unwrap_or(0);
-    let confidence = Confidence { drift_px: drift_px(&searched, pick, &scales, opts), ..beliefs[pick] };
+    let wanted = |i: usize| {
+        opts.levels
+            .is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels)
+    };
+    let most = (0..searched.len())
+        .filter(|&i| wanted(i))
+        .map(|i| beliefs[i].value())
+        .fold(0.0, f64::max);
+    let pick = (0..searched.len())
+        .find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most)
+        .unwrap_or(0);
+    let confidence = Confidence {
+        drift_px: drift_px(&searched, pick, &scales, opts),
+        ..beliefs[pick]
+    };
     searched.swap_remove(pick).chosen(scales, confidence)
 }
 
@@ -83,25 +103,52 @@ struct Searched {
 
 fn scales(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Scale> {
     let (w, h) = picture.size();
-    let large_enough = |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST_SEARCHED;
-    let sizes: Vec<_> = SIZES.into_iter().filter(|(reduction, _)| large_enough(*reduction)).collect();
+    let large_enough =
+        |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST_SEARCHED;
+    let sizes: Vec<_> = SIZES
+        .into_iter()
+        .filter(|(reduction, _)| large_enough(*reduction))
+        .collect();
     let scale = |&(reduction, depths): &(usize, &[usize])| {
         let longer = w.max(h) / reduction;
-        let mut depths: Vec<usize> = depths.iter().copied().filter(|&d| d == 2 || longer >> d >= LEAST_CELLS).collect();
-        depths.extend(opts.levels.filter(|levels| reduction == 1 && !depths.contains(levels)));
-        let smaller = (reduction > 1).then(|| filter::resize(picture, w / reduction, h / reduction));
-        let search = Search::of(smaller.as_ref().unwrap_or(picture), opts, depths.iter().copied().max().unwrap_or(2));
-        Scale { reduction, search, depths }
+        let mut depths: Vec<usize> = depths
+            .iter()
+            .copied()
+            .filter(|&d| d == 2 || longer >> d >= LEAST_CELLS)
+            .collect();
+        depths.extend(
+            opts.levels
+                .filter(|levels| reduction == 1 && !depths.contains(levels)),
+        );
+        let smaller =
+            (reduction > 1).then(|| filter::resize(picture, w / reduction, h / reduction));
+        let search = Search::of(
+            smaller.as_ref().unwrap_or(picture),
+            opts,
+            depths.iter().copied().max().unwrap_or(2),
+        );
+        Scale {
+            reduction,
+            search,
+            depths,
+        }
     };
     sizes.par_iter().map(scale).collect()
 }
 
 fn searches(scales: &[Scale], opts: &SegmentOptions) -> Vec<Searched> {
-    let settings = scales.iter().enumerate().flat_map(|(i, scale)| scale.depths.iter().map(move |&levels| (i, levels)));
+    let settings = scales
+        .iter()
+        .enumerate()
+        .flat_map(|(i, scale)| scale.depths.iter().map(move |&levels| (i, levels)));
     let settings: Vec<(usize, usize)> = settings.collect();
     let search = |&(scale, levels): &(usize, usize)| {
         let picture: &Scale = &scales[scale];
-        Searched { scale, levels, pass: picture.search.at(levels, opts) }
+        Searched {
+            scale,
+            levels,
+            pass: picture.search.at(levels, opts),
+        }
     };
     settings.par_iter().map(search).collect()
 }
@@ -116,7 +163,10 @@ fn drift_px(searched: &[Searched], pick: usize, scales: &[Scale], opts: &Segment
     let Ok(pass) = &own.pass else { return 0.0 };
     let stricter = scale.search.at_cut(own.levels, STRICTER, opts);
     let lost = pass.inside.width().max(pass.inside.height()) as f64;
-    let deeper = searched.iter().filter(|other| other.scale == own.scale).filter_map(|other| other.pass.as_ref().ok());
+    let deeper = searched
+        .iter()
+        .filter(|other| other.scale == own.scale)
+        .filter_map(|other| other.pass.as_ref().ok());
     let moved = deeper.map(|other| hull::farthest_side(&pass.hull, &other.hull));
     let stricter = stricter.map_or(lost, |other| hull::farthest_side(&pass.hull, &other.hull));
     scale.reduction as f64 * moved.fold(stricter, f64::max)
@@ -125,7 +175,13 @@ fn drift_px(searched: &[Searched], pick: usize, scales: &[Scale], opts: &Segment
 impl Searched {
     fn chosen(self, mut scales: Vec<Scale>, confidence: Confidence) -> Result<Chosen> {
         let (first, first_binary) = scales.swap_remove(self.scale).search.into_first();
-        Ok(Chosen { pass: self.pass?, first, first_binary, levels: self.levels, confidence })
+        Ok(Chosen {
+            pass: self.pass?,
+            first,
+            first_binary,
+            levels: self.levels,
+            confidence,
+        })
     }
 
     /// The inside in a picture small enough to be compared quickly.
@@ -145,7 +201,9 @@ impl Searched {
         let (w, h) = core.size();
         let (mut length, mut on_edges) = (0u64, 0u64);
         for (y, (inside, core)) in pass.inside.rows().zip(core.rows()).enumerate() {
-            for x in (0..w).filter(|&x| inside[x] && !core[x] && x > 0 && y > 0 && x + 1 < w && y + 1 < h) {
+            for x in (0..w)
+                .filter(|&x| inside[x] && !core[x] && x > 0 && y > 0 && x + 1 < w && y + 1 < h)
+            {
                 length += 1;
                 on_edges += u64::from(near[(x, y)]);
             }
@@ -160,14 +218,24 @@ const EDGE_REACH_PX: f64 = 2.0;
 /// Mean overlap of one outline with the others.
 fn agreement(outlines: &[Option<Image<bool>>], i: usize) -> f64 {
     let others = (0..outlines.len()).filter(|&j| j != i);
-    let overlap = |j: usize| outlines[i].as_ref().zip(outlines[j].as_ref()).map_or(0.0, |(a, b)| overlap(a, b));
+    let overlap = |j: usize| {
+        outlines[i]
+            .as_ref()
+            .zip(outlines[j].as_ref())
+            .map_or(0.0, |(a, b)| overlap(a, b))
+    };
     others.clone().map(overlap).sum::<f64>() / others.count().max(1) as f64
 }
 
 /// Intersection over union.
 fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
-    let count =
-        |holds: fn(bool, bool) -> bool| a.pixels().iter().zip(b.pixels()).filter(|(a, b)| holds(**a, **b)).count();
+    let count = |holds: fn(bool, bool) -> bool| {
+        a.pixels()
+            .iter()
+            .zip(b.pixels())
+            .filter(|(a, b)| holds(**a, **b))
+            .count()
+    };
     count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
 }
 
@@ -184,17 +252,31 @@ mod tests {
         assert_eq!(overlap(&square(10).unwrap(), &square(5).unwrap()), 0.25);
         let found = [square(10), square(10), square(5), None];
         assert!((agreement(&found, 0) - (1.0 + 0.25 + 0.0) / 3.0).abs() < 1e-12);
-        assert_eq!((agreement(&found, 3), agreement(&found[..1], 0)), (0.0, 0.0));
+        assert_eq!(
+            (agreement(&found, 3), agreement(&found[..1], 0)),
+            (0.0, 0.0)
+        );
     }
 
     #[test]
     fn the_depth_that_was_asked_for_is_taken() {
         let disc = |x: f64, y: f64| (x - 150.0).hypot(y - 100.0) < 60.0;
         let photo = Image::from_fn(300, 200, |x, y| {
-            if disc(x as f64, y as f64) { LinearRgb::WHITE } else { LinearRgb::new(0.04, 0.4, 0.08) }
+            if disc(x as f64, y as f64) {
+                LinearRgb::WHITE
+            } else {
+                LinearRgb::new(0.04, 0.4, 0.08)
+            }
         });
         for levels in [2, 3, 6] {
-            let chosen = best(&photo, &SegmentOptions { levels: Some(levels), ..Default::default() }).unwrap();
+            let chosen = best(
+                &photo,
+                &SegmentOptions {
+                    levels: Some(levels),
+                    ..Default::default()
+                },
+            )
+            .unwrap();
             assert_eq!(chosen.levels, levels);
             assert_eq!(chosen.pass.inside.size(), photo.size());
         }

@@ -32,22 +32,37 @@ impl Groups {
                 while above < here && runs[above].columns.end < columns.start {
                     above += 1;
                 }
-                runs.push(Run { row, columns, group });
+                runs.push(Run {
+                    row,
+                    columns,
+                    group,
+                });
                 let touches = |run: &Run| run.columns.start <= runs[group].columns.end;
-                let end = above + runs[above..here].iter().take_while(|run| touches(run)).count();
+                let end = above
+                    + runs[above..here]
+                        .iter()
+                        .take_while(|run| touches(run))
+                        .count();
                 (above..end).for_each(|other| join(&mut runs, group, other));
             }
             (above, here) = (here, runs.len());
         }
         let count = number(&mut runs);
-        Self { size: set.size(), runs, count }
+        Self {
+            size: set.size(),
+            runs,
+            count,
+        }
     }
 
     /// How many pixels of `members` are in each group.
     pub(in super::super) fn sizes(&self, members: &Image<bool>) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
-            sizes[run.group] += members.row(run.row)[run.columns.clone()].iter().filter(|p| **p).count();
+            sizes[run.group] += members.row(run.row)[run.columns.clone()]
+                .iter()
+                .filter(|p| **p)
+                .count();
         }
         sizes
     }
@@ -66,7 +81,8 @@ impl Groups {
         let (w, h) = self.size;
         let mut reaching = vec![false; self.count];
         for run in &self.runs {
-            reaching[run.group] |= run.row == 0 || run.row + 1 == h || run.columns.start == 0 || run.columns.end == w;
+            reaching[run.group] |=
+                run.row == 0 || run.row + 1 == h || run.columns.start == 0 || run.columns.end == w;
         }
         reaching
     }
@@ -77,7 +93,10 @@ fn runs_of(row: &[bool]) -> impl Iterator<Item = Range<usize>> {
     let mut at = 0;
     std::iter::from_fn(move || {
         let start = at + row[at..].iter().position(|p| *p)?;
-        at = row[start..].iter().position(|p| !p).map_or(row.len(), |length| start + length);
+        at = row[start..]
+            .iter()
+            .position(|p| !p)
+            .map_or(row.len(), |length| start + length);
         Some(start..at)
     })
 }
@@ -136,7 +155,9 @@ mod tests {
 
     #[test]
     fn groups_are_joined_over_corners_and_counted() {
-        let set = Image::from_fn(6, 3, |x, y| matches!((x, y), (0, 0) | (1, 1) | (4, 1) | (5, 1) | (4, 2)));
+        let set = Image::from_fn(6, 3, |x, y| {
+            matches!((x, y), (0, 0) | (1, 1) | (4, 1) | (5, 1) | (4, 2))
+        });
         assert_eq!(Groups::of(&set).sizes(&set), [2, 3]);
         assert_eq!(count(&without_specks(&set, 3)), 3);
     }
@@ -151,7 +172,11 @@ mod tests {
 
     #[test]
     fn empty_pictures_have_no_groups() {
-        assert!(Groups::of(&Image::new(0, 3)).sizes(&Image::new(0, 3)).is_empty());
+        assert!(
+            Groups::of(&Image::new(0, 3))
+                .sizes(&Image::new(0, 3))
+                .is_empty()
+        );
         assert!(filled(&Image::new(3, 0)).is_empty());
     }
 }

@@ -64,19 +64,71 @@ mod tests {
 
     #[test]
     fn each_reason_is_said_alone() {
-        let sure =
-            Confidence { support: 0.9, agreement: 0.95, drift_px: 1.0, stray_px: 1.0, blur_px: 0.7, width_px: 100.0 };
+        let sure = Confidence {
+            support: 0.9,
+            agreement: 0.95,
+            drift_px: 1.0,
+            stray_px: 1.0,
+            blur_px: 0.7,
+            width_px: 100.0,
+        };
         assert!(sure.remarks().is_empty());
-        let said = |unsure: Confidence| unsure.remarks().iter().map(ToString::to_string).collect::<Vec<_>>();
+        let said = |unsure: Confidence| {
+            unsure
+                .remarks()
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+        };
         for (unsure, reason) in [
-            (Confidence { support: 0.5, ..sure }, "50 % of it lies on edges"),
-            (Confidence { agreement: 0.5, ..sure }, "agree with it to 50 %"),
-            (Confidence { drift_px: 7.0, ..sure }, "7 pixels"),
-            (Confidence { blur_px: 2.0, ..sure }, "blurred by 2.0 pixels"),
-            (Confidence { stray_px: 5.0, ..sure }, "5 pixels beyond its outline"),
-            (Confidence { width_px: 12.0, ..sure }, "only 12 pixels wide"),
+            (
+                Confidence {
+                    support: 0.5,
+                    ..sure
+                },
+                "50 % of it lies on edges",
+            ),
+            (
+                Confidence {
+                    agreement: 0.5,
+                    ..sure
+                },
+                "agree with it to 50 %",
+            ),
+            (
+                Confidence {
+                    drift_px: 7.0,
+                    ..sure
+                },
+                "7 pixels",
+            ),
+            (
+                Confidence {
+                    blur_px: 2.0,
+                    ..sure
+                },
+                "blurred by 2.0 pixels",
+            ),
+            (
+                Confidence {
+                    stray_px: 5.0,
+                    ..sure
+                },
+                "5 pixels beyond its outline",
+            ),
+            (
+                Confidence {
+                    width_px: 12.0,
+                    ..sure
+                },
+                "only 12 pixels wide",
+            ),
         ] {
-            assert!(matches!(&said(unsure)[..], [only] if only.contains(reason)), "{:?}", said(unsure));
+            assert!(
+                matches!(&said(unsure)[..], [only] if only.contains(reason)),
+                "{:?}",
+                said(unsure)
+            );
         }
     }
 }

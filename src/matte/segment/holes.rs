@@ -22,8 +22,14 @@ const RIM_PX: [f64; 2] = [2.0, 5.0];
 /// What is enclosed, without the holes.
 ///
 /// A hole looks like the screen all over and has a rim that does not: a rim of clear plastic encloses clear plastic.
-pub(super) fn without_holes(picture: &Image<LinearRgb>, inside: &Image<bool>, background: &Image<bool>) -> Image<bool> {
-    let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else { return inside.clone() };
+pub(super) fn without_holes(
+    picture: &Image<LinearRgb>,
+    inside: &Image<bool>,
+    background: &Image<bool>,
+) -> Image<bool> {
+    let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else {
+        return inside.clone();
+    };
     let smooth = filter::box_blur(picture, 1);
     let noise: [f32; 3] = plate.residual.into();
     let like = smooth.zip3_map(&plate.image, inside, |p, k, inside| {
@@ -32,20 +38,29 @@ pub(super) fn without_holes(picture: &Image<LinearRgb>, inside: &Image<bool>, ba
     });
     let groups = Groups::of(&filter::erode(&like, 1.0));
     let (sizes, area) = (groups.sizes(&like), count(inside) as f64);
-    let large: Vec<usize> = (0..sizes.len()).filter(|&g| sizes[g] as f64 >= LEAST_AREA * area).collect();
+    let large: Vec<usize> = (0..sizes.len())
+        .filter(|&g| sizes[g] as f64 >= LEAST_AREA * area)
+        .collect();
     if large.is_empty() {
         return inside.clone();
     }
     let unlike = smooth.zip_map(&plate.image, |p, k| {
         let strongest = <[f32; 3]>::from(k).into_iter().fold(0.0, f32::max);
-        differences(p, k).into_iter().any(|d| d >= UNLIKE_SHARE * strongest)
+        differences(p, k)
+            .into_iter()
+            .any(|d| d >= UNLIKE_SHARE * strongest)
     });
     let mut kept = inside.clone();
     for group in large {
         let hole = filter::dilate(&groups.only(|g| g == group), RIM_PX[0]);
-        let rim = filter::dilate(&hole, RIM_PX[1] - RIM_PX[0]).zip_map(&hole, |near, hole| near && !hole);
+        let rim =
+            filter::dilate(&hole, RIM_PX[1] - RIM_PX[0]).zip_map(&hole, |near, hole| near && !hole);
         let opaque = rim.zip_map(&unlike, |rim, unlike| rim && unlike);
-        let enclosed = rim.zip_map(inside, |rim, inside| !rim || inside).pixels().iter().all(|p| *p);
+        let enclosed = rim
+            .zip_map(inside, |rim, inside| !rim || inside)
+            .pixels()
+            .iter()
+            .all(|p| *p);
         if enclosed && count(&opaque) as f64 >= OPAQUE_RIM * count(&rim) as f64 {
             kept = kept.zip_map(&hole, |kept, hole| kept && !hole);
         }
@@ -55,7 +70,11 @@ pub(super) fn without_holes(picture: &Image<LinearRgb>, inside: &Image<bool>, ba
 
 /// Whether the screen has enough colour to be told from clear plastic.
 pub(super) fn are_told(picture: &Image<LinearRgb>, background: &Image<bool>) -> bool {
-    let seen = picture.pixels().iter().zip(background.pixels()).filter(|(_, free)| **free);
+    let seen = picture
+        .pixels()
+        .iter()
+        .zip(background.pixels())
+        .filter(|(_, free)| **free);
     is_keyable(seen.fold(LinearRgb::BLACK, |sum, (p, _)| sum + *p))
 }
 
@@ -79,12 +98,17 @@ mod tests {
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 
     fn disc(radius: f64) -> Image<bool> {
-        Image::from_fn(120, 100, |x, y| (x as f64 - 60.0).hypot(y as f64 - 50.0) < radius)
+        Image::from_fn(120, 100, |x, y| {
+            (x as f64 - 60.0).hypot(y as f64 - 50.0) < radius
+        })
     }
 
     fn kept(rim: LinearRgb) -> Image<bool> {
         let (outer, inner) = (disc(40.0), disc(20.0));
-        let photo = outer.zip_map(&inner, |outer, inner| if outer && !inner { rim } else { GREEN });
+        let photo = outer.zip_map(
+            &inner,
+            |outer, inner| if outer && !inner { rim } else { GREEN },
+        );
         without_holes(&photo, &outer, &around(&outer, 3.0))
     }
 
@@ -92,14 +116,20 @@ mod tests {
     fn an_opaque_ring_has_a_hole() {
         let kept = kept(LinearRgb::new(0.5, 0.05, 0.05));
         assert!(!kept[(60, 50)] && kept[(60, 80)] && kept[(60, 79)]);
-        assert!((count(&disc(20.0)) as f64 / (count(&disc(40.0)) - count(&kept)) as f64 - 1.0).abs() < 0.15);
+        assert!(
+            (count(&disc(20.0)) as f64 / (count(&disc(40.0)) - count(&kept)) as f64 - 1.0).abs()
+                < 0.15
+        );
     }
 
     #[test]
     fn a_grey_board_tells_no_holes() {
         let background = disc(40.0).map(|inside| !inside);
         let board = |color: LinearRgb| Image::filled(120, 100, color);
-        assert!(are_told(&board(GREEN), &background) && !are_told(&board(LinearRgb::grey(0.6)), &background));
+        assert!(
+            are_told(&board(GREEN), &background)
+                && !are_told(&board(LinearRgb::grey(0.6)), &background)
+        );
     }
 
     #[test]

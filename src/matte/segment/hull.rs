@@ -16,14 +16,22 @@ pub(super) fn convex_hull(edges: &Image<bool>) -> Vec<Point2<f64>> {
     });
     let (w, h) = edges.size();
     let point = |(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h));
-    let hull = ends.flatten().map(point).collect::<MultiPoint>().convex_hull();
+    let hull = ends
+        .flatten()
+        .map(point)
+        .collect::<MultiPoint>()
+        .convex_hull();
     if hull.unsigned_area() <= 0.0 {
         return Vec::new();
     }
     // geo goes counter-clockwise with y up, which is clockwise as seen, and repeats the first point.
     let (ring, _) = hull.into_inner();
     let closed = ring.into_inner();
-    closed.iter().skip(1).map(|c| Point2::new(c.x, c.y)).collect()
+    closed
+        .iter()
+        .skip(1)
+        .map(|c| Point2::new(c.x, c.y))
+        .collect()
 }
 
 fn center_or_border(i: usize, len: usize) -> f64 {
@@ -36,19 +44,31 @@ fn center_or_border(i: usize, len: usize) -> f64 {
 
 /// Left, top, right and bottom of a polygon; infinite where it has no corner.
 pub(super) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
-    let least = |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
-    [least(|p| p.x), least(|p| p.y), -least(|p| -p.x), -least(|p| -p.y)]
+    let least =
+        |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
+    [
+        least(|p| p.x),
+        least(|p| p.y),
+        -least(|p| -p.x),
+        -least(|p| -p.y),
+    ]
 }
 
 /// The largest distance between a side of one polygon's box and that of another.
 pub(super) fn farthest_side(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
-    sides(a).into_iter().zip(sides(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    sides(a)
+        .into_iter()
+        .zip(sides(b))
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
 }
 
 /// By how much the side of one polygon's box that lies farthest beyond another's does so; 0 where none does.
 pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
     let ([l, t, r, b], [left, top, right, bottom]) = (sides(from), sides(to));
-    [l - left, t - top, right - r, bottom - b].into_iter().fold(0.0, f64::max)
+    [l - left, t - top, right - r, bottom - b]
+        .into_iter()
+        .fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -57,11 +77,19 @@ mod tests {
 
     #[test]
     fn the_hull_goes_through_centres_and_clockwise() {
-        let set = Image::from_fn(8, 8, |x, y| matches!((x, y), (2, 1) | (5, 1) | (2, 4) | (5, 4) | (3, 2)));
+        let set = Image::from_fn(8, 8, |x, y| {
+            matches!((x, y), (2, 1) | (5, 1) | (2, 4) | (5, 4) | (3, 2))
+        });
         let mut hull = convex_hull(&set);
-        let start = hull.iter().position(|p| *p == Point2::new(2.5, 1.5)).unwrap();
+        let start = hull
+            .iter()
+            .position(|p| *p == Point2::new(2.5, 1.5))
+            .unwrap();
         hull.rotate_left(start);
-        assert_eq!(hull, [[2.5, 1.5], [5.5, 1.5], [5.5, 4.5], [2.5, 4.5]].map(Point2::from));
+        assert_eq!(
+            hull,
+            [[2.5, 1.5], [5.5, 1.5], [5.5, 4.5], [2.5, 4.5]].map(Point2::from)
+        );
     }
 
     #[test]
@@ -74,7 +102,8 @@ mod tests {
 
     #[test]
     fn boxes_are_compared_side_by_side() {
-        let square = |x: f64, w: f64| [[x, 1.0], [x + w, 1.0], [x + w, 5.0], [x, 5.0]].map(Point2::from);
+        let square =
+            |x: f64, w: f64| [[x, 1.0], [x + w, 1.0], [x + w, 5.0], [x, 5.0]].map(Point2::from);
         assert_eq!(sides(&square(2.0, 3.0)), [2.0, 1.0, 5.0, 5.0]);
         assert_eq!(farthest_side(&square(2.0, 3.0), &square(1.0, 7.0)), 3.0);
     }

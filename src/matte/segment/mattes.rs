@@ -24,8 +24,15 @@ impl Segmentation {
     ///
     /// # Panics
     /// When the sizes differ.
-    pub fn mattes(&self, photo: &Image<LinearRgb>, plate: &Image<LinearRgb>) -> [Image<Coverage>; 2] {
-        [self.garbage(GARBAGE_MARGIN_PX * self.reduction.max(1.0)), self.core(photo, plate)]
+    pub fn mattes(
+        &self,
+        photo: &Image<LinearRgb>,
+        plate: &Image<LinearRgb>,
+    ) -> [Image<Coverage>; 2] {
+        [
+            self.garbage(GARBAGE_MARGIN_PX * self.reduction.max(1.0)),
+            self.core(photo, plate),
+        ]
     }
 
     /// Garbage matte: 1 at more than `margin_px` from the tight outline, where there is no object.
@@ -47,7 +54,9 @@ impl Segmentation {
             let c = strongest_channel(k);
             <[f32; 3]>::from(p)[c] < CORE_TRANSMITTANCE * <[f32; 3]>::from(k)[c]
         });
-        deep.zip_map(&opaque, |deep, opaque| Coverage(f32::from(u8::from(deep && opaque))))
+        deep.zip_map(&opaque, |deep, opaque| {
+            Coverage(f32::from(u8::from(deep && opaque)))
+        })
     }
 }
 
@@ -74,9 +83,22 @@ mod tests {
         let photo = photo();
         let found = segment(&photo, &SegmentOptions::default()).unwrap();
         let [garbage, core] = found.mattes(&photo, &Image::filled(160, 100, GREEN));
-        assert_eq!((garbage[(2, 2)].0, garbage[(60, 50)].0, garbage[(100, 50)].0), (1.0, 0.0, 0.0));
-        assert_eq!((core[(2, 2)].0, core[(60, 50)].0, core[(100, 50)].0), (0.0, 1.0, 0.0));
-        assert!(garbage.pixels().iter().zip(core.pixels()).all(|(g, c)| g.0 + c.0 <= 1.0), "no pixel is both");
+        assert_eq!(
+            (garbage[(2, 2)].0, garbage[(60, 50)].0, garbage[(100, 50)].0),
+            (1.0, 0.0, 0.0)
+        );
+        assert_eq!(
+            (core[(2, 2)].0, core[(60, 50)].0, core[(100, 50)].0),
+            (0.0, 1.0, 0.0)
+        );
+        assert!(
+            garbage
+                .pixels()
+                .iter()
+                .zip(core.pixels())
+                .all(|(g, c)| g.0 + c.0 <= 1.0),
+            "no pixel is both"
+        );
     }
 
     #[test]
@@ -85,7 +107,8 @@ mod tests {
         let found = segment(&photo, &SegmentOptions::default()).unwrap();
         let [garbage, core] = found.mattes(&photo, &Image::filled(160, 100, GREEN));
         let job = Keying::new(&photo, Screen::Color(GREEN));
-        let stain = |job: &Keying<'_, LinearRgb>| job.run(&KeyOptions::default()).unwrap().matte[(2, 2)].0;
+        let stain =
+            |job: &Keying<'_, LinearRgb>| job.run(&KeyOptions::default()).unwrap().matte[(2, 2)].0;
         assert!(stain(&job) > 0.5);
         assert_eq!(stain(&job.with_garbage(&garbage).with_core(&core)), 0.0);
     }

@@ -57,7 +57,12 @@ impl Search {
         let first_binary = first.map(|c| c.0 > cut);
         let strongest = band::largest_around(first, SMEAR);
         let ridges = first.zip_map(&strongest, |c, most| c.0 >= opts.ridge * most.0);
-        Self { bands, cut, first_binary, ridges }
+        Self {
+            bands,
+            cut,
+            first_binary,
+            ridges,
+        }
     }
 
     /// The first band and where it is above its cut.
@@ -76,7 +81,12 @@ impl Search {
         self.pass(levels, &self.bands.first.map(|c| c.0 > cut), opts)
     }
 
-    fn pass(&self, levels: usize, first_binary: &Image<bool>, opts: &SegmentOptions) -> Result<Pass> {
+    fn pass(
+        &self,
+        levels: usize,
+        first_binary: &Image<bool>,
+        opts: &SegmentOptions,
+    ) -> Result<Pass> {
         let last = self.bands.last(levels);
         let cut = opts.last_threshold.of(&last);
         let last_binary = last.map(|c| c.0 > cut);
@@ -88,7 +98,16 @@ impl Search {
         let touches = touches(&object);
         check_object(&hull, touches, edges.size())?;
         let inside = enclosed(&object, join_px);
-        Ok(Pass { last, last_binary, edges, object, hull, inside, touches, remarks })
+        Ok(Pass {
+            last,
+            last_binary,
+            edges,
+            object,
+            hull,
+            inside,
+            touches,
+            remarks,
+        })
     }
 }
 
@@ -113,7 +132,11 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
             "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
         ));
     };
-    let member = |i: usize| groups.only(move |group| group == i).zip_map(edges, |near, edge| near && edge);
+    let member = |i: usize| {
+        groups
+            .only(move |group| group == i)
+            .zip_map(edges, |near, edge| near && edge)
+    };
     let object = member(main);
     let hull = under_hull(&object, 0.0);
     let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
@@ -129,14 +152,19 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
             )));
         }
         if share >= REMNANT {
-            remarks.push(Remark::LeftOut { what: place(&member(i)), object: place(&object) });
+            remarks.push(Remark::LeftOut {
+                what: place(&member(i)),
+                object: place(&object),
+            });
         } else {
             specks += 1;
         }
     }
     remarks.extend((specks >= SPECKS).then_some(Remark::Specks(specks)));
     let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
-    let object = groups.only(belongs).zip_map(edges, |near, edge| near && edge);
+    let object = groups
+        .only(belongs)
+        .zip_map(edges, |near, edge| near && edge);
     remarks.extend(parted(&object, PARTED * join_px));
     Ok((object, remarks))
 }
@@ -149,19 +177,28 @@ fn parted(object: &Image<bool>, join_px: f64) -> Option<Remark> {
     let groups = Groups::of(&filter::dilate(object, join_px / 2.0));
     let sizes = groups.sizes(object);
     let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
-    let member = |i: usize| groups.only(move |group| group == i).zip_map(object, |near, edge| near && edge);
+    let member = |i: usize| {
+        groups
+            .only(move |group| group == i)
+            .zip_map(object, |near, edge| near && edge)
+    };
     let first = member(main);
     let hull = under_hull(&first, 0.0);
     let inside = groups.sizes(&object.zip_map(&hull, |edge, inside| edge && inside));
-    let rival = |i: &usize| *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64;
+    let rival = |i: &usize| {
+        *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64
+    };
     let other = (0..sizes.len()).find(rival)?;
     Some(Remark::Parted([place(&first), place(&member(other))]))
 }
 
 /// The pixels of which more than a share lies in the convex hull of a set.
 fn under_hull(set: &Image<bool>, share: f32) -> Image<bool> {
-    let hull = Outline { rings: vec![hull::convex_hull(set)] };
-    hull.coverage(set.width(), set.height()).map(|c| c.0 > share)
+    let hull = Outline {
+        rings: vec![hull::convex_hull(set)],
+    };
+    hull.coverage(set.width(), set.height())
+        .map(|c| c.0 > share)
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.
@@ -194,7 +231,10 @@ fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
 }
 
 fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool> {
-    let whole = filter::erode(&cluster::filled(&filter::dilate(edges, radius_px)), radius_px);
+    let whole = filter::erode(
+        &cluster::filled(&filter::dilate(edges, radius_px)),
+        radius_px,
+    );
     whole.zip_map(hull, |inside, hull| inside && hull)
 }
 
@@ -204,10 +244,16 @@ const NEAR_BORDER: usize = 4;
 
 fn touches(set: &Image<bool>) -> [bool; 4] {
     let (w, h) = set.size();
-    let columns = |xs: std::ops::Range<usize>| set.rows().any(|row| row[xs.clone()].contains(&true));
+    let columns =
+        |xs: std::ops::Range<usize>| set.rows().any(|row| row[xs.clone()].contains(&true));
     let rows = |ys: std::ops::Range<usize>| ys.into_iter().any(|y| set.row(y).contains(&true));
     let near = |len: usize| NEAR_BORDER.min(len);
-    [columns(0..near(w)), rows(0..near(h)), columns(w - near(w)..w), rows(h - near(h)..h)]
+    [
+        columns(0..near(w)),
+        rows(0..near(h)),
+        columns(w - near(w)..w),
+        rows(h - near(h)..h),
+    ]
 }
 
 /// Least length of an object as a share of the photo's longer side; anything smaller is dirt.
@@ -215,7 +261,10 @@ const LEAST_LENGTH: f64 = 0.05;
 
 fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)) -> Result<()> {
     let extent = |along: fn(&Point2<f64>) -> f64| {
-        let (low, high) = hull.iter().map(along).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+        let (low, high) = hull
+            .iter()
+            .map(along)
+            .fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
         (high - low).max(0.0)
     };
     let (width, height) = (extent(|p| p.x), extent(|p| p.y));
@@ -225,7 +274,9 @@ fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)
         )));
     }
     if touches == [true; 4] {
-        return Err(refused("the object reaches all four borders; photograph it with background all around it"));
+        return Err(refused(
+            "the object reaches all four borders; photograph it with background all around it",
+        ));
     }
     Ok(())
 }

@@ -35,7 +35,9 @@ const NEIGHBOURS: usize = 2;
 /// place, whatever the blur.
 pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> Outline {
     let ring = |ring: &Vec<Point2<f64>>| snapped_ring(&evenly(ring, scale.max(1.0)), roots, scale);
-    Outline { rings: outline.rings.iter().map(ring).collect() }
+    Outline {
+        rings: outline.rings.iter().map(ring).collect(),
+    }
 }
 
 fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> Vec<Point2<f64>> {
@@ -43,15 +45,22 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
     if n < 2 * NEIGHBOURS + 1 {
         return ring.to_vec();
     }
-    let normals: Vec<Vector2<f64>> = (0..n).map(|i| normal(ring[(i + n - 2) % n], ring[(i + 2) % n])).collect();
-    let profiles: Vec<Profile> =
-        ring.par_iter().zip(&normals).map(|(p, normal)| Profile::of(roots, *p, *normal, scale)).collect();
+    let normals: Vec<Vector2<f64>> = (0..n)
+        .map(|i| normal(ring[(i + n - 2) % n], ring[(i + 2) % n]))
+        .collect();
+    let profiles: Vec<Profile> = ring
+        .par_iter()
+        .zip(&normals)
+        .map(|(p, normal)| Profile::of(roots, *p, *normal, scale))
+        .collect();
     let mut noises: Vec<f32> = profiles.iter().map(|p| p.noise).collect();
     noises.sort_by(f32::total_cmp);
     let least = LEAST_CHANGE * noises[n / 2].max(ROUNDING);
     let found: Vec<Option<f64>> = profiles.iter().map(|p| p.half_way(least)).collect();
     let moved = |i: usize| {
-        let mut near: Vec<f64> = (0..=2 * NEIGHBOURS).filter_map(|k| found[(i + n + k - NEIGHBOURS) % n]).collect();
+        let mut near: Vec<f64> = (0..=2 * NEIGHBOURS)
+            .filter_map(|k| found[(i + n + k - NEIGHBOURS) % n])
+            .collect();
         near.sort_by(f64::total_cmp);
         let by = near.get(near.len() / 2).copied().unwrap_or(0.0);
         let (w, h) = (roots.width() as f64, roots.height() as f64);
@@ -59,25 +68,39 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
         // What reaches the border of the photo stays there.
         let on_border = |v: f64, len: f64| v <= scale || v >= len - scale;
         let keep = on_border(ring[i].x, w) || on_border(ring[i].y, h);
-        if keep { ring[i] } else { Point2::new(at.x.clamp(0.0, w), at.y.clamp(0.0, h)) }
+        if keep {
+            ring[i]
+        } else {
+            Point2::new(at.x.clamp(0.0, w), at.y.clamp(0.0, h))
+        }
     };
     (0..n).map(moved).collect()
 }
 
 /// The mean of a few pixels along the outline at a distance `t` outwards, pixels of the search.
-pub(super) fn lanes(roots: &Image<LinearRgb>, at: Point2<f64>, normal: Vector2<f64>, t: f64, scale: f64) -> LinearRgb {
+pub(super) fn lanes(
+    roots: &Image<LinearRgb>,
+    at: Point2<f64>,
+    normal: Vector2<f64>,
+    t: f64,
+    scale: f64,
+) -> LinearRgb {
     let along = Vector2::new(-normal.y, normal.x);
     let lanes = (-(LANES / 2)..=LANES / 2).map(|lane| {
         let p = at + normal * (t * scale) + along * (f64::from(lane) * scale / 2.0);
         filter::sample_bilinear_clamped(roots, p.x, p.y)
     });
-    lanes.fold(LinearRgb::BLACK, |sum, p| sum + p).scale(1.0 / LANES as f32)
+    lanes
+        .fold(LinearRgb::BLACK, |sum, p| sum + p)
+        .scale(1.0 / LANES as f32)
 }
 
 /// Unit normal to the outside of a ring that goes from `a` to `b`, clockwise as seen.
 pub(super) fn normal(a: Point2<f64>, b: Point2<f64>) -> Vector2<f64> {
     let along = b - a;
-    Vector2::new(along.y, -along.x).try_normalize(0.0).unwrap_or_default()
+    Vector2::new(along.y, -along.x)
+        .try_normalize(0.0)
+        .unwrap_or_default()
 }
 
 /// Difference from the outside along a normal, from the outside inwards.
@@ -92,12 +115,21 @@ impl Profile {
     fn of(roots: &Image<LinearRgb>, at: Point2<f64>, normal: Vector2<f64>, scale: f64) -> Self {
         let sample = |t: f64| lanes(roots, at, normal, t, scale);
         let step = 1.0 / STEPS as f64;
-        let outside: Vec<_> = (0..(OUTSIDE * STEPS as f64) as usize).map(|k| sample(REACH + k as f64 * step)).collect();
-        let mean = outside.iter().fold(LinearRgb::BLACK, |sum, p| sum + *p).scale(1.0 / outside.len() as f32);
+        let outside: Vec<_> = (0..(OUTSIDE * STEPS as f64) as usize)
+            .map(|k| sample(REACH + k as f64 * step))
+            .collect();
+        let mean = outside
+            .iter()
+            .fold(LinearRgb::BLACK, |sum, p| sum + *p)
+            .scale(1.0 / outside.len() as f32);
         let off = |p: &LinearRgb| distance(*p, mean);
         let square: f32 = outside.iter().map(|p| off(p) * off(p)).sum();
-        let inwards = (0..=(2.0 * REACH * STEPS as f64) as usize).map(|k| off(&sample(REACH - k as f64 * step)));
-        Self { change: inwards.collect(), noise: (square / outside.len() as f32).sqrt() }
+        let inwards = (0..=(2.0 * REACH * STEPS as f64) as usize)
+            .map(|k| off(&sample(REACH - k as f64 * step)));
+        Self {
+            change: inwards.collect(),
+            noise: (square / outside.len() as f32).sqrt(),
+        }
     }
 
     /// Where the first clear change is half done: outwards from the outline, pixels of the search.
@@ -105,8 +137,9 @@ impl Profile {
         let change = &self.change;
         let most = change.iter().fold(0.0f32, |most, c| most.max(*c));
         let least = least.max(LEAST_SHARE * most);
-        let rim = (0..change.len())
-            .find(|&k| change[k] >= least && change.get(k + 1).is_none_or(|next| *next <= change[k]))?;
+        let rim = (0..change.len()).find(|&k| {
+            change[k] >= least && change.get(k + 1).is_none_or(|next| *next <= change[k])
+        })?;
         let half = 0.5 * change[rim];
         let k = (1..=rim).find(|&k| change[k] >= half)?;
         let part = f64::from((half - change[k - 1]) / (change[k] - change[k - 1]));
@@ -155,15 +188,19 @@ mod tests {
             let a = std::f64::consts::TAU * i as f64 / 200.0;
             Point2::new(50.0 + radius * libm::cos(a), 45.0 + radius * libm::sin(a))
         };
-        Outline { rings: vec![(0..200).map(at).collect()] }
+        Outline {
+            rings: vec![(0..200).map(at).collect()],
+        }
     }
 
     #[test]
     fn an_outline_a_pixel_off_comes_to_the_edge() {
         for radius in [29.3, 30.3, 31.3] {
             let snapped = snapped(&circle(radius), &photo(), 1.0);
-            let worst =
-                snapped.rings[0].iter().map(|p| ((p.x - 50.0).hypot(p.y - 45.0) - 30.3).abs()).fold(0.0, f64::max);
+            let worst = snapped.rings[0]
+                .iter()
+                .map(|p| ((p.x - 50.0).hypot(p.y - 45.0) - 30.3).abs())
+                .fold(0.0, f64::max);
             // From a pixel outside, the reach ends before the blurred edge has its full height: half of less lies farther out.
             assert!(worst < 0.6, "from {radius}: {worst} px off");
         }
@@ -173,6 +210,8 @@ mod tests {
     fn an_outline_over_nothing_stays() {
         let even = Image::filled(100, 90, LinearRgb::grey(0.3));
         let area = |outline: &Outline| outline.area();
-        assert!((area(&snapped(&circle(30.0), &even, 1.0)) / area(&circle(30.0)) - 1.0).abs() < 0.005);
+        assert!(
+            (area(&snapped(&circle(30.0), &even, 1.0)) / area(&circle(30.0)) - 1.0).abs() < 0.005
+        );
     }
 }

@@ -6,7 +6,12 @@ const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 const WHITE: LinearRgb = LinearRgb::new(0.8, 0.82, 0.78);
 
 /// A screen with vignetting and sensor noise (shot and read noise of a small camera) and what lies on it.
-fn photo(w: usize, h: usize, screen: LinearRgb, paint: impl Fn(f64, f64) -> Option<LinearRgb>) -> Image<LinearRgb> {
+fn photo(
+    w: usize,
+    h: usize,
+    screen: LinearRgb,
+    paint: impl Fn(f64, f64) -> Option<LinearRgb>,
+) -> Image<LinearRgb> {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
     let mut image = Image::new(w, h);
     for i in 0..w * h {
@@ -33,13 +38,22 @@ fn find(photo: &Image<LinearRgb>) -> Result<Segmentation> {
 fn bounds(hull: &[Point2<f64>]) -> [f64; 4] {
     let xs = || hull.iter().map(|p| p.x);
     let ys = || hull.iter().map(|p| p.y);
-    [xs().fold(f64::MAX, f64::min), ys().fold(f64::MAX, f64::min), xs().fold(0.0, f64::max), ys().fold(0.0, f64::max)]
+    [
+        xs().fold(f64::MAX, f64::min),
+        ys().fold(f64::MAX, f64::min),
+        xs().fold(0.0, f64::max),
+        ys().fold(0.0, f64::max),
+    ]
 }
 
 /// The hull's box is within 2 pixels of `truth`, the accuracy that is promised of photos.
 fn assert_box(found: &Segmentation, truth: [f64; 4]) {
     let found = bounds(&found.hull);
-    let worst = found.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let worst = found
+        .iter()
+        .zip(truth)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max);
     assert!(worst <= 2.0, "{found:?}, expected {truth:?}");
 }
 
@@ -51,7 +65,10 @@ fn said(photo: &Image<LinearRgb>) -> String {
 fn a_disc_is_found_where_it_is() {
     for screen in [GREEN, WHITE] {
         let red = LinearRgb::new(0.5, 0.04, 0.05);
-        let found = find(&photo(300, 200, screen, |x, y| disc(x, y, [150.0, 90.0, 50.0]).then_some(red))).unwrap();
+        let found = find(&photo(300, 200, screen, |x, y| {
+            disc(x, y, [150.0, 90.0, 50.0]).then_some(red)
+        }))
+        .unwrap();
         assert_box(&found, [100.0, 40.0, 200.0, 140.0]);
         let area: f32 = found.mask.pixels().iter().map(|c| c.0).sum();
         assert!((f64::from(area) / (std::f64::consts::PI * 2500.0) - 1.0).abs() < 0.05);
@@ -63,14 +80,18 @@ fn a_disc_is_found_where_it_is() {
 fn a_clear_film_is_found_by_its_rim() {
     // 15 % darker along a rim of 4 pixels, the screen's colour within.
     let rim = |x, y| disc(x, y, [150.0, 100.0, 70.0]) && !disc(x, y, [150.0, 100.0, 66.0]);
-    let found = find(&photo(300, 200, GREEN, |x, y| rim(x, y).then_some(GREEN.scale(0.85)))).unwrap();
+    let found = find(&photo(300, 200, GREEN, |x, y| {
+        rim(x, y).then_some(GREEN.scale(0.85))
+    }))
+    .unwrap();
     assert_box(&found, [80.0, 30.0, 220.0, 170.0]);
     assert!(found.tight[(150, 100)].0 > 0.99, "the inside belongs to it");
 }
 
 #[test]
 fn a_soft_shadow_is_not_the_object() {
-    let shadow = |x: f64, y: f64| (((x - 220.0).powi(2) + (y - 100.0).powi(2)) / 2000.0).min(10.0) as f32;
+    let shadow =
+        |x: f64, y: f64| (((x - 220.0).powi(2) + (y - 100.0).powi(2)) / 2000.0).min(10.0) as f32;
     let found = find(&photo(300, 200, WHITE, |x, y| {
         if disc(x, y, [110.0, 100.0, 50.0]) {
             Some(LinearRgb::new(0.1, 0.2, 0.5))
@@ -93,21 +114,37 @@ fn dirt_far_away_does_not_blow_up_the_hull() {
 #[test]
 fn a_cap_of_the_same_grey_as_the_screen_is_seen() {
     // Equal means of the square roots, which is what the grey picture shows.
-    let (screen, cap) = (LinearRgb::new(0.04, 0.09, 0.36), LinearRgb::new(0.36, 0.09, 0.04));
-    let picture = photo(300, 200, screen, |x, y| disc(x, y, [150.0, 100.0, 40.0]).then_some(cap));
+    let (screen, cap) = (
+        LinearRgb::new(0.04, 0.09, 0.36),
+        LinearRgb::new(0.36, 0.09, 0.04),
+    );
+    let picture = photo(300, 200, screen, |x, y| {
+        disc(x, y, [150.0, 100.0, 40.0]).then_some(cap)
+    });
     assert_box(&find(&picture).unwrap(), [110.0, 60.0, 190.0, 140.0]);
 }
 
 #[test]
 fn hollows_are_in_the_hull_and_not_in_the_tight_mask() {
-    let ell = |x: f64, y: f64| (40.0..260.0).contains(&x) && (40.0..260.0).contains(&y) && (x < 120.0 || y > 180.0);
-    let found = find(&photo(300, 300, GREEN, |x, y| ell(x, y).then_some(LinearRgb::grey(0.5)))).unwrap();
-    assert!(found.mask[(160, 140)].0 == 1.0 && found.tight[(190, 110)].0 == 0.0 && found.tight[(80, 80)].0 == 1.0);
+    let ell = |x: f64, y: f64| {
+        (40.0..260.0).contains(&x) && (40.0..260.0).contains(&y) && (x < 120.0 || y > 180.0)
+    };
+    let found = find(&photo(300, 300, GREEN, |x, y| {
+        ell(x, y).then_some(LinearRgb::grey(0.5))
+    }))
+    .unwrap();
+    assert!(
+        found.mask[(160, 140)].0 == 1.0
+            && found.tight[(190, 110)].0 == 0.0
+            && found.tight[(80, 80)].0 == 1.0
+    );
 }
 
 #[test]
 fn an_object_may_reach_a_border() {
-    let found = find(&photo(300, 200, GREEN, |x, y| (x < 90.0 && (50.0..150.0).contains(&y)).then_some(WHITE)));
+    let found = find(&photo(300, 200, GREEN, |x, y| {
+        (x < 90.0 && (50.0..150.0).contains(&y)).then_some(WHITE)
+    }));
     let found = found.unwrap();
     assert_eq!(found.touches, [true, false, false, false]);
     assert_box(&found, [0.0, 50.0, 90.0, 150.0]);
@@ -115,10 +152,22 @@ fn an_object_may_reach_a_border() {
 
 #[test]
 fn large_photos_are_searched_small_and_told_in_their_own_pixels() {
-    let found = find(&photo(2000, 1500, GREEN, |x, y| disc(x, y, [900.0, 700.0, 400.0]).then_some(WHITE))).unwrap();
-    let worst = bounds(&found.hull).into_iter().zip([500.0, 300.0, 1300.0, 1100.0]).map(|(a, b)| (a - b).abs());
-    assert!(worst.fold(0.0, f64::max) <= 4.0, "2 pixels of the search are 4 of the photo");
-    assert_eq!((found.mask.size(), found.tight.size()), ((2000, 1500), (2000, 1500)));
+    let found = find(&photo(2000, 1500, GREEN, |x, y| {
+        disc(x, y, [900.0, 700.0, 400.0]).then_some(WHITE)
+    }))
+    .unwrap();
+    let worst = bounds(&found.hull)
+        .into_iter()
+        .zip([500.0, 300.0, 1300.0, 1100.0])
+        .map(|(a, b)| (a - b).abs());
+    assert!(
+        worst.fold(0.0, f64::max) <= 4.0,
+        "2 pixels of the search are 4 of the photo"
+    );
+    assert_eq!(
+        (found.mask.size(), found.tight.size()),
+        ((2000, 1500), (2000, 1500))
+    );
     assert_eq!(found.steps[0].image.size(), (640, 480));
 }
 
@@ -131,7 +180,9 @@ fn an_empty_screen_is_refused() {
 
 #[test]
 fn a_lone_speck_is_refused() {
-    let speck = photo(400, 300, GREEN, |x, y| disc(x, y, [200.0, 150.0, 4.0]).then_some(WHITE));
+    let speck = photo(400, 300, GREEN, |x, y| {
+        disc(x, y, [200.0, 150.0, 4.0]).then_some(WHITE)
+    });
     assert!(said(&speck).contains("the largest thing found is"));
 }
 
@@ -140,16 +191,30 @@ fn two_objects_are_refused() {
     let two = photo(400, 200, GREEN, |x, y| {
         (disc(x, y, [90.0, 100.0, 50.0]) || disc(x, y, [310.0, 100.0, 45.0])).then_some(WHITE)
     });
-    assert!(said(&two).contains("two objects, at 23 % of the width"), "{}", said(&two));
+    assert!(
+        said(&two).contains("two objects, at 23 % of the width"),
+        "{}",
+        said(&two)
+    );
 }
 
 #[test]
 fn a_picture_full_of_object_is_refused() {
-    let stripes = photo(300, 200, GREEN, |x, y| ((x + y) % 16.0 < 8.0).then_some(WHITE));
-    assert!(said(&stripes).contains("background all around it"), "{}", said(&stripes));
+    let stripes = photo(300, 200, GREEN, |x, y| {
+        ((x + y) % 16.0 < 8.0).then_some(WHITE)
+    });
+    assert!(
+        said(&stripes).contains("background all around it"),
+        "{}",
+        said(&stripes)
+    );
     let cross = |x: f64, y: f64| (146.0..154.0).contains(&x) || (96.0..104.0).contains(&y);
     let cross = photo(300, 200, GREEN, |x, y| cross(x, y).then_some(WHITE));
-    assert!(said(&cross).contains("all four borders"), "{}", said(&cross));
+    assert!(
+        said(&cross).contains("all four borders"),
+        "{}",
+        said(&cross)
+    );
 }
 
 #[test]
@@ -164,36 +229,80 @@ fn tiny_and_broken_photos_are_refused() {
 #[test]
 fn a_photo_of_64_pixels_is_searched_enlarged() {
     let red = LinearRgb::new(0.5, 0.04, 0.05);
-    let found = find(&photo(64, 64, GREEN, |x, y| disc(x, y, [30.0, 33.0, 18.0]).then_some(red))).unwrap();
+    let found = find(&photo(64, 64, GREEN, |x, y| {
+        disc(x, y, [30.0, 33.0, 18.0]).then_some(red)
+    }))
+    .unwrap();
     assert_box(&found, [12.0, 15.0, 48.0, 51.0]);
     assert_eq!((found.mask.size(), found.reduction), ((64, 64), 0.25));
 }
 
 #[test]
 fn what_lies_near_a_border_may_go_on_beyond() {
-    let near = |gap: f64| photo(300, 200, GREEN, move |x, y| disc(x, y, [50.0 + gap, 100.0, 50.0]).then_some(WHITE));
+    let near = |gap: f64| {
+        photo(300, 200, GREEN, move |x, y| {
+            disc(x, y, [50.0 + gap, 100.0, 50.0]).then_some(WHITE)
+        })
+    };
     assert!(find(&near(1.0)).unwrap().touches[0] && !find(&near(8.0)).unwrap().touches[0]);
 }
 
 #[test]
 fn specks_all_over_are_told() {
-    let specks = [[40.0, 20.0, 2.0], [260.0, 30.0, 2.0], [30.0, 180.0, 2.0], [270.0, 170.0, 2.0]];
+    let specks = [
+        [40.0, 20.0, 2.0],
+        [260.0, 30.0, 2.0],
+        [30.0, 180.0, 2.0],
+        [270.0, 170.0, 2.0],
+    ];
     let taken = |count: usize| {
-        photo(300, 200, GREEN, move |x, y| match disc(x, y, [150.0, 100.0, 40.0]) {
-            true => Some(WHITE),
-            false => specks[..count].iter().any(|speck| disc(x, y, *speck)).then_some(LinearRgb::BLACK),
+        photo(300, 200, GREEN, move |x, y| {
+            match disc(x, y, [150.0, 100.0, 40.0]) {
+                true => Some(WHITE),
+                false => specks[..count]
+                    .iter()
+                    .any(|speck| disc(x, y, *speck))
+                    .then_some(LinearRgb::BLACK),
+            }
         })
     };
-    let told = |count: usize| find(&taken(count)).unwrap().remarks.contains(&Remark::Specks(count));
+    let told = |count: usize| {
+        find(&taken(count))
+            .unwrap()
+            .remarks
+            .contains(&Remark::Specks(count))
+    };
     assert!(told(4) && !told(1));
 }
 
 #[test]
 fn impossible_options_are_named() {
-    let said = |opts: SegmentOptions| segment(&Image::filled(64, 64, GREEN), &opts).unwrap_err().to_string();
-    assert_eq!(said(SegmentOptions { levels: Some(1), ..Default::default() }), "levels: 1, expected 2 to 8");
-    assert!(said(SegmentOptions { join: f64::NAN, ..Default::default() }).starts_with("join: NaN"));
-    assert!(said(SegmentOptions { tone: Tone::Grey([0.0; 3]), ..Default::default() }).starts_with("tone.grey"));
+    let said = |opts: SegmentOptions| {
+        segment(&Image::filled(64, 64, GREEN), &opts)
+            .unwrap_err()
+            .to_string()
+    };
+    assert_eq!(
+        said(SegmentOptions {
+            levels: Some(1),
+            ..Default::default()
+        }),
+        "levels: 1, expected 2 to 8"
+    );
+    assert!(
+        said(SegmentOptions {
+            join: f64::NAN,
+            ..Default::default()
+        })
+        .starts_with("join: NaN")
+    );
+    assert!(
+        said(SegmentOptions {
+            tone: Tone::Grey([0.0; 3]),
+            ..Default::default()
+        })
+        .starts_with("tone.grey")
+    );
 }
 
 proptest! {

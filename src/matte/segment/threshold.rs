@@ -53,7 +53,11 @@ fn otsu(band: &Image<Coverage>) -> f32 {
 /// Last bin of the lower group.
 fn best_split(histogram: &[u64; BINS]) -> usize {
     let count: u64 = histogram.iter().sum();
-    let total: u64 = histogram.iter().zip(0..).map(|(n, bin): (_, u64)| n * bin).sum();
+    let total: u64 = histogram
+        .iter()
+        .zip(0..)
+        .map(|(n, bin): (_, u64)| n * bin)
+        .sum();
     let (mut below, mut sum, mut best) = (0, 0, (0, -1.0));
     for (bin, &n) in histogram.iter().enumerate() {
         below += n;
@@ -84,8 +88,9 @@ mod tests {
 
     #[test]
     fn highlights_do_not_hide_faint_edges() {
-        let img =
-            Image::from_fn(100, 10, |x, _| Coverage([2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)]));
+        let img = Image::from_fn(100, 10, |x, _| {
+            Coverage([2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)])
+        });
         let cut = Threshold::Otsu.of(&img);
         assert!(cut > 2.0 && cut < 20.0, "{cut}");
     }

@@ -91,20 +91,31 @@ impl Borrowed {
         determined: [bool; 3],
         plastic: [f32; 3],
     ) -> Self {
-        let believed = Self { determined, plastic };
+        let believed = Self {
+            determined,
+            plastic,
+        };
         let scaled = |c: usize| {
             let (gain, variance) = believed.gain(pixels, inside, c);
             let trust = BELIEF * BELIEF;
             (plastic[c] * (variance + gain * trust) / (variance + trust)).clamp(0.0, 1.0)
         };
-        Self { plastic: std::array::from_fn(|c| if determined[c] { plastic[c] } else { scaled(c) }), ..believed }
+        Self {
+            plastic: std::array::from_fn(|c| if determined[c] { plastic[c] } else { scaled(c) }),
+            ..believed
+        }
     }
 
     /// By what the plastic of an open channel must be multiplied by its own lines, and the variance of that: noise, and
     /// plates that are a little off.
     fn gain(&self, pixels: &Image<Pixel>, inside: &Image<Coverage>, channel: usize) -> (f32, f32) {
         let (mut top, mut bottom, mut levers) = (0.0, f64::MIN_POSITIVE, Vec::new());
-        for (pixel, _) in pixels.pixels().iter().zip(inside.pixels()).filter(|(_, inside)| inside.0 > 0.5) {
+        for (pixel, _) in pixels
+            .pixels()
+            .iter()
+            .zip(inside.pixels())
+            .filter(|(_, inside)| inside.0 > 0.5)
+        {
             let (share, bare) = self.shares(pixel);
             let expected = f64::from(share * self.plastic[channel]);
             let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
@@ -113,7 +124,9 @@ impl Borrowed {
             levers.push(pixel.lines[channel].lever());
         }
         let gain = (top / bottom) as f32;
-        let off = PLATE_ERROR * median(levers.into_iter()).unwrap_or(UNKNOWN).min(UNKNOWN) * gain.max(1.0);
+        let off = PLATE_ERROR
+            * median(levers.into_iter()).unwrap_or(UNKNOWN).min(UNKNOWN)
+            * gain.max(1.0);
         (gain, (1.0 / bottom) as f32 + off * off)
     }
 
@@ -131,7 +144,8 @@ impl Borrowed {
             tp += weight * told * plastic;
             tb += weight * told;
         }
-        let bare = ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let bare =
+            ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         (((tp - pb * bare) / pp).max(0.0), bare)
     }
 
@@ -147,10 +161,16 @@ impl Borrowed {
             }
             let (measured, borrowed) = (1.0 / (sigma * sigma), 1.0 / (BORROWED * BORROWED));
             worst = worst.max((measured + borrowed).sqrt().recip());
-            ((slope * measured + (share * self.plastic[c] + bare) * borrowed) / (measured + borrowed)).clamp(0.0, 1.0)
+            ((slope * measured + (share * self.plastic[c] + bare) * borrowed)
+                / (measured + borrowed))
+                .clamp(0.0, 1.0)
         });
         let reflected = std::array::from_fn(|c| pixel.lines[c].intercept(told[c]).max(0.0));
-        Solved { transmittance: told.into(), reflected: LinearRgb::from(reflected), sigma: worst }
+        Solved {
+            transmittance: told.into(),
+            reflected: LinearRgb::from(reflected),
+            sigma: worst,
+        }
     }
 }
 
@@ -172,17 +192,25 @@ const CLEAREST: f64 = 0.05;
 /// Transmittance per channel where the plastic lies flat: the median over what is not much darker than the clearest.
 pub(super) fn flat(solved: &Image<Solved>, inside: &Image<Coverage>) -> LinearRgb {
     let mean = |t: LinearRgb| (t.r + t.g + t.b) / 3.0;
-    let object =
-        || solved.pixels().iter().zip(inside.pixels()).filter(|(_, c)| c.0 >= 0.99).map(|(p, _)| p.transmittance);
+    let object = || {
+        solved
+            .pixels()
+            .iter()
+            .zip(inside.pixels())
+            .filter(|(_, c)| c.0 >= 0.99)
+            .map(|(p, _)| p.transmittance)
+    };
     let mut means: Vec<f32> = object().map(mean).collect();
     if means.is_empty() {
         return LinearRgb::WHITE;
     }
     let at = ((means.len() as f64 * (1.0 - CLEAREST)) as usize).min(means.len() - 1);
     let clearest = *means.select_nth_unstable_by(at, f32::total_cmp).1;
-    let channel =
-        |of: fn(LinearRgb) -> f32| median(object().filter(|t| mean(*t) >= FLAT * clearest).map(of)).unwrap_or(1.0);
-    LinearRgb::new(channel(|t| t.r), channel(|t| t.g), channel(|t| t.b)).map(|t| t.clamp(0.001, 1.0))
+    let channel = |of: fn(LinearRgb) -> f32| {
+        median(object().filter(|t| mean(*t) >= FLAT * clearest).map(of)).unwrap_or(1.0)
+    };
+    LinearRgb::new(channel(|t| t.r), channel(|t| t.g), channel(|t| t.b))
+        .map(|t| t.clamp(0.001, 1.0))
 }
 
 pub(super) fn median(values: impl Iterator<Item = f32>) -> Option<f32> {

@@ -22,7 +22,10 @@ fn truth(x: f64, y: f64) -> (LinearRgb, LinearRgb) {
     }
     let fold = (0.75 + 0.2 * libm::sin(0.23 * x + 0.011 * y * y)) as f32;
     let glint = (0.12 * libm::pow(libm::sin(0.17 * x - 0.29 * y), 8.0)) as f32;
-    (LinearRgb::new(0.03, 0.05, 0.07).map(|f| f + glint), LinearRgb::new(0.25, 0.45, 0.6).scale(fold))
+    (
+        LinearRgb::new(0.03, 0.05, 0.07).map(|f| f + glint),
+        LinearRgb::new(0.25, 0.45, 0.6).scale(fold),
+    )
 }
 
 fn photo(screen: LinearRgb, [dx, dy]: [f64; 2], noise: f32, seed: u64) -> Image<LinearRgb> {
@@ -32,7 +35,10 @@ fn photo(screen: LinearRgb, [dx, dy]: [f64; 2], noise: f32, seed: u64) -> Image<
         let (f, t) = truth(x as f64 - dx, y as f64 - dy);
         f + t * screen
     });
-    image.pixels_mut().iter_mut().for_each(|p| *p = p.map(|v| v + grain()));
+    image
+        .pixels_mut()
+        .iter_mut()
+        .for_each(|p| *p = p.map(|v| v + grain()));
     image
 }
 
@@ -42,7 +48,10 @@ fn solved(screens: &[LinearRgb], shift: [f64; 2], noise: f32) -> Result<Triangul
         .enumerate()
         .map(|(i, &k)| photo(k, if i == 0 { [0.0; 2] } else { shift }, noise, i as u64))
         .collect();
-    let plates: Vec<_> = screens.iter().map(|&k| ScreenPlate::even(k, SIZE)).collect();
+    let plates: Vec<_> = screens
+        .iter()
+        .map(|&k| ScreenPlate::even(k, SIZE))
+        .collect();
     let shots: Vec<_> = photos.iter().zip(&plates).collect();
     triangulate(&shots, &inside(), &TriangulateOptions::default())
 }
@@ -86,7 +95,10 @@ fn an_object_that_moved_is_moved_back() {
     let shift = [1.6, -0.7];
     let found = solved(&[GREEN, BLUE], shift, 0.002).unwrap();
     let [x, y] = found.shift_px[1];
-    assert!((x - shift[0]).abs() < 0.15 && (y - shift[1]).abs() < 0.15, "{x} {y}");
+    assert!(
+        (x - shift[0]).abs() < 0.15 && (y - shift[1]).abs() < 0.15,
+        "{x} {y}"
+    );
     assert!(matches!(found.remarks[0], Remark::Moved { photo: 2, .. }));
     let still = errors(&solved(&[GREEN, BLUE], [0.0; 2], 0.002).unwrap());
     assert!(errors(&found).0[1] < still.0[1] + 0.05);
@@ -94,16 +106,30 @@ fn an_object_that_moved_is_moved_back() {
 
 #[test]
 fn an_object_that_moved_far_is_refused() {
-    let (a, b) = (photo(GREEN, [0.0; 2], 0.002, 1), photo(BLUE, [1.6, -0.7], 0.002, 2));
-    let (ka, kb) = (ScreenPlate::even(GREEN, SIZE), ScreenPlate::even(BLUE, SIZE));
-    let strict = TriangulateOptions { max_shift_px: 1.0, ..TriangulateOptions::default() };
-    let far = triangulate(&[(&a, &ka), (&b, &kb)], &inside(), &strict).unwrap_err().to_string();
+    let (a, b) = (
+        photo(GREEN, [0.0; 2], 0.002, 1),
+        photo(BLUE, [1.6, -0.7], 0.002, 2),
+    );
+    let (ka, kb) = (
+        ScreenPlate::even(GREEN, SIZE),
+        ScreenPlate::even(BLUE, SIZE),
+    );
+    let strict = TriangulateOptions {
+        max_shift_px: 1.0,
+        ..TriangulateOptions::default()
+    };
+    let far = triangulate(&[(&a, &ka), (&b, &kb)], &inside(), &strict)
+        .unwrap_err()
+        .to_string();
     assert!(far.contains("did it move?"), "{far}");
 }
 
 /// The object on a screen, turned around its middle.
 fn turned(screen: LinearRgb, degrees: f64) -> Image<LinearRgb> {
-    let (sin, cos) = (libm::sin(degrees.to_radians()), libm::cos(degrees.to_radians()));
+    let (sin, cos) = (
+        libm::sin(degrees.to_radians()),
+        libm::cos(degrees.to_radians()),
+    );
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         let (dx, dy) = (x as f64 - 80.0, y as f64 - 50.0);
         let (f, t) = truth(80.0 + cos * dx + sin * dy, 50.0 - sin * dx + cos * dy);
@@ -113,11 +139,18 @@ fn turned(screen: LinearRgb, degrees: f64) -> Image<LinearRgb> {
 
 #[test]
 fn an_object_that_turned_is_refused_and_one_that_hardly_did_is_not() {
-    let plates = [ScreenPlate::even(GREEN, SIZE), ScreenPlate::even(BLUE, SIZE)];
+    let plates = [
+        ScreenPlate::even(GREEN, SIZE),
+        ScreenPlate::even(BLUE, SIZE),
+    ];
     let first = turned(GREEN, 0.0);
     let on_blue = |degrees| {
         let second = turned(BLUE, degrees);
-        triangulate(&[(&first, &plates[0]), (&second, &plates[1])], &inside(), &TriangulateOptions::default())
+        triangulate(
+            &[(&first, &plates[0]), (&second, &plates[1])],
+            &inside(),
+            &TriangulateOptions::default(),
+        )
     };
     for degrees in [-3.0, 2.0, 4.0] {
         let refusal = on_blue(degrees).unwrap_err().to_string();
@@ -128,7 +161,9 @@ fn an_object_that_turned_is_refused_and_one_that_hardly_did_is_not() {
 
 #[test]
 fn screens_that_are_alike_and_single_photos_are_refused() {
-    let alike = solved(&[GREEN, GREEN], [0.0; 2], 0.002).unwrap_err().to_string();
+    let alike = solved(&[GREEN, GREEN], [0.0; 2], 0.002)
+        .unwrap_err()
+        .to_string();
     assert!(alike.contains("too alike"), "{alike}");
     let single = solved(&[GREEN], [0.0; 2], 0.0).unwrap_err().to_string();
     assert_eq!(single, "photos: 1, expected at least 2");
@@ -137,5 +172,8 @@ fn screens_that_are_alike_and_single_photos_are_refused() {
 #[test]
 fn outside_the_object_there_is_nothing() {
     let found = solved(&[GREEN, BLUE], [0.0; 2], 0.01).unwrap();
-    assert_eq!((found.film[(2, 3)], found.transmittance[(2, 3)]), (Film::default(), LinearRgb::WHITE));
+    assert_eq!(
+        (found.film[(2, 3)], found.transmittance[(2, 3)]),
+        (Film::default(), LinearRgb::WHITE)
+    );
 }

@@ -39,7 +39,9 @@ pub struct Coverage {
 
 /// Measures whole pictures under every word on them, and cropped ones under those that are not lies.
 pub(super) fn measure(views: u64) -> Vec<Coverage> {
-    let kinds = NOISES.into_iter().flat_map(|noise_px| OFF_CENTER.map(|off_center| (noise_px, off_center)));
+    let kinds = NOISES
+        .into_iter()
+        .flat_map(|noise_px| OFF_CENTER.map(|off_center| (noise_px, off_center)));
     let told = |(noise_px, off_center): (f64, f64)| {
         let told = [Framing::Whole, Framing::Unknown, Framing::Cropped].into_iter();
         told.filter(move |t| off_center == 0.0 || *t != Framing::Whole)
@@ -49,17 +51,26 @@ pub(super) fn measure(views: u64) -> Vec<Coverage> {
 }
 
 fn coverage(off_center: f64, noise_px: f64, told: Framing, views: u64) -> Coverage {
-    let (mut focal, mut height, mut sigmas, mut refused) = ([vec![], vec![]], [vec![], vec![]], Vec::new(), 0);
+    let (mut focal, mut height, mut sigmas, mut refused) =
+        ([vec![], vec![]], [vec![], vec![]], Vec::new(), 0);
     for k in 0..views {
         let tilt = TILTS[k as usize % TILTS.len()];
-        let scenario = Scenario { off_center, corner_sigma_px: noise_px, ..Scenario::default() }.tilted(tilt);
+        let scenario = Scenario {
+            off_center,
+            corner_sigma_px: noise_px,
+            ..Scenario::default()
+        }
+        .tilted(tilt);
         let mut view = scenario.view(SEED, k);
         view.label.image.cropped = match told {
             Framing::Whole => Some(false),
             Framing::Unknown => None,
             Framing::Cropped => Some(true),
         };
-        let Some(solution) = solve(&view.label, &SolveOptions::default()).ok().and_then(|s| s.fitting().ok()) else {
+        let Some(solution) = solve(&view.label, &SolveOptions::default())
+            .ok()
+            .and_then(|s| s.fitting().ok())
+        else {
             refused += 1;
             continue;
         };
@@ -70,7 +81,9 @@ fn coverage(off_center: f64, noise_px: f64, told: Framing, views: u64) -> Covera
         height[0].push(height_error_px(&view, &solution));
         height[1].push(solution.sigma.height_px);
     }
-    let part = |limit: f64| sigmas.iter().filter(|s| **s < limit).count() as f64 / sigmas.len().max(1) as f64;
+    let part = |limit: f64| {
+        sigmas.iter().filter(|s| **s < limit).count() as f64 / sigmas.len().max(1) as f64
+    };
     Coverage {
         off_center,
         noise_px,
@@ -98,8 +111,15 @@ pub(super) fn csv(rows: &[Coverage]) -> String {
                 height_sigma_px,within_1,within_2,within_3,worst_sigmas\n";
     let line = |r: &Coverage| {
         let ([f, fs], [h, hs], [a, b, c]) = (r.focal_percent, r.height_px, r.within);
-        let kind = format!("{},{},{:?},{},{}", r.off_center, r.noise_px, r.told, r.views, r.refused).to_lowercase();
-        format!("{kind},{f:.4},{fs:.4},{h:.4},{hs:.4},{a:.4},{b:.4},{c:.4},{:.3}\n", r.worst)
+        let kind = format!(
+            "{},{},{:?},{},{}",
+            r.off_center, r.noise_px, r.told, r.views, r.refused
+        )
+        .to_lowercase();
+        format!(
+            "{kind},{f:.4},{fs:.4},{h:.4},{hs:.4},{a:.4},{b:.4},{c:.4},{:.3}\n",
+            r.worst
+        )
     };
     head.to_owned() + &rows.iter().map(line).collect::<String>()
 }
@@ -114,10 +134,19 @@ pub(super) fn markdown(rows: &[Coverage]) -> String {
         .to_owned();
     for r in rows {
         let ([f, fs], [h, hs], [a, b, c]) = (r.focal_percent, r.height_px, r.within);
-        let kind =
-            format!("{} % | {} | {} | {} of {}", 100.0 * r.off_center, r.noise_px, words(r.told), r.refused, r.views);
+        let kind = format!(
+            "{} % | {} | {} | {} of {}",
+            100.0 * r.off_center,
+            r.noise_px,
+            words(r.told),
+            r.refused,
+            r.views
+        );
         let errors = [f, fs, h, hs].map(super::three).join(" | ");
-        text += &format!("| {kind} | {errors} | {a:.2} | {b:.2} | {c:.2} | {:.1} |\n", r.worst);
+        text += &format!(
+            "| {kind} | {errors} | {a:.2} | {b:.2} | {c:.2} | {:.1} |\n",
+            r.worst
+        );
     }
     text
 }
@@ -134,8 +163,18 @@ mod tests {
             // A normal error is within one standard deviation in 68 % of all cases; beside the middle by 23 % every view is
             // one of twice what is expected of a cropped one.
             let extreme = row.off_center > 0.2;
-            let least = if extreme { [0.5, 0.75, 0.95] } else { [0.64, 0.9, 0.97] };
-            assert!(row.within.iter().zip(least).all(|(part, least)| *part >= least), "{row:?}");
+            let least = if extreme {
+                [0.5, 0.75, 0.95]
+            } else {
+                [0.64, 0.9, 0.97]
+            };
+            assert!(
+                row.within
+                    .iter()
+                    .zip(least)
+                    .all(|(part, least)| *part >= least),
+                "{row:?}"
+            );
             assert!(row.worst < 3.5, "{row:?}");
         }
     }
@@ -143,11 +182,20 @@ mod tests {
     #[test]
     fn whole_pictures_pay_only_where_nobody_says_that_they_are_whole() {
         for noise_px in NOISES {
-            let [whole, unknown, cropped] =
-                [Framing::Whole, Framing::Unknown, Framing::Cropped].map(|told| coverage(0.0, noise_px, told, 120));
-            assert!((unknown.focal_percent[0] / whole.focal_percent[0] - 1.0).abs() < 1e-9, "{whole:?} {unknown:?}");
-            assert!(whole.focal_percent[1] < 0.3 * unknown.focal_percent[1], "{whole:?} {unknown:?}");
-            assert!(cropped.focal_percent[0] > 2.0 * whole.focal_percent[0], "{whole:?} {cropped:?}");
+            let [whole, unknown, cropped] = [Framing::Whole, Framing::Unknown, Framing::Cropped]
+                .map(|told| coverage(0.0, noise_px, told, 120));
+            assert!(
+                (unknown.focal_percent[0] / whole.focal_percent[0] - 1.0).abs() < 1e-9,
+                "{whole:?} {unknown:?}"
+            );
+            assert!(
+                whole.focal_percent[1] < 0.3 * unknown.focal_percent[1],
+                "{whole:?} {unknown:?}"
+            );
+            assert!(
+                cropped.focal_percent[0] > 2.0 * whole.focal_percent[0],
+                "{whole:?} {cropped:?}"
+            );
         }
     }
 }

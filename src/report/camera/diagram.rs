@@ -14,7 +14,11 @@ pub fn diagrams(views: u64) -> Vec<Diagram> {
 }
 
 fn diagram(tilt_deg: f64, views: u64) -> Diagram {
-    let cell = Cell { lens: Lens::Realistic, noise_px: NOISE_PX, tilt_deg };
+    let cell = Cell {
+        lens: Lens::Realistic,
+        noise_px: NOISE_PX,
+        tilt_deg,
+    };
     let photos: Vec<_> = (0..views).map(|k| cell.photos(k)).collect();
     Diagram {
         file: format!("camera_{tilt_deg}_degrees"),
@@ -32,8 +36,13 @@ fn diagram(tilt_deg: f64, views: u64) -> Diagram {
 }
 
 fn point(row: &Row) -> Point {
-    let curve = if row.method == Method::Joint { "several photos" } else { "one photo" };
-    Point::new(curve, row.method.name(), row.time_us, row.focal_percent[0]).used_where(|_| row.method == Method::Whole)
+    let curve = if row.method == Method::Joint {
+        "several photos"
+    } else {
+        "one photo"
+    };
+    Point::new(curve, row.method.name(), row.time_us, row.focal_percent[0])
+        .used_where(|_| row.method == Method::Whole)
 }
 
 #[cfg(test)]

@@ -196,16 +196,25 @@ impl Variant {
             Self::Noisy => with(sensor::noisy(&known.photo, 0.03, seed)),
             Self::Blurred => with(crate::filter::gaussian_blur(&known.photo, 2.0)),
             Self::OtherScreen => with(screen::on(known, |k| LinearRgb::new(k.r, k.b, k.g))),
-            Self::GreyScreen => with(screen::on(known, |k| LinearRgb::grey(k.r.max(k.g).max(k.b)))),
+            Self::GreyScreen => with(screen::on(known, |k| {
+                LinearRgb::grey(k.r.max(k.g).max(k.b))
+            })),
             Self::ScreenHue => with(screen::hued(known)?),
             Self::OverBorder => framing::cut_off(plain(), 0.1),
             Self::Two => framing::two(&plain()),
             Self::Empty => with(sensor::noisy(&known.screen, read, seed)),
-            Self::EmptyUneven => with(sensor::noisy(&lighting::fallen_off(&known.screen, direction, 0.6), read, seed)),
+            Self::EmptyUneven => with(sensor::noisy(
+                &lighting::fallen_off(&known.screen, direction, 0.6),
+                read,
+                seed,
+            )),
             Self::Tiny => framing::tiny(&plain()),
             Self::Huge => {
                 let large = framing::huge(&plain());
-                Trial { photo: sensor::noisy(&large.photo, read, seed), ..large }
+                Trial {
+                    photo: sensor::noisy(&large.photo, read, seed),
+                    ..large
+                }
             }
             Self::Portrait => framing::upright(&plain()),
             Self::FullFrame => framing::full_frame(plain()),
@@ -213,17 +222,28 @@ impl Variant {
             Self::ThinObject => framing::thin_object(known, plain()),
             Self::AtBorder => framing::cut_off(plain(), 0.0),
             Self::Jpeg => with(sensor::jpeg(&known.photo, 60)?),
-            Self::Dark => with(sensor::noisy(&known.photo.map(|p| p.scale(0.1)), read, seed)),
+            Self::Dark => with(sensor::noisy(
+                &known.photo.map(|p| p.scale(0.1)),
+                read,
+                seed,
+            )),
             Self::MotionBlur => with(lens::moved(&known.photo, direction, 6)),
             Self::Defocused => with(lens::defocused(&known.photo, 3)),
-            Self::Vignetted => with(lighting::fallen_off(&lens::vignetted(&known.photo, 0.4), direction, 0.3)),
+            Self::Vignetted => with(lighting::fallen_off(
+                &lens::vignetted(&known.photo, 0.4),
+                direction,
+                0.3,
+            )),
             Self::TwoHues => with(lighting::two_hues(&known.photo, direction)),
             Self::CastShadow => with(lighting::cast(known, direction)),
             Self::Wrinkled => with(screen::wrinkled(known, seed)),
             Self::Specks => with(screen::specks(known, seed)),
             Self::ScreenEdge => with(screen::ending(known)),
         };
-        Some(Trial { photo: trial.photo.map(sensor::coded), ..trial })
+        Some(Trial {
+            photo: trial.photo.map(sensor::coded),
+            ..trial
+        })
     }
 }
 

@@ -27,15 +27,29 @@ pub fn diagrams(truth: &Path) -> Result<Vec<Diagram>> {
         true => format!("{photos} photos of see-through bottles made in code, 600 x 320"),
         false => format!("{photos} photos with known mattes"),
     };
-    let source = if is_made { "the formula that the photos are made by" } else { "what the photos' renderer knows" };
+    let source = if is_made {
+        "the formula that the photos are made by"
+    } else {
+        "what the photos' renderer knows"
+    };
     Ok(of(&summaries(&rows), &input, source))
 }
 
 fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
     type Error = fn(&Score) -> f64;
     let errors: [(&str, &str, &str, Error); 2] = [
-        ("matte_lit", "matte: on new backgrounds", "mean absolute error, scene-linear", |s| s.mae_lit),
-        ("matte_shaded", "matte: in the object's own shadow", "mean absolute error, scene-linear", |s| s.mae_shaded),
+        (
+            "matte_lit",
+            "matte: on new backgrounds",
+            "mean absolute error, scene-linear",
+            |s| s.mae_lit,
+        ),
+        (
+            "matte_shaded",
+            "matte: in the object's own shadow",
+            "mean absolute error, scene-linear",
+            |s| s.mae_shaded,
+        ),
     ];
     let diagram = |(file, title, error, of): (&str, &str, &str, Error)| Diagram {
         file: file.into(),
@@ -54,7 +68,12 @@ fn of(summaries: &[Summary], input: &str, source: &str) -> Vec<Diagram> {
 
 /// What the default is worth beside the paper's method.
 fn why(summaries: &[Summary], error: fn(&Score) -> f64) -> String {
-    let of = |method| summaries.iter().find(|s| s.method == method).map_or(0.0, |s: &Summary| error(&s.score));
+    let of = |method| {
+        summaries
+            .iter()
+            .find(|s| s.method == method)
+            .map_or(0.0, |s: &Summary| error(&s.score))
+    };
     let share = three(of(Method::Physical) / of(Method::Paper));
     format!(
         "Times include finding the object. Two screens need a second photo of each object. The default has \
@@ -75,6 +94,10 @@ mod tests {
     fn every_method_is_a_point_and_the_physical_one_has_the_ring() {
         let found = of(&summaries(&[]), "", "");
         assert!(found.iter().all(|d| d.points.len() == Method::ALL.len()));
-        assert!(found.iter().all(|d| d.default_point().is_some_and(|p| p.curve == "physical")));
+        assert!(
+            found
+                .iter()
+                .all(|d| d.default_point().is_some_and(|p| p.curve == "physical"))
+        );
     }
 }

@@ -12,7 +12,12 @@ use crate::pixel::{Coverage, LinearRgb};
 /// How many there are.
 pub(super) const COUNT: usize = TINTS.len();
 /// Absorbance of the dye of two walls that lie flat: clear, blue, green, brown.
-const TINTS: [[f64; 3]; 4] = [[0.0; 3], [0.4, 0.13, 0.01], [0.35, 0.09, 0.27], [0.08, 0.18, 0.25]];
+const TINTS: [[f64; 3]; 4] = [
+    [0.0; 3],
+    [0.4, 0.13, 0.01],
+    [0.35, 0.09, 0.27],
+    [0.08, 0.18, 0.25],
+];
 /// Absorbance of two clear walls, by what four surfaces reflect.
 const CLEAR: f64 = 0.29;
 const SIZE: (usize, usize) = (600, 320);
@@ -24,7 +29,10 @@ const AXIS_PX: f64 = 170.0;
 const RADIUS_PX: f64 = 75.0;
 const EDGE_PX: f64 = 1.0;
 /// Noise of a usual camera at base sensitivity.
-const NOISE: Noise = Noise { shot: 0.006, read: 0.002 };
+const NOISE: Noise = Noise {
+    shot: 0.006,
+    read: 0.002,
+};
 
 /// What is at one place.
 #[derive(Clone, Copy)]
@@ -45,7 +53,9 @@ pub(super) fn made(i: usize) -> Known {
 pub(super) fn enlarged(i: usize, times: usize) -> Known {
     let (w, h) = (times * SIZE.0, times * SIZE.1);
     let px = 1.0 / times as f64;
-    let places = Image::from_fn(w, h, |x, y| place(i, [x, y].map(|v| (v as f64 + 0.5) * px), px));
+    let places = Image::from_fn(w, h, |x, y| {
+        place(i, [x, y].map(|v| (v as f64 + 0.5) * px), px)
+    });
     let color = |c: [f64; 3]| LinearRgb::from(c.map(|v| v as f32));
     let foreground = places.map(|p| color(p.foreground));
     let transmittance = places.map(|p| color([0, 1, 2].map(|c| p.view[c] * p.lit[c])));
@@ -107,9 +117,16 @@ fn place(i: usize, [x, y]: [f64; 2], px: f64) -> Place {
     let inside = cover * cover * (3.0 - 2.0 * cover);
     // Walls seen at a grazing angle near the outline are thicker, and wrinkles fold them.
     let rim = 1.0 + 2.0 * libm::exp(-depth.max(0.0) / 6.0);
-    let wrinkle = 1.0 + 0.5 * libm::sin(0.11 * x + 0.03 * i as f64) * libm::sin(0.07 * y + 0.05 * x);
-    let label = if (0.45..0.65).contains(&along) && depth > 12.0 { 1.0 } else { 0.0 };
-    let streak = 0.5 * libm::exp(-((depth - 30.0) / 5.0).powi(2)) * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4);
+    let wrinkle =
+        1.0 + 0.5 * libm::sin(0.11 * x + 0.03 * i as f64) * libm::sin(0.07 * y + 0.05 * x);
+    let label = if (0.45..0.65).contains(&along) && depth > 12.0 {
+        1.0
+    } else {
+        0.0
+    };
+    let streak = 0.5
+        * libm::exp(-((depth - 30.0) / 5.0).powi(2))
+        * (0.5 + 0.5 * libm::sin(0.05 * x)).powi(4);
     let flat = TINTS[i % COUNT].map(|dye| libm::exp(-CLEAR - dye));
     let film = flat.map(|v| libm::pow(v, rim * wrinkle));
     let own = |c: usize| {
@@ -133,7 +150,10 @@ fn body(i: usize, x: f64, y: f64) -> (f64, f64) {
     let length = 2.0 * AXIS_PX;
     let axis = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
     let from = [x - a[0], y - a[1]];
-    let (along, across) = (from[0] * axis[0] + from[1] * axis[1], from[0] * axis[1] - from[1] * axis[0]);
+    let (along, across) = (
+        from[0] * axis[0] + from[1] * axis[1],
+        from[0] * axis[1] - from[1] * axis[0],
+    );
     // The side leans out by the difference of the radii: its foot lies further back than the point.
     let sine = (RADII[1] - RADII[0]) / length;
     let cosine = (1.0 - sine * sine).sqrt();
@@ -156,8 +176,17 @@ mod tests {
             let columns = (0..w).filter(|&x| (0..h).any(|y| inside(x, y)));
             let rows: Vec<usize> = (0..h).filter(|&y| (0..w).any(|x| inside(x, y))).collect();
             let columns: Vec<usize> = columns.collect();
-            let found = [columns[0], rows[0], columns[columns.len() - 1] + 1, rows[rows.len() - 1] + 1];
-            let off = found.iter().zip(known.box_px).map(|(a, b)| (*a as f64 - b).abs()).fold(0.0, f64::max);
+            let found = [
+                columns[0],
+                rows[0],
+                columns[columns.len() - 1] + 1,
+                rows[rows.len() - 1] + 1,
+            ];
+            let off = found
+                .iter()
+                .zip(known.box_px)
+                .map(|(a, b)| (*a as f64 - b).abs())
+                .fold(0.0, f64::max);
             assert!(off <= 1.0, "{found:?} {:?}", known.box_px);
         }
     }
@@ -166,10 +195,14 @@ mod tests {
     fn a_photo_is_its_foreground_over_its_screen_and_the_object_is_found() {
         let known = made(1);
         let off = |x: usize, y: usize| {
-            let truth = known.foreground[(x, y)] + known.transmittance[(x, y)] * known.screen[(x, y)];
+            let truth =
+                known.foreground[(x, y)] + known.transmittance[(x, y)] * known.screen[(x, y)];
             (known.photo[(x, y)].g - truth.g.min(1.0)).abs()
         };
-        assert!((0..300).all(|k| off(2 * k, k) < 0.05), "noise and 8 bits only");
+        assert!(
+            (0..300).all(|k| off(2 * k, k) < 0.05),
+            "noise and 8 bits only"
+        );
         let found = segment(&known.photo, &SegmentOptions::default()).unwrap();
         assert!(super::super::score::overlap(&found.tight, &known.mask) > 0.95);
     }

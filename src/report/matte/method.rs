@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
 use crate::matte::{
-    CutOutOptions, FilmOptions, KeyOptions, Keying, Screen, ScreenPlate, SegmentOptions, Segmentation, screen_color,
-    segment, triangulate,
+    CutOutOptions, FilmOptions, KeyOptions, Keying, Screen, ScreenPlate, SegmentOptions,
+    Segmentation, screen_color, segment, triangulate,
 };
 use crate::pixel::{Coverage, Film, LinearRgb, PremulRgba};
 
@@ -38,7 +38,13 @@ pub(super) struct Cut {
 
 impl Method {
     /// All of them, the paper's first.
-    pub const ALL: [Self; 5] = [Self::Paper, Self::KeyPlate, Self::Difference, Self::Physical, Self::TwoScreen];
+    pub const ALL: [Self; 5] = [
+        Self::Paper,
+        Self::KeyPlate,
+        Self::Difference,
+        Self::Physical,
+        Self::TwoScreen,
+    ];
 
     /// What it is called in tables.
     pub fn name(self) -> &'static str {
@@ -65,7 +71,8 @@ impl Method {
         let plate = fitted(photo, &found)?;
         Ok(match self {
             Self::Paper | Self::KeyPlate => {
-                let keyed = Keying::new(photo, Screen::Plate(&plate.image)).run(&KeyOptions::default())?;
+                let keyed =
+                    Keying::new(photo, Screen::Plate(&plate.image)).run(&KeyOptions::default())?;
                 let cut = keyed.cutout.zip_map(&inside, |p, m| p.masked(m));
                 Cut::grey(&cut, found.tight.clone(), found)
             }
@@ -77,14 +84,24 @@ impl Method {
             Self::Physical => {
                 let solved = crate::matte::film(photo, &plate, &inside, &FilmOptions::default())?;
                 let outline = found.tight.clone();
-                Cut { film: solved.film, transmittance: solved.transmittance, outline, found }
+                Cut {
+                    film: solved.film,
+                    transmittance: solved.transmittance,
+                    outline,
+                    found,
+                }
             }
             Self::TwoScreen => {
                 let plates = [fitted(&shots[0], &found)?, fitted(&shots[1], &found)?];
                 let shots = [(&shots[0], &plates[0]), (&shots[1], &plates[1])];
                 let solved = triangulate(&shots, &inside, &Default::default())?;
                 let outline = found.tight.clone();
-                Cut { film: solved.film, transmittance: solved.transmittance, outline, found }
+                Cut {
+                    film: solved.film,
+                    transmittance: solved.transmittance,
+                    outline,
+                    found,
+                }
             }
         })
     }
@@ -93,7 +110,12 @@ impl Method {
 impl Cut {
     fn grey(cut: &Image<PremulRgba>, outline: Image<Coverage>, found: Segmentation) -> Self {
         let transmittance = cut.map(|p| LinearRgb::grey(1.0 - p.a.clamp(0.0, 1.0)));
-        Self { film: cut.map(Film::from), transmittance, outline, found }
+        Self {
+            film: cut.map(Film::from),
+            transmittance,
+            outline,
+            found,
+        }
     }
 }
 
@@ -110,7 +132,11 @@ fn difference(pixel: LinearRgb, screen: LinearRgb) -> PremulRgba {
     let (i, k): ([f32; 3], [f32; 3]) = (pixel.into(), screen.into());
     let p = (1..3).fold(0, |best, c| if k[c] > k[best] { c } else { best });
     let excess = |c: [f32; 3]| c[p] - c[(p + 1) % 3].max(c[(p + 2) % 3]);
-    let through = if excess(k) > 0.0 { (excess(i) / excess(k)).clamp(0.0, 1.0) } else { 0.0 };
+    let through = if excess(k) > 0.0 {
+        (excess(i) / excess(k)).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let [r, g, b] = [0, 1, 2].map(|c| (i[c] - through * k[c]).max(0.0));
     PremulRgba::new(r, g, b, 1.0 - through)
 }
@@ -123,7 +149,10 @@ mod tests {
     fn colour_difference_takes_the_screen_away_and_keeps_what_is_grey() {
         let screen = LinearRgb::new(0.05, 0.4, 0.1);
         assert_eq!(difference(screen, screen), PremulRgba::TRANSPARENT);
-        assert_eq!(difference(LinearRgb::grey(0.3), screen), PremulRgba::new(0.3, 0.3, 0.3, 1.0));
+        assert_eq!(
+            difference(LinearRgb::grey(0.3), screen),
+            PremulRgba::new(0.3, 0.3, 0.3, 1.0)
+        );
         let half = difference(screen.scale(0.5) + LinearRgb::grey(0.1), screen);
         assert!((half.a - 0.5).abs() < 1e-6 && (half.g - 0.1).abs() < 1e-6);
     }

@@ -38,12 +38,22 @@ impl Score {
         let truth = known.view.map(|v| Coverage(1.0 - (v.r + v.g + v.b) / 3.0));
         let off = |a: Coverage, b: Coverage| f64::from(a.0) - f64::from(b.0);
         let n = alpha.pixels().len().max(1) as f64;
-        let differences = || alpha.pixels().iter().zip(truth.pixels()).map(|(a, b)| off(*a, *b));
-        let slopes = gradient(&alpha).into_iter().zip(gradient(&truth)).map(|(a, b)| (a - b) * (a - b));
+        let differences = || {
+            alpha
+                .pixels()
+                .iter()
+                .zip(truth.pixels())
+                .map(|(a, b)| off(*a, *b))
+        };
+        let slopes = gradient(&alpha)
+            .into_iter()
+            .zip(gradient(&truth))
+            .map(|(a, b)| (a - b) * (a - b));
         let lit = |f: Film, _, b| f.over_color(b);
         let shaded = |f: Film, t: LinearRgb, b: LinearRgb| f.color + t * b;
         let [mae_lit, psnr_lit] = recomposite(found, known, &known.view, backgrounds, lit);
-        let [mae_shaded, psnr_shaded] = recomposite(found, known, &known.transmittance, backgrounds, shaded);
+        let [mae_shaded, psnr_shaded] =
+            recomposite(found, known, &known.transmittance, backgrounds, shaded);
         Self {
             sad: differences().map(f64::abs).sum::<f64>() / THOUSAND,
             mse: differences().map(|d| d * d).sum::<f64>() / n,
@@ -68,12 +78,17 @@ const GRADIENT_SIGMA_PX: f32 = 1.4;
 /// Length of the gradient of the blurred picture, by central differences.
 fn gradient(alpha: &Image<Coverage>) -> Vec<f64> {
     let smooth = filter::gaussian_blur(alpha, GRADIENT_SIGMA_PX);
-    let at = |x: usize, y: usize, dx: isize, dy: isize| f64::from(smooth.nearest(x as isize + dx, y as isize + dy).0);
+    let at = |x: usize, y: usize, dx: isize, dy: isize| {
+        f64::from(smooth.nearest(x as isize + dx, y as isize + dy).0)
+    };
     let half = |a: f64, b: f64| 0.5 * (a - b);
     let (w, h) = alpha.size();
     let along = |i: usize| {
         let (x, y) = (i % w, i / w);
-        libm::hypot(half(at(x, y, 1, 0), at(x, y, -1, 0)), half(at(x, y, 0, 1), at(x, y, 0, -1)))
+        libm::hypot(
+            half(at(x, y, 1, 0), at(x, y, -1, 0)),
+            half(at(x, y, 0, 1), at(x, y, 0, -1)),
+        )
     };
     (0..w * h).map(along).collect()
 }
@@ -90,7 +105,8 @@ fn recomposite(
     for background in backgrounds {
         for i in 0..background.pixels().len() {
             let b = background.pixels()[i];
-            let ours: [f32; 3] = over(found.film.pixels()[i], found.transmittance.pixels()[i], b).into();
+            let ours: [f32; 3] =
+                over(found.film.pixels()[i], found.transmittance.pixels()[i], b).into();
             let truth: [f32; 3] = (known.foreground.pixels()[i] + passes.pixels()[i] * b).into();
             for (a, b) in ours.into_iter().zip(truth) {
                 let d = f64::from(a) - f64::from(b);
@@ -99,30 +115,49 @@ fn recomposite(
         }
     }
     let n = count.max(1) as f64;
-    [sum / n, -10.0 * libm::log10((squares / n).max(f64::MIN_POSITIVE))]
+    [
+        sum / n,
+        -10.0 * libm::log10((squares / n).max(f64::MIN_POSITIVE)),
+    ]
 }
 
 /// Mean alpha where the object covers nothing.
 fn residue(alpha: &Image<Coverage>, mask: &Image<Coverage>) -> f64 {
-    let outside = alpha.pixels().iter().zip(mask.pixels()).filter(|(_, m)| m.0 == 0.0);
-    let (sum, count) = outside.fold((0.0, 0u64), |(sum, n), (a, _)| (sum + f64::from(a.0), n + 1));
+    let outside = alpha
+        .pixels()
+        .iter()
+        .zip(mask.pixels())
+        .filter(|(_, m)| m.0 == 0.0);
+    let (sum, count) = outside.fold((0.0, 0u64), |(sum, n), (a, _)| {
+        (sum + f64::from(a.0), n + 1)
+    });
     sum / count.max(1) as f64
 }
 
 /// Intersection over union of what is covered by at least a half.
 pub(in crate::report) fn overlap(a: &Image<Coverage>, b: &Image<Coverage>) -> f64 {
-    let pairs = a.pixels().iter().zip(b.pixels()).map(|(a, b)| (a.0 >= 0.5, b.0 >= 0.5));
-    let (both, any) =
-        pairs.fold((0u64, 0u64), |(both, any), (a, b)| (both + u64::from(a && b), any + u64::from(a || b)));
+    let pairs = a
+        .pixels()
+        .iter()
+        .zip(b.pixels())
+        .map(|(a, b)| (a.0 >= 0.5, b.0 >= 0.5));
+    let (both, any) = pairs.fold((0u64, 0u64), |(both, any), (a, b)| {
+        (both + u64::from(a && b), any + u64::from(a || b))
+    });
     both as f64 / any.max(1) as f64
 }
 
 /// The side of a hull's box that is farthest from left, top, right or bottom.
 pub(super) fn box_error(hull: &[Point2<f64>], truth: [f64; 4]) -> f64 {
     let low = |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::INFINITY, f64::min);
-    let high = |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
+    let high =
+        |along: fn(&Point2<f64>) -> f64| hull.iter().map(along).fold(f64::NEG_INFINITY, f64::max);
     let sides = [low(|p| p.x), low(|p| p.y), high(|p| p.x), high(|p| p.y)];
-    sides.iter().zip(truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    sides
+        .iter()
+        .zip(truth)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -156,10 +191,29 @@ mod tests {
         };
         let (transmittance, view) = (passes(0.5), passes(0.75));
         let screen = Image::filled(w, h, GREEN);
-        let photo = Image::from_fn(w, h, |x, y| foreground[(x, y)] + transmittance[(x, y)] * GREEN);
+        let photo = Image::from_fn(w, h, |x, y| {
+            foreground[(x, y)] + transmittance[(x, y)] * GREEN
+        });
         let mask = Image::from_fn(w, h, |x, y| Coverage(f32::from(u8::from(on(x, y)))));
-        let (box_px, noise) = ([40.0, 30.0, 120.0, 70.0], Noise { shot: 0.0, read: 0.0 });
-        Known { name: "slab".into(), photo, foreground, transmittance, view, screen, mask, box_px, noise, paint: GREEN }
+        let (box_px, noise) = (
+            [40.0, 30.0, 120.0, 70.0],
+            Noise {
+                shot: 0.0,
+                read: 0.0,
+            },
+        );
+        Known {
+            name: "slab".into(),
+            photo,
+            foreground,
+            transmittance,
+            view,
+            screen,
+            mask,
+            box_px,
+            noise,
+            paint: GREEN,
+        }
     }
 
     fn truth(known: &Known) -> Cut {
@@ -175,8 +229,15 @@ mod tests {
     fn the_truth_has_no_error() {
         let known = known();
         let score = Score::of(&truth(&known), &known, &[background(known.photo.size(), 1)]);
-        let all =
-            [score.sad, score.mse, score.gradient, score.mae_lit, score.mae_shaded, score.residue, 1.0 - score.iou];
+        let all = [
+            score.sad,
+            score.mse,
+            score.gradient,
+            score.mae_lit,
+            score.mae_shaded,
+            score.residue,
+            1.0 - score.iou,
+        ];
         assert!(all.iter().all(|e| e.abs() < 1e-6), "{score:?}");
         assert!(score.psnr_lit > 100.0 && score.box_px <= 2.0, "{score:?}");
     }
@@ -186,10 +247,22 @@ mod tests {
         let known = known();
         let mut cut = truth(&known);
         // A tenth too opaque everywhere: on a background of 1, a tenth too dark.
-        cut.film = cut.film.map(|f| Film { color: f.color, opacity: f.opacity.map(|o| o + 0.1) });
+        cut.film = cut.film.map(|f| Film {
+            color: f.color,
+            opacity: f.opacity.map(|o| o + 0.1),
+        });
         let score = Score::of(&cut, &known, &[Image::filled(160, 100, LinearRgb::WHITE)]);
-        assert!((score.mse - 0.01).abs() < 1e-5 && (score.sad - 1.6).abs() < 1e-3, "{score:?}");
-        assert!((score.mae_lit - 0.1).abs() < 1e-5 && (score.psnr_lit - 20.0).abs() < 1e-2, "{score:?}");
-        assert!((score.residue - 0.1).abs() < 1e-5 && score.mae_shaded < 1e-6, "{score:?}");
+        assert!(
+            (score.mse - 0.01).abs() < 1e-5 && (score.sad - 1.6).abs() < 1e-3,
+            "{score:?}"
+        );
+        assert!(
+            (score.mae_lit - 0.1).abs() < 1e-5 && (score.psnr_lit - 20.0).abs() < 1e-2,
+            "{score:?}"
+        );
+        assert!(
+            (score.residue - 0.1).abs() < 1e-5 && score.mae_shaded < 1e-6,
+            "{score:?}"
+        );
     }
 }

@@ -38,21 +38,38 @@ struct Found {
 pub fn searches(bottles: usize) -> Result<Vec<Diagram>> {
     let (mut outlines, mut boxes) = (Vec::new(), Vec::new());
     for times in TIMES {
-        let photos: Vec<Known> = (0..bottles.min(made::COUNT)).map(|i| made::enlarged(i, times)).collect();
-        let longer = photos.iter().map(|known| known.photo.width()).max().unwrap_or(0);
+        let photos: Vec<Known> = (0..bottles.min(made::COUNT))
+            .map(|i| made::enlarged(i, times))
+            .collect();
+        let longer = photos
+            .iter()
+            .map(|known| known.photo.width())
+            .max()
+            .unwrap_or(0);
         // A photo is not enlarged to be searched.
         for side in SIDES.into_iter().filter(|side| *side <= longer) {
             let found = searched(&photos, side)?;
             let point = |error: f64| {
-                Point::new(format!("photos {longer} px wide"), format!("{side} px"), found.seconds, error)
-                    .used_where(|quality| times == USUAL_TIMES && side == side_of(quality))
+                Point::new(
+                    format!("photos {longer} px wide"),
+                    format!("{side} px"),
+                    found.seconds,
+                    error,
+                )
+                .used_where(|quality| times == USUAL_TIMES && side == side_of(quality))
             };
             outlines.push(point(found.outline));
             boxes.push(point(found.box_px));
         }
     }
     Ok(vec![
-        diagram("matte_search_outline", "matte: size of the search, outline", "1 - IoU", bottles, outlines),
+        diagram(
+            "matte_search_outline",
+            "matte: size of the search, outline",
+            "1 - IoU",
+            bottles,
+            outlines,
+        ),
         diagram(
             "matte_search_box",
             "matte: size of the search, box",
@@ -64,21 +81,39 @@ pub fn searches(bottles: usize) -> Result<Vec<Diagram>> {
 }
 
 fn side_of(quality: Quality) -> usize {
-    quality.cut_out(CutOutOptions::default()).segment.working_size
+    quality
+        .cut_out(CutOutOptions::default())
+        .segment
+        .working_size
 }
 
 /// Means over the photos.
 fn searched(photos: &[Known], working_size: usize) -> Result<Found> {
-    let options = SegmentOptions { working_size, ..SegmentOptions::default() };
-    let found: Vec<Found> = photos.iter().map(|known| search(known, &options)).collect::<Result<_>>()?;
-    let mean = |of: fn(&Found) -> f64| found.iter().map(of).sum::<f64>() / found.len().max(1) as f64;
-    Ok(Found { outline: mean(|f| f.outline), box_px: mean(|f| f.box_px), seconds: mean(|f| f.seconds) })
+    let options = SegmentOptions {
+        working_size,
+        ..SegmentOptions::default()
+    };
+    let found: Vec<Found> = photos
+        .iter()
+        .map(|known| search(known, &options))
+        .collect::<Result<_>>()?;
+    let mean =
+        |of: fn(&Found) -> f64| found.iter().map(of).sum::<f64>() / found.len().max(1) as f64;
+    Ok(Found {
+        outline: mean(|f| f.outline),
+        box_px: mean(|f| f.box_px),
+        seconds: mean(|f| f.seconds),
+    })
 }
 
 fn search(known: &Known, options: &SegmentOptions) -> Result<Found> {
     let (found, seconds) = timed(RUNS, || segment(&known.photo, options))?;
     let outline = 1.0 - overlap(&found.tight, &known.mask);
-    Ok(Found { outline, box_px: box_error(&found.hull, known.box_px), seconds })
+    Ok(Found {
+        outline,
+        box_px: box_error(&found.hull, known.box_px),
+        seconds,
+    })
 }
 
 /// Intersection over union, where a pixel counts as far as it is covered.
@@ -118,13 +153,23 @@ mod tests {
     #[test]
     fn a_search_is_held_against_the_closed_form() {
         let found = searched(&[made::enlarged(1, 1)], side_of(Quality::Draft)).unwrap();
-        assert!(found.outline < 0.03 && found.box_px < 3.0 && found.seconds > 0.0, "{found:?}");
+        assert!(
+            found.outline < 0.03 && found.box_px < 3.0 && found.seconds > 0.0,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn a_larger_camera_sees_the_same_bottle() {
         let [small, large] = [1, 2].map(|times| made::enlarged(2, times));
-        let area = |known: &Known| known.mask.pixels().iter().map(|c| f64::from(c.0)).sum::<f64>();
+        let area = |known: &Known| {
+            known
+                .mask
+                .pixels()
+                .iter()
+                .map(|c| f64::from(c.0))
+                .sum::<f64>()
+        };
         assert!((area(&large) / area(&small) / 4.0 - 1.0).abs() < 1e-3);
         assert_eq!(large.box_px, small.box_px.map(|side| 2.0 * side));
         assert!((overlap(&small.mask, &small.mask) - 1.0).abs() < 1e-12);

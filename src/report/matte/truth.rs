@@ -28,7 +28,10 @@ pub(in crate::report) struct Known {
 }
 
 /// The paints of the sample world's two screens.
-const PAINTS: [LinearRgb; 2] = [LinearRgb::new(0.045, 0.42, 0.085), LinearRgb::new(0.03, 0.095, 0.52)];
+const PAINTS: [LinearRgb; 2] = [
+    LinearRgb::new(0.045, 0.42, 0.085),
+    LinearRgb::new(0.03, 0.095, 0.52),
+];
 
 #[derive(Deserialize)]
 struct Document {
@@ -76,16 +79,23 @@ impl Truths {
     /// Finds the records (`*.json`) of a folder.
     pub(in crate::report) fn of(folder: &Path) -> Result<Self> {
         let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-        let paths = entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::file(folder, e)));
+        let paths =
+            entries.map(|entry| entry.map(|e| e.path()).map_err(|e| Error::file(folder, e)));
         let mut paths: Vec<PathBuf> = paths.collect::<Result<_>>()?;
         paths.retain(|path| path.extension().is_some_and(|e| e == "json"));
         paths.sort();
         let documents: Vec<Document> = paths.iter().map(io::read_json).collect::<Result<_>>()?;
         let records: Vec<Record> = documents.into_iter().flat_map(|d| d.photos).collect();
         if records.is_empty() {
-            return Err(Error::file(folder, "no photos with truth (*.json), expected those of the sample world"));
+            return Err(Error::file(
+                folder,
+                "no photos with truth (*.json), expected those of the sample world",
+            ));
         }
-        Ok(Self { folder: folder.into(), records })
+        Ok(Self {
+            folder: folder.into(),
+            records,
+        })
     }
 
     pub(in crate::report) fn len(&self) -> usize {
@@ -98,7 +108,8 @@ impl Truths {
         let color = |name: &Path| io::inside(&self.folder, name).and_then(io::read::<LinearRgb>);
         let mask: Image<Coverage> = io::read(io::inside(&self.folder, &record.files.mask)?)?;
         // Linear in 8 bits, which is how coverage is stored and colour is not.
-        let view = color(&record.files.transmittance_view)?.map(|p| p.map(crate::color::linear_to_srgb));
+        let view =
+            color(&record.files.transmittance_view)?.map(|p| p.map(crate::color::linear_to_srgb));
         let inside = |t: LinearRgb, c: Coverage| t.map(|t| 1.0 + c.0.min(1.0) * (t - 1.0));
         Ok(Known {
             name: record.name.clone(),
@@ -118,8 +129,16 @@ impl Truths {
 impl Known {
     /// The empty screen painted green where it is blue, and blue where it is green, under the same light.
     pub(super) fn other_screen(&self) -> Image<LinearRgb> {
-        let other = if self.paint.g > self.paint.b { PAINTS[1] } else { PAINTS[0] };
-        let change = LinearRgb::new(other.r / self.paint.r, other.g / self.paint.g, other.b / self.paint.b);
+        let other = if self.paint.g > self.paint.b {
+            PAINTS[1]
+        } else {
+            PAINTS[0]
+        };
+        let change = LinearRgb::new(
+            other.r / self.paint.r,
+            other.g / self.paint.g,
+            other.b / self.paint.b,
+        );
         self.screen.map(|k| k * change)
     }
 
@@ -127,11 +146,20 @@ impl Known {
     pub(in crate::report) fn on(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
         let mut draw = super::normal(seed);
         let mut seen = self.foreground.clone();
-        for ((pixel, t), k) in seen.pixels_mut().iter_mut().zip(self.transmittance.pixels()).zip(screen.pixels()) {
+        for ((pixel, t), k) in seen
+            .pixels_mut()
+            .iter_mut()
+            .zip(self.transmittance.pixels())
+            .zip(screen.pixels())
+        {
             *pixel = (*pixel + *t * *k).map(|v| {
-                let deviation =
-                    (self.noise.shot * self.noise.shot * f64::from(v) + self.noise.read * self.noise.read).sqrt();
-                let code = 255.0 * crate::color::linear_to_srgb((v + (deviation * draw()) as f32).clamp(0.0, 1.0));
+                let deviation = (self.noise.shot * self.noise.shot * f64::from(v)
+                    + self.noise.read * self.noise.read)
+                    .sqrt();
+                let code = 255.0
+                    * crate::color::linear_to_srgb(
+                        (v + (deviation * draw()) as f32).clamp(0.0, 1.0),
+                    );
                 crate::color::srgb_to_linear(code.round() / 255.0)
             });
         }

@@ -50,7 +50,10 @@ pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
         return Ok(Vec::new());
     }
     let mut found = samples(&scenes, runs)?;
-    let plain: Vec<Scene> = scenes.into_iter().filter(|scene| scene.name == PLAIN).collect();
+    let plain: Vec<Scene> = scenes
+        .into_iter()
+        .filter(|scene| scene.name == PLAIN)
+        .collect();
     if !plain.is_empty() {
         found.push(filter(&plain, runs)?);
     }
@@ -63,7 +66,11 @@ fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
     for (curve, setting, options) in settings() {
         let costs = measured(scenes, runs, |shot| cast(shot, &options))?;
         let of = |is_in: fn(&Scene) -> bool| {
-            let some = scenes.iter().zip(&costs).filter(|(scene, _)| is_in(scene)).map(|(_, cost)| cost);
+            let some = scenes
+                .iter()
+                .zip(&costs)
+                .filter(|(scene, _)| is_in(scene))
+                .map(|(_, cost)| cost);
             point(curve, &setting, some).used_where(|q| curve == PRESETS && q.render() == options)
         };
         piles.push(of(Scene::is_pile));
@@ -73,8 +80,16 @@ fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
     let bottles = format!("{count} golden piles of 5 to 30 bottles");
     let everything = format!("{} golden scenes", scenes.len());
     Ok(vec![
-        diagram("render_piles", "render: samples, piles of bottles", bottles, piles),
-        Diagram { why: EDGES.into(), ..diagram("render_all", "render: samples, all scenes", everything, all) },
+        diagram(
+            "render_piles",
+            "render: samples, piles of bottles",
+            bottles,
+            piles,
+        ),
+        Diagram {
+            why: EDGES.into(),
+            ..diagram("render_all", "render: samples, all scenes", everything, all)
+        },
     ])
 }
 
@@ -82,14 +97,30 @@ fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
 fn filter(scenes: &[Scene], runs: usize) -> Result<Diagram> {
     let mut points = Vec::new();
     for subsamples in SIDES {
-        let options = RenderOptions { subsamples, ..RenderOptions::default() };
+        let options = RenderOptions {
+            subsamples,
+            ..RenderOptions::default()
+        };
         let is_default = options == RenderOptions::default();
         let setting = format!("{subsamples} x {subsamples}");
-        let filtered = point("filtered", &setting, &measured(scenes, runs, |shot| cast(shot, &options))?);
+        let filtered = point(
+            "filtered",
+            &setting,
+            &measured(scenes, runs, |shot| cast(shot, &options))?,
+        );
         points.push(filtered.used_where(|q| is_default && q == Quality::default()));
-        points.push(point("plain samples", &setting, &measured(scenes, 1, |shot| reference(shot, &options))?));
+        points.push(point(
+            "plain samples",
+            &setting,
+            &measured(scenes, 1, |shot| reference(shot, &options))?,
+        ));
     }
-    Ok(diagram("render_filter", "render: filtered and plain samples", format!("golden scene {PLAIN}"), points))
+    Ok(diagram(
+        "render_filter",
+        "render: filtered and plain samples",
+        format!("golden scene {PLAIN}"),
+        points,
+    ))
 }
 
 /// What is to be known of the scenes.
@@ -113,33 +144,100 @@ fn diagram(file: &str, title: &str, input: String, points: Vec<Point>) -> Diagra
 /// The presets, and each number of the default changed by itself.
 fn settings() -> Vec<(&'static str, String, RenderOptions)> {
     let usual = RenderOptions::default();
-    let presets = Preset::ALL.into_iter().map(|(name, preset)| (PRESETS, name.to_owned(), preset.options()));
+    let presets = Preset::ALL
+        .into_iter()
+        .map(|(name, preset)| (PRESETS, name.to_owned(), preset.options()));
     let square = |n: usize| format!("{n} x {n}");
-    let pixels = PIXELS.map(|n| ("samples of a pixel", square(n), RenderOptions { subsamples: n, ..usual }));
-    let lights = LIGHTS.map(|n| ("samples of a light", square(n), RenderOptions { light_samples: n, ..usual }));
-    let skies = SKIES.map(|n| ("directions of the sky", n.to_string(), RenderOptions { ambient_samples: n, ..usual }));
-    let cells = CELLS.map(|px| ("irradiance cells", format!("{px} px"), RenderOptions { cell_px: px, ..usual }));
-    presets.chain(pixels).chain(lights).chain(skies).chain(cells).collect()
+    let pixels = PIXELS.map(|n| {
+        (
+            "samples of a pixel",
+            square(n),
+            RenderOptions {
+                subsamples: n,
+                ..usual
+            },
+        )
+    });
+    let lights = LIGHTS.map(|n| {
+        (
+            "samples of a light",
+            square(n),
+            RenderOptions {
+                light_samples: n,
+                ..usual
+            },
+        )
+    });
+    let skies = SKIES.map(|n| {
+        (
+            "directions of the sky",
+            n.to_string(),
+            RenderOptions {
+                ambient_samples: n,
+                ..usual
+            },
+        )
+    });
+    let cells = CELLS.map(|px| {
+        (
+            "irradiance cells",
+            format!("{px} px"),
+            RenderOptions {
+                cell_px: px,
+                ..usual
+            },
+        )
+    });
+    presets
+        .chain(pixels)
+        .chain(lights)
+        .chain(skies)
+        .chain(cells)
+        .collect()
 }
 
 fn scenes(golden: &Path) -> Result<Vec<Scene>> {
-    let entries = std::fs::read_dir(golden).into_iter().flatten().flatten().map(|entry| entry.path());
-    let mut folders: Vec<PathBuf> = entries.filter(|folder| folder.join("reference.exr").exists()).collect();
+    let entries = std::fs::read_dir(golden)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.path());
+    let mut folders: Vec<PathBuf> = entries
+        .filter(|folder| folder.join("reference.exr").exists())
+        .collect();
     folders.sort();
     let scene = |folder: &PathBuf| {
-        let name = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let (shot, wanted) =
-            (cycles::import(folder.join("scene.json"), None)?, io::read(folder.join("reference.exr"))?);
+        let name = folder
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let (shot, wanted) = (
+            cycles::import(folder.join("scene.json"), None)?,
+            io::read(folder.join("reference.exr"))?,
+        );
         Ok(Scene { name, shot, wanted })
     };
     folders.iter().map(scene).collect()
 }
 
-fn measured(scenes: &[Scene], runs: usize, render: impl Fn(&Shot) -> DeepImage + Sync) -> Result<Vec<Cost>> {
+fn measured(
+    scenes: &[Scene],
+    runs: usize,
+    render: impl Fn(&Shot) -> DeepImage + Sync,
+) -> Result<Vec<Cost>> {
     let cost = |scene: &Scene| {
-        let frame = || Ok(composite::frame(&render(&scene.shot), scene.shot.plate.as_deref()));
+        let frame = || {
+            Ok(composite::frame(
+                &render(&scene.shot),
+                scene.shot.plate.as_deref(),
+            ))
+        };
         let (frame, seconds) = timed(runs, frame)?;
-        Ok(Cost { mean_square: mean_square(&frame, scene)?, seconds, pixels: frame.pixels().len() as f64 })
+        Ok(Cost {
+            mean_square: mean_square(&frame, scene)?,
+            seconds,
+            pixels: frame.pixels().len() as f64,
+        })
     };
     scenes.iter().map(cost).collect()
 }
@@ -149,7 +247,12 @@ fn point<'a>(curve: &str, setting: &str, costs: impl IntoIterator<Item = &'a Cos
     let costs: Vec<&Cost> = costs.into_iter().collect();
     let sum = |of: fn(&Cost) -> f64| costs.iter().map(|cost| of(cost)).sum::<f64>();
     let error = (sum(|c| c.mean_square) / costs.len() as f64).sqrt();
-    Point::new(curve, setting, sum(|c| c.seconds) / sum(|c| c.pixels) * MEGA, error)
+    Point::new(
+        curve,
+        setting,
+        sum(|c| c.seconds) / sum(|c| c.pixels) * MEGA,
+        error,
+    )
 }
 
 impl Scene {
@@ -161,7 +264,11 @@ impl Scene {
 
 fn mean_square(frame: &Image<PremulRgba>, scene: &Scene) -> Result<f64> {
     if frame.size() != scene.wanted.size() {
-        let what = format!("{:?} pixels, reference has {:?}", frame.size(), scene.wanted.size());
+        let what = format!(
+            "{:?} pixels, reference has {:?}",
+            frame.size(),
+            scene.wanted.size()
+        );
         return Err(Error::value(&scene.name, what));
     }
     let pairs = frame.pixels().iter().zip(scene.wanted.pixels());
@@ -188,18 +295,35 @@ mod tests {
             .count()
         };
         let all = settings();
-        assert!(all.iter().filter(|(curve, ..)| *curve != PRESETS).all(|(.., o)| changed(o) == 1));
-        assert_eq!(all.iter().filter(|(curve, _, o)| *curve == PRESETS && *o == usual).count(), 1);
+        assert!(
+            all.iter()
+                .filter(|(curve, ..)| *curve != PRESETS)
+                .all(|(.., o)| changed(o) == 1)
+        );
+        assert_eq!(
+            all.iter()
+                .filter(|(curve, _, o)| *curve == PRESETS && *o == usual)
+                .count(),
+            1
+        );
     }
 
     #[test]
     fn a_preset_that_does_more_is_nearer_to_cycles() {
         let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("golden/render");
-        let scenes: Vec<_> = scenes(&golden).unwrap().into_iter().filter(|s| s.name == "pile_of_5").collect();
-        let measured = |preset: Preset| measured(&scenes, 1, |shot| cast(shot, &preset.options())).unwrap();
+        let scenes: Vec<_> = scenes(&golden)
+            .unwrap()
+            .into_iter()
+            .filter(|s| s.name == "pile_of_5")
+            .collect();
+        let measured =
+            |preset: Preset| measured(&scenes, 1, |shot| cast(shot, &preset.options())).unwrap();
         let error = |preset| point("", "", &measured(preset)).error;
         let [draft, fast, high] = [Preset::Draft, Preset::Fast, Preset::High].map(error);
-        assert!(draft > fast && fast > high && high > 0.0, "{draft} {fast} {high}");
+        assert!(
+            draft > fast && fast > high && high > 0.0,
+            "{draft} {fast} {high}"
+        );
     }
 
     #[test]

@@ -17,10 +17,21 @@ pub struct Case {
 }
 
 /// The picture of a usual dataset: that of the recipe's defaults, with its most cards.
-pub(super) const USUAL: Case = Case { threads: 1, image: [640, 480], cards: 12, scale: 1.0 };
+pub(super) const USUAL: Case = Case {
+    threads: 1,
+    image: [640, 480],
+    cards: 12,
+    scale: 1.0,
+};
 
 /// From 0.3 to 33 megapixels, in shapes that cameras have.
-const IMAGES: [[u32; 2]; 5] = [[640, 480], [1152, 864], [2048, 1536], [3648, 2736], [7680, 4320]];
+const IMAGES: [[u32; 2]; 5] = [
+    [640, 480],
+    [1152, 864],
+    [2048, 1536],
+    [3648, 2736],
+    [7680, 4320],
+];
 /// Numbers of cards with the factors on their sides: so that cards and layers do not grow together.
 const CARDS: [(usize, f64); 12] = [
     (1, 1.0),
@@ -37,8 +48,12 @@ const CARDS: [(usize, f64); 12] = [
     (30, 2.0),
 ];
 /// Corners of the grid, where terms that only fit along its edges would show: few pixels, many pixels and no layers.
-const CORNERS: [([u32; 2], usize, f64); 4] =
-    [([160, 120], 12, 1.0), ([160, 120], 100, 1.0), ([2048, 1536], 1, 0.5), ([2048, 1536], 100, 0.5)];
+const CORNERS: [([u32; 2], usize, f64); 4] = [
+    ([160, 120], 12, 1.0),
+    ([160, 120], 100, 1.0),
+    ([2048, 1536], 1, 0.5),
+    ([2048, 1536], 100, 0.5),
+];
 
 /// Cards that fall together.
 pub(super) const FALLS: [usize; 5] = [1, 5, 12, 20, 40];
@@ -46,10 +61,24 @@ pub(super) const FALLS: [usize; 5] = [1, 5, 12, 20, 40];
 /// Every case: the usual picture on 1, 2, 4 ... threads, then sizes, cards and corners on one.
 pub(super) fn cases(threads: usize) -> Vec<Case> {
     let powers = std::iter::successors(Some(1), |n| Some(2 * n)).take_while(|n| *n < threads);
-    let threads = powers.chain([threads.max(1)]).map(|threads| Case { threads, ..USUAL });
-    let sizes = IMAGES.into_iter().skip(1).map(|image| Case { image, ..USUAL });
-    let cards = CARDS.into_iter().map(|(cards, scale)| Case { cards, scale, ..USUAL });
-    let corners = CORNERS.into_iter().map(|(image, cards, scale)| Case { image, cards, scale, ..USUAL });
+    let threads = powers
+        .chain([threads.max(1)])
+        .map(|threads| Case { threads, ..USUAL });
+    let sizes = IMAGES
+        .into_iter()
+        .skip(1)
+        .map(|image| Case { image, ..USUAL });
+    let cards = CARDS.into_iter().map(|(cards, scale)| Case {
+        cards,
+        scale,
+        ..USUAL
+    });
+    let corners = CORNERS.into_iter().map(|(image, cards, scale)| Case {
+        image,
+        cards,
+        scale,
+        ..USUAL
+    });
     threads.chain(sizes).chain(cards).chain(corners).collect()
 }
 
@@ -66,8 +95,17 @@ mod tests {
 
     #[test]
     fn threads_go_up_to_what_is_asked_and_the_rest_is_on_one() {
-        let threads = |most: usize| cases(most).iter().map(|case| case.threads).filter(|n| *n > 1).collect::<Vec<_>>();
-        assert_eq!((threads(4), threads(6), threads(1)), (vec![2, 4], vec![2, 4, 6], vec![]));
+        let threads = |most: usize| {
+            cases(most)
+                .iter()
+                .map(|case| case.threads)
+                .filter(|n| *n > 1)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(
+            (threads(4), threads(6), threads(1)),
+            (vec![2, 4], vec![2, 4, 6], vec![])
+        );
         assert!(threads(0).is_empty());
     }
 
@@ -75,7 +113,12 @@ mod tests {
     fn the_grid_spans_what_the_report_promises() {
         let cases = cases(1);
         let span = |of: fn(&Case) -> f64| {
-            cases.iter().map(of).fold([f64::INFINITY, 0.0], |[low, high], v| [v.min(low), v.max(high)])
+            cases
+                .iter()
+                .map(of)
+                .fold([f64::INFINITY, 0.0], |[low, high], v| {
+                    [v.min(low), v.max(high)]
+                })
         };
         assert!(span(Case::megapixels)[0] < 0.3 && span(Case::megapixels)[1] > 33.0);
         assert_eq!(span(|case| case.cards as f64), [1.0, 300.0]);

@@ -4,7 +4,9 @@ use super::process::{cpu_seconds, peak_bytes};
 use super::{Case, Point};
 use crate::asset::Texture;
 use crate::camera::Camera;
-use crate::dataset::{Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, Writer, Yolo, generate};
+use crate::dataset::{
+    Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, Writer, Yolo, generate,
+};
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::label::{LabelOptions, label};
 use crate::render::{DeepImage, RenderOptions, cast};
@@ -46,9 +48,11 @@ pub fn run(case: &Case, seconds: f64) -> Result<Point> {
     let (first, layers) = Round::of(1, || pool.install(|| world.make(1)))?;
     // A picture that takes all of the time is made once more, others in several rounds.
     let rounds = if first.cpu < seconds { ROUNDS } else { 1 };
-    let share = seconds * case.threads as f64 / (rounds as f64 * first.cpu.max(first.wall).max(1e-3));
+    let share =
+        seconds * case.threads as f64 / (rounds as f64 * first.cpu.max(first.wall).max(1e-3));
     let pictures = share.ceil().clamp(case.threads as f64, MOST) as u64;
-    let later = (0..rounds).map(|_| Ok(Round::of(pictures, || pool.install(|| world.make(pictures)))?.0));
+    let later =
+        (0..rounds).map(|_| Ok(Round::of(pictures, || pool.install(|| world.make(pictures)))?.0));
     let later = later.collect::<Result<Vec<_>>>()?;
     let least = |of: fn(&Round) -> f64| later.iter().map(of).fold(f64::INFINITY, f64::min);
     Ok(Point {
@@ -72,7 +76,13 @@ impl Round {
         let (began, before) = (Instant::now(), cpu_seconds());
         let made = make()?;
         let each = |seconds: f64| seconds / pictures as f64;
-        Ok((Self { cpu: each(cpu_seconds() - before), wall: each(began.elapsed().as_secs_f64()) }, made))
+        Ok((
+            Self {
+                cpu: each(cpu_seconds() - before),
+                wall: each(began.elapsed().as_secs_f64()),
+            },
+            made,
+        ))
     }
 }
 
@@ -99,15 +109,25 @@ impl World {
     fn of(case: &Case) -> Self {
         let scene = scene(case);
         let textures: Vec<_> = (0..CUT_OUTS).map(|k| Texture::from(cut_out(k))).collect();
-        let outline_uv: Arc<[Point2<f64>]> = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from).into();
+        let outline_uv: Arc<[Point2<f64>]> = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+            .map(Point2::from)
+            .into();
         let look = |object: &Object| {
             let texture = textures[object.photo % CUT_OUTS].clone();
-            Some(Look { class: 0, texture, back: None, outline_uv: outline_uv.clone() })
+            Some(Look {
+                class: 0,
+                texture,
+                back: None,
+                outline_uv: outline_uv.clone(),
+            })
         };
         let [w, h] = case.image.map(|side| side as usize);
-        let plate = Image::from_fn(w, h, |x, y| LinearRgb::grey(0.2 + 0.01 * ((7 * x + 13 * y) % 11) as f32));
-        let shot =
-            scene.resolve(look, Some(Arc::new(plate)), None).expect("the scene is known and its plate has its size");
+        let plate = Image::from_fn(w, h, |x, y| {
+            LinearRgb::grey(0.2 + 0.01 * ((7 * x + 13 * y) % 11) as f32)
+        });
+        let shot = scene
+            .resolve(look, Some(Arc::new(plate)), None)
+            .expect("the scene is known and its plate has its size");
         Self { scene, shot }
     }
 
@@ -144,7 +164,11 @@ impl World {
 }
 
 fn plan(folder: &std::path::Path, count: u64) -> Plan {
-    let writers: [Box<dyn Writer>; 3] = [Box::new(Pictures::default()), Box::new(Sidecar), Box::new(Yolo::default())];
+    let writers: [Box<dyn Writer>; 3] = [
+        Box::new(Pictures::default()),
+        Box::new(Sidecar),
+        Box::new(Yolo::default()),
+    ];
     Plan {
         folder: folder.into(),
         count,
@@ -161,14 +185,19 @@ fn plan(folder: &std::path::Path, count: u64) -> Plan {
 
 fn mean_layers(deep: &DeepImage) -> f64 {
     let (w, h) = (deep.width(), deep.height());
-    let samples: usize = (0..h).flat_map(|y| (0..w).map(move |x| deep.at(x, y).len())).sum();
+    let samples: usize = (0..h)
+        .flat_map(|y| (0..w).map(move |x| deep.at(x, y).len()))
+        .sum();
     samples as f64 / (w * h) as f64
 }
 
 /// Cards in a heap under a lamp and an even sky, seen from above.
 fn scene(case: &Case) -> Scene {
     let focal_px = Vector2::repeat(FOCAL_BY_WIDTH * f64::from(case.image[0]));
-    let camera = Camera { focal_px, ..above(case.image, HEIGHT) };
+    let camera = Camera {
+        focal_px,
+        ..above(case.image, HEIGHT)
+    };
     Scene {
         image: case.image,
         plate: "tray".into(),
@@ -190,7 +219,11 @@ fn card(case: &Case, k: usize) -> Object {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let share = |power: i32| (0.5 + (k + 1) as f64 * PLASTIC.powi(-power)).fract() - 0.5;
     let rise = RISE.min(PILE / case.cards as f64);
-    let at = Vector3::new(ROOM[0] * share(1), ROOM[1] * share(2), rise * (k + 1) as f64);
+    let at = Vector3::new(
+        ROOM[0] * share(1),
+        ROOM[1] * share(2),
+        rise * (k + 1) as f64,
+    );
     Object {
         asset: "bottle".into(),
         photo: k,
@@ -203,7 +236,11 @@ fn card(case: &Case, k: usize) -> Object {
             at.into(),
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 2.4 * k as f64),
         )),
-        grade: Grade { hue_deg: (7 * k % 60) as f32, saturation: 0.9, value: 1.1 },
+        grade: Grade {
+            hue_deg: (7 * k % 60) as f32,
+            saturation: 0.9,
+            value: 1.1,
+        },
     }
 }
 
@@ -212,8 +249,13 @@ fn cut_out(k: usize) -> Image<PremulRgba> {
     Image::from_fn(192, 576, |x, y| {
         let across = (x as f32 - 95.5).abs() / 96.0;
         let half_width = if y < 115 { 0.35 } else { 0.9 };
-        let alpha = (20.0 * (half_width - across)).clamp(0.0, 1.0) * if (230..346).contains(&y) { 0.95 } else { 0.5 };
-        let stripe = if (y / 6 + k).is_multiple_of(2) { 0.75 } else { 0.35 };
+        let alpha = (20.0 * (half_width - across)).clamp(0.0, 1.0)
+            * if (230..346).contains(&y) { 0.95 } else { 0.5 };
+        let stripe = if (y / 6 + k).is_multiple_of(2) {
+            0.75
+        } else {
+            0.35
+        };
         PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
     })
 }
@@ -222,7 +264,12 @@ fn cut_out(k: usize) -> Image<PremulRgba> {
 mod tests {
     use super::*;
 
-    const SMALL: Case = Case { threads: 2, image: [320, 240], cards: 5, scale: 1.0 };
+    const SMALL: Case = Case {
+        threads: 2,
+        image: [320, 240],
+        cards: 5,
+        scale: 1.0,
+    };
 
     #[test]
     fn a_point_tells_time_memory_and_layers() {
@@ -237,7 +284,20 @@ mod tests {
     fn larger_cards_are_more_layers_and_larger_pictures_are_not() {
         let layers = |case| mean_layers(&World::of(&case).sample().deep);
         let usual = layers(SMALL);
-        assert!(layers(Case { scale: 2.0, ..SMALL }) > 2.5 * usual);
-        assert!((layers(Case { image: [640, 480], ..SMALL }) / usual - 1.0).abs() < 0.15);
+        assert!(
+            layers(Case {
+                scale: 2.0,
+                ..SMALL
+            }) > 2.5 * usual
+        );
+        assert!(
+            (layers(Case {
+                image: [640, 480],
+                ..SMALL
+            }) / usual
+                - 1.0)
+                .abs()
+                < 0.15
+        );
     }
 }

@@ -45,9 +45,20 @@ fn points(measured: &Measured, model: &Model) -> Table {
     let percent = |share: f64| format!("{:+.1}", 100.0 * share);
     let mut alone = model.time.residuals.iter().zip(&model.time.unseen);
     for (point, memory) in measured.points.iter().zip(&model.memory.residuals) {
-        let Point { case, layers, cpu_seconds, rate, peak_bytes, .. } = point;
+        let Point {
+            case,
+            layers,
+            cpu_seconds,
+            rate,
+            peak_bytes,
+            ..
+        } = point;
         // Time is fitted to points on one thread.
-        let time = if case.threads == 1 { alone.next() } else { None };
+        let time = if case.threads == 1 {
+            alone.next()
+        } else {
+            None
+        };
         table.push([
             case.threads.to_string(),
             format!("{} x {}", case.image[0], case.image[1]),
@@ -71,26 +82,51 @@ fn prices(model: &Model) -> Table {
     let mut table = Table::new(["each", "takes", "of"]);
     let time = model.time.terms.iter().zip(&model.time.prices);
     time.for_each(|(term, price)| {
-        table.push([(*term).to_owned(), format!("{:.4} ms", 1e3 * price), "CPU time".into()])
+        table.push([
+            (*term).to_owned(),
+            format!("{:.4} ms", 1e3 * price),
+            "CPU time".into(),
+        ])
     });
     let memory = model.memory.terms.iter().zip(&model.memory.prices);
-    memory.for_each(|(term, price)| table.push([(*term).to_owned(), format!("{:.3} MB", price * MB), "memory".into()]));
+    memory.for_each(|(term, price)| {
+        table.push([
+            (*term).to_owned(),
+            format!("{:.3} MB", price * MB),
+            "memory".into(),
+        ])
+    });
     for (what, fit) in [("CPU time", &model.time), ("memory", &model.memory)] {
         let spread = format!("within {:.0} %", 100.0 * fit.spread());
-        table.push(["nine in ten points that the fit has not seen".into(), spread, what.to_owned()]);
+        table.push([
+            "nine in ten points that the fit has not seen".into(),
+            spread,
+            what.to_owned(),
+        ]);
     }
     table
 }
 
 /// The usual picture on one thread and on more, in their order.
 fn by_threads(measured: &Measured) -> Vec<&Point> {
-    let usual = |point: &&Point| grid::Case { threads: 1, ..point.case } == grid::USUAL;
+    let usual = |point: &&Point| {
+        grid::Case {
+            threads: 1,
+            ..point.case
+        } == grid::USUAL
+    };
     measured.points.iter().filter(usual).collect()
 }
 
 fn threads(measured: &Measured) -> Table {
-    let mut table =
-        Table::new(["threads", "pictures/s", "times one thread", "efficiency %", "CPU s a picture", "peak MB"]);
+    let mut table = Table::new([
+        "threads",
+        "pictures/s",
+        "times one thread",
+        "efficiency %",
+        "CPU s a picture",
+        "peak MB",
+    ]);
     let points = by_threads(measured);
     let one = points.first().map_or(f64::NAN, |point| point.rate);
     for point in points {
@@ -109,7 +145,10 @@ fn threads(measured: &Measured) -> Table {
 
 fn falls(measured: &Measured) -> Table {
     let mut table = Table::new(["cards that fall together", "CPU ms until they lie"]);
-    measured.falls.iter().for_each(|(cards, s)| table.push([cards.to_string(), format!("{:.1}", 1e3 * s)]));
+    measured
+        .falls
+        .iter()
+        .for_each(|(cards, s)| table.push([cards.to_string(), format!("{:.1}", 1e3 * s)]));
     table
 }
 
@@ -120,19 +159,37 @@ fn million(measured: &Measured) -> Result<Table> {
     };
     let mut table = Table::new(["a million pictures", "expected (nine in ten)"]);
     let [w, h] = told.case.image;
-    table.push(["picture".into(), format!("{w} x {h}, {} cards", told.case.cards)]);
-    table.push(["CPU ms a picture".into(), interval(told.picture_seconds.map(|s| 1e3 * s), 1)]);
-    table.push(["CPU ms until its cards lie".into(), format!("{:.1}", 1e3 * told.fall_seconds)]);
-    table.push([format!("efficiency of {} threads", told.cores), format!("{:.0} %", 100.0 * told.efficiency)]);
+    table.push([
+        "picture".into(),
+        format!("{w} x {h}, {} cards", told.case.cards),
+    ]);
+    table.push([
+        "CPU ms a picture".into(),
+        interval(told.picture_seconds.map(|s| 1e3 * s), 1),
+    ]);
+    table.push([
+        "CPU ms until its cards lie".into(),
+        format!("{:.1}", 1e3 * told.fall_seconds),
+    ]);
+    table.push([
+        format!("efficiency of {} threads", told.cores),
+        format!("{:.0} %", 100.0 * told.efficiency),
+    ]);
     table.push(["core hours".into(), interval(told.core_hours, 0)]);
     for machines in MACHINES {
         let plural = if machines == 1 { "" } else { "s" };
         table.push([
-            format!("hours on {machines} machine{plural} of {} cores", told.cores),
+            format!(
+                "hours on {machines} machine{plural} of {} cores",
+                told.cores
+            ),
             interval(told.hours(machines), 2),
         ]);
     }
-    table.push([format!("memory of a process of {} threads, MB", told.cores), interval(told.bytes.map(|b| b * MB), 0)]);
+    table.push([
+        format!("memory of a process of {} threads, MB", told.cores),
+        interval(told.bytes.map(|b| b * MB), 0),
+    ]);
     Ok(table)
 }
 
@@ -143,9 +200,18 @@ fn million(measured: &Measured) -> Result<Table> {
 pub fn charts(measured: &Measured) -> Result<Vec<(String, String)>> {
     let model = Model::of(measured)?;
     let usual = grid::USUAL;
-    let alone = || measured.points.iter().filter(|point| point.case.threads == 1);
-    let sizes: Vec<_> = alone().filter(|p| p.case.cards == usual.cards && p.case.scale == usual.scale).collect();
-    let cards: Vec<_> = alone().filter(|p| p.case.image == usual.image && p.case.scale == usual.scale).collect();
+    let alone = || {
+        measured
+            .points
+            .iter()
+            .filter(|point| point.case.threads == 1)
+    };
+    let sizes: Vec<_> = alone()
+        .filter(|p| p.case.cards == usual.cards && p.case.scale == usual.scale)
+        .collect();
+    let cards: Vec<_> = alone()
+        .filter(|p| p.case.image == usual.image && p.case.scale == usual.scale)
+        .collect();
     let threads = by_threads(measured);
     let one = threads.first().map_or(1.0, |point| point.rate);
     let pixels = |point: &Point| point.case.megapixels();
@@ -157,10 +223,30 @@ pub fn charts(measured: &Measured) -> Result<Vec<(String, String)>> {
         |p| p.rate,
         |p| one * p.case.threads as f64,
     );
-    let memory = both("peak MB", "megapixels", &sizes, pixels, |p| p.peak_bytes * MB, |p| model.bytes(p) * MB);
-    let by_pixels = both("CPU s a picture", "megapixels", &sizes, pixels, |p| p.cpu_seconds, |p| model.seconds(p));
-    let by_cards =
-        both("CPU s a picture", "cards", &cards, |p| p.case.cards as f64, |p| p.cpu_seconds, |p| model.seconds(p));
+    let memory = both(
+        "peak MB",
+        "megapixels",
+        &sizes,
+        pixels,
+        |p| p.peak_bytes * MB,
+        |p| model.bytes(p) * MB,
+    );
+    let by_pixels = both(
+        "CPU s a picture",
+        "megapixels",
+        &sizes,
+        pixels,
+        |p| p.cpu_seconds,
+        |p| model.seconds(p),
+    );
+    let by_cards = both(
+        "CPU s a picture",
+        "cards",
+        &cards,
+        |p| p.case.cards as f64,
+        |p| p.cpu_seconds,
+        |p| model.seconds(p),
+    );
     Ok(vec![
         (Chart::row(&[rate, memory]), "Left: every thread makes a picture of its own; the model is as many times one thread. Right: one picture in hand.".into()),
         (Chart::row(&[by_pixels, by_cards]), "One thread: rendered, labelled, encoded, written; cards lie already. By pixels with 12 cards, by cards at 640 x 480.".into()),
@@ -182,7 +268,13 @@ fn both(
         curve
     };
     let curves = vec![curve(&measured), curve(&expected)];
-    let values = |axis: usize| curves.iter().flatten().map(move |p| p[axis]).collect::<Vec<_>>();
+    let values = |axis: usize| {
+        curves
+            .iter()
+            .flatten()
+            .map(move |p| p[axis])
+            .collect::<Vec<_>>()
+    };
     Chart {
         title: format!("{up} by {across}"),
         names: ["measured", "model"].map(String::from).into(),
@@ -205,22 +297,44 @@ mod tests {
         let points = &tables[0].1;
         assert_eq!(points.rows.len(), measured.points.len());
         for row in &points.rows {
-            assert_eq!(row[7].is_empty(), row[0] != "1", "time is fitted on one thread alone: {row:?}");
-            assert!(row[7].is_empty() || row[7].trim_start_matches(['+', '-']) == "0.0", "{row:?}");
+            assert_eq!(
+                row[7].is_empty(),
+                row[0] != "1",
+                "time is fitted on one thread alone: {row:?}"
+            );
+            assert!(
+                row[7].is_empty() || row[7].trim_start_matches(['+', '-']) == "0.0",
+                "{row:?}"
+            );
         }
     }
 
     #[test]
     fn efficiency_is_the_share_of_so_many_threads() {
         let mut measured = measured();
-        measured.points.iter_mut().for_each(|p| p.rate = if p.case.threads == 2 { 15.0 } else { 10.0 });
+        measured
+            .points
+            .iter_mut()
+            .for_each(|p| p.rate = if p.case.threads == 2 { 15.0 } else { 10.0 });
         let rows = threads(&measured).rows;
-        assert_eq!((rows[0][3].as_str(), rows[1][2].as_str(), rows[1][3].as_str()), ("100", "1.50", "75"));
+        assert_eq!(
+            (
+                rows[0][3].as_str(),
+                rows[1][2].as_str(),
+                rows[1][3].as_str()
+            ),
+            ("100", "1.50", "75")
+        );
     }
 
     #[test]
     fn charts_show_measured_and_model() {
         let charts = charts(&measured()).unwrap();
-        assert!(charts.len() == 2 && charts.iter().all(|(svg, _)| svg.contains("measured") && !svg.contains("NaN")));
+        assert!(
+            charts.len() == 2
+                && charts
+                    .iter()
+                    .all(|(svg, _)| svg.contains("measured") && !svg.contains("NaN"))
+        );
     }
 }

@@ -44,8 +44,12 @@ pub fn diagrams(rows: &[Row]) -> Vec<Diagram> {
             file: "settle_stack".into(),
             title: "settle: height of a stack".into(),
             error: "error of the height, mm".into(),
-            reference: "ten thicknesses, and two skins of 0.2 mm below each plate (closed form)".into(),
-            limit: Some((usual.max_overlap * CARD_MM, "what is accepted of overlaps".into())),
+            reference: "ten thicknesses, and two skins of 0.2 mm below each plate (closed form)"
+                .into(),
+            limit: Some((
+                usual.max_overlap * CARD_MM,
+                "what is accepted of overlaps".into(),
+            )),
             ..with(stack_error)
         },
     ]
@@ -54,10 +58,17 @@ pub fn diagrams(rows: &[Row]) -> Vec<Diagram> {
 fn point(row: &Row, error: f64) -> Point {
     let options = SettleOptions::default();
     let is_usual = row.ccd == options.ccd;
-    let curve = if is_usual { format!("1/{} s", row.rate) } else { "1/480 s, other CCD".into() };
+    let curve = if is_usual {
+        format!("1/{} s", row.rate)
+    } else {
+        "1/480 s, other CCD".into()
+    };
     let many = if row.iterations == 1 { "" } else { "s" };
-    let setting =
-        if is_usual { format!("{} iteration{many}", row.iterations) } else { format!("{} CCD stops", row.ccd) };
+    let setting = if is_usual {
+        format!("{} iteration{many}", row.iterations)
+    } else {
+        format!("{} CCD stops", row.ccd)
+    };
     Point::new(curve, setting, row.cpu_ms, error).used_where(|q: Quality| {
         let settings = q.settle(options);
         is_usual && settings.iterations == row.iterations && is_step(row, settings.step)
@@ -67,12 +78,19 @@ fn point(row: &Row, error: f64) -> Point {
 /// What no single error shows: which settings are right in everything, and which of them costs least.
 fn why(rows: &[Row]) -> String {
     let usual = SettleOptions::default();
-    let is_default =
-        |row: &&Row| row.ccd == usual.ccd && row.iterations == usual.iterations && is_step(row, usual.step);
+    let is_default = |row: &&Row| {
+        row.ccd == usual.ccd && row.iterations == usual.iterations && is_step(row, usual.step)
+    };
     let right: Vec<&Row> = rows.iter().filter(|row| is_right(row)).collect();
     let best = right.iter().min_by(|a, b| a.cpu_ms.total_cmp(&b.cpu_ms));
-    let (Some(best), Some(default)) = (best, rows.iter().find(is_default)) else { return String::new() };
-    let judged = if is_right(default) { "is one of them" } else { "is NOT one of them" };
+    let (Some(best), Some(default)) = (best, rows.iter().find(is_default)) else {
+        return String::new();
+    };
+    let judged = if is_right(default) {
+        "is one of them"
+    } else {
+        "is NOT one of them"
+    };
     format!(
         "A setting is right where every heap comes to a good end at the first try, all three errors are under their limits, and \
          plates slide on slopes as the closed form says: {} of {} are, and the default {judged}. The cheapest of them is \
@@ -129,16 +147,38 @@ mod tests {
     fn each_error_has_a_diagram_and_the_default_its_ring() {
         let found = diagrams(&[row(480, 4, 1), row(240, 4, 1), row(480, 4, 0)]);
         assert_eq!(found.len(), 3);
-        assert!(found.iter().all(|d| d.points.iter().filter(|p| p.is_default()).count() == 1));
+        assert!(
+            found
+                .iter()
+                .all(|d| d.points.iter().filter(|p| p.is_default()).count() == 1)
+        );
         assert_eq!(found[0].points[2].curve, "1/480 s, other CCD");
     }
     #[test]
     fn the_cheapest_setting_that_is_right_in_everything_is_told() {
-        let fine = |rate, cpu_ms| Row { rested: 4, wrong_slopes: 0, cpu_ms, ..row(rate, 4, 1) };
-        let told = why(&[fine(480, 20.0), fine(240, 10.0), Row { stack_mm: 1.0, ..fine(960, 1.0) }]);
-        assert!(told.contains("2 of 3 are") && told.contains("1/240 s") && told.contains("0.500"), "{told}");
+        let fine = |rate, cpu_ms| Row {
+            rested: 4,
+            wrong_slopes: 0,
+            cpu_ms,
+            ..row(rate, 4, 1)
+        };
+        let told = why(&[
+            fine(480, 20.0),
+            fine(240, 10.0),
+            Row {
+                stack_mm: 1.0,
+                ..fine(960, 1.0)
+            },
+        ]);
+        assert!(
+            told.contains("2 of 3 are") && told.contains("1/240 s") && told.contains("0.500"),
+            "{told}"
+        );
         assert!(told.contains("is one of them") && why(&[]).is_empty());
-        let late = Row { rested: 3, ..fine(480, 20.0) };
+        let late = Row {
+            rested: 3,
+            ..fine(480, 20.0)
+        };
         assert!(why(&[late, fine(960, 40.0)]).contains("is NOT one of them"));
     }
 }

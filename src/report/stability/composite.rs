@@ -36,8 +36,15 @@ fn layers() -> Case {
         move || {
             let film = Film::new(LinearRgb::grey(0.03), LinearRgb::grey(0.97));
             let all = (0..200).fold(Film::default(), |behind, _| film.over(behind));
-            let off = [f64::from(all.transmittance().g) - expected, f64::from(all.color.g) - (1.0 - expected)];
-            Ok(Outcome::at_most(off[0].abs().max(off[1].abs()), 200.0 * f64::from(f32::EPSILON), "off"))
+            let off = [
+                f64::from(all.transmittance().g) - expected,
+                f64::from(all.color.g) - (1.0 - expected),
+            ];
+            Ok(Outcome::at_most(
+                off[0].abs().max(off[1].abs()),
+                200.0 * f64::from(f32::EPSILON),
+                "off",
+            ))
         },
     )
 }
@@ -49,16 +56,23 @@ fn thousands_of_layers() -> Case {
         "alpha 1 and light 1, to 1e-4, never above 1",
         || {
             let a = 1.0 / 255.0;
-            let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| PremulRgba::new(a, a, a, a).over(behind));
+            let all = (0..10_000).fold(PremulRgba::TRANSPARENT, |behind, _| {
+                PremulRgba::new(a, a, a, a).over(behind)
+            });
             let passed = (0.9999..=1.0).contains(&all.a) && (0.9999..=1.0).contains(&all.g);
-            Ok(Outcome::new(format!("alpha {:.7}, light {:.7}", all.a, all.g), passed))
+            Ok(Outcome::new(
+                format!("alpha {:.7}, light {:.7}", all.a, all.g),
+                passed,
+            ))
         },
     )
 }
 
 /// Noise that looks like no constant.
 fn plate(width: usize, height: usize) -> Image<LinearRgb> {
-    Image::from_fn(width, height, |x, y| LinearRgb::new(0.1 + 0.01 * x as f32, f32::MIN_POSITIVE, 1e5 + y as f32))
+    Image::from_fn(width, height, |x, y| {
+        LinearRgb::new(0.1 + 0.01 * x as f32, f32::MIN_POSITIVE, 1e5 + y as f32)
+    })
 }
 
 fn everything_off() -> Case {
@@ -70,21 +84,57 @@ fn everything_off() -> Case {
             let plate = Arc::new(plate(64, 48));
             let shot = Shot::new(above([64, 48], 60.0)).with_plate(plate.clone());
             let deep = cast(&shot, &RenderOptions::default());
-            let out = finish(frame(&deep, Some(&plate)), &deep, Some(&plate), &Finish::default());
-            let pixels = out.pixels().iter().zip(plate.pixels()).filter(|(p, q)| **p != q.opaque()).count();
-            let shadows = deep.shadow().pixels().iter().filter(|s| **s != LinearRgb::WHITE).count();
+            let out = finish(
+                frame(&deep, Some(&plate)),
+                &deep,
+                Some(&plate),
+                &Finish::default(),
+            );
+            let pixels = out
+                .pixels()
+                .iter()
+                .zip(plate.pixels())
+                .filter(|(p, q)| **p != q.opaque())
+                .count();
+            let shadows = deep
+                .shadow()
+                .pixels()
+                .iter()
+                .filter(|s| **s != LinearRgb::WHITE)
+                .count();
             let labels = label(&deep, &shot, &LabelOptions::default()).objects.len();
-            Ok(Outcome::near((pixels + shadows + labels) as f64, 0.0, 0.0, "differ"))
+            Ok(Outcome::near(
+                (pixels + shadows + labels) as f64,
+                0.0,
+                0.0,
+                "differ",
+            ))
         },
     )
 }
 
 fn empty_without_plate() -> Case {
-    Case::new("empty scene", "no card, no plate", "transparent black everywhere: 0 pixels differ", || {
-        let deep = cast(&Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE), &RenderOptions::default());
-        let out = frame(&deep, None);
-        Ok(Outcome::near(out.pixels().iter().filter(|p| **p != PremulRgba::TRANSPARENT).count() as f64, 0.0, 0.0, "px"))
-    })
+    Case::new(
+        "empty scene",
+        "no card, no plate",
+        "transparent black everywhere: 0 pixels differ",
+        || {
+            let deep = cast(
+                &Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE),
+                &RenderOptions::default(),
+            );
+            let out = frame(&deep, None);
+            Ok(Outcome::near(
+                out.pixels()
+                    .iter()
+                    .filter(|p| **p != PremulRgba::TRANSPARENT)
+                    .count() as f64,
+                0.0,
+                0.0,
+                "px",
+            ))
+        },
+    )
 }
 
 /// A picture of one row from the samples of its pixels.
@@ -94,7 +144,13 @@ fn row(pixels: Vec<Vec<DeepSample>>) -> DeepImage {
 
 fn sample(id: u32, light: f32, visible: f32) -> DeepSample {
     let depth = Depth(1.0);
-    DeepSample { object: ObjectId(id), depth, light: LinearRgb::grey(light), alpha: visible, visible }
+    DeepSample {
+        object: ObjectId(id),
+        depth,
+        light: LinearRgb::grey(light),
+        alpha: visible,
+        visible,
+    }
 }
 
 fn rounded_up() -> Case {
@@ -108,7 +164,10 @@ fn rounded_up() -> Case {
             let out = frame(&deep, Some(&Image::filled(1, 1, LinearRgb::grey(1e5))));
             // The sum of 300 rounded numbers is known to 300 roundings, of which the plate is a 1e5-fold.
             let value = f64::from(out[(0, 0)].g);
-            Ok(Outcome::new(format!("{value:e}"), (0.0..=300.0 * 1e5 * f64::from(f32::EPSILON)).contains(&value)))
+            Ok(Outcome::new(
+                format!("{value:e}"),
+                (0.0..=300.0 * 1e5 * f64::from(f32::EPSILON)).contains(&value),
+            ))
         },
     )
 }
@@ -121,19 +180,36 @@ fn bright_beside_dim() -> Case {
         || {
             let deep = row(vec![vec![sample(1, 1e5, 1.0)], vec![sample(2, 1e-4, 1.0)]]);
             let out = frame(&deep, Some(&Image::filled(2, 1, LinearRgb::grey(1e5))));
-            Ok(Outcome::near(out[(1, 0)].g.into(), 1e-4_f32.into(), 0.0, ""))
+            Ok(Outcome::near(
+                out[(1, 0)].g.into(),
+                1e-4_f32.into(),
+                0.0,
+                "",
+            ))
         },
     )
 }
 
 fn broken_plate() -> Case {
-    Case::new("plate with one pixel of NaN", "64 x 48 pixels, no card", "no more than that pixel is NaN: 1", || {
-        let mut plate = plate(64, 48);
-        plate[(20, 30)].g = f32::NAN;
-        let out = frame(&cast(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()), Some(&plate));
-        let broken = out.pixels().iter().filter(|p| !p.color().is_finite()).count();
-        Ok(Outcome::near(broken as f64, 1.0, 0.0, "px"))
-    })
+    Case::new(
+        "plate with one pixel of NaN",
+        "64 x 48 pixels, no card",
+        "no more than that pixel is NaN: 1",
+        || {
+            let mut plate = plate(64, 48);
+            plate[(20, 30)].g = f32::NAN;
+            let out = frame(
+                &cast(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
+                Some(&plate),
+            );
+            let broken = out
+                .pixels()
+                .iter()
+                .filter(|p| !p.color().is_finite())
+                .count();
+            Ok(Outcome::near(broken as f64, 1.0, 0.0, "px"))
+        },
+    )
 }
 
 fn exposed(ev: f64) -> Case {
@@ -143,12 +219,19 @@ fn exposed(ev: f64) -> Case {
         "black stays 0, order stays, nothing is NaN",
         move || {
             let values = [0.0, 1e-4, 1.0];
-            let picture = Image::from_vec(3, 1, values.map(|v| LinearRgb::grey(v).opaque()).to_vec());
-            let change = Finish { exposure_ev: ev, ..Finish::default() };
+            let picture =
+                Image::from_vec(3, 1, values.map(|v| LinearRgb::grey(v).opaque()).to_vec());
+            let change = Finish {
+                exposure_ev: ev,
+                ..Finish::default()
+            };
             let out = finish(picture, &row(vec![vec![]; 3]), None, &change);
             let found = [0, 1, 2].map(|x| out[(x, 0)].g);
             let passed = found[0] == 0.0 && found[0] <= found[1] && found[1] <= found[2];
-            Ok(Outcome::new(format!("{:e}, {:e}, {:e}", found[0], found[1], found[2]), passed))
+            Ok(Outcome::new(
+                format!("{:e}, {:e}, {:e}", found[0], found[1], found[2]),
+                passed,
+            ))
         },
     )
 }
@@ -159,21 +242,37 @@ fn sharpened() -> Case {
         "an amount of 2",
         "every value in 0..3e5, and 1e-4 kept (to 1e-6) where the window of 4 pixels does not reach",
         || {
-            let picture =
-                Image::from_fn(33, 33, |x, y| LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque());
-            let change = Finish { sharpening: 2.0, ..Finish::default() };
+            let picture = Image::from_fn(33, 33, |x, y| {
+                LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque()
+            });
+            let change = Finish {
+                sharpening: 2.0,
+                ..Finish::default()
+            };
             let out = finish(picture, &row(vec![]), None, &change);
-            let [least, most] = [f32::min, f32::max].map(|of| out.pixels().iter().map(|p| p.g).fold(out[(0, 0)].g, of));
+            let [least, most] = [f32::min, f32::max]
+                .map(|of| out.pixels().iter().map(|p| p.g).fold(out[(0, 0)].g, of));
             let far = f64::from(out[(2, 2)].g);
             let passed = least >= 0.0 && most <= 3e5 && (far / 1e-4 - 1.0).abs() < 1e-6;
-            Ok(Outcome::new(format!("{least:e} to {most:e}; far away {far:e}"), passed))
+            Ok(Outcome::new(
+                format!("{least:e} to {most:e}; far away {far:e}"),
+                passed,
+            ))
         },
     )
 }
 
 fn one_pixel() -> Case {
-    Case::new("one-pixel image", "a film of transmittance 1/2 and light 0.25 over a plate of 1", "0.75 exactly", || {
-        let out = frame(&row(vec![vec![sample(1, 0.25, 0.5)]]), Some(&Image::filled(1, 1, LinearRgb::WHITE)));
-        Ok(Outcome::near(out[(0, 0)].g.into(), 0.75, 0.0, ""))
-    })
+    Case::new(
+        "one-pixel image",
+        "a film of transmittance 1/2 and light 0.25 over a plate of 1",
+        "0.75 exactly",
+        || {
+            let out = frame(
+                &row(vec![vec![sample(1, 0.25, 0.5)]]),
+                Some(&Image::filled(1, 1, LinearRgb::WHITE)),
+            );
+            Ok(Outcome::near(out[(0, 0)].g.into(), 0.75, 0.0, ""))
+        },
+    )
 }

@@ -4,8 +4,8 @@ use super::staged::{above, grey, level, scene};
 use super::{Case, Outcome};
 use crate::composite;
 use crate::dataset::{
-    Format, JOURNAL, LabelSetup, Numbers, Obstructed, Part, Pictures, Plan, Sample, Shard, Sidecar, Split, SplitOrder,
-    Times, Writer, check, generate, mend,
+    Format, JOURNAL, LabelSetup, Numbers, Obstructed, Part, Pictures, Plan, Sample, Shard, Sidecar,
+    Split, SplitOrder, Times, Writer, check, generate, mend,
 };
 use crate::error::{Error, Result};
 use crate::io;
@@ -53,13 +53,25 @@ fn sample(shot: &Shot, deep: DeepImage) -> Sample {
     let labels = label(&deep, shot, &LabelOptions::default());
     let (drawn, rejected, draws, times) = (scene.clone(), Vec::new(), Vec::new(), Times::default());
     let frame = composite::frame(&deep, None).map(|p| p.color().opaque());
-    Sample { frame, deep, labels, drawn, scene, scene_seed: 0, rejected, draws, times }
+    Sample {
+        frame,
+        deep,
+        labels,
+        drawn,
+        scene,
+        scene_seed: 0,
+        rejected,
+        draws,
+        times,
+    }
 }
 
 /// A card whose brightness tells picture `k` from the others.
 fn with_a_card(k: u64, size: f64) -> Shot {
     let at = 0.01 * k as f64 - 0.05;
-    Shot::new(above(IMAGE, 100.0)).with_ambient(LinearRgb::WHITE).with_card(level(1, [at, 0.0, 0.0], size, grey(1.0)))
+    Shot::new(above(IMAGE, 100.0))
+        .with_ambient(LinearRgb::WHITE)
+        .with_card(level(1, [at, 0.0, 0.0], size, grey(1.0)))
 }
 
 /// A dataset in every layout, made and counted.
@@ -82,14 +94,26 @@ impl Made {
 
     /// Makes what is missing; how many that were.
     fn go_on(&self, make: impl Fn(u64) -> Sample + Sync) -> Result<u64> {
-        let report = generate(&self.plan(), |k| Ok(make(k)), &|_| (), &AtomicBool::new(false))?;
+        let report = generate(
+            &self.plan(),
+            |k| Ok(make(k)),
+            &|_| (),
+            &AtomicBool::new(false),
+        )?;
         Ok(report.made)
     }
 
     fn plan(&self) -> Plan {
         let formats = vec![Format::Yolo, Format::Coco, Format::Voc];
-        let mut writers: Vec<Box<dyn Writer>> = vec![Box::new(Pictures::default()), Box::new(Sidecar)];
-        writers.extend(LabelSetup { formats, ..LabelSetup::default() }.writers(&Pictures::default()));
+        let mut writers: Vec<Box<dyn Writer>> =
+            vec![Box::new(Pictures::default()), Box::new(Sidecar)];
+        writers.extend(
+            LabelSetup {
+                formats,
+                ..LabelSetup::default()
+            }
+            .writers(&Pictures::default()),
+        );
         Plan {
             folder: self.path().into(),
             count: self.count,
@@ -108,7 +132,9 @@ impl Made {
     fn faults(&self) -> Result<Vec<String>> {
         let faults = check(self.path())?.faults;
         let told = faults.iter().map(|fault| fault.what.clone());
-        Ok(told.filter(|what| !what.contains("looks like") && !what.contains("same bytes")).collect())
+        Ok(told
+            .filter(|what| !what.contains("looks like") && !what.contains("same bytes"))
+            .collect())
     }
 
     fn label(&self, name: &str) -> Result<String> {
@@ -125,8 +151,16 @@ fn empty_pictures() -> Case {
             let made = Made::of(5, |_| taken(&Shot::new(above(IMAGE, 100.0))))?;
             let (faults, checked) = (made.faults()?, check(made.path())?);
             let rows: usize = checked.rows.iter().sum();
-            let told = format!("{} images, {rows} rows, {} faults {}", checked.images, faults.len(), faults.join("; "));
-            Ok(Outcome::new(told.trim_end(), rows == 0 && faults.is_empty() && checked.images == 5))
+            let told = format!(
+                "{} images, {rows} rows, {} faults {}",
+                checked.images,
+                faults.len(),
+                faults.join("; ")
+            );
+            Ok(Outcome::new(
+                told.trim_end(),
+                rows == 0 && faults.is_empty() && checked.images == 5,
+            ))
         },
     )
 }
@@ -138,7 +172,10 @@ fn crowd() -> Case {
         "YOLO's equal rows are one; no fault",
         || {
             let made = Made::of(2, |_| crowded())?;
-            let (rows, faults) = (made.label("train/000001.txt")?.lines().count(), made.faults()?);
+            let (rows, faults) = (
+                made.label("train/000001.txt")?.lines().count(),
+                made.faults()?,
+            );
             Ok(Outcome::new(
                 format!("{rows} row, {} faults {}", faults.len(), faults.join("; ")),
                 rows == 1 && faults.is_empty(),
@@ -159,7 +196,13 @@ fn crowded() -> Sample {
     });
     let samples: Vec<_> = samples.collect();
     let [w, h] = IMAGE.map(|side| side as usize);
-    let pixels = (0..w * h).map(|i| if i == 2 * w + 3 { samples.clone() } else { Vec::new() });
+    let pixels = (0..w * h).map(|i| {
+        if i == 2 * w + 3 {
+            samples.clone()
+        } else {
+            Vec::new()
+        }
+    });
     let deep = DeepImage::from_pixels(crate::Image::filled(w, h, LinearRgb::WHITE), pixels);
     sample(&shot, deep)
 }
@@ -178,10 +221,18 @@ fn row_of_one_pixel() -> Case {
 }
 
 fn too_small() -> Case {
-    Case::new("one-pixel pictures", "1 x 1 pixel, for YOLO", "refused: \"expected at least 10 a side\"", || {
-        let made = Made::of(1, |_| taken(&Shot::new(above([1, 1], 100.0))));
-        Ok(Outcome::refused(made.map(|_| ()), "expected at least 10 a side"))
-    })
+    Case::new(
+        "one-pixel pictures",
+        "1 x 1 pixel, for YOLO",
+        "refused: \"expected at least 10 a side\"",
+        || {
+            let made = Made::of(1, |_| taken(&Shot::new(above([1, 1], 100.0))));
+            Ok(Outcome::refused(
+                made.map(|_| ()),
+                "expected at least 10 a side",
+            ))
+        },
+    )
 }
 
 /// Ten pictures of a card.
@@ -201,7 +252,10 @@ fn cut_journal() -> Case {
             io::write_text(&path, &text[..text.len() - 20])?;
             let again = made.go_on(|k| taken(&with_a_card(k, 0.1)))?;
             let faults = made.faults()?;
-            Ok(Outcome::new(format!("{again} made, {} faults", faults.len()), again == 1 && faults.is_empty()))
+            Ok(Outcome::new(
+                format!("{again} made, {} faults", faults.len()),
+                again == 1 && faults.is_empty(),
+            ))
         },
     )
 }
@@ -216,25 +270,40 @@ fn lost_picture() -> Case {
             let picture = |k: u64| made.path().join(format!("images/train/{k:06}.png"));
             std::fs::remove_file(picture(1)).map_err(|e| Error::file(picture(1), e))?;
             let half = std::fs::read(picture(2)).map_err(|e| Error::file(picture(2), e))?;
-            std::fs::write(picture(2), &half[..half.len() / 2]).map_err(|e| Error::file(picture(2), e))?;
+            std::fs::write(picture(2), &half[..half.len() / 2])
+                .map_err(|e| Error::file(picture(2), e))?;
             let (good, lost) = mend(made.path())?;
             let again = made.go_on(|k| taken(&with_a_card(k, 0.1)))?;
             let faults = made.faults()?;
-            let told = format!("{good} good, {lost} lost, {again} made, {} faults", faults.len());
-            Ok(Outcome::new(told, (good, lost, again) == (8, 2, 2) && faults.is_empty()))
+            let told = format!(
+                "{good} good, {lost} lost, {again} made, {} faults",
+                faults.len()
+            );
+            Ok(Outcome::new(
+                told,
+                (good, lost, again) == (8, 2, 2) && faults.is_empty(),
+            ))
         },
     )
 }
 
 fn classes_missing() -> Case {
-    Case::new("object of a class that there is not", "class 7 of 1", "refused, by \"but there are 1 classes\"", || {
-        let made = Made::of(1, |_| {
-            let mut sample = taken(&with_a_card(0, 0.1));
-            sample.labels.objects.iter_mut().for_each(|o| o.class = 7);
-            sample
-        });
-        Ok(Outcome::refused(made.map(|_| ()), "but there are 1 classes"))
-    })
+    Case::new(
+        "object of a class that there is not",
+        "class 7 of 1",
+        "refused, by \"but there are 1 classes\"",
+        || {
+            let made = Made::of(1, |_| {
+                let mut sample = taken(&with_a_card(0, 0.1));
+                sample.labels.objects.iter_mut().for_each(|o| o.class = 7);
+                sample
+            });
+            Ok(Outcome::refused(
+                made.map(|_| ()),
+                "but there are 1 classes",
+            ))
+        },
+    )
 }
 
 fn splits(percent: u8) -> Case {
@@ -245,42 +314,88 @@ fn splits(percent: u8) -> Case {
         format!("{expected} for validation, either way"),
         move || {
             let count = |order| {
-                let split = Split { val_percent: percent, order };
-                (0..1000).filter(|&k| split.part(k, 1000) == Part::Val).count() as u64
+                let split = Split {
+                    val_percent: percent,
+                    order,
+                };
+                (0..1000)
+                    .filter(|&k| split.part(k, 1000) == Part::Val)
+                    .count() as u64
             };
-            let found = [count(SplitOrder::Interleaved), count(SplitOrder::Consecutive)];
-            Ok(Outcome::new(format!("{} and {}", found[0], found[1]), found == [expected; 2]))
+            let found = [
+                count(SplitOrder::Interleaved),
+                count(SplitOrder::Consecutive),
+            ];
+            Ok(Outcome::new(
+                format!("{} and {}", found[0], found[1]),
+                found == [expected; 2],
+            ))
         },
     )
 }
 
 fn last_number() -> Case {
-    Case::new("the last number there is", "picture 2^64 - 1 of 2^64 - 1", "a part, without overflow", || {
-        let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive]
-            .map(|order| Split { order, ..Split::default() }.part(u64::MAX, u64::MAX));
-        Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
-    })
+    Case::new(
+        "the last number there is",
+        "picture 2^64 - 1 of 2^64 - 1",
+        "a part, without overflow",
+        || {
+            let parts = [SplitOrder::Interleaved, SplitOrder::Consecutive].map(|order| {
+                Split {
+                    order,
+                    ..Split::default()
+                }
+                .part(u64::MAX, u64::MAX)
+            });
+            Ok(Outcome::new(format!("{parts:?}"), parts[1] == Part::Val))
+        },
+    )
 }
 
 fn shards() -> Case {
-    Case::new("more shards than pictures", "10 pictures on 1000 machines", "each picture on exactly one: 10", || {
-        let all = (1..=1000).map(|index| Shard::new(index, 1000)).collect::<Result<Vec<_>>>()?;
-        let once = (0..10).filter(|&k| all.iter().filter(|shard| shard.contains(k)).count() == 1).count();
-        Ok(Outcome::near(once as f64, 10.0, 0.0, ""))
-    })
+    Case::new(
+        "more shards than pictures",
+        "10 pictures on 1000 machines",
+        "each picture on exactly one: 10",
+        || {
+            let all = (1..=1000)
+                .map(|index| Shard::new(index, 1000))
+                .collect::<Result<Vec<_>>>()?;
+            let once = (0..10)
+                .filter(|&k| all.iter().filter(|shard| shard.contains(k)).count() == 1)
+                .count();
+            Ok(Outcome::near(once as f64, 10.0, 0.0, ""))
+        },
+    )
 }
 
 fn no_shard() -> Case {
-    Case::new("shard 0, shard 5 of 4, shard 1 of 0", "as --shard", "refused: 3", || {
-        let refused = [(0, 4), (5, 4), (1, 0)].iter().filter(|(index, of)| Shard::new(*index, *of).is_err()).count();
-        Ok(Outcome::near(refused as f64, 3.0, 0.0, "refused"))
-    })
+    Case::new(
+        "shard 0, shard 5 of 4, shard 1 of 0",
+        "as --shard",
+        "refused: 3",
+        || {
+            let refused = [(0, 4), (5, 4), (1, 0)]
+                .iter()
+                .filter(|(index, of)| Shard::new(*index, *of).is_err())
+                .count();
+            Ok(Outcome::near(refused as f64, 3.0, 0.0, "refused"))
+        },
+    )
 }
 
 fn tray() -> Background {
     let corners_px = [[0.0, 0.0], [60.0, 0.0], [60.0, 40.0], [0.0, 40.0]];
-    let camera = CameraSource::Rectangle { corners_px, photo: [60, 40], focal_px: None };
-    Background { name: "tray".into(), size: [0.6, 0.4], camera }
+    let camera = CameraSource::Rectangle {
+        corners_px,
+        photo: [60, 40],
+        focal_px: None,
+    };
+    Background {
+        name: "tray".into(),
+        size: [0.6, 0.4],
+        camera,
+    }
 }
 
 fn negatives() -> Case {
@@ -289,11 +404,28 @@ fn negatives() -> Case {
         "negatives = 1, and objects = 0, 20 scenes of each, without stock",
         "no object in any: 0",
         || {
-            let none = Recipe { objects: Range::fixed(0.0), ..Recipe::default() };
-            let negative = Recipe { negatives: 1.0, ..Recipe::default() };
-            let count = |recipe: &Recipe, k| recipe.scene(1, k, &[tray()], &[]).map(|scene| scene.objects.len());
-            let all = (0..20).flat_map(|k| [count(&none, k), count(&negative, k)]).collect::<Result<Vec<_>>>()?;
-            Ok(Outcome::near(all.iter().sum::<usize>() as f64, 0.0, 0.0, "objects"))
+            let none = Recipe {
+                objects: Range::fixed(0.0),
+                ..Recipe::default()
+            };
+            let negative = Recipe {
+                negatives: 1.0,
+                ..Recipe::default()
+            };
+            let count = |recipe: &Recipe, k| {
+                recipe
+                    .scene(1, k, &[tray()], &[])
+                    .map(|scene| scene.objects.len())
+            };
+            let all = (0..20)
+                .flat_map(|k| [count(&none, k), count(&negative, k)])
+                .collect::<Result<Vec<_>>>()?;
+            Ok(Outcome::near(
+                all.iter().sum::<usize>() as f64,
+                0.0,
+                0.0,
+                "objects",
+            ))
         },
     )
 }
@@ -304,14 +436,30 @@ fn seeds() -> Case {
         "seeds 0, 1 and 2^64 - 1, scenes 0, 1 and 2^64 - 1",
         "nine different scenes, each the same when it is drawn again",
         || {
-            let recipe = Recipe { objects: Range::fixed(0.0), ..Recipe::default() };
+            let recipe = Recipe {
+                objects: Range::fixed(0.0),
+                ..Recipe::default()
+            };
             let ends = [0, 1, u64::MAX];
             let pairs = || ends.into_iter().flat_map(|seed| ends.map(|k| (seed, k)));
-            let drawn = || pairs().map(|(seed, k)| recipe.scene(seed, k, &[tray()], &[])).collect::<Result<Vec<_>>>();
+            let drawn = || {
+                pairs()
+                    .map(|(seed, k)| recipe.scene(seed, k, &[tray()], &[]))
+                    .collect::<Result<Vec<_>>>()
+            };
             let (once, again) = (drawn()?, drawn()?);
-            let different = (0..once.len()).filter(|&i| !once[..i].contains(&once[i])).count();
-            let same = if once == again { "the same again" } else { "not the same again" };
-            Ok(Outcome::new(format!("{different} different, {same}"), different == 9 && once == again))
+            let different = (0..once.len())
+                .filter(|&i| !once[..i].contains(&once[i]))
+                .count();
+            let same = if once == again {
+                "the same again"
+            } else {
+                "not the same again"
+            };
+            Ok(Outcome::new(
+                format!("{different} different, {same}"),
+                different == 9 && once == again,
+            ))
         },
     )
 }
@@ -320,20 +468,38 @@ fn recipes() -> Vec<Case> {
     vec![
         refused("recipe without a background", "background", &[], |_| ()),
         refused("recipe without stock", "no asset", &[tray()], |_| ()),
-        refused("pictures of 0 x 48", "image", &[tray()], |recipe| recipe.image = [0, 48]),
-        refused("10^9 objects", "objects", &[tray()], |recipe| recipe.objects = Range::fixed(1e9)),
-        refused("range turned round", "objects", &[tray()], |recipe| recipe.objects = Range::new(5.0, 2.0)),
-        refused("range of NaN", "scale", &[tray()], |recipe| recipe.scale = Range::fixed(f64::NAN)),
-        refused("share of negatives of 1.5", "negatives", &[tray()], |recipe| recipe.negatives = 1.5),
+        refused("pictures of 0 x 48", "image", &[tray()], |recipe| {
+            recipe.image = [0, 48]
+        }),
+        refused("10^9 objects", "objects", &[tray()], |recipe| {
+            recipe.objects = Range::fixed(1e9)
+        }),
+        refused("range turned round", "objects", &[tray()], |recipe| {
+            recipe.objects = Range::new(5.0, 2.0)
+        }),
+        refused("range of NaN", "scale", &[tray()], |recipe| {
+            recipe.scale = Range::fixed(f64::NAN)
+        }),
+        refused(
+            "share of negatives of 1.5",
+            "negatives",
+            &[tray()],
+            |recipe| recipe.negatives = 1.5,
+        ),
     ]
 }
 
 /// A recipe with one thing wrong.
 fn refused(name: &str, cause: &'static str, places: &[Background], spoil: fn(&mut Recipe)) -> Case {
     let places = places.to_vec();
-    Case::new(name, "an else good recipe", format!("refused, by \"{cause}\""), move || {
-        let mut recipe = Recipe::default();
-        spoil(&mut recipe);
-        Ok(Outcome::refused(recipe.scene(0, 0, &places, &[]), cause))
-    })
+    Case::new(
+        name,
+        "an else good recipe",
+        format!("refused, by \"{cause}\""),
+        move || {
+            let mut recipe = Recipe::default();
+            spoil(&mut recipe);
+            Ok(Outcome::refused(recipe.scene(0, 0, &places, &[]), cause))
+        },
+    )
 }

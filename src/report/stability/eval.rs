@@ -3,7 +3,8 @@
 use super::{Case, Outcome};
 use crate::error::Result;
 use crate::eval::{
-    Confusion, ConfusionOptions, Definition, FoundBox, Scores, Sheet, TrueBox, bootstrap, coco, curves, evaluate, iou,
+    Confusion, ConfusionOptions, Definition, FoundBox, Scores, Sheet, TrueBox, bootstrap, coco,
+    curves, evaluate, iou,
 };
 use crate::label::BBox;
 
@@ -14,33 +15,107 @@ const PERFECT_YOLO: f64 = 0.995;
 
 pub(super) fn cases() -> Result<Vec<Case>> {
     let mut cases = Vec::new();
-    for (name, definition, perfect) in [("yolov5", Definition::Yolov5, PERFECT_YOLO), ("coco", Definition::Coco, 1.0)] {
+    for (name, definition, perfect) in [
+        ("yolov5", Definition::Yolov5, PERFECT_YOLO),
+        ("coco", Definition::Coco, 1.0),
+    ] {
         cases.extend([
-            scored(name, definition, "nothing at all", "no image", 0.0, Vec::new),
-            scored(name, definition, "no predictions", "10 boxes to find", 0.0, || vec![sheet(10, 0, equal)]),
-            scored(name, definition, "no truth", "10 detections, nothing to find", 0.0, || vec![sheet(0, 10, equal)]),
-            scored(name, definition, "boxes without area", "points found where points are", 0.0, points),
-            scored(name, definition, "equal confidences", "100 boxes, all found, all of 0.5", perfect, || {
-                vec![sheet(100, 100, equal)]
+            scored(
+                name,
+                definition,
+                "nothing at all",
+                "no image",
+                0.0,
+                Vec::new,
+            ),
+            scored(
+                name,
+                definition,
+                "no predictions",
+                "10 boxes to find",
+                0.0,
+                || vec![sheet(10, 0, equal)],
+            ),
+            scored(
+                name,
+                definition,
+                "no truth",
+                "10 detections, nothing to find",
+                0.0,
+                || vec![sheet(0, 10, equal)],
+            ),
+            scored(
+                name,
+                definition,
+                "boxes without area",
+                "points found where points are",
+                0.0,
+                points,
+            ),
+            scored(
+                name,
+                definition,
+                "equal confidences",
+                "100 boxes, all found, all of 0.5",
+                perfect,
+                || vec![sheet(100, 100, equal)],
+            ),
+            scored(
+                name,
+                definition,
+                "confidences of 0",
+                "100 boxes, all found, all of 0",
+                perfect,
+                || vec![sheet(100, 100, |_| 0.0)],
+            ),
+            scored(
+                name,
+                definition,
+                "confidences of 1e-300",
+                "100 boxes, all found",
+                perfect,
+                || vec![sheet(100, 100, |i| 1e-300 * (i + 1) as f64)],
+            ),
+            scored(name, definition, "one box", "found", perfect, || {
+                vec![sheet(1, 1, equal)]
             }),
-            scored(name, definition, "confidences of 0", "100 boxes, all found, all of 0", perfect, || {
-                vec![sheet(100, 100, |_| 0.0)]
-            }),
-            scored(name, definition, "confidences of 1e-300", "100 boxes, all found", perfect, || {
-                vec![sheet(100, 100, |i| 1e-300 * (i + 1) as f64)]
-            }),
-            scored(name, definition, "one box", "found", perfect, || vec![sheet(1, 1, equal)]),
-            scored(name, definition, "a detection twice", "1 box, named twice", perfect, || {
-                let mut one = sheet(1, 1, equal);
-                one.found.push(FoundBox { confidence: 0.4, ..one.found[0] });
-                vec![one]
-            }),
-            scored(name, definition, "100 000 boxes in 1000 images", "all found", perfect, || {
-                (0..MANY / 100).map(|_| sheet(100, 100, |i| 1.0 / (i + 1) as f64)).collect()
-            }),
+            scored(
+                name,
+                definition,
+                "a detection twice",
+                "1 box, named twice",
+                perfect,
+                || {
+                    let mut one = sheet(1, 1, equal);
+                    one.found.push(FoundBox {
+                        confidence: 0.4,
+                        ..one.found[0]
+                    });
+                    vec![one]
+                },
+            ),
+            scored(
+                name,
+                definition,
+                "100 000 boxes in 1000 images",
+                "all found",
+                perfect,
+                || {
+                    (0..MANY / 100)
+                        .map(|_| sheet(100, 100, |i| 1.0 / (i + 1) as f64))
+                        .collect()
+                },
+            ),
         ]);
     }
-    cases.extend([crowded(), one_image(), half_right(), no_images(), confusion(), huge_boxes()]);
+    cases.extend([
+        crowded(),
+        one_image(),
+        half_right(),
+        no_images(),
+        confusion(),
+        huge_boxes(),
+    ]);
     Ok(cases)
 }
 
@@ -52,17 +127,45 @@ fn equal(_: usize) -> f64 {
 fn sheet(truths: usize, found: usize, confidence: fn(usize) -> f64) -> Sheet {
     let place = |i: usize| {
         let (x, y) = (20.0 * (i % 100) as f64, 20.0 * (i / 100) as f64);
-        BBox { x0: x, y0: y, x1: x + 10.0, y1: y + 10.0 }
+        BBox {
+            x0: x,
+            y0: y,
+            x1: x + 10.0,
+            y1: y + 10.0,
+        }
     };
-    let truth = (0..truths).map(|i| TrueBox { class: 0, bbox: place(i), area: 100.0, crowd: false }).collect();
-    let found = (0..found).map(|i| FoundBox { class: 0, bbox: place(i), confidence: confidence(i) }).collect();
-    Sheet { image: String::new(), truth, found }
+    let truth = (0..truths)
+        .map(|i| TrueBox {
+            class: 0,
+            bbox: place(i),
+            area: 100.0,
+            crowd: false,
+        })
+        .collect();
+    let found = (0..found)
+        .map(|i| FoundBox {
+            class: 0,
+            bbox: place(i),
+            confidence: confidence(i),
+        })
+        .collect();
+    Sheet {
+        image: String::new(),
+        truth,
+        found,
+    }
 }
 
 fn points() -> Vec<Sheet> {
     let mut sheet = sheet(3, 3, equal);
-    sheet.truth.iter_mut().for_each(|t| (t.bbox.x1, t.bbox.y1, t.area) = (t.bbox.x0, t.bbox.y0, 0.0));
-    sheet.found.iter_mut().for_each(|f| (f.bbox.x1, f.bbox.y1) = (f.bbox.x0, f.bbox.y0));
+    sheet
+        .truth
+        .iter_mut()
+        .for_each(|t| (t.bbox.x1, t.bbox.y1, t.area) = (t.bbox.x0, t.bbox.y0, 0.0));
+    sheet
+        .found
+        .iter_mut()
+        .for_each(|f| (f.bbox.x1, f.bbox.y1) = (f.bbox.x0, f.bbox.y0));
     vec![sheet]
 }
 
@@ -76,7 +179,12 @@ fn scored(
 ) -> Case {
     let promise = format!("mAP {expected}, to 1e-9");
     Case::new(format!("{name}: {what}"), input, promise, move || {
-        Ok(Outcome::near(Scores::map(&evaluate(&sheets(), definition, &[])), expected, 1e-9, ""))
+        Ok(Outcome::near(
+            Scores::map(&evaluate(&sheets(), definition, &[])),
+            expected,
+            1e-9,
+            "",
+        ))
     })
 }
 
@@ -115,21 +223,43 @@ fn half_right() -> Case {
         "equal ones keep their order, the right ones first: mAP 1, to 1e-9",
         || {
             let mut half = sheet(50, 50, equal);
-            let away =
-                |f: &FoundBox| FoundBox { bbox: BBox { x0: f.bbox.x0 + 1e4, x1: f.bbox.x1 + 1e4, ..f.bbox }, ..*f };
+            let away = |f: &FoundBox| FoundBox {
+                bbox: BBox {
+                    x0: f.bbox.x0 + 1e4,
+                    x1: f.bbox.x1 + 1e4,
+                    ..f.bbox
+                },
+                ..*f
+            };
             let wrong: Vec<FoundBox> = half.found.iter().map(away).collect();
             half.found.extend(wrong);
-            Ok(Outcome::near(evaluate(&[half], Definition::Coco, &[]).map(), 1.0, 1e-9, ""))
+            Ok(Outcome::near(
+                evaluate(&[half], Definition::Coco, &[]).map(),
+                1.0,
+                1e-9,
+                "",
+            ))
         },
     )
 }
 
 fn no_images() -> Case {
-    Case::new("interval of no images", "a bootstrap of 100 rounds over nothing", "0 from 0 to 0; no curve", || {
-        let interval = bootstrap(&[], Definition::Coco, 100, 1);
-        let (found, curves) = ([interval.low, interval.value, interval.high], curves(&[]).classes.len());
-        Ok(Outcome::new(format!("{found:?}, {curves} curves"), found == [0.0; 3] && curves == 0))
-    })
+    Case::new(
+        "interval of no images",
+        "a bootstrap of 100 rounds over nothing",
+        "0 from 0 to 0; no curve",
+        || {
+            let interval = bootstrap(&[], Definition::Coco, 100, 1);
+            let (found, curves) = (
+                [interval.low, interval.value, interval.high],
+                curves(&[]).classes.len(),
+            );
+            Ok(Outcome::new(
+                format!("{found:?}, {curves} curves"),
+                found == [0.0; 3] && curves == 0,
+            ))
+        },
+    )
 }
 
 fn confusion() -> Case {
@@ -143,7 +273,10 @@ fn confusion() -> Case {
             sheet.truth.iter_mut().for_each(|t| t.bbox = place);
             sheet.found.iter_mut().for_each(|f| f.bbox = place);
             let counts = Confusion::new(&[sheet], &ConfusionOptions::default()).counts;
-            Ok(Outcome::new(format!("{counts:?}"), counts.into_iter().eq([([Some(0), Some(0)], 300)])))
+            Ok(Outcome::new(
+                format!("{counts:?}"),
+                counts.into_iter().eq([([Some(0), Some(0)], 300)]),
+            ))
         },
     )
 }
@@ -154,9 +287,20 @@ fn huge_boxes() -> Case {
         "one half of the other; areas of 1e300",
         "intersection over union 1/2, to 1e-12; of infinite ones a number, not NaN",
         || {
-            let whole = BBox { x0: 0.0, y0: 0.0, x1: 1e150, y1: 1e150 };
-            let half = BBox { x1: 0.5e150, ..whole };
-            let endless = BBox { x1: f64::INFINITY, ..whole };
+            let whole = BBox {
+                x0: 0.0,
+                y0: 0.0,
+                x1: 1e150,
+                y1: 1e150,
+            };
+            let half = BBox {
+                x1: 0.5e150,
+                ..whole
+            };
+            let endless = BBox {
+                x1: f64::INFINITY,
+                ..whole
+            };
             let (found, of_endless) = (iou(&whole, &half), iou(&endless, &endless));
             Ok(Outcome::new(
                 format!("{found}, of infinite ones {of_endless}"),

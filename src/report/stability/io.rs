@@ -17,9 +17,21 @@ const FORMATS: [&str; 4] = ["exr", "png", "tif", "jpg"];
 
 pub(super) fn cases() -> Result<Vec<Case>> {
     let mut cases = vec![
-        half("half float: 65504", &[HALF_MAX, -HALF_MAX], &[HALF_MAX, -HALF_MAX]),
-        half("half float: above 65504", &[65520.0, 1e5, 1e38, -1e5], &[HALF_MAX, HALF_MAX, HALF_MAX, -HALF_MAX]),
-        half("half float: denormals", &[HALF_MIN, 3.0 * HALF_MIN, HALF_MIN / 4.0], &[HALF_MIN, 3.0 * HALF_MIN, 0.0]),
+        half(
+            "half float: 65504",
+            &[HALF_MAX, -HALF_MAX],
+            &[HALF_MAX, -HALF_MAX],
+        ),
+        half(
+            "half float: above 65504",
+            &[65520.0, 1e5, 1e38, -1e5],
+            &[HALF_MAX, HALF_MAX, HALF_MAX, -HALF_MAX],
+        ),
+        half(
+            "half float: denormals",
+            &[HALF_MIN, 3.0 * HALF_MIN, HALF_MIN / 4.0],
+            &[HALF_MIN, 3.0 * HALF_MIN, 0.0],
+        ),
         half_channels(),
         floats(),
         codes(),
@@ -46,23 +58,43 @@ fn through(name: &str, values: &[f32], options: &WriteOptions) -> Result<Vec<f32
     let (_folder, path) = folder()?;
     let path = path.join(name);
     io::write_with(&path, &row(values), options)?;
-    Ok(io::read::<LinearRgb>(&path)?.pixels().iter().map(|p| p.g).collect())
+    Ok(io::read::<LinearRgb>(&path)?
+        .pixels()
+        .iter()
+        .map(|p| p.g)
+        .collect())
 }
 
 fn row(values: &[f32]) -> Image<LinearRgb> {
-    Image::from_vec(values.len(), 1, values.iter().map(|&v| LinearRgb::new(0.0, v, 0.0)).collect())
+    Image::from_vec(
+        values.len(),
+        1,
+        values
+            .iter()
+            .map(|&v| LinearRgb::new(0.0, v, 0.0))
+            .collect(),
+    )
 }
 
 fn shown(values: &[f32]) -> String {
-    values.iter().map(|v| format!("{v:e}")).collect::<Vec<_>>().join(", ")
+    values
+        .iter()
+        .map(|v| format!("{v:e}"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 fn half(name: &str, values: &'static [f32], expected: &'static [f32]) -> Case {
     let input = format!("{} to a half-float EXR and back", shown(values));
-    Case::new(name, input, format!("{}: clamped, never infinite", shown(expected)), move || {
-        let found = through("a.exr", values, &WriteOptions::default())?;
-        Ok(Outcome::new(shown(&found), found == expected))
-    })
+    Case::new(
+        name,
+        input,
+        format!("{}: clamped, never infinite", shown(expected)),
+        move || {
+            let found = through("a.exr", values, &WriteOptions::default())?;
+            Ok(Outcome::new(shown(&found), found == expected))
+        },
+    )
 }
 
 fn half_channels() -> Case {
@@ -74,7 +106,11 @@ fn half_channels() -> Case {
             let (_folder, path) = folder()?;
             let path = path.join("a.exr");
             exr::write_half_channels(&path, (2, 1), &[("TR", &[1e5, -1e5])], &[])?;
-            let found: Vec<f32> = exr::read_channels(&path)?.1.into_iter().flat_map(|c| c.samples).collect();
+            let found: Vec<f32> = exr::read_channels(&path)?
+                .1
+                .into_iter()
+                .flat_map(|c| c.samples)
+                .collect();
             Ok(Outcome::new(shown(&found), found == [HALF_MAX, -HALF_MAX]))
         },
     )
@@ -86,12 +122,27 @@ fn floats() -> Case {
         "the smallest denormal, the smallest normal, 1e-4 beside 1e5, the largest, in EXR and TIFF",
         "every bit comes back: 0 differ",
         || {
-            let values = [f32::from_bits(1), f32::MIN_POSITIVE, 1e-4, 1e5, f32::MAX, -f32::MAX, -0.0];
-            let options = WriteOptions { bits: Some(Bits::Float), ..WriteOptions::default() };
+            let values = [
+                f32::from_bits(1),
+                f32::MIN_POSITIVE,
+                1e-4,
+                1e5,
+                f32::MAX,
+                -f32::MAX,
+                -0.0,
+            ];
+            let options = WriteOptions {
+                bits: Some(Bits::Float),
+                ..WriteOptions::default()
+            };
             let mut differ = 0;
             for name in ["a.exr", "a.tif"] {
                 let found = through(name, &values, &options)?;
-                differ += found.iter().zip(&values).filter(|(a, b)| a.to_bits() != b.to_bits()).count();
+                differ += found
+                    .iter()
+                    .zip(&values)
+                    .filter(|(a, b)| a.to_bits() != b.to_bits())
+                    .count();
             }
             Ok(Outcome::near(differ as f64, 0.0, 0.0, "differ"))
         },
@@ -106,7 +157,10 @@ fn codes() -> Case {
         || {
             let values = [f32::NAN, f32::NEG_INFINITY, -1.0, 1e38, f32::INFINITY];
             let found = through("a.png", &values, &WriteOptions::default())?;
-            Ok(Outcome::new(shown(&found), found == [0.0, 0.0, 0.0, 1.0, 1.0]))
+            Ok(Outcome::new(
+                shown(&found),
+                found == [0.0, 0.0, 0.0, 1.0, 1.0],
+            ))
         },
     )
 }
@@ -118,26 +172,46 @@ fn one_pixel(format: &'static str) -> Case {
         "1 x 1 pixel back, to 1 code of 255",
         move || {
             let found = through(&format!("a.{format}"), &[0.5], &WriteOptions::default())?;
-            let off = found.iter().map(|v| f64::from(v - 0.5).abs()).fold(0.0, f64::max);
+            let off = found
+                .iter()
+                .map(|v| f64::from(v - 0.5).abs())
+                .fold(0.0, f64::max);
             // A code is at most 1/255 of the curve, whose slope in linear light at 1/2 is below 1.7; JPEG's YCbCr adds one.
-            Ok(Outcome::new(format!("{} px, {off:.4} off", found.len()), found.len() == 1 && off < 2.0 * 1.7 / 255.0))
+            Ok(Outcome::new(
+                format!("{} px, {off:.4} off", found.len()),
+                found.len() == 1 && off < 2.0 * 1.7 / 255.0,
+            ))
         },
     )
 }
 
 fn empty(format: &'static str) -> Case {
-    Case::new(format!("{format}: no pixel"), "0 x 0 and 5 x 0 pixels", "refused, and nothing is written", move || {
-        let (_folder, path) = folder()?;
-        let path = path.join(format!("a.{format}"));
-        let refused = [(0, 0), (5, 0)].map(|(w, h)| io::write(&path, &Image::<LinearRgb>::new(w, h)).is_err());
-        Ok(Outcome::new(format!("{refused:?}, a file: {}", path.exists()), refused == [true; 2] && !path.exists()))
-    })
+    Case::new(
+        format!("{format}: no pixel"),
+        "0 x 0 and 5 x 0 pixels",
+        "refused, and nothing is written",
+        move || {
+            let (_folder, path) = folder()?;
+            let path = path.join(format!("a.{format}"));
+            let refused = [(0, 0), (5, 0)]
+                .map(|(w, h)| io::write(&path, &Image::<LinearRgb>::new(w, h)).is_err());
+            Ok(Outcome::new(
+                format!("{refused:?}, a file: {}", path.exists()),
+                refused == [true; 2] && !path.exists(),
+            ))
+        },
+    )
 }
 
 /// The bytes of a picture of 17 x 13 pixels.
 fn bytes(path: &Path) -> Result<Vec<u8>> {
-    let value =
-        |x: usize, y: usize| LinearRgb::new(x as f32 / 17.0, y as f32 / 13.0, ((x * 7 + y * 5) % 11) as f32 / 11.0);
+    let value = |x: usize, y: usize| {
+        LinearRgb::new(
+            x as f32 / 17.0,
+            y as f32 / 13.0,
+            ((x * 7 + y * 5) % 11) as f32 / 11.0,
+        )
+    };
     io::write(path, &Image::from_fn(17, 13, value))?;
     std::fs::read(path).map_err(|e| Error::file(path, e))
 }
@@ -157,7 +231,9 @@ fn truncated(format: &'static str) -> Case {
             let (_folder, path) = folder()?;
             let path = path.join(format!("a.{format}"));
             let whole = bytes(&path)?;
-            let read = (0..20).filter(|i| read_as(&path, &whole[..i * whole.len() / 20]).is_ok()).count();
+            let read = (0..20)
+                .filter(|i| read_as(&path, &whole[..i * whole.len() / 20]).is_ok())
+                .count();
             Ok(Outcome::near(read as f64, 0.0, 0.0, "read"))
         },
     )
@@ -181,7 +257,10 @@ fn lying(
         let grown = peak.zip(before).map_or(0.0, |(peak, before)| peak - before);
         let outcome = Outcome::refused(read, &format!("Limits::{limit}"));
         let measured = strip(&outcome.measured, &path);
-        Ok(Outcome::new(format!("{measured}; {:.0} MiB", grown * 1024.0), outcome.passed && grown < FEW_GIB))
+        Ok(Outcome::new(
+            format!("{measured}; {:.0} MiB", grown * 1024.0),
+            outcome.passed && grown < FEW_GIB,
+        ))
     })
 }
 
@@ -191,34 +270,57 @@ fn strip(message: &str, path: &Path) -> String {
 }
 
 fn lying_png() -> Case {
-    lying("png: header of 32767 x 32767 pixels", "a PNG of 17 x 13 that says so", "pixels", |folder| {
-        let path = folder.join("a.png");
-        let mut png = bytes(&path)?;
-        png[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
-        let sum = crc32fast::hash(&png[12..29]);
-        png[29..33].copy_from_slice(&sum.to_be_bytes());
-        save(path, &png)
-    })
+    lying(
+        "png: header of 32767 x 32767 pixels",
+        "a PNG of 17 x 13 that says so",
+        "pixels",
+        |folder| {
+            let path = folder.join("a.png");
+            let mut png = bytes(&path)?;
+            png[16..24].copy_from_slice(&[0, 0, 0x7f, 0xff, 0, 0, 0x7f, 0xff]);
+            let sum = crc32fast::hash(&png[12..29]);
+            png[29..33].copy_from_slice(&sum.to_be_bytes());
+            save(path, &png)
+        },
+    )
 }
 
 fn lying_exr() -> Case {
-    lying("exr: window of 200 000 pixels a side", "an EXR of 17 x 13 that says so", "side", |folder| {
-        let path = folder.join("a.exr");
-        let mut exr = bytes(&path)?;
-        for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
-            let Some(at) = exr.windows(window.len()).position(|w| w == window.as_bytes()) else { continue };
-            // Behind the name and the attribute's size stand x0, y0, x1, y1.
-            let corner = at + window.len() + 4 + 8;
-            exr[corner..corner + 8].copy_from_slice(&[0x3f, 0x0d, 3, 0, 0x3f, 0x0d, 3, 0]);
-        }
-        save(path, &exr)
-    })
+    lying(
+        "exr: window of 200 000 pixels a side",
+        "an EXR of 17 x 13 that says so",
+        "side",
+        |folder| {
+            let path = folder.join("a.exr");
+            let mut exr = bytes(&path)?;
+            for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+                let Some(at) = exr
+                    .windows(window.len())
+                    .position(|w| w == window.as_bytes())
+                else {
+                    continue;
+                };
+                // Behind the name and the attribute's size stand x0, y0, x1, y1.
+                let corner = at + window.len() + 4 + 8;
+                exr[corner..corner + 8].copy_from_slice(&[0x3f, 0x0d, 3, 0, 0x3f, 0x0d, 3, 0]);
+            }
+            save(path, &exr)
+        },
+    )
 }
 
 fn lying_hdr() -> Case {
-    lying("hdr: 99999 pixels a side", "a header and nothing behind it", "side", |folder| {
-        save(folder.join("a.hdr"), b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n")
-    })
+    lying(
+        "hdr: 99999 pixels a side",
+        "a header and nothing behind it",
+        "side",
+        |folder| {
+            save(
+                folder.join("a.hdr"),
+                b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n",
+            )
+        },
+    )
 }
 
 fn save(path: PathBuf, bytes: &[u8]) -> Result<PathBuf> {
@@ -227,38 +329,74 @@ fn save(path: PathBuf, bytes: &[u8]) -> Result<PathBuf> {
 }
 
 fn nothing() -> Case {
-    Case::new("file of 0 bytes", "called .png, .exr, .tif, .jpg", "refused: 0 read", || {
-        let (_folder, path) = folder()?;
-        let read = FORMATS.iter().filter(|f| read_as(&path.join(format!("a.{f}")), &[]).is_ok()).count();
-        Ok(Outcome::near(read as f64, 0.0, 0.0, "read"))
-    })
+    Case::new(
+        "file of 0 bytes",
+        "called .png, .exr, .tif, .jpg",
+        "refused: 0 read",
+        || {
+            let (_folder, path) = folder()?;
+            let read = FORMATS
+                .iter()
+                .filter(|f| read_as(&path.join(format!("a.{f}")), &[]).is_ok())
+                .count();
+            Ok(Outcome::near(read as f64, 0.0, 0.0, "read"))
+        },
+    )
 }
 
 fn no_file() -> Case {
-    Case::new("no file", "a name that is none", "an error that names the file", || {
-        let (_folder, path) = folder()?;
-        let outcome = Outcome::refused(io::read::<PremulRgba>(path.join("none.png")), "none.png");
-        let measured = outcome.measured.replace(&format!("{}/", path.display()), "");
-        Ok(Outcome { measured, ..outcome })
-    })
+    Case::new(
+        "no file",
+        "a name that is none",
+        "an error that names the file",
+        || {
+            let (_folder, path) = folder()?;
+            let outcome =
+                Outcome::refused(io::read::<PremulRgba>(path.join("none.png")), "none.png");
+            let measured = outcome
+                .measured
+                .replace(&format!("{}/", path.display()), "");
+            Ok(Outcome {
+                measured,
+                ..outcome
+            })
+        },
+    )
 }
 
 fn nested() -> Case {
-    Case::new("document of 100 000 brackets", "[[[[...", "refused, not a stack overflow", || {
-        let (_folder, path) = folder()?;
-        let path = save(path.join("a.json"), "[".repeat(100_000).as_bytes())?;
-        let outcome = Outcome::refused(io::read_json::<serde_json::Value>(&path), "nested deeper");
-        Ok(Outcome { measured: strip(&outcome.measured, &path), ..outcome })
-    })
+    Case::new(
+        "document of 100 000 brackets",
+        "[[[[...",
+        "refused, not a stack overflow",
+        || {
+            let (_folder, path) = folder()?;
+            let path = save(path.join("a.json"), "[".repeat(100_000).as_bytes())?;
+            let outcome =
+                Outcome::refused(io::read_json::<serde_json::Value>(&path), "nested deeper");
+            Ok(Outcome {
+                measured: strip(&outcome.measured, &path),
+                ..outcome
+            })
+        },
+    )
 }
 
 fn overlong_number() -> Case {
-    Case::new("document with the number 1e999", "[1e999]", "refused, not infinity", || {
-        let (_folder, path) = folder()?;
-        let path = save(path.join("a.json"), b"[1e999]")?;
-        let outcome = Outcome::refused(io::read_json::<Vec<f64>>(&path), "number out of range");
-        Ok(Outcome { measured: strip(&outcome.measured, &path), ..outcome })
-    })
+    Case::new(
+        "document with the number 1e999",
+        "[1e999]",
+        "refused, not infinity",
+        || {
+            let (_folder, path) = folder()?;
+            let path = save(path.join("a.json"), b"[1e999]")?;
+            let outcome = Outcome::refused(io::read_json::<Vec<f64>>(&path), "number out of range");
+            Ok(Outcome {
+                measured: strip(&outcome.measured, &path),
+                ..outcome
+            })
+        },
+    )
 }
 
 /// Pixels along a side of the largest picture.

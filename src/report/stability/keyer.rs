@@ -40,7 +40,14 @@ fn all_stages(profile: Profile) -> KeyOptions {
 
 /// Values of a matte that are no share, in all profiles.
 fn no_shares(keyed: impl Iterator<Item = Keyed>) -> Outcome {
-    let wrong = |keyed: Keyed| keyed.matte.pixels().iter().filter(|m| !(0.0..=1.0).contains(&m.0)).count();
+    let wrong = |keyed: Keyed| {
+        keyed
+            .matte
+            .pixels()
+            .iter()
+            .filter(|m| !(0.0..=1.0).contains(&m.0))
+            .count()
+    };
     Outcome::near(keyed.map(wrong).sum::<usize>() as f64, 0.0, 0.0, "wrong")
 }
 
@@ -51,19 +58,36 @@ fn weak(saturation: f32) -> Case {
         "every matte value in 0..1: 0 wrong",
         move || {
             let screen = LinearRgb::new(0.5, 0.5 + saturation, 0.5);
-            let photo =
-                Image::from_fn(7, 5, |x, y| LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32));
-            Ok(no_shares(Profile::ALL.iter().map(|(_, profile)| key(&photo, screen, &KeyOptions::of(*profile)))))
+            let photo = Image::from_fn(7, 5, |x, y| {
+                LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32)
+            });
+            Ok(no_shares(Profile::ALL.iter().map(|(_, profile)| {
+                key(&photo, screen, &KeyOptions::of(*profile))
+            })))
         },
     )
 }
 
 fn pixel(name: &str, value: [f32; 3], expected: f32) -> Case {
     let promise = format!("a matte of {expected}, as Blender 3.4.1 prints it, to 1e-7");
-    Case::new(name, format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN)), promise, move || {
-        let keyed = key(&Image::filled(1, 1, value.into()), GREEN, &KeyOptions::default());
-        Ok(Outcome::near(keyed.matte[(0, 0)].0.into(), expected.into(), 1e-7, ""))
-    })
+    Case::new(
+        name,
+        format!("{value:?} against {:?}", <[f32; 3]>::from(GREEN)),
+        promise,
+        move || {
+            let keyed = key(
+                &Image::filled(1, 1, value.into()),
+                GREEN,
+                &KeyOptions::default(),
+            );
+            Ok(Outcome::near(
+                keyed.matte[(0, 0)].0.into(),
+                expected.into(),
+                1e-7,
+                "",
+            ))
+        },
+    )
 }
 
 fn all_of_the_key() -> Case {
@@ -75,10 +99,25 @@ fn all_of_the_key() -> Case {
             let photo = Image::filled(64, 64, GREEN);
             let left = |(_, profile): &(&str, Profile)| {
                 let keyed = key(&photo, GREEN, &KeyOptions::of(*profile));
-                let light = keyed.cutout.pixels().iter().map(|p| f64::from(p.r.abs() + p.g.abs() + p.b.abs() + p.a));
-                light.sum::<f64>() + keyed.matte.pixels().iter().map(|m| f64::from(m.0)).sum::<f64>()
+                let light = keyed
+                    .cutout
+                    .pixels()
+                    .iter()
+                    .map(|p| f64::from(p.r.abs() + p.g.abs() + p.b.abs() + p.a));
+                light.sum::<f64>()
+                    + keyed
+                        .matte
+                        .pixels()
+                        .iter()
+                        .map(|m| f64::from(m.0))
+                        .sum::<f64>()
             };
-            Ok(Outcome::near(Profile::ALL.iter().map(left).sum(), 0.0, 0.0, ""))
+            Ok(Outcome::near(
+                Profile::ALL.iter().map(left).sum(),
+                0.0,
+                0.0,
+                "",
+            ))
         },
     )
 }
@@ -91,7 +130,13 @@ fn extreme_pixels() -> Case {
         || {
             let sizes = [1e-42_f32, 1e-38, 1e-30, 1e-10, 1.0, 1e10, 1e20, 1e30];
             let photo = Image::from_fn(17, 13, |x, y| {
-                let sign = |k: usize| if (x + y + k).is_multiple_of(5) { -1.0 } else { 1.0 };
+                let sign = |k: usize| {
+                    if (x + y + k).is_multiple_of(5) {
+                        -1.0
+                    } else {
+                        1.0
+                    }
+                };
                 let at = |k: usize| sizes[(x * 7 + y * 3 + k * 5) % 8] * sign(k);
                 PremulRgba::new(at(0), at(1), at(2), [0.0, 0.5, 1.0, 1.5][(x + y) % 4])
             });
@@ -121,13 +166,30 @@ fn no_numbers() -> Case {
         || {
             let mut photo = Image::filled(9, 9, GREEN.opaque());
             (photo[(4, 4)].b, photo[(5, 4)].a) = (f32::NAN, f32::INFINITY);
-            let garbage = Image::from_fn(9, 9, |x, _| Coverage(if x == 0 { f32::NAN } else { 0.0 }));
+            let garbage =
+                Image::from_fn(9, 9, |x, _| Coverage(if x == 0 { f32::NAN } else { 0.0 }));
             let job = Keying::new(&photo, Screen::Color(GREEN)).with_garbage(&garbage);
             let keyed = job.run(&all_stages(Profile::Robust))?;
-            let counted = [keyed.deviations.unusable_pixels, keyed.deviations.unusable_mattes];
-            let shares = keyed.matte.pixels().iter().all(|m| (0.0..=1.0).contains(&m.0));
-            let finite = keyed.cutout.pixels().iter().all(|p| p.color().is_finite() && p.a.is_finite());
-            let told = format!("{} pixels, {} mattes, sound: {}", counted[0], counted[1], shares && finite);
+            let counted = [
+                keyed.deviations.unusable_pixels,
+                keyed.deviations.unusable_mattes,
+            ];
+            let shares = keyed
+                .matte
+                .pixels()
+                .iter()
+                .all(|m| (0.0..=1.0).contains(&m.0));
+            let finite = keyed
+                .cutout
+                .pixels()
+                .iter()
+                .all(|p| p.color().is_finite() && p.a.is_finite());
+            let told = format!(
+                "{} pixels, {} mattes, sound: {}",
+                counted[0],
+                counted[1],
+                shares && finite
+            );
             Ok(Outcome::new(told, counted == [2, 9] && shares && finite))
         },
     )
@@ -148,10 +210,15 @@ fn wide_windows() -> Case {
                 ..all_stages(profile)
             };
             let sizes = [(1, 1), (5, 1), (1, 5), (3, 2)];
-            let photos =
-                sizes.map(|(w, h)| Image::from_fn(w, h, |x, y| LinearRgb::new(0.3, 0.2 * (x + y) as f32, 0.25)));
-            let runs = Profile::ALL.iter().flat_map(|(_, profile)| photos.iter().map(move |photo| (*profile, photo)));
-            Ok(no_shares(runs.map(|(profile, photo)| key(photo, GREEN, &opts(profile)))))
+            let photos = sizes.map(|(w, h)| {
+                Image::from_fn(w, h, |x, y| LinearRgb::new(0.3, 0.2 * (x + y) as f32, 0.25))
+            });
+            let runs = Profile::ALL
+                .iter()
+                .flat_map(|(_, profile)| photos.iter().map(move |photo| (*profile, photo)));
+            Ok(no_shares(
+                runs.map(|(profile, photo)| key(photo, GREEN, &opts(profile))),
+            ))
         },
     )
 }
@@ -165,7 +232,11 @@ fn no_pixels() -> Case {
             let keyed = |(w, h)| key(&Image::new(w, h), GREEN, &all_stages(Profile::Blender34));
             let count = |keyed: Keyed| keyed.matte.pixels().len() + keyed.cutout.pixels().len();
             Ok(Outcome::near(
-                [(0, 0), (0, 5), (5, 0)].map(keyed).map(count).iter().sum::<usize>() as f64,
+                [(0, 0), (0, 5), (5, 0)]
+                    .map(keyed)
+                    .map(count)
+                    .iter()
+                    .sum::<usize>() as f64,
                 0.0,
                 0.0,
                 "px",
@@ -182,10 +253,15 @@ fn twelve_megapixels() -> Case {
         "the matte repeats, too, away from the border: 0 differ",
         || {
             let at = |x: usize, y: usize| ((x % TILE) * 7 + (y % TILE) * 13) % 101;
-            let photo = Image::from_fn(4000, 3000, |x, y| LinearRgb::new(0.3, 0.2 + 0.005 * at(x, y) as f32, 0.25));
+            let photo = Image::from_fn(4000, 3000, |x, y| {
+                LinearRgb::new(0.3, 0.2 + 0.005 * at(x, y) as f32, 0.25)
+            });
             let matte = key(&photo, GREEN, &KeyOptions::default()).matte;
-            let places = (TILE..3000 - 2 * TILE).flat_map(|y| (TILE..4000 - 2 * TILE).map(move |x| (x, y)));
-            let differ = places.filter(|&(x, y)| matte[(x, y)] != matte[(x % TILE + TILE, y % TILE + TILE)]).count();
+            let places =
+                (TILE..3000 - 2 * TILE).flat_map(|y| (TILE..4000 - 2 * TILE).map(move |x| (x, y)));
+            let differ = places
+                .filter(|&(x, y)| matte[(x, y)] != matte[(x % TILE + TILE, y % TILE + TILE)])
+                .count();
             Ok(Outcome::near(differ as f64, 0.0, 0.0, "differ"))
         },
     )

@@ -21,8 +21,14 @@ pub(super) fn peak_gib<T>(call: impl FnOnce() -> T) -> (T, Option<f64>) {
 /// A line `Name:   123 kB` of a file, GiB.
 fn line(file: &str, name: &str) -> Option<f64> {
     let text = fs::read_to_string(file).ok()?;
-    let rest = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(':'))?;
-    rest.trim().strip_suffix(" kB")?.parse().ok().map(|kib: f64| kib / KIB_PER_GIB)
+    let rest = text
+        .lines()
+        .find_map(|line| line.strip_prefix(name)?.strip_prefix(':'))?;
+    rest.trim()
+        .strip_suffix(" kB")?
+        .parse()
+        .ok()
+        .map(|kib: f64| kib / KIB_PER_GIB)
 }
 
 #[cfg(test)]
@@ -31,7 +37,12 @@ mod tests {
 
     #[test]
     fn what_was_held_shows_even_when_it_is_gone() {
-        let (_, peak) = peak_gib(|| vec![1_u8; 64 << 20].iter().map(|&b| u64::from(b)).sum::<u64>());
+        let (_, peak) = peak_gib(|| {
+            vec![1_u8; 64 << 20]
+                .iter()
+                .map(|&b| u64::from(b))
+                .sum::<u64>()
+        });
         assert!(peak.is_none_or(|gib| gib > 64.0 / 1024.0));
     }
 }

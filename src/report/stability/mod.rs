@@ -74,10 +74,16 @@ pub fn stages() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// [`Error::Value`] for a stage that has none.
 pub fn cases(stage: &str) -> Result<Vec<(&'static str, Case)>> {
-    let asked: Vec<_> = STAGES.iter().filter(|(name, _)| stage.is_empty() || *name == stage).collect();
+    let asked: Vec<_> = STAGES
+        .iter()
+        .filter(|(name, _)| stage.is_empty() || *name == stage)
+        .collect();
     if asked.is_empty() {
         let names = stages().collect::<Vec<_>>().join(", ");
-        return Err(Error::value("stage", format!("\"{stage}\", expected one of {names}")));
+        return Err(Error::value(
+            "stage",
+            format!("\"{stage}\", expected one of {names}"),
+        ));
     }
     let mut all = Vec::new();
     for (name, cases) in asked {
@@ -105,11 +111,27 @@ pub fn run(cases: &[(&'static str, Case)], progress: impl Fn(u64, u64)) -> Vec<R
 
 /// Cases as a table, a row each.
 pub fn table(rows: &[Row]) -> Table {
-    let mut table = Table::new(["stage", "case", "input", "expectation", "result", "pass", "time ms"]);
+    let mut table = Table::new([
+        "stage",
+        "case",
+        "input",
+        "expectation",
+        "result",
+        "pass",
+        "time ms",
+    ]);
     for row in rows {
         let pass = if row.outcome.passed { "pass" } else { "FAIL" };
         let time = format!("{:.1}", row.wall_ms);
-        table.push([row.stage, &row.name, &row.input, &row.expectation, &row.outcome.measured, pass, &time]);
+        table.push([
+            row.stage,
+            &row.name,
+            &row.input,
+            &row.expectation,
+            &row.outcome.measured,
+            pass,
+            &time,
+        ]);
     }
     table
 }
@@ -147,16 +169,29 @@ mod tests {
 
     #[test]
     fn an_unknown_stage_is_told_with_those_that_are_known() {
-        let told = cases("physics").err().map(|e| e.to_string()).unwrap_or_default();
-        assert!(told.starts_with("stage: \"physics\", expected one of "), "{told}");
+        let told = cases("physics")
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default();
+        assert!(
+            told.starts_with("stage: \"physics\", expected one of "),
+            "{told}"
+        );
     }
 
     #[test]
     fn every_stage_has_cases_and_their_names_are_their_own() {
         for stage in stages() {
-            let names: Vec<String> = cases(stage).unwrap().into_iter().map(|(_, case)| case.name).collect();
+            let names: Vec<String> = cases(stage)
+                .unwrap()
+                .into_iter()
+                .map(|(_, case)| case.name)
+                .collect();
             let distinct: std::collections::BTreeSet<&String> = names.iter().collect();
-            assert!(!names.is_empty() && distinct.len() == names.len(), "{stage}: {names:?}");
+            assert!(
+                !names.is_empty() && distinct.len() == names.len(),
+                "{stage}: {names:?}"
+            );
         }
     }
 
@@ -164,12 +199,29 @@ mod tests {
     fn a_case_that_panics_or_fails_is_a_row_that_failed() {
         let cases = [
             ("a", Case::new("panics", "", "", || panic!("index 3 of 2"))),
-            ("a", Case::new("errs", "", "", || Err(Error::value("size", "0")))),
-            ("b", Case::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m")))),
+            (
+                "a",
+                Case::new("errs", "", "", || Err(Error::value("size", "0"))),
+            ),
+            (
+                "b",
+                Case::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m"))),
+            ),
         ];
         let rows = run(&cases, |_, _| ());
-        assert_eq!(rows.iter().map(|row| row.outcome.passed).collect::<Vec<_>>(), [false, false, true]);
-        assert!(rows[0].outcome.measured.contains("index 3 of 2") && rows[1].outcome.measured.contains("size: 0"));
-        assert_eq!(table(&rows).rows[2][4..6], ["1 m".to_string(), "pass".to_string()]);
+        assert_eq!(
+            rows.iter()
+                .map(|row| row.outcome.passed)
+                .collect::<Vec<_>>(),
+            [false, false, true]
+        );
+        assert!(
+            rows[0].outcome.measured.contains("index 3 of 2")
+                && rows[1].outcome.measured.contains("size: 0")
+        );
+        assert_eq!(
+            table(&rows).rows[2][4..6],
+            ["1 m".to_string(), "pass".to_string()]
+        );
     }
 }

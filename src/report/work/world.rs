@@ -6,7 +6,10 @@ use crate::dataset::Setup;
 use crate::geom::{Pose, UnitQuaternion, Vector3};
 use crate::matte::MatteMethod;
 use crate::report::pile::lamp;
-use crate::scene::{AreaLight, CameraSource, Environment, Exposure, Grade, Object, Placement, Recipe, Scene, Surface};
+use crate::scene::{
+    AreaLight, CameraSource, Environment, Exposure, Grade, Object, Placement, Recipe, Scene,
+    Surface,
+};
 use crate::{Error, Film, Image, LinearRgb, PremulRgba, Result, io};
 use tempfile::TempDir;
 
@@ -57,7 +60,11 @@ impl World {
         io::write(folder.join(file_of(OPAQUE)), &cut_out(1.0))?;
         io::write(folder.join(file_of(FILM)), &cut_out(0.5).map(tinted))?;
         let assets = [SEE_THROUGH, OPAQUE, FILM].map(record).into();
-        Manifest { classes: vec!["none".into()], assets }.write(&folder)?;
+        Manifest {
+            classes: vec!["none".into()],
+            assets,
+        }
+        .write(&folder)?;
         Ok(())
     }
 
@@ -79,17 +86,35 @@ impl World {
     /// The recipe that names the folders.
     pub(super) fn setup(&self) -> Setup {
         let [assets, backgrounds] = ["assets", "photos"].map(|kind| self.folder.path().join(kind));
-        let scene = Recipe { image: IMAGE, ..Recipe::default() };
-        Setup { folder: self.folder.path().into(), assets, backgrounds, scene, ..Setup::default() }
+        let scene = Recipe {
+            image: IMAGE,
+            ..Recipe::default()
+        };
+        Setup {
+            folder: self.folder.path().into(),
+            assets,
+            backgrounds,
+            scene,
+            ..Setup::default()
+        }
     }
 
     /// A few see-through cards at rest over the photo, one on another, under a lamp and an even sky.
     pub(super) fn scene(&self) -> Scene {
-        let lamp = AreaLight { position: [0.3, 0.2, 1.0], size: [0.2; 2], power: 6.0, ..lamp(LinearRgb::WHITE) };
+        let lamp = AreaLight {
+            position: [0.3, 0.2, 1.0],
+            size: [0.2; 2],
+            power: 6.0,
+            ..lamp(LinearRgb::WHITE)
+        };
         Scene {
             image: IMAGE,
             plate: "tray".into(),
-            camera: CameraSource::Rectangle { corners_px: CORNERS, photo: IMAGE, focal_px: Some(FOCAL) },
+            camera: CameraSource::Rectangle {
+                corners_px: CORNERS,
+                photo: IMAGE,
+                focal_px: Some(FOCAL),
+            },
             surface: Surface::new(SURFACE),
             objects: (0..CARDS).map(|k| lying(SEE_THROUGH, k)).collect(),
             lights: vec![lamp],
@@ -103,7 +128,11 @@ impl World {
 
     /// The light of a picture of the surroundings.
     pub(super) fn environment(&self, strength: f64) -> Environment {
-        Environment { file: PANORAMA.into(), rotation_deg: 0.0, strength }
+        Environment {
+            file: PANORAMA.into(),
+            rotation_deg: 0.0,
+            strength,
+        }
     }
 }
 
@@ -127,16 +156,25 @@ fn lying(asset: &str, k: usize) -> Object {
 /// The same objects, still in the air.
 pub(super) fn dropped(mut scene: Scene) -> Scene {
     for object in &mut scene.objects {
-        let Placement::At(pose) = object.placement else { continue };
+        let Placement::At(pose) = object.placement else {
+            continue;
+        };
         let above = [pose.translation.x, pose.translation.y];
-        object.placement = Placement::Drop { above, height: pose.translation.z, rotation: pose.rotation };
+        object.placement = Placement::Drop {
+            above,
+            height: pose.translation.z,
+            rotation: pose.rotation,
+        };
     }
     scene
 }
 
 /// The same scene of another asset.
 pub(super) fn made_of(asset: &str, mut scene: Scene) -> Scene {
-    scene.objects.iter_mut().for_each(|object| object.asset = asset.into());
+    scene
+        .objects
+        .iter_mut()
+        .for_each(|object| object.asset = asset.into());
     scene
 }
 
@@ -165,13 +203,23 @@ fn record(asset: &str) -> AssetRecord {
         truncated: false,
         outline_px: vec![[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]],
     };
-    AssetRecord { name: asset.into(), class: "none".into(), thickness: 0.005, mass: 0.02, photos: vec![photo] }
+    AssetRecord {
+        name: asset.into(),
+        class: "none".into(),
+        thickness: 0.005,
+        mass: 0.02,
+        photos: vec![photo],
+    }
 }
 
 /// Stripes of one alpha.
 fn cut_out(alpha: f32) -> Image<PremulRgba> {
     Image::from_fn(TEXELS[0], TEXELS[1], |x, y| {
-        let stripe = if (x / 8 + y / 8).is_multiple_of(2) { 0.75 } else { 0.25 };
+        let stripe = if (x / 8 + y / 8).is_multiple_of(2) {
+            0.75
+        } else {
+            0.25
+        };
         PremulRgba::new(alpha * stripe, alpha * 0.5, alpha * (1.0 - stripe), alpha)
     })
 }

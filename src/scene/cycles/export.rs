@@ -1,6 +1,8 @@
 //! A shot as a folder for the reference renderer.
 
-use super::file::{Camera, Environment, File, Ground, Light, Picture, Quad, Render, Shape, Side, Size, Tray};
+use super::file::{
+    Camera, Environment, File, Ground, Light, Picture, Quad, Render, Shape, Side, Size, Tray,
+};
 use crate::asset::Texture;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, Vector3};
@@ -29,29 +31,52 @@ const FAR: f64 = 1000.0;
 pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<()> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
-    let plate = shot.plate.as_ref().map(|plate| picture(folder, "plate.exr", plate)).transpose()?;
+    let plate = shot
+        .plate
+        .as_ref()
+        .map(|plate| picture(folder, "plate.exr", plate))
+        .transpose()?;
     let file = File {
-        render: Render { width: shot.camera.image[0], height: shot.camera.image[1], samples: SAMPLES, max_bounces: 0 },
+        render: Render {
+            width: shot.camera.image[0],
+            height: shot.camera.image[1],
+            samples: SAMPLES,
+            max_bounces: 0,
+        },
         camera: camera(&shot.camera),
         tray: Tray { size },
         plate: plate.map(|path| Picture { path }),
-        quads: shot.cards.iter().map(|card| quad(folder, card)).collect::<Result<_>>()?,
-        lights: shot.lights.iter().map(|l| light(l, shot.exposure)).collect(),
+        quads: shot
+            .cards
+            .iter()
+            .map(|card| quad(folder, card))
+            .collect::<Result<_>>()?,
+        lights: shot
+            .lights
+            .iter()
+            .map(|l| light(l, shot.exposure))
+            .collect(),
         environment: Some(environment(folder, shot)?),
-        ground: Some(Ground { extent: shot.catcher.map(|side| side.min(FAR)) }),
+        ground: Some(Ground {
+            extent: shot.catcher.map(|side| side.min(FAR)),
+        }),
     };
     io::write_json(folder.join("scene.json"), &file)?;
     io::write_text(folder.join(SCRIPT), SCRIPT_TEXT)
 }
 
 fn picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result<String> {
-    let options = WriteOptions { bits: Some(Bits::Float), ..Default::default() };
+    let options = WriteOptions {
+        bits: Some(Bits::Float),
+        ..Default::default()
+    };
     io::write_with(folder.join(name), image, &options)?;
     Ok(name.into())
 }
 
 fn camera(camera: &crate::Camera) -> Camera {
-    let rows = |m: nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+    let rows =
+        |m: nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
     let pose = &camera.camera_from_world;
     Camera {
         K: rows(camera.intrinsics()),
@@ -64,14 +89,21 @@ fn camera(camera: &crate::Camera) -> Camera {
 fn quad(folder: &Path, card: &Card) -> Result<Quad> {
     let id = card.id.0;
     if !(1..=u32::from(u16::MAX)).contains(&id) {
-        return Err(Error::value("cards", format!("id {id}, expected 1 to {}", u16::MAX)));
+        return Err(Error::value(
+            "cards",
+            format!("id {id}, expected 1 to {}", u16::MAX),
+        ));
     }
     Ok(Quad {
         id,
         size: card.quad.size,
         pose: matrix(&card.quad.world_from_card),
         front: side(folder, &format!("card_{id}"), &card.texture)?,
-        back: card.back.as_ref().map(|back| side(folder, &format!("card_{id}_back"), back)).transpose()?,
+        back: card
+            .back
+            .as_ref()
+            .map(|back| side(folder, &format!("card_{id}_back"), back))
+            .transpose()?,
         hue_shift: card.grade.hue_deg,
         saturation: card.grade.saturation,
         value: card.grade.value,
@@ -85,12 +117,21 @@ fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
 
 fn side(folder: &Path, name: &str, texture: &Texture) -> Result<Side> {
     match texture {
-        Texture::Rgba(pyramid) => {
-            Ok(Side { texture: picture(folder, &format!("{name}.exr"), pyramid.base())?, film: None })
-        }
+        Texture::Rgba(pyramid) => Ok(Side {
+            texture: picture(folder, &format!("{name}.exr"), pyramid.base())?,
+            film: None,
+        }),
         Texture::Film(pyramid) => Ok(Side {
-            texture: picture(folder, &format!("{name}.exr"), &pyramid.base().map(|film| film.to_rgba()))?,
-            film: Some(picture(folder, &format!("{name}_opacity.exr"), &pyramid.base().map(|film| film.opacity))?),
+            texture: picture(
+                folder,
+                &format!("{name}.exr"),
+                &pyramid.base().map(|film| film.to_rgba()),
+            )?,
+            film: Some(picture(
+                folder,
+                &format!("{name}_opacity.exr"),
+                &pyramid.base().map(|film| film.opacity),
+            )?),
         }),
     }
 }
@@ -114,11 +155,28 @@ fn light(light: &AreaLight, exposure: f32) -> Light {
 
 /// One environment for the constant one and the picture.
 fn environment(folder: &Path, shot: &Shot) -> Result<Environment> {
-    let Some(EnvironmentMap { panorama, rotation, strength }) = &shot.environment else {
+    let Some(EnvironmentMap {
+        panorama,
+        rotation,
+        strength,
+    }) = &shot.environment
+    else {
         let color = Some(shot.ambient.scale(shot.exposure));
-        return Ok(Environment { color, path: None, strength: 1.0, rotation_z: 0.0 });
+        return Ok(Environment {
+            color,
+            path: None,
+            strength: 1.0,
+            rotation_z: 0.0,
+        });
     };
-    let both = panorama.image().map(|c: LinearRgb| (c.scale(*strength) + shot.ambient).scale(shot.exposure));
+    let both = panorama
+        .image()
+        .map(|c: LinearRgb| (c.scale(*strength) + shot.ambient).scale(shot.exposure));
     let path = Some(picture(folder, "environment.exr", &both)?);
-    Ok(Environment { color: None, path, strength: 1.0, rotation_z: rotation.to_degrees() })
+    Ok(Environment {
+        color: None,
+        path,
+        strength: 1.0,
+        rotation_z: rotation.to_degrees(),
+    })
 }

@@ -28,11 +28,22 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let mut shot = Shot::new(camera);
     if let Some(plate) = &file.plate {
         let photo: Image<PremulRgba> = io::read(files.find(&plate.path)?)?;
-        shot = shot.with_plate(Arc::new(averaged(&photo.map(PremulRgba::color), camera.image)));
+        shot = shot.with_plate(Arc::new(averaged(
+            &photo.map(PremulRgba::color),
+            camera.image,
+        )));
     }
-    shot.catcher = file.ground.map_or(file.tray.size.map(|side| CATCHER * side), |ground| ground.extent);
+    shot.catcher = file
+        .ground
+        .map_or(file.tray.size.map(|side| CATCHER * side), |ground| {
+            ground.extent
+        });
     shot.lights = file.lights.iter().map(light).collect();
-    shot.cards = file.quads.iter().map(|q| card(files, q)).collect::<Result<_>>()?;
+    shot.cards = file
+        .quads
+        .iter()
+        .map(|q| card(files, q))
+        .collect::<Result<_>>()?;
     if let Some(around) = &file.environment {
         shot.ambient = around.color.unwrap_or_default().scale(around.strength);
         shot.environment = map(files, around)?;
@@ -55,13 +66,19 @@ impl Files {
         let whole = std::path::absolute(scene).map_err(|e| Error::file(scene, e))?;
         let folder = whole.parent().unwrap_or(&whole);
         let root = folder.parent().unwrap_or(folder).to_path_buf();
-        Ok(Self { scene: scene.into(), own: folder.file_name().unwrap_or_default().into(), root })
+        Ok(Self {
+            scene: scene.into(),
+            own: folder.file_name().unwrap_or_default().into(),
+            root,
+        })
     }
 
     /// The picture of a name: at most one step up.
     fn find(&self, name: &str) -> Result<PathBuf> {
         let outside = || {
-            let what = format!("\"{name}\", expected a path below the scene's folder or the one that holds it");
+            let what = format!(
+                "\"{name}\", expected a path below the scene's folder or the one that holds it"
+            );
             Error::value("path", what).in_file(&self.scene)
         };
         let mut place = self.own.clone();
@@ -80,7 +97,9 @@ impl Files {
 fn camera(file: &File) -> Camera {
     let c = &file.camera;
     Camera {
-        image: c.resolution.unwrap_or([file.render.width, file.render.height]),
+        image: c
+            .resolution
+            .unwrap_or([file.render.width, file.render.height]),
         focal_px: Vector2::new(c.K[0][0], c.K[1][1]),
         principal_px: Point2::new(c.K[0][2], c.K[1][2]),
         camera_from_world: Pose::from_parts(Vector3::from(c.t).into(), rotation(c.R)),
@@ -115,33 +134,63 @@ fn card(files: &Files, q: &Quad) -> Result<Card> {
     Ok(Card {
         id: ObjectId(q.id),
         class: 0,
-        quad: crate::geom::Quad { world_from_card: Pose::from_parts(at.into(), rotation(axes)), size: q.size },
+        quad: crate::geom::Quad {
+            world_from_card: Pose::from_parts(at.into(), rotation(axes)),
+            size: q.size,
+        },
         texture: texture(files, &q.front)?,
-        back: q.back.as_ref().map(|back| texture(files, back)).transpose()?,
-        outline_uv: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from).into(),
-        grade: Grade { hue_deg: q.hue_shift, saturation: q.saturation, value: q.value },
+        back: q
+            .back
+            .as_ref()
+            .map(|back| texture(files, back))
+            .transpose()?,
+        outline_uv: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+            .map(Point2::from)
+            .into(),
+        grade: Grade {
+            hue_deg: q.hue_shift,
+            saturation: q.saturation,
+            value: q.value,
+        },
     })
 }
 
 fn texture(files: &Files, side: &Side) -> Result<Texture> {
     let color: Image<PremulRgba> = io::read(files.find(&side.texture)?)?;
-    let Some(film) = &side.film else { return Ok(color.into()) };
+    let Some(film) = &side.film else {
+        return Ok(color.into());
+    };
     let film = files.find(film)?;
     let opacity: Image<PremulRgba> = io::read(&film)?;
     if opacity.size() != color.size() {
-        let what = format!("{:?} pixels, but its colour has {:?}", opacity.size(), color.size());
+        let what = format!(
+            "{:?} pixels, but its colour has {:?}",
+            opacity.size(),
+            color.size()
+        );
         return Err(Error::file(film, what));
     }
-    Ok(color.zip_map(&opacity, |c, o| Film { color: c.color(), opacity: o.color() }).into())
+    Ok(color
+        .zip_map(&opacity, |c, o| Film {
+            color: c.color(),
+            opacity: o.color(),
+        })
+        .into())
 }
 
 fn map(files: &Files, around: &Environment) -> Result<Option<EnvironmentMap>> {
-    let Some(path) = &around.path else { return Ok(None) };
+    let Some(path) = &around.path else {
+        return Ok(None);
+    };
     let path = files.find(path)?;
     let photo: Image<PremulRgba> = io::read(&path)?;
     let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))?;
     let rotation = around.rotation_z.to_radians();
-    Ok(Some(EnvironmentMap { panorama: Arc::new(panorama), rotation, strength: around.strength }))
+    Ok(Some(EnvironmentMap {
+        panorama: Arc::new(panorama),
+        rotation,
+        strength: around.strength,
+    }))
 }
 
 /// Each pixel the mean over the part of the photo that it covers, whether that is more than one of its pixels or less.
@@ -150,11 +199,17 @@ fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<Linear
     if photo.size() == (width, height) {
         return photo.clone();
     }
-    let columns: Vec<_> = (0..width).map(|x| covered(x, width, photo.width())).collect();
-    let rows: Vec<_> = (0..height).map(|y| covered(y, height, photo.height())).collect();
+    let columns: Vec<_> = (0..width)
+        .map(|x| covered(x, width, photo.width()))
+        .collect();
+    let rows: Vec<_> = (0..height)
+        .map(|y| covered(y, height, photo.height()))
+        .collect();
     Image::from_fn(width, height, |x, y| {
         rows[y].iter().fold(LinearRgb::BLACK, |sum, &(j, v)| {
-            columns[x].iter().fold(sum, |sum, &(i, u)| sum.add_scaled(u * v, photo[(i, j)]))
+            columns[x]
+                .iter()
+                .fold(sum, |sum, &(i, u)| sum.add_scaled(u * v, photo[(i, j)]))
         })
     })
 }
@@ -164,7 +219,10 @@ fn covered(k: usize, n: usize, len: usize) -> Vec<(usize, f32)> {
     let scale = len as f64 / n as f64;
     let (start, end) = (k as f64 * scale, (k + 1) as f64 * scale);
     let share = |i: usize| (end.min((i + 1) as f64) - start.max(i as f64)) / scale;
-    (start as usize..len).map(|i| (i, share(i) as f32)).take_while(|&(_, share)| share > 0.0).collect()
+    (start as usize..len)
+        .map(|i| (i, share(i) as f32))
+        .take_while(|&(_, share)| share > 0.0)
+        .collect()
 }
 
 #[cfg(test)]
@@ -184,8 +242,19 @@ mod tests {
         }
         let files = Files::of(&at("set/case/scene.json")).unwrap();
         assert!(files.find("../textures/a.exr").is_ok() && files.find("b.exr").is_ok());
-        for outside in ["../../secret.exr", "../textures/../../secret.exr", "/etc/passwd"] {
-            assert!(files.find(outside).unwrap_err().to_string().contains("expected a path below"), "{outside}");
+        for outside in [
+            "../../secret.exr",
+            "../textures/../../secret.exr",
+            "/etc/passwd",
+        ] {
+            assert!(
+                files
+                    .find(outside)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("expected a path below"),
+                "{outside}"
+            );
         }
     }
 
@@ -199,15 +268,25 @@ mod tests {
                 UnitQuaternion::from_euler_angles(3.0, 0.2, 0.1),
             ),
         };
-        let film = Film::new(LinearRgb::new(0.1, 0.2, 0.0), LinearRgb::new(0.5, 0.25, 1.0));
+        let film = Film::new(
+            LinearRgb::new(0.1, 0.2, 0.0),
+            LinearRgb::new(0.5, 0.25, 1.0),
+        );
         let card = Card {
             id: ObjectId(4),
             class: 0,
-            quad: Quad { world_from_card: Pose::translation(0.1, 0.0, 0.05), size: [0.2, 0.1] },
+            quad: Quad {
+                world_from_card: Pose::translation(0.1, 0.0, 0.05),
+                size: [0.2, 0.1],
+            },
             texture: Image::filled(3, 2, PremulRgba::new(0.25, 0.125, 0.0, 0.5)).into(),
             back: Some(Image::filled(2, 2, film).into()),
             outline_uv: Arc::new([]),
-            grade: Grade { hue_deg: 10.0, saturation: 0.75, value: 1.5 },
+            grade: Grade {
+                hue_deg: 10.0,
+                saturation: 0.75,
+                value: 1.5,
+            },
         };
         let light = AreaLight {
             shape: LightShape::Ellipse,
@@ -217,8 +296,13 @@ mod tests {
             power: 5.0,
             color: LinearRgb::new(1.0, 0.5, 0.25),
         };
-        let mut shot = Shot::new(camera).with_card(card).with_light(light).with_ambient(LinearRgb::grey(0.5));
-        shot.plate = Some(Arc::new(Image::from_fn(8, 6, |x, y| LinearRgb::new(x as f32, y as f32, 0.5))));
+        let mut shot = Shot::new(camera)
+            .with_card(card)
+            .with_light(light)
+            .with_ambient(LinearRgb::grey(0.5));
+        shot.plate = Some(Arc::new(Image::from_fn(8, 6, |x, y| {
+            LinearRgb::new(x as f32, y as f32, 0.5)
+        })));
         shot.catcher = [1.0, 0.75];
         shot.exposure = 2.0;
         shot
@@ -231,22 +315,51 @@ mod tests {
         export(&shot, [0.4, 0.3], folder.path()).unwrap();
         assert!(folder.path().join(SCRIPT).exists());
         let back = import(folder.path().join("scene.json"), None).unwrap();
-        assert!((back.camera.camera_from_world.inverse() * shot.camera.camera_from_world).rotation.angle() < 1e-12);
-        assert_eq!((back.camera.image, back.catcher, back.exposure), (shot.camera.image, shot.catcher, 1.0));
+        assert!(
+            (back.camera.camera_from_world.inverse() * shot.camera.camera_from_world)
+                .rotation
+                .angle()
+                < 1e-12
+        );
+        assert_eq!(
+            (back.camera.image, back.catcher, back.exposure),
+            (shot.camera.image, shot.catcher, 1.0)
+        );
         assert_eq!((back.plate, back.ambient), (shot.plate, LinearRgb::WHITE));
-        assert_eq!(back.lights, [AreaLight { power: 10.0, ..shot.lights[0] }]);
+        assert_eq!(
+            back.lights,
+            [AreaLight {
+                power: 10.0,
+                ..shot.lights[0]
+            }]
+        );
         let (a, b) = (&back.cards[0], &shot.cards[0]);
         assert_eq!((a.id, a.quad.size, a.grade), (b.id, b.quad.size, b.grade));
         assert_eq!(a.texture.texel(2, 1), b.texture.texel(2, 1));
-        assert_eq!(a.back.as_ref().unwrap().texel(1, 1), b.back.as_ref().unwrap().texel(1, 1));
+        assert_eq!(
+            a.back.as_ref().unwrap().texel(1, 1),
+            b.back.as_ref().unwrap().texel(1, 1)
+        );
     }
 
     #[test]
     fn ambient_and_a_picture_become_one_environment() {
         let folder = tempfile::tempdir().unwrap();
         let panorama = Panorama::new(Image::filled(4, 2, LinearRgb::new(1.0, 2.0, 3.0))).unwrap();
-        let map = EnvironmentMap { panorama: Arc::new(panorama), rotation: 1.0, strength: 0.5 };
-        export(&Shot { environment: Some(map), ..shot() }, [0.4, 0.3], folder.path()).unwrap();
+        let map = EnvironmentMap {
+            panorama: Arc::new(panorama),
+            rotation: 1.0,
+            strength: 0.5,
+        };
+        export(
+            &Shot {
+                environment: Some(map),
+                ..shot()
+            },
+            [0.4, 0.3],
+            folder.path(),
+        )
+        .unwrap();
         let back = import(folder.path().join("scene.json"), None).unwrap();
         let map = back.environment.unwrap();
         assert_eq!(back.ambient, LinearRgb::BLACK);
@@ -258,9 +371,20 @@ mod tests {
     #[test]
     fn averaging_keeps_the_mean_and_the_places() {
         let photo = Image::from_fn(4, 1, |x, _| LinearRgb::grey(x as f32));
-        let values = |w| averaged(&photo, [w, 1]).pixels().iter().map(|c| c.r).collect::<Vec<_>>();
+        let values = |w| {
+            averaged(&photo, [w, 1])
+                .pixels()
+                .iter()
+                .map(|c| c.r)
+                .collect::<Vec<_>>()
+        };
         assert_eq!(values(2), [0.5, 2.5]);
         assert_eq!(values(8), [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
-        assert!(values(3).iter().zip([0.25, 1.5, 2.75]).all(|(v, w)| (v - w).abs() < 1e-6));
+        assert!(
+            values(3)
+                .iter()
+                .zip([0.25, 1.5, 2.75])
+                .all(|(v, w)| (v - w).abs() < 1e-6)
+        );
     }
 }

@@ -18,7 +18,9 @@ use crate::error::Result;
 use crate::geom::{Pose, Vector3};
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 use crate::work::{self, Kind};
-use rapier3d::prelude::{CoefficientCombineRule, ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::prelude::{
+    CoefficientCombineRule, ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+};
 use run::Pace;
 use units::{Units, vector};
 
@@ -86,7 +88,12 @@ pub(crate) fn typical_length(scene: &Scene) -> f64 {
 }
 
 fn median(scene: &Scene, of: impl Fn(&Object) -> f64) -> f64 {
-    let mut all: Vec<f64> = scene.objects.iter().filter(|object| is_dropped(object)).map(of).collect();
+    let mut all: Vec<f64> = scene
+        .objects
+        .iter()
+        .filter(|object| is_dropped(object))
+        .map(of)
+        .collect();
     all.sort_by(f64::total_cmp);
     all[all.len() / 2]
 }
@@ -113,25 +120,42 @@ impl Drop<'_> {
         self.check_pace(members, &units, &pace)?;
         let mut world = self.empty_world(pace.step);
         self.enclose(&mut world, &units, members);
-        for object in self.scene.objects.iter().filter(|object| !is_dropped(object)) {
+        for object in self
+            .scene
+            .objects
+            .iter()
+            .filter(|object| !is_dropped(object))
+        {
             self.add(&mut world, object, 0.0, &units);
         }
-        let add = |&i: &usize| self.add(&mut world, &self.scene.objects[i], self.heights[i], &units);
+        let add =
+            |&i: &usize| self.add(&mut world, &self.scene.objects[i], self.heights[i], &units);
         let bodies: Vec<RigidBodyHandle> = members.iter().map(add).collect();
         let ids: Vec<usize> = members.iter().map(|i| i + 1).collect();
-        run::Run { world, bodies, ids, units, pace, effort: self.effort(), allowance: self.allowance }.until_rest()
+        run::Run {
+            world,
+            bodies,
+            ids,
+            units,
+            pace,
+            effort: self.effort(),
+            allowance: self.allowance,
+        }
+        .until_rest()
     }
 
     /// Work of a step for each object and pair: iterations, as often as a step may be cut at what is in the way.
     fn effort(&self) -> u64 {
-        u64::from(self.options.iterations.div_ceil(USUAL_ITERATIONS)) * u64::from(self.options.ccd.clamp(1, MOST_CUTS))
+        u64::from(self.options.iterations.div_ceil(USUAL_ITERATIONS))
+            * u64::from(self.options.ccd.clamp(1, MOST_CUTS))
     }
 
     /// Refuses at once what would take more work than is left even if it rested where it lands.
     fn check_pace(&self, members: &[usize], units: &Units, pace: &Pace) -> Result<()> {
         let highest = members.iter().map(|&i| self.heights[i]).fold(0.0, f64::max) * units.length;
         let steps = (highest / FASTEST).min(pace.time_limit) / pace.step * LANDING;
-        self.allowance.check(steps * members.len() as f64 * self.effort() as f64)
+        self.allowance
+            .check(steps * members.len() as f64 * self.effort() as f64)
     }
 
     fn empty_world(&self, step: f64) -> PhysicsWorld {
@@ -161,7 +185,11 @@ impl Drop<'_> {
 
     /// Floor and four walls, which reach above the highest start. The walls are smooth: what nobody sees holds nothing up.
     fn enclose(&self, world: &mut PhysicsWorld, units: &Units, members: &[usize]) {
-        let [x, y] = self.scene.surface.size.map(|length| length * units.length / 2.0);
+        let [x, y] = self
+            .scene
+            .surface
+            .size
+            .map(|length| length * units.length / 2.0);
         let top = |&i: &usize| self.heights[i] + self.scene.objects[i].size.iter().sum::<f64>();
         let middle = members.iter().map(top).fold(0.0, f64::max) * units.length / 2.0;
         let (wide, high) = (x.max(y) + 2.0 * WALL, middle + WALL);
@@ -175,21 +203,42 @@ impl Drop<'_> {
         for (center, half) in slabs {
             let [hx, hy, hz] = half.map(|length| length as f32);
             let slab = ColliderBuilder::cuboid(hx, hy, hz).translation(vector(&center.into()));
-            let friction = if center[2] < 0.0 { self.scene.surface.friction } else { 0.0 };
+            let friction = if center[2] < 0.0 {
+                self.scene.surface.friction
+            } else {
+                0.0
+            };
             let slab = self.touching(slab).friction(friction as f32);
-            world.insert_collider(slab.friction_combine_rule(CoefficientCombineRule::Min), None);
+            world.insert_collider(
+                slab.friction_combine_rule(CoefficientCombineRule::Min),
+                None,
+            );
         }
     }
 
-    fn add(&self, world: &mut PhysicsWorld, object: &Object, height: f64, units: &Units) -> RigidBodyHandle {
+    fn add(
+        &self,
+        world: &mut PhysicsWorld,
+        object: &Object,
+        height: f64,
+        units: &Units,
+    ) -> RigidBodyHandle {
         let (body, pose) = match object.placement {
             Placement::At(pose) => (RigidBodyBuilder::fixed(), pose),
-            Placement::Drop { above: [x, y], rotation, .. } => {
-                (RigidBodyBuilder::dynamic(), Pose::from_parts([x, y, height].into(), rotation))
-            }
+            Placement::Drop {
+                above: [x, y],
+                rotation,
+                ..
+            } => (
+                RigidBodyBuilder::dynamic(),
+                Pose::from_parts([x, y, height].into(), rotation),
+            ),
         };
         // Damping: without it one fall in 30 rocks for ever.
-        let body = body.pose(units.to_world(&pose)).linear_damping(0.1).angular_damping(0.5);
+        let body = body
+            .pose(units.to_world(&pose))
+            .linear_damping(0.1)
+            .angular_damping(0.5);
         let body = world.insert_body(body);
         let mass = (object.mass * units.mass).clamp(MASS / MASS_SPREAD, MASS * MASS_SPREAD);
         let half = self.options.half_body(object) * units.length;
@@ -197,12 +246,17 @@ impl Drop<'_> {
             world.insert_collider(self.touching(part), Some(body));
         }
         // Asleep below 1 cm/s: at the default some bodies creep and never sleep.
-        world.bodies[body].activation_mut().normalized_linear_threshold = 0.2;
+        world.bodies[body]
+            .activation_mut()
+            .normalized_linear_threshold = 0.2;
         body
     }
 
     fn touching(&self, collider: ColliderBuilder) -> ColliderBuilder {
         let surface = &self.scene.surface;
-        collider.friction(surface.friction as f32).restitution(surface.restitution as f32).contact_skin(SKIN)
+        collider
+            .friction(surface.friction as f32)
+            .restitution(surface.restitution as f32)
+            .contact_skin(SKIN)
     }
 }

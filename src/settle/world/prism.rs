@@ -9,16 +9,33 @@ use rapier3d::prelude::{ColliderBuilder, Vector};
 /// # Method
 /// The engine makes contacts with four corners of a face and not more, so a plate with more corners would rest on
 /// a part of itself. A prism is therefore cut across into prisms of four corners, which move as one body.
-pub(super) fn colliders(object: &Object, half: &Vector3<f64>, length: f64, mass: f64) -> Vec<ColliderBuilder> {
-    let ring: Vec<[f64; 2]> = object.outline.iter().map(|corner| corner.map(|x| x * length)).collect();
-    let parts: Option<Vec<ColliderBuilder>> = quarters(&ring).iter().map(|part| plate(part, half.z)).collect();
+pub(super) fn colliders(
+    object: &Object,
+    half: &Vector3<f64>,
+    length: f64,
+    mass: f64,
+) -> Vec<ColliderBuilder> {
+    let ring: Vec<[f64; 2]> = object
+        .outline
+        .iter()
+        .map(|corner| corner.map(|x| x * length))
+        .collect();
+    let parts: Option<Vec<ColliderBuilder>> = quarters(&ring)
+        .iter()
+        .map(|part| plate(part, half.z))
+        .collect();
     let area = area(&ring);
     match parts {
         Some(parts) if area > 0.0 => {
             let density = mass / (area * 2.0 * half.z);
-            parts.into_iter().map(|part| part.density(density as f32)).collect()
+            parts
+                .into_iter()
+                .map(|part| part.density(density as f32))
+                .collect()
         }
-        _ => vec![ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32).mass(mass as f32)],
+        _ => vec![
+            ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32).mass(mass as f32),
+        ],
     }
 }
 
@@ -36,12 +53,19 @@ fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
 
 fn area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
-    ring.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>() / 2.0
+    ring.iter()
+        .zip(next)
+        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
+        .sum::<f64>()
+        / 2.0
 }
 
 /// A plate of this outline; none where the engine finds it too thin a shape.
 fn plate(ring: &[[f64; 2]], half: f64) -> Option<ColliderBuilder> {
-    let at = |z: f64| ring.iter().map(move |&[x, y]| Vector::new(x as f32, y as f32, z as f32));
+    let at = |z: f64| {
+        ring.iter()
+            .map(move |&[x, y]| Vector::new(x as f32, y as f32, z as f32))
+    };
     let corners: Vec<Vector> = at(half).chain(at(-half)).collect();
     ColliderBuilder::convex_hull(&corners)
 }
@@ -52,14 +76,21 @@ mod tests {
 
     fn circle(n: usize) -> Vec<[f64; 2]> {
         let angle = |i: usize| std::f64::consts::TAU * i as f64 / n as f64;
-        (0..n).map(|i| [0.1 * libm::cos(angle(i)), 0.1 * libm::sin(angle(i))]).collect()
+        (0..n)
+            .map(|i| [0.1 * libm::cos(angle(i)), 0.1 * libm::sin(angle(i))])
+            .collect()
     }
 
     #[test]
     fn a_cut_ring_keeps_its_area_in_parts_of_four_corners() {
         for n in 3..=9 {
             let parts = quarters(&circle(n));
-            assert!(parts.iter().all(|part| (3..=4).contains(&part.len()) && area(part) > 0.0), "{n}: {parts:?}");
+            assert!(
+                parts
+                    .iter()
+                    .all(|part| (3..=4).contains(&part.len()) && area(part) > 0.0),
+                "{n}: {parts:?}"
+            );
             let sum: f64 = parts.iter().map(|part| area(part)).sum();
             assert!((sum - area(&circle(n))).abs() < 1e-15, "{n}");
         }

@@ -48,9 +48,14 @@ pub(super) struct Pace {
 impl Run<'_> {
     /// Steps until everything rests or the time is over.
     pub(super) fn until_rest(mut self) -> Result<Fall> {
-        let Pace { step: dt, time_limit, .. } = self.pace;
+        let Pace {
+            step: dt,
+            time_limit,
+            ..
+        } = self.pace;
         let steps = (time_limit / dt).ceil() as usize;
-        let (mut stillness, mut energy, mut fall) = (Stillness::default(), Energy::of(&self), Fall::default());
+        let (mut stillness, mut energy, mut fall) =
+            (Stillness::default(), Energy::of(&self), Fall::default());
         fall.swept = [[f64::INFINITY, -f64::INFINITY]; 2];
         self.sample(&mut fall, 0);
         for step in 1..=steps {
@@ -70,12 +75,23 @@ impl Run<'_> {
             }
         }
         fall.energy_rise = energy.rise();
-        fall.poses = self.moving().map(|body| self.units.to_scene(body.position())).collect();
+        fall.poses = self
+            .moving()
+            .map(|body| self.units.to_scene(body.position()))
+            .collect();
         Ok(fall)
     }
 
     fn work_of_step(&self) -> u64 {
-        (self.bodies.len() + self.world.narrow_phase.contact_graph().raw_graph().raw_edges().len()) as u64 * self.effort
+        (self.bodies.len()
+            + self
+                .world
+                .narrow_phase
+                .contact_graph()
+                .raw_graph()
+                .raw_edges()
+                .len()) as u64
+            * self.effort
     }
 
     fn moving(&self) -> impl Iterator<Item = &RigidBody> {
@@ -83,14 +99,19 @@ impl Run<'_> {
     }
 
     fn trembling_energy(&self) -> f64 {
-        self.moving().map(|body| f64::from(body.mass()) * SLOW * SLOW / 2.0).sum()
+        self.moving()
+            .map(|body| f64::from(body.mass()) * SLOW * SLOW / 2.0)
+            .sum()
     }
 
     fn sweep(&self, swept: &mut [[f64; 2]; 2]) {
         for collider in self.moving().flat_map(|body| body.colliders()) {
             let around = self.world.colliders[*collider].compute_aabb();
             let (least, most) = (around.mins, around.maxs);
-            for (axis, [low, high]) in [[least.x, most.x], [least.y, most.y]].into_iter().enumerate() {
+            for (axis, [low, high]) in [[least.x, most.x], [least.y, most.y]]
+                .into_iter()
+                .enumerate()
+            {
                 let [l, h] = &mut swept[axis];
                 *l = l.min(f64::from(low) / self.units.length);
                 *h = h.max(f64::from(high) / self.units.length);
@@ -99,30 +120,43 @@ impl Run<'_> {
     }
 
     fn sample(&self, fall: &mut Fall, step: usize) {
-        let Pace { step: dt, sample_every, .. } = self.pace;
+        let Pace {
+            step: dt,
+            sample_every,
+            ..
+        } = self.pace;
         if sample_every == 0 || !step.is_multiple_of(sample_every) {
             return;
         }
         let seconds = step as f64 * dt / self.units.time;
         let (per_length, per_time) = (1.0 / self.units.length, self.units.time);
-        fall.samples.extend(self.ids.iter().zip(self.moving()).map(|(&object, body)| Sample {
-            seconds,
-            object,
-            pose: self.units.to_scene(body.position()),
-            speed: f64::from(body.linvel().length()) * per_length * per_time,
-            spin: f64::from(body.angvel().length()) * per_time,
-            kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
-            potential: potential(body, &self.world) / self.units.energy(),
-        }));
+        fall.samples.extend(
+            self.ids
+                .iter()
+                .zip(self.moving())
+                .map(|(&object, body)| Sample {
+                    seconds,
+                    object,
+                    pose: self.units.to_scene(body.position()),
+                    speed: f64::from(body.linvel().length()) * per_length * per_time,
+                    spin: f64::from(body.angvel().length()) * per_time,
+                    kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
+                    potential: potential(body, &self.world) / self.units.energy(),
+                }),
+        );
     }
 }
 
 /// `-m g . x` of the centre of mass, joules in the world.
 fn potential(body: &RigidBody, world: &PhysicsWorld) -> f64 {
-    let center = body.mass_properties().local_mprops.world_com(body.position());
+    let center = body
+        .mass_properties()
+        .local_mprops
+        .world_com(body.position());
     let product = |a: f32, b: f32| f64::from(a) * f64::from(b);
     let g = world.gravity;
-    -f64::from(body.mass()) * (product(g.x, center.x) + product(g.y, center.y) + product(g.z, center.z))
+    -f64::from(body.mass())
+        * (product(g.x, center.x) + product(g.y, center.y) + product(g.z, center.z))
 }
 
 /// The energy of a fall.
@@ -138,13 +172,25 @@ impl Energy {
     fn of(run: &Run) -> Self {
         let start = run.moving().map(|body| potential(body, &run.world)).sum();
         let weight = run.moving().count() as f64 * MASS * super::GRAVITY;
-        Self { start, last: start, most_rise: 0.0, least: weight * LEAST_DROP }
+        Self {
+            start,
+            last: start,
+            most_rise: 0.0,
+            least: weight * LEAST_DROP,
+        }
     }
 
     /// Looks at the energy after a step; returns the kinetic one, joules in the world.
     fn follow(&mut self, run: &Run) -> f64 {
-        let kinetic = run.moving().map(|body| f64::from(body.kinetic_energy())).sum::<f64>();
-        let now = kinetic + run.moving().map(|body| potential(body, &run.world)).sum::<f64>();
+        let kinetic = run
+            .moving()
+            .map(|body| f64::from(body.kinetic_energy()))
+            .sum::<f64>();
+        let now = kinetic
+            + run
+                .moving()
+                .map(|body| potential(body, &run.world))
+                .sum::<f64>();
         self.most_rise = self.most_rise.max(now - self.last);
         self.last = now;
         kinetic
@@ -168,7 +214,10 @@ impl Stillness {
     fn lasts(&mut self, run: &Run, now: f64) -> bool {
         let poses = || run.moving().map(|body| *body.position());
         let known = self.poses.len() == run.bodies.len();
-        let still = known && poses().zip(&self.poses).all(|(a, b)| moved(&a, b) < TREMBLE);
+        let still = known
+            && poses()
+                .zip(&self.poses)
+                .all(|(a, b)| moved(&a, b) < TREMBLE);
         if !still {
             (self.poses, self.since) = (poses().collect(), now);
         }
@@ -179,6 +228,8 @@ impl Stillness {
 /// How far the end of a card has moved, at most: its middle, and half a card times the angle (twice the difference of
 /// the quaternions).
 fn moved(a: &RapierPose, b: &RapierPose) -> f32 {
-    let turned = (a.rotation - b.rotation).length().min((a.rotation + b.rotation).length());
+    let turned = (a.rotation - b.rotation)
+        .length()
+        .min((a.rotation + b.rotation).length());
     (a.translation - b.translation).length() + CARD as f32 * turned
 }

@@ -20,7 +20,11 @@ impl Units {
         let gravity = Vector3::from(options.gravity).norm();
         // g = length / time^2.
         let time = (length * gravity / GRAVITY).sqrt();
-        Self { length, mass: MASS / median(scene, |object| object.mass), time }
+        Self {
+            length,
+            mass: MASS / median(scene, |object| object.mass),
+            time,
+        }
     }
 
     pub(super) fn energy(&self) -> f64 {
@@ -30,14 +34,26 @@ impl Units {
     pub(super) fn to_world(&self, pose: &Pose) -> RapierPose {
         let q = pose.rotation;
         let rotation = Rotation::from_xyzw(q.i as f32, q.j as f32, q.k as f32, q.w as f32);
-        RapierPose::from_parts(vector(&(pose.translation.vector * self.length)), rotation.normalize())
+        RapierPose::from_parts(
+            vector(&(pose.translation.vector * self.length)),
+            rotation.normalize(),
+        )
     }
 
     pub(super) fn to_scene(&self, pose: &RapierPose) -> Pose {
         let (t, q) = (pose.translation, pose.rotation);
-        let translation = Vector3::new(f64::from(t.x), f64::from(t.y), f64::from(t.z)) / self.length;
-        let rotation = Quaternion::new(f64::from(q.w), f64::from(q.x), f64::from(q.y), f64::from(q.z));
-        Pose::from_parts(translation.into(), UnitQuaternion::from_quaternion(rotation))
+        let translation =
+            Vector3::new(f64::from(t.x), f64::from(t.y), f64::from(t.z)) / self.length;
+        let rotation = Quaternion::new(
+            f64::from(q.w),
+            f64::from(q.x),
+            f64::from(q.y),
+            f64::from(q.z),
+        );
+        Pose::from_parts(
+            translation.into(),
+            UnitQuaternion::from_quaternion(rotation),
+        )
     }
 }
 

@@ -32,7 +32,14 @@ impl KitOptions {
     /// The paper's numbers for two datasets.
     pub fn new(real: impl Into<PathBuf>, synthetic: impl Into<PathBuf>) -> Self {
         let (real, synthetic) = (real.into(), synthetic.into());
-        Self { real, synthetic, balance: Balance::default(), seeds: 6, epochs: 300, batch: 32 }
+        Self {
+            real,
+            synthetic,
+            balance: Balance::default(),
+            seeds: 6,
+            epochs: 300,
+            batch: 32,
+        }
     }
 }
 
@@ -45,15 +52,31 @@ struct Variant {
 
 /// Concatenation comes in the paper's two forms; `combined` is trained by `balanced.py`.
 const VARIANTS: [Variant; 5] = [
-    Variant { name: "real", train: &["real_train"], val: &["real_val"] },
-    Variant { name: "synthetic", train: &["synthetic_train"], val: &["synthetic_val"] },
-    Variant { name: "concatenated", train: &["real_train", "synthetic_train"], val: &["real_val"] },
+    Variant {
+        name: "real",
+        train: &["real_train"],
+        val: &["real_val"],
+    },
+    Variant {
+        name: "synthetic",
+        train: &["synthetic_train"],
+        val: &["synthetic_val"],
+    },
+    Variant {
+        name: "concatenated",
+        train: &["real_train", "synthetic_train"],
+        val: &["real_val"],
+    },
     Variant {
         name: "concatenated_val_both",
         train: &["real_train", "synthetic_train"],
         val: &["real_val", "synthetic_val"],
     },
-    Variant { name: "combined", train: &["real_train", "synthetic_train"], val: &["real_val"] },
+    Variant {
+        name: "combined",
+        train: &["real_train", "synthetic_train"],
+        val: &["real_val"],
+    },
 ];
 
 /// Writes the kit: lists of images, one `VARIANT.yaml` each, `hyp.yaml`, `balance.json`, `balanced.py`, `commands.sh`.
@@ -84,11 +107,17 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
         ("synthetic_train", &synthetic.train),
         ("synthetic_val", &synthetic.val),
     ] {
-        let lines: String = images.iter().map(|path| format!("{}\n", path.display())).collect();
+        let lines: String = images
+            .iter()
+            .map(|path| format!("{}\n", path.display()))
+            .collect();
         io::write_text(folder.join(format!("{name}.txt")), &lines)?;
     }
     for variant in &VARIANTS {
-        io::write_text(folder.join(format!("{}.yaml", variant.name)), &variant.yaml(&real.classes))?;
+        io::write_text(
+            folder.join(format!("{}.yaml", variant.name)),
+            &variant.yaml(&real.classes),
+        )?;
     }
     let balance = serde_json::json!({
         "alpha": options.balance.alpha, "normalize": options.balance.normalize,
@@ -107,10 +136,17 @@ fn opened(folder: &Path) -> Result<YoloSet> {
 
 impl Variant {
     fn yaml(&self, classes: &[String]) -> String {
-        let list = |names: &[&str]| names.iter().map(|name| format!("  - {name}.txt\n")).collect::<String>();
+        let list = |names: &[&str]| {
+            names
+                .iter()
+                .map(|name| format!("  - {name}.txt\n"))
+                .collect::<String>()
+        };
         // A JSON string is a YAML string, whatever is in it.
-        let names =
-            classes.iter().enumerate().map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())));
+        let names = classes
+            .iter()
+            .enumerate()
+            .map(|(i, name)| format!("  {i}: {}\n", serde_json::Value::from(name.as_str())));
         let names: String = names.collect();
         format!(
             "# `path` is this folder; start the training in it.\npath: .\ntrain:\n{}val:\n{}nc: {}\nnames:\n{names}",
@@ -123,7 +159,12 @@ impl Variant {
 
 /// The commands of all trainings, with equally many updates for the single sources told in words.
 fn commands(options: &KitOptions, [real, synthetic]: [u64; 2]) -> String {
-    let KitOptions { seeds, epochs, batch, .. } = options;
+    let KitOptions {
+        seeds,
+        epochs,
+        batch,
+        ..
+    } = options;
     let combined = Updates::of(real + synthetic, *batch, *epochs);
     let equal = |images| combined.epochs_of(batches_per_epoch(images, *batch));
     let mut text = format!(
@@ -165,32 +206,60 @@ mod tests {
                 io::write(path, &Image::filled(16, 16, LinearRgb::WHITE)).unwrap();
             }
         }
-        io::write_text(folder.join("data.yaml"), &format!("train: images/train\nval: images/val\nnames: {names}\n"))
-            .unwrap();
+        io::write_text(
+            folder.join("data.yaml"),
+            &format!("train: images/train\nval: images/val\nnames: {names}\n"),
+        )
+        .unwrap();
         folder
     }
 
     #[test]
     fn a_kit_has_every_variant_list_and_seed() {
         let root = tempfile::tempdir().unwrap();
-        let [real, synthetic] = [("real", 2), ("made", 6)].map(|(name, n)| dataset(root.path(), name, n, "[cap]"));
+        let [real, synthetic] =
+            [("real", 2), ("made", 6)].map(|(name, n)| dataset(root.path(), name, n, "[cap]"));
         let kit = root.path().join("kit");
         write(&kit, &KitOptions::new(real, synthetic)).unwrap();
         for variant in &VARIANTS {
             let text = io::read_text(kit.join(format!("{}.yaml", variant.name))).unwrap();
-            variant.train.iter().for_each(|list| assert!(text.contains(&format!("  - {list}.txt")), "{text}"));
+            variant
+                .train
+                .iter()
+                .for_each(|list| assert!(text.contains(&format!("  - {list}.txt")), "{text}"));
         }
-        assert_eq!(io::read_text(kit.join("synthetic_train.txt")).unwrap().lines().count(), 6);
+        assert_eq!(
+            io::read_text(kit.join("synthetic_train.txt"))
+                .unwrap()
+                .lines()
+                .count(),
+            6
+        );
         let balance: serde_json::Value = io::read_json(kit.join("balance.json")).unwrap();
-        assert_eq!(balance["weights"], serde_json::json!({ "real": 1.0, "synthetic": 8.0 / 12.0 * 0.5 }));
+        assert_eq!(
+            balance["weights"],
+            serde_json::json!({ "real": 1.0, "synthetic": 8.0 / 12.0 * 0.5 })
+        );
         let commands = io::read_text(kit.join("commands.sh")).unwrap();
         assert!(commands.contains("seq 1 6") && commands.contains("--cos-lr"));
     }
 
     #[test]
     fn the_papers_settings_are_in_the_hyperparameters() {
-        for line in ["lr0: 0.01", "lrf: 0.2", "momentum: 0.937", "warmup_epochs: 3.0", "mosaic: 1.0", "fliplr: 0.5"] {
-            assert!(HYP_YAML.lines().any(|l| l.split('#').next().unwrap_or_default().trim() == line), "{line}");
+        for line in [
+            "lr0: 0.01",
+            "lrf: 0.2",
+            "momentum: 0.937",
+            "warmup_epochs: 3.0",
+            "mosaic: 1.0",
+            "fliplr: 0.5",
+        ] {
+            assert!(
+                HYP_YAML
+                    .lines()
+                    .any(|l| l.split('#').next().unwrap_or_default().trim() == line),
+                "{line}"
+            );
         }
     }
 
@@ -199,7 +268,12 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let real = dataset(root.path(), "real", 2, "[cap]");
         let made = dataset(root.path(), "made", 2, "[cap, label]");
-        let said = write(&root.path().join("kit"), &KitOptions::new(real, made)).unwrap_err().to_string();
-        assert!(said.starts_with("classes: [\"cap\", \"label\"] in "), "{said}");
+        let said = write(&root.path().join("kit"), &KitOptions::new(real, made))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            said.starts_with("classes: [\"cap\", \"label\"] in "),
+            "{said}"
+        );
     }
 }

@@ -17,7 +17,9 @@ fn main() -> std::process::ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     // `cargo bench` runs every bench with a word that is no number: nothing to do.
-    let Some(times) = words.first().and_then(|word| word.parse().ok()) else { return std::process::ExitCode::SUCCESS };
+    let Some(times) = words.first().and_then(|word| word.parse().ok()) else {
+        return std::process::ExitCode::SUCCESS;
+    };
     let done = match words[1..] {
         ["key", photo, screen] => key(times, photo, screen),
         ["film", photo, mask] => film(times, photo, mask),
@@ -27,7 +29,10 @@ fn main() -> std::process::ExitCode {
         ["convert", from, to] => convert(times, from, to),
         ["settle", ref scenes @ ..] => fall(times, scenes),
         ["eval", found, truth] => evaluate(times, found, truth),
-        _ => Err(petcomp::Error::value("work", format!("{:?} is none that is known", &words[1..]))),
+        _ => Err(petcomp::Error::value(
+            "work",
+            format!("{:?} is none that is known", &words[1..]),
+        )),
     };
     match done {
         Ok(()) => std::process::ExitCode::SUCCESS,
@@ -40,9 +45,21 @@ fn main() -> std::process::ExitCode {
 
 fn key(times: usize, photo: &str, screen: &str) -> Result<()> {
     let photo: Image<PremulRgba> = io::read(photo)?;
-    let channel = |k: usize| screen.split(',').nth(k).and_then(|number| number.parse().ok()).unwrap_or(0.0);
-    let job = Keying::new(&photo, Screen::Color(LinearRgb::new(channel(0), channel(1), channel(2))));
-    (0..times).try_for_each(|_| job.run(&Default::default()).map(|keyed| drop(black_box(keyed))))
+    let channel = |k: usize| {
+        screen
+            .split(',')
+            .nth(k)
+            .and_then(|number| number.parse().ok())
+            .unwrap_or(0.0)
+    };
+    let job = Keying::new(
+        &photo,
+        Screen::Color(LinearRgb::new(channel(0), channel(1), channel(2))),
+    );
+    (0..times).try_for_each(|_| {
+        job.run(&Default::default())
+            .map(|keyed| drop(black_box(keyed)))
+    })
 }
 
 /// Film inside a given mask; the screen is fitted around it.
@@ -55,7 +72,12 @@ fn film(times: usize, photo: &str, mask: &str) -> Result<()> {
 /// Film of an object that is searched for.
 fn cut(times: usize, photo: &str) -> Result<()> {
     let photo: Image<LinearRgb> = io::read(photo)?;
-    (0..times).try_for_each(|_| film_within(&photo, &matte::segment(&photo, &SegmentOptions::default())?.tight))
+    (0..times).try_for_each(|_| {
+        film_within(
+            &photo,
+            &matte::segment(&photo, &SegmentOptions::default())?.tight,
+        )
+    })
 }
 
 fn film_within(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<()> {
@@ -65,9 +87,14 @@ fn film_within(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<()> {
 }
 
 fn solve(times: usize, labels: &[&str]) -> Result<()> {
-    let labels = labels.iter().map(|path| camera::read_label(Path::new(path))).collect::<Result<Vec<_>>>()?;
+    let labels = labels
+        .iter()
+        .map(|path| camera::read_label(Path::new(path)))
+        .collect::<Result<Vec<_>>>()?;
     (0..times).for_each(|_| {
-        labels.iter().for_each(|label| drop(black_box(camera::solve(label, &SolveOptions::default()))));
+        labels
+            .iter()
+            .for_each(|label| drop(black_box(camera::solve(label, &SolveOptions::default()))));
     });
     Ok(())
 }
@@ -75,10 +102,18 @@ fn solve(times: usize, labels: &[&str]) -> Result<()> {
 /// The pyramid counts: it is made anew for every photo.
 fn rectify(times: usize, photo: &str, label: &str, px_per_metre: &str) -> Result<()> {
     let photo: Image<LinearRgb> = io::read(photo)?;
-    let seen = camera::solve(&camera::read_label(Path::new(label))?, &SolveOptions::default())?;
+    let seen = camera::solve(
+        &camera::read_label(Path::new(label))?,
+        &SolveOptions::default(),
+    )?;
     let px_per_metre = px_per_metre.parse().unwrap_or(seen.fit.px_per_metre);
     (0..times).try_for_each(|_| {
-        let map = camera::rectify(&Pyramid::new(photo.clone()), &seen.camera, seen.size, px_per_metre)?;
+        let map = camera::rectify(
+            &Pyramid::new(photo.clone()),
+            &seen.camera,
+            seen.size,
+            px_per_metre,
+        )?;
         black_box(map);
         Ok(())
     })
@@ -87,12 +122,18 @@ fn rectify(times: usize, photo: &str, label: &str, px_per_metre: &str) -> Result
 /// Scene-linear floats in between; PNG gets 16 bits and EXR the half floats that are their default.
 fn convert(times: usize, from: &str, to: &str) -> Result<()> {
     let bits = to.ends_with(".png").then_some(Bits::Sixteen);
-    let options = WriteOptions { bits, ..Default::default() };
+    let options = WriteOptions {
+        bits,
+        ..Default::default()
+    };
     (0..times).try_for_each(|_| io::write_with(to, &io::read::<LinearRgb>(from)?, &options))
 }
 
 fn fall(times: usize, scenes: &[&str]) -> Result<()> {
-    let scenes = scenes.iter().map(io::read_document).collect::<Result<Vec<petcomp::Scene>>>()?;
+    let scenes = scenes
+        .iter()
+        .map(io::read_document)
+        .collect::<Result<Vec<petcomp::Scene>>>()?;
     (0..times).try_for_each(|_| {
         scenes.iter().try_for_each(|scene| {
             black_box(settle(scene.clone(), &Default::default())?);

@@ -3,7 +3,8 @@
 use crate::common::{Common, RecipeArgs, interruption};
 use crate::print;
 use petcomp::dataset::{
-    self, LongRun, Numbers, Obstructed, Plan, Progress, Report, Setup, ShardChoice, Studio, contact_sheet_of,
+    self, LongRun, Numbers, Obstructed, Plan, Progress, Report, Setup, ShardChoice, Studio,
+    contact_sheet_of,
 };
 use petcomp::{Error, Quality, io};
 use std::path::{Path, PathBuf};
@@ -90,7 +91,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if args.preview.is_some() {
         setup = setup.preview();
     }
-    let count = args.count.or(args.preview).unwrap_or_else(|| args.only.map_or(0, |k| k.saturating_add(1)));
+    let count = args
+        .count
+        .or(args.preview)
+        .unwrap_or_else(|| args.only.map_or(0, |k| k.saturating_add(1)));
     let count = args.preview.map_or(count, |first| first.min(count));
     let numbers = numbers(args)?;
     let folder = match numbers {
@@ -99,25 +103,38 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     };
     if args.resume {
         let (good, bad) = dataset::mend(&folder)?;
-        print::line(format_args!("{}: {good} images are as they were written, {bad} are made again", folder.display()));
+        print::line(format_args!(
+            "{}: {good} images are as they were written, {bad} are made again",
+            folder.display()
+        ));
     }
     let studio = Studio::open(setup)?.stopped_by(interruption());
-    let plan = Plan { numbers, ..studio.plan(count, args.seed, &folder)? };
+    let plan = Plan {
+        numbers,
+        ..studio.plan(count, args.seed, &folder)?
+    };
     let report = make(&studio, &plan, &args.consent, common)?;
     tell(&report);
     if args.preview.is_some() {
         let sheet = folder.join("sheet.png");
-        io::write(&sheet, &contact_sheet_of(&folder, count as usize, &Default::default())?)?;
+        io::write(
+            &sheet,
+            &contact_sheet_of(&folder, count as usize, &Default::default())?,
+        )?;
         print::line(format_args!("look at      {}", sheet.display()));
     }
-    for_trainers(&report, &folder).iter().for_each(|path| print::line(path.display()));
+    for_trainers(&report, &folder)
+        .iter()
+        .for_each(|path| print::line(path.display()));
     Ok(())
 }
 
 fn numbers(args: &Args) -> petcomp::Result<Numbers> {
     match (args.only, args.shard) {
         (Some(k), _) => Ok(Numbers::One(k)),
-        (None, Some(choice)) => choice.within(|name| std::env::var(name).ok()).map(Numbers::Shard),
+        (None, Some(choice)) => choice
+            .within(|name| std::env::var(name).ok())
+            .map(Numbers::Shard),
         (None, None) => Ok(Numbers::All),
     }
 }
@@ -140,16 +157,28 @@ pub(crate) fn ablate(args: &Ablate, common: &Common) -> anyhow::Result<()> {
 
 pub(crate) fn merge(args: &Merge, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("pictures");
-    let report = dataset::merge(&args.shards, &args.output, &|p| progress.at(p.done, p.count), interruption())?;
+    let report = dataset::merge(
+        &args.shards,
+        &args.output,
+        &|p| progress.at(p.done, p.count),
+        interruption(),
+    )?;
     drop(progress);
     tell(&report);
-    for_trainers(&report, &args.output).iter().for_each(|path| print::line(path.display()));
+    for_trainers(&report, &args.output)
+        .iter()
+        .for_each(|path| print::line(path.display()));
     Ok(())
 }
 
 /// Makes the dataset, showing progress, and stops between two pictures when interrupted, or when the first ones tell that
 /// it takes longer than an hour and nobody has agreed to that.
-pub(crate) fn make(studio: &Studio, plan: &Plan, consent: &Consent, common: &Common) -> anyhow::Result<Report> {
+pub(crate) fn make(
+    studio: &Studio,
+    plan: &Plan,
+    consent: &Consent,
+    common: &Common,
+) -> anyhow::Result<Report> {
     let progress = common.progress("pictures");
     let sample = |k| studio.sample(plan.seed, k);
     let (last, done) = (Mutex::new(None), AtomicBool::new(false));
@@ -158,7 +187,13 @@ pub(crate) fn make(studio: &Studio, plan: &Plan, consent: &Consent, common: &Com
         *last.lock().unwrap_or_else(PoisonError::into_inner) = Some(p);
     };
     std::thread::scope(|scope| {
-        let watch = scope.spawn(|| if consent.yes { None } else { watch(&last, &done) });
+        let watch = scope.spawn(|| {
+            if consent.yes {
+                None
+            } else {
+                watch(&last, &done)
+            }
+        });
         let made = dataset::generate(plan, sample, &show, interruption());
         done.store(true, Ordering::Relaxed);
         watch.thread().unpark();
@@ -179,7 +214,9 @@ fn watch(last: &Mutex<Option<Progress>>, done: &AtomicBool) -> Option<LongRun> {
     let (began, threads) = (Instant::now(), rayon::current_num_threads());
     while !done.load(Ordering::Relaxed) {
         let progress = *last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(long) = progress.and_then(|progress| LongRun::of(&progress, began.elapsed(), threads)) {
+        if let Some(long) =
+            progress.and_then(|progress| LongRun::of(&progress, began.elapsed(), threads))
+        {
             interruption().store(true, Ordering::Relaxed);
             return Some(long);
         }
@@ -190,7 +227,16 @@ fn watch(last: &Mutex<Option<Progress>>, done: &AtomicBool) -> Option<LongRun> {
 
 /// Prints what is in the folder: a result, so also where quiet is asked for.
 pub(crate) fn tell(report: &Report) {
-    let Report { images, val, made, objects, labelled, obstructed, retries, .. } = report;
+    let Report {
+        images,
+        val,
+        made,
+        objects,
+        labelled,
+        obstructed,
+        retries,
+        ..
+    } = report;
     print::line(format_args!(
         "images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again"
     ));
@@ -199,7 +245,10 @@ pub(crate) fn tell(report: &Report) {
         labels_of(report.policy)
     ));
     for class in &report.classes {
-        print::line(format_args!("  {:10} {} labelled of {}", class.name, class.labelled, class.objects));
+        print::line(format_args!(
+            "  {:10} {} labelled of {}",
+            class.name, class.labelled, class.objects
+        ));
     }
 }
 

@@ -49,11 +49,15 @@ pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
     let Checked { faults, images, .. } = &checked;
     print::text(checked.balance().markdown());
     let notes = checked.remarks();
-    notes.iter().for_each(|note| common.say(format_args!("note: {note}")));
+    notes
+        .iter()
+        .for_each(|note| common.say(format_args!("note: {note}")));
     faults.iter().for_each(print::line);
     anyhow::ensure!(faults.is_empty(), "{folder}: {} faults", faults.len());
     let rows: usize = checked.rows.iter().sum();
-    print::line(format_args!("{folder}: {images} images, {rows} labels, no fault"));
+    print::line(format_args!(
+        "{folder}: {images} images, {rows} labels, no fault"
+    ));
     match notes.len() {
         n if args.strict && n > 0 => Err(NeedsReview(format!("{folder}: {n} notes")).into()),
         _ => Ok(()),
@@ -61,17 +65,32 @@ pub(crate) fn check(args: &Check, common: &Common) -> anyhow::Result<()> {
 }
 
 pub(crate) fn report(args: &Report, common: &Common) -> anyhow::Result<()> {
-    let output = args.output.clone().unwrap_or_else(|| args.folder.join("report.html"));
-    let folder = output.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let options =
-        DatasetReportOptions { most: args.most, page: Some(folder.to_path_buf()), beside: args.beside.clone() };
-    io::write_text(&output, &report::dataset::page(&args.folder, &options)?.document())?;
+    let output = args
+        .output
+        .clone()
+        .unwrap_or_else(|| args.folder.join("report.html"));
+    let folder = output
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let options = DatasetReportOptions {
+        most: args.most,
+        page: Some(folder.to_path_buf()),
+        beside: args.beside.clone(),
+    };
+    io::write_text(
+        &output,
+        &report::dataset::page(&args.folder, &options)?.document(),
+    )?;
     common.say(format_args!("look at {}", output.display()));
     Ok(())
 }
 
 pub(crate) fn sheet(args: &Sheet, common: &Common) -> anyhow::Result<()> {
-    io::write(&args.output, &contact_sheet_of(&args.folder, args.most, &Default::default())?)?;
+    io::write(
+        &args.output,
+        &contact_sheet_of(&args.folder, args.most, &Default::default())?,
+    )?;
     common.say(args.output.display());
     Ok(())
 }

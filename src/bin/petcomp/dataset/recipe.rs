@@ -42,13 +42,28 @@ pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
         print::line(format_args!("# a scene was thrown away: {reason}"));
     }
     if !sample.rejected.is_empty() {
-        print::line(format_args!("# what follows was drawn with seed {}", sample.scene_seed));
+        print::line(format_args!(
+            "# what follows was drawn with seed {}",
+            sample.scene_seed
+        ));
     }
-    let width = |text: &dyn Fn(&Drawn) -> String| sample.draws.iter().map(|d| text(d).len()).max().unwrap_or(0);
+    let width = |text: &dyn Fn(&Drawn) -> String| {
+        sample
+            .draws
+            .iter()
+            .map(|d| text(d).len())
+            .max()
+            .unwrap_or(0)
+    };
     let (paths, froms) = (width(&|d| d.path.clone()), width(&|d| d.from.to_string()));
     for draw in &sample.draws {
         let from = draw.from.to_string();
-        let line = format!("{:paths$}  {from:froms$}  {}  {}", draw.path, draw.value, chosen(draw, &sample.drawn));
+        let line = format!(
+            "{:paths$}  {from:froms$}  {}  {}",
+            draw.path,
+            draw.value,
+            chosen(draw, &sample.drawn)
+        );
         print::line(line.trim_end());
     }
     Ok(())
@@ -56,7 +71,10 @@ pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
 
 /// The name of what a choice chose.
 fn chosen<'a>(draw: &Drawn, scene: &'a Scene) -> &'a str {
-    let object = draw.path.strip_prefix("selection[").and_then(|rest| rest.strip_suffix("].asset"));
+    let object = draw
+        .path
+        .strip_prefix("selection[")
+        .and_then(|rest| rest.strip_suffix("].asset"));
     match object.and_then(|i| i.parse::<usize>().ok()) {
         Some(i) => scene.objects.get(i).map_or("", |object| &object.asset),
         None if draw.path == "background" => &scene.plate,

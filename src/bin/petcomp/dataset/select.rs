@@ -57,7 +57,11 @@ pub(crate) fn split(args: &Split, common: &Common) -> anyhow::Result<()> {
     };
     let shared = Listing::read(&args.folder)?.shared(how, args.ratio, args.seed)?;
     if shared.train.is_empty() || shared.val.is_empty() {
-        let what = format!("{} images for training and {} for validation", shared.train.len(), shared.val.len());
+        let what = format!(
+            "{} images for training and {} for validation",
+            shared.train.len(),
+            shared.val.len()
+        );
         return Err(Error::value("split", format!("{what}: too few groups for this ratio")).into());
     }
     write(&shared, &args.output, common)?;
@@ -66,23 +70,38 @@ pub(crate) fn split(args: &Split, common: &Common) -> anyhow::Result<()> {
 }
 
 pub(crate) fn subset(args: &Subset, common: &Common) -> anyhow::Result<()> {
-    write(&Listing::read(&args.folder)?.head(args.head)?, &args.output, common)
+    write(
+        &Listing::read(&args.folder)?.head(args.head)?,
+        &args.output,
+        common,
+    )
 }
 
 fn write(listing: &Listing, folder: &std::path::Path, common: &Common) -> anyhow::Result<()> {
     listing.write(folder)?;
     let (train, val) = (listing.train.len(), listing.val.len());
-    common.say(format_args!("{}: {train} images for training, {val} for validation", folder.display()));
+    common.say(format_args!(
+        "{}: {train} images for training, {val} for validation",
+        folder.display()
+    ));
     Ok(())
 }
 
 fn tell(leaks: &Leaks) {
     for (group, [all, shared]) in &leaks.groups {
-        print::line(format_args!("leak: {shared} of {all} {group}s of the validation images are also trained on"));
+        print::line(format_args!(
+            "leak: {shared} of {all} {group}s of the validation images are also trained on"
+        ));
     }
-    print::line(format_args!("leak: {} validation images look like one that is trained on", leaks.near.len()));
+    print::line(format_args!(
+        "leak: {} validation images look like one that is trained on",
+        leaks.near.len()
+    ));
     for near in leaks.near.iter().take(10) {
         let (val, train) = (near.val.display(), near.train.display());
-        print::line(format_args!("  {val} and {train} differ by {:.2} codes", near.codes));
+        print::line(format_args!(
+            "  {val} and {train} differ by {:.2} codes",
+            near.codes
+        ));
     }
 }

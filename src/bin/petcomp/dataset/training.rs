@@ -31,7 +31,10 @@ pub(crate) struct Sets {
 
 impl Sets {
     fn balance(&self) -> Balance {
-        Balance { alpha: self.alpha, normalize: self.normalize }
+        Balance {
+            alpha: self.alpha,
+            normalize: self.normalize,
+        }
     }
 }
 
@@ -81,9 +84,18 @@ pub(crate) struct Anchors {
 }
 
 pub(crate) fn batches(args: &Batches, common: &Common) -> anyhow::Result<()> {
-    let (real, synthetic) = (YoloSet::open(&args.sets.real)?, YoloSet::open(&args.sets.synthetic)?);
-    let weights = args.sets.balance().weights(real.train.len() as u64, synthetic.train.len() as u64)?;
-    let options = BatchOptions { size: args.sets.batch, seed: args.seed };
+    let (real, synthetic) = (
+        YoloSet::open(&args.sets.real)?,
+        YoloSet::open(&args.sets.synthetic)?,
+    );
+    let weights = args
+        .sets
+        .balance()
+        .weights(real.train.len() as u64, synthetic.train.len() as u64)?;
+    let options = BatchOptions {
+        size: args.sets.batch,
+        seed: args.seed,
+    };
     let mut text = String::new();
     for epoch in 0..args.epochs {
         for batch in train::batches(real.train.len(), synthetic.train.len(), epoch, &options) {
@@ -92,8 +104,7 @@ pub(crate) fn batches(args: &Batches, common: &Common) -> anyhow::Result<()> {
                 Source::Synthetic => (&synthetic.train, weights.synthetic),
             };
             let images: Vec<&Path> = batch.images.iter().map(|&i| list[i].as_path()).collect();
-            let line =
-                serde_json::json!({ "epoch": epoch, "source": batch.source, "weight": weight, "images": images });
+            let line = serde_json::json!({ "epoch": epoch, "source": batch.source, "weight": weight, "images": images });
             text += &format!("{line}\n");
         }
     }
@@ -117,22 +128,38 @@ pub(crate) fn kit(args: &Kit, common: &Common) -> anyhow::Result<()> {
         ..KitOptions::new(&args.sets.real, &args.sets.synthetic)
     };
     train::kit::write(&args.output, &options)?;
-    common.say(format_args!("{}: run commands.sh there", args.output.display()));
+    common.say(format_args!(
+        "{}: run commands.sh there",
+        args.output.display()
+    ));
     Ok(())
 }
 
 pub(crate) fn anchors(args: &Anchors) -> anyhow::Result<()> {
     let set = YoloSet::open(&args.folder)?;
-    let labels = set.train.first().and_then(|image| YoloSet::label_of(image).parent().map(Path::to_path_buf));
+    let labels = set
+        .train
+        .first()
+        .and_then(|image| YoloSet::label_of(image).parent().map(Path::to_path_buf));
     let truth = read_yolo_truth(&labels.unwrap_or_default(), None)?;
-    let scaled = truth.sheets.iter().zip(&truth.sizes).flat_map(|(sheet, size)| {
-        let scale = f64::from(args.side) / f64::from(size[0].max(size[1]));
-        sheet.truth.iter().map(move |t| [t.bbox.width() * scale, t.bbox.height() * scale])
-    });
+    let scaled = truth
+        .sheets
+        .iter()
+        .zip(&truth.sizes)
+        .flat_map(|(sheet, size)| {
+            let scale = f64::from(args.side) / f64::from(size[0].max(size[1]));
+            sheet
+                .truth
+                .iter()
+                .map(move |t| [t.bbox.width() * scale, t.bbox.height() * scale])
+        });
     let found = train::anchors(&scaled.collect::<Vec<_>>(), args.count, args.seed);
     for [w, h] in &found.sizes {
         print::line(format_args!("{w:.1},{h:.1}"));
     }
-    print::line(format_args!("mean IoU {:.3}, best possible recall {:.4}", found.mean_iou, found.best_possible_recall));
+    print::line(format_args!(
+        "mean IoU {:.3}, best possible recall {:.4}",
+        found.mean_iou, found.best_possible_recall
+    ));
     Ok(())
 }

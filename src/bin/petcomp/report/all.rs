@@ -22,7 +22,12 @@ pub(crate) struct Args {
     #[arg(long)]
     quick: bool,
     /// When it is made, to be told on the page
-    #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
+    #[arg(
+        long,
+        value_name = "TEXT",
+        default_value = "",
+        hide_default_value = true
+    )]
     date: String,
 }
 
@@ -39,6 +44,9 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
     all::write(&args.output, &options, |done, of| progress.at(done, of))?;
     drop(progress);
-    common.say(format_args!("look at {}", args.output.join("report.html").display()));
+    common.say(format_args!(
+        "look at {}",
+        args.output.join("report.html").display()
+    ));
     Ok(())
 }

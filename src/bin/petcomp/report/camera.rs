@@ -21,8 +21,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let progress = common.progress("measuring");
-    let rows =
-        camera::write(&args.output, &CameraReportOptions { views: args.views }, |done, of| progress.at(done, of))?;
+    let rows = camera::write(
+        &args.output,
+        &CameraReportOptions { views: args.views },
+        |done, of| progress.at(done, of),
+    )?;
     drop(progress);
     common.say(format_args!(
         "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",

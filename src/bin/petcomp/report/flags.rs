@@ -10,6 +10,9 @@ pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
     let table = flags::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
     drop(progress);
     print::text(table.markdown().trim_end());
-    common.say(format_args!("{}: flags.csv and flags.md", args.output.display()));
+    common.say(format_args!(
+        "{}: flags.csv and flags.md",
+        args.output.display()
+    ));
     Ok(())
 }

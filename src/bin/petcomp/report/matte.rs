@@ -10,6 +10,9 @@ pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
     let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
     drop(progress);
     print::text(matte::table(&summaries).markdown().trim_end());
-    common.say(format_args!("{}: matte.csv, matte.md, matte.svg and matte.html", args.output.display()));
+    common.say(format_args!(
+        "{}: matte.csv, matte.md, matte.svg and matte.html",
+        args.output.display()
+    ));
     Ok(())
 }

@@ -22,7 +22,10 @@ pub(crate) struct Args {
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|seconds| (0.0..=3600.0).contains(seconds));
+    let number = text
+        .parse::<f64>()
+        .ok()
+        .filter(|seconds| (0.0..=3600.0).contains(seconds));
     number.ok_or_else(|| format!("{text}, expected 0 to 3600"))
 }
 
@@ -32,13 +35,20 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         print::line(serde_json::to_string(&scale::run(&case, args.seconds)?)?);
         return Ok(());
     }
-    let options = ScaleOptions { seconds: args.seconds, threads: args.most_threads, ..ScaleOptions::default() };
+    let options = ScaleOptions {
+        seconds: args.seconds,
+        threads: args.most_threads,
+        ..ScaleOptions::default()
+    };
     let progress = common.progress("measuring");
     let measured = scale::write(&args.output, &options, |done, of| progress.at(done, of))?;
     drop(progress);
     for (title, table) in scale::tables(&measured)? {
         print::text(format_args!("{title}\n{}", table.markdown()));
     }
-    common.say(format_args!("{}: scale.csv, scale.md and two charts", args.output.display()));
+    common.say(format_args!(
+        "{}: scale.csv, scale.md and two charts",
+        args.output.display()
+    ));
     Ok(())
 }

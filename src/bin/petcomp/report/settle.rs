@@ -28,9 +28,16 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         return Ok(io::write_document(path, &settle::peer_cases()?)?);
     }
     let progress = common.progress("measuring");
-    let rows =
-        settle::write(&args.output, &SettleReportOptions { heaps: args.heaps }, |done, of| progress.at(done, of))?;
+    let rows = settle::write(
+        &args.output,
+        &SettleReportOptions { heaps: args.heaps },
+        |done, of| progress.at(done, of),
+    )?;
     drop(progress);
-    common.say(format_args!("{}: settle.csv ({} lines), settle.md and a plot", args.output.display(), rows.len()));
+    common.say(format_args!(
+        "{}: settle.csv ({} lines), settle.md and a plot",
+        args.output.display(),
+        rows.len()
+    ));
     Ok(())
 }

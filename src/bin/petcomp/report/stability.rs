@@ -11,7 +11,12 @@ pub(crate) struct Args {
     #[arg(short, long, value_name = "FOLDER", default_value = "report")]
     output: PathBuf,
     /// Only this stage; all of them otherwise
-    #[arg(long, value_name = "NAME", default_value = "", hide_default_value = true)]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "",
+        hide_default_value = true
+    )]
     stage: String,
 }
 
@@ -22,10 +27,23 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     drop(progress);
     let failed: Vec<_> = rows.iter().filter(|row| !row.outcome.passed).collect();
     for row in &failed {
-        print::line(format_args!("FAIL {}: {}: {}", row.stage, row.name, row.outcome.measured));
+        print::line(format_args!(
+            "FAIL {}: {}: {}",
+            row.stage, row.name, row.outcome.measured
+        ));
     }
     let table = args.output.join("stability.md");
-    print::line(format_args!("{}: {} of {} pass", table.display(), rows.len() - failed.len(), rows.len()));
-    anyhow::ensure!(failed.is_empty(), "{} of {} cases fail", failed.len(), rows.len());
+    print::line(format_args!(
+        "{}: {} of {} pass",
+        table.display(),
+        rows.len() - failed.len(),
+        rows.len()
+    ));
+    anyhow::ensure!(
+        failed.is_empty(),
+        "{} of {} cases fail",
+        failed.len(),
+        rows.len()
+    );
     Ok(())
 }

@@ -17,6 +17,10 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let rows = work::write(&args.output, |done, of| progress.at(done, of))?;
     drop(progress);
     let kept = rows.iter().filter(|row| row.is_as_promised()).count();
-    print::line(format_args!("{}: {kept} of {} as promised", args.output.join("work.md").display(), rows.len()));
+    print::line(format_args!(
+        "{}: {kept} of {} as promised",
+        args.output.join("work.md").display(),
+        rows.len()
+    ));
     Ok(())
 }

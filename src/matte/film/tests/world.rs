@@ -3,11 +3,18 @@
 
 use super::*;
 use crate::io;
-use crate::matte::{KeyOptions, Keying, Screen, TriangulateOptions, Triangulated, screen_color, triangulate};
+use crate::matte::{
+    KeyOptions, Keying, Screen, TriangulateOptions, Triangulated, screen_color, triangulate,
+};
 use std::path::Path;
 
-const BACKGROUNDS: [[f32; 3]; 5] =
-    [[0.3, 0.3, 0.3], [0.7, 0.7, 0.7], [0.05, 0.05, 0.06], [0.5, 0.25, 0.12], [0.12, 0.3, 0.55]];
+const BACKGROUNDS: [[f32; 3]; 5] = [
+    [0.3, 0.3, 0.3],
+    [0.7, 0.7, 0.7],
+    [0.05, 0.05, 0.06],
+    [0.5, 0.25, 0.12],
+    [0.12, 0.3, 0.55],
+];
 
 struct Truth {
     photo: Image<LinearRgb>,
@@ -23,9 +30,17 @@ fn read(folder: &Path, name: &str) -> Truth {
     let rgb = |end: &str| io::read::<LinearRgb>(at(end)).unwrap();
     let codes = rgb("_view.png");
     // Linear codes, which the reader took for display-encoded ones.
-    let v = codes.map(|p| p.map(|c| f32::from(crate::color::encode_srgb8(LinearRgb::grey(c)).r) / 255.0));
+    let v = codes
+        .map(|p| p.map(|c| f32::from(crate::color::encode_srgb8(LinearRgb::grey(c)).r) / 255.0));
     let mask = io::read(at("_mask.png")).unwrap();
-    Truth { photo: rgb(".png"), f: rgb("_fg.exr"), t: rgb("_trans.exr"), v, k: rgb("_plate.exr"), mask }
+    Truth {
+        photo: rgb(".png"),
+        f: rgb("_fg.exr"),
+        t: rgb("_trans.exr"),
+        v,
+        k: rgb("_plate.exr"),
+        mask,
+    }
 }
 
 impl Truth {
@@ -35,7 +50,11 @@ impl Truth {
             for b in BACKGROUNDS.map(LinearRgb::from) {
                 let told: [f32; 3] = film.pixels()[i].over_color(b).into();
                 let real: [f32; 3] = (self.f.pixels()[i] + through.pixels()[i] * b).into();
-                sum += told.iter().zip(real).map(|(a, r)| f64::from((a - r).abs())).sum::<f64>();
+                sum += told
+                    .iter()
+                    .zip(real)
+                    .map(|(a, r)| f64::from((a - r).abs()))
+                    .sum::<f64>();
                 count += 3.0;
             }
         }
@@ -45,7 +64,9 @@ impl Truth {
     /// `F + T * screen` with sensor noise.
     fn simulated(&self, screen: &Image<LinearRgb>, seed: u64) -> Image<LinearRgb> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut out = self.f.zip_map(&self.t.zip_map(screen, |t, k| t * k), |f, s| f + s);
+        let mut out = self
+            .f
+            .zip_map(&self.t.zip_map(screen, |t, k| t * k), |f, s| f + s);
         for p in out.pixels_mut() {
             *p = p.map(|v| {
                 let grain = (0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0;
@@ -57,19 +78,30 @@ impl Truth {
 
     fn paper(&self, photo: &Image<LinearRgb>) -> Image<Film> {
         let color = screen_color(photo, &self.mask).unwrap();
-        let keyed = Keying::new(photo, Screen::Color(color)).run(&KeyOptions::default()).unwrap();
+        let keyed = Keying::new(photo, Screen::Color(color))
+            .run(&KeyOptions::default())
+            .unwrap();
         keyed.cutout.zip_map(&self.mask, |p, m| p.masked(m).into())
     }
 
     /// The same screen as a board of some other paint.
     fn board(&self, paint: LinearRgb) -> Image<LinearRgb> {
-        let most = self.k.pixels().iter().map(|p| p.r.max(p.g).max(p.b)).fold(0.0, f32::max);
+        let most = self
+            .k
+            .pixels()
+            .iter()
+            .map(|p| p.r.max(p.g).max(p.b))
+            .fold(0.0, f32::max);
         self.k.map(|p| paint.scale(p.r.max(p.g).max(p.b) / most))
     }
 
     /// Mean error of alpha over the object.
     fn alpha_error(&self, film: &Image<Film>) -> f64 {
-        let pairs = film.pixels().iter().zip(self.v.pixels()).zip(self.mask.pixels());
+        let pairs = film
+            .pixels()
+            .iter()
+            .zip(self.v.pixels())
+            .zip(self.mask.pixels());
         let errors = pairs
             .filter(|(_, c)| c.0 > 0.02)
             .map(|((f, v), _)| f64::from((f.to_rgba().a - (1.0 - (v.r + v.g + v.b) / 3.0)).abs()));
@@ -79,18 +111,31 @@ impl Truth {
 
     /// The same screen in the other colour.
     fn other_screen(&self) -> Image<LinearRgb> {
-        let other = if strongest_channel(self.k[(0, 0)]) == 1 { BLUE } else { GREEN };
+        let other = if strongest_channel(self.k[(0, 0)]) == 1 {
+            BLUE
+        } else {
+            GREEN
+        };
         let level = |p: LinearRgb| p.r.max(p.g).max(p.b) / other.g.max(other.b);
         self.k.map(|p| other.scale(level(p)))
     }
 
     fn two(&self) -> Triangulated {
         let screens = [self.k.clone(), self.other_screen()];
-        let photos = [self.simulated(&screens[0], 1), self.simulated(&screens[1], 2)];
-        let plates =
-            [0, 1].map(|i| ScreenPlate { image: screens[i].clone(), ..ScreenPlate::even(GREEN, self.k.size()) });
-        triangulate(&[(&photos[0], &plates[0]), (&photos[1], &plates[1])], &self.mask, &TriangulateOptions::default())
-            .unwrap()
+        let photos = [
+            self.simulated(&screens[0], 1),
+            self.simulated(&screens[1], 2),
+        ];
+        let plates = [0, 1].map(|i| ScreenPlate {
+            image: screens[i].clone(),
+            ..ScreenPlate::even(GREEN, self.k.size())
+        });
+        triangulate(
+            &[(&photos[0], &plates[0]), (&photos[1], &plates[1])],
+            &self.mask,
+            &TriangulateOptions::default(),
+        )
+        .unwrap()
     }
 }
 
@@ -102,7 +147,13 @@ fn plate_error(plate: &ScreenPlate, truth: &Truth) -> f64 {
     let pairs = plate.image.pixels().iter().zip(truth.k.pixels());
     let differs: Vec<f64> = pairs
         .map(|(a, b)| {
-            f64::from((a.r - b.r).abs().max((a.g - b.g).abs()).max((a.b - b.b).abs()) / b.r.max(b.g).max(b.b))
+            f64::from(
+                (a.r - b.r)
+                    .abs()
+                    .max((a.g - b.g).abs())
+                    .max((a.b - b.b).abs())
+                    / b.r.max(b.g).max(b.b),
+            )
         })
         .collect();
     differs.iter().sum::<f64>() / differs.len() as f64
@@ -110,14 +161,28 @@ fn plate_error(plate: &ScreenPlate, truth: &Truth) -> f64 {
 
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> =
-        entries.filter_map(|e| e.unwrap().file_name().to_str()?.strip_suffix("_fg.exr").map(String::from)).collect();
+    let mut names: Vec<String> = entries
+        .filter_map(|e| {
+            e.unwrap()
+                .file_name()
+                .to_str()?
+                .strip_suffix("_fg.exr")
+                .map(String::from)
+        })
+        .collect();
     names.sort();
     names
 }
 
 /// Paints of boards that tell nothing of film, scene-linear as seen.
-const BOARDS: [[f32; 3]; 6] = [[0.02; 3], [0.15; 3], [0.4; 3], [0.75; 3], [0.7, 0.62, 0.5], [0.3, 0.38, 0.32]];
+const BOARDS: [[f32; 3]; 6] = [
+    [0.02; 3],
+    [0.15; 3],
+    [0.4; 3],
+    [0.75; 3],
+    [0.7, 0.62, 0.5],
+    [0.3, 0.38, 0.32],
+];
 
 #[test]
 #[ignore = "needs a folder of rendered photos, and minutes"]
@@ -130,9 +195,11 @@ fn errors_on_grey_boards() {
         for name in names_in(folder) {
             let truth = read(folder, &name);
             let photo = truth.simulated(&truth.board(paint), 5);
-            let plate = ScreenPlate::fit(&photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+            let plate =
+                ScreenPlate::fit(&photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
             let found = film(&photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
-            let opaque: Image<Film> = photo.zip_map(&truth.mask, |p, m| p.opaque().masked(m).into());
+            let opaque: Image<Film> =
+                photo.zip_map(&truth.mask, |p, m| p.opaque().masked(m).into());
             let paper = truth.paper(&photo);
             let both = |film: &Image<Film>| [truth.alpha_error(film), truth.error(film, &truth.v)];
             let row = [both(&opaque), both(&paper), both(&found.film)];
@@ -158,11 +225,18 @@ fn doubts_follow_errors() {
         let truth = read(folder, &name);
         let other = truth.simulated(&truth.other_screen(), 3);
         for (screen, photo) in [("own", &truth.photo), ("other", &other)] {
-            let plate = ScreenPlate::fit(photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+            let plate =
+                ScreenPlate::fit(photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
             let found = film(photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
-            let (lit, shaded) = (truth.error(&found.film, &truth.v), truth.error(&found.shaded(), &truth.t));
+            let (lit, shaded) = (
+                truth.error(&found.film, &truth.v),
+                truth.error(&found.shaded(), &truth.t),
+            );
             let hue = strongest_channel(plate.color());
-            println!("{name} {screen} {hue} {lit:.4} {shaded:.4} {:?} {:?}", found.flat, found.doubts);
+            println!(
+                "{name} {screen} {hue} {lit:.4} {shaded:.4} {:?} {:?}",
+                found.flat, found.doubts
+            );
         }
     }
 }
@@ -177,14 +251,18 @@ fn errors_on_rendered_photos() {
     for name in &names {
         let truth = read(folder, name);
         let started = std::time::Instant::now();
-        let plate = ScreenPlate::fit(&truth.photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
+        let plate =
+            ScreenPlate::fit(&truth.photo, &free(&truth.mask), &PlateOptions::default()).unwrap();
         let fitted = started.elapsed();
         let one = film(&truth.photo, &plate, &truth.mask, &FilmOptions::default()).unwrap();
         let ms = started.elapsed().as_secs_f64() * 1e3;
         let simulated = truth.simulated(&truth.k, 1);
         let clean = film(&simulated, &plate, &truth.mask, &FilmOptions::default()).unwrap();
         let two = truth.two();
-        let shaded = |t: &Triangulated| t.film.zip_map(&t.transmittance, |f, t| Film::new(f.color, t));
+        let shaded = |t: &Triangulated| {
+            t.film
+                .zip_map(&t.transmittance, |f, t| Film::new(f.color, t))
+        };
         let (paper, paper_clean) = (truth.paper(&truth.photo), truth.paper(&simulated));
         let row = [
             truth.error(&paper, &truth.t),
@@ -214,10 +292,15 @@ fn errors_on_rendered_photos() {
         );
         rows.push(row);
     }
-    let mean: Vec<f64> =
-        (0..rows[0].len()).map(|c| rows.iter().map(|r| r[c]).sum::<f64>() / rows.len() as f64).collect();
+    let mean: Vec<f64> = (0..rows[0].len())
+        .map(|c| rows.iter().map(|r| r[c]).sum::<f64>() / rows.len() as f64)
+        .collect();
     println!("mean {mean:.4?}");
-    println!("one screen over paper: shaded {:.3}, lit by itself {:.3}", mean[1] / mean[0], mean[3] / mean[2]);
+    println!(
+        "one screen over paper: shaded {:.3}, lit by itself {:.3}",
+        mean[1] / mean[0],
+        mean[3] / mean[2]
+    );
     println!(
         "simulated: one {:.3} and {:.3}, two {:.3} and {:.3}",
         mean[5] / mean[4],

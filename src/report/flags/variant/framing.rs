@@ -14,7 +14,12 @@ pub(super) fn cut_off(whole: Trial, share: f64) -> Trial {
     let (w, h) = whole.photo.size();
     let roi = Roi::spanning(from..w, 0..h);
     let box_px = [0.0, top, right - from as f64, bottom];
-    Trial { photo: whole.photo.crop(roi), mask: whole.mask.crop(roi), box_px, ..whole }
+    Trial {
+        photo: whole.photo.crop(roi),
+        mask: whole.mask.crop(roi),
+        box_px,
+        ..whole
+    }
 }
 
 /// The photo and its mirror image beside each other.
@@ -23,7 +28,11 @@ pub(super) fn two(one: &Trial) -> Trial {
     let column = |x: usize| if x < w { x } else { 2 * w - 1 - x };
     let photo = Image::from_fn(2 * w, one.photo.height(), |x, y| one.photo[(column(x), y)]);
     let mask = Image::from_fn(2 * w, one.mask.height(), |x, y| one.mask[(column(x), y)]);
-    Trial { photo, mask, ..one.clone() }
+    Trial {
+        photo,
+        mask,
+        ..one.clone()
+    }
 }
 
 /// The longer side of a tiny photo, pixels.
@@ -80,12 +89,18 @@ pub(super) fn full_frame(whole: Trial) -> Trial {
     let (width, height) = (right - left, bottom - top);
     let sum = width + height;
     let margin = 0.25 * ((sum * sum + 4.0 * width * height * (1.0 / FULL - 1.0)).sqrt() - sum);
-    let range =
-        |low: f64, high: f64, len: usize| (low - margin).max(0.0) as usize..((high + margin).ceil() as usize).min(len);
+    let range = |low: f64, high: f64, len: usize| {
+        (low - margin).max(0.0) as usize..((high + margin).ceil() as usize).min(len)
+    };
     let roi = Roi::spanning(range(left, right, w), range(top, bottom, h));
     let (x, y) = (roi.x as f64, roi.y as f64);
     let box_px = [left - x, top - y, right - x, bottom - y];
-    Trial { photo: whole.photo.crop(roi), mask: whole.mask.crop(roi), box_px, ..whole }
+    Trial {
+        photo: whole.photo.crop(roi),
+        mask: whole.mask.crop(roi),
+        box_px,
+        ..whole
+    }
 }
 
 /// Share of the picture that a small object covers.
@@ -105,7 +120,11 @@ const THIN: f64 = 0.125;
 /// The object squeezed across its length.
 pub(super) fn thin_object(known: &Known, whole: Trial) -> Trial {
     let [left, top, right, bottom] = known.box_px;
-    let scale = if right - left > bottom - top { [1.0, THIN] } else { [THIN, 1.0] };
+    let scale = if right - left > bottom - top {
+        [1.0, THIN]
+    } else {
+        [THIN, 1.0]
+    };
     shrunk(known, whole, scale)
 }
 
@@ -116,16 +135,33 @@ fn shrunk(known: &Known, whole: Trial, [sx, sy]: [f64; 2]) -> Trial {
     let (sw, sh) = (side(w, sx), side(h, sy));
     let (x0, y0) = ((w - sw) / 2, (h - sh) / 2);
     let inside = |x: usize, y: usize| (x0..x0 + sw).contains(&x) && (y0..y0 + sh).contains(&y);
-    let [light, through] = [&known.foreground, &known.transmittance].map(|p| filter::resize(p, sw, sh));
+    let [light, through] =
+        [&known.foreground, &known.transmittance].map(|p| filter::resize(p, sw, sh));
     let small = filter::resize(&known.mask, sw, sh);
     let at = |x: usize, y: usize| (x - x0, y - y0);
     let clean = Image::from_fn(w, h, |x, y| match inside(x, y) {
         true => light[at(x, y)] + through[at(x, y)] * known.screen[(x, y)],
         false => known.screen[(x, y)],
     });
-    let mask = Image::from_fn(w, h, |x, y| if inside(x, y) { small[at(x, y)] } else { Coverage(0.0) });
+    let mask = Image::from_fn(w, h, |x, y| {
+        if inside(x, y) {
+            small[at(x, y)]
+        } else {
+            Coverage(0.0)
+        }
+    });
     let [left, top, right, bottom] = known.box_px;
     let moved = |v: f64, from: usize, to: usize, at: usize| at as f64 + v * to as f64 / from as f64;
-    let box_px = [moved(left, w, sw, x0), moved(top, h, sh, y0), moved(right, w, sw, x0), moved(bottom, h, sh, y0)];
-    Trial { photo: noisy(&clean, known.noise.read as f32, 1), mask, box_px, ..whole }
+    let box_px = [
+        moved(left, w, sw, x0),
+        moved(top, h, sh, y0),
+        moved(right, w, sw, x0),
+        moved(bottom, h, sh, y0),
+    ];
+    Trial {
+        photo: noisy(&clean, known.noise.read as f32, 1),
+        mask,
+        box_px,
+        ..whole
+    }
 }

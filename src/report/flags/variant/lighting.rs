@@ -27,7 +27,11 @@ const PENUMBRA_PX: f64 = 1.5;
 pub(super) fn shadowed(known: &Known, beyond: f64) -> Image<LinearRgb> {
     let [left, _, right, _] = known.box_px;
     let (w, h) = (known.photo.width() as f64, known.photo.height() as f64);
-    let free = if beyond > 0.0 { w - right } else { right - left };
+    let free = if beyond > 0.0 {
+        w - right
+    } else {
+        right - left
+    };
     let edge = right + beyond * free;
     scaled(&known.photo, |x, y| {
         let slant = edge + 0.1 * (y - 0.5 * h) * f64::from(u8::from(beyond < 0.0));
@@ -45,7 +49,9 @@ pub(super) fn two_hues(photo: &Image<LinearRgb>, direction: f64) -> Image<Linear
     let (sin, cos) = libm::sincos(direction);
     let reach = 0.5 * (cos.abs() * w as f64 + sin.abs() * h as f64);
     Image::from_fn(w, h, |x, y| {
-        let along = (cos * (x as f64 + 0.5 - 0.5 * w as f64) + sin * (y as f64 + 0.5 - 0.5 * h as f64)) / reach;
+        let along = (cos * (x as f64 + 0.5 - 0.5 * w as f64)
+            + sin * (y as f64 + 0.5 - 0.5 * h as f64))
+            / reach;
         let warm = (HUE * along) as f32;
         photo[(x, y)] * LinearRgb::new(1.0 + warm, 1.0, 1.0 - warm)
     })
@@ -62,9 +68,14 @@ pub(super) fn cast(known: &Known, direction: f64) -> Image<LinearRgb> {
     let [left, top, right, bottom] = known.box_px;
     let reach = CAST * (right - left).min(bottom - top);
     let (sin, cos) = libm::sincos(direction);
-    let (dx, dy) = ((reach * cos).round() as isize, (reach * sin).round() as isize);
+    let (dx, dy) = (
+        (reach * cos).round() as isize,
+        (reach * sin).round() as isize,
+    );
     let (w, h) = known.photo.size();
-    let dense = known.transmittance.zip_map(&known.mask, |t, m| Coverage(m.0 * (1.0 - (t.r + t.g + t.b) / 3.0)));
+    let dense = known.transmittance.zip_map(&known.mask, |t, m| {
+        Coverage(m.0 * (1.0 - (t.r + t.g + t.b) / 3.0))
+    });
     let moved = Image::from_fn(w, h, |x, y| dense.nearest(x as isize - dx, y as isize - dy));
     let soft = filter::gaussian_blur(&moved, CAST_BLUR_PX);
     Image::from_fn(w, h, |x, y| {

@@ -38,9 +38,17 @@ pub(super) fn hued(known: &Known) -> Option<Image<LinearRgb>> {
     }
     let (w, h) = known.photo.size();
     Some(Image::from_fn(w, h, |x, y| {
-        let (p, f, k) = (known.photo[(x, y)], known.foreground[(x, y)], known.screen[(x, y)]);
+        let (p, f, k) = (
+            known.photo[(x, y)],
+            known.foreground[(x, y)],
+            known.screen[(x, y)],
+        );
         let sum = |c: LinearRgb| c.r + c.g + c.b;
-        if opaque[(x, y)] { p + f.scale(-1.0) + k.scale(sum(f) / sum(k).max(f32::MIN_POSITIVE)) } else { p }
+        if opaque[(x, y)] {
+            p + f.scale(-1.0) + k.scale(sum(f) / sum(k).max(f32::MIN_POSITIVE))
+        } else {
+            p
+        }
     }))
 }
 
@@ -50,7 +58,11 @@ fn relit(known: &Known, light: impl Fn(f64, f64) -> f32 + Sync) -> Image<LinearR
     Image::from_fn(w, h, |x, y| {
         let at = (x, y);
         let change = light(x as f64 + 0.5, y as f64 + 0.5) - 1.0;
-        let t = if known.mask[at].0 == 0.0 { known.photo[at] } else { known.transmittance[at] * known.screen[at] };
+        let t = if known.mask[at].0 == 0.0 {
+            known.photo[at]
+        } else {
+            known.transmittance[at] * known.screen[at]
+        };
         known.photo[at] + t.scale(change)
     })
 }
@@ -94,8 +106,9 @@ pub(super) fn specks(known: &Known, seed: u64) -> Image<LinearRgb> {
     let mut share = shares(seed);
     let (w, h) = (known.photo.width() as f64, known.photo.height() as f64);
     let mut draw = |from: f64, to: f64| from + (to - from) * share();
-    let specks: Vec<[f64; 3]> =
-        (0..SPECKS).map(|_| [draw(0.0, w), draw(0.0, h), draw(SPECK_PX[0], SPECK_PX[1])]).collect();
+    let specks: Vec<[f64; 3]> = (0..SPECKS)
+        .map(|_| [draw(0.0, w), draw(0.0, h), draw(SPECK_PX[0], SPECK_PX[1])])
+        .collect();
     relit(known, |x, y| {
         let depth = |[u, v, r]: &[f64; 3]| (r + 0.5 - (x - u).hypot(y - v)).clamp(0.0, 1.0);
         1.0 - (1.0 - SPECK_LIGHT) * specks.iter().map(depth).fold(0.0, f64::max) as f32
