@@ -44,8 +44,11 @@ pub enum Error {
         what: String,
     },
     /// A rectangle that no camera can have seen.
-    #[error("{0}")]
-    Camera(#[from] crate::camera::SolveError),
+    #[error("{what}")]
+    Camera {
+        /// What is wrong with its corners, and what was expected.
+        what: String,
+    },
     /// Dropped objects that would not come to rest.
     #[error("settle: {what}")]
     Unsettled {
@@ -93,7 +96,7 @@ impl Error {
         let path = path.as_ref().to_path_buf();
         match self {
             Self::Value { at, what } => Self::Field { path, at, what },
-            Self::Photo { .. } | Self::Camera(_) => Self::File {
+            Self::Photo { .. } | Self::Camera { .. } => Self::File {
                 path,
                 what: self.to_string(),
             },

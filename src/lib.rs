@@ -8,7 +8,10 @@ pub mod camera;
 pub mod color;
 pub mod composite;
 pub mod dataset;
+mod deep;
+mod diagnostic;
 pub mod diff;
+mod draw;
 mod error;
 pub mod eval;
 pub mod filter;
@@ -21,6 +24,7 @@ pub mod label;
 pub mod light;
 pub mod matte;
 mod pixel;
+pub mod plot;
 mod quality;
 pub mod render;
 pub mod report;
@@ -33,6 +37,8 @@ pub mod work;
 
 pub use allowance::Allowance;
 pub use camera::Camera;
+pub use deep::{DeepImage, DeepSample};
+pub use diagnostic::{Code, Diagnostic, Severity};
 pub use error::{Error, Result, printable};
 pub use image::{Image, Roi};
 pub use pixel::{

@@ -1,14 +1,15 @@
 //! A dataset's folder: the same bytes whoever made it and however often they were stopped, and trainers accept it.
 
+use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
     LabelSetup, Numbers, Obstructed, PictureFormat, Pictures, Plan, Progress, Record, Report,
     Sample, Setup, Shard, SheetOptions, Sidecar, Split, SplitOrder, Studio, Times, Writer, Yolo,
     YoloTask, check, contact_sheet_of, generate, mend, merge,
 };
+use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
-use petcomp::label::{BBox, Labels, Mask, ObjectLabel};
-use petcomp::render::DeepImage;
+use petcomp::label::{Labels, Mask, ObjectLabel};
 use petcomp::scene::{CameraSource, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io, report};
 use std::collections::BTreeMap;

@@ -2,12 +2,11 @@
 
 use geo::Contains;
 use petcomp::camera::Camera;
+use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
-use petcomp::label::{
-    AmodalBox, BBox, DepthRange, LabelOptions, Labels, ObjectLabel, knotted, label,
-};
-use petcomp::render::{DeepImage, DeepSample};
+use petcomp::label::{AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, knotted, label};
 use petcomp::scene::{Card, Grade};
+use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use proptest::prelude::*;
 

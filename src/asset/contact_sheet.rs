@@ -2,9 +2,9 @@
 
 use super::{Library, Photo, Texture};
 use crate::color::to_srgb8;
+use crate::draw::{self, TextSize};
 use crate::filter;
 use crate::image::Image;
-use crate::label::draw::{self, TextSize};
 use crate::pixel::{Film, LinearRgb, Mix, Srgb8};
 use rayon::prelude::*;
 

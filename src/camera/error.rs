@@ -1,6 +1,7 @@
 //! Why no camera could be found.
 
 use super::warning::Warning;
+use crate::error::Error;
 
 /// Why no camera could be found.
 #[non_exhaustive]
@@ -107,5 +108,13 @@ fn cure(exchanged: Option<[f64; 2]>) -> String {
         }
         None => "wrong dimensions, corners of different rectangles, strong distortion, or corner_sigma_px is too small"
             .into(),
+    }
+}
+
+impl From<SolveError> for Error {
+    fn from(error: SolveError) -> Self {
+        Self::Camera {
+            what: error.to_string(),
+        }
     }
 }

@@ -19,7 +19,6 @@ mod import;
 mod init;
 mod joint;
 mod label;
-mod locate;
 mod marker;
 mod model;
 mod options;
@@ -53,7 +52,6 @@ pub use label::{
     Artwork, Crop, Framing, Label, LabelCamera, LabelFormat, LabelImage, LabelPoint, LabelSurface,
     MarkerMap, PixelOrigin,
 };
-pub use locate::locate;
 pub(crate) use marker::any_markers;
 #[cfg(test)]
 pub(crate) use marker::printed;

@@ -2,9 +2,9 @@
 
 use super::solution::Solution;
 use crate::color::{decode_srgb8, encode_srgb8};
+use crate::draw::{self, TextSize};
 use crate::geom::{Point2, Point3, Vector2};
 use crate::image::Image;
-use crate::label::draw::{self, TextSize};
 use crate::pixel::{LinearRgb, Srgb8};
 use nalgebra::{Matrix2, SymmetricEigen};
 

@@ -3,12 +3,12 @@
 //! Each is a fold of its own over the samples, done only when asked for.
 
 use super::cryptomatte::cryptomatte;
+use crate::deep::{DeepImage, DeepSample};
 use crate::error::Error;
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
 use crate::io::exr_parts::{Part, Plane};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, DeepSample};
 use crate::scene::{Card, Shot};
 use std::str::FromStr;
 

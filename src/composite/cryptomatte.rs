@@ -1,9 +1,10 @@
 //! Cryptomatte: soft mattes of all objects in a few channels.
 
 use super::aov::{floats, pixels};
+use crate::deep::DeepImage;
 use crate::io::exr_parts::Part;
 use crate::pixel::ObjectId;
-use crate::render::{DeepImage, id_of, murmur3};
+use crate::render::{id_of, murmur3};
 use std::collections::BTreeMap;
 
 /// Objects kept per pixel, those that are seen most; two in each group of four channels.
@@ -96,10 +97,10 @@ fn identifier(name: &str) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deep::DeepSample;
     use crate::image::Image;
     use crate::io::exr_parts::Plane;
     use crate::pixel::{Depth, LinearRgb};
-    use crate::render::DeepSample;
 
     /// Published test vectors of MurmurHash3_x86_32 with seed 0.
     #[test]

@@ -1,9 +1,9 @@
 //! The frame as a camera would have given it: noise where there was none, white balance, exposure, sharpening.
 
+use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix, PremulRgba};
-use crate::render::DeepImage;
 use crate::scene::{Finish, Noise};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
@@ -126,8 +126,8 @@ fn mixed(n: u64) -> u64 {
 mod tests {
     use super::*;
     use crate::composite::frame;
+    use crate::deep::DeepSample;
     use crate::pixel::{Depth, ObjectId};
-    use crate::render::DeepSample;
 
     /// The left half bare plate, the right half an opaque card of 0.5.
     fn deep(size: usize) -> DeepImage {

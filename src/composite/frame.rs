@@ -1,8 +1,8 @@
 //! The finished frame: what objects add, over what their shadows leave of the plate.
 
+use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::DeepImage;
 
 /// Folds deep samples into a picture, over `plate` where there is one.
 ///
@@ -35,8 +35,8 @@ pub fn film(deep: &DeepImage) -> Image<Film> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deep::DeepSample;
     use crate::pixel::{Depth, ObjectId};
-    use crate::render::DeepSample;
 
     fn sample(light: f32, visible: f32) -> DeepSample {
         DeepSample {

@@ -9,7 +9,7 @@ use crate::dataset::{Part, YoloSet};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::pixel::PremulRgba;
-use crate::report::Table;
+use crate::plot::Table;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

@@ -3,7 +3,8 @@
 use crate::bounds::Bounds;
 use crate::dataset::{Coco, Layers, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
 use crate::error::Result;
-use crate::label::{AmodalBox, BBox, LabelOptions, Mask, ObjectLabel};
+use crate::geom::BBox;
+use crate::label::{AmodalBox, LabelOptions, Mask, ObjectLabel};
 use serde::{Deserialize, Serialize};
 
 /// How labels are made and written: the table `[labels]` of a recipe.

@@ -1,12 +1,13 @@
 //! One EXR file for each image with everything a compositor asks for.
 
 use crate::dataset::{Entry, Part, Writer};
+use crate::deep::{DeepImage, DeepSample};
 use crate::error::Result;
 use crate::io;
 use crate::io::exr::write_channels;
 use crate::label::LabelOptions;
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::render::{Cryptomatte, DeepImage, DeepSample};
+use crate::render::Cryptomatte;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

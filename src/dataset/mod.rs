@@ -33,8 +33,10 @@ mod listing;
 mod merge;
 mod near;
 mod obstructed;
+pub mod page;
 mod pictures;
 mod place;
+mod quality;
 mod run;
 mod setup;
 mod shard;
@@ -83,11 +85,11 @@ pub use yolo::{Yolo, YoloTask};
 pub use yolo_set::YoloSet;
 pub(crate) use yolo_yaml::DataYaml;
 
+use crate::deep::DeepImage;
 use crate::error::Result;
 use crate::image::Image;
 use crate::label::Labels;
 use crate::pixel::PremulRgba;
-use crate::render::DeepImage;
 use crate::scene::{Drawn, Scene};
 use std::path::{Path, PathBuf};
 

@@ -3,20 +3,22 @@
 use crate::allowance::Allowance;
 use crate::asset::{Library, Panorama};
 use crate::bounds::LEAST_OBJECT_PX;
-use crate::camera;
 use crate::composite;
 use crate::dataset::fingerprint::fingerprint;
 use crate::dataset::place::{Place, PlaceOptions};
 use crate::dataset::surroundings::Surroundings;
 use crate::dataset::times::timed;
 use crate::dataset::{Inputs, Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
+use crate::deep::DeepImage;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::label::{self, Labels};
 use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
-use crate::render::{self, DeepImage};
-use crate::scene::{Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, stock};
+use crate::render::{self};
+use crate::scene::{
+    Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, locate, stock,
+};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -286,7 +288,7 @@ impl Studio {
 
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
         let plate = self.plate(&scene.plate)?;
-        let mut scene = self.rest(camera::locate(scene)?, allowance)?;
+        let mut scene = self.rest(locate(scene)?, allowance)?;
         if let Some(plate) = &plate {
             scene = light::match_plate(scene, plate);
         }

@@ -2,8 +2,8 @@
 
 use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
 use crate::error::Result;
+use crate::geom::BBox;
 use crate::io;
-use crate::label::BBox;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -2,8 +2,8 @@
 
 use super::{FARTHEST_PX, FoundBox, Picture, Sheet, TrueBox};
 use crate::error::{Error, Result};
+use crate::geom::BBox;
 use crate::io;
-use crate::label::BBox;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};

@@ -15,6 +15,7 @@ mod curve;
 mod matches;
 mod mistake;
 mod overlap;
+pub mod page;
 mod pairing;
 mod picture;
 mod rank;
@@ -39,7 +40,7 @@ pub(crate) use yolo::sheet_of as yolo_sheet;
 pub use yolo::{YoloTruth, read_yolo_found, read_yolo_truth};
 pub use yolov5::yolov5;
 
-use crate::label::BBox;
+use crate::geom::BBox;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

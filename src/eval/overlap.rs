@@ -1,6 +1,6 @@
 //! How much two boxes share.
 
-use crate::label::BBox;
+use crate::geom::BBox;
 
 /// Intersection over union; 0 where the union is empty.
 pub fn iou(a: &BBox, b: &BBox) -> f64 {

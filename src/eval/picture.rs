@@ -1,7 +1,8 @@
 //! Curves and the confusion matrix as SVG.
 
 use super::{Confusion, Curves};
-use crate::report::{Axis, Chart, clipped, escaped};
+use crate::label::clipped;
+use crate::plot::{Axis, Chart, escaped};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -2,8 +2,8 @@
 
 use super::{FoundBox, Picture, Sheet, TrueBox};
 use crate::error::{Error, Result};
+use crate::geom::BBox;
 use crate::io;
-use crate::label::BBox;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@ use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::BoxIndex;
 use super::rank::{Hit, Marks, Ranking, Running};
 use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS};
-use crate::label::BBox;
+use crate::geom::BBox;
 use rayon::prelude::*;
 
 /// Confidences at which precision, recall and F1 are read.

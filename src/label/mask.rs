@@ -1,6 +1,7 @@
 //! Masks: which pixels of a picture belong to an object, as runs down its columns.
 
-use crate::label::{BBox, rle};
+use crate::geom::BBox;
+use crate::label::rle;
 use serde::{Deserialize, Serialize};
 
 /// Yes or no for each pixel of a picture, in the run lengths that COCO uses.

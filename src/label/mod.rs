@@ -3,9 +3,8 @@
 //! Masks, boxes and visibility are folds over the deep samples, so a label cannot disagree with its picture. Outlines and the
 //! topmost rule are geometry: the cards' outlines as the camera sees them.
 
-mod bbox;
 mod border;
-pub(crate) mod draw;
+pub(crate) mod gallery;
 mod mask;
 mod outline;
 pub(crate) mod overlay;
@@ -15,17 +14,17 @@ mod topmost;
 pub mod trace;
 mod visibility;
 
-pub use bbox::BBox;
 pub use border::{Border, borders};
+pub(crate) use gallery::clipped;
 pub use mask::Mask;
 pub use overlay::overlay;
 pub use topmost::knotted;
 pub use visibility::DepthRange;
 
 use crate::camera::Camera;
-use crate::geom::Point2;
+use crate::deep::DeepImage;
+use crate::geom::{BBox, Point2};
 use crate::pixel::ObjectId;
-use crate::render::DeepImage;
 use crate::scene::{Card, Shot};
 use geo::MultiPolygon;
 use serde::{Deserialize, Serialize};

@@ -7,8 +7,8 @@
 //! resolves under the non-zero rule: whatever the outline winds around is inside.
 
 use crate::camera::Camera;
+use crate::geom::BBox;
 use crate::geom::{Point2, Vector3};
-use crate::label::BBox;
 use crate::scene::Card;
 use geo::bool_ops::FillRule;
 use geo::{Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon};

@@ -1,9 +1,10 @@
 //! Labels drawn onto their picture, to look at.
 
 use crate::color::encode_srgb8;
+use crate::draw::{self, TextSize};
+use crate::geom::BBox;
 use crate::image::Image;
-use crate::label::draw::{self, TextSize};
-use crate::label::{BBox, Labels, ObjectLabel};
+use crate::label::{Labels, ObjectLabel};
 use crate::pixel::{PremulRgba, Srgb8};
 
 /// Colour of outlines without a label.

@@ -1,9 +1,9 @@
 //! What is seen of each object: one fold over the deep samples.
 
+use crate::deep::{DeepImage, DeepSample};
 use crate::label::mask::Bits;
 use crate::label::{LabelOptions, Mask};
 use crate::pixel::ObjectId;
-use crate::render::{DeepImage, DeepSample};
 use crate::work::{self, Kind};
 use serde::{Deserialize, Serialize};
 

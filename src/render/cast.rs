@@ -1,8 +1,10 @@
 //! A shot becomes deep samples, fast.
 
 use crate::asset::Texture;
+use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
+use crate::render::RenderOptions;
 use crate::render::half_plane::sides;
 use crate::render::irradiance::{Map, maps};
 use crate::render::lattice::Lattice;
@@ -12,7 +14,6 @@ use crate::render::receiver::Studio;
 use crate::render::shadow::{Casters, rows_and_columns};
 use crate::render::texture::Baked;
 use crate::render::view::{Seen, Sheet, View, sheets};
-use crate::render::{DeepImage, RenderOptions};
 use crate::scene::{Card, Shot};
 use crate::work::{self, Kind};
 use rayon::prelude::*;

@@ -6,8 +6,8 @@
 //! channels; text attributes name the layer, the hash and the objects. Readers need the floats exactly: no half, and no
 //! compression with loss.
 
+use crate::deep::DeepImage;
 use crate::pixel::ObjectId;
-use crate::render::DeepImage;
 
 /// Sets of four channels, two ranks each: the six ranks that most programs write.
 const SETS: usize = 3;
@@ -128,9 +128,9 @@ pub(crate) fn murmur3(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::deep::DeepSample;
     use crate::image::Image;
     use crate::pixel::LinearRgb;
-    use crate::render::DeepSample;
 
     /// Values of the Python package mmh3 5.
     const HASHES: [(&str, u32); 7] = [

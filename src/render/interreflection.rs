@@ -1,10 +1,10 @@
 //! Light that goes to and fro between the surface and the cards over it.
 
+use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
-use crate::render::DeepImage;
 use crate::render::reference::texel;
 use crate::render::view::{Seen, Sheet, View, sheets};
 use crate::scene::{Card, Shot};

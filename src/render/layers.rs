@@ -4,9 +4,9 @@
 //! a block it holds in all of it. A block where it does not (cards cross) is split until it does, or until it is one
 //! pixel: order is decided by depth at the pixel's centre there. Inside a block each card is walked once, as a layer.
 
+use crate::deep::DeepSample;
 use crate::geom::Vector3;
 use crate::pixel::{Depth, LinearRgb, ObjectId};
-use crate::render::DeepSample;
 use crate::render::four::Four;
 use crate::render::half_plane::{meet, sides, span, whole};
 use crate::render::irradiance::Map;

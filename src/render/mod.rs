@@ -13,9 +13,6 @@
 mod cast;
 mod check;
 mod cryptomatte;
-mod deep;
-#[cfg(test)]
-mod definition;
 mod four;
 mod half_plane;
 mod interreflection;
@@ -28,6 +25,8 @@ mod receiver;
 mod reference;
 mod shadow;
 mod source;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod through;
 mod view;
@@ -36,7 +35,6 @@ pub use cast::{cast, cover};
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{id_of, murmur3};
-pub use deep::{DeepImage, DeepSample};
 pub use interreflection::interreflect;
 pub use options::{Preset, RenderOptions};
 pub use reference::reference;

@@ -1,15 +1,16 @@
 //! The definition, sample by sample: slow and obviously right.
 
 use crate::asset::Texture;
+use crate::deep::{DeepImage, DeepSample};
 use crate::filter::sample_bilinear;
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Depth, Film, LinearRgb, Mix};
+use crate::render::RenderOptions;
 use crate::render::pixel_filter::quantiles;
 use crate::render::source::{Kind, Lamp, Lamps, Source};
 use crate::render::texture::{graded_opacity, mean};
 use crate::render::view::{Seen, Sheet, View, sheets};
-use crate::render::{DeepImage, DeepSample, RenderOptions};
 use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 use std::f32::consts::PI;

@@ -10,10 +10,10 @@ pub use coverage::Coverage;
 pub use diagram::diagrams;
 
 use super::clock::cpu_seconds;
-use super::{Axis, Chart, Curve};
 use crate::camera::simulate::{Scenario, View, distorted};
 use crate::camera::{self, Effort, Priors, Solution, SolveOptions};
 use crate::geom::Point3;
+use crate::plot::{Axis, Chart, Curve};
 use crate::{Error, Result, io};
 use std::path::Path;
 

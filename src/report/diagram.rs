@@ -1,8 +1,8 @@
 //! Work-precision diagrams: the error of a stage against what it costs, a point for each setting.
 
-use super::chart::Beside;
-use super::number::three;
-use super::{Axis, Chart, Curve, Table};
+use crate::plot::chart::Beside;
+use crate::plot::number::three;
+use crate::plot::{Axis, Chart, Curve, Table};
 use crate::quality::Quality;
 
 /// Costs closer than this are equal: the noise of timings, as a factor.

@@ -4,13 +4,13 @@
 //! against OpenImageIO's.
 
 use super::clock::timed;
-use super::number::three;
 use super::pile::pile;
 use super::{Diagram, Point};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io::{self, Bits, Compression, PngEffort, WriteOptions};
 use crate::pixel::{LinearRgb, PremulRgba};
+use crate::plot::number::three;
 use crate::quality::Quality;
 use crate::render::cast;
 use crate::{Shot, composite};

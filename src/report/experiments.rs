@@ -1,9 +1,9 @@
 //! Our trainings beside the paper's.
 
-use super::eval::{Metrics, Spread};
-use super::{Page, Table};
 use crate::error::{Error, Result};
+use crate::eval::page::{Metrics, Spread};
 use crate::io;
+use crate::plot::{Page, Table};
 use crate::train::{Updates, batches_per_epoch};
 use serde::Deserialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};

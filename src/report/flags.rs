@@ -8,7 +8,6 @@ mod variant;
 
 pub use variant::{Expected, Variant};
 
-use super::Table;
 use super::matte::score::overlap;
 use super::matte::truth::Truths;
 use super::matte::{GOOD_BOX_PX, GOOD_IOU};
@@ -18,6 +17,7 @@ use crate::image::Image;
 use crate::io;
 use crate::matte::{CutOut, CutOutOptions, Remark, cut_out};
 use crate::pixel::{Coverage, LinearRgb};
+use crate::plot::Table;
 use rayon::prelude::*;
 use std::path::Path;
 

@@ -3,13 +3,13 @@
 //! The reference is the mean over the window in double precision, added up pixel by pixel from the matte before the blur.
 
 use super::clock::timed;
-use super::number::three;
 use super::{Diagram, Point};
 use crate::error::Result;
 use crate::image::Image;
 use crate::matte::key::Blur;
 use crate::matte::{KeyOptions, Keying, Screen};
 use crate::pixel::{Coverage, LinearRgb};
+use crate::plot::number::three;
 
 const SIZE: (usize, usize) = (640, 480);
 /// Sizes of the blur, pixels: a window reaches one pixel less to every side.

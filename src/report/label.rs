@@ -6,12 +6,12 @@
 use super::clock::timed;
 use super::pile::above;
 use super::{Diagram, Point};
+use crate::deep::{DeepImage, DeepSample};
 use crate::error::Result;
 use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3};
 use crate::image::Image;
 use crate::label::{LabelOptions, Labels, Mask, label, outline_of, trace};
 use crate::pixel::{Depth, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, DeepSample};
 use crate::scene::{Card, Grade, Shot};
 use std::f64::consts::{PI, TAU};
 

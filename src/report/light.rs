@@ -7,13 +7,14 @@
 use super::clock::timed;
 use super::pile::above;
 use super::{Diagram, Point};
+use crate::deep::DeepImage;
 use crate::error::Result;
 use crate::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
 use crate::image::Image;
 use crate::light::{frame, polygon_irradiance};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::quality::Quality;
-use crate::render::{DeepImage, RenderOptions, cast, reference};
+use crate::render::{RenderOptions, cast, reference};
 use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
 use std::f64::consts::PI;
 

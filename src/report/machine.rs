@@ -1,6 +1,6 @@
 //! What the measurements were made on.
 
-use super::Table;
+use crate::plot::Table;
 use std::path::Path;
 
 const KIB_PER_GIB: f64 = 1024.0 * 1024.0;

@@ -18,11 +18,11 @@ pub use score::Score;
 pub use search::searches;
 
 use super::clock::cpu_seconds;
-use super::{Axis, Chart, Page, Table};
 use crate::error::Result;
 use crate::image::Image;
 use crate::io;
 use crate::pixel::LinearRgb;
+use crate::plot::{Axis, Chart, Page, Table};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::path::Path;

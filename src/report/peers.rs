@@ -1,10 +1,11 @@
 //! Other programs that do the same, measured beside petcomp in one run: `tests/benches/peers/<stage>.py` writes what is read
 //! here, `make peers` runs them.
 
-use super::number::three;
-use super::{Diagram, Point, Table};
+use super::{Diagram, Point};
 use crate::error::{Error, Result};
 use crate::io;
+use crate::plot::Table;
+use crate::plot::number::three;
 use serde::Deserialize;
 use std::path::Path;
 

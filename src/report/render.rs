@@ -7,10 +7,10 @@ mod diagram;
 pub use diagram::diagrams;
 
 use super::clock::timed;
-use super::{Axis, Chart, Table};
 use crate::diff::{Likeness, triple};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, PremulRgba};
+use crate::plot::{Axis, Chart, Table};
 use crate::render::{Preset, RenderOptions, cast, reference};
 use crate::scene::{Shot, cycles};
 use crate::{Error, Result, composite, io};

@@ -1,8 +1,9 @@
 //! Sections of a document of measurements, which becomes a page, Markdown, and a file of data for each table and plot.
 
-use super::{Diagram, Page, Table, escaped};
+use super::Diagram;
 use crate::error::Result;
 use crate::io;
+use crate::plot::{Page, Table, escaped};
 use std::path::Path;
 
 /// A part of a document under a heading of its own.
@@ -192,7 +193,7 @@ fn with_code(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::Chart;
+    use crate::plot::Chart;
 
     fn document() -> Document {
         let mut table = Table::new(["a", "b"]);

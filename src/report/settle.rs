@@ -14,8 +14,8 @@ mod diagram;
 pub use diagram::diagrams;
 
 use super::clock::cpu_seconds;
-use super::{Axis, Chart, Table};
 use crate::geom::UnitQuaternion;
+use crate::plot::{Axis, Chart, Table};
 use crate::scene::{Object, Placement, Scene, SettleOptions};
 use crate::settle::{Settled, Verdict, heap, settle};
 use crate::{Error, Result, io};

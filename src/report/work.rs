@@ -9,9 +9,9 @@ mod cases;
 mod tests;
 mod world;
 
-use super::Table;
 use crate::dataset::{Studio, generate};
 use crate::pixel::PremulRgba;
+use crate::plot::Table;
 use crate::work::{self, Kind, LARGE, Work};
 use crate::{Error, Result, io};
 use cases::{Asked, Case, cases};

@@ -2,9 +2,9 @@
 
 use super::overlap::Solid;
 use super::{SettleOptions, solids_at_rest};
+use crate::draw::{TextSize, class_color, ink_on, outline, rgb, text};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
-use crate::label::draw::{TextSize, class_color, ink_on, outline, rgb, text};
 use crate::pixel::Srgb8;
 use crate::scene::Scene;
 

@@ -4,8 +4,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use petcomp::camera::Camera;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{DeepImage, DeepSample};
 use petcomp::scene::{Card, Grade};
+use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
 use std::hint::black_box;
 

@@ -5,7 +5,9 @@ use crate::change::{self, Chance};
 use crate::world::{LIST, World};
 use petcomp::asset::{self, Library, List};
 use petcomp::camera::{self, CameraFile, ColmapModel, SolveOptions};
+use petcomp::dataset::page::DatasetReportOptions;
 use petcomp::dataset::{self, Listing, Setup, Sharing, Studio, YoloSet};
+use petcomp::eval::page::{EvalReportOptions, Metrics, Run};
 use petcomp::eval::{self, Tags};
 use petcomp::filter::Pyramid;
 use petcomp::io::{self, Override, Raise};
@@ -13,10 +15,8 @@ use petcomp::label::{self, Labels};
 use petcomp::matte::key::{KeyOptions, Keying, Screen};
 use petcomp::matte::{CutOutOptions, FilmOptions, SegmentOptions, cut_out, segment};
 use petcomp::render::RenderOptions;
-use petcomp::report::dataset::DatasetReportOptions;
-use petcomp::report::eval::{EvalReportOptions, Metrics, Run};
 use petcomp::scene::{Placement, SettleOptions, cycles};
-use petcomp::{Image, LinearRgb, PremulRgba, Result, Scene, render, report};
+use petcomp::{Image, LinearRgb, PremulRgba, Result, Scene, render};
 use serde_json::Value;
 use std::sync::atomic::AtomicBool;
 
@@ -454,7 +454,7 @@ fn dataset_folder(world: &World) {
     let folder = world.path("dataset");
     ends(dataset::contact_sheet_of(&folder, 24, &Default::default()));
     ends(
-        report::dataset::page(
+        dataset::page::page(
             &folder,
             &DatasetReportOptions {
                 most: 4,
@@ -523,7 +523,7 @@ fn evaluated(world: &World, sheets: Vec<eval::Sheet>) {
         sheets,
     };
     Metrics::of(&run, &options);
-    ends(report::eval::write(&world.path("eval"), &[run], &options));
+    ends(eval::page::write(&world.path("eval"), &[run], &options));
 }
 
 fn yolo_eval(world: &World) {
@@ -560,7 +560,7 @@ fn tags(world: &World) {
         name: "run".into(),
         sheets,
     };
-    report::eval::factors_table(
+    eval::page::factors_table(
         &[run],
         &EvalReportOptions {
             tags,

@@ -2,7 +2,7 @@
 
 use crate::case::Case;
 use petcomp::eval::{self, FoundBox, Scores, Sheet, TrueBox};
-use petcomp::label::BBox;
+use petcomp::geom::BBox;
 use serde::Deserialize;
 use std::path::Path;
 

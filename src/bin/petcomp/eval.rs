@@ -3,11 +3,11 @@
 use crate::common::{Common, count};
 use crate::print;
 use petcomp::dataset::YoloSet;
+use petcomp::eval::page::{self, EvalReportOptions, Run};
 use petcomp::eval::{
     ConfusionOptions, Sheet, Tags, read_coco_results, read_coco_truth, read_tags, read_yolo_found,
     read_yolo_truth,
 };
-use petcomp::report::eval::{self, EvalReportOptions, Run};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

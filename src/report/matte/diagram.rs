@@ -2,7 +2,7 @@
 
 use super::{Method, Score, Summary, made, measure, measure_known, summaries};
 use crate::error::Result;
-use crate::report::number::three;
+use crate::plot::number::three;
 use crate::report::{Diagram, Point};
 use std::path::Path;
 

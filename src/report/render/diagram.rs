@@ -1,12 +1,13 @@
 //! The renderer's samples and filters: error against Cycles, over run time.
 
 use crate::composite;
+use crate::deep::DeepImage;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::quality::Quality;
-use crate::render::{DeepImage, Preset, RenderOptions, cast, reference};
+use crate::render::{Preset, RenderOptions, cast, reference};
 use crate::report::clock::timed;
 use crate::report::{Diagram, Point};
 use crate::scene::{Shot, cycles};

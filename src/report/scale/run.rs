@@ -7,9 +7,10 @@ use crate::camera::Camera;
 use crate::dataset::{
     Numbers, Obstructed, Pictures, Plan, Sample, Sidecar, Split, Times, Writer, Yolo, generate,
 };
+use crate::deep::DeepImage;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::label::{LabelOptions, label};
-use crate::render::{DeepImage, RenderOptions, cast};
+use crate::render::{RenderOptions, cast};
 use crate::report::pile::{above, lamp};
 use crate::report::settle::median_and_worst;
 use crate::scene::{CameraSource, Exposure, Grade, Look, Object, Placement, Scene, Shot, Surface};

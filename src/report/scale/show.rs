@@ -2,7 +2,7 @@
 
 use super::{Measured, Model, Point, forecast, grid};
 use crate::Result;
-use crate::report::{Axis, Chart, Curve, Table};
+use crate::plot::{Axis, Chart, Curve, Table};
 
 /// Pictures that are forecast.
 const MILLION: f64 = 1e6;

@@ -1,8 +1,8 @@
 //! The physics' steps: errors of heaps at rest against run time.
 
 use super::{CARDS, PLATES, Row};
+use crate::plot::number::three;
 use crate::quality::Quality;
-use crate::report::number::three;
 use crate::report::{Diagram, Point};
 use crate::scene::SettleOptions;
 

@@ -3,11 +3,12 @@
 use super::staged::above;
 use super::{Case, Outcome};
 use crate::composite::{finish, frame};
+use crate::deep::{DeepImage, DeepSample};
 use crate::error::Result;
 use crate::image::Image;
 use crate::label::{LabelOptions, label};
 use crate::pixel::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, DeepSample, RenderOptions, cast};
+use crate::render::{RenderOptions, cast};
 use crate::scene::{Finish, Shot};
 use std::sync::Arc;
 

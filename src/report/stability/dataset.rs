@@ -7,11 +7,12 @@ use crate::dataset::{
     Format, JOURNAL, LabelSetup, Numbers, Obstructed, Part, Pictures, Plan, Sample, Shard, Sidecar,
     Split, SplitOrder, Times, Writer, check, generate, mend,
 };
+use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::{LabelOptions, label};
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::render::{DeepImage, DeepSample, RenderOptions, cast};
+use crate::render::{RenderOptions, cast};
 use crate::scene::{Background, CameraSource, Range, Recipe, Shot};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;

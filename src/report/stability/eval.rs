@@ -6,7 +6,7 @@ use crate::eval::{
     Confusion, ConfusionOptions, Definition, FoundBox, Scores, Sheet, TrueBox, bootstrap, coco,
     curves, evaluate, iou,
 };
-use crate::label::BBox;
+use crate::geom::BBox;
 
 /// Boxes of the largest case.
 const MANY: usize = 100_000;

@@ -2,12 +2,14 @@
 
 use super::staged::{above, card, grey, level, tilted};
 use super::{Case, Outcome};
+use crate::deep::{DeepImage, DeepSample};
 use crate::error::Result;
+use crate::geom::BBox;
 use crate::geom::Point2;
 use crate::image::Image;
-use crate::label::{AmodalBox, BBox, LabelOptions, Labels, Mask, ObjectLabel, label};
+use crate::label::{AmodalBox, LabelOptions, Labels, Mask, ObjectLabel, label};
 use crate::pixel::{Depth, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, DeepSample, RenderOptions, cast};
+use crate::render::{RenderOptions, cast};
 use crate::scene::{Card, Shot};
 use std::f64::consts::FRAC_PI_2;
 

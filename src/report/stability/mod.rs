@@ -24,9 +24,9 @@ mod staged;
 
 pub use case::{Case, Outcome};
 
-use super::Table;
 use crate::error::{Error, Result};
 use crate::io::{create_folder, write_text};
+use crate::plot::Table;
 use std::path::Path;
 
 /// Makes the cases of a stage.

@@ -3,11 +3,12 @@
 use super::staged::{above, card, grey, lamp, level, looking_at, projected_area, small, tilted};
 use super::{Case, Outcome, memory, render_light};
 use crate::composite;
+use crate::deep::DeepImage;
 use crate::error::Result;
 use crate::geom::UnitQuaternion;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::{DeepImage, Preset, RenderOptions, cast, interreflect, reference};
+use crate::render::{Preset, RenderOptions, cast, interreflect, reference};
 use crate::scene::{Card, Shot};
 use std::f64::consts::FRAC_PI_2;
 

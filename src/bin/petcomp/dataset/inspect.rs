@@ -2,8 +2,8 @@
 
 use crate::common::{Common, NeedsReview};
 use crate::print;
+use petcomp::dataset::page::DatasetReportOptions;
 use petcomp::dataset::{self, Checked, contact_sheet_of};
-use petcomp::report::dataset::DatasetReportOptions;
 use petcomp::{io, report};
 use std::path::{Path, PathBuf};
 

@@ -10,6 +10,9 @@
 //!   Texture coordinates `u, v` run from 0 to 1, right and *down*.
 //! * **Names**: a transform is called `target_from_source`, so that `camera_from_world * world_from_card` reads and cancels.
 
+mod bbox;
+
+pub use bbox::BBox;
 pub use nalgebra::{Point2, Point3, UnitQuaternion, Vector2, Vector3};
 
 /// A rigid placement: rotation, then translation in metres. Names say which frames it joins (`world_from_card`).

@@ -3,11 +3,12 @@
 use crate::asset::{Panorama, Texture};
 use crate::camera::Camera;
 use crate::composite;
+use crate::deep::DeepImage;
 use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{DeepImage, Preset, RenderOptions, cast, check, interreflect, reference};
+use crate::render::{Preset, RenderOptions, cast, check, interreflect, reference};
 use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;

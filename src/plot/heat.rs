@@ -11,7 +11,7 @@ const TOP: f64 = 22.0;
 
 /// How many places, as shares of a picture's width and height, lie in each part of it: the darker the more. Those
 /// outside the picture are left out.
-pub(super) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
+pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
     let mut counts = vec![0_u64; CELLS[0] * CELLS[1]];
     for place in places
         .iter()

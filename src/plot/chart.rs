@@ -50,11 +50,11 @@ pub struct Chart {
 
 /// What a large chart has beyond a small one.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Beside {
+pub(crate) struct Beside {
     /// Words beside points; those without room are left out.
-    pub(super) labels: Vec<([f64; 2], String)>,
+    pub(crate) labels: Vec<([f64; 2], String)>,
     /// Points of one curve have nothing between them, and no line.
-    pub(super) apart: bool,
+    pub(crate) apart: bool,
 }
 
 /// The points of a curve, from left to right; points that are not finite, or not positive on a logarithmic axis, are left out.
@@ -160,7 +160,7 @@ impl Chart {
     }
 
     /// A chart by itself, larger than in a row, as an SVG document.
-    pub(super) fn alone(&self, beside: &Beside) -> String {
+    pub(crate) fn alone(&self, beside: &Beside) -> String {
         Self::drawing(std::slice::from_ref(self), ALONE, beside)
     }
 

@@ -1,10 +1,10 @@
 //! What a detector got wrong, as a table and as pictures, the worst first.
 
-use super::eval::{EvalReportOptions, Run};
-use super::gallery::{self, Figure, gallery, marked_box};
-use super::{Page, Table};
+use super::{EvalReportOptions, Run};
 use crate::eval::{FoundBox, Kind, Mistake, Picture, Sheet, TrueBox, class_name};
-use crate::label::BBox;
+use crate::geom::BBox;
+use crate::label::gallery::{self, Figure, gallery, marked_box};
+use crate::plot::{Page, Table};
 use rayon::prelude::*;
 
 /// Colours of Okabe and Ito, which every kind of colour vision tells apart.
@@ -25,7 +25,7 @@ const LEAST_SHARE: f64 = 0.15;
 const MOST_OTHERS: usize = 100;
 
 /// All mistakes of a run, one a row.
-pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
+pub(crate) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
     let columns = [
         "image",
         "mistake",
@@ -67,7 +67,7 @@ pub(super) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions
 }
 
 /// The worst mistakes as pictures.
-pub(super) fn put_on(
+pub(crate) fn put_on(
     page: &mut Page,
     run: &Run,
     mistakes: &[Mistake],

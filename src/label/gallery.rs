@@ -1,13 +1,13 @@
 //! Pictures in a grid on a page, each enlarged by a click or by the keyboard, without another file.
 
-use super::{base64, escaped};
 use crate::color::to_srgb8;
 use crate::error::Result;
 use crate::filter::resize;
+use crate::geom::BBox;
 use crate::image::{Image, Roi};
 use crate::io;
-use crate::label::BBox;
 use crate::pixel::LinearRgb;
+use crate::plot::{base64, escaped};
 use std::path::Path;
 
 /// Longest side of a picture on a page, pixels, and its quality as JPEG: about 30 kB.
@@ -16,7 +16,7 @@ const QUALITY: u8 = 82;
 
 /// What a page with galleries needs once. An enlarged picture is the target of the address, so no script is needed for
 /// it; the script adds the keys Escape and the arrows.
-pub(super) const STYLE: &str = "<style>.gallery{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));\
+pub(crate) const STYLE: &str = "<style>.gallery{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));\
     gap:14px;margin:1em 0}.gallery>div{min-width:0}.gallery figure{margin:0;overflow:visible}\
     .gallery .frame{display:block;position:relative;width:min(100%,calc(320px*var(--aspect)));background:#eee}\
     .gallery img{display:block;width:100%}.gallery svg{position:absolute;inset:0;width:100%;height:100%}\
@@ -29,14 +29,14 @@ pub(super) const STYLE: &str = "<style>.gallery{display:grid;grid-template-colum
     a=c&&document.querySelector('.gallery figure:target '+c);if(a){e.preventDefault();a.click()}})</script>\n";
 
 /// A picture with what is drawn over it.
-pub(super) struct Figure {
+pub(crate) struct Figure {
     jpeg: Vec<u8>,
     /// The part of the picture that is shown, in the units of the drawing.
     view: BBox,
     /// Marks as SVG.
-    pub(super) drawing: String,
+    pub(crate) drawing: String,
     /// What is to be seen.
-    pub(super) caption: String,
+    pub(crate) caption: String,
 }
 
 impl Figure {
@@ -44,7 +44,7 @@ impl Figure {
     ///
     /// # Errors
     /// A picture that cannot be read.
-    pub(super) fn of(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
+    pub(crate) fn of(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
         let picture = io::read::<LinearRgb>(path)?;
         let scale = [
             picture.width() as f64 / size[0],
@@ -87,7 +87,7 @@ impl Figure {
     ///
     /// # Errors
     /// As [`Figure::of`].
-    pub(super) fn whole(path: &Path, size: [f64; 2]) -> Result<Self> {
+    pub(crate) fn whole(path: &Path, size: [f64; 2]) -> Result<Self> {
         Self::of(
             path,
             size,
@@ -101,12 +101,12 @@ impl Figure {
     }
 
     /// Height of letters, in the units of the drawing.
-    pub(super) fn letter(&self) -> f64 {
+    pub(crate) fn letter(&self) -> f64 {
         0.045 * self.view.width().max(self.view.height())
     }
 
     /// Where it begins, in the units of the drawing.
-    pub(super) fn top(&self) -> f64 {
+    pub(crate) fn top(&self) -> f64 {
         self.view.y0
     }
 
@@ -156,7 +156,7 @@ fn small(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
 }
 
 /// A grid of figures; `name` begins their addresses on the page.
-pub(super) fn gallery(name: &str, figures: &[Figure]) -> String {
+pub(crate) fn gallery(name: &str, figures: &[Figure]) -> String {
     let all: String = figures
         .iter()
         .enumerate()
@@ -166,7 +166,7 @@ pub(super) fn gallery(name: &str, figures: &[Figure]) -> String {
 }
 
 /// A box with words at its upper left corner, inside it where there is no room above; `style` are attributes.
-pub(super) fn marked_box(
+pub(crate) fn marked_box(
     b: &BBox,
     text: &str,
     letter: f64,
@@ -192,7 +192,7 @@ pub(super) fn marked_box(
 }
 
 /// Words that begin at a place.
-pub(super) fn words([x, y]: [f64; 2], text: &str, letter: f64, color: &str) -> String {
+pub(crate) fn words([x, y]: [f64; 2], text: &str, letter: f64, color: &str) -> String {
     let text = escaped(text);
     format!(
         "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{letter:.2}\" fill=\"{color}\">{text}</text>"

@@ -1,17 +1,17 @@
 //! A dataset beside the user's own photographs: distributions that should be alike.
 
-use super::gallery::{Figure, gallery, marked_box};
 use super::outlier::{quantile, short};
-use super::{Page, Table, escaped, heat::heat_map};
 use crate::color::encode_srgb8;
 use crate::dataset::{Listing, YoloSet};
 use crate::error::{Error, Result};
 use crate::eval;
 use crate::filter::resize;
+use crate::geom::BBox;
 use crate::image::Image;
 use crate::io;
-use crate::label::BBox;
+use crate::label::gallery::{Figure, gallery, marked_box};
 use crate::pixel::LinearRgb;
+use crate::plot::{Page, Table, escaped, heat::heat_map};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -37,18 +37,18 @@ const THEIRS: &str = "#d55e00";
 
 /// Pictures with boxes, from wherever.
 #[derive(Default)]
-pub(super) struct Set {
+pub(crate) struct Set {
     /// Names of the classes, in order; may be fewer than occur.
-    pub(super) classes: Vec<String>,
-    pub(super) pictures: Vec<Labelled>,
+    pub(crate) classes: Vec<String>,
+    pub(crate) pictures: Vec<Labelled>,
 }
 
 /// A picture and its boxes.
 #[derive(Clone)]
-pub(super) struct Labelled {
-    pub(super) path: PathBuf,
+pub(crate) struct Labelled {
+    pub(crate) path: PathBuf,
     /// Class, and centre, width and height as shares of the picture's; none for a picture without a label file.
-    pub(super) boxes: Option<Vec<(u32, [f64; 4])>>,
+    pub(crate) boxes: Option<Vec<(u32, [f64; 4])>>,
 }
 
 impl Set {
@@ -56,7 +56,7 @@ impl Set {
     ///
     /// # Errors
     /// A folder without images; a label that cannot be read.
-    pub(super) fn read(folder: &Path) -> Result<Self> {
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
         let (classes, images) = if folder.join("data.yaml").is_file() {
             let listing = Listing::read(folder)?;
             (listing.classes.clone(), listing.series())
@@ -245,7 +245,7 @@ fn mean(values: impl Iterator<Item = f32>) -> f64 {
 }
 
 /// Puts the two side by side, what differs most first, with at most `most` of the others' pictures.
-pub(super) fn put_on(page: &mut Page, ours: &Set, theirs: &Set, most: usize) {
+pub(crate) fn put_on(page: &mut Page, ours: &Set, theirs: &Set, most: usize) {
     page.heading("Beside your own pictures");
     let unlabelled = theirs
         .pictures
@@ -312,7 +312,7 @@ fn figure(set: &Set, picture: &Labelled) -> Option<Figure> {
             x1: b.x1 * size[0],
             y1: b.y1 * size[1],
         };
-        let color = super::dataset::color_of(*class);
+        let color = super::color_of(*class);
         figure.drawing += &marked_box(
             &b,
             &set.name(*class),

@@ -1,22 +1,22 @@
 //! What is unlike the rest, in robust standard deviations.
 
 /// A number of every row.
-pub(super) struct Feature<'a> {
+pub(crate) struct Feature<'a> {
     /// What it is: `objects`.
-    pub(super) name: &'a str,
+    pub(crate) name: &'a str,
     /// One for each row; those that are not finite are not looked at.
-    pub(super) values: Vec<f64>,
+    pub(crate) values: Vec<f64>,
 }
 
 /// A row that is unlike the others.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Outlier {
+pub(crate) struct Outlier {
     /// Which row.
-    pub(super) row: usize,
+    pub(crate) row: usize,
     /// How far it is from the median, in robust standard deviations.
-    pub(super) deviations: f64,
+    pub(crate) deviations: f64,
     /// By what: `objects 17, as a rule 8`.
-    pub(super) why: String,
+    pub(crate) why: String,
 }
 
 /// From so many deviations on a value is unlike the others ([Iglewicz and Hoaglin 1993]).
@@ -33,7 +33,7 @@ const OF_MEAN: f64 = 1.2533;
 /// # Method
 /// The modified z-score of Iglewicz and Hoaglin: distance from the median over the median absolute deviation, or over the
 /// mean one where most values are the same.
-pub(super) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
+pub(crate) fn outliers(features: &[Feature<'_>]) -> Vec<Outlier> {
     let mut worst: Vec<Option<Outlier>> = Vec::new();
     for feature in features {
         let Some((middle, scale)) = middle_and_scale(&feature.values) else {
@@ -77,12 +77,12 @@ fn middle_and_scale(values: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// The middle of some values, the upper one of two.
-pub(super) fn median(values: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(values: Vec<f64>) -> Option<f64> {
     quantile(values, 0.5)
 }
 
 /// A value that this share of all are below; the upper one of two.
-pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values
         .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
@@ -90,7 +90,7 @@ pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
 }
 
 /// A number with two decimals at most.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     let text = format!("{value:.2}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

@@ -1,8 +1,6 @@
 //! The pipeline stage: a scene's camera becomes known.
 
-use super::label::Label;
-use super::options::SolveOptions;
-use super::solve::solve;
+use crate::camera::{Label, SolveOptions, solve};
 use crate::error::Result;
 use crate::scene::{CameraSource, Scene};
 

@@ -6,7 +6,7 @@ const DIGITS: i32 = 3;
 const WRITTEN_OUT: [f64; 2] = [1e-3, 1e5];
 
 /// Three digits that count: `0.00123`, `12.3`, `1234`, `1.2e-7`; `0` only for zero.
-pub(super) fn three(value: f64) -> String {
+pub(crate) fn three(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
@@ -18,7 +18,7 @@ pub(super) fn three(value: f64) -> String {
 }
 
 /// With a power of ten, without zeros at the end of the number before it.
-pub(super) fn power(value: f64) -> String {
+pub(crate) fn power(value: f64) -> String {
     let text = format!("{value:.2e}");
     let Some((number, exponent)) = text.split_once('e') else {
         return text;

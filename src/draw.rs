@@ -1,8 +1,8 @@
 //! Lines, boxes and text on display-encoded pictures.
 
+use crate::geom::BBox;
 use crate::geom::Point2;
 use crate::image::Image;
-use crate::label::BBox;
 use crate::pixel::Srgb8;
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 

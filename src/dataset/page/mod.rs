@@ -1,17 +1,21 @@
 //! A dataset on one page: pictures with their labels, every drawn value against its distribution, what can be seen, and
 //! the user's own pictures beside it.
 
-use super::beside::{self, Labelled, Set};
-use super::gallery::{self, Figure, gallery};
-use super::heat::heat_map;
-use super::outlier::{Feature, outliers};
-use super::{Histogram, Page, Table, escaped};
+mod beside;
+mod outlier;
+
 use crate::dataset::{Glance, NoLabel, Shown, Summary};
+use crate::draw::class_color;
 use crate::error::Result;
 use crate::eval::class_name;
+use crate::geom::BBox;
 use crate::io;
-use crate::label::draw::class_color;
-use crate::label::{BBox, ObjectLabel, trace};
+use crate::label::gallery::{self, Figure, gallery};
+use crate::label::{ObjectLabel, trace};
+use crate::plot::heat::heat_map;
+use crate::plot::{Histogram, Page, Table, escaped};
+use beside::{Labelled, Set};
+use outlier::{Feature, outliers};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -285,7 +289,7 @@ fn figure(shown: &Shown, classes: &[String], why: Option<&str>) -> Result<Figure
     Ok(figure)
 }
 
-pub(super) fn color_of(class: u32) -> String {
+pub(crate) fn color_of(class: u32) -> String {
     let color = class_color(class);
     format!("#{:02x}{:02x}{:02x}", color.r, color.g, color.b)
 }

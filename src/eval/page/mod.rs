@@ -1,12 +1,14 @@
 //! A detector against the truth: tables, curves and one page; several runs with their spread.
 
-use super::{Page, Table, mistakes};
+mod mistakes;
+
 use crate::error::Result;
 use crate::eval::{
     self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, Interval, Matches,
     Picture, Scores, Sheet, THRESHOLDS, Tags, thresholds,
 };
 use crate::io;
+use crate::plot::{Page, Table};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -462,7 +464,7 @@ const _: () = assert!(THRESHOLDS > 5, "mAP@0.75 is the sixth threshold");
 mod tests {
     use super::*;
     use crate::eval::{FoundBox, TrueBox};
-    use crate::label::BBox;
+    use crate::geom::BBox;
 
     fn run(name: &str, confidence: f64) -> Run {
         let bbox = BBox {

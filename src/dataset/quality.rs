@@ -1,0 +1,237 @@
+//! What each [`Quality`] stands for, stage by stage.
+//!
+//! Each stage has settings on its own curve of error against time (`petcomp report all` measures them); a [`Quality`] names
+//! one point on every curve at once. [`Quality::table`] lists them. What is not in it is exact, or so quick that nothing is
+//! gained: colour transfer, the keyer, labels (masks and boxes), and the camera, which is solved to its end in a fifth of a
+//! millisecond.
+
+use crate::dataset::{Pictures, Setup};
+use crate::error::{Error, Result};
+use crate::matte::{CutOutOptions, SegmentOptions};
+use crate::plot::Table;
+use crate::quality::Quality;
+use crate::render::{Preset, RenderOptions};
+use crate::scene::SettleOptions;
+
+impl Quality {
+    /// How finely pictures, their light and their shadows are sampled.
+    pub fn render(self) -> RenderOptions {
+        self.of([Preset::Draft, Preset::default(), Preset::Reference])
+            .options()
+    }
+
+    /// Settle options with the solver's steps changed; what a fall is, and what is believed of its end, stay.
+    pub fn settle(self, options: SettleOptions) -> SettleOptions {
+        let usual = SettleOptions::default();
+        let step = self.of([1.0 / 240.0, usual.step, 1.0 / 1920.0]);
+        let iterations = self.of([4, usual.iterations, 8]);
+        SettleOptions {
+            step,
+            iterations,
+            ccd: usual.ccd,
+            ..options
+        }
+    }
+
+    /// Cut-out options with the sizes of the searched photo and of the cut-out changed.
+    pub fn cut_out(self, options: CutOutOptions) -> CutOutOptions {
+        let usual = CutOutOptions::default();
+        let working_size = self.of([320, usual.segment.working_size, 1280]);
+        let longest_side = self.of([1024, usual.longest_side, 4096]);
+        CutOutOptions {
+            segment: SegmentOptions {
+                working_size,
+                ..options.segment
+            },
+            longest_side,
+            ..options
+        }
+    }
+
+    /// Picture options: a reference also keeps the scene-linear picture, which 8 bits cannot hold.
+    pub fn pictures(self, pictures: Pictures) -> Pictures {
+        Pictures {
+            exr: pictures.exr || self == Self::Reference,
+            ..pictures
+        }
+    }
+
+    /// A dataset's setup with every approximate stage of a run at this quality.
+    pub fn setup(self, mut setup: Setup) -> Setup {
+        setup.render = self.render();
+        setup.scene.settle = self.settle(setup.scene.settle);
+        setup.pictures = self.pictures(setup.pictures);
+        setup
+    }
+
+    /// The setting of each stage: a row a setting, a column a quality.
+    pub fn table() -> Table {
+        let mut table = Table::new([
+            "stage",
+            "setting",
+            "draft",
+            "normal (the default)",
+            "reference",
+        ]);
+        let mut row = |stage: &str, setting: &str, value: &dyn Fn(Self) -> String| {
+            let values = Self::ALL.map(value);
+            table.push([stage, setting].map(String::from).into_iter().chain(values));
+        };
+        let cut_out = |q: Self| q.cut_out(CutOutOptions::default());
+        let settle = |q: Self| q.settle(SettleOptions::default());
+        row("matte", "longer side that is searched, px", &|q| {
+            cut_out(q).segment.working_size.to_string()
+        });
+        row("matte", "longer side of a cut-out, px", &|q| {
+            cut_out(q).longest_side.to_string()
+        });
+        row("settle", "time step, s", &|q| {
+            format!("1/{}", libm::round(1.0 / settle(q).step))
+        });
+        row("settle", "iterations in a step", &|q| {
+            settle(q).iterations.to_string()
+        });
+        row("light, shadow", "samples of a light", &|q| {
+            square(q.render().light_samples)
+        });
+        row("light, shadow", "directions of the sky", &|q| {
+            q.render().ambient_samples.to_string()
+        });
+        row(
+            "light, shadow",
+            "distance of irradiance samples, px",
+            &|q| q.render().cell_px.to_string(),
+        );
+        row("render", "samples of a pixel", &|q| {
+            square(q.render().subsamples)
+        });
+        row("encode", "files of a picture", &|q| {
+            if q.pictures(Pictures::default()).exr {
+                "PNG of 8 bits, EXR of half floats"
+            } else {
+                "PNG of 8 bits"
+            }
+            .into()
+        });
+        table
+    }
+}
+
+fn square(side: usize) -> String {
+    format!("{side} x {side}")
+}
+
+impl std::fmt::Display for Quality {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for Quality {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let known = Self::ALL.into_iter().find(|q| q.name() == name);
+        known.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::value("quality", format!("\"{name}\", expected one of {names}"))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_is_the_default_of_every_stage() {
+        assert_eq!(Quality::default(), Quality::Normal);
+        assert_eq!(Quality::Normal.setup(Setup::default()), Setup::default());
+        assert_eq!(
+            Quality::Normal.cut_out(CutOutOptions::default()),
+            CutOutOptions::default()
+        );
+    }
+
+    #[test]
+    fn only_what_is_approximate_changes() {
+        let odd = SettleOptions {
+            gravity: [1.0, 0.0, -9.0],
+            attempts: 3,
+            ..SettleOptions::default()
+        };
+        let settled = Quality::Reference.settle(odd);
+        assert_eq!(
+            (settled.gravity, settled.attempts),
+            (odd.gravity, odd.attempts)
+        );
+        let mut setup = Setup::default();
+        setup.scene.objects = crate::scene::Range::fixed(3.0);
+        setup.pictures.exr = true;
+        let draft = Quality::Draft.setup(setup.clone());
+        assert_eq!(
+            (draft.scene.objects, draft.labels.clone(), draft.pictures),
+            (setup.scene.objects, setup.labels, setup.pictures)
+        );
+        assert_eq!(draft.render, Quality::Draft.render());
+    }
+
+    #[test]
+    fn better_qualities_do_more_work_and_are_accepted() {
+        for [low, high] in [
+            [Quality::Draft, Quality::Normal],
+            [Quality::Normal, Quality::Reference],
+        ] {
+            let [a, b] = [low, high].map(Quality::render);
+            assert!(a.subsamples < b.subsamples && a.light_samples < b.light_samples);
+            assert!(a.ambient_samples < b.ambient_samples && a.cell_px > b.cell_px);
+            let [a, b] = [low, high].map(|q| q.settle(SettleOptions::default()));
+            assert!(a.step > b.step && a.iterations <= b.iterations);
+            assert!(a.check().is_ok() && b.check().is_ok());
+        }
+    }
+
+    #[test]
+    fn the_table_tells_the_settings_that_the_stages_get() {
+        let table = Quality::table();
+        let cell = |setting: &str, quality: usize| {
+            table
+                .rows
+                .iter()
+                .find(|row| row[1] == setting)
+                .map(|row| row[2 + quality].clone())
+        };
+        for (i, quality) in Quality::ALL.into_iter().enumerate() {
+            let setup = quality.setup(Setup::default());
+            let sides = setup.render.subsamples;
+            assert_eq!(
+                cell("samples of a pixel", i),
+                Some(format!("{sides} x {sides}"))
+            );
+            assert_eq!(
+                cell("iterations in a step", i),
+                Some(setup.scene.settle.iterations.to_string())
+            );
+            assert_eq!(
+                cell("files of a picture", i).map(|t| t.contains("EXR")),
+                Some(setup.pictures.exr)
+            );
+        }
+    }
+
+    #[test]
+    fn names_are_read_back_and_others_refused() {
+        assert!(
+            Quality::ALL
+                .iter()
+                .all(|q| q.name().parse::<Quality>().is_ok_and(|read| read == *q))
+        );
+        assert!(
+            "fast"
+                .parse::<Quality>()
+                .unwrap_err()
+                .to_string()
+                .contains("draft, normal, reference")
+        );
+    }
+}

@@ -1,0 +1,168 @@
+//! What a stage noticed that a person should know: one shape for all of them, as compilers have it.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A note, a warning or an error about an input or a result, with a code that scripts can rely on.
+///
+/// Messages may change between versions; codes do not. `docs/diagnostics.md` lists them all.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Diagnostic {
+    /// What kind of thing it is.
+    pub code: Code,
+    /// How much it matters.
+    pub severity: Severity,
+    /// One line, lower case, without a full stop: what was found and what to do.
+    pub message: String,
+}
+
+/// How much a [`Diagnostic`] matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Good to know; the result is as good as it can be.
+    Note,
+    /// The result may be wrong: a person should look at it.
+    Warning,
+    /// The result is wrong or cannot be used.
+    Error,
+}
+
+impl Diagnostic {
+    /// A [`Severity::Note`].
+    pub fn note(code: Code, message: impl fmt::Display) -> Self {
+        Self::new(code, Severity::Note, message)
+    }
+
+    /// A [`Severity::Warning`].
+    pub fn warning(code: Code, message: impl fmt::Display) -> Self {
+        Self::new(code, Severity::Warning, message)
+    }
+
+    /// A [`Severity::Error`].
+    pub fn error(code: Code, message: impl fmt::Display) -> Self {
+        Self::new(code, Severity::Error, message)
+    }
+
+    /// One of this severity.
+    pub fn new(code: Code, severity: Severity, message: impl fmt::Display) -> Self {
+        let message = message.to_string();
+        Self {
+            code,
+            severity,
+            message,
+        }
+    }
+
+    /// A person should look at what it is about.
+    pub fn needs_review(&self) -> bool {
+        self.severity > Severity::Note
+    }
+}
+
+/// The message alone, as it stands behind the name of a file.
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+/// Declares [`Code`] as a table: a name in Rust, the name in files, what it means.
+macro_rules! codes {
+    ($($variant:ident $name:literal $meaning:literal)*) => {
+        /// The kind of a [`Diagnostic`]: `stage.what_is_odd`.
+        #[non_exhaustive]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        pub enum Code {
+            $(#[doc = $meaning] #[serde(rename = $name)] $variant,)*
+        }
+
+        impl Code {
+            /// All of them, by stage.
+            pub const ALL: &[Self] = &[$(Self::$variant),*];
+
+            /// As files and messages spell it.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+
+            /// What it means, one line.
+            pub const fn meaning(self) -> &'static str {
+                match self { $(Self::$variant => $meaning,)* }
+            }
+        }
+    };
+}
+
+codes! {
+    // Camera.
+    CornersReordered "camera.corners_reordered" "The corners crossed each other and were sorted"
+    CornersReversed "camera.corners_reversed" "The corners ran anticlockwise and were reversed"
+    SmallQuad "camera.small_quad" "The rectangle is small in the picture"
+    CornerOutside "camera.corner_outside" "A corner lies far outside the picture"
+    SmallMarkerSpan "camera.small_marker_span" "The markers span little of the surface"
+    GrazingView "camera.grazing_view" "The optical axis is almost parallel to the surface"
+    FocalUnbounded "camera.focal_unbounded" "The corners show no perspective and the focal length is unknown"
+    FramingUnknown "camera.framing_unknown" "It is unknown whether the picture was cropped"
+    OffCenter "camera.off_center" "The principal point lies off the middle of the picture"
+    FocalPriorConflict "camera.focal_prior_conflict" "The corners contradict the expected focal length"
+    HeightUncertain "camera.height_uncertain" "Points above the surface are projected with a large uncertainty"
+    PoorFit "camera.poor_fit" "No camera fits the corners within their noise"
+    SidesSwapped "camera.sides_swapped" "Width and height of the surface look exchanged"
+    PoseAmbiguous "camera.pose_ambiguous" "Another pose fits almost as well"
+    OutlierPhoto "camera.outlier_photo" "A photo contradicts the others and was left out"
+    // Matte.
+    LeftOut "matte.left_out" "Something beside the object was left out"
+    TwoObjects "matte.two_objects" "The object may be two objects"
+    Truncated "matte.truncated" "The object reaches a border of the photo"
+    GreyScreen "matte.grey_screen" "The background has no colour to key"
+    UnstableOutline "matte.unstable_outline" "Searches at other depths of the pyramid find another outline"
+    WeakEdges "matte.weak_edges" "Little of the outline lies on edges"
+    ThresholdSensitive "matte.threshold_sensitive" "The bounding box moves at a higher edge threshold"
+    Blurred "matte.blurred" "The edges of the object are blurred"
+    Noisy "matte.noisy" "The object stands out from the noise only in a much smaller picture"
+    ScreenLikeParts "matte.screen_like_parts" "Parts of the object look like the screen"
+    BoxBeyondOutline "matte.box_beyond_outline" "The bounding box lies beyond the outline"
+    Specks "matte.specks" "There are specks on the screen"
+    SmallObject "matte.small_object" "The object is only a few pixels wide"
+    ClippedScreen "matte.clipped_screen" "The screen is overexposed"
+    ResidualMatte "matte.residual_matte" "The key leaves some of the screen"
+    ScreenHue "matte.screen_hue" "A part of the object has the hue of the screen"
+    KeyedAway "matte.keyed_away" "A part of the object looks like bare screen"
+    TintUncertain "matte.tint_uncertain" "The tint of the plastic is uncertain"
+    ClippedObject "matte.clipped_object" "A part of the object is overexposed"
+    Moved "matte.moved" "The object moved between two photos and was aligned"
+    SimilarScreens "matte.similar_screens" "The screens do not differ in a channel"
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn names_differ_and_say_their_stage() {
+        let names: BTreeSet<_> = Code::ALL.iter().map(|code| code.name()).collect();
+        assert_eq!(names.len(), Code::ALL.len());
+        assert!(names.iter().all(|name| name.contains('.')));
+    }
+
+    #[test]
+    fn a_file_holds_code_severity_and_message() {
+        let diagnostic = Diagnostic::warning(Code::GrazingView, "tilted by 85 degrees");
+        let written = serde_json::to_string(&diagnostic).unwrap();
+        assert_eq!(
+            written,
+            r#"{"code":"camera.grazing_view","severity":"warning","message":"tilted by 85 degrees"}"#
+        );
+        let read: Diagnostic = serde_json::from_str(&written).unwrap();
+        assert_eq!(read, diagnostic);
+    }
+}

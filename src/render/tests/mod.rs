@@ -1,0 +1,3 @@
+//! The renderer against its definition.
+
+mod definition;
