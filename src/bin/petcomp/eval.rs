@@ -74,21 +74,21 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         })
         .collect::<anyhow::Result<_>>()?;
     let metrics = match &args.output {
-        Some(folder) => eval::write(folder, &runs, &options)?,
+        Some(folder) => page::write(folder, &runs, &options)?,
         None => runs
             .iter()
-            .map(|run| eval::Metrics::of(run, &options))
+            .map(|run| page::Metrics::of(run, &options))
             .collect(),
     };
-    print::text(eval::scores_table(&metrics, &options).markdown());
-    let (classes, others) = eval::classes_in_brief(&metrics, &options);
+    print::text(page::scores_table(&metrics, &options).markdown());
+    let (classes, others) = page::classes_in_brief(&metrics, &options);
     print::text(classes.markdown());
     if others > 0 {
         common.say(format_args!(
             "the classes with the lowest AP; {others} others: -o FOLDER writes classes.csv"
         ));
     }
-    let factors = eval::factors_table(&runs, &options);
+    let factors = page::factors_table(&runs, &options);
     if !factors.rows.is_empty() {
         print::text(factors.markdown());
     }

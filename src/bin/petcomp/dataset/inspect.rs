@@ -4,7 +4,7 @@ use crate::common::{Common, NeedsReview};
 use crate::print;
 use petcomp::dataset::page::DatasetReportOptions;
 use petcomp::dataset::{self, Checked, contact_sheet_of};
-use petcomp::{io, report};
+use petcomp::io;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -80,7 +80,7 @@ pub(crate) fn report(args: &Report, common: &Common) -> anyhow::Result<()> {
     };
     io::write_text(
         &output,
-        &report::dataset::page(&args.folder, &options)?.document(),
+        &dataset::page::page(&args.folder, &options)?.document(),
     )?;
     common.say(format_args!("look at {}", output.display()));
     Ok(())
