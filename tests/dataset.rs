@@ -11,7 +11,7 @@ use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use petcomp::label::{Labels, Mask, ObjectLabel};
 use petcomp::scene::{CameraSource, Exposure, Grade, Object, Placement, Surface};
-use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io, report};
+use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -1203,9 +1203,9 @@ fn browse(page: &str, script: &str) -> Option<String> {
 fn a_browser_shows_the_report_and_its_switches_work() {
     let dir = tempfile::tempdir().unwrap();
     make(&plan(dir.path(), 12)).unwrap();
-    let page = report::dataset::page(
+    let page = petcomp::dataset::page::page(
         dir.path(),
-        &report::dataset::DatasetReportOptions {
+        &petcomp::dataset::page::DatasetReportOptions {
             most: 6,
             ..Default::default()
         },
