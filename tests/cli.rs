@@ -166,7 +166,7 @@ fn global_options_are_explained_once() {
 }
 
 #[test]
-fn a_check_fails_on_what_needs_a_look_where_that_is_asked_for() {
+fn a_check_fails_on_what_needs_review_where_that_is_asked_for() {
     let desk = Desk::new();
     let photo = sample("bottles/b0006_0.png");
     desk.ok(&[
@@ -174,7 +174,7 @@ fn a_check_fails_on_what_needs_a_look_where_that_is_asked_for() {
     ]);
     let said = desk.ok(&["asset", "check", "assets"]);
     assert!(
-        said.contains("look at "),
+        said.contains("b0006_0.exr: ") && said.contains("1 to review"),
         "the sample has the screen's hue: {said}"
     );
     let strict = desk.run(&["asset", "check", "assets", "--strict"]);

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::io;
-use crate::matte::{CutOut, CutOutOptions, Remark, cut_out};
+use crate::matte::{CutOut, CutOutOptions, cut_out};
 use crate::pixel::{Coverage, LinearRgb};
 use crate::plot::Table;
 use rayon::prelude::*;
@@ -129,10 +129,10 @@ impl Trial {
         };
         // What is judged is the outline.
         let of_outline = cut
-            .remarks
+            .diagnostics
             .iter()
-            .filter(|r| r.is_doubt() && !r.is_about_color());
-        let doubts: Vec<String> = of_outline.map(Remark::to_string).collect();
+            .filter(|d| d.needs_review() && !d.code.is_about_color());
+        let doubts: Vec<String> = of_outline.map(ToString::to_string).collect();
         let [iou, box_px] = self.errors(&cut);
         // Pixels of a reduced search are that much larger.
         let right = iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);

@@ -121,9 +121,9 @@ fn row(
         Ok(cut) => {
             let doubts = cut
                 .found
-                .remarks
+                .diagnostics
                 .iter()
-                .filter(|r| r.is_doubt())
+                .filter(|d| d.needs_review())
                 .map(ToString::to_string)
                 .collect();
             (Some(Score::of(cut, known, backgrounds)), doubts)

@@ -151,27 +151,27 @@ fn check(folder: &Path, strict: bool) -> anyhow::Result<()> {
         .iter()
         .flat_map(|asset| &asset.photos)
         .collect();
-    let doubted: Vec<_> = photos
+    let to_review: Vec<_> = photos
         .iter()
-        .filter(|photo| !photo.record.doubts.is_empty())
+        .filter(|photo| photo.record.needs_review())
         .collect();
-    for photo in &doubted {
+    for photo in &to_review {
         print::line(format_args!(
-            "look at {}: {}",
+            "{}: {}",
             photo.record.file,
-            photo.record.doubts.join("; ")
+            photo.record.review_reasons()
         ));
     }
     let counts = format!(
-        "{} assets, {} cut-outs, all whole, {} to look at",
+        "{} assets, {} cut-outs, all intact, {} to review",
         library.assets.len(),
         photos.len(),
-        doubted.len()
+        to_review.len()
     );
     print::line(format_args!("{}: {counts}", folder.display()));
-    match doubted.len() {
+    match to_review.len() {
         n if strict && n > 0 => {
-            Err(NeedsReview(format!("{}: {n} cut-outs to look at", folder.display())).into())
+            Err(NeedsReview(format!("{}: {n} cut-outs to review", folder.display())).into())
         }
         _ => Ok(()),
     }
@@ -189,9 +189,9 @@ pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Resu
         .iter()
         .for_each(|refusal| log::warn!("{refusal}"));
     built
-        .doubtful
+        .needs_review
         .iter()
-        .for_each(|doubt| common.say(format_args!("look at {doubt}")));
+        .for_each(|reason| common.say(reason));
     common.say(format_args!(
         "{}: {} photos, {} assets",
         folder.display(),
@@ -248,9 +248,9 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
             record.file
         ));
         record
-            .doubts
+            .diagnostics
             .iter()
-            .for_each(|doubt| common.say(format_args!("look at {}: {doubt}", record.file)));
+            .for_each(|diagnostic| common.say(format_args!("{}: {diagnostic}", record.file)));
         added.push(photo);
     }
     tell_classes(&Manifest::read(&args.output)?.classes, "--classes", common);

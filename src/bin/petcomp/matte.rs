@@ -2,10 +2,8 @@
 
 use crate::common::Common;
 use crate::{matte_film, matte_key, matte_nodes};
-use petcomp::matte::{
-    CutOutOptions, PlateOptions, Remark, ScreenPlate, SegmentOptions, cut_out, segment,
-};
-use petcomp::{Image, LinearRgb, io};
+use petcomp::matte::{CutOutOptions, PlateOptions, ScreenPlate, SegmentOptions, cut_out, segment};
+use petcomp::{Diagnostic, Image, LinearRgb, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -61,7 +59,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let picture: Image<LinearRgb> = io::read(photo)?;
             let found = segment(&picture, &options).map_err(|e| e.in_file(photo))?;
             io::create_folder(output)?;
-            warn(photo, &found.remarks);
+            warn(photo, &found.diagnostics);
             let steps = found.steps.iter().map(|step| (step.name, step.shown()));
             let outcome = [
                 ("hull", found.mask.clone()),
@@ -93,7 +91,7 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let cut =
                 cut_out(&io::read::<LinearRgb>(photo)?, &options).map_err(|e| e.in_file(photo))?;
             io::write(output, &cut.to_rgba())?;
-            warn(photo, &cut.remarks);
+            warn(photo, &cut.diagnostics);
             let (w, h) = cut.film.size();
             common.say(format_args!(
                 "{}: {w} x {h}, matte by {}",
@@ -105,8 +103,8 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-pub(crate) fn warn(photo: &Path, remarks: &[Remark]) {
-    remarks
+pub(crate) fn warn(photo: &Path, diagnostics: &[Diagnostic]) {
+    diagnostics
         .iter()
-        .for_each(|remark| log::warn!("{}: {remark}", photo.display()));
+        .for_each(|diagnostic| log::warn!("{}: {diagnostic}", photo.display()));
 }

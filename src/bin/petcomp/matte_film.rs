@@ -58,7 +58,7 @@ impl Film {
         let plate = self.files.plate(0, &self.photo, &photo, &inside)?;
         let options = from_overrides("film", &self.files.settings)?;
         let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(&self.photo))?;
-        warn(&self.photo, &found.remarks);
+        warn(&self.photo, &found.diagnostics);
         self.files.write(
             &plate,
             &found.film,
@@ -91,7 +91,7 @@ impl Triangulate {
             &inside,
             &from_overrides("film", &self.files.settings)?,
         )?;
-        warn(&self.photos[0], &found.remarks);
+        warn(&self.photos[0], &found.diagnostics);
         self.files.write(
             &plates[0],
             &found.film,
@@ -120,7 +120,7 @@ impl Files {
             return Ok(mask);
         }
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
-        warn(path, &found.remarks);
+        warn(path, &found.diagnostics);
         Ok(found.tight)
     }
 

@@ -55,7 +55,7 @@ impl Args {
         let photo: Image<LinearRgb> = io::read(&self.input)?;
         let found =
             segment(&photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
-        crate::matte::warn(&self.input, &found.remarks);
+        crate::matte::warn(&self.input, &found.diagnostics);
         let [garbage, core] = match plate {
             Some(plate) => found.mattes(&photo, plate),
             None => found.mattes(

@@ -203,9 +203,9 @@ impl Likeness {
             iou >= GOOD_IOU && box_px <= GOOD_BOX_PX * cut.segmentation.reduction.max(1.0);
         let doubts = cut
             .segmentation
-            .remarks
+            .diagnostics
             .iter()
-            .filter(|r| r.is_doubt())
+            .filter(|d| d.needs_review())
             .map(ToString::to_string)
             .collect();
         Self {

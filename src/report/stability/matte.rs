@@ -5,8 +5,8 @@ use super::{Case, Outcome, keyer};
 use crate::error::Result;
 use crate::image::Image;
 use crate::matte::{
-    CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, Remark, ScreenPlate,
-    TriangulateOptions, Triangulated, film, triangulate,
+    CutOut, CutOutOptions, FilmMatte, FilmOptions, PlateOptions, ScreenPlate, TriangulateOptions,
+    Triangulated, film, triangulate,
 };
 use crate::pixel::{Coverage, LinearRgb};
 use crate::report::matte::{GOOD_BOX_PX, GOOD_IOU};
@@ -223,9 +223,9 @@ fn opaque_on_grey(take: Take) -> Case {
             let doubts: Vec<String> = take
                 .cut()?
                 .0
-                .remarks
+                .diagnostics
                 .iter()
-                .filter(|r| r.is_doubt())
+                .filter(|d| d.needs_review())
                 .map(ToString::to_string)
                 .collect();
             Ok(Outcome::new(
@@ -388,9 +388,9 @@ fn film_told(
         let found = of_film(&photo(), screen)?;
         let unsound = found.film.pixels().iter().filter(|p| !p.is_sound()).count();
         let remarks = found
-            .remarks
+            .diagnostics
             .iter()
-            .map(Remark::to_string)
+            .map(ToString::to_string)
             .collect::<Vec<_>>()
             .join("; ");
         let remarks = if remarks.is_empty() {
@@ -589,7 +589,11 @@ fn clipped_screen() -> Case {
                 .map(|c| f64::from(c.0))
                 .sum::<f64>()
                 / inside_area();
-            let doubts = found.remarks.iter().filter(|r| r.is_doubt()).count();
+            let doubts = found
+                .diagnostics
+                .iter()
+                .filter(|d| d.needs_review())
+                .count();
             let told = doubts > 0 || found.residual > 0.05 || unsure > 0.05;
             let numbers = format!(
                 "residual {:.3}, uncertainty {unsure:.3}, {doubts} doubts",

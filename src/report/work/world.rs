@@ -199,9 +199,9 @@ fn record(asset: &str) -> AssetRecord {
         unevenness: 0.0,
         outline_confidence: 1.0,
         color_confidence: None,
-        doubts: Vec::new(),
         truncated: false,
         outline_px: vec![[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]],
+        diagnostics: Vec::new(),
     };
     AssetRecord {
         name: asset.into(),
