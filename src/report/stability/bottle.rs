@@ -3,7 +3,7 @@
 
 use crate::color::{linear_to_srgb, srgb_to_linear};
 use crate::error::Result;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::{CutOut, CutOutOptions, cut_out};
 use crate::pixel::LinearRgb;
 use crate::report::matte::{GOOD_BOX_PX, GOOD_IOU, normal};
@@ -127,7 +127,7 @@ impl Take {
     }
 
     /// The photo in 8 bits, and which pixels show a bottle.
-    pub(super) fn taken(&self) -> (Image<LinearRgb>, Image<bool>) {
+    pub(super) fn taken(&self) -> (Image<LinearRgb>, Mask) {
         const OFFSETS: [[f64; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
         let (w, h) = self.size;
         let mut photo = Image::from_fn(w, h, |x, y| {
@@ -173,7 +173,7 @@ pub(super) struct Likeness {
 }
 
 impl Likeness {
-    fn of(cut: &CutOut, mask: &Image<bool>) -> Self {
+    fn of(cut: &CutOut, mask: &Mask) -> Self {
         let found = cut.segmentation.tight.map(|c| c.0 >= 0.5);
         let count = |holds: fn(bool, bool) -> bool| {
             found
@@ -218,7 +218,7 @@ impl Likeness {
 }
 
 /// Left, top, right and bottom of what is true.
-fn sides_of(mask: &Image<bool>) -> [f64; 4] {
+fn sides_of(mask: &Mask) -> [f64; 4] {
     let (w, h) = mask.size();
     let columns = || (0..w).filter(|&x| (0..h).any(|y| mask[(x, y)]));
     let rows = || (0..h).filter(|&y| (0..w).any(|x| mask[(x, y)]));
