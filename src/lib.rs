@@ -70,7 +70,7 @@ pub use camera::Camera;
 pub use deep::{DeepImage, DeepSample};
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use error::{Error, Result, printable};
-pub use image::{Image, Roi};
+pub use image::{Image, Mask, Roi};
 pub use pixel::{
     Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
 };

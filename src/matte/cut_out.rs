@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::{Image, Roi};
+use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -104,7 +104,7 @@ pub struct CutOut {
     /// Transmittance as measured, the object's own shadow on the screen included; 1 outside. Of the size of `film`.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of the transmittance, 0 to 1. Of the size of `film`.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// Convex hull of the object in pixels of `film`, clockwise as seen.
     pub hull: Vec<Point2<f64>>,
     /// Tight outline of the object in pixels of `film`.
@@ -335,7 +335,7 @@ fn plate(
 struct Matted {
     film: Image<Film>,
     transmittance: Image<LinearRgb>,
-    uncertainty: Image<Coverage>,
+    uncertainty: Image<f32>,
     residue: f32,
     doubts: Option<ColorDoubts>,
     diagnostics: Vec<Diagnostic>,
@@ -409,7 +409,7 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
     filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
-fn mean(matte: &Image<Coverage>, set: &Image<bool>) -> f32 {
+fn mean(matte: &Image<Coverage>, set: &Mask) -> f32 {
     let chosen = matte
         .pixels()
         .iter()

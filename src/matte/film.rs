@@ -61,7 +61,7 @@ pub struct FilmMatte {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
     /// What makes its colours wrong.
@@ -265,7 +265,7 @@ fn composed(
         Film::new(f.scale(c.0), covered(v, c))
     });
     let most = flat.r.max(flat.g).max(flat.b);
-    let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
+    let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
     FilmMatte {
         film,
         transmittance,

@@ -23,7 +23,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -101,24 +101,23 @@ pub struct Step {
     /// What it is: a file name without ending.
     pub name: &'static str,
     /// The picture, of the size that was searched; bands are in units of noise.
-    pub image: Image<Coverage>,
+    pub image: Image<f32>,
 }
 
 impl Step {
     /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms as shares of the
     /// largest.
-    pub fn shown(&self) -> Image<Coverage> {
+    pub fn shown(&self) -> Image<f32> {
         let most = self
             .image
             .pixels()
             .iter()
-            .fold(0.0f32, |most, c| most.max(c.0));
+            .fold(0.0f32, |most, v| most.max(*v));
         if most <= 1.0 {
             return self.image.clone();
         }
         let scale = 1.0 / libm::log1pf(most);
-        self.image
-            .map(|c| Coverage(scale * libm::log1pf(c.0.max(0.0))))
+        self.image.map(|v| scale * libm::log1pf(v.max(0.0)))
     }
 }
 
@@ -176,7 +175,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     } else {
         found.inside.clone()
     };
-    let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
+    let around = Outline::around(&filter::gaussian_blur(&solid.to_coverage(), CRACK_BLUR_PX));
     watch.lap("holes");
     let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
     let outline = snap::snapped(&around.map(to_photo), &roots, reduction);
@@ -362,8 +361,8 @@ fn reduced(
     ))
 }
 
-fn shown(set: &Image<bool>) -> Image<Coverage> {
-    set.map(|p| Coverage(f32::from(u8::from(p))))
+fn shown(set: &Mask) -> Image<f32> {
+    set.map(|p| f32::from(u8::from(p)))
 }
 
 /// Names of the borders in the order of [`Segmentation::touches`].

@@ -241,7 +241,7 @@ fn noise_of_3_percent_is_survived_and_told() {
     let found = world.solved();
     let error = world.error(&found, |_| true);
     assert!(error < 0.045, "{error}");
-    let mean = |found: &FilmMatte| found.uncertainty.pixels().iter().map(|u| u.0).sum::<f32>();
+    let mean = |found: &FilmMatte| found.uncertainty.pixels().iter().sum::<f32>();
     assert!(mean(&found) > 2.0 * mean(&World::default().solved()));
 }
 
@@ -342,7 +342,7 @@ fn on_a_board_without_a_hue_film_is_guessed_and_said_and_better_than_a_slab_or_t
             found.diagnostics
         );
         assert!(
-            found.uncertainty[(50, 60)].0 > 0.1 && found.doubts.confidence() < 0.7,
+            found.uncertainty[(50, 60)] > 0.1 && found.doubts.confidence() < 0.7,
             "{:?}",
             found.doubts
         );
