@@ -11,7 +11,7 @@ use crate::bounds::{MASS, OBJECT, PX_PER_METRE, SURFACE, THICKNESS, WIDTH, numbe
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::matte::{ColorDoubts, CutOut, CutOutOptions, cut_out_on};
+use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
@@ -276,7 +276,7 @@ fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> P
         residue: f64::from(cut.residue),
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
-        color_confidence: cut.doubts.map(ColorDoubts::confidence),
+        color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
         outline_px: cut.hull.iter().map(files::rounded).collect(),
         diagnostics: diagnostics.collect(),

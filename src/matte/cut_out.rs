@@ -1,6 +1,6 @@
 //! Cut-out: segmentation, screen plate and matte in one go, trimmed to the object.
 
-use super::film::{ColorDoubts, FilmMatte, FilmOptions, PartOf, film_of_part};
+use super::film::{ColorUncertainty, FilmMatte, FilmOptions, PartOf, film_of_part};
 use super::key::{KeyOptions, Keying, Screen};
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
@@ -122,7 +122,7 @@ pub struct CutOut {
     /// Mean matte on the screen outside the object, where it should be 0.
     pub residue: f32,
     /// What makes its colours and its transmittance wrong; of the physical matte only.
-    pub doubts: Option<ColorDoubts>,
+    pub color_uncertainty: Option<ColorUncertainty>,
     /// What a person should know, of the segmentation, the screen and the matte.
     pub diagnostics: Vec<Diagnostic>,
     /// Where the object was found in the photo.
@@ -270,7 +270,7 @@ pub fn cut_out_on(
         unevenness: plate.unevenness,
         method,
         residue: matted.residue,
-        doubts: matted.doubts,
+        color_uncertainty: matted.color_uncertainty,
         diagnostics,
         segmentation,
     })
@@ -337,7 +337,7 @@ struct Matted {
     transmittance: Image<LinearRgb>,
     uncertainty: Image<f32>,
     residue: f32,
-    doubts: Option<ColorDoubts>,
+    color_uncertainty: Option<ColorUncertainty>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -355,7 +355,7 @@ impl Matted {
             film,
             transmittance,
             uncertainty,
-            doubts,
+            color_uncertainty,
             diagnostics,
             ..
         } = solved;
@@ -365,7 +365,7 @@ impl Matted {
             transmittance,
             uncertainty,
             residue: 0.0,
-            doubts: Some(doubts),
+            color_uncertainty: Some(color_uncertainty),
             diagnostics,
         })
     }
@@ -395,7 +395,7 @@ impl Matted {
             transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
             uncertainty: Image::new(image.width(), image.height()),
             residue,
-            doubts: None,
+            color_uncertainty: None,
             diagnostics: Vec::new(),
         }
     }

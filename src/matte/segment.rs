@@ -12,7 +12,7 @@ mod pass;
 mod snap;
 mod threshold;
 
-pub use band::Tone;
+pub use band::LumaMode;
 pub(super) use cluster::Groups;
 pub use confidence::Confidence;
 pub use threshold::Threshold;
@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentOptions {
     /// What the pyramid is made of. Default: each channel by itself.
-    pub tone: Tone,
+    pub tone: LumaMode,
     /// Which band of the pyramid is the coarse one, 2 to 8; the fine one is the first. Default: nothing = the depth that
     /// the others agree with best.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -57,7 +57,7 @@ pub struct SegmentOptions {
 impl Default for SegmentOptions {
     fn default() -> Self {
         Self {
-            tone: Tone::Channels,
+            tone: LumaMode::Channels,
             levels: None,
             first_threshold: Threshold::Otsu,
             last_threshold: Threshold::Otsu,
@@ -130,7 +130,7 @@ impl Step {
 /// A cut of a Laplacian pyramid ([Burt and Adelson 1983]): the first and the last band, brought to full size, are
 /// binarised and combined by AND. Noise has no coarse structure and soft shadows have no fine one, so that what is left
 /// are the object's edges; the hull is theirs. Departs from the plain method in that
-/// * bands are those of the square roots of the three channels, in units of their noise along the border ([`Tone`]);
+/// * bands are those of the square roots of the three channels, in units of their noise along the border ([`LumaMode`]);
 /// * the thresholds are Otsu's on a logarithmic scale ([`Threshold`]);
 /// * the last band is spread by one of its pixels, since it passes through 0 on an edge;
 /// * edges are thinned to their ridge and specks dropped;
@@ -283,7 +283,7 @@ impl SegmentOptions {
         };
         share("ridge", f64::from(self.ridge))?;
         share("join", self.join)?;
-        let weights = if let Tone::Grey(weights) = self.tone {
+        let weights = if let LumaMode::Grey(weights) = self.tone {
             weights
         } else {
             [1.0; 3]

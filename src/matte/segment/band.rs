@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// What the pyramid is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Tone {
+pub enum LumaMode {
     /// Each channel by itself: sees a red cap on a blue screen of the same grey.
     #[default]
     Channels,
@@ -29,16 +29,16 @@ pub(super) struct Bands {
 
 impl Bands {
     /// Splits a photo into so many bands.
-    pub(super) fn of(photo: &Image<LinearRgb>, tone: Tone, count: usize) -> Self {
+    pub(super) fn of(photo: &Image<LinearRgb>, tone: LumaMode, count: usize) -> Self {
         let pictures = match tone {
-            Tone::Channels => {
+            LumaMode::Channels => {
                 vec![
                     root(photo, [1.0, 0.0, 0.0]),
                     root(photo, [0.0, 1.0, 0.0]),
                     root(photo, [0.0, 0.0, 1.0]),
                 ]
             }
-            Tone::Grey(weights) => vec![root(photo, weights)],
+            LumaMode::Grey(weights) => vec![root(photo, weights)],
         };
         let mut channels: Vec<_> = pictures
             .into_iter()
@@ -228,7 +228,7 @@ mod tests {
     fn a_constant_has_no_bands() {
         let bands = Bands::of(
             &Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)),
-            Tone::Channels,
+            LumaMode::Channels,
             4,
         );
         assert!(
@@ -251,6 +251,6 @@ mod tests {
             }
         });
         let seen = |tone| Bands::of(&photo, tone, 4).first[(32, 32)];
-        assert!(seen(Tone::Grey([1.0; 3])) < 0.01 && seen(Tone::Channels) > 50.0);
+        assert!(seen(LumaMode::Grey([1.0; 3])) < 0.01 && seen(LumaMode::Channels) > 50.0);
     }
 }
