@@ -22,7 +22,7 @@ pub struct Built {
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
     /// Cut-outs that a person should review, and why.
-    pub doubtful: Vec<String>,
+    pub needs_review: Vec<String>,
 }
 
 /// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is not there.
@@ -63,7 +63,7 @@ pub fn build(
             .iter()
             .map(|photo| [photo.record.object_m[0], photo.record.error_m])
             .collect(),
-        doubtful: photos.iter().filter_map(doubts_of).collect(),
+        needs_review: photos.iter().filter_map(review_line).collect(),
         refused,
         library: Library::of_manifest(folder, manifest, photos)?,
     })
@@ -115,15 +115,18 @@ fn insert_all(
 }
 
 /// Why a person should review a cut-out, after the name of its file.
-fn doubts_of(photo: &Photo) -> Option<String> {
+fn review_line(photo: &Photo) -> Option<String> {
     let record = &photo.record;
-    (!record.doubts.is_empty()).then(|| format!("{}: {}", record.file, record.doubts.join("; ")))
+    record
+        .needs_review()
+        .then(|| format!("{}: {}", record.file, record.review_reasons()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::{MANIFEST, PhotoRecord, contact_sheet};
     use super::*;
+    use crate::diagnostic::Code;
     use crate::geom::Point2;
     use crate::image::Image;
     use crate::io;
@@ -409,24 +412,24 @@ mod tests {
         let built = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
         assert!(
             built
-                .doubtful
+                .needs_review
                 .iter()
                 .any(|d| d.contains("two.exr") && d.contains("too grey")),
             "{:?}",
-            built.doubtful
+            built.needs_review
         );
         let library = Library::open(&out).unwrap();
         let [one, two] = [0, 1].map(|i| &library.assets[0].photos[i].record);
         assert!(
-            two.doubts.iter().any(|doubt| doubt.contains("guessed")),
+            two.diagnostics.iter().any(|d| d.code == Code::GreyScreen),
             "{:?}",
-            two.doubts
+            two.diagnostics
         );
         assert!(
             one.color_confidence > Some(0.6) && two.color_confidence < Some(0.55),
             "{one:?} {two:?}"
         );
-        let plain = built_sheet_height(&library, |record| record.doubts.clear());
+        let plain = built_sheet_height(&library, |record| record.diagnostics.clear());
         assert!(plain < built_sheet_height(&library, |_| ()));
     }
 
@@ -442,18 +445,16 @@ mod tests {
     }
 
     #[test]
-    fn a_told_size_that_contradicts_the_outline_is_doubted() {
-        let is_doubted = |width: &str| {
+    fn a_given_size_that_contradicts_the_outline_needs_review() {
+        let needs_review = |width: &str| {
             let list = TWO.replace("length = 0.3", &format!("length = 0.3\nwidth = {width}"));
-            let doubts = built(&list).unwrap().assets[0].photos[0]
-                .record
-                .doubts
-                .clone();
-            doubts
-                .iter()
-                .any(|doubt| doubt.contains("times as long as wide"))
+            let library = built(&list).unwrap();
+            let diagnostics = &library.assets[0].photos[0].record.diagnostics;
+            diagnostics.iter().any(|d| {
+                d.code == Code::SizeMismatch && d.message.contains("times as long as wide")
+            })
         };
-        assert!(!is_doubted("0.15") && is_doubted("0.25"));
+        assert!(!needs_review("0.15") && needs_review("0.25"));
     }
 
     #[test]

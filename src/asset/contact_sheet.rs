@@ -101,9 +101,9 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
 /// What is written over a cut-out: its size, and why it needs a review.
 fn lines_of(record: &PhotoRecord) -> Vec<(String, Srgb8)> {
     let title = title(record);
-    let texts =
-        std::iter::once((&title, INK)).chain(record.doubts.iter().map(|doubt| (doubt, WARNING)));
-    texts
+    let reasons = record.diagnostics.iter().map(|d| (&d.message, WARNING));
+    std::iter::once((&title, INK))
+        .chain(reasons)
         .flat_map(|(text, ink)| {
             draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small)
                 .into_iter()
@@ -116,10 +116,10 @@ fn title(record: &PhotoRecord) -> String {
     let [length, width] = record.object_m.map(|m| 1e3 * m);
     let color = record
         .color_confidence
-        .map(|confidence| format!(", of colour {confidence:.2}"))
+        .map(|confidence| format!(", colour {confidence:.2}"))
         .unwrap_or_default();
     format!(
-        "{}  {length:.1} x {width:.1} mm (+- {:.1})  sure of outline {:.2}{color}",
+        "{}  {length:.1} x {width:.1} mm (+- {:.1})  outline confidence {:.2}{color}",
         record.file,
         1e3 * record.error_m,
         record.outline_confidence,
@@ -145,11 +145,15 @@ mod tests {
     use super::super::manifest::Asset;
     use super::super::manifest::tests::photo;
     use super::*;
+    use crate::diagnostic::{Code, Diagnostic};
     use crate::pixel::PremulRgba;
 
-    fn library(doubts: &[&str], count: usize) -> Library {
+    fn library(warnings: &[&str], count: usize) -> Library {
         let mut record = photo("a.exr");
-        record.doubts = doubts.iter().map(|d| (*d).into()).collect();
+        record.diagnostics = warnings
+            .iter()
+            .map(|text| Diagnostic::warning(Code::Uncoded, text))
+            .collect();
         let one = Photo::new(Image::filled(480, 240, PremulRgba::TRANSPARENT), record);
         let asset = Asset {
             name: "a".into(),
@@ -177,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn doubts_are_written_and_make_room() {
+    fn diagnostics_are_written_and_make_room() {
         let heights = [&[][..], &["two objects"], &["two objects", "blurred"]]
             .map(|d| contact_sheet(&library(d, 1)).height());
         assert!(heights[0] < heights[1] && heights[1] < heights[2]);

@@ -9,9 +9,10 @@ use super::measure::Measured;
 use super::rectified::RectifiedPhoto;
 use super::scale::Scale;
 use super::screen_source::EmptyScreens;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::matte::{ColorDoubts, CutOut, CutOutOptions, Remark, cut_out_on};
+use crate::matte::{ColorDoubts, CutOut, CutOutOptions, cut_out_on};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
@@ -80,7 +81,7 @@ impl CutOutWriter<'_> {
         let cut = cut_out_on(&photo.photo, empty.as_deref(), &options)
             .map_err(|e| with_name(e, &entry.file))?;
         watch.lap("cut out");
-        log_remarks(&cut, &entry.file);
+        log_diagnostics(&cut, &entry.file);
         let record = record(&cut, entry, &photo)?;
         watch.lap("measure");
         io::create_folder(self.folder.join(&entry.asset))?;
@@ -119,14 +120,14 @@ fn with_name(error: Error, photo: &Path) -> Error {
     }
 }
 
-fn log_remarks(cut: &CutOut, photo: &Path) {
-    for remark in &cut.remarks {
-        let level = if matches!(remark, Remark::ScreenHue(_)) {
+fn log_diagnostics(cut: &CutOut, photo: &Path) {
+    for diagnostic in &cut.diagnostics {
+        let level = if diagnostic.code == Code::ScreenHue {
             log::Level::Warn
         } else {
             log::Level::Info
         };
-        log::log!(level, "{}: {remark}", photo.display());
+        log::log!(level, "{}: {diagnostic}", photo.display());
     }
 }
 
@@ -142,13 +143,13 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
     let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);
     let outline_px = cut.hull.iter().map(files::rounded).collect();
     let file = entry.cut_out_file();
-    let doubts = cut
-        .remarks
+    let diagnostics = cut
+        .diagnostics
         .iter()
-        .filter(|r| r.is_doubt())
-        .map(Remark::to_string)
-        .chain(measured.doubt)
-        .chain(photo.doubt());
+        .filter(|d| Diagnostic::needs_review(d))
+        .cloned()
+        .chain(measured.size_mismatch)
+        .chain(photo.diagnostic());
     Ok(PhotoRecord {
         source: entry.source(),
         object_m: measured.object_m,
@@ -159,8 +160,8 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.doubts.map(ColorDoubts::confidence),
-        doubts: doubts.collect(),
         truncated: cut.segmentation.touches.contains(&true),
+        diagnostics: diagnostics.collect(),
         ..PhotoRecord::new(file, measured.px_per_metre, size_m, outline_px)
     })
 }

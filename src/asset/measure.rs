@@ -3,6 +3,7 @@
 use super::rectified::{RectifiedPhoto, ScreenScale};
 use super::scale::Scale;
 use super::size::oriented_size;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Vector2};
 use crate::matte::CutOut;
 
@@ -15,7 +16,7 @@ pub(super) struct Measured {
     /// Standard error of the length.
     pub(super) error_m: f64,
     /// The given size does not fit the outline.
-    pub(super) doubt: Option<String>,
+    pub(super) size_mismatch: Option<Diagnostic>,
 }
 
 /// Standard error of one side of an outline, pixels of the picture that was searched: root mean square over the four sides
@@ -45,7 +46,7 @@ impl Measured {
             px_per_metre,
             object_m: tight.map(metres),
             error_m: libm::hypot(metres(error_px), screen.sigma * metres(tight[0])),
-            doubt: contradiction(tight, error_px, scale),
+            size_mismatch: size_mismatch(tight, error_px, scale),
         }
     }
 }
@@ -68,18 +69,19 @@ fn middle_px(cut: &CutOut) -> Point2<f64> {
     Point2::from(middle / cut.scale + Vector2::new(cut.roi.x as f64, cut.roi.y as f64))
 }
 
-/// How a given size contradicts the proportions of the outline.
-fn contradiction(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<String> {
+/// The warning about a given size of other proportions than the outline.
+fn size_mismatch(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<Diagnostic> {
     let Scale::Size([length, width]) = scale else {
         return None;
     };
     let (given, seen) = (width / length, tight[1] / tight[0]);
     let slack = PROPORTION_SLACK + error_px / tight[1];
     ((given / seen - 1.0).abs() > slack).then(|| {
-        format!(
+        let message = format!(
             "the outline is {:.2} times as long as wide, the given size {:.2} times",
             1.0 / seen,
             1.0 / given
-        )
+        );
+        Diagnostic::warning(Code::SizeMismatch, message)
     })
 }

@@ -5,6 +5,7 @@ use super::inpaint::inpaint;
 use super::screen_pose::{ReferenceRectangle, ScreenPose, scale_unknown};
 use super::top_view::{TopView, size_px};
 use crate::camera::{Marker, any_markers};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::geom::Point2;
 use crate::image::{Image, Roi};
@@ -118,20 +119,22 @@ impl RectifiedPhoto {
         })
     }
 
-    /// Why a person should check a size that comes from this.
-    pub(super) fn doubt(&self) -> Option<String> {
+    /// The warning about a size that is measured by this.
+    pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
         let pose = &self.view.as_ref()?.pose;
         let [w, h] = pose.size;
         if pose.is_poor_fit {
-            return Some(format!(
+            let message = format!(
                 "the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?"
-            ));
+            );
+            return Some(Diagnostic::warning(Code::ScreenSizeMismatch, message));
         }
         let percent = 100.0 * pose.swap_error;
         (pose.swap_error > REVIEWED_SWAP_ERROR).then(|| {
-            format!(
-                "either side of the screen may be the longer one: lengths may differ by {percent:.0} %"
-            )
+            let message = format!(
+                "the longer side of the screen cannot be identified: lengths may be off by {percent:.0} %"
+            );
+            Diagnostic::warning(Code::ScreenSidesAmbiguous, message)
         })
     }
 }
@@ -282,12 +285,13 @@ mod tests {
                 photo: Image::new(0, 0),
                 view: Some(TopView::of_screen(ground, 0.0)),
             }
-            .doubt()
+            .diagnostic()
         };
         assert_eq!(doubt(SCREEN), None);
         assert!(
             doubt([0.5, 0.5])
                 .unwrap()
+                .message
                 .ends_with("0.500 x 0.500 m; are width and height right?")
         );
     }
@@ -328,9 +332,10 @@ mod tests {
             view: Some(TopView::of_screen(ground, 0.0)),
         };
         assert!(
-            seen.doubt()
+            seen.diagnostic()
                 .unwrap()
-                .starts_with("either side of the screen may be the longer one")
+                .message
+                .starts_with("the longer side of the screen cannot be identified")
         );
     }
 
