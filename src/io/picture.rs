@@ -96,6 +96,20 @@ impl Picture {
             .expect("colours were found when the picture was read")
     }
 
+    /// All colours, as [`read`](super::read) makes them.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a picture with alpha below 1 where `LinearRgb` is asked for.
+    ///
+    /// # Panics
+    /// When the pixels asked for are no colours.
+    pub fn pixels<P: FromFile>(&self) -> Result<Image<P>> {
+        let rows = 0..self.raster.height;
+        P::check(&self.raster.rows(self.profile.as_ref(), rows.clone()))
+            .map_err(|e| Error::file(&self.path, e))?;
+        Ok(self.rows(rows))
+    }
+
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {
         let Self {
             path,

@@ -417,7 +417,12 @@ fn unassociated(encoded: [f32; 3], alpha: f32) -> [f32; 3] {
 const BAND_PIXELS: usize = 1 << 20;
 
 impl Raster {
-    fn rows<'a>(&'a self, profile: Option<&'a Profile>, rows: Range<usize>) -> SampleRows<'a> {
+    /// Some rows and what their colours mean.
+    pub(crate) fn rows<'a>(
+        &'a self,
+        profile: Option<&'a Profile>,
+        rows: Range<usize>,
+    ) -> SampleRows<'a> {
         SampleRows {
             raster: self,
             profile,

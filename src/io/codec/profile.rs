@@ -338,7 +338,7 @@ mod tests {
             ),
             0.0625
         );
-        assert!(table(&ToneReprCurve::Parametric(vec![1.0, 2.0])).is_none());
+        assert!(trc_table(&Some(ToneReprCurve::Parametric(vec![1.0, 2.0]))).is_none());
     }
 
     #[test]

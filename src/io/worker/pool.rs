@@ -362,12 +362,16 @@ mod tests {
     );
 
     /// A worker that greets and then does what a shell script says.
-    fn asked(script: &str, limits: &Limits) -> Result<Raster, String> {
+    fn asked(script: &str, limits: &Limits) -> std::result::Result<Raster, String> {
         asked_of(&format!("{GREETING}\n{script}"), limits, false)
     }
 
     /// A worker that is a shell script; `$n` counts how many were started in its folder.
-    fn asked_of(script: &str, limits: &Limits, strict: bool) -> Result<Raster, String> {
+    fn asked_of(
+        script: &str,
+        limits: &Limits,
+        strict: bool,
+    ) -> std::result::Result<Raster, String> {
         let folder = tempfile::tempdir().unwrap();
         let program = folder.path().join("worker");
         let count = folder.path().join("count");

@@ -167,12 +167,12 @@ mod tests {
     fn one_part_alone_is_a_plain_file_that_our_reader_takes() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
-        write_parts(&path, (2, 1), &parts()[..1]).unwrap();
+        crate::io::exr::write_parts(&path, (2, 1), &parts()[..1]).unwrap();
         assert_eq!(
             crate::io::read::<crate::LinearRgb>(&path).unwrap()[(1, 0)],
             crate::LinearRgb::grey(2.0)
         );
-        write_parts(&path, (2, 1), &parts()).unwrap();
+        crate::io::exr::write_parts(&path, (2, 1), &parts()).unwrap();
         assert_eq!(
             crate::io::read::<crate::LinearRgb>(&path).unwrap()[(0, 0)],
             crate::LinearRgb::grey(0.5)

@@ -376,6 +376,9 @@ fn convert_primaries(samples: &mut [f32], n: usize, matrix: &ColorMatrix) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::codec::exr::{Compression, encode, float_samples};
+    use exr::prelude::{AnyChannel, AnyChannels, Encoding, Layer, LayerAttributes, WritableImage};
+    use std::io::Cursor;
 
     fn notes(n: usize) -> Notes {
         (0..n)
@@ -388,7 +391,7 @@ mod tests {
         let file = || {
             encode(
                 (2, 1),
-                vec![("Z", floats(vec![1.0, 2.0]))],
+                vec![("Z", float_samples(vec![1.0, 2.0]))],
                 Compression::Zip,
                 &notes(12),
             )
@@ -403,15 +406,15 @@ mod tests {
     }
 
     #[test]
-    fn names_come_in_the_usual_order() {
+    fn names_come_in_the_default_order() {
         let names = ["A", "B", "G", "N.X", "R", "Z"].map(String::from).to_vec();
-        assert_eq!(in_usual_order(names), ["R", "G", "B", "A", "N.X", "Z"]);
+        assert_eq!(in_default_order(names), ["R", "G", "B", "A", "N.X", "Z"]);
     }
 
     /// ACEScg (0.322761, 0.482919, 0.841329) is Rec. 709 (0.18, 0.5, 0.9), by colour-science.
     #[test]
     fn other_primaries_become_ours() {
-        let plane = |name, v: f32| AnyChannel::new(name, floats(vec![v]));
+        let plane = |name, v: f32| AnyChannel::new(name, float_samples(vec![v]));
         let list = [
             plane("R", 0.322_761),
             plane("G", 0.482_919),
@@ -471,9 +474,12 @@ mod tests {
             LayerAttributes::default(),
             Encoding::UNCOMPRESSED,
             AnyChannels::sort(
-                [AnyChannel::new("Y", floats(vec![1.0, 2.0, 3.0, 4.0]))]
-                    .into_iter()
-                    .collect(),
+                [AnyChannel::new(
+                    "Y",
+                    float_samples(vec![1.0, 2.0, 3.0, 4.0]),
+                )]
+                .into_iter()
+                .collect(),
             ),
         );
         layer.attributes.layer_position = Vec2(-1, 1);

@@ -151,10 +151,12 @@ fn deflated(samples: &[f16]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::exr::{encode as encode_any, halves};
-    use super::super::{Compression, Limits, Window, raster::Samples, raster::Wanted};
     use super::*;
-    use exr::prelude::FlatSamples;
+    use crate::io::codec::Wanted;
+    use crate::io::codec::exr::{decode, encode, half_samples, to_halves};
+    use crate::io::codec::raster::Samples;
+    use crate::io::header::Window;
+    use crate::io::limits::Limits;
 
     fn grain(count: usize) -> Vec<f32> {
         (0..count)
@@ -168,17 +170,8 @@ mod tests {
             .collect()
     }
 
-    fn samples(values: &[f32]) -> Vec<f16> {
-        let FlatSamples::F16(samples) = halves(values) else {
-            panic!("not halves")
-        };
-        samples
-    }
-
     fn decoded(bytes: &[u8]) -> (usize, usize, Samples) {
-        let raster =
-            super::super::exr::decode(bytes, &Limits::default(), Wanted::Color, Window::Display)
-                .unwrap();
+        let raster = decode(bytes, &Limits::default(), Wanted::Color, Window::Display).unwrap();
         (raster.width, raster.height, raster.samples)
     }
 
@@ -187,24 +180,24 @@ mod tests {
         let (size, values) = ((67, 41), grain(67 * 41));
         let names = ["R", "G", "B"];
         let notes = [("petcomp:note".to_string(), "text".to_string())];
-        let ours = encode(
+        let ours = encode_runs(
             size,
-            names.map(|name| (name, samples(&values))).into(),
+            names.map(|name| (name, to_halves(&values))).into(),
             &notes,
         )
         .unwrap();
-        let usual = encode_any(
+        let default = encode(
             size,
-            names.map(|name| (name, halves(&values))).into(),
-            Compression::Zip,
+            names.map(|name| (name, half_samples(&values))).into(),
+            crate::io::Compression::Zip,
             &notes,
         )
         .unwrap();
-        assert_eq!(decoded(&ours), decoded(&usual));
-        let end = sort_attributes(&mut usual.clone(), HEADER).unwrap();
+        assert_eq!(decoded(&ours), decoded(&default));
+        let end = sort_attributes(&mut default.clone(), FIRST_ATTRIBUTE).unwrap();
         assert_eq!(
             String::from_utf8_lossy(&ours[..end]),
-            String::from_utf8_lossy(&usual[..end])
+            String::from_utf8_lossy(&default[..end])
         );
     }
 
@@ -213,7 +206,7 @@ mod tests {
         let noise: Vec<f16> = (0..48_u64)
             .map(|i| f16::from_bits((i * i * 40_503 % 31_744) as u16))
             .collect();
-        let bytes = encode((48, 1), vec![("Y", noise.clone())], &[]).unwrap();
+        let bytes = encode_runs((48, 1), vec![("Y", noise.clone())], &[]).unwrap();
         let raw: Vec<u8> = noise.iter().flat_map(|v| v.to_le_bytes()).collect();
         assert!(bytes.ends_with(&raw));
     }
@@ -221,18 +214,18 @@ mod tests {
     #[test]
     fn a_channel_of_another_size_or_twice_is_refused() {
         assert!(
-            encode((2, 2), vec![("Y", vec![f16::ONE; 3])], &[])
+            encode_runs((2, 2), vec![("Y", vec![f16::ONE; 3])], &[])
                 .unwrap_err()
                 .contains("expected 2 x 2")
         );
         assert!(
-            encode(
+            encode_runs(
                 (1, 1),
                 vec![("Y", vec![f16::ONE]), ("Y", vec![f16::ONE])],
                 &[]
             )
             .is_err()
         );
-        assert!(encode((0, 0), vec![("Y", vec![])], &[]).is_err());
+        assert!(encode_runs((0, 0), vec![("Y", vec![])], &[]).is_err());
     }
 }
