@@ -1,6 +1,6 @@
 //! The plane of the screen in a photo, by what lies in it: the screen's own four corners, or a printed marker.
 
-use crate::camera::{self, Camera, Label, Marker, Solution, TELLING, any_markers, rectify};
+use crate::camera::{self, CHI2_99, Camera, Label, Marker, Solution, any_markers, rectify};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::geom::{Point2, Point3, Pose, UnitQuaternion, Vector3};
@@ -69,7 +69,7 @@ impl Ground {
             (Err(error), Err(_)) => return Err(error),
         };
         check_fit(&best, reference.size)?;
-        let other = other.filter(|other| other.fit.chi2 < best.fit.chi2 + TELLING);
+        let other = other.filter(|other| other.fit.chi2 < best.fit.chi2 + CHI2_99);
         let exchanged = other.map_or(0.0, |other| {
             best.fit.px_per_metre / other.fit.px_per_metre - 1.0
         });
@@ -118,7 +118,7 @@ fn solved(
         Some(reference.sigma_px),
         Some(TAPE_SIGMA * size[0].min(size[1])),
     );
-    camera::learn(&mut label, header);
+    camera::apply_exif(&mut label, header);
     camera::solve(&label, &Default::default()).map_err(|e| unfit(&e.to_string()))
 }
 

@@ -16,7 +16,7 @@ const CAMERA_SUFFIX: &str = ".camera.json";
 
 /// A label, and where it and its camera lie.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Labelled {
+pub struct LabelledPhoto {
     /// The label, with what its photo knows.
     pub label: Label,
     /// The file that it was read from; one of another program may hold many labels.
@@ -25,7 +25,7 @@ pub struct Labelled {
     pub name: String,
 }
 
-impl Labelled {
+impl LabelledPhoto {
     /// A file of its own: `bg0001.camera.json` for the ending `camera.json`.
     pub fn beside(&self, ending: &str) -> PathBuf {
         self.source
@@ -38,7 +38,7 @@ impl Labelled {
     }
 }
 
-impl std::fmt::Display for Labelled {
+impl std::fmt::Display for LabelledPhoto {
     /// The file, and the picture where the file alone does not say which.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.source.display())?;
@@ -74,7 +74,7 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 /// # Errors
 /// A file that cannot be read or understood, a photo instead of a label among them; a photo that has another size than its
 /// label says, or a path that leads out of the label's folder.
-pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<Labelled>> {
+pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
     let text = text_of(path)?;
     let drawings = import::drawings(&text).map_err(|e| e.in_file(path))?;
@@ -99,12 +99,12 @@ pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec
 ///
 /// # Errors
 /// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
-pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Labelled>> {
+pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     // Ours first: what is read later does not come before it.
     paths.sort_by_key(|path| (!ends_with(path, LABEL_SUFFIX), path.clone()));
-    let mut found: Vec<Labelled> = Vec::new();
+    let mut found: Vec<LabelledPhoto> = Vec::new();
     for path in paths.iter().filter(|path| may_be_label(path)) {
         let is_ours = ends_with(path, LABEL_SUFFIX);
         if !is_ours && !is_drawn(path) {
@@ -170,7 +170,7 @@ fn text_of(path: &Path) -> Result<String> {
 }
 
 /// A label of ours, or an array of them.
-fn ours(text: &str, path: &Path) -> Result<Vec<Labelled>> {
+fn ours(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
     let is_array = text.trim_start().starts_with('[');
     let labels: Result<Vec<Label>> = if is_array {
         io::parse_json(text)
@@ -190,7 +190,7 @@ fn ours(text: &str, path: &Path) -> Result<Vec<Labelled>> {
         if !label.image.file.is_empty() {
             io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
         }
-        Ok(Labelled {
+        Ok(LabelledPhoto {
             name: name(&label),
             label,
             source: path.into(),
@@ -206,7 +206,7 @@ fn stem(path: &Path) -> String {
 }
 
 /// The label that another program's drawing means, its photo looked for beside the file.
-fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
+fn drawn(drawing: &Drawing, path: &Path) -> Result<LabelledPhoto> {
     let inside = |file: &&String| io::below("", file.as_str()).is_ok();
     let base = |file: &String| file.rsplit('/').next().unwrap_or_default().to_owned();
     let names: Vec<String> = drawing
@@ -231,7 +231,7 @@ fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
         let header = io::read_header(path.with_file_name(&file))?;
         (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
     }
-    Ok(Labelled {
+    Ok(LabelledPhoto {
         name: stem(Path::new(&file)),
         label,
         source: path.into(),
@@ -239,8 +239,8 @@ fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
 }
 
 /// With the sides that were given where the label has none, and with what its photo knows.
-fn completed(labelled: Labelled, size: Option<[f64; 2]>) -> Result<Labelled> {
-    let Labelled {
+fn completed(labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<LabelledPhoto> {
+    let LabelledPhoto {
         mut label,
         source,
         name,
@@ -249,7 +249,7 @@ fn completed(labelled: Labelled, size: Option<[f64; 2]>) -> Result<Labelled> {
         (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
     }
     check_size(&label).map_err(|e| e.in_file(&source))?;
-    Ok(Labelled {
+    Ok(LabelledPhoto {
         label: with_photo(label, &source)?,
         source,
         name,
@@ -279,12 +279,12 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
         let what = format!("{tw} x {th} pixels, but {} has {w} x {h}", photo.display());
         return Err(Error::value("image", what).in_file(path));
     }
-    learn(&mut label, &header);
+    apply_exif(&mut label, &header);
     Ok(label)
 }
 
 /// Takes over what the photo's file says of its camera and the label does not.
-pub(crate) fn learn(label: &mut Label, header: &io::Header) {
+pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
     if header.cropped || header.whole {
         label.image.cropped.get_or_insert(header.cropped);
     }

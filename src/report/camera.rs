@@ -11,7 +11,7 @@ pub use diagram::diagrams;
 
 use super::clock::cpu_seconds;
 use crate::camera::simulate::{Scenario, View, distorted};
-use crate::camera::{self, Effort, Priors, Solution, SolveOptions};
+use crate::camera::{self, Priors, Solution, SolveOptions};
 use crate::geom::Point3;
 use crate::plot::{Axis, Chart, Curve};
 use crate::{Error, Result, io};
@@ -144,14 +144,13 @@ impl Method {
     }
 
     fn options(self, lens: Lens) -> SolveOptions {
-        let effort = if let Self::Steps(n) = self {
-            Effort::Steps(n)
-        } else {
-            Effort::Whole
+        let max_iterations = match self {
+            Self::Steps(limit) => Some(limit),
+            Self::Whole | Self::Joint => None,
         };
         SolveOptions {
             priors: lens.priors(self),
-            effort,
+            max_iterations,
             ..Default::default()
         }
     }

@@ -74,9 +74,8 @@ fn marker(tag: &Detection, artwork: Artwork) -> Option<Marker> {
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::camera::{
-        self, Label, MarkerMap, SolveOptions, Warning, project_picture, with_markers,
-    };
+    use crate::camera::{self, Label, MarkerMap, SolveOptions, project_picture, with_markers};
+    use crate::diagnostic::Code;
     use crate::filter::Pyramid;
     use crate::geom::Point3;
     use crate::pixel::PremulRgba;
@@ -223,7 +222,7 @@ mod tests {
                 !solution
                     .warnings
                     .iter()
-                    .any(|w| matches!(w, Warning::LoneMarker { .. }))
+                    .any(|w| w.code == Code::SmallMarkerSpan)
             );
         }
     }
@@ -237,7 +236,7 @@ mod tests {
             solution
                 .warnings
                 .iter()
-                .any(|w| matches!(w, Warning::LoneMarker { .. })),
+                .any(|w| w.code == Code::SmallMarkerSpan),
             "{:?}",
             solution.warnings
         );

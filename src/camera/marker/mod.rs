@@ -13,9 +13,9 @@ mod candidate;
 mod dictionary;
 mod edge;
 
+use super::chi::CHI2_99;
 use super::label::{Label, LabelPoint, MarkerMap, PixelOrigin};
 use super::options::SolveOptions;
-use super::search::TELLING;
 use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::image::Image;
@@ -189,7 +189,7 @@ fn turns_that_fit(turned: impl Fn(usize) -> Label) -> usize {
     let others = (1..4).map(|turns| (turns, chi2(turns)));
     let best = others
         .min_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|(_, chi2)| chi2 + TELLING < straight);
+        .filter(|(_, chi2)| chi2 + CHI2_99 < straight);
     best.map_or(0, |(turns, _)| turns)
 }
 
