@@ -1,19 +1,19 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
-mod doubts;
 mod planes;
 mod solve;
 pub(super) mod tint;
+mod uncertainty;
 mod view;
 
-pub use doubts::ColorDoubts;
 pub use planes::film_planes;
+pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
-use super::remark::Remark;
 use super::screen::{is_keyable, strongest_channel};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
@@ -61,13 +61,13 @@ pub struct FilmMatte {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
     /// What makes its colours wrong.
-    pub doubts: ColorDoubts,
+    pub color_uncertainty: ColorUncertainty,
     /// What a person should know.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl FilmMatte {
@@ -82,7 +82,7 @@ impl FilmMatte {
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
 /// garbage matte). A screen with little colour tells little of T: then what may be plastic by its light is guessed to be
-/// that, and a [`Remark`] says so.
+/// that, and a [`Diagnostic`] says so.
 ///
 /// # Method
 /// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the plastic is clear or has
@@ -164,7 +164,7 @@ pub(super) fn film_of_part(
     }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);
-    let grey = (!is_keyable(screen)).then_some(Remark::GreyScreen(screen));
+    let grey = (!is_keyable(screen)).then(|| grey_screen(screen));
     let (flat, tint) = match (opts.flat, &grey) {
         (Some(flat), _) => (flat.into(), 0.0),
         // That the tint may be another is part of the guess.
@@ -187,23 +187,26 @@ pub(super) fn film_of_part(
     });
     watch.lap("factors");
     let most = flat.into_iter().fold(0.0, f32::max);
-    let guessed = doubts::guessed(&factors, inside, opts.thickness_spread, most);
+    let guessed = uncertainty::guessed(&factors, inside, opts.thickness_spread, most);
     let screen_hue = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
-    let keyed_away = doubts::keyed_away(&factors, inside, flat[key], longer_side);
+    let keyed_away = uncertainty::keyed_away(&factors, inside, flat[key], longer_side);
     watch.lap("paint");
     let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
     watch.lap("glints");
-    let doubts = ColorDoubts {
+    let color_uncertainty = ColorUncertainty {
         keyed_away,
         screen_hue,
         clipped,
         guessed,
         tint,
     };
-    let remarks = grey.into_iter().chain(doubts.remarks()).collect();
+    let diagnostics = grey
+        .into_iter()
+        .chain(color_uncertainty.diagnostics())
+        .collect();
     let matte = FilmMatte {
-        doubts,
-        remarks,
+        color_uncertainty,
+        diagnostics,
         ..composed(photo, plate, inside, &factors, flat.into())
     };
     watch.lap("compose");
@@ -265,14 +268,14 @@ fn composed(
         Film::new(f.scale(c.0), covered(v, c))
     });
     let most = flat.r.max(flat.g).max(flat.b);
-    let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
+    let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
     FilmMatte {
         film,
         transmittance,
         uncertainty,
         flat,
-        doubts: ColorDoubts::default(),
-        remarks: Vec::new(),
+        color_uncertainty: ColorUncertainty::default(),
+        diagnostics: Vec::new(),
     }
 }
 
@@ -287,6 +290,16 @@ pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
         (light.r - taken.r).max(0.0),
         (light.g - taken.g).max(0.0),
         (light.b - taken.b).max(0.0),
+    )
+}
+
+fn grey_screen(screen: LinearRgb) -> Diagnostic {
+    let LinearRgb { r, g, b } = screen;
+    Diagnostic::warning(
+        Code::GreyScreen,
+        format_args!(
+            "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to measure transmittance: that of plastic is assumed"
+        ),
     )
 }
 

@@ -22,10 +22,12 @@ mod trace;
 mod world;
 
 pub use crate::scene::{SettleMode, SettleOptions};
-pub(crate) use heap::{heap, octagon};
+#[doc(hidden)]
+pub use heap::{heap, octagon};
 pub use preview::preview;
 pub use trace::{Sample, csv as trace_csv};
-pub(crate) use world::typical_length;
+#[doc(hidden)]
+pub use world::typical_length;
 
 pub use crate::allowance::Allowance;
 use crate::error::{Error, Result};
