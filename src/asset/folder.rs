@@ -273,7 +273,7 @@ fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> P
         hull_m: measured.hull_m,
         screen: cut.screen,
         matte: cut.method,
-        residue: f64::from(cut.residue),
+        residue: f64::from(cut.residual_matte),
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.doubts.map(ColorDoubts::confidence),
