@@ -5,7 +5,7 @@ mod options;
 
 pub use options::{Boundary, CutOutOptions, MatteMethod};
 
-use super::film::ColorDoubts;
+use super::film::ColorUncertainty;
 use super::outline::Outline;
 use super::plate::ScreenPlate;
 use super::prepared::Prepared;
@@ -46,7 +46,7 @@ pub struct CutOut {
     /// Mean matte on the screen outside the object, where it should be 0.
     pub residual_matte: f32,
     /// What makes its colours and its transmittance wrong; of the physical matte only.
-    pub doubts: Option<ColorDoubts>,
+    pub color_uncertainty: Option<ColorUncertainty>,
     /// What a person should know, of the segmentation, the screen and the matte.
     pub diagnostics: Vec<Diagnostic>,
     /// Where the object was found in the photo.
@@ -102,7 +102,7 @@ pub fn cut_out_on(
         unevenness: screen.plate.unevenness,
         method: opts.method.unwrap_or_default(),
         residual_matte: matted.residual_matte,
-        doubts: matted.doubts,
+        color_uncertainty: matted.color_uncertainty,
         diagnostics: diagnostics(photo, &segmentation, &matted, opts),
         film: trim.cropped(&matted.film),
         transmittance: trim.cropped(&matted.transmittance),

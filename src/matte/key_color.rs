@@ -1,6 +1,6 @@
 //! Key colour: one colour for the screen, and whether the object has it, too.
 
-use super::film::ColorDoubts;
+use super::film::ColorUncertainty;
 use super::screen::{screen_color, screen_pixels, strongest_channel};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
@@ -147,7 +147,7 @@ fn screen_hue(
         .filter(|(p, inside)| **inside && excess(**p) > limit)
         .count();
     let share = hued as f32 / object.max(1) as f32;
-    (excess(screen) > 0.0 && share > WORTH_SAYING).then(|| ColorDoubts::screen_hue(share))
+    (excess(screen) > 0.0 && share > WORTH_SAYING).then(|| ColorUncertainty::screen_hue(share))
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub use chroma_key::{ChromaKeyOptions, chroma_key};
 pub use color_spill::{Channel, ColorSpillOptions, SpillLimit, color_spill};
 pub use cut_out::{Boundary, CutOut, CutOutOptions, MatteMethod, cut_out, cut_out_on};
 pub use difference_key::{DifferenceKeyOptions, difference_key};
-pub use film::{ColorDoubts, FilmMatte, FilmOptions, film, film_planes};
+pub use film::{ColorUncertainty, FilmMatte, FilmOptions, film, film_planes};
 pub use key::{KeyOptions, Keyed, Keying, Screen, key};
 pub use key_color::{KeyAverage, KeyColor, key_color};
 pub use keying_screen::{ScreenPoint, keying_screen};

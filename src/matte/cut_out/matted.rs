@@ -4,7 +4,7 @@ use super::{CleanScreen, CutOutOptions, MatteMethod, ObjectRegion};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::image::{Image, Mask};
-use crate::matte::film::{ColorDoubts, FilmMatte, PartOf, film_of_part};
+use crate::matte::film::{ColorUncertainty, FilmInput, FilmMatte, solve_film};
 use crate::matte::key::{Keying, Screen};
 use crate::matte::prepared::Prepared;
 use crate::pixel::{Coverage, Film, LinearRgb, PremulRgba};
@@ -16,7 +16,7 @@ pub(super) struct Matted {
     pub(super) uncertainty: Image<f32>,
     /// Mean matte on the screen outside the object.
     pub(super) residual_matte: f32,
-    pub(super) doubts: Option<ColorDoubts>,
+    pub(super) color_uncertainty: Option<ColorUncertainty>,
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
@@ -46,27 +46,28 @@ impl Matted {
         region: &ObjectRegion,
         opts: &CutOutOptions,
     ) -> Result<Self> {
-        let whole = PartOf {
+        let object = FilmInput {
+            photo: &region.photo,
+            plate: &screen.plate.crop(region.around),
+            inside: &region.cut,
             screen: screen.color,
             longer_side: prepared.longer_side(),
         };
-        let plate = screen.plate.crop(region.around);
         let FilmMatte {
             film,
             transmittance,
             uncertainty,
-            doubts,
+            color_uncertainty,
             diagnostics,
             ..
-        } = film_of_part(&region.photo, &plate, &region.cut, whole, &opts.film)
-            .map_err(|e| e.within("film"))?;
+        } = solve_film(object, &opts.film)?;
         // Film is empty outside the cut.
         Ok(Self {
             film,
             transmittance,
             uncertainty,
             residual_matte: 0.0,
-            doubts: Some(doubts),
+            color_uncertainty: Some(color_uncertainty),
             diagnostics,
         })
     }
@@ -94,7 +95,7 @@ impl Matted {
             transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
             uncertainty: Image::new(image.width(), image.height()),
             residual_matte,
-            doubts: None,
+            color_uncertainty: None,
             diagnostics: Vec::new(),
         }
     }

@@ -11,9 +11,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentOptions {
-    /// What the pyramid is made of (`tone` in files). Default: each channel by itself.
-    #[serde(rename = "tone")]
-    pub luma: LumaMode,
+    /// What the pyramid is made of. Default: each channel by itself.
+    pub tone: LumaMode,
     /// Which band of the pyramid is the coarse one, 2 to 8; the fine one is the finest. Default: nothing = the depth that
     /// the others agree with best.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -39,7 +38,7 @@ pub struct SegmentOptions {
 impl Default for SegmentOptions {
     fn default() -> Self {
         Self {
-            luma: LumaMode::Channels,
+            tone: LumaMode::Channels,
             levels: None,
             finest_threshold: Threshold::Otsu,
             coarsest_threshold: Threshold::Otsu,
@@ -61,7 +60,7 @@ impl SegmentOptions {
         }
         check_share("ridge", f64::from(self.ridge))?;
         check_share("join", self.join)?;
-        self.luma.check()?;
+        self.tone.check()?;
         let sizes = Bounds::new(MIN_SEARCH_SIZE_PX as f64, 32_768.0, "pixels");
         sizes.check("working_size", self.working_size as f64)
     }

@@ -54,7 +54,7 @@ const MIN_JOIN_PX: f64 = 6.0;
 impl Search {
     /// Splits a picture into bands, `deepest` of them.
     pub(super) fn new(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
-        let bands = Bands::new(picture, opts.luma, deepest);
+        let bands = Bands::new(picture, opts.tone, deepest);
         let finest = &bands.finest;
         let threshold = opts
             .finest_threshold

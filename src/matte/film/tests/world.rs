@@ -236,7 +236,7 @@ fn doubts_follow_errors() {
             let hue = strongest_channel(plate.color());
             println!(
                 "{name} {screen} {hue} {lit:.4} {shaded:.4} {:?} {:?}",
-                found.flat, found.doubts
+                found.flat, found.color_uncertainty
             );
         }
     }
