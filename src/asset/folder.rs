@@ -12,7 +12,7 @@ use super::screen_source::EmptyScreens;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::matte::{ColorDoubts, CutOut, CutOutOptions, cut_out_on};
+use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
@@ -159,7 +159,7 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         residue: f64::from(cut.residue),
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
-        color_confidence: cut.doubts.map(ColorDoubts::confidence),
+        color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
         diagnostics: diagnostics.collect(),
         ..PhotoRecord::new(file, measured.px_per_metre, size_m, outline_px)
