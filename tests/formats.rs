@@ -89,7 +89,7 @@ fn shot(k: u64) -> Shot {
 
 fn sample(k: u64) -> Result<Sample> {
     let shot = shot(k);
-    let deep = render::cast(&shot, &Default::default());
+    let deep = render::render(&shot, &Default::default());
     let frame = composite::frame(&deep, shot.plate.as_deref());
     let labels = label(&deep, &shot, &LabelOptions::default());
     let scene = Scene {
@@ -342,7 +342,7 @@ fn a_box_is_that_of_the_object_rendered_alone() {
                 ..shot.clone()
             };
             let alone = label(
-                &render::cast(&alone, &Default::default()),
+                &render::render(&alone, &Default::default()),
                 &alone,
                 &LabelOptions::default(),
             );

@@ -236,7 +236,7 @@ mod tests {
     use crate::camera::Camera;
     use crate::composite;
     use crate::geom::{Pose, Quad, UnitQuaternion, Vector2, Vector3};
-    use crate::render::{RenderOptions, cast};
+    use crate::render::{RenderOptions, render};
     use crate::scene::Grade;
 
     fn shot() -> Shot {
@@ -279,7 +279,7 @@ mod tests {
 
     fn made(names: &[&str]) -> (Image<PremulRgba>, Vec<Part>) {
         let shot = shot();
-        let deep = cast(&shot, &RenderOptions::default());
+        let deep = render(&shot, &RenderOptions::default());
         let frame = composite::frame(&deep, None);
         let aovs: Vec<Aov> = names.iter().map(|n| n.parse().unwrap()).collect();
         let parts = parts(&aovs, &deep, &shot, &frame);

@@ -6,7 +6,7 @@ use crate::scene::{Card, Shot};
 
 /// Is a shot something that can be rendered?
 ///
-/// Reads every texel, so ask once per shot that comes from outside, not once per frame. [`cast`](super::cast) itself
+/// Reads every texel, so ask once per shot that comes from outside, not once per frame. [`render`](super::render) itself
 /// neither asks nor panics: a NaN in a texture then becomes a NaN in the picture. Cards that are edge-on, behind the
 /// eye or without area are fine; they are not seen.
 ///

@@ -20,7 +20,7 @@ const MOST_STEPS: f64 = 1024.0;
 
 /// Brightens the surface by what cards above throw back to it; for who knows the surface's albedo.
 ///
-/// Not part of the definition, which leaves bounces out: [`cast`](super::cast) never does this. A black albedo changes no
+/// Not part of the definition, which leaves bounces out: [`render`](super::render) never does this. A black albedo changes no
 /// bit; shadow factors may come out above 1.
 ///
 /// # Method

@@ -3,16 +3,16 @@
 //! Everything in a shot is planar, so each map between two planes seen from a point is a homography and visibility
 //! needs no ray tracing. Work is split by frequency: textures are sharp and are sampled several times a pixel
 //! (`layers`), irradiance is smooth and is computed once per receiver on a coarse lattice of the picture and looked up
-//! (`irradiance`). [`reference()`] computes the same definition sample by sample without any of this, to test against.
+//! (`irradiance`). [`render_reference`] computes the same definition sample by sample without any of this, to test against.
 //!
 //! The definition: cards are Lambert surfaces that scatter a share `alpha` of the light and let the rest pass; lights
 //! are seen through the product of `1 - alpha` of the cards in between; the plate is multiplied by the ratio of shadowed
 //! to unshadowed irradiance of the surface `z = 0`; a pixel is the average under a Blackman-Harris window three pixels
 //! wide.
 
-mod cast;
 mod check;
 mod cryptomatte;
+mod deep;
 mod four;
 mod half_plane;
 mod interreflection;
@@ -31,10 +31,10 @@ mod texture;
 mod through;
 mod view;
 
-pub use cast::{cast, cover};
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
 pub(crate) use cryptomatte::{id_of, murmur3};
+pub use deep::{render, render_coverage};
 pub use interreflection::interreflect;
-pub use options::{Preset, RenderOptions};
-pub use reference::reference;
+pub use options::RenderOptions;
+pub use reference::render_reference;

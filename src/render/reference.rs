@@ -18,8 +18,8 @@ use std::f32::consts::PI;
 /// Renders a shot without any shortcut: every sub-sample of every pixel sends a ray to every light sample.
 ///
 /// Textures are read at full size, colours are graded after interpolation, `cell_px` is not used. Takes minutes where
-/// [`cast`](super::cast) takes milliseconds; its error against the definition falls with the numbers in `options`.
-pub fn reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
+/// [`render`](super::render) takes milliseconds; its error against the definition falls with the numbers in `options`.
+pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let world = World::of(shot, &options);
     let offsets = quantiles(options.subsamples);

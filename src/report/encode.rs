@@ -12,7 +12,7 @@ use crate::io::{self, Bits, Compression, PngEffort, WriteOptions};
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::plot::number::three;
 use crate::quality::Quality;
-use crate::render::cast;
+use crate::render::render;
 use crate::{Shot, composite};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -221,7 +221,7 @@ fn picture() -> Image<LinearRgb> {
         .iter_mut()
         .for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
     let shot: Shot = pile(CARDS, SIZE).with_plate(Arc::new(plate));
-    let deep = cast(&shot, &Quality::default().render());
+    let deep = render(&shot, &Quality::default().render());
     composite::frame(&deep, shot.plate.as_deref()).map(PremulRgba::color)
 }
 

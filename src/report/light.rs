@@ -14,7 +14,7 @@ use crate::image::Image;
 use crate::light::{frame, polygon_irradiance};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::quality::Quality;
-use crate::render::{RenderOptions, cast, reference};
+use crate::render::{RenderOptions, render, render_reference};
 use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
 use std::f64::consts::PI;
 
@@ -77,7 +77,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &sampled(n),
-            cast,
+            render,
         )?);
     }
     for cell_px in CELLS.into_iter().filter(|c| *c != usual.cell_px) {
@@ -87,7 +87,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &options,
-            cast,
+            render,
         )?);
     }
     for n in counts.into_iter().filter(|n| *n <= MOST_PLAIN) {
@@ -101,7 +101,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &options,
-            reference,
+            render_reference,
         )?);
     }
     for quality in [Quality::Draft, Quality::Reference] {
@@ -111,7 +111,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &options,
-            cast,
+            render,
         )?;
         points.push(point.used_where(|q| q == quality));
     }
@@ -321,7 +321,7 @@ mod tests {
         let shot = shot(Kind::Area);
         let exact = exact(&shot, Kind::Area);
         let error = |options: RenderOptions| {
-            measured(("", String::new()), &shot, &exact, &options, cast)
+            measured(("", String::new()), &shot, &exact, &options, render)
                 .unwrap()
                 .error
         };

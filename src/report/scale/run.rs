@@ -10,7 +10,7 @@ use crate::dataset::{
 use crate::deep::DeepImage;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::label::{LabelOptions, label};
-use crate::render::{RenderOptions, cast};
+use crate::render::{RenderOptions, render};
 use crate::report::pile::{above, lamp};
 use crate::report::settle::median_and_worst;
 use crate::scene::{CameraSource, Exposure, Grade, Look, Object, Placement, Scene, Shot, Surface};
@@ -147,7 +147,7 @@ impl World {
     }
 
     fn sample(&self) -> Sample {
-        let deep = cast(&self.shot, &RenderOptions::default());
+        let deep = render(&self.shot, &RenderOptions::default());
         let frame = composite::frame(&deep, self.shot.plate.as_deref());
         let labels = label(&deep, &self.shot, &LabelOptions::default());
         Sample {

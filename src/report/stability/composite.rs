@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::image::Image;
 use crate::label::{LabelOptions, label};
 use crate::pixel::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{RenderOptions, cast};
+use crate::render::{RenderOptions, render};
 use crate::scene::{Finish, Shot};
 use std::sync::Arc;
 
@@ -84,7 +84,7 @@ fn everything_off() -> Case {
         || {
             let plate = Arc::new(plate(64, 48));
             let shot = Shot::new(above([64, 48], 60.0)).with_plate(plate.clone());
-            let deep = cast(&shot, &RenderOptions::default());
+            let deep = render(&shot, &RenderOptions::default());
             let out = finish(
                 frame(&deep, Some(&plate)),
                 &deep,
@@ -120,7 +120,7 @@ fn empty_without_plate() -> Case {
         "no card, no plate",
         "transparent black everywhere: 0 pixels differ",
         || {
-            let deep = cast(
+            let deep = render(
                 &Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE),
                 &RenderOptions::default(),
             );
@@ -200,7 +200,7 @@ fn broken_plate() -> Case {
             let mut plate = plate(64, 48);
             plate[(20, 30)].g = f32::NAN;
             let out = frame(
-                &cast(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
+                &render(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
                 Some(&plate),
             );
             let broken = out

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::io;
 use crate::label::{LabelOptions, label};
 use crate::pixel::{LinearRgb, ObjectId};
-use crate::render::{RenderOptions, cast};
+use crate::render::{RenderOptions, render};
 use crate::scene::{Background, CameraSource, Range, Recipe, Shot};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -45,7 +45,7 @@ pub(super) fn cases() -> Result<Vec<Case>> {
 
 /// A picture of a shot, its labels, and what it was made from.
 fn taken(shot: &Shot) -> Sample {
-    let deep = cast(shot, &RenderOptions::default());
+    let deep = render(shot, &RenderOptions::default());
     sample(shot, deep)
 }
 

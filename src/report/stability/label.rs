@@ -9,7 +9,7 @@ use crate::geom::Point2;
 use crate::image::Image;
 use crate::label::{AmodalBox, LabelOptions, Labels, Mask, ObjectLabel, label};
 use crate::pixel::{Depth, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{RenderOptions, cast};
+use crate::render::{RenderOptions, render};
 use crate::scene::{Card, Shot};
 use std::f64::consts::FRAC_PI_2;
 
@@ -43,7 +43,7 @@ fn shot(image: [u32; 2], cards: impl IntoIterator<Item = Card>) -> Shot {
 
 fn labelled(shot: &Shot) -> Labels {
     label(
-        &cast(shot, &RenderOptions::default()),
+        &render(shot, &RenderOptions::default()),
         shot,
         &LabelOptions::default(),
     )
@@ -276,7 +276,7 @@ fn edge_on() -> Case {
                     opaque(3, [3.0, 0.0, 0.0], 0.2),
                 ],
             );
-            let deep = cast(&shot, &RenderOptions::default());
+            let deep = render(&shot, &RenderOptions::default());
             let around = |amodal| {
                 label(
                     &deep,

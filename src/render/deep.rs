@@ -35,7 +35,7 @@ const DENSE: usize = 4;
 /// of the environment, each seen through the product of `1 - alpha` of the cards in between. Textures are sharp: they are
 /// read at the quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave over. Cards
 /// are ordered by depth block by block; blocks in which they cross are split.
-pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
+pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let view = View::of(&shot.camera);
     let offsets = quantiles(options.subsamples);
@@ -92,8 +92,8 @@ pub fn cast(shot: &Shot, options: &RenderOptions) -> DeepImage {
 
 /// The same in the dark: what objects cover and hide, and how far away they are, without any light.
 ///
-/// All that labels are made from, at a part of the price; bit for bit what [`cast`] says of it.
-pub fn cover(shot: &Shot, options: &RenderOptions) -> DeepImage {
+/// All that labels are made from, at a part of the price; bit for bit what [`render`] says of it.
+pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let dark = Shot {
         lights: Vec::new(),
         ambient: LinearRgb::BLACK,
@@ -101,7 +101,7 @@ pub fn cover(shot: &Shot, options: &RenderOptions) -> DeepImage {
         plate: None,
         ..shot.clone()
     };
-    cast(&dark, options)
+    render(&dark, options)
 }
 
 /// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
