@@ -10,13 +10,13 @@ use crate::deep::DeepImage;
 use crate::pixel::ObjectId;
 
 /// Sets of four channels, two ranks each: the six ranks that most programs write.
-const SETS: usize = 3;
+const CHANNEL_SETS: usize = 3;
 
 /// Channels of a set: id and coverage of the one rank, then of the next.
-const SET: [&str; 4] = ["R", "G", "B", "A"];
+const SET_CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
 
 /// Characters of the layer's key in its attributes.
-const KEY: usize = 7;
+const KEY_DIGITS: usize = 7;
 
 /// The channels and attributes of one layer.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,7 +36,10 @@ impl Cryptomatte {
             .iter()
             .map(|(object, name)| (*object, id_of(name)))
             .collect();
-        let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); SETS * SET.len()];
+        let mut planes = vec![
+            Vec::with_capacity(deep.width() * deep.height());
+            CHANNEL_SETS * SET_CHANNELS.len()
+        ];
         for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
             let id = |object| {
                 ids.iter()
@@ -57,7 +60,13 @@ impl Cryptomatte {
                 pair[1].push(coverage);
             }
         }
-        let name = |i: usize| format!("{layer}{:02}.{}", i / SET.len(), SET[i % SET.len()]);
+        let name = |i: usize| {
+            format!(
+                "{layer}{:02}.{}",
+                i / SET_CHANNELS.len(),
+                SET_CHANNELS[i % SET_CHANNELS.len()]
+            )
+        };
         let channels = planes
             .into_iter()
             .enumerate()
@@ -71,7 +80,7 @@ impl Cryptomatte {
 }
 
 fn metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
-    let key = &format!("{:08x}", murmur3(layer.as_bytes()))[..KEY];
+    let key = &format!("{:08x}", murmur3(layer.as_bytes()))[..KEY_DIGITS];
     let hex = |name: &str| format!("{:08x}", id_of(name).to_bits());
     let manifest: serde_json::Map<_, _> = names
         .iter()

@@ -6,23 +6,25 @@ use crate::image::Image;
 use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
 use crate::render::half_plane::sides;
-use crate::render::irradiance::{Map, maps};
+use crate::render::irradiance::{IrradianceMap, maps};
 use crate::render::lattice::Lattice;
-use crate::render::layers::{Block, Ground, Layer, Painted, Samples, Stack};
+use crate::render::layers::{
+    Layer, LayerStack, PixelBlock, RenderedTile, SampleGrid, ShadowCatcher,
+};
 use crate::render::pixel_filter::{left_over_sigma, quantiles};
-use crate::render::receiver::Studio;
-use crate::render::shadow::{Casters, rows_and_columns};
-use crate::render::texture::Baked;
-use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::render::receiver::LightingContext;
+use crate::render::shadow::{Occluders, rows_and_columns};
+use crate::render::texture::BakedTexture;
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, sheets};
 use crate::scene::{Card, Shot};
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 
 /// Side of the blocks that the picture is put together from, pixels.
-const TILE: usize = 32;
+const TILE_SIDE_PX: usize = 32;
 
 /// Sub-samples a side from which on a sharper level of detail pays.
-const DENSE: usize = 4;
+const DENSE_SUBSAMPLES: usize = 4;
 
 /// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
 ///
@@ -37,13 +39,13 @@ const DENSE: usize = 4;
 /// are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
-    let view = View::of(&shot.camera);
+    let view = CameraView::of(&shot.camera);
     let offsets = quantiles(options.subsamples);
     let cards = sheets(shot);
-    let casters = Casters::new(&cards, Sheet::surface(shot.catcher));
+    let casters = Occluders::new(&cards, ScenePlane::surface(shot.catcher));
     let tinted = casters.tinted;
     let [fine, coarse] = [1.0, 2.0].map(|scale| Lattice::new(&view, scale * options.cell_px));
-    let studio = Studio {
+    let studio = LightingContext {
         fine,
         coarse,
         casters,
@@ -53,7 +55,7 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
 
     let looks: Vec<_> = cards
         .par_iter()
-        .map(|(card, sheet)| Look::of(card, sheet, &view, &offsets))
+        .map(|(card, sheet)| ProjectedCard::of(card, sheet, &view, &offsets))
         .collect();
     let receiver = |k: usize| match looks.get(k) {
         Some(look) => studio.card(k, look.as_ref()?.texture.grid.reach),
@@ -70,11 +72,11 @@ pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let layers = seen
         .map(|(card, look, light)| look.layer(card, light))
         .collect();
-    let ground = Ground {
-        seen: Seen::of(&studio.casters.surface, &view),
+    let ground = ShadowCatcher {
+        seen: ProjectedPlane::of(&studio.casters.surface, &view),
         share,
     };
-    let stack = Stack {
+    let stack = LayerStack {
         layers,
         ground,
         samples: samples(&view, &fine, offsets, &options),
@@ -105,10 +107,15 @@ pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
 }
 
 /// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
-fn samples(view: &View, lattice: &Lattice, offsets: Vec<f64>, options: &RenderOptions) -> Samples {
+fn samples(
+    view: &CameraView,
+    lattice: &Lattice,
+    offsets: Vec<f64>,
+    options: &RenderOptions,
+) -> SampleGrid {
     let each = options.cell_px < 1.0;
     let places = |pixels: usize| lattice.places(pixels, if each { &offsets } else { &[0.0] });
-    Samples {
+    SampleGrid {
         columns: places(view.width),
         rows: places(view.height),
         each,
@@ -117,24 +124,24 @@ fn samples(view: &View, lattice: &Lattice, offsets: Vec<f64>, options: &RenderOp
 }
 
 /// A card in the picture, before it is lit.
-struct Look {
-    seen: Seen,
-    texture: Baked,
+struct ProjectedCard {
+    seen: ProjectedPlane,
+    texture: BakedTexture,
     columns: std::ops::Range<usize>,
     rows: std::ops::Range<usize>,
 }
 
-impl Look {
+impl ProjectedCard {
     /// None for a card that is edge-on or outside the picture.
-    fn of(card: &Card, sheet: &Sheet, view: &View, offsets: &[f64]) -> Option<Self> {
-        let seen = Seen::of(sheet, view)?;
+    fn of(card: &Card, sheet: &ScenePlane, view: &CameraView, offsets: &[f64]) -> Option<Self> {
+        let seen = ProjectedPlane::of(sheet, view)?;
         let (rows, columns) = rows_and_columns(sheet, [0.0; 2], view);
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
         work::add(Kind::Bakes, 1);
         let (seen, texture) = side(card, sheet, seen, view);
-        let texture = Baked::new(
+        let texture = BakedTexture::new(
             texture,
             &card.grade,
             level(texture, sheet, &seen, view, offsets),
@@ -148,7 +155,7 @@ impl Look {
         })
     }
 
-    fn layer(self, card: &Card, light: Option<Map>) -> Layer {
+    fn layer(self, card: &Card, light: Option<IrradianceMap>) -> Layer {
         let Self {
             seen,
             texture,
@@ -169,11 +176,16 @@ impl Look {
 }
 
 /// The side of a card that is turned to the eye, and how it lies.
-fn side<'a>(card: &'a Card, sheet: &Sheet, seen: Seen, view: &View) -> (Seen, &'a Texture) {
+fn side<'a>(
+    card: &'a Card,
+    sheet: &ScenePlane,
+    seen: ProjectedPlane,
+    view: &CameraView,
+) -> (ProjectedPlane, &'a Texture) {
     let from_behind = sheet.normal.dot(&(view.eye - sheet.center)) < 0.0;
     match &card.back {
         Some(back) if from_behind => (
-            Seen {
+            ProjectedPlane {
                 u: seen.w - seen.u,
                 ..seen
             },
@@ -186,26 +198,40 @@ fn side<'a>(card: &'a Card, sheet: &Sheet, seen: Seen, view: &View) -> (Seen, &'
 /// Level of detail by matching variance: what sub-samples leave of the pixel's window, the texture's own filter covers.
 ///
 /// A level read bilinearly has variance `4^level / 4` texels.
-fn level(texture: &Texture, sheet: &Sheet, seen: &Seen, view: &View, offsets: &[f64]) -> f64 {
+fn level(
+    texture: &Texture,
+    sheet: &ScenePlane,
+    seen: &ProjectedPlane,
+    view: &CameraView,
+    offsets: &[f64],
+) -> f64 {
     let (width, height) = texture.size();
     let texels = (width * height) as f64;
     let per_pixel =
         seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
-    let dense = if offsets.len() >= DENSE { 0.25 } else { 0.0 };
+    let dense = if offsets.len() >= DENSE_SUBSAMPLES {
+        0.25
+    } else {
+        0.0
+    };
     let level = libm::log2(2.0 * left_over_sigma(offsets) * per_pixel) - dense;
     // A NaN from a card that fills the horizon reads the full texture.
     level.clamp(0.0, 32.0).max(0.0)
 }
 
-fn tiles(view: &View) -> Vec<Block> {
-    let cuts = |len: usize| (0..len).step_by(TILE).map(move |a| a..(a + TILE).min(len));
+fn tiles(view: &CameraView) -> Vec<PixelBlock> {
+    let cuts = |len: usize| {
+        (0..len)
+            .step_by(TILE_SIDE_PX)
+            .map(move |a| a..(a + TILE_SIDE_PX).min(len))
+    };
     cuts(view.height)
-        .flat_map(|y| cuts(view.width).map(move |x| Block { x, y: y.clone() }))
+        .flat_map(|y| cuts(view.width).map(move |x| PixelBlock { x, y: y.clone() }))
         .collect()
 }
 
 /// Puts the tiles' pixels in order.
-fn assemble(view: &View, painted: &[Painted]) -> DeepImage {
+fn assemble(view: &CameraView, painted: &[RenderedTile]) -> DeepImage {
     let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
     for p in painted {
         let Some(values) = &p.shadow else { continue };
@@ -225,7 +251,7 @@ mod tests {
 
     #[test]
     fn tiles_cover_every_pixel_once() {
-        let view = View {
+        let view = CameraView {
             eye: Vector3::zeros(),
             ray: nalgebra::Matrix3::identity(),
             width: 37,

@@ -6,17 +6,17 @@ use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use crate::render::reference::texel;
-use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, sheets};
 use crate::scene::{Card, Shot};
 
 /// How far light spreads on its way to and fro, metres: the order of a pile's height; 4 to 16 mm do as well.
-const SPREAD: f64 = 0.008;
+const BOUNCE_SPREAD_M: f64 = 0.008;
 
 /// Distance of the places on the surface that look up, metres.
-const STEP: f64 = 0.002;
+const GRID_STEP_M: f64 = 0.002;
 
 /// Most places along a side; more distant ones for larger scenes.
-const MOST_STEPS: f64 = 1024.0;
+const MAX_GRID_STEPS: f64 = 1024.0;
 
 /// Brightens the surface by what cards above throw back to it; for who knows the surface's albedo.
 ///
@@ -27,9 +27,10 @@ const MOST_STEPS: f64 = 1024.0;
 /// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the sum over cards upwards
 /// of their colour times the squared transmittance of what lies below, blurred over the surface.
 pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImage {
-    let view = View::of(&shot.camera);
-    let seen = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
-    let (Some(seen), Some(above)) = (seen, Above::of(shot)) else {
+    let view = CameraView::of(&shot.camera);
+    let seen =
+        ProjectedPlane::of(&ScenePlane::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
+    let (Some(seen), Some(above)) = (seen, BounceMap::of(shot)) else {
         return deep;
     };
     deep.map_shadow(|x, y, factor| {
@@ -45,13 +46,13 @@ pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImag
 }
 
 /// What comes back from above, on a grid over the part of the surface that has cards over it.
-struct Above {
+struct BounceMap {
     corner: [f64; 2],
     step: f64,
     back: Image<LinearRgb>,
 }
 
-impl Above {
+impl BounceMap {
     /// None without cards.
     fn of(shot: &Shot) -> Option<Self> {
         let cards = sheets(shot);
@@ -60,12 +61,12 @@ impl Above {
             .flat_map(|(_, sheet)| sheet.corners())
             .collect();
         let side = |axis: usize| {
-            let low = corners.iter().map(|c| c[axis]).reduce(f64::min)? - 3.0 * SPREAD;
-            let high = corners.iter().map(|c| c[axis]).reduce(f64::max)? + 3.0 * SPREAD;
+            let low = corners.iter().map(|c| c[axis]).reduce(f64::min)? - 3.0 * BOUNCE_SPREAD_M;
+            let high = corners.iter().map(|c| c[axis]).reduce(f64::max)? + 3.0 * BOUNCE_SPREAD_M;
             Some((low, high - low))
         };
         let ((left, width), (bottom, height)) = (side(0)?, side(1)?);
-        let step = STEP.max(width.max(height) / MOST_STEPS);
+        let step = GRID_STEP_M.max(width.max(height) / MAX_GRID_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
         let at = |i: usize, j: usize| {
             Vector3::new(left + i as f64 * step, bottom + j as f64 * step, 0.0)
@@ -74,7 +75,7 @@ impl Above {
         Some(Self {
             corner: [left, bottom],
             step,
-            back: gaussian_blur(&back, (SPREAD / step) as f32),
+            back: gaussian_blur(&back, (BOUNCE_SPREAD_M / step) as f32),
         })
     }
 
@@ -85,8 +86,8 @@ impl Above {
 }
 
 /// Light that cards straight above a point of the surface send back to it.
-fn straight_above(cards: &[(&Card, Sheet)], point: &Vector3<f64>) -> LinearRgb {
-    let hit = |(card, sheet): &(&Card, Sheet)| {
+fn straight_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> LinearRgb {
+    let hit = |(card, sheet): &(&Card, ScenePlane)| {
         let height = sheet.normal.dot(&(sheet.center - point)) / sheet.normal.z;
         let local = point + Vector3::z() * height - sheet.center;
         let uv = [

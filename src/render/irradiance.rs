@@ -1,34 +1,34 @@
 //! Irradiance of each receiver at the nodes of the lattice, to be looked up between them.
 
-use crate::render::four::Four;
+use crate::render::float4::Float4;
 use crate::render::half_plane::meet;
-use crate::render::lattice::{Place, coarser};
-use crate::render::receiver::{Buffers, Lit, Receiver};
+use crate::render::lattice::{LatticePosition, coarser};
+use crate::render::receiver::{Receiver, ReceiverIrradiance, RowBuffers};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows of nodes that one task computes.
-const BAND: usize = 16;
+const BAND_ROWS: usize = 16;
 
 /// Values at the nodes of a part of a lattice.
 #[derive(Debug)]
-pub(super) struct Map {
+pub(super) struct IrradianceMap {
     columns: Range<usize>,
     rows: Range<usize>,
-    values: Vec<Four>,
+    values: Vec<Float4>,
 }
 
 /// The maps of all receivers, computed in parallel in bands of rows; the same bits for any number of threads.
 ///
 /// Irradiance, or what shadows leave of it as a share; each with 1 as the fourth number. None in the dark.
-pub(super) fn maps(receivers: &[Option<Lit>]) -> Vec<Option<Map>> {
+pub(super) fn maps(receivers: &[Option<ReceiverIrradiance>]) -> Vec<Option<IrradianceMap>> {
     let lit = || {
         receivers
             .iter()
             .map(|r| r.as_ref().filter(|r| !r.is_dark()))
     };
     let mut soft: Vec<_> = lit()
-        .map(|r| r.map(|r| Map::of(&r.coarse, Four::ZERO)))
+        .map(|r| r.map(|r| IrradianceMap::of(&r.coarse, Float4::ZERO)))
         .collect();
     fill(
         receivers,
@@ -36,11 +36,21 @@ pub(super) fn maps(receivers: &[Option<Lit>]) -> Vec<Option<Map>> {
         |lit, _| &lit.coarse,
         |lit, _, j, out, buffers| hidden(&lit.coarse, j, out, buffers),
     );
-    let empty = |lit: &Lit| if lit.relative { Four::ONE } else { Four::ZERO };
+    let empty = |lit: &ReceiverIrradiance| {
+        if lit.relative {
+            Float4::ONE
+        } else {
+            Float4::ZERO
+        }
+    };
     let mut maps: Vec<_> = lit()
-        .map(|r| r.map(|r| Map::of(&r.fine, empty(r))))
+        .map(|r| r.map(|r| IrradianceMap::of(&r.fine, empty(r))))
         .collect();
-    let with_soft = |lit: &Lit, k: usize, j: usize, out: &mut [Four], buffers: &mut Buffers| {
+    let with_soft = |lit: &ReceiverIrradiance,
+                     k: usize,
+                     j: usize,
+                     out: &mut [Float4],
+                     buffers: &mut RowBuffers| {
         if let Some(soft) = &soft[k] {
             whole_row(lit, soft, j, out, buffers);
         }
@@ -51,10 +61,10 @@ pub(super) fn maps(receivers: &[Option<Lit>]) -> Vec<Option<Map>> {
 
 /// Fills maps row by row, in parallel bands.
 fn fill(
-    receivers: &[Option<Lit>],
-    maps: &mut [Option<Map>],
-    part: impl Fn(&Lit, usize) -> &Receiver + Sync,
-    row: impl Fn(&Lit, usize, usize, &mut [Four], &mut Buffers) + Sync,
+    receivers: &[Option<ReceiverIrradiance>],
+    maps: &mut [Option<IrradianceMap>],
+    part: impl Fn(&ReceiverIrradiance, usize) -> &Receiver + Sync,
+    row: impl Fn(&ReceiverIrradiance, usize, usize, &mut [Float4], &mut RowBuffers) + Sync,
 ) {
     let pairs = receivers
         .iter()
@@ -66,7 +76,7 @@ fn fill(
         .collect();
     bands
         .into_par_iter()
-        .for_each_init(Buffers::default, |buffers, (k, lit, first, band)| {
+        .for_each_init(RowBuffers::default, |buffers, (k, lit, first, band)| {
             for (n, out) in band
                 .chunks_exact_mut(part(lit, k).columns.len())
                 .enumerate()
@@ -77,7 +87,7 @@ fn fill(
 }
 
 /// One row of what blockers hide of a receiver's lamps.
-fn hidden(receiver: &Receiver, j: usize, out: &mut [Four], buffers: &mut Buffers) {
+fn hidden(receiver: &Receiver, j: usize, out: &mut [Float4], buffers: &mut RowBuffers) {
     let asked = receiver.asked(j);
     if !asked.is_empty() {
         receiver.gather(j, &asked, buffers);
@@ -86,7 +96,13 @@ fn hidden(receiver: &Receiver, j: usize, out: &mut [Four], buffers: &mut Buffers
 }
 
 /// One row of irradiance or of its share, from the sharp part and the soft one.
-fn whole_row(lit: &Lit, soft: &Map, j: usize, out: &mut [Four], buffers: &mut Buffers) {
+fn whole_row(
+    lit: &ReceiverIrradiance,
+    soft: &IrradianceMap,
+    j: usize,
+    out: &mut [Float4],
+    buffers: &mut RowBuffers,
+) {
     let asked = lit.fine.asked(j);
     if asked.is_empty() {
         return;
@@ -111,13 +127,13 @@ fn whole_row(lit: &Lit, soft: &Map, j: usize, out: &mut [Four], buffers: &mut Bu
 }
 
 /// What is left of open irradiance.
-fn left(open: &Four, hidden: &Four) -> Four {
+fn left(open: &Float4, hidden: &Float4) -> Float4 {
     let channel = |i: usize| (open.0[i] - hidden.0[i]).max(0.0);
-    Four([channel(0), channel(1), channel(2), 1.0])
+    Float4([channel(0), channel(1), channel(2), 1.0])
 }
 
 /// The same as a share; exactly 1 where nothing is hidden, and where there is no light.
-fn share(open: &Four, hidden: &Four) -> Four {
+fn share(open: &Float4, hidden: &Float4) -> Float4 {
     let channel = |i: usize| {
         if open.0[i] > 0.0 {
             (1.0 - hidden.0[i] / open.0[i]).clamp(0.0, 1.0)
@@ -125,11 +141,11 @@ fn share(open: &Four, hidden: &Four) -> Four {
             1.0
         }
     };
-    Four([channel(0), channel(1), channel(2), 1.0])
+    Float4([channel(0), channel(1), channel(2), 1.0])
 }
 
-impl Map {
-    fn of(receiver: &Receiver, value: Four) -> Self {
+impl IrradianceMap {
+    fn of(receiver: &Receiver, value: Float4) -> Self {
         let (columns, rows) = (receiver.columns.clone(), receiver.rows.clone());
         let values = vec![value; columns.len() * rows.len()];
         Self {
@@ -140,19 +156,19 @@ impl Map {
     }
 
     /// Bands of rows, each with its first row's number.
-    fn bands(&mut self) -> impl Iterator<Item = (usize, &mut [Four])> {
+    fn bands(&mut self) -> impl Iterator<Item = (usize, &mut [Float4])> {
         let (first, width) = (self.rows.start, self.columns.len().max(1));
         self.values
-            .chunks_mut(BAND * width)
+            .chunks_mut(BAND_ROWS * width)
             .enumerate()
-            .map(move |(k, band)| (first + k * BAND, band))
+            .map(move |(k, band)| (first + k * BAND_ROWS, band))
     }
 
     /// The row of this coarser map that belongs to row `j` of a finer one, at all nodes around `asked`; 0 outside.
-    fn enlarged(&self, j: usize, asked: &Range<usize>, out: &mut Vec<Four>) {
+    fn enlarged(&self, j: usize, asked: &Range<usize>, out: &mut Vec<Float4>) {
         let (first, end) = (coarser(asked.start)[0], coarser(asked.end)[1] + 1);
         out.clear();
-        out.resize(end - first, Four::ZERO);
+        out.resize(end - first, Float4::ZERO);
         for row in coarser(j) {
             let (start, end) = (first.max(self.columns.start), end.min(self.columns.end));
             if !self.rows.contains(&row) || start >= end {
@@ -175,7 +191,7 @@ impl Map {
 
     /// Is a place inside, with all four nodes around it?
     #[inline(always)]
-    pub(super) fn holds(&self, column: Place, row: Place) -> bool {
+    pub(super) fn holds(&self, column: LatticePosition, row: LatticePosition) -> bool {
         let (i, j) = (column.0 as usize, row.0 as usize);
         i >= self.columns.start
             && i + 1 < self.columns.end
@@ -187,7 +203,7 @@ impl Map {
     ///
     /// Maps hold at least two nodes a side.
     #[inline(always)]
-    pub(super) fn at(&self, column: Place, row: Place) -> Four {
+    pub(super) fn at(&self, column: LatticePosition, row: LatticePosition) -> Float4 {
         let width = self.columns.len();
         let i = (column.0 as usize)
             .saturating_sub(self.columns.start)
@@ -197,6 +213,6 @@ impl Map {
             .min(self.rows.len() - 2);
         let top = &self.values[j * width + i..][..2];
         let bottom = &self.values[(j + 1) * width + i..][..2];
-        Four::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)
+        Float4::bilinear([top[0], top[1]], [bottom[0], bottom[1]], column.1, row.1)
     }
 }

@@ -4,7 +4,7 @@
 //! The lattice lies in the *picture*, not on the receiver: nodes are as dense as pixels ask for, at any distance and
 //! slant, and nothing is spent on what the eye does not see.
 
-use crate::render::view::View;
+use crate::render::view::CameraView;
 use nalgebra::Matrix3;
 
 /// Nodes over the picture: node `(i, j)` lies at pixel position `((i - 1) cell, (j - 1) cell)`.
@@ -13,18 +13,18 @@ pub(super) struct Lattice {
     /// Distance of nodes, pixels.
     cell: f64,
     /// The camera, in nodes instead of pixels.
-    pub(super) view: View,
+    pub(super) view: CameraView,
 }
 
 /// Where a pixel position lies between nodes: the node before it, and the way to the next.
-pub(super) type Place = (u32, f32);
+pub(super) type LatticePosition = (u32, f32);
 
 impl Lattice {
-    pub(super) fn new(view: &View, cell: f64) -> Self {
+    pub(super) fn new(view: &CameraView, cell: f64) -> Self {
         let pixel_from_node = Matrix3::new(cell, 0.0, -cell, 0.0, cell, -cell, 0.0, 0.0, 1.0);
         // One pixel beyond the picture's end: sub-samples reach over it.
         let count = |pixels: usize| ((pixels as f64 + 1.0) / cell) as usize + 3;
-        let view = View {
+        let view = CameraView {
             ray: view.ray * pixel_from_node,
             width: count(view.width),
             height: count(view.height),
@@ -34,7 +34,7 @@ impl Lattice {
     }
 
     /// The places of pixel positions `i + 0.5 + offset`, for all `i` below `pixels` and all offsets in turn.
-    pub(super) fn places(&self, pixels: usize, offsets: &[f64]) -> Vec<Place> {
+    pub(super) fn places(&self, pixels: usize, offsets: &[f64]) -> Vec<LatticePosition> {
         let place = |at: f64| {
             let node = (at / self.cell + 1.0).max(0.0);
             (node as u32, (node - node.floor()) as f32)

@@ -7,13 +7,13 @@
 use crate::deep::DeepSample;
 use crate::geom::Vector3;
 use crate::pixel::{Depth, LinearRgb, ObjectId};
-use crate::render::four::Four;
+use crate::render::float4::Float4;
 use crate::render::half_plane::{meet, sides, span, whole};
-use crate::render::irradiance::Map;
-use crate::render::lattice::Place;
-use crate::render::texture::{Baked, Linear, mean};
-use crate::render::through::{LayerRow, Through};
-use crate::render::view::Seen;
+use crate::render::irradiance::IrradianceMap;
+use crate::render::lattice::LatticePosition;
+use crate::render::texture::{BakedTexture, TexelLine, mean};
+use crate::render::transmittance::{LayerRow, Transmittance};
+use crate::render::view::ProjectedPlane;
 use crate::work::{self, Kind};
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -24,11 +24,11 @@ pub(super) struct Layer {
     /// Whose it is.
     pub(super) id: ObjectId,
     /// How it lies.
-    pub(super) seen: Seen,
+    pub(super) seen: ProjectedPlane,
     /// Its colours.
-    pub(super) texture: Baked,
+    pub(super) texture: BakedTexture,
     /// Light on it; none in the dark.
-    pub(super) light: Option<Map>,
+    pub(super) light: Option<IrradianceMap>,
     /// Where it ends, its texture's soft border included.
     pub(super) sides: [Vector3<f64>; 5],
     /// Pixels it may touch.
@@ -39,18 +39,18 @@ pub(super) struct Layer {
 
 /// Where the samples of all pixels lie.
 #[derive(Debug)]
-pub(super) struct Samples {
+pub(super) struct SampleGrid {
     /// Positions along each side of a pixel, from its centre.
     pub(super) offsets: Vec<f64>,
     /// Light is looked up for each sub-sample, not for each pixel: where the lattice is finer than pixels are.
     pub(super) each: bool,
     /// Places in the lattice: sub-sample by sub-sample, or the middles of pixels.
-    pub(super) columns: Vec<Place>,
+    pub(super) columns: Vec<LatticePosition>,
     /// Places in the lattice, the same way.
-    pub(super) rows: Vec<Place>,
+    pub(super) rows: Vec<LatticePosition>,
 }
 
-impl Samples {
+impl SampleGrid {
     /// Places along a side of a pixel.
     fn per_side(&self) -> usize {
         if self.each { self.offsets.len() } else { 1 }
@@ -59,22 +59,22 @@ impl Samples {
 
 /// The plane under the cards.
 #[derive(Debug)]
-pub(super) struct Ground {
+pub(super) struct ShadowCatcher {
     /// How it lies; none where the camera does not look down on it.
-    pub(super) seen: Option<Seen>,
+    pub(super) seen: Option<ProjectedPlane>,
     /// What shadows leave of its light; none where there is no shadow.
-    pub(super) share: Option<Map>,
+    pub(super) share: Option<IrradianceMap>,
 }
 
 /// A picture's parts, ready to be put together.
 #[derive(Debug)]
-pub(super) struct Stack {
+pub(super) struct LayerStack {
     /// Cards, in the order of their ids.
     pub(super) layers: Vec<Layer>,
     /// The surface.
-    pub(super) ground: Ground,
+    pub(super) ground: ShadowCatcher,
     /// Sub-samples.
-    pub(super) samples: Samples,
+    pub(super) samples: SampleGrid,
     /// Factor on light.
     pub(super) exposure: f32,
     /// Some layer is film.
@@ -83,7 +83,7 @@ pub(super) struct Stack {
 
 /// A rectangle of pixels.
 #[derive(Clone, Debug)]
-pub(super) struct Block {
+pub(super) struct PixelBlock {
     /// Columns.
     pub(super) x: Range<usize>,
     /// Rows.
@@ -92,7 +92,7 @@ pub(super) struct Block {
 
 /// Deep samples in any order of pixels, front to back for each.
 #[derive(Debug, Default)]
-pub(super) struct Painting {
+pub(super) struct TileSamples {
     /// Column, row and sample.
     pub(super) samples: Vec<(u32, u32, DeepSample)>,
     /// What each sample hides, per channel; empty where no layer is film.
@@ -101,16 +101,16 @@ pub(super) struct Painting {
 
 /// A block's result.
 #[derive(Debug)]
-pub(super) struct Painted {
+pub(super) struct RenderedTile {
     /// Which pixels.
-    pub(super) block: Block,
+    pub(super) block: PixelBlock,
     /// Samples and their tints.
-    pub(super) painting: Painting,
+    pub(super) painting: TileSamples,
     /// The plate's factor, row by row; none where it is 1 everywhere.
     pub(super) shadow: Option<Vec<LinearRgb>>,
 }
 
-impl Block {
+impl PixelBlock {
     pub(super) fn len(&self) -> usize {
         self.x.len() * self.y.len()
     }
@@ -154,7 +154,7 @@ impl Block {
 }
 
 impl Layer {
-    fn touches(&self, block: &Block) -> bool {
+    fn touches(&self, block: &PixelBlock) -> bool {
         meet(&self.columns, &block.x) && meet(&self.rows, &block.y)
     }
 
@@ -164,20 +164,20 @@ impl Layer {
     }
 }
 
-impl Stack {
+impl LayerStack {
     /// Everything that is to know about a block.
-    pub(super) fn paint(&self, block: Block) -> Painted {
+    pub(super) fn paint(&self, block: PixelBlock) -> RenderedTile {
         let layers: Vec<_> = (0..self.layers.len())
             .filter(|&k| self.layers[k].touches(&block))
             .collect();
-        let mut painting = Painting::default();
+        let mut painting = TileSamples::default();
         let mut shadow = self
             .may_be_shadowed(&block)
             .then(|| vec![LinearRgb::WHITE; block.len()]);
         if !layers.is_empty() || shadow.is_some() {
             self.split(&block, &block, &layers, &mut painting, &mut shadow);
         }
-        Painted {
+        RenderedTile {
             block,
             painting,
             shadow,
@@ -186,10 +186,10 @@ impl Stack {
 
     fn split(
         &self,
-        whole: &Block,
-        part: &Block,
+        whole: &PixelBlock,
+        part: &PixelBlock,
         layers: &[usize],
-        painting: &mut Painting,
+        painting: &mut TileSamples,
         shadow: &mut Option<Vec<LinearRgb>>,
     ) {
         let mut layers: Vec<_> = layers
@@ -227,9 +227,9 @@ impl Stack {
     }
 
     /// Walks a block's layers front to back; returns what passes through all of them.
-    fn walk(&self, block: &Block, layers: &[usize], out: &mut Painting) -> Through {
+    fn walk(&self, block: &PixelBlock, layers: &[usize], out: &mut TileSamples) -> Transmittance {
         let r = self.samples.offsets.len();
-        let mut through = Through::all(block, r, self.tinted);
+        let mut through = Transmittance::all(block, r, self.tinted);
         let mut row = LayerRow::default();
         for &k in layers {
             let layer = &self.layers[k];
@@ -246,16 +246,16 @@ impl Stack {
     fn walk_row(
         &self,
         layer: &Layer,
-        block: &Block,
+        block: &PixelBlock,
         y: usize,
-        through: &mut Through,
+        through: &mut Transmittance,
         row: &mut LayerRow,
     ) {
         let offsets = &self.samples.offsets;
         let r = offsets.len();
         row.start(block.x.len(), self.tinted);
         for (sy, offset_y) in offsets.iter().enumerate() {
-            let line = Line::of(layer, block.x.start, y as f64 + 0.5 + offset_y);
+            let line = LayerLine::of(layer, block.x.start, y as f64 + 0.5 + offset_y);
             for (sx, offset_x) in offsets.iter().enumerate() {
                 let pixels = line.pixels(0.5 + *offset_x as f32, block.x.len());
                 if pixels.is_empty() {
@@ -275,7 +275,14 @@ impl Stack {
     }
 
     /// Keeps what a row's pixels got from a layer.
-    fn keep(&self, layer: &Layer, block: &Block, y: usize, row: &mut LayerRow, out: &mut Painting) {
+    fn keep(
+        &self,
+        layer: &Layer,
+        block: &PixelBlock,
+        y: usize,
+        row: &mut LayerRow,
+        out: &mut TileSamples,
+    ) {
         let r = self.samples.offsets.len();
         let weight = 1.0 / (r * r) as f32;
         for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
@@ -286,7 +293,7 @@ impl Stack {
                     row.light[i].times(self.light_at(map, x, y))
                 }
                 Some(_) => row.light[i],
-                None => Four([0.0, 0.0, 0.0, row.light[i].alpha()]),
+                None => Float4([0.0, 0.0, 0.0, row.light[i].alpha()]),
             };
             let hidden = if self.tinted {
                 row.hidden[i].rgb()
@@ -309,7 +316,7 @@ impl Stack {
 
     /// Irradiance in the middle of a pixel.
     #[inline(always)]
-    fn light_at(&self, light: &Map, x: usize, y: usize) -> Four {
+    fn light_at(&self, light: &IrradianceMap, x: usize, y: usize) -> Float4 {
         light.at(self.samples.columns[x], self.samples.rows[y])
     }
 
@@ -317,7 +324,7 @@ impl Stack {
         &self,
         layer: &Layer,
         [x, y]: [usize; 2],
-        light: Four,
+        light: Float4,
         alpha: f32,
         hidden: LinearRgb,
     ) -> (DeepSample, LinearRgb) {
@@ -343,12 +350,12 @@ impl Stack {
         (sample, hidden.map(|h| h.min(1.0)))
     }
 
-    fn may_be_shadowed(&self, block: &Block) -> bool {
+    fn may_be_shadowed(&self, block: &PixelBlock) -> bool {
         let Some(map) = &self.ground.share else {
             return false;
         };
         let n = self.samples.per_side();
-        let places = |range: &Range<usize>, all: &[Place]| {
+        let places = |range: &Range<usize>, all: &[LatticePosition]| {
             [all[range.start * n], all[range.end * n - 1]].map(|p| p.0 as usize)
         };
         let [x, y] = [
@@ -368,9 +375,9 @@ impl Stack {
     /// it), so that averaging the share itself is the same.
     fn shade_ground(
         &self,
-        whole: &Block,
-        block: &Block,
-        through: &Through,
+        whole: &PixelBlock,
+        block: &PixelBlock,
+        through: &Transmittance,
         shadow: &mut [LinearRgb],
     ) {
         let (Some(map), Some(seen)) = (&self.ground.share, &self.ground.seen) else {
@@ -401,25 +408,25 @@ impl Stack {
     }
 
     /// The share in the middle of a pixel.
-    fn share_at(&self, map: &Map, x: usize, y: usize) -> Four {
+    fn share_at(&self, map: &IrradianceMap, x: usize, y: usize) -> Float4 {
         let (column, row) = (self.samples.columns[x], self.samples.rows[y]);
         if map.holds(column, row) {
             map.at(column, row)
         } else {
-            Four::ONE
+            Float4::ONE
         }
     }
 
     /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the surface.
     fn mean_share(
         &self,
-        map: &Map,
+        map: &IrradianceMap,
         [x, y]: [usize; 2],
         spans: &[(f64, f64)],
-        through: impl Iterator<Item = Four>,
+        through: impl Iterator<Item = Float4>,
     ) -> LinearRgb {
         let (r, n) = (self.samples.offsets.len(), self.samples.per_side());
-        let (mut sum, mut weight) = (Four::ZERO, Four::ZERO);
+        let (mut sum, mut weight) = (Float4::ZERO, Float4::ZERO);
         for (sub, t) in through.enumerate() {
             let (sx, sy) = (sub % r, sub / r);
             let at = x as f64 + 0.5 + self.samples.offsets[sx];
@@ -432,7 +439,7 @@ impl Stack {
             let share = if on_ground {
                 self.share_at(map, place[0], place[1])
             } else {
-                Four::ONE
+                Float4::ONE
             };
             (sum, weight) = (
                 sum.add_scaled(1.0, t.times(share)),
@@ -444,7 +451,7 @@ impl Stack {
 }
 
 /// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
-fn ratio(sum: &Four, weight: &Four) -> LinearRgb {
+fn ratio(sum: &Float4, weight: &Float4) -> LinearRgb {
     let channel = |c: usize| {
         if weight.0[c] > 0.0 {
             (sum.0[c] / weight.0[c]).min(1.0)
@@ -456,13 +463,13 @@ fn ratio(sum: &Four, weight: &Four) -> LinearRgb {
 }
 
 /// A layer along one row of sub-samples; `x` counts pixels from the block's left edge.
-struct Line {
+struct LayerLine {
     low: f32,
     high: f32,
-    position: Linear,
+    position: TexelLine,
 }
 
-impl Line {
+impl LayerLine {
     fn of(layer: &Layer, left: usize, y: f64) -> Self {
         let seen = &layer.seen;
         let (low, high) = span(&layer.sides, y);
@@ -487,7 +494,7 @@ impl Line {
     }
 
     /// The same line, counted from `x`.
-    fn at(&self, x: f32) -> Linear {
+    fn at(&self, x: f32) -> TexelLine {
         self.position.map(|(start, step)| (start + step * x, step))
     }
 }

@@ -13,22 +13,22 @@
 mod check;
 mod cryptomatte;
 mod deep;
-mod four;
+mod float4;
 mod half_plane;
 mod interreflection;
 mod irradiance;
 mod lattice;
 mod layers;
+mod light_samples;
 mod options;
 mod pixel_filter;
 mod receiver;
 mod reference;
 mod shadow;
-mod source;
 #[cfg(test)]
 mod tests;
 mod texture;
-mod through;
+mod transmittance;
 mod view;
 
 pub use check::check;

@@ -3,13 +3,13 @@
 use std::f64::consts::TAU;
 
 /// Half of the window's width, pixels: Cycles' default filter is 1.5 wide to either side.
-const RADIUS: f64 = 1.5;
+const WINDOW_RADIUS_PX: f64 = 1.5;
 
 /// Variance of the window, square pixels.
-const VARIANCE: f64 = 0.17266;
+const WINDOW_VARIANCE_PX2: f64 = 0.17266;
 
 /// Coefficients of the Blackman-Harris window (Harris 1978, four terms, 92 dB).
-const TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
+const WINDOW_TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
 
 /// Positions, pixels from the centre, that split the window's weight into `count` equal parts at their middle.
 ///
@@ -23,12 +23,12 @@ pub(super) fn quantiles(count: usize) -> Vec<f64> {
 /// What the positions leave of the window's width: the standard deviation that the texture's own filter must add.
 pub(super) fn left_over_sigma(offsets: &[f64]) -> f64 {
     let covered = offsets.iter().map(|o| o * o).sum::<f64>() / offsets.len() as f64;
-    (VARIANCE - covered).max(0.0).sqrt()
+    (WINDOW_VARIANCE_PX2 - covered).max(0.0).sqrt()
 }
 
 fn quantile(share: f64) -> f64 {
     // The window is symmetric; bisection to the last bit of a position of order one.
-    let (mut low, mut high) = (-RADIUS, RADIUS);
+    let (mut low, mut high) = (-WINDOW_RADIUS_PX, WINDOW_RADIUS_PX);
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
         if cumulative(mid) < share {
@@ -42,9 +42,9 @@ fn quantile(share: f64) -> f64 {
 
 /// Weight of the window left of `s`; 0 at its left end, 1 at its right end.
 fn cumulative(s: f64) -> f64 {
-    let t = s / (2.0 * RADIUS) + 0.5;
-    let wave = |k: usize| TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64);
-    t + (wave(1) + wave(2) + wave(3)) / TERMS[0]
+    let t = s / (2.0 * WINDOW_RADIUS_PX) + 0.5;
+    let wave = |k: usize| WINDOW_TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64);
+    t + (wave(1) + wave(2) + wave(3)) / WINDOW_TERMS[0]
 }
 
 #[cfg(test)]

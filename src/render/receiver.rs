@@ -6,12 +6,12 @@
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
-use crate::render::four::Four;
+use crate::render::float4::Float4;
 use crate::render::half_plane::{grown, sides, span, whole};
 use crate::render::lattice::Lattice;
-use crate::render::shadow::{Area, Beam, Casters, Readings, rows_and_columns};
-use crate::render::source::{Lamp, Lamps};
-use crate::render::view::{HORIZON, Seen, Sheet};
+use crate::render::light_samples::{LightGroup, LightSamples};
+use crate::render::shadow::{LatticeArea, Occluders, ShadowRay, TexelReads, rows_and_columns};
+use crate::render::view::{HORIZON_M, ProjectedPlane, ScenePlane};
 use crate::scene::Shot;
 use crate::work::{self, Kind};
 use std::ops::Range;
@@ -19,12 +19,12 @@ use std::ops::Range;
 /// One receiver under some of its lamps, on a lattice.
 #[derive(Debug)]
 pub(super) struct Receiver {
-    seen: Seen,
+    seen: ProjectedPlane,
     /// Nodes outside of these conditions are not asked for.
     outline: Vec<Vector3<f64>>,
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
-    lamps: Vec<(LinearRgb, Vec<Beam>)>,
+    lamps: Vec<(LinearRgb, Vec<ShadowRay>)>,
     /// Channels that blockers differ in: 1, or 3 where there is film.
     channels: usize,
     /// Irradiance that comes from other lamps than these, before anything is lost.
@@ -34,14 +34,14 @@ pub(super) struct Receiver {
 /// A receiver under area lights, whose shadows are sharp, and under the sky, whose shadows are soft enough for half the
 /// nodes.
 #[derive(Debug)]
-pub(super) struct Lit {
+pub(super) struct ReceiverIrradiance {
     pub(super) fine: Receiver,
     pub(super) coarse: Receiver,
     /// The share of open irradiance is asked for, not irradiance itself.
     pub(super) relative: bool,
 }
 
-impl Lit {
+impl ReceiverIrradiance {
     /// No lamp shines on it.
     pub(super) fn is_dark(&self) -> bool {
         self.fine.lamps.is_empty() && self.coarse.lamps.is_empty()
@@ -49,19 +49,19 @@ impl Lit {
 }
 
 /// What receivers are made from.
-pub(super) struct Studio<'a> {
+pub(super) struct LightingContext<'a> {
     pub(super) fine: Lattice,
     pub(super) coarse: Lattice,
-    pub(super) casters: Casters<'a>,
+    pub(super) casters: Occluders<'a>,
     pub(super) shot: &'a Shot,
     pub(super) options: RenderOptions,
 }
 
-impl Studio<'_> {
+impl LightingContext<'_> {
     /// What lights a sheet on the side of the eye; none where it is seen edge-on. The normal is that of every lattice.
-    fn lamps(&self, sheet: &Sheet) -> Option<Lamps> {
-        let seen = Seen::of(sheet, &self.fine.view)?;
-        Some(Lamps::of(
+    fn lamps(&self, sheet: &ScenePlane) -> Option<LightSamples> {
+        let seen = ProjectedPlane::of(sheet, &self.fine.view)?;
+        Some(LightSamples::of(
             self.shot,
             &self.options,
             &sheet.center,
@@ -70,11 +70,11 @@ impl Studio<'_> {
     }
 
     /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.
-    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<Lit> {
+    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<ReceiverIrradiance> {
         let lamps = self.lamps(&self.casters.cards[own].sheet)?;
         let fine = self.card_on(&self.fine, own, reach, &lamps, &lamps.faces)?;
         let coarse = self.card_on(&self.coarse, own, reach, &lamps, &lamps.sky)?;
-        Some(Lit {
+        Some(ReceiverIrradiance {
             fine,
             coarse,
             relative: false,
@@ -86,11 +86,11 @@ impl Studio<'_> {
         lattice: &Lattice,
         own: usize,
         reach: [f64; 2],
-        all: &Lamps,
-        some: &[Lamp],
+        all: &LightSamples,
+        some: &[LightGroup],
     ) -> Option<Receiver> {
         let sheet = &self.casters.cards[own].sheet;
-        let seen = Seen::of(sheet, &lattice.view)?;
+        let seen = ProjectedPlane::of(sheet, &lattice.view)?;
         let (rows, columns) = rows_and_columns(sheet, reach, &lattice.view);
         if rows.len() < 2 || columns.len() < 2 {
             return None;
@@ -107,7 +107,7 @@ impl Studio<'_> {
     }
 
     /// The surface; asked for where a shadow may fall on it. None where there is no shadow, or none to be seen.
-    pub(super) fn surface(&self) -> Option<Lit> {
+    pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
         let lamps = self.lamps(&self.casters.surface)?;
         let fine = self.surface_on(&self.fine, &lamps, &lamps.faces)?;
         let coarse = self.surface_on(&self.coarse, &lamps, &lamps.sky)?;
@@ -125,7 +125,7 @@ impl Studio<'_> {
             view.width,
         );
         let seen = rows.len() > 1 && columns.len() > 1;
-        seen.then_some(Lit {
+        seen.then_some(ReceiverIrradiance {
             fine: Receiver {
                 rows,
                 columns,
@@ -136,8 +136,14 @@ impl Studio<'_> {
         })
     }
 
-    fn surface_on(&self, lattice: &Lattice, all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
-        let seen = Seen::of(&self.casters.surface, &lattice.view).filter(|s| s.normal.z > 0.0)?;
+    fn surface_on(
+        &self,
+        lattice: &Lattice,
+        all: &LightSamples,
+        some: &[LightGroup],
+    ) -> Option<Receiver> {
+        let seen = ProjectedPlane::of(&self.casters.surface, &lattice.view)
+            .filter(|s| s.normal.z > 0.0)?;
         let cell = seen.cell_metres(&lattice.view, &Vector3::zeros());
         let everywhere = (0..lattice.view.height, 0..lattice.view.width);
         let receiver = self.receiver(lattice, (seen, &everywhere), None, cell, (all, some));
@@ -156,12 +162,12 @@ impl Studio<'_> {
     fn receiver(
         &self,
         lattice: &Lattice,
-        (seen, area): (Seen, &Area),
+        (seen, area): (ProjectedPlane, &LatticeArea),
         own: Option<usize>,
         cell: f64,
-        (all, some): (&Lamps, &[Lamp]),
+        (all, some): (&LightSamples, &[LightGroup]),
     ) -> Receiver {
-        let beams = |lamp: &Lamp| {
+        let beams = |lamp: &LightGroup| {
             (
                 lamp.radiance,
                 self.casters
@@ -194,7 +200,7 @@ fn cut(range: Range<usize>, end: usize) -> Range<usize> {
 
 /// Scratch of one task, a value per node of a row.
 #[derive(Default)]
-pub(super) struct Buffers {
+pub(super) struct RowBuffers {
     /// World position.
     position: [Vec<f32>; 3],
     /// Irradiance by unit radiance of one beam, and of all beams of a lamp.
@@ -206,23 +212,23 @@ pub(super) struct Buffers {
     /// Nodes that each blocker of a beam touches.
     touched: Vec<(usize, Range<usize>)>,
     /// Irradiance in the open.
-    pub(super) open: Vec<Four>,
+    pub(super) open: Vec<Float4>,
     /// Irradiance that blockers take away.
-    pub(super) hidden: Vec<Four>,
+    pub(super) hidden: Vec<Float4>,
     /// A row of hidden irradiance of the coarser lattice.
-    pub(super) coarse: Vec<Four>,
-    rays: Rays,
+    pub(super) coarse: Vec<Float4>,
+    rays: RayCounts,
 }
 
 /// What one row took.
 #[derive(Default)]
-struct Rays {
+struct RayCounts {
     light: usize,
     shadow: usize,
-    through: Readings,
+    through: TexelReads,
 }
 
-impl Rays {
+impl RayCounts {
     fn counts(self) -> [(Kind, u64); 4] {
         [
             (Kind::LightSamples, self.light as u64),
@@ -250,21 +256,21 @@ impl Receiver {
     }
 
     /// Open and hidden irradiance at the asked nodes of a row: `rest` and this receiver's own lamps.
-    pub(super) fn gather(&self, j: usize, asked: &Range<usize>, buffers: &mut Buffers) {
+    pub(super) fn gather(&self, j: usize, asked: &Range<usize>, buffers: &mut RowBuffers) {
         let n = asked.len();
         let LinearRgb { r, g, b } = self.rest;
-        refill(&mut buffers.open, n, Four([r, g, b, 0.0]));
-        refill(&mut buffers.hidden, n, Four::ZERO);
+        refill(&mut buffers.open, n, Float4([r, g, b, 0.0]));
+        refill(&mut buffers.hidden, n, Float4::ZERO);
         if self
             .lamps
             .iter()
             .flat_map(|(_, beams)| beams)
-            .any(Beam::is_face)
+            .any(ShadowRay::is_face)
         {
             self.positions(j, asked, &mut buffers.position);
         }
         for (radiance, beams) in &self.lamps {
-            let is_face = beams.iter().any(Beam::is_face);
+            let is_face = beams.iter().any(ShadowRay::is_face);
             refill(&mut buffers.lamp, if is_face { n } else { 0 }, 0.0);
             buffers
                 .lost
@@ -291,12 +297,12 @@ impl Receiver {
     /// Adds up a beam; tells the nodes (counted from the first that is asked for) where something is in its way.
     fn beam(
         &self,
-        beam: &Beam,
+        beam: &ShadowRay,
         j: usize,
         asked: &Range<usize>,
-        buffers: &mut Buffers,
+        buffers: &mut RowBuffers,
     ) -> Range<usize> {
-        let Buffers {
+        let RowBuffers {
             position,
             strength,
             lamp,
@@ -349,7 +355,7 @@ impl Receiver {
         let first = Vector3::new(asked.start as f64, j as f64, 1.0);
         let (p, w) = (seen.point * first, seen.w.dot(&first));
         let (step, w_step) = (seen.point.column(0), seen.w.x);
-        let nearest = seen.height / HORIZON;
+        let nearest = seen.height / HORIZON_M;
         for (axis, out) in out.iter_mut().enumerate() {
             out.resize(asked.len(), 0.0);
             for (i, out) in out.iter_mut().enumerate() {
@@ -371,16 +377,16 @@ fn lose(lost: &mut [f32], strength: &[f32], through: &[f32]) {
     }
 }
 
-fn add_lamp(open: &mut [Four], lamp: &[f32], radiance: Four) {
+fn add_lamp(open: &mut [Float4], lamp: &[f32], radiance: Float4) {
     open.iter_mut()
         .zip(lamp)
         .for_each(|(o, &e)| *o = o.add_scaled(e, radiance));
 }
 
-fn add_lost(hidden: &mut [Four], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
+fn add_lost(hidden: &mut [Float4], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
     for (((h, &r), &g), &b) in hidden.iter_mut().zip(r).zip(g).zip(b) {
         let [x, y, z, _] = h.0;
-        *h = Four([
+        *h = Float4([
             x + r * radiance.r,
             y + g * radiance.g,
             z + b * radiance.b,

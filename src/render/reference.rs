@@ -7,10 +7,10 @@ use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Depth, Film, LinearRgb, Mix};
 use crate::render::RenderOptions;
+use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
 use crate::render::pixel_filter::quantiles;
-use crate::render::source::{Kind, Lamp, Lamps, Source};
 use crate::render::texture::{graded_opacity, mean};
-use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, sheets};
 use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -21,7 +21,7 @@ use std::f32::consts::PI;
 /// [`render`](super::render) takes milliseconds; its error against the definition falls with the numbers in `options`.
 pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
-    let world = World::of(shot, &options);
+    let world = ReferenceWorld::of(shot, &options);
     let offsets = quantiles(options.subsamples);
     let (width, height) = (world.view.width, world.view.height);
     let pixel =
@@ -41,39 +41,40 @@ pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
 }
 
 /// A card with everything that a ray asks of it.
-struct Facing<'a> {
+struct ReferenceCard<'a> {
     card: &'a Card,
-    sheet: Sheet,
-    seen: Option<Seen>,
-    lamps: Vec<Lamp>,
+    sheet: ScenePlane,
+    seen: Option<ProjectedPlane>,
+    lamps: Vec<LightGroup>,
 }
 
-struct World<'a> {
+struct ReferenceWorld<'a> {
     shot: &'a Shot,
-    view: View,
-    cards: Vec<Facing<'a>>,
-    surface: Option<Seen>,
-    surface_lamps: Vec<Lamp>,
+    view: CameraView,
+    cards: Vec<ReferenceCard<'a>>,
+    surface: Option<ProjectedPlane>,
+    surface_lamps: Vec<LightGroup>,
     tinted: bool,
 }
 
-impl<'a> World<'a> {
+impl<'a> ReferenceWorld<'a> {
     fn of(shot: &'a Shot, options: &RenderOptions) -> Self {
-        let view = View::of(&shot.camera);
-        let lit = |normal: &Vector3<f64>| Lamps::plain(shot, options, normal);
-        let facing = |(card, sheet): (&'a Card, Sheet)| {
-            let seen = Seen::of(&sheet, &view);
+        let view = CameraView::of(&shot.camera);
+        let lit = |normal: &Vector3<f64>| LightSamples::plain(shot, options, normal);
+        let facing = |(card, sheet): (&'a Card, ScenePlane)| {
+            let seen = ProjectedPlane::of(&sheet, &view);
             let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));
-            Facing {
+            ReferenceCard {
                 card,
                 sheet,
                 seen,
                 lamps,
             }
         };
-        let surface = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
+        let surface = ProjectedPlane::of(&ScenePlane::surface(shot.catcher), &view)
+            .filter(|s| s.normal.z > 0.0);
         let cards: Vec<_> = sheets(shot).into_iter().map(facing).collect();
-        let is_film = |f: &Facing<'_>| {
+        let is_film = |f: &ReferenceCard<'_>| {
             f.card.texture.is_film() || f.card.back.as_ref().is_some_and(Texture::is_film)
         };
         let tinted = cards.iter().any(is_film);
@@ -101,7 +102,7 @@ impl<'a> World<'a> {
             .map(|&(k, depth)| self.empty_sample(k, depth))
             .collect();
         let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
-        let mut shadow = Ratio::default();
+        let mut shadow = ShadowRatio::default();
         for oy in offsets {
             for ox in offsets {
                 let through = self.walk(x + ox, y + oy, &order, weight, &mut samples);
@@ -168,7 +169,7 @@ impl<'a> World<'a> {
         through
     }
 
-    fn shade_surface(&self, x: f64, y: f64, weight: LinearRgb, shadow: &mut Ratio) {
+    fn shade_surface(&self, x: f64, y: f64, weight: LinearRgb, shadow: &mut ShadowRatio) {
         let hit = self.surface.as_ref().and_then(|s| s.hit(x, y));
         let (open, shadowed) = match hit {
             None => (LinearRgb::BLACK, LinearRgb::BLACK),
@@ -190,7 +191,7 @@ impl<'a> World<'a> {
         &self,
         p: &Vector3<f64>,
         n: &Vector3<f64>,
-        lamps: &[Lamp],
+        lamps: &[LightGroup],
         own: Option<usize>,
     ) -> (LinearRgb, LinearRgb) {
         let (mut open, mut shadowed) = (LinearRgb::BLACK, LinearRgb::BLACK);
@@ -205,9 +206,9 @@ impl<'a> World<'a> {
     }
 
     /// Share of a source's light that reaches a point.
-    fn passes(&self, p: &Vector3<f64>, source: &Source, own: Option<usize>) -> LinearRgb {
+    fn passes(&self, p: &Vector3<f64>, source: &LightSample, own: Option<usize>) -> LinearRgb {
         if own.is_some()
-            && matches!(source.kind, Kind::Sky { .. })
+            && matches!(source.kind, SampleKind::Sky { .. })
             && self.surface_blocks(p, &source.at.xyz())
         {
             return LinearRgb::BLACK;
@@ -233,7 +234,7 @@ impl<'a> World<'a> {
 }
 
 /// Texture coordinates where the way from a point to a source crosses a sheet.
-fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]> {
+fn crossing(sheet: &ScenePlane, p: &Vector3<f64>, source: &LightSample) -> Option<[f64; 2]> {
     let way = source.at.xyz() - p * source.at.w;
     let s = sheet.normal.dot(&(sheet.center - p)) / sheet.normal.dot(&way);
     let local = p + way * s - sheet.center;
@@ -249,14 +250,19 @@ fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]
     (s > 0.0 && s < end && uv.iter().all(|c| (0.0..=1.0).contains(c))).then_some(uv)
 }
 
-impl Facing<'_> {
+impl ReferenceCard<'_> {
     fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {
         texel(self.card, &self.sheet, uv, from)
     }
 }
 
 /// What a card shows to whoever looks at it from a point: full detail, what lies outside counts as nothing.
-pub(super) fn texel(card: &Card, sheet: &Sheet, [u, v]: [f64; 2], from: &Vector3<f64>) -> Film {
+pub(super) fn texel(
+    card: &Card,
+    sheet: &ScenePlane,
+    [u, v]: [f64; 2],
+    from: &Vector3<f64>,
+) -> Film {
     let from_behind = sheet.normal.dot(&(from - sheet.center)) < 0.0;
     let (texture, u) = match &card.back {
         Some(back) if from_behind => (back, 1.0 - u),
@@ -278,14 +284,14 @@ pub(super) fn texel(card: &Card, sheet: &Sheet, [u, v]: [f64; 2], from: &Vector3
 
 /// A ratio of averages, per channel; 1 where there is nothing to average.
 #[derive(Default)]
-struct Ratio {
+struct ShadowRatio {
     open: LinearRgb,
     shadowed: LinearRgb,
     outside: LinearRgb,
     weight: LinearRgb,
 }
 
-impl Ratio {
+impl ShadowRatio {
     fn value(&self) -> LinearRgb {
         let of = |c: LinearRgb| <[f32; 3]>::from(c);
         let (shadowed, open, outside, weight) = (

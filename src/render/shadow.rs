@@ -3,65 +3,65 @@
 use crate::asset::Texture;
 use crate::geom::Vector3;
 use crate::render::half_plane::{meet, sides, span, whole};
-use crate::render::source::{self, Lamp, Source};
-use crate::render::texture::Shade;
-use crate::render::view::{Seen, Sheet, View, texture_rows};
+use crate::render::light_samples::{LightGroup, LightSample, SampleKind};
+use crate::render::texture::OpacityLevel;
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, texture_rows};
 use crate::scene::{Card, Grade};
 use crate::work::{self, Kind};
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 /// Heights and distances below this (metres) are contact.
-const TOUCHING: f64 = 1e-9;
+const CONTACT_EPSILON_M: f64 = 1e-9;
 
 /// How much of the smear by a piece of light is given to a card's shadow.
 ///
 /// All of it would be right for one card. Piles are darkened by it, since a product of blurred shadows is not the blurred
 /// product (bias -0.003 in a pile of 20); a quarter takes the facets out of soft shadows and biases by 1e-4.
-const SMEAR: f64 = 0.25;
+const PENUMBRA_BLUR_SHARE: f64 = 0.25;
 
 /// A card as something that stops light.
 #[derive(Debug)]
-pub(super) struct Caster<'a> {
+pub(super) struct Occluder<'a> {
     /// Where it lies.
-    pub(super) sheet: Sheet,
-    front: Arc<Shades<'a>>,
+    pub(super) sheet: ScenePlane,
+    front: Arc<OpacityMips<'a>>,
     /// None where it is the front seen through.
-    back: Option<Arc<Shades<'a>>>,
+    back: Option<Arc<OpacityMips<'a>>>,
 }
 
 /// A texture's opacity at each halving, made when first asked for; shared by the cards that show it.
 #[derive(Debug)]
-struct Shades<'a> {
+struct OpacityMips<'a> {
     texture: &'a Texture,
     grade: Grade,
-    levels: Vec<OnceLock<Arc<Shade>>>,
+    levels: Vec<OnceLock<Arc<OpacityLevel>>>,
 }
 
 /// Everything that stops light: cards, and the surface for what comes from below.
 #[derive(Debug)]
-pub(super) struct Casters<'a> {
+pub(super) struct Occluders<'a> {
     /// In the order of the cards.
-    pub(super) cards: Vec<Caster<'a>>,
+    pub(super) cards: Vec<Occluder<'a>>,
     /// The plane `z = 0` as far as it reaches.
-    pub(super) surface: Sheet,
+    pub(super) surface: ScenePlane,
     /// Some card is film: what gets through differs from channel to channel.
     pub(super) tinted: bool,
 }
 
 /// One source as one receiver sees it.
 #[derive(Debug)]
-pub(super) struct Beam {
-    source: Source,
+pub(super) struct ShadowRay {
+    source: LightSample,
     /// Of the source over the receiver's plane, metres (a cosine for a direction).
     height: f64,
     /// What may be in its way.
-    pub(super) blockers: Vec<Blocker>,
+    pub(super) blockers: Vec<ProjectedShadow>,
 }
 
 /// A caster's shadow on a receiver, in nodes of the lattice.
 #[derive(Debug)]
-pub(super) struct Blocker {
+pub(super) struct ProjectedShadow {
     /// Rows that the shadow may touch.
     pub(super) rows: Range<usize>,
     /// Columns that the shadow may touch.
@@ -71,21 +71,21 @@ pub(super) struct Blocker {
     u: Vector3<f64>,
     v: Vector3<f64>,
     w: Vector3<f64>,
-    shade: Option<Arc<Shade>>,
+    shade: Option<Arc<OpacityLevel>>,
     /// Where nothing gets through an opaque texture, whatever is read of it; none for one that is see-through.
     inside: Option<[Vector3<f64>; 5]>,
 }
 
 /// Texels read, bilinearly, to know what gets through.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Readings {
+pub(super) struct TexelReads {
     /// Of see-through cards.
     pub(super) see_through: usize,
     /// Of opaque ones, along their edges.
     pub(super) edges: usize,
 }
 
-impl std::ops::AddAssign for Readings {
+impl std::ops::AddAssign for TexelReads {
     fn add_assign(&mut self, other: Self) {
         self.see_through += other.see_through;
         self.edges += other.edges;
@@ -93,15 +93,19 @@ impl std::ops::AddAssign for Readings {
 }
 
 /// Rows and columns of the lattice, or pixels of a picture.
-pub(super) type Area = (Range<usize>, Range<usize>);
+pub(super) type LatticeArea = (Range<usize>, Range<usize>);
 
 /// Rows and columns that a sheet is seen in, one more on each side.
-pub(super) fn rows_and_columns(sheet: &Sheet, reach: [f64; 2], view: &View) -> Area {
+pub(super) fn rows_and_columns(
+    sheet: &ScenePlane,
+    reach: [f64; 2],
+    view: &CameraView,
+) -> LatticeArea {
     bounds(&sheet.grown(reach).corners(), view)
 }
 
 /// Bounds of projected points; the whole view where one of them is not in front.
-fn bounds(points: &[Vector3<f64>; 4], view: &View) -> Area {
+fn bounds(points: &[Vector3<f64>; 4], view: &CameraView) -> LatticeArea {
     let Some(px) = view.project(points) else {
         return (0..view.height, 0..view.width);
     };
@@ -113,18 +117,18 @@ fn bounds(points: &[Vector3<f64>; 4], view: &View) -> Area {
     (range(1, view.height), range(0, view.width))
 }
 
-impl<'a> Casters<'a> {
+impl<'a> Occluders<'a> {
     /// What stops light in a shot.
-    pub(super) fn new(cards: &[(&'a Card, Sheet)], surface: Sheet) -> Self {
-        let mut known: Vec<Arc<Shades<'a>>> = Vec::new();
+    pub(super) fn new(cards: &[(&'a Card, ScenePlane)], surface: ScenePlane) -> Self {
+        let mut known: Vec<Arc<OpacityMips<'a>>> = Vec::new();
         let mut shades = |texture: &'a Texture, grade: &Grade| {
             if let Some(same) = known.iter().find(|shades| shades.are_of(texture, grade)) {
                 return same.clone();
             }
-            known.push(Arc::new(Shades::new(texture, *grade)));
+            known.push(Arc::new(OpacityMips::new(texture, *grade)));
             known[known.len() - 1].clone()
         };
-        let caster = |&(card, sheet): &(&'a Card, Sheet)| Caster {
+        let caster = |&(card, sheet): &(&'a Card, ScenePlane)| Occluder {
             sheet,
             front: shades(&card.texture, &card.grade),
             back: card.back.as_ref().map(|back| shades(back, &card.grade)),
@@ -144,26 +148,26 @@ impl<'a> Casters<'a> {
     /// distance of nodes on it, metres.
     pub(super) fn beams(
         &self,
-        (seen, area): (&Seen, &Area),
-        view: &View,
-        lamp: &Lamp,
+        (seen, area): (&ProjectedPlane, &LatticeArea),
+        view: &CameraView,
+        lamp: &LightGroup,
         own: Option<usize>,
         cell: f64,
-    ) -> Vec<Beam> {
+    ) -> Vec<ShadowRay> {
         let plane = seen.normal.dot(&view.eye) - seen.height;
         let above = |k: usize| {
             self.cards[k]
                 .sheet
                 .corners()
                 .iter()
-                .any(|c| seen.normal.dot(c) - plane > TOUCHING)
+                .any(|c| seen.normal.dot(c) - plane > CONTACT_EPSILON_M)
         };
         let above: Vec<_> = (0..self.cards.len())
             .filter(|&k| Some(k) != own && above(k))
             .collect();
-        let beam = |source: &Source| {
+        let beam = |source: &LightSample| {
             let height = source.at.xyz().dot(&seen.normal) - source.at.w * plane;
-            let shadow = Shadow {
+            let shadow = ShadowProjection {
                 seen,
                 area,
                 view,
@@ -175,7 +179,7 @@ impl<'a> Casters<'a> {
             let from_below = own.is_some() && source.at.w == 0.0 && source.at.z < 0.0;
             let surface = from_below.then(|| shadow.of_surface(&self.surface));
             let cards = above.iter().filter_map(|&k| shadow.of_card(&self.cards[k]));
-            (height > TOUCHING).then(|| Beam {
+            (height > CONTACT_EPSILON_M).then(|| ShadowRay {
                 source: *source,
                 height,
                 blockers: surface.into_iter().chain(cards).collect(),
@@ -185,7 +189,7 @@ impl<'a> Casters<'a> {
     }
 }
 
-impl<'a> Shades<'a> {
+impl<'a> OpacityMips<'a> {
     fn new(texture: &'a Texture, grade: Grade) -> Self {
         Self {
             texture,
@@ -205,7 +209,7 @@ impl<'a> Shades<'a> {
 
     /// The coarsest opacity whose texels are no larger than `cell` metres, or a coarser one that blurs by `blur` metres;
     /// on a card of this size.
-    fn at(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<Shade> {
+    fn at(&self, size: [f64; 2], cell: f64, blur: f64) -> Arc<OpacityLevel> {
         let (width, height) = self.texture.size();
         let texel = (size[0] * size[1] / (width * height) as f64).sqrt();
         let level = libm::log2((cell / texel).max(1.0))
@@ -216,7 +220,7 @@ impl<'a> Shades<'a> {
             return shade.clone();
         }
         // Made outside of the lock: a pyramid may halve in parallel, and whoever waits may come back here.
-        let shade = Arc::new(Shade::new(self.texture, &self.grade, level));
+        let shade = Arc::new(OpacityLevel::new(self.texture, &self.grade, level));
         let keep = || {
             work::add(Kind::Bakes, 1);
             shade
@@ -226,26 +230,26 @@ impl<'a> Shades<'a> {
 }
 
 /// One receiver and one source.
-struct Shadow<'a> {
-    seen: &'a Seen,
+struct ShadowProjection<'a> {
+    seen: &'a ProjectedPlane,
     /// Where the receiver is asked for.
-    area: &'a Area,
-    view: &'a View,
+    area: &'a LatticeArea,
+    view: &'a CameraView,
     /// Offset of the receiver's plane along its normal.
     plane: f64,
     /// Of the source over that plane.
     height: f64,
-    source: &'a Source,
+    source: &'a LightSample,
     cell: f64,
 }
 
-impl Shadow<'_> {
+impl ShadowProjection<'_> {
     /// The homography from the lattice over the receiver, through the source, to a card's texels.
-    fn of_card(&self, caster: &Caster<'_>) -> Option<Blocker> {
+    fn of_card(&self, caster: &Occluder<'_>) -> Option<ProjectedShadow> {
         let sheet = &caster.sheet;
         let (at, q) = (self.source.at.xyz(), self.source.at.w);
         let toward = sheet.normal.dot(&at) - q * sheet.normal.dot(&sheet.center);
-        if toward.abs() <= TOUCHING {
+        if toward.abs() <= CONTACT_EPSILON_M {
             return None;
         }
         // A receiver sees the side that is turned away from the source.
@@ -275,7 +279,7 @@ impl Shadow<'_> {
             .inset()
             .map(|inset| self::sides(&u, &v, &w, inset.map(|by| -by)));
         let [u, v] = shade.grid.rows(&u, &v, &w);
-        Some(Blocker {
+        Some(ProjectedShadow {
             rows,
             columns,
             sides,
@@ -291,7 +295,7 @@ impl Shadow<'_> {
     /// texel whose bilinear reading has the same variance.
     ///
     /// A square of side b has variance `b^2 / 12`, texels of side t read bilinearly have `t^2 / 4`.
-    fn blur(&self, sheet: &Sheet) -> f64 {
+    fn blur(&self, sheet: &ScenePlane) -> f64 {
         let height = |p: &Vector3<f64>| (self.seen.normal.dot(p) - self.plane).max(0.0);
         let lowest = sheet
             .corners()
@@ -300,11 +304,11 @@ impl Shadow<'_> {
             .fold(f64::INFINITY, f64::min);
         // Cards that lean on the receiver are sharp where they touch it and blurred at the other end.
         let way = 0.5 * (lowest + height(&sheet.center)) / self.height;
-        SMEAR * self.source.width * way * libm::sqrt(4.0 / 12.0)
+        PENUMBRA_BLUR_SHARE * self.source.width * way * libm::sqrt(4.0 / 12.0)
     }
 
     /// The surface stops what comes from below it.
-    fn of_surface(&self, sheet: &Sheet) -> Blocker {
+    fn of_surface(&self, sheet: &ScenePlane) -> ProjectedShadow {
         let (point, depth) = (&self.seen.point, &self.seen.w);
         let direction = self.source.at.xyz();
         let height = point.transpose() * Vector3::z() / -direction.z;
@@ -317,7 +321,7 @@ impl Shadow<'_> {
             }
         }
         let zero = Vector3::zeros();
-        Blocker {
+        ProjectedShadow {
             rows: 0..self.view.height,
             columns: 0..self.view.width,
             sides,
@@ -330,7 +334,7 @@ impl Shadow<'_> {
     }
 
     /// Part of the lattice that a shadow lies in: bounds of the four corners thrown onto the receiver.
-    fn bounds(&self, sheet: &Sheet) -> Area {
+    fn bounds(&self, sheet: &ScenePlane) -> LatticeArea {
         let everything = (0..self.view.height, 0..self.view.width);
         let mut thrown = sheet.corners();
         for corner in &mut thrown {
@@ -346,7 +350,7 @@ impl Shadow<'_> {
     }
 }
 
-impl Blocker {
+impl ProjectedShadow {
     /// Nodes of a row that the shadow touches.
     pub(super) fn nodes(&self, j: usize, within: &Range<usize>) -> Range<usize> {
         if !self.rows.contains(&j) {
@@ -363,16 +367,16 @@ impl Blocker {
         j: usize,
         nodes: &Range<usize>,
         through: &mut [f32],
-    ) -> Readings {
+    ) -> TexelReads {
         let Some(shade) = &self.shade else {
             through.fill(0.0);
-            return Readings::default();
+            return TexelReads::default();
         };
         let first = Vector3::new(nodes.start as f64, j as f64, 1.0);
         let line = [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32));
         let Some(inside) = &self.inside else {
             shade.darken(channel, &line, 0, through);
-            return Readings {
+            return TexelReads {
                 see_through: nodes.len(),
                 edges: 0,
             };
@@ -383,7 +387,7 @@ impl Blocker {
         through[dark.clone()].fill(0.0);
         shade.darken(channel, &line, 0, &mut through[..dark.start]);
         shade.darken(channel, &line, dark.end, &mut through[dark.end..]);
-        Readings {
+        TexelReads {
             see_through: 0,
             edges: nodes.len() - dark.len(),
         }
@@ -392,7 +396,7 @@ impl Blocker {
 
 /// Irradiance by unit radiance of one source, at any point of a plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Strength {
+pub(super) enum UnitIrradiance {
     /// The same everywhere.
     Even(f32),
     /// By a piece of a light's face.
@@ -406,18 +410,18 @@ pub(super) enum Strength {
     },
 }
 
-impl Beam {
+impl ShadowRay {
     /// It comes from an area light, not from the sky.
     pub(super) fn is_face(&self) -> bool {
-        matches!(self.source.kind, source::Kind::Face { .. })
+        matches!(self.source.kind, SampleKind::Face { .. })
     }
 
     /// For the receiver it was made for.
-    pub(super) fn strength(&self) -> Strength {
+    pub(super) fn strength(&self) -> UnitIrradiance {
         match self.source.kind {
-            source::Kind::Sky { share } => Strength::Even(share as f32),
+            SampleKind::Sky { share } => UnitIrradiance::Even(share as f32),
             // All points of a plane see a light from the same height.
-            source::Kind::Face { normal, area } => Strength::Face {
+            SampleKind::Face { normal, area } => UnitIrradiance::Face {
                 at: self.source.at.xyz().map(|c| c as f32).into(),
                 normal: normal.map(|c| c as f32).into(),
                 scale: (area * self.height) as f32,
@@ -426,7 +430,7 @@ impl Beam {
     }
 }
 
-impl Strength {
+impl UnitIrradiance {
     /// Cosines over squared distance times area, at points of the plane.
     pub(super) fn fill(&self, [x, y, z]: [&[f32]; 3], out: &mut [f32]) {
         match *self {
@@ -458,7 +462,7 @@ mod tests {
     use crate::image::Image;
     use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
     use crate::render::RenderOptions;
-    use crate::render::source::Lamps;
+    use crate::render::light_samples::LightSamples;
     use crate::render::view::sheets;
     use crate::scene::{AreaLight, LightShape, Shot};
 
@@ -508,10 +512,10 @@ mod tests {
     fn the_inside_of_an_opaque_card_is_as_dark_as_if_it_were_read() {
         for tilt in [0.0, 0.3, 1.2] {
             let shot = shot(tilt);
-            let view = View::of(&shot.camera);
-            let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
-            let seen = Seen::of(&casters.surface, &view).unwrap();
-            let Lamps { faces, sky } = Lamps::of(
+            let view = CameraView::of(&shot.camera);
+            let casters = Occluders::new(&sheets(&shot), ScenePlane::surface(shot.catcher));
+            let seen = ProjectedPlane::of(&casters.surface, &view).unwrap();
+            let LightSamples { faces, sky } = LightSamples::of(
                 &shot,
                 &RenderOptions::default(),
                 &casters.surface.center,
@@ -550,17 +554,17 @@ mod tests {
     #[test]
     fn shadows_that_miss_the_receiver_are_left_out() {
         let shot = shot(0.0);
-        let view = View::of(&shot.camera);
-        let casters = Casters::new(&sheets(&shot), Sheet::surface(shot.catcher));
-        let seen = Seen::of(&casters.surface, &view).unwrap();
-        let lamps = Lamps::of(
+        let view = CameraView::of(&shot.camera);
+        let casters = Occluders::new(&sheets(&shot), ScenePlane::surface(shot.catcher));
+        let seen = ProjectedPlane::of(&casters.surface, &view).unwrap();
+        let lamps = LightSamples::of(
             &shot,
             &RenderOptions::default(),
             &casters.surface.center,
             &seen.normal,
         )
         .faces;
-        let blockers = |area: Area| {
+        let blockers = |area: LatticeArea| {
             let beams = casters.beams((&seen, &area), &view, &lamps[0], None, 1e-3);
             beams.iter().map(|beam| beam.blockers.len()).sum::<usize>()
         };

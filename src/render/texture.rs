@@ -9,26 +9,26 @@
 use crate::asset::Texture;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::four::Four;
+use crate::render::float4::Float4;
 use crate::scene::Grade;
 use nalgebra::Vector3;
 
 /// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to read on.
-const BORDER: usize = 2;
+const BORDER_TEXELS: usize = 2;
 
 /// Positions are worked out for this many samples at once.
-pub(super) const LANES: usize = 16;
+pub(super) const SIMD_LANES: usize = 16;
 
 /// Where a texture's pixels lie in its own coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
+pub(super) struct TexelGrid {
     /// Texels that `u` and `v` from 0 to 1 run over; not whole on halved levels of odd sizes.
     texels: [f64; 2],
     /// How far the texture reaches beyond 0..1, as a share of it.
     pub(super) reach: [f64; 2],
 }
 
-impl Grid {
+impl TexelGrid {
     fn new((width, height): (usize, usize), level: f64, reach_texels: f64) -> Self {
         let scale = libm::exp2(-level);
         let texels = [width as f64 * scale, height as f64 * scale];
@@ -45,7 +45,7 @@ impl Grid {
         v: &Vector3<f64>,
         w: &Vector3<f64>,
     ) -> [Vector3<f64>; 2] {
-        let first = BORDER as f64 - 0.5;
+        let first = BORDER_TEXELS as f64 - 0.5;
         [
             u * self.texels[0] + w * first,
             v * self.texels[1] + w * first,
@@ -54,27 +54,30 @@ impl Grid {
 }
 
 /// Positions along a line over bordered texels: numbers that grow evenly, the third the divisor of the others.
-pub(super) type Linear = [(f32, f32); 3];
+pub(super) type TexelLine = [(f32, f32); 3];
 
 /// Bilinear cells that a run of samples falls into: index of the first of the four texels, and the way to the others.
-pub(super) struct Cells {
-    pub(super) at: [u32; LANES],
-    pub(super) fx: [f32; LANES],
-    pub(super) fy: [f32; LANES],
+pub(super) struct BilinearCells {
+    pub(super) at: [u32; SIMD_LANES],
+    pub(super) fx: [f32; SIMD_LANES],
+    pub(super) fy: [f32; SIMD_LANES],
 }
 
-impl Cells {
+impl BilinearCells {
     /// Samples `first`, `first + 1` and so on of a line; positions outside count as the nearest inside.
     #[inline(always)]
-    pub(super) fn of([u, v, w]: &Linear, first: f32, (width, height): (usize, usize)) -> Self {
+    pub(super) fn of([u, v, w]: &TexelLine, first: f32, (width, height): (usize, usize)) -> Self {
         let mut cells = Self {
-            at: [0; LANES],
-            fx: [0.0; LANES],
-            fy: [0.0; LANES],
+            at: [0; SIMD_LANES],
+            fx: [0.0; SIMD_LANES],
+            fy: [0.0; SIMD_LANES],
         };
-        let last = [width as f32 - 1.0 - INSIDE, height as f32 - 1.0 - INSIDE];
+        let last = [
+            width as f32 - 1.0 - INSET_TEXELS,
+            height as f32 - 1.0 - INSET_TEXELS,
+        ];
         let stride = width as u32;
-        for lane in 0..LANES {
+        for lane in 0..SIMD_LANES {
             let k = first + lane as f32;
             let scale = 1.0 / (w.0 + k * w.1);
             let (i, fx) = whole_and_rest((u.0 + k * u.1) * scale, last[0]);
@@ -87,10 +90,10 @@ impl Cells {
 }
 
 /// How far positions are kept from the first and the last texel, which are empty anyway.
-const INSIDE: f32 = 1.0 / 64.0;
+const INSET_TEXELS: f32 = 1.0 / 64.0;
 
 /// 2^23: floats from here on are whole, and their lowest bits count them.
-const WHOLE: f32 = 8_388_608.0;
+const TWO_POW_23: f32 = 8_388_608.0;
 
 /// A position between texels 0 and `last` as the texel before it and the way on.
 ///
@@ -98,39 +101,39 @@ const WHOLE: f32 = 8_388_608.0;
 /// the one before and a whole way on, which is the same place.
 #[inline(always)]
 fn whole_and_rest(x: f32, last: f32) -> (u32, f32) {
-    let x = x.max(INSIDE).min(last);
-    let next = (x + 0.5) + WHOLE;
+    let x = x.max(INSET_TEXELS).min(last);
+    let next = (x + 0.5) + TWO_POW_23;
     (
         (next.to_bits() & 0x007f_ffff).wrapping_sub(1),
-        x - (next - WHOLE - 1.0),
+        x - (next - TWO_POW_23 - 1.0),
     )
 }
 
 /// Colour and opacity at the level of detail that a picture asks for.
 #[derive(Debug)]
-pub(super) struct Baked {
-    pub(super) grid: Grid,
+pub(super) struct BakedTexture {
+    pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
     /// Colour, and alpha; for film the mean opacity.
-    pub(super) texels: Vec<Four>,
+    pub(super) texels: Vec<Float4>,
     /// Opacity of film, per channel; empty for a texture with alpha.
-    pub(super) opacity: Vec<Four>,
+    pub(super) opacity: Vec<Float4>,
 }
 
-impl Baked {
+impl BakedTexture {
     /// A texture at a level of detail, which need not be whole, in a card's own colours.
     ///
     /// The level below is averaged further, so that there are no more texels than are needed and a reading costs four of
     /// them.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: f64) -> Self {
         let level = level.clamp(0.0, (texture.levels() - 1) as f64);
-        let detail = Detail {
+        let detail = DetailLevel {
             level: level as usize,
             step: libm::exp2(level.fract()),
         };
         // The full picture ends at its edge; smaller ones fade half a texel out.
-        let grid = Grid::new(texture.size(), level, if level > 0.0 { 0.5 } else { 0.0 });
+        let grid = TexelGrid::new(texture.size(), level, if level > 0.0 { 0.5 } else { 0.0 });
         let (size, texels, opacity) = match texture {
             Texture::Rgba(pyramid) => {
                 let (size, texels) = detail.read(|l| pyramid.level(l), |p: PremulRgba| p.into());
@@ -166,7 +169,7 @@ impl Baked {
             ..*grade
         };
         if through != Grade::default() {
-            for o in self.opacity.iter_mut().filter(|o| **o != Four::ZERO) {
+            for o in self.opacity.iter_mut().filter(|o| **o != Float4::ZERO) {
                 *o = graded_opacity(o.rgb(), &through).into();
             }
         }
@@ -195,7 +198,7 @@ pub(super) fn mean(c: LinearRgb) -> f32 {
     }
 }
 
-fn grade_colors(texels: &mut [Four], grade: &Grade) {
+fn grade_colors(texels: &mut [Float4], grade: &Grade) {
     if *grade != Grade::default() {
         shift_colors(texels, grade.hue_deg, grade.saturation, grade.value);
     }
@@ -206,16 +209,16 @@ fn grade_colors(texels: &mut [Four], grade: &Grade) {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn shift_colors(texels: &mut [Four], hue_deg: f32, saturation: f32, value: f32) {
+fn shift_colors(texels: &mut [Float4], hue_deg: f32, saturation: f32, value: f32) {
     for run in texels
-        .chunks_mut(LANES)
+        .chunks_mut(SIMD_LANES)
         .filter(|run| run.iter().any(|t| t.0 != [0.0; 4]))
     {
-        let mut colors = [[0.0; LANES]; 3];
+        let mut colors = [[0.0; SIMD_LANES]; 3];
         for (lane, t) in run.iter().enumerate() {
             (0..3).for_each(|c| colors[c][lane] = t.0[c]);
         }
-        for lane in 0..LANES {
+        for lane in 0..SIMD_LANES {
             let color = LinearRgb::new(colors[0][lane], colors[1][lane], colors[2][lane]);
             let LinearRgb { r, g, b } = crate::color::shift_hsv(color, hue_deg, saturation, value);
             (colors[0][lane], colors[1][lane], colors[2][lane]) = (r, g, b);
@@ -227,36 +230,39 @@ fn shift_colors(texels: &mut [Four], hue_deg: f32, saturation: f32, value: f32) 
 }
 
 /// A level of detail, and how much smaller the picture is to be.
-struct Detail {
+struct DetailLevel {
     level: usize,
     /// Texels of the level that make one, along each side: 1 up to 2.
     step: f64,
 }
 
-impl Detail {
+impl DetailLevel {
     /// Size and texels, bordered.
     fn read<'a, P: Copy + 'a>(
         &self,
         level: impl Fn(usize) -> &'a Image<P>,
-        four: impl Fn(P) -> Four,
-    ) -> ((usize, usize), Vec<Four>) {
+        four: impl Fn(P) -> Float4,
+    ) -> ((usize, usize), Vec<Float4>) {
         let image = level(self.level);
         let (columns, rows) = (
-            Shares::of(image.width(), self.step),
-            Shares::of(image.height(), self.step),
+            DownsampleAxis::of(image.width(), self.step),
+            DownsampleAxis::of(image.height(), self.step),
         );
-        let (width, height) = (columns.0.len() + 2 * BORDER, rows.0.len() + 2 * BORDER);
-        let mut texels = vec![Four::ZERO; width * height];
+        let (width, height) = (
+            columns.0.len() + 2 * BORDER_TEXELS,
+            rows.0.len() + 2 * BORDER_TEXELS,
+        );
+        let mut texels = vec![Float4::ZERO; width * height];
         let (mut line, mut sum) = (
-            vec![Four::ZERO; image.width()],
-            vec![Four::ZERO; image.width()],
+            vec![Float4::ZERO; image.width()],
+            vec![Float4::ZERO; image.width()],
         );
         for (share, out) in rows
             .0
             .iter()
-            .zip(texels.chunks_exact_mut(width).skip(BORDER))
+            .zip(texels.chunks_exact_mut(width).skip(BORDER_TEXELS))
         {
-            sum.fill(Four::ZERO);
+            sum.fill(Float4::ZERO);
             for (y, weight) in share.weighted() {
                 line.iter_mut()
                     .zip(image.row(y))
@@ -265,10 +271,10 @@ impl Detail {
                     .zip(&line)
                     .for_each(|(s, t)| *s = s.add_scaled(weight, *t));
             }
-            for (share, out) in columns.0.iter().zip(&mut out[BORDER..]) {
+            for (share, out) in columns.0.iter().zip(&mut out[BORDER_TEXELS..]) {
                 *out = share
                     .weighted()
-                    .fold(Four::ZERO, |s, (x, weight)| s.add_scaled(weight, sum[x]));
+                    .fold(Float4::ZERO, |s, (x, weight)| s.add_scaled(weight, sum[x]));
             }
         }
         ((width, height), texels)
@@ -276,28 +282,28 @@ impl Detail {
 }
 
 /// What each texel of a smaller picture takes from a larger one, along one side.
-struct Shares(Vec<Share>);
+struct DownsampleAxis(Vec<TexelWeights>);
 
 /// Up to three texels in a row and their weights, which add up to 1 (less at the end, where the picture ends).
-struct Share {
+struct TexelWeights {
     first: usize,
     weights: [f32; 3],
     count: usize,
 }
 
-impl Shares {
+impl DownsampleAxis {
     /// Averages over `step` texels (1 up to 2).
     fn of(len: usize, step: f64) -> Self {
         let count = (len as f64 / step).ceil() as usize;
         Self(
             (0..count)
-                .map(|k| Share::of(k as f64 * step, (k + 1) as f64 * step, len))
+                .map(|k| TexelWeights::of(k as f64 * step, (k + 1) as f64 * step, len))
                 .collect(),
         )
     }
 }
 
-impl Share {
+impl TexelWeights {
     fn of(start: f64, end: f64, len: usize) -> Self {
         let first = (start as usize).min(len - 1);
         let count = ((end.ceil() as usize).min(len) - first).min(3);
@@ -324,8 +330,8 @@ impl Share {
 
 /// Opacity alone, for what falls into shadow.
 #[derive(Debug)]
-pub(super) struct Shade {
-    pub(super) grid: Grid,
+pub(super) struct OpacityLevel {
+    pub(super) grid: TexelGrid,
     width: usize,
     height: usize,
     /// One plane of alpha, or one for each channel of film.
@@ -335,12 +341,12 @@ pub(super) struct Shade {
 }
 
 /// Positions in single precision are off by less than this, texels.
-const SURELY: f64 = 1.0 / 8.0;
+const POSITION_ERROR_TEXELS: f64 = 1.0 / 8.0;
 
-impl Shade {
+impl OpacityLevel {
     /// Opacity of a texture halved `level` times, in a card's own colours.
     pub(super) fn new(texture: &Texture, grade: &Grade, level: usize) -> Self {
-        let grid = Grid::new(
+        let grid = TexelGrid::new(
             texture.size(),
             level as f64,
             if level > 0 { 0.5 } else { 0.0 },
@@ -357,12 +363,15 @@ impl Shade {
         }
     }
 
-    fn of<P: Copy>(grid: Grid, image: &Image<P>, channels: &[&dyn Fn(P) -> f32]) -> Self {
-        let (width, height) = (image.width() + 2 * BORDER, image.height() + 2 * BORDER);
+    fn of<P: Copy>(grid: TexelGrid, image: &Image<P>, channels: &[&dyn Fn(P) -> f32]) -> Self {
+        let (width, height) = (
+            image.width() + 2 * BORDER_TEXELS,
+            image.height() + 2 * BORDER_TEXELS,
+        );
         let plane = |channel: &&dyn Fn(P) -> f32| {
             let mut plane = vec![0.0; width * height];
             for (y, row) in image.rows().enumerate() {
-                let line = &mut plane[(y + BORDER) * width + BORDER..][..row.len()];
+                let line = &mut plane[(y + BORDER_TEXELS) * width + BORDER_TEXELS..][..row.len()];
                 line.iter_mut().zip(row).for_each(|(a, &p)| *a = channel(p));
             }
             plane
@@ -384,11 +393,17 @@ impl Shade {
     /// How far inside of its sides an opaque texture is surely read as opaque, as shares of it; none for one that is not.
     pub(super) fn inset(&self) -> Option<[f64; 2]> {
         self.opaque
-            .then(|| self.grid.texels.map(|n| (0.5 + SURELY) / n))
+            .then(|| self.grid.texels.map(|n| (0.5 + POSITION_ERROR_TEXELS) / n))
     }
 
     /// Multiplies what gets through, along a line over bordered texels from its sample `first` on, in one channel.
-    pub(super) fn darken(&self, channel: usize, line: &Linear, first: usize, through: &mut [f32]) {
+    pub(super) fn darken(
+        &self,
+        channel: usize,
+        line: &TexelLine,
+        first: usize,
+        through: &mut [f32],
+    ) {
         let plane = &self.planes[channel.min(self.planes.len() - 1)];
         darken(
             plane,
@@ -405,26 +420,32 @@ impl Shade {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn darken(opacity: &[f32], size: (usize, usize), line: &Linear, first: f32, through: &mut [f32]) {
+fn darken(
+    opacity: &[f32],
+    size: (usize, usize),
+    line: &TexelLine,
+    first: f32,
+    through: &mut [f32],
+) {
     let mut first = first;
-    for run in through.chunks_mut(LANES) {
-        let cells = Cells::of(line, first, size);
-        let mut corners = [[0.0; LANES]; 4];
-        for lane in 0..LANES {
+    for run in through.chunks_mut(SIMD_LANES) {
+        let cells = BilinearCells::of(line, first, size);
+        let mut corners = [[0.0; SIMD_LANES]; 4];
+        for lane in 0..SIMD_LANES {
             let at = cells.at[lane] as usize;
             let (top, bottom) = (&opacity[at..][..2], &opacity[at + size.0..][..2]);
             (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
             (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
         }
-        let mut passes = [0.0; LANES];
-        for lane in 0..LANES {
+        let mut passes = [0.0; SIMD_LANES];
+        for lane in 0..SIMD_LANES {
             let (fx, fy) = (cells.fx[lane], cells.fy[lane]);
             let top = corners[0][lane] + fx * (corners[1][lane] - corners[0][lane]);
             let bottom = corners[2][lane] + fx * (corners[3][lane] - corners[2][lane]);
             passes[lane] = 1.0 - (top + fy * (bottom - top)).max(0.0).min(1.0);
         }
         run.iter_mut().zip(&passes).for_each(|(t, p)| *t *= p);
-        first += LANES as f32;
+        first += SIMD_LANES as f32;
     }
 }
 
@@ -447,11 +468,11 @@ mod tests {
     #[test]
     fn shares_add_up_but_for_the_end() {
         for (len, step) in [(7, 1.0), (7, 1.3), (10, 1.999), (1, 1.5)] {
-            let shares = Shares::of(len, step).0;
+            let shares = DownsampleAxis::of(len, step).0;
             let mut taken = vec![0.0; len];
             shares
                 .iter()
-                .flat_map(Share::weighted)
+                .flat_map(TexelWeights::weighted)
                 .for_each(|(x, w)| taken[x] += f64::from(w) * step);
             assert!(
                 taken.iter().all(|t| (t - 1.0).abs() < 1e-6),
@@ -485,8 +506,8 @@ mod tests {
             value: 1.2,
         };
         let (a, b) = (
-            Baked::new(&alpha, &grade, 0.6),
-            Baked::new(&film, &grade, 0.6),
+            BakedTexture::new(&alpha, &grade, 0.6),
+            BakedTexture::new(&film, &grade, 0.6),
         );
         assert_eq!(a.texels, b.texels);
         assert!(
@@ -495,7 +516,10 @@ mod tests {
                 .zip(&a.texels)
                 .all(|(o, t)| o.rgb() == LinearRgb::grey(t.alpha()))
         );
-        let (a, b) = (Shade::new(&alpha, &grade, 1), Shade::new(&film, &grade, 1));
+        let (a, b) = (
+            OpacityLevel::new(&alpha, &grade, 1),
+            OpacityLevel::new(&film, &grade, 1),
+        );
         assert!(b.planes.len() == 3 && b.planes.iter().all(|plane| *plane == a.planes[0]));
     }
 }

@@ -6,14 +6,14 @@ use crate::scene::{Card, Shot};
 use nalgebra::Matrix3;
 
 /// Areas below this (square metres) and angles below this (sine) are nothing to look at.
-const VANISHING: f64 = 1e-12;
+const GEOMETRY_EPSILON: f64 = 1e-12;
 
 /// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen past its own edge.
-pub(super) const HORIZON: f64 = 1e6;
+pub(super) const HORIZON_M: f64 = 1e6;
 
 /// A card or the surface as a plane in the world.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sheet {
+pub(super) struct ScenePlane {
     /// Centre.
     pub(super) center: Vector3<f64>,
     /// Unit vector along texture columns.
@@ -26,13 +26,13 @@ pub(super) struct Sheet {
     pub(super) size: [f64; 2],
 }
 
-impl Sheet {
+impl ScenePlane {
     /// A card's plane; none for a card without area or place.
     pub(super) fn of(card: &Card) -> Option<Self> {
         let pose = &card.quad.world_from_card;
         let [w, h] = card.quad.size;
         let center = pose.translation.vector;
-        let solid = w > 0.0 && h > 0.0 && w * h > VANISHING && (w * h).is_finite();
+        let solid = w > 0.0 && h > 0.0 && w * h > GEOMETRY_EPSILON && (w * h).is_finite();
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
         let placed = axes
             .iter()
@@ -81,7 +81,7 @@ impl Sheet {
 
 /// The camera as linear algebra.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct CameraView {
     /// Centre of projection.
     pub(super) eye: Vector3<f64>,
     /// Ray direction from `(x, y, 1)`; its parameter is the depth.
@@ -92,7 +92,7 @@ pub(super) struct View {
     pub(super) height: usize,
 }
 
-impl View {
+impl CameraView {
     pub(super) fn of(camera: &Camera) -> Self {
         let (f, c) = (camera.focal_px, camera.principal_px);
         let from_px = Matrix3::new(
@@ -128,14 +128,14 @@ impl View {
         let seen = world.map(|point| picture_from_world * (point - self.eye));
         let in_front = seen
             .iter()
-            .all(|p| p.z > VANISHING && p.iter().all(|c| c.is_finite()));
+            .all(|p| p.z > GEOMETRY_EPSILON && p.iter().all(|c| c.is_finite()));
         in_front.then(|| seen.map(|p| p / p.z))
     }
 }
 
 /// How a sheet lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and `v.p / w.p`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct ProjectedPlane {
     /// Numerator of the texture coordinate to the right, 0 to 1.
     pub(super) u: Vector3<f64>,
     /// Numerator of the texture coordinate downwards, 0 to 1.
@@ -150,9 +150,9 @@ pub(super) struct Seen {
     pub(super) normal: Vector3<f64>,
 }
 
-impl Seen {
+impl ProjectedPlane {
     /// None for a sheet seen edge-on.
-    pub(super) fn of(sheet: &Sheet, view: &View) -> Option<Self> {
+    pub(super) fn of(sheet: &ScenePlane, view: &CameraView) -> Option<Self> {
         let above = sheet.normal.dot(&(view.eye - sheet.center));
         let (normal, height) = if above >= 0.0 {
             (sheet.normal, above)
@@ -162,7 +162,7 @@ impl Seen {
         let w = -(view.ray.transpose() * normal);
         let point = view.eye * w.transpose() + view.ray * height;
         let [u, v] = texture_rows(sheet, &point, &w);
-        (height > VANISHING).then_some(Self {
+        (height > GEOMETRY_EPSILON).then_some(Self {
             u,
             v,
             w,
@@ -174,10 +174,10 @@ impl Seen {
 
     /// Side of the square that a pixel (or lattice cell) covers on the sheet's plane, metres, where it shows `target`; in
     /// the middle of the picture where that is behind the eye.
-    pub(super) fn cell_metres(&self, view: &View, target: &Vector3<f64>) -> f64 {
+    pub(super) fn cell_metres(&self, view: &CameraView, target: &Vector3<f64>) -> f64 {
         let middle = Vector3::new(0.5 * view.width as f64, 0.5 * view.height as f64, 1.0);
         let p = view.project(&[*target]).map_or(middle, |[p]| p);
-        let w = self.w.dot(&p).max(self.height / HORIZON);
+        let w = self.w.dot(&p).max(self.height / HORIZON_M);
         let point = self.point * p / w;
         let along = |k: usize| (self.point.column(k) - point * self.w[k]) / w;
         along(0).cross(&along(1)).norm().sqrt()
@@ -195,7 +195,7 @@ impl Seen {
 
 /// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a sheet's plane.
 pub(super) fn texture_rows(
-    sheet: &Sheet,
+    sheet: &ScenePlane,
     point: &Matrix3<f64>,
     w: &Vector3<f64>,
 ) -> [Vector3<f64>; 2] {
@@ -210,10 +210,10 @@ pub(super) fn texture_rows(
 }
 
 /// The cards of a shot that are there at all, in the order of their ids.
-pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, Sheet)> {
+pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, ScenePlane)> {
     let there = shot.cards.iter().filter(|card| !card.texture.is_empty());
     let mut sheets: Vec<_> = there
-        .filter_map(|card| Some((card, Sheet::of(card)?)))
+        .filter_map(|card| Some((card, ScenePlane::of(card)?)))
         .collect();
     sheets.sort_by_key(|(card, _)| card.id);
     sheets
@@ -245,14 +245,14 @@ mod tests {
                 size: [0.3, 0.2],
             };
             let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|a| rotation * a);
-            let sheet = Sheet {
+            let sheet = ScenePlane {
                 center: Vector3::new(0.1, 0.0, 0.1),
                 x: axes[0],
                 y: axes[1],
                 normal: axes[2],
                 size: quad.size,
             };
-            let seen = Seen::of(&sheet, &View::of(&camera)).unwrap();
+            let seen = ProjectedPlane::of(&sheet, &CameraView::of(&camera)).unwrap();
             let (px, depth) = camera.project(quad.point(0.3, 0.8)).unwrap();
             let ([u, v], t) = seen.hit(px.x, px.y).unwrap();
             assert!(

@@ -2,24 +2,24 @@
 
 #![expect(clippy::manual_clamp, reason = "takes a number that is none to 0")]
 
-use crate::render::four::Four;
-use crate::render::irradiance::Map;
-use crate::render::lattice::Place;
-use crate::render::layers::{Block, Layer};
-use crate::render::texture::{Baked, Cells, LANES, Linear, mean};
+use crate::render::float4::Float4;
+use crate::render::irradiance::IrradianceMap;
+use crate::render::lattice::LatticePosition;
+use crate::render::layers::{Layer, PixelBlock};
+use crate::render::texture::{BakedTexture, BilinearCells, SIMD_LANES, TexelLine, mean};
 use crate::work::Kind;
 use std::ops::Range;
 
 /// Transmittance of each sub-sample of a block: a plane for each of the places inside a pixel.
 #[derive(Debug)]
-pub(super) struct Through {
+pub(super) struct Transmittance {
     width: usize,
     /// Pixels of a plane.
     area: usize,
     /// One number for all channels; empty where there is film.
     grey: Vec<f32>,
     /// A number for each channel; empty where there is none.
-    tinted: Vec<Four>,
+    tinted: Vec<Float4>,
 }
 
 /// A row of one layer, a value for each pixel.
@@ -28,13 +28,13 @@ pub(super) struct LayerRow {
     /// Pixels that the layer touches.
     pub(super) touched: Range<usize>,
     /// Sum over sub-samples of its colour, as far as it is seen; the fourth number is the same of its alpha.
-    pub(super) light: Vec<Four>,
+    pub(super) light: Vec<Float4>,
     /// The same of its opacity, where there is film.
-    pub(super) hidden: Vec<Four>,
+    pub(super) hidden: Vec<Float4>,
     /// Sum of its alpha, whatever is in front.
     pub(super) alpha: Vec<f32>,
     /// Light on it at the sub-samples under work, where that is not the pixel's.
-    irradiance: Vec<Four>,
+    irradiance: Vec<Float4>,
     /// Texture readings, and light looked up, for all rows so far.
     pub(super) read: usize,
     /// See `read`.
@@ -59,8 +59,8 @@ impl LayerRow {
         for fours in [&mut self.light, &mut self.hidden] {
             fours.clear();
         }
-        self.light.resize(n, Four::ZERO);
-        self.hidden.resize(if tinted { n } else { 0 }, Four::ZERO);
+        self.light.resize(n, Float4::ZERO);
+        self.hidden.resize(if tinted { n } else { 0 }, Float4::ZERO);
         self.alpha.clear();
         self.alpha.resize(n, 0.0);
     }
@@ -68,10 +68,10 @@ impl LayerRow {
     /// Looks up the light on a layer at one sub-sample of each pixel.
     pub(super) fn light_between(
         &mut self,
-        light: &Map,
+        light: &IrradianceMap,
         pixels: Range<usize>,
-        column: impl Fn(usize) -> Place,
-        row: Place,
+        column: impl Fn(usize) -> LatticePosition,
+        row: LatticePosition,
     ) {
         self.irradiance.clear();
         self.lit += pixels.len();
@@ -80,9 +80,9 @@ impl LayerRow {
     }
 }
 
-impl Through {
+impl Transmittance {
     /// Nothing in the way of `r` x `r` sub-samples a pixel.
-    pub(super) fn all(block: &Block, r: usize, tinted: bool) -> Self {
+    pub(super) fn all(block: &PixelBlock, r: usize, tinted: bool) -> Self {
         let (width, area) = (block.x.len(), block.len());
         let count = area * r * r;
         let (grey, tints) = if tinted { (0, count) } else { (count, 0) };
@@ -90,20 +90,20 @@ impl Through {
             width,
             area,
             grey: vec![1.0; grey],
-            tinted: vec![Four::ONE; tints],
+            tinted: vec![Float4::ONE; tints],
         }
     }
 
     /// The sub-samples of a pixel, row by row.
     #[inline(always)]
-    pub(super) fn of(&self, x: usize, y: usize) -> impl Iterator<Item = Four> {
+    pub(super) fn of(&self, x: usize, y: usize) -> impl Iterator<Item = Float4> {
         let i = y * self.width + x;
         let grey = self
             .grey
             .iter()
             .skip(i)
             .step_by(self.area.max(1))
-            .map(|&t| Four([t; 4]));
+            .map(|&t| Float4([t; 4]));
         grey.chain(
             self.tinted
                 .iter()
@@ -118,7 +118,7 @@ impl Through {
     pub(super) fn pass(
         &mut self,
         layer: &Layer,
-        line: &Linear,
+        line: &TexelLine,
         plane: usize,
         y: usize,
         pixels: Range<usize>,
@@ -158,21 +158,21 @@ impl Through {
     "aarch64+neon"
 ))]
 fn pass_grey(
-    texture: &Baked,
-    line: &Linear,
-    irradiance: &[Four],
+    texture: &BakedTexture,
+    line: &TexelLine,
+    irradiance: &[Float4],
     through: &mut [f32],
-    light: &mut [Four],
+    light: &mut [Float4],
     alpha: &mut [f32],
 ) {
     let size = texture.size();
     let sums = through
-        .chunks_mut(LANES)
-        .zip(light.chunks_mut(LANES))
-        .zip(alpha.chunks_mut(LANES));
+        .chunks_mut(SIMD_LANES)
+        .zip(light.chunks_mut(SIMD_LANES))
+        .zip(alpha.chunks_mut(SIMD_LANES));
     for (run, ((through, light), alpha)) in sums.enumerate() {
-        let cells = Cells::of(line, (run * LANES) as f32, size);
-        let irradiance = irradiance.get(run * LANES..).unwrap_or_default();
+        let cells = BilinearCells::of(line, (run * SIMD_LANES) as f32, size);
+        let irradiance = irradiance.get(run * SIMD_LANES..).unwrap_or_default();
         for (lane, ((through, light), alpha)) in
             through.iter_mut().zip(light).zip(alpha).enumerate()
         {
@@ -191,11 +191,11 @@ fn pass_grey(
 }
 
 fn pass_tinted(
-    texture: &Baked,
-    line: &Linear,
-    irradiance: &[Four],
-    through: &mut [Four],
-    (light, alpha, hidden): (&mut [Four], &mut [f32], &mut [Four]),
+    texture: &BakedTexture,
+    line: &TexelLine,
+    irradiance: &[Float4],
+    through: &mut [Float4],
+    (light, alpha, hidden): (&mut [Float4], &mut [f32], &mut [Float4]),
 ) {
     let size = texture.size();
     let sums = through
@@ -203,40 +203,40 @@ fn pass_tinted(
         .zip(light)
         .zip(alpha.iter_mut().zip(hidden))
         .enumerate();
-    let mut cells = Cells::of(line, 0.0, size);
+    let mut cells = BilinearCells::of(line, 0.0, size);
     for (i, ((through, light), (alpha, hidden))) in sums {
-        let lane = i % LANES;
+        let lane = i % SIMD_LANES;
         if lane == 0 {
-            cells = Cells::of(line, i as f32, size);
+            cells = BilinearCells::of(line, i as f32, size);
         }
         let texel = bilinear(&texture.texels, size.0, &cells, lane);
         let opacity = match texture.opacity.as_slice() {
-            [] => Four([texel.alpha(); 4]),
+            [] => Float4([texel.alpha(); 4]),
             film => bilinear(film, size.0, &cells, lane),
         };
-        let opacity = Four(opacity.0.map(|o| o.max(0.0).min(1.0)));
+        let opacity = Float4(opacity.0.map(|o| o.max(0.0).min(1.0)));
         let lit = if let Some(&e) = irradiance.get(i) {
             texel.times(e)
         } else {
             texel
         };
         // The fourth number tells whether anything is seen at all.
-        *light = Four(std::array::from_fn(|c| {
+        *light = Float4(std::array::from_fn(|c| {
             light.0[c] + through.0[c] * if c < 3 { lit.0[c] } else { texel.alpha() }
         }));
         *alpha += mean(opacity.rgb());
-        *hidden = Four(std::array::from_fn(|c| {
+        *hidden = Float4(std::array::from_fn(|c| {
             hidden.0[c] + through.0[c] * opacity.0[c]
         }));
-        *through = Four(std::array::from_fn(|c| through.0[c] * (1.0 - opacity.0[c])));
+        *through = Float4(std::array::from_fn(|c| through.0[c] * (1.0 - opacity.0[c])));
     }
 }
 
 #[inline(always)]
-fn bilinear(texels: &[Four], stride: usize, cells: &Cells, lane: usize) -> Four {
+fn bilinear(texels: &[Float4], stride: usize, cells: &BilinearCells, lane: usize) -> Float4 {
     let at = cells.at[lane] as usize;
     let (top, bottom) = (&texels[at..][..2], &texels[at + stride..][..2]);
-    Four::bilinear(
+    Float4::bilinear(
         [top[0], top[1]],
         [bottom[0], bottom[1]],
         cells.fx[lane],

@@ -5,9 +5,9 @@ use crate::pixel::{LinearRgb, PremulRgba};
 /// Red, green, blue and a fourth: alpha of a texel, 1 of a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(16))]
-pub(super) struct Four(pub(super) [f32; 4]);
+pub(super) struct Float4(pub(super) [f32; 4]);
 
-impl Four {
+impl Float4 {
     pub(super) const ZERO: Self = Self([0.0; 4]);
     pub(super) const ONE: Self = Self([1.0; 4]);
 
@@ -48,7 +48,7 @@ impl Four {
     }
 }
 
-impl From<LinearRgb> for Four {
+impl From<LinearRgb> for Float4 {
     /// With nothing as the fourth.
     #[inline(always)]
     fn from(c: LinearRgb) -> Self {
@@ -56,7 +56,7 @@ impl From<LinearRgb> for Four {
     }
 }
 
-impl From<PremulRgba> for Four {
+impl From<PremulRgba> for Float4 {
     #[inline(always)]
     fn from(p: PremulRgba) -> Self {
         Self([p.r, p.g, p.b, p.a])

@@ -10,18 +10,18 @@ use std::f64::consts::PI;
 
 /// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Source {
+pub(super) struct LightSample {
     /// Where.
     pub(super) at: Vector4<f64>,
     /// Side of the square of light that it stands for: metres, or radians of a direction.
     pub(super) width: f64,
     /// What it does to a receiver that sees it.
-    pub(super) kind: Kind,
+    pub(super) kind: SampleKind,
 }
 
 /// How a source lights a receiver.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
+pub(super) enum SampleKind {
     /// A piece of a light's face: unit normal and area.
     Face {
         /// Which way it shines.
@@ -38,23 +38,23 @@ pub(super) enum Kind {
 
 /// Sources of one colour.
 #[derive(Clone, Debug)]
-pub(super) struct Lamp {
+pub(super) struct LightGroup {
     /// Radiance of each.
     pub(super) radiance: LinearRgb,
     /// Its points or directions.
-    pub(super) sources: Vec<Source>,
+    pub(super) sources: Vec<LightSample>,
 }
 
 /// All that lights a receiver.
 #[derive(Clone, Debug)]
-pub(super) struct Lamps {
+pub(super) struct LightSamples {
     /// Area lights, in their order.
-    pub(super) faces: Vec<Lamp>,
+    pub(super) faces: Vec<LightGroup>,
     /// What is all around: the constant environment, then the pieces of the map.
-    pub(super) sky: Vec<Lamp>,
+    pub(super) sky: Vec<LightGroup>,
 }
 
-impl Lamps {
+impl LightSamples {
     /// What lights a receiver with this unit normal, in the plane through `point`.
     pub(super) fn of(
         shot: &Shot,
@@ -73,7 +73,11 @@ impl Lamps {
     }
 
     /// The same for a quadrature without cleverness: the map in even rectangles.
-    pub(super) fn plain(shot: &Shot, options: &RenderOptions, normal: &Vector3<f64>) -> Vec<Lamp> {
+    pub(super) fn plain(
+        shot: &Shot,
+        options: &RenderOptions,
+        normal: &Vector3<f64>,
+    ) -> Vec<LightGroup> {
         let faces = shot
             .lights
             .iter()
@@ -88,9 +92,13 @@ impl Lamps {
         faces.into_iter().chain(sky).collect()
     }
 
-    fn from_parts(faces: Vec<Lamp>, ambient: Lamp, map: impl Iterator<Item = Lamp>) -> Self {
+    fn from_parts(
+        faces: Vec<LightGroup>,
+        ambient: LightGroup,
+        map: impl Iterator<Item = LightGroup>,
+    ) -> Self {
         let sky = std::iter::once(ambient).chain(map).collect();
-        let lit = |lamps: Vec<Lamp>| {
+        let lit = |lamps: Vec<LightGroup>| {
             lamps
                 .into_iter()
                 .filter(|lamp| lamp.radiance != LinearRgb::BLACK)
@@ -104,38 +112,39 @@ impl Lamps {
 
     /// Irradiance of the sky where nothing is in its way.
     pub(super) fn open_sky(&self) -> LinearRgb {
-        let shares = |lamp: &Lamp| lamp.sources.iter().map(Source::share).sum::<f64>() as f32;
+        let shares =
+            |lamp: &LightGroup| lamp.sources.iter().map(LightSample::share).sum::<f64>() as f32;
         self.sky.iter().fold(LinearRgb::BLACK, |sum, lamp| {
             sum.add_scaled(shares(lamp), lamp.radiance)
         })
     }
 }
 
-fn face(light: &AreaLight, nodes: Vec<light::Node>) -> Lamp {
+fn face(light: &AreaLight, nodes: Vec<light::Node>) -> LightGroup {
     let normal = light::frame(light).normal;
-    let source = |n: light::Node| Source {
+    let source = |n: light::Node| LightSample {
         at: n.point.to_homogeneous(),
         width: n.area.sqrt(),
-        kind: Kind::Face {
+        kind: SampleKind::Face {
             normal,
             area: n.area,
         },
     };
-    Lamp {
+    LightGroup {
         radiance: light::radiance(light),
         sources: nodes.into_iter().map(source).collect(),
     }
 }
 
-fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {
+fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> LightGroup {
     let world_from_hemisphere = hemisphere(normal);
     let share = PI / count as f64;
-    let source = |d: Vector3<f64>| Source {
+    let source = |d: Vector3<f64>| LightSample {
         at: (world_from_hemisphere * d).to_homogeneous(),
         width: (share / d.z).sqrt(),
-        kind: Kind::Sky { share },
+        kind: SampleKind::Sky { share },
     };
-    Lamp {
+    LightGroup {
         radiance,
         sources: light::ambient_directions(count)
             .into_iter()
@@ -145,13 +154,13 @@ fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Lamp {
 }
 
 /// The pieces of a map that a receiver sees: a lamp each, since each has a colour of its own.
-fn pieces(pieces: Vec<light::SkyPiece>) -> impl Iterator<Item = Lamp> {
-    let lamp = |piece: light::SkyPiece| Lamp {
+fn pieces(pieces: Vec<light::SkyPiece>) -> impl Iterator<Item = LightGroup> {
+    let lamp = |piece: light::SkyPiece| LightGroup {
         radiance: piece.irradiance,
-        sources: vec![Source {
+        sources: vec![LightSample {
             at: piece.direction.to_homogeneous(),
             width: piece.width,
-            kind: Kind::Sky { share: 1.0 },
+            kind: SampleKind::Sky { share: 1.0 },
         }],
     };
     pieces.into_iter().map(lamp)
@@ -168,10 +177,10 @@ fn hemisphere(normal: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[x, normal.cross(&x), *normal])
 }
 
-impl Source {
+impl LightSample {
     /// Cosine times solid angle of a piece of the sky.
     fn share(&self) -> f64 {
-        if let Kind::Sky { share } = self.kind {
+        if let SampleKind::Sky { share } = self.kind {
             share
         } else {
             0.0
@@ -181,8 +190,8 @@ impl Source {
     /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below a horizon.
     pub(super) fn irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
         match self.kind {
-            Kind::Sky { share } => share,
-            Kind::Face { normal: face, area } => {
+            SampleKind::Sky { share } => share,
+            SampleKind::Face { normal: face, area } => {
                 let to = self.at.xyz() - point;
                 let r2 = to.norm_squared();
                 let cosines = normal.dot(&to).max(0.0) * (-face.dot(&to)).max(0.0);
