@@ -5,22 +5,23 @@ use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
-use crate::render::half_plane::sides;
-use crate::render::irradiance::{IrradianceMap, maps};
+use crate::render::block::PixelBlock;
+use crate::render::half_plane::quad_sides;
+use crate::render::irradiance::{IrradianceMap, irradiance_maps};
 use crate::render::lattice::Lattice;
-use crate::render::layers::{
-    Layer, LayerStack, PixelBlock, RenderedTile, SampleGrid, ShadowCatcher,
-};
-use crate::render::pixel_filter::{left_over_sigma, quantiles};
-use crate::render::receiver::LightingContext;
-use crate::render::shadow::{Occluders, rows_and_columns};
+use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
+use crate::render::pixel_filter::{filter_quantiles, residual_sigma};
+use crate::render::receiver::{LightingContext, ReceiverIrradiance};
 use crate::render::texture::BakedTexture;
-use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, sheets};
+use crate::render::view::{
+    CameraView, ProjectedPlane, ScenePlane, rows_and_columns, visible_planes,
+};
 use crate::scene::{Card, Shot};
 use crate::work::{self, Kind};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Side of the blocks that the picture is put together from, pixels.
+/// Side of the blocks that the picture is put together from.
 const TILE_SIDE_PX: usize = 32;
 
 /// Sub-samples a side from which on a sharper level of detail pays.
@@ -39,62 +40,38 @@ const DENSE_SUBSAMPLES: usize = 4;
 /// are ordered by depth block by block; blocks in which they cross are split.
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
-    let view = CameraView::of(&shot.camera);
-    let offsets = quantiles(options.subsamples);
-    let cards = sheets(shot);
-    let casters = Occluders::new(&cards, ScenePlane::surface(shot.catcher));
-    let tinted = casters.tinted;
-    let [fine, coarse] = [1.0, 2.0].map(|scale| Lattice::new(&view, scale * options.cell_px));
-    let studio = LightingContext {
-        fine,
-        coarse,
-        casters,
-        shot,
-        options,
-    };
-
-    let looks: Vec<_> = cards
+    let view = CameraView::from_camera(&shot.camera);
+    let offsets = filter_quantiles(options.subsamples);
+    let planes = visible_planes(shot);
+    let context = LightingContext::new(shot, &planes, &view, options);
+    let cards: Vec<_> = planes
         .par_iter()
-        .map(|(card, sheet)| ProjectedCard::of(card, sheet, &view, &offsets))
+        .map(|(card, plane)| ProjectedCard::new(card, plane, &view, &offsets))
         .collect();
-    let receiver = |k: usize| match looks.get(k) {
-        Some(look) => studio.card(k, look.as_ref()?.texture.grid.reach),
-        None => studio.surface(),
-    };
-    let receivers: Vec<_> = (0..=cards.len()).into_par_iter().map(receiver).collect();
-    let mut lights = maps(&receivers);
-
-    let share = lights.pop().flatten();
-    let together = cards.iter().zip(looks).zip(receivers.iter().zip(lights));
-    let seen = together.filter_map(|(((card, _), look), (lit, light))| {
-        Some((card, lit.as_ref().and(look)?, light))
-    });
-    let layers = seen
-        .map(|(card, look, light)| look.layer(card, light))
-        .collect();
-    let ground = ShadowCatcher {
-        seen: ProjectedPlane::of(&studio.casters.surface, &view),
-        share,
+    let receivers = receivers(&context, &cards);
+    let mut maps = irradiance_maps(&receivers);
+    let catcher = ShadowCatcher {
+        plane: ProjectedPlane::new(&context.occluders.surface, &view),
+        share: maps.pop().flatten(),
     };
     let stack = LayerStack {
-        layers,
-        ground,
-        samples: samples(&view, &fine, offsets, &options),
+        layers: lit_layers(cards, &receivers, maps),
+        catcher,
+        samples: sample_grid(&view, &context.fine, offsets, &options),
         exposure: shot.exposure,
-        tinted,
+        tinted: context.occluders.tinted,
     };
-    assemble(
-        &view,
-        &tiles(&view)
-            .into_par_iter()
-            .map(|tile| stack.paint(tile))
-            .collect::<Vec<_>>(),
-    )
+    let tiles = PixelBlock::tiles_of(view.width, view.height, TILE_SIDE_PX);
+    let rendered: Vec<_> = tiles
+        .into_par_iter()
+        .map(|tile| stack.render_tile(tile))
+        .collect();
+    assemble_tiles(&view, &rendered)
 }
 
-/// The same in the dark: what objects cover and hide, and how far away they are, without any light.
+/// The same without any light: what objects cover and hide, and how far away they are.
 ///
-/// All that labels are made from, at a part of the price; bit for bit what [`render`] says of it.
+/// All that labels are made from, at a part of the cost; the same bits as [`render`] gives for it.
 pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let dark = Shot {
         lights: Vec::new(),
@@ -106,158 +83,158 @@ pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
     render(&dark, options)
 }
 
+/// The cards as receivers of light, then the surface; none for what is not seen.
+fn receivers(
+    context: &LightingContext<'_>,
+    cards: &[Option<ProjectedCard<'_>>],
+) -> Vec<Option<ReceiverIrradiance>> {
+    (0..=cards.len())
+        .into_par_iter()
+        .map(|k| match cards.get(k) {
+            Some(card) => context.card(k, card.as_ref()?.texture.grid.reach),
+            None => context.surface(),
+        })
+        .collect()
+}
+
+/// The layers of the cards that are seen and have a receiver, each with the light on it.
+fn lit_layers(
+    cards: Vec<Option<ProjectedCard<'_>>>,
+    receivers: &[Option<ReceiverIrradiance>],
+    maps: Vec<Option<IrradianceMap>>,
+) -> Vec<Layer> {
+    cards
+        .into_iter()
+        .zip(receivers.iter().zip(maps))
+        .filter_map(|(card, (receiver, light))| {
+            let card = receiver.as_ref().and(card)?;
+            Some(card.into_layer(light))
+        })
+        .collect()
+}
+
 /// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
-fn samples(
+fn sample_grid(
     view: &CameraView,
     lattice: &Lattice,
     offsets: Vec<f64>,
     options: &RenderOptions,
 ) -> SampleGrid {
-    let each = options.cell_px < 1.0;
-    let places = |pixels: usize| lattice.places(pixels, if each { &offsets } else { &[0.0] });
+    let per_subsample = options.cell_px < 1.0;
+    let looked_up: &[f64] = if per_subsample { &offsets } else { &[0.0] };
     SampleGrid {
-        columns: places(view.width),
-        rows: places(view.height),
-        each,
+        columns: lattice.positions_of(view.width, looked_up),
+        rows: lattice.positions_of(view.height, looked_up),
+        per_subsample,
         offsets,
     }
 }
 
 /// A card in the picture, before it is lit.
-struct ProjectedCard {
-    seen: ProjectedPlane,
+struct ProjectedCard<'a> {
+    card: &'a Card,
+    plane: ProjectedPlane,
     texture: BakedTexture,
-    columns: std::ops::Range<usize>,
-    rows: std::ops::Range<usize>,
+    columns: Range<usize>,
+    rows: Range<usize>,
 }
 
-impl ProjectedCard {
+impl<'a> ProjectedCard<'a> {
     /// None for a card that is edge-on or outside the picture.
-    fn of(card: &Card, sheet: &ScenePlane, view: &CameraView, offsets: &[f64]) -> Option<Self> {
-        let seen = ProjectedPlane::of(sheet, view)?;
-        let (rows, columns) = rows_and_columns(sheet, [0.0; 2], view);
+    fn new(card: &'a Card, plane: &ScenePlane, view: &CameraView, offsets: &[f64]) -> Option<Self> {
+        let projected = ProjectedPlane::new(plane, view)?;
+        let (rows, columns) = rows_and_columns(plane, [0.0; 2], view);
         if rows.is_empty() || columns.is_empty() {
             return None;
         }
         work::add(Kind::Bakes, 1);
-        let (seen, texture) = side(card, sheet, seen, view);
-        let texture = BakedTexture::new(
-            texture,
-            &card.grade,
-            level(texture, sheet, &seen, view, offsets),
-        );
-        let (rows, columns) = rows_and_columns(sheet, texture.grid.reach, view);
+        let (projected, texture) = visible_side(card, plane, projected, view);
+        let level = detail_level(texture, plane, &projected, view, offsets);
+        let texture = BakedTexture::new(texture, &card.grade, level);
+        let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
         Some(Self {
-            seen,
+            card,
+            plane: projected,
             texture,
             columns,
             rows,
         })
     }
 
-    fn layer(self, card: &Card, light: Option<IrradianceMap>) -> Layer {
-        let Self {
-            seen,
-            texture,
-            columns,
-            rows,
-        } = self;
-        let sides = sides(&seen.u, &seen.v, &seen.w, texture.grid.reach);
+    fn into_layer(self, light: Option<IrradianceMap>) -> Layer {
+        let plane = self.plane;
         Layer {
-            id: card.id,
-            seen,
-            texture,
+            id: self.card.id,
+            plane,
+            sides: quad_sides(&plane.u, &plane.v, &plane.w, self.texture.grid.reach),
+            texture: self.texture,
             light,
-            sides,
-            columns,
-            rows,
+            columns: self.columns,
+            rows: self.rows,
         }
     }
 }
 
-/// The side of a card that is turned to the eye, and how it lies.
-fn side<'a>(
+/// The side of a card that is turned to the camera, and how it lies in the picture.
+fn visible_side<'a>(
     card: &'a Card,
-    sheet: &ScenePlane,
-    seen: ProjectedPlane,
+    plane: &ScenePlane,
+    projected: ProjectedPlane,
     view: &CameraView,
 ) -> (ProjectedPlane, &'a Texture) {
-    let from_behind = sheet.normal.dot(&(view.eye - sheet.center)) < 0.0;
+    let from_behind = plane.normal.dot(&(view.eye - plane.center)) < 0.0;
     match &card.back {
-        Some(back) if from_behind => (
-            ProjectedPlane {
-                u: seen.w - seen.u,
-                ..seen
-            },
-            back,
-        ),
-        _ => (seen, &card.texture),
+        Some(back) if from_behind => {
+            let mirrored = ProjectedPlane {
+                u: projected.w - projected.u,
+                ..projected
+            };
+            (mirrored, back)
+        }
+        _ => (projected, &card.texture),
     }
 }
 
 /// Level of detail by matching variance: what sub-samples leave of the pixel's window, the texture's own filter covers.
 ///
 /// A level read bilinearly has variance `4^level / 4` texels.
-fn level(
+fn detail_level(
     texture: &Texture,
-    sheet: &ScenePlane,
-    seen: &ProjectedPlane,
+    plane: &ScenePlane,
+    projected: &ProjectedPlane,
     view: &CameraView,
     offsets: &[f64],
 ) -> f64 {
     let (width, height) = texture.size();
     let texels = (width * height) as f64;
-    let per_pixel =
-        seen.cell_metres(view, &sheet.center) * (texels / (sheet.size[0] * sheet.size[1])).sqrt();
+    let per_pixel = projected.cell_metres(view, &plane.center)
+        * (texels / (plane.size[0] * plane.size[1])).sqrt();
     let dense = if offsets.len() >= DENSE_SUBSAMPLES {
         0.25
     } else {
         0.0
     };
-    let level = libm::log2(2.0 * left_over_sigma(offsets) * per_pixel) - dense;
+    let level = libm::log2(2.0 * residual_sigma(offsets) * per_pixel) - dense;
     // A NaN from a card that fills the horizon reads the full texture.
     level.clamp(0.0, 32.0).max(0.0)
 }
 
-fn tiles(view: &CameraView) -> Vec<PixelBlock> {
-    let cuts = |len: usize| {
-        (0..len)
-            .step_by(TILE_SIDE_PX)
-            .map(move |a| a..(a + TILE_SIDE_PX).min(len))
-    };
-    cuts(view.height)
-        .flat_map(|y| cuts(view.width).map(move |x| PixelBlock { x, y: y.clone() }))
-        .collect()
+/// Puts the tiles' pixels in order.
+fn assemble_tiles(view: &CameraView, tiles: &[RenderedTile]) -> DeepImage {
+    let samples = tiles.iter().flat_map(|tile| &tile.samples.samples).copied();
+    let tints = tiles.iter().flat_map(|tile| &tile.samples.tints).copied();
+    DeepImage::from_samples(assemble_shadow(view, tiles), samples, tints)
 }
 
-/// Puts the tiles' pixels in order.
-fn assemble(view: &CameraView, painted: &[RenderedTile]) -> DeepImage {
+/// The factor on the plate, 1 where no tile has one.
+fn assemble_shadow(view: &CameraView, tiles: &[RenderedTile]) -> Image<LinearRgb> {
     let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
-    for p in painted {
-        let Some(values) = &p.shadow else { continue };
-        for (y, line) in p.block.y.clone().zip(values.chunks_exact(p.block.x.len())) {
-            shadow.row_mut(y)[p.block.x.clone()].copy_from_slice(line);
+    for tile in tiles {
+        let Some(values) = &tile.shadow else { continue };
+        let PixelBlock { x, y } = &tile.block;
+        for (y, row) in y.clone().zip(values.chunks_exact(x.len())) {
+            shadow.row_mut(y)[x.clone()].copy_from_slice(row);
         }
     }
-    let paintings = || painted.iter().map(|p| &p.painting);
-    let samples = paintings().flat_map(|p| &p.samples).copied();
-    DeepImage::from_samples(shadow, samples, paintings().flat_map(|p| &p.tints).copied())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geom::Vector3;
-
-    #[test]
-    fn tiles_cover_every_pixel_once() {
-        let view = CameraView {
-            eye: Vector3::zeros(),
-            ray: nalgebra::Matrix3::identity(),
-            width: 37,
-            height: 17,
-        };
-        let area: usize = tiles(&view).iter().map(|t| t.x.len() * t.y.len()).sum();
-        assert_eq!(area, 37 * 17);
-    }
+    shadow
 }

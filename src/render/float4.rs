@@ -31,6 +31,24 @@ impl Float4 {
         Self(std::array::from_fn(|i| self.0[i] * o.0[i]))
     }
 
+    /// `self + a * b`, number by number.
+    #[inline(always)]
+    pub(super) fn add_product(self, a: Self, b: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + a.0[i] * b.0[i]))
+    }
+
+    /// `1 - self`, number by number.
+    #[inline(always)]
+    pub(super) fn complement(self) -> Self {
+        Self(self.0.map(|v| 1.0 - v))
+    }
+
+    /// The same with another fourth number.
+    #[inline(always)]
+    pub(super) fn with_fourth(self, fourth: f32) -> Self {
+        Self([self.0[0], self.0[1], self.0[2], fourth])
+    }
+
     /// `self` at 0, `o` at 1; exactly the value where both are the same.
     #[inline(always)]
     pub(super) fn lerp(self, o: Self, t: f32) -> Self {

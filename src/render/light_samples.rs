@@ -19,7 +19,7 @@ pub(super) struct LightSample {
     pub(super) kind: SampleKind,
 }
 
-/// How a source lights a receiver.
+/// How a light sample lights a receiver.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum SampleKind {
     /// A piece of a light's face: unit normal and area.
@@ -36,13 +36,13 @@ pub(super) enum SampleKind {
     },
 }
 
-/// Sources of one colour.
+/// Light samples of one colour.
 #[derive(Clone, Debug)]
 pub(super) struct LightGroup {
     /// Radiance of each.
     pub(super) radiance: LinearRgb,
     /// Its points or directions.
-    pub(super) sources: Vec<LightSample>,
+    pub(super) samples: Vec<LightSample>,
 }
 
 /// All that lights a receiver.
@@ -56,23 +56,25 @@ pub(super) struct LightSamples {
 
 impl LightSamples {
     /// What lights a receiver with this unit normal, in the plane through `point`.
-    pub(super) fn of(
+    pub(super) fn above(
         shot: &Shot,
         options: &RenderOptions,
         point: &Vector3<f64>,
         normal: &Vector3<f64>,
     ) -> Self {
-        let above =
-            |l: &AreaLight| light::nodes_above(l, options.light_samples, (*point).into(), normal);
-        let faces = shot.lights.iter().map(|l| face(l, above(l))).collect();
-        let ambient = ambient(shot.ambient, options.ambient_samples, normal);
+        let (count, point) = (options.light_samples, (*point).into());
+        let faces = shot
+            .lights
+            .iter()
+            .map(|l| LightGroup::area_light(l, light::nodes_above(l, count, point, normal)));
         let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
-        let map =
-            shining.flat_map(|map| pieces(light::sky_pieces(map, options.ambient_samples, normal)));
-        Self::from_parts(faces, ambient, map)
+        let pieces =
+            shining.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal));
+        let ambient = LightGroup::ambient(shot.ambient, options.ambient_samples, normal);
+        Self::from_parts(faces, ambient, pieces)
     }
 
-    /// The same for a quadrature without cleverness: the map in even rectangles.
+    /// The same for a plain quadrature: whole lights, and the map in even rectangles.
     pub(super) fn plain(
         shot: &Shot,
         options: &RenderOptions,
@@ -81,93 +83,94 @@ impl LightSamples {
         let faces = shot
             .lights
             .iter()
-            .map(|l| face(l, light::nodes(l, options.light_samples)))
-            .collect();
-        let ambient = ambient(shot.ambient, options.ambient_samples, normal);
-        let map = shot
+            .map(|l| LightGroup::area_light(l, light::nodes(l, options.light_samples)));
+        let pieces = shot
             .environment
             .iter()
-            .flat_map(|map| pieces(light::sky_cells(map, options.ambient_samples, normal)));
-        let Self { faces, sky } = Self::from_parts(faces, ambient, map);
+            .flat_map(|map| light::sky_cells(map, options.ambient_samples, normal));
+        let ambient = LightGroup::ambient(shot.ambient, options.ambient_samples, normal);
+        let Self { faces, sky } = Self::from_parts(faces, ambient, pieces);
         faces.into_iter().chain(sky).collect()
     }
 
+    /// Leaves out what is black.
     fn from_parts(
-        faces: Vec<LightGroup>,
+        faces: impl Iterator<Item = LightGroup>,
         ambient: LightGroup,
-        map: impl Iterator<Item = LightGroup>,
+        pieces: impl Iterator<Item = light::SkyPiece>,
     ) -> Self {
-        let sky = std::iter::once(ambient).chain(map).collect();
-        let lit = |lamps: Vec<LightGroup>| {
-            lamps
-                .into_iter()
-                .filter(|lamp| lamp.radiance != LinearRgb::BLACK)
-                .collect()
-        };
+        let sky = std::iter::once(ambient).chain(pieces.map(LightGroup::sky_piece));
         Self {
-            faces: lit(faces),
-            sky: lit(sky),
+            faces: faces.filter(LightGroup::is_lit).collect(),
+            sky: sky.filter(LightGroup::is_lit).collect(),
         }
     }
 
     /// Irradiance of the sky where nothing is in its way.
     pub(super) fn open_sky(&self) -> LinearRgb {
-        let shares =
-            |lamp: &LightGroup| lamp.sources.iter().map(LightSample::share).sum::<f64>() as f32;
-        self.sky.iter().fold(LinearRgb::BLACK, |sum, lamp| {
-            sum.add_scaled(shares(lamp), lamp.radiance)
+        self.sky.iter().fold(LinearRgb::BLACK, |sum, group| {
+            sum.add_scaled(group.sky_share(), group.radiance)
         })
     }
 }
 
-fn face(light: &AreaLight, nodes: Vec<light::Node>) -> LightGroup {
-    let normal = light::frame(light).normal;
-    let source = |n: light::Node| LightSample {
-        at: n.point.to_homogeneous(),
-        width: n.area.sqrt(),
-        kind: SampleKind::Face {
-            normal,
-            area: n.area,
-        },
-    };
-    LightGroup {
-        radiance: light::radiance(light),
-        sources: nodes.into_iter().map(source).collect(),
+impl LightGroup {
+    fn area_light(light: &AreaLight, nodes: Vec<light::Node>) -> Self {
+        let normal = light::frame(light).normal;
+        let samples = nodes.into_iter().map(|node| LightSample {
+            at: node.point.to_homogeneous(),
+            width: node.area.sqrt(),
+            kind: SampleKind::Face {
+                normal,
+                area: node.area,
+            },
+        });
+        Self {
+            radiance: light::radiance(light),
+            samples: samples.collect(),
+        }
     }
-}
 
-fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> LightGroup {
-    let world_from_hemisphere = hemisphere(normal);
-    let share = PI / count as f64;
-    let source = |d: Vector3<f64>| LightSample {
-        at: (world_from_hemisphere * d).to_homogeneous(),
-        width: (share / d.z).sqrt(),
-        kind: SampleKind::Sky { share },
-    };
-    LightGroup {
-        radiance,
-        sources: light::ambient_directions(count)
+    /// A constant environment, from directions around a normal.
+    fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Self {
+        let world_from_hemisphere = hemisphere_frame(normal);
+        let share = PI / count as f64;
+        let samples = light::ambient_directions(count)
             .into_iter()
-            .map(source)
-            .collect(),
+            .map(|d| LightSample {
+                at: (world_from_hemisphere * d).to_homogeneous(),
+                width: (share / d.z).sqrt(),
+                kind: SampleKind::Sky { share },
+            });
+        Self {
+            radiance,
+            samples: samples.collect(),
+        }
     }
-}
 
-/// The pieces of a map that a receiver sees: a lamp each, since each has a colour of its own.
-fn pieces(pieces: Vec<light::SkyPiece>) -> impl Iterator<Item = LightGroup> {
-    let lamp = |piece: light::SkyPiece| LightGroup {
-        radiance: piece.irradiance,
-        sources: vec![LightSample {
-            at: piece.direction.to_homogeneous(),
-            width: piece.width,
-            kind: SampleKind::Sky { share: 1.0 },
-        }],
-    };
-    pieces.into_iter().map(lamp)
+    /// A piece of a map: a group by itself, since each has a colour of its own.
+    fn sky_piece(piece: light::SkyPiece) -> Self {
+        Self {
+            radiance: piece.irradiance,
+            samples: vec![LightSample {
+                at: piece.direction.to_homogeneous(),
+                width: piece.width,
+                kind: SampleKind::Sky { share: 1.0 },
+            }],
+        }
+    }
+
+    fn is_lit(&self) -> bool {
+        self.radiance != LinearRgb::BLACK
+    }
+
+    fn sky_share(&self) -> f32 {
+        self.samples.iter().map(LightSample::sky_share).sum::<f64>() as f32
+    }
 }
 
 /// Axes of a frame whose `z` is `normal`.
-fn hemisphere(normal: &Vector3<f64>) -> Matrix3<f64> {
+fn hemisphere_frame(normal: &Vector3<f64>) -> Matrix3<f64> {
     let helper = if normal.x.abs() < 0.6 {
         Vector3::x()
     } else {
@@ -179,7 +182,7 @@ fn hemisphere(normal: &Vector3<f64>) -> Matrix3<f64> {
 
 impl LightSample {
     /// Cosine times solid angle of a piece of the sky.
-    fn share(&self) -> f64 {
+    fn sky_share(&self) -> f64 {
         if let SampleKind::Sky { share } = self.kind {
             share
         } else {

@@ -10,23 +10,31 @@
 //! to unshadowed irradiance of the surface `z = 0`; a pixel is the average under a Blackman-Harris window three pixels
 //! wide.
 
+mod block;
 mod check;
 mod cryptomatte;
 mod deep;
 mod float4;
+mod grade;
 mod half_plane;
 mod interreflection;
 mod irradiance;
 mod lattice;
 mod layers;
 mod light_samples;
+mod occluders;
+mod opacity;
 mod options;
 mod pixel_filter;
+mod ranges;
 mod receiver;
 mod reference;
+mod resample;
 mod shadow;
+mod shadow_ray;
 #[cfg(test)]
 mod tests;
+mod texel_grid;
 mod texture;
 mod transmittance;
 mod view;
