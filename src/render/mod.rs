@@ -41,7 +41,7 @@ mod view;
 
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
-pub(crate) use cryptomatte::{id_of, murmur3};
+pub(crate) use cryptomatte::{attribute_name, hex_id, id_of_name};
 pub use deep::{render, render_coverage};
 pub use interreflection::interreflect;
 pub use options::RenderOptions;
