@@ -2,7 +2,7 @@
 
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
-use crate::light::{irradiance, match_cast, match_noise, surface_color};
+use crate::light::{irradiance, match_light_tint, match_noise, surface_color};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
 use std::f64::consts::PI;
@@ -16,7 +16,7 @@ const WHITE_PERCENTILE: f64 = 0.99;
 ///
 /// A scene that leaves nothing comes back as it is.
 pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    match_noise(expose(match_cast(scene, plate), plate), plate)
+    match_noise(expose(match_light_tint(scene, plate), plate), plate)
 }
 
 /// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene whose exposure is known comes back as it is.

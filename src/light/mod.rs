@@ -22,4 +22,4 @@ pub use noise::{match_noise, plate_noise};
 pub use polygon::polygon_irradiance;
 pub(crate) use sky::sky_cells;
 pub use sky::{SkyPiece, sky_pieces};
-pub use surface::{match_cast, surface_color};
+pub use surface::{match_light_tint, surface_color};

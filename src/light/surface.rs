@@ -3,7 +3,7 @@
 use crate::geom::{Plane, Point2};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
-use crate::scene::{CameraSource, Cast, Scene};
+use crate::scene::{CameraSource, LightTint, Scene};
 
 /// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
 /// camera is not known yet, or does not see it.
@@ -38,12 +38,12 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
     ))
 }
 
-/// Turns [`Cast::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
+/// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
 ///
 /// The surface is taken to be grey: its colour is then that of the light on it. A share below 1 believes half, say, of
 /// that, since trays and tables may have a colour of their own. Luminance stays.
-pub fn match_cast(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let Cast::MatchSurface { share } = scene.cast else {
+pub fn match_light_tint(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    let LightTint::MatchSurface { share } = scene.cast else {
         return scene;
     };
     let color = surface_color(&scene, plate).unwrap_or(LinearRgb::WHITE);
@@ -58,7 +58,7 @@ pub fn match_cast(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     };
     let tint = color.map(channel);
     Scene {
-        cast: Cast::Known(tint.scale(1.0 / tint.luminance())),
+        cast: LightTint::Known(tint.scale(1.0 / tint.luminance())),
         ..scene
     }
 }
@@ -71,7 +71,7 @@ pub(super) mod tests {
     use crate::scene::{Exposure, Surface};
 
     /// A camera one metre above a surface that fills the middle half of its picture.
-    pub(in crate::light) fn scene(cast: Cast) -> Scene {
+    pub(in crate::light) fn scene(cast: LightTint) -> Scene {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let camera = Camera {
             image: [40, 30],
@@ -106,30 +106,31 @@ pub(super) mod tests {
     #[test]
     fn the_surface_is_told_from_the_table_and_from_highlights() {
         assert_eq!(
-            surface_color(&scene(Cast::default()), &plate()),
+            surface_color(&scene(LightTint::default()), &plate()),
             Some(LinearRgb::new(0.4, 0.2, 0.1))
         );
     }
 
     #[test]
     fn the_cast_is_the_surface_s_colour_at_luminance_one() {
-        let Cast::Known(tint) = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &plate()).cast
+        let LightTint::Known(tint) =
+            match_light_tint(scene(LightTint::MatchSurface { share: 1.0 }), &plate()).cast
         else {
             panic!("still unknown")
         };
         assert!((tint.luminance() - 1.0).abs() < 1e-6 && (tint.r / tint.g - 2.0).abs() < 1e-5);
-        let none = match_cast(scene(Cast::MatchSurface { share: 0.0 }), &plate()).cast;
-        assert_eq!(none, Cast::Known(LinearRgb::WHITE));
-        let known = scene(Cast::Known(LinearRgb::new(2.0, 1.0, 0.5)));
-        assert_eq!(match_cast(known.clone(), &plate()), known);
+        let none = match_light_tint(scene(LightTint::MatchSurface { share: 0.0 }), &plate()).cast;
+        assert_eq!(none, LightTint::Known(LinearRgb::WHITE));
+        let known = scene(LightTint::Known(LinearRgb::new(2.0, 1.0, 0.5)));
+        assert_eq!(match_light_tint(known.clone(), &plate()), known);
     }
 
     #[test]
     fn a_black_plate_has_no_cast() {
-        let black = match_cast(
-            scene(Cast::MatchSurface { share: 1.0 }),
+        let black = match_light_tint(
+            scene(LightTint::MatchSurface { share: 1.0 }),
             &Image::filled(40, 30, LinearRgb::BLACK),
         );
-        assert_eq!(black.cast, Cast::Known(LinearRgb::WHITE));
+        assert_eq!(black.cast, LightTint::Known(LinearRgb::WHITE));
     }
 }
