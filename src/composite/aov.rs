@@ -7,7 +7,7 @@ use crate::deep::{DeepImage, DeepSample};
 use crate::error::Error;
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
-use crate::io::exr_parts::{Part, Plane};
+use crate::io::exr::{ChannelSamples, Part};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::scene::{Card, Shot};
 use std::str::FromStr;
@@ -135,7 +135,7 @@ pub(super) fn floats<const N: usize>(
     let channels = names
         .iter()
         .zip(planes)
-        .map(|(name, plane)| (name.to_string(), Plane::Float(plane)))
+        .map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)))
         .collect();
     Part {
         name: name.into(),
@@ -155,8 +155,8 @@ impl Fronts<'_> {
         pixels(self.deep).map(|(x, y)| ((x, y), front(self.deep.at(x, y))))
     }
 
-    fn ids(&self) -> Plane {
-        Plane::Whole(
+    fn ids(&self) -> ChannelSamples {
+        ChannelSamples::Integer(
             self.samples()
                 .map(|(_, s)| s.map_or(0, |s| s.object.0))
                 .collect(),
@@ -272,8 +272,8 @@ mod tests {
 
     fn plane<'a>(part: &'a Part, name: &str) -> &'a [f32] {
         match &part.channels.iter().find(|(n, _)| n == name).unwrap().1 {
-            Plane::Float(samples) => samples,
-            Plane::Whole(_) => panic!("whole numbers"),
+            ChannelSamples::Float(samples) => samples,
+            ChannelSamples::Integer(_) => panic!("integers"),
         }
     }
 
@@ -306,7 +306,7 @@ mod tests {
         let (_, parts) = made(&["id", "depth", "position", "uv", "coverage"]);
         let middle = 12 * 32 + 16;
         assert!(
-            matches!(&parts[0].channels[0].1, Plane::Whole(ids) if ids[middle] == 7 && ids[0] == 0)
+            matches!(&parts[0].channels[0].1, ChannelSamples::Integer(ids) if ids[middle] == 7 && ids[0] == 0)
         );
         assert!(
             (plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5

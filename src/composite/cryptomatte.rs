@@ -2,7 +2,7 @@
 
 use super::aov::{floats, pixels};
 use crate::deep::DeepImage;
-use crate::io::exr_parts::Part;
+use crate::io::exr::Part;
 use crate::pixel::ObjectId;
 use crate::render::{id_of, murmur3};
 use std::collections::BTreeMap;
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use crate::deep::DeepSample;
     use crate::image::Image;
-    use crate::io::exr_parts::Plane;
+    use crate::io::exr::ChannelSamples;
     use crate::pixel::{Depth, LinearRgb};
 
     /// Published test vectors of MurmurHash3_x86_32 with seed 0.
@@ -139,8 +139,8 @@ mod tests {
         let deep = DeepImage::from_pixels(Image::filled(2, 1, LinearRgb::WHITE), lists);
         let part = cryptomatte(&deep, |id| format!("bottle {}", id.0));
         let at = |c: usize| match &part.channels[c].1 {
-            Plane::Float(v) => (v[0], v[1]),
-            Plane::Whole(_) => panic!("whole numbers"),
+            ChannelSamples::Float(v) => (v[0], v[1]),
+            ChannelSamples::Integer(_) => panic!("integers"),
         };
         assert_eq!(at(0), (f32::from_bits(identifier("bottle 2")), 0.0));
         assert_eq!(

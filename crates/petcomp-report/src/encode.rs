@@ -8,7 +8,7 @@ use super::pile::pile;
 use super::{Diagram, Point};
 use petcomp::Image;
 use petcomp::Quality;
-use petcomp::io::{self, Bits, Compression, PngEffort, WriteOptions};
+use petcomp::io::{self, Bits, Compression, WriteOptions};
 use petcomp::plot::three;
 use petcomp::render::cast;
 use petcomp::{Error, Result};
@@ -134,7 +134,7 @@ fn ways() -> Vec<Way> {
         extension: "png",
         options: WriteOptions {
             bits: Some(bits),
-            png: effort,
+            png_effort: effort,
             ..WriteOptions::default()
         },
     };
@@ -148,11 +148,10 @@ fn ways() -> Vec<Way> {
         },
     });
     let mut all = vec![
-        png(PNG, "least", Bits::Eight, PngEffort::Least),
-        png(PNG, "fast", Bits::Eight, PngEffort::Fast),
-        png(PNG, "usual", Bits::Eight, PngEffort::Usual),
-        png(PNG, "most", Bits::Eight, PngEffort::Most),
-        png("PNG, 16 bits", "fast", Bits::Sixteen, PngEffort::Fast),
+        png(PNG, "draft", Bits::Eight, Quality::Draft),
+        png(PNG, "normal", Bits::Eight, Quality::Normal),
+        png(PNG, "reference", Bits::Eight, Quality::Reference),
+        png("PNG, 16 bits", "normal", Bits::Sixteen, Quality::Normal),
         exr(HALF, "uncompressed", Bits::Half, Compression::None),
         exr(HALF, "PIZ", Bits::Half, Compression::Piz),
         exr(HALF, "ZIP", Bits::Half, Compression::Zip),
