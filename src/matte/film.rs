@@ -1,12 +1,14 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
+mod object;
 mod planes;
 mod solve;
 pub(super) mod tint;
 mod uncertainty;
 mod view;
 
+pub(super) use object::OPAQUE;
 pub use planes::film_planes;
 pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
@@ -22,21 +24,22 @@ use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
+use tint::{DARKEST_SHARE, Tint, TintSamples};
 
 /// How film is solved for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmOptions {
-    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath it; nothing = from the
-    /// photo. Default: nothing.
+    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath it; none = from the
+    /// photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<LinearRgb>,
-    /// Scene-linear value from which on a channel counts as clipped. Default: 0.98.
+    /// Scene-linear value from which on a channel is clipped. Default: 0.98.
     pub clipped: f32,
-    /// How far the thickness of plastic scatters around that of two walls, as a share: what counts where the photo does
-    /// not tell. Default: 0.35.
+    /// How far the thickness of plastic scatters around that of two walls, as a share: the prior where the photo
+    /// shows too little. Default: 0.35.
     pub thickness_spread: f32,
-    /// How well the reflected light of the screen's channel is told from the others, as a share. Default: 0.15.
+    /// How well the reflected light of the screen's channel is inferred from the others, as a share. Default: 0.15.
     pub reflection_error: f32,
 }
 
@@ -51,7 +54,7 @@ impl Default for FilmOptions {
     }
 }
 
-/// What one photo tells of a film. `F + V * background` composites it over a background with light of its own,
+/// The film that one photo shows. `F + V * background` composites it over a background with light of its own,
 /// `F + T * background` over one that the object itself shades.
 #[derive(Clone, Debug)]
 pub struct FilmMatte {
@@ -64,7 +67,7 @@ pub struct FilmMatte {
     pub uncertainty: Image<f32>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
-    /// What makes its colours wrong.
+    /// What may make its colours wrong.
     pub color_uncertainty: ColorUncertainty,
     /// What a person should know.
     pub diagnostics: Vec<Diagnostic>,
@@ -81,7 +84,7 @@ impl FilmMatte {
 /// Solves `photo = F + T * plate` for the reflected light F and the transmittance T of one object.
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
-/// garbage matte). A screen with little colour tells little of T: then what may be plastic by its light is guessed to be
+/// garbage matte). A screen with little colour shows little of T: then what may be plastic by its light is guessed to be
 /// that, and a [`Diagnostic`] says so.
 ///
 /// # Method
@@ -109,20 +112,14 @@ pub fn film(
     inside: &Image<Coverage>,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
-    let longer_side = photo.width().max(photo.height());
-    film_of_part(
-        photo,
-        plate,
-        inside,
-        PartOf {
-            screen: plate.color(),
-            longer_side,
-        },
-        opts,
-    )
+    let whole = PartOf {
+        screen: plate.color(),
+        longer_side: photo.width().max(photo.height()),
+    };
+    film_of_part(photo, plate, inside, whole, opts)
 }
 
-/// What a part of a photo does not tell of all of it.
+/// What a part of a photo does not show of all of it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PartOf {
     /// Mean colour of the screen.
@@ -137,14 +134,48 @@ pub(super) fn film_of_part(
     photo: &Image<LinearRgb>,
     plate: &ScreenPlate,
     inside: &Image<Coverage>,
-    PartOf {
-        screen,
-        longer_side,
-    }: PartOf,
+    part: PartOf,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
     opts.check()?;
+    check_input(photo, plate, inside)?;
     let mut watch = Stopwatch::start();
+    let input = FilmInput {
+        photo,
+        calm: calmed(photo, plate.residual),
+        plate,
+        inside,
+        key: strongest_channel(part.screen),
+        is_keyable: is_keyable(part.screen),
+        longer_side: part.longer_side,
+        opts,
+    };
+    let tint = input.tint();
+    watch.lap("tint");
+    let mut factors = input.factors(tint.flat);
+    watch.lap("factors");
+    let color_uncertainty = input.refine(&mut factors, tint, &mut watch);
+    let grey = (!input.is_keyable).then(|| grey_screen(part.screen));
+    let diagnostics = grey.into_iter().chain(color_uncertainty.diagnostics());
+    let matte = FilmMatte {
+        color_uncertainty,
+        diagnostics: diagnostics.collect(),
+        ..input.composed(&factors, tint.flat.into())
+    };
+    watch.lap("compose");
+    watch.log("film");
+    Ok(matte)
+}
+
+/// # Errors
+/// [`Error::Photo`] where the mask is empty or a pixel is not a finite number.
+/// # Panics
+/// When the sizes differ.
+fn check_input(
+    photo: &Image<LinearRgb>,
+    plate: &ScreenPlate,
+    inside: &Image<Coverage>,
+) -> Result<()> {
     assert_eq!(
         photo.size(),
         plate.image.size(),
@@ -162,56 +193,114 @@ pub(super) fn film_of_part(
             what: format!("pixel ({x}, {y}) is not a finite number"),
         });
     }
-    let key = strongest_channel(screen);
-    let calm = calmed(photo, plate.residual);
-    let grey = (!is_keyable(screen)).then(|| grey_screen(screen));
-    let (flat, tint) = match (opts.flat, &grey) {
-        (Some(flat), _) => (flat.into(), 0.0),
-        // That the tint may be another is part of the guess.
-        (None, Some(_)) => (tint::fit(&calm, plate, inside, key, 1.0).0, 0.0),
-        (None, None) => tint::fit(&calm, plate, inside, key, tint::DARKEST),
-    };
-    watch.lap("tint");
-    let solver = Solver::new(key, flat, plate.residual, opts);
-    let factor = if grey.is_some() {
-        Solver::guess
-    } else {
-        Solver::solve
-    };
-    let mut factors = calm.zip3_map(&plate.image, inside, |pixel, screen, inside| {
-        if inside.0 > 0.0 {
-            factor(&solver, pixel.into(), screen.into())
-        } else {
-            Factor::default()
+    Ok(())
+}
+
+/// What film is solved from; pictures of one size.
+struct FilmInput<'a> {
+    photo: &'a Image<LinearRgb>,
+    /// The photo that the transmittance is measured in.
+    calm: Cow<'a, Image<LinearRgb>>,
+    plate: &'a ScreenPlate,
+    inside: &'a Image<Coverage>,
+    /// The screen's strongest channel.
+    key: usize,
+    is_keyable: bool,
+    /// Of the whole photo, pixels.
+    longer_side: usize,
+    opts: &'a FilmOptions,
+}
+
+impl FilmInput<'_> {
+    /// The tint that is given, or else that of the photo. On a grey screen all of the object is looked at, and that the
+    /// tint may be another is part of the guess.
+    fn tint(&self) -> Tint {
+        if let Some(flat) = self.opts.flat {
+            return Tint {
+                flat: flat.into(),
+                uncertainty: 0.0,
+            };
         }
-    });
-    watch.lap("factors");
-    let most = flat.into_iter().fold(0.0, f32::max);
-    let guessed = uncertainty::guessed(&factors, inside, opts.thickness_spread, most);
-    let screen_hue = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
-    let keyed_away = uncertainty::keyed_away(&factors, inside, flat[key], longer_side);
-    watch.lap("paint");
-    let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
-    watch.lap("glints");
-    let color_uncertainty = ColorUncertainty {
-        keyed_away,
-        screen_hue,
-        clipped,
-        guessed,
-        tint,
-    };
-    let diagnostics = grey
-        .into_iter()
-        .chain(color_uncertainty.diagnostics())
-        .collect();
-    let matte = FilmMatte {
-        color_uncertainty,
-        diagnostics,
-        ..composed(photo, plate, inside, &factors, flat.into())
-    };
-    watch.lap("compose");
-    watch.log("film");
-    Ok(matte)
+        let share = if self.is_keyable { DARKEST_SHARE } else { 1.0 };
+        let samples = TintSamples::new(&self.calm, self.plate, self.inside, self.key, share);
+        let tint = samples.fit();
+        match self.is_keyable {
+            true => tint,
+            false => Tint {
+                uncertainty: 0.0,
+                ..tint
+            },
+        }
+    }
+
+    /// By which factor each pixel is flat plastic.
+    fn factors(&self, flat: [f32; 3]) -> Image<Factor> {
+        let solver = Solver::new(self.key, flat, self.plate.residual, self.opts);
+        let factor = if self.is_keyable {
+            Solver::solve
+        } else {
+            Solver::guess
+        };
+        self.calm
+            .zip3_map(&self.plate.image, self.inside, |pixel, screen, inside| {
+                if inside.0 > 0.0 {
+                    factor(&solver, pixel.into(), screen.into())
+                } else {
+                    Factor::default()
+                }
+            })
+    }
+
+    /// Makes paint opaque, fills what glints hide, and says how certain the colours are.
+    fn refine(
+        &self,
+        factors: &mut Image<Factor>,
+        Tint { flat, uncertainty }: Tint,
+        watch: &mut Stopwatch,
+    ) -> ColorUncertainty {
+        let (inside, longer_side) = (self.inside, self.longer_side);
+        let most = flat.into_iter().fold(0.0, f32::max);
+        let guessed = uncertainty::guessed(factors, inside, self.opts.thickness_spread, most);
+        let screen_hue =
+            bright::make_opaque(factors, &self.calm, &self.plate.image, inside, longer_side);
+        let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
+        watch.lap("paint");
+        let clipped = bright::fill_glints(factors, self.photo, inside, self.opts.clipped);
+        watch.lap("glints");
+        ColorUncertainty {
+            keyed_away,
+            screen_hue,
+            clipped,
+            guessed,
+            tint: uncertainty,
+        }
+    }
+
+    /// F, T and V from the factors by which the pixels are flat plastic.
+    fn composed(&self, factors: &Image<Factor>, flat: LinearRgb) -> FilmMatte {
+        let inside = self.inside;
+        let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
+        let transmittance = plastic.zip_map(inside, covered);
+        let reflected = self
+            .photo
+            .zip3_map(&self.plate.image, &transmittance, |p, k, t| {
+                without(p, t * k)
+            });
+        let seen = view(&plastic, flat, inside);
+        let film = reflected.zip3_map(&seen, inside, |f, v, c| {
+            Film::new(f.scale(c.0), covered(v, c))
+        });
+        let most = flat.r.max(flat.g).max(flat.b);
+        let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
+        FilmMatte {
+            film,
+            transmittance,
+            uncertainty,
+            flat,
+            color_uncertainty: ColorUncertainty::default(),
+            diagnostics: Vec::new(),
+        }
+    }
 }
 
 impl FilmOptions {
@@ -238,45 +327,18 @@ impl FilmOptions {
     }
 }
 
-/// Noise from which on the transmittance is told from a blurred photo: a twentieth of what a screen at 0.4 shows through
+/// Noise from which on the transmittance is measured in a blurred photo: a twentieth of what a screen at 0.4 shows through
 /// two clear walls.
-const NOISY: f32 = 0.01;
+const MAX_SHARP_NOISE: f32 = 0.01;
 /// Blur of a noisy photo, standard deviation in pixels: leaves a quarter of the noise, and folds.
-const CALM_PX: f32 = 1.0;
+const NOISE_BLUR_PX: f32 = 1.0;
 
-/// The photo that the transmittance is told from.
+/// The photo that the transmittance is measured in.
 fn calmed(photo: &Image<LinearRgb>, noise: LinearRgb) -> Cow<'_, Image<LinearRgb>> {
-    if noise.r.max(noise.g).max(noise.b) < NOISY {
+    if noise.r.max(noise.g).max(noise.b) < MAX_SHARP_NOISE {
         return Cow::Borrowed(photo);
     }
-    Cow::Owned(filter::gaussian_blur(photo, CALM_PX))
-}
-
-/// F, T and V from the factors by which the pixels are flat plastic.
-fn composed(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    factors: &Image<Factor>,
-    flat: LinearRgb,
-) -> FilmMatte {
-    let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
-    let transmittance = plastic.zip_map(inside, covered);
-    let reflected = photo.zip3_map(&plate.image, &transmittance, |p, k, t| without(p, t * k));
-    let seen = view(&plastic, flat, inside);
-    let film = reflected.zip3_map(&seen, inside, |f, v, c| {
-        Film::new(f.scale(c.0), covered(v, c))
-    });
-    let most = flat.r.max(flat.g).max(flat.b);
-    let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
-    FilmMatte {
-        film,
-        transmittance,
-        uncertainty,
-        flat,
-        color_uncertainty: ColorUncertainty::default(),
-        diagnostics: Vec::new(),
-    }
+    Cow::Owned(filter::gaussian_blur(photo, NOISE_BLUR_PX))
 }
 
 /// A transmittance that holds for the covered share of a pixel only.
