@@ -14,6 +14,7 @@ pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
+use super::prepared::{check_finite, longer_side, refused};
 use super::screen::{is_keyable, strongest_channel};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -112,106 +113,94 @@ pub fn film(
     inside: &Image<Coverage>,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
-    let whole = PartOf {
+    opts.check()?;
+    check_finite(photo)?;
+    let object = FilmInput {
+        photo,
+        plate,
+        inside,
         screen: plate.color(),
-        longer_side: photo.width().max(photo.height()),
+        longer_side: longer_side(photo),
     };
-    film_of_part(photo, plate, inside, whole, opts)
+    solve_film(object, opts)
 }
 
-/// What a part of a photo does not show of all of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PartOf {
-    /// Mean colour of the screen.
+/// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
+/// one size.
+#[derive(Clone, Copy)]
+pub(super) struct FilmInput<'a> {
+    /// Finite.
+    pub(super) photo: &'a Image<LinearRgb>,
+    pub(super) plate: &'a ScreenPlate,
+    /// Coverage of the object.
+    pub(super) inside: &'a Image<Coverage>,
+    /// Mean colour of the whole screen.
     pub(super) screen: LinearRgb,
-    /// Longer side of the photo, pixels.
+    /// Longer side of the whole photo, pixels.
     pub(super) longer_side: usize,
 }
 
-/// As [`film`], of the part of a photo around the object: there is nothing to solve elsewhere. All pictures are of the
-/// part's size.
-pub(super) fn film_of_part(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    part: PartOf,
-    opts: &FilmOptions,
-) -> Result<FilmMatte> {
-    opts.check()?;
-    check_input(photo, plate, inside)?;
+/// As [`film`], with options that are checked.
+pub(super) fn solve_film(object: FilmInput<'_>, opts: &FilmOptions) -> Result<FilmMatte> {
+    object.check()?;
     let mut watch = Stopwatch::start();
-    let input = FilmInput {
-        photo,
-        calm: calmed(photo, plate.residual),
-        plate,
-        inside,
-        key: strongest_channel(part.screen),
-        is_keyable: is_keyable(part.screen),
-        longer_side: part.longer_side,
+    let solution = FilmSolution {
+        object,
+        calm: calmed(object.photo, object.plate.residual),
+        key: strongest_channel(object.screen),
+        is_keyable: is_keyable(object.screen),
         opts,
     };
-    let tint = input.tint();
+    let tint = solution.tint();
     watch.lap("tint");
-    let mut factors = input.factors(tint.flat);
+    let mut factors = solution.factors(tint.flat);
     watch.lap("factors");
-    let color_uncertainty = input.refine(&mut factors, tint, &mut watch);
-    let grey = (!input.is_keyable).then(|| grey_screen(part.screen));
+    let color_uncertainty = solution.refine(&mut factors, tint, &mut watch);
+    let grey = (!solution.is_keyable).then(|| grey_screen(object.screen));
     let diagnostics = grey.into_iter().chain(color_uncertainty.diagnostics());
     let matte = FilmMatte {
         color_uncertainty,
         diagnostics: diagnostics.collect(),
-        ..input.composed(&factors, tint.flat.into())
+        ..solution.composed(&factors, tint.flat.into())
     };
     watch.lap("compose");
     watch.log("film");
     Ok(matte)
 }
 
-/// # Errors
-/// [`Error::Photo`] where the mask is empty or a pixel is not a finite number.
-/// # Panics
-/// When the sizes differ.
-fn check_input(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-) -> Result<()> {
-    assert_eq!(
-        photo.size(),
-        plate.image.size(),
-        "photo and plate differ in size"
-    );
-    assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
-    if !inside.pixels().iter().any(|c| c.0 > 0.0) {
-        return Err(Error::Photo {
-            what: "the mask of the object is empty".into(),
-        });
+impl FilmInput<'_> {
+    /// # Errors
+    /// [`Error::Photo`] where the mask is empty.
+    /// # Panics
+    /// When the sizes differ.
+    fn check(&self) -> Result<()> {
+        let size = self.photo.size();
+        assert_eq!(
+            size,
+            self.plate.image.size(),
+            "photo and plate differ in size"
+        );
+        assert_eq!(size, self.inside.size(), "photo and mask differ in size");
+        if self.inside.pixels().iter().any(|c| c.0 > 0.0) {
+            Ok(())
+        } else {
+            Err(refused("the mask of the object is empty"))
+        }
     }
-    if let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) {
-        let (x, y) = (i % photo.width(), i / photo.width());
-        return Err(Error::Photo {
-            what: format!("pixel ({x}, {y}) is not a finite number"),
-        });
-    }
-    Ok(())
 }
 
-/// What film is solved from; pictures of one size.
-struct FilmInput<'a> {
-    photo: &'a Image<LinearRgb>,
+/// A film while it is solved.
+struct FilmSolution<'a> {
+    object: FilmInput<'a>,
     /// The photo that the transmittance is measured in.
     calm: Cow<'a, Image<LinearRgb>>,
-    plate: &'a ScreenPlate,
-    inside: &'a Image<Coverage>,
     /// The screen's strongest channel.
     key: usize,
     is_keyable: bool,
-    /// Of the whole photo, pixels.
-    longer_side: usize,
     opts: &'a FilmOptions,
 }
 
-impl FilmInput<'_> {
+impl FilmSolution<'_> {
     /// The tint that is given, or else that of the photo. On a grey screen all of the object is looked at, and that the
     /// tint may be another is part of the guess.
     fn tint(&self) -> Tint {
@@ -222,7 +211,13 @@ impl FilmInput<'_> {
             };
         }
         let share = if self.is_keyable { DARKEST_SHARE } else { 1.0 };
-        let samples = TintSamples::new(&self.calm, self.plate, self.inside, self.key, share);
+        let samples = TintSamples::new(
+            &self.calm,
+            self.object.plate,
+            self.object.inside,
+            self.key,
+            share,
+        );
         let tint = samples.fit();
         match self.is_keyable {
             true => tint,
@@ -235,20 +230,23 @@ impl FilmInput<'_> {
 
     /// By which factor each pixel is flat plastic.
     fn factors(&self, flat: [f32; 3]) -> Image<Factor> {
-        let solver = Solver::new(self.key, flat, self.plate.residual, self.opts);
+        let solver = Solver::new(self.key, flat, self.object.plate.residual, self.opts);
         let factor = if self.is_keyable {
             Solver::solve
         } else {
             Solver::guess
         };
-        self.calm
-            .zip3_map(&self.plate.image, self.inside, |pixel, screen, inside| {
+        self.calm.zip3_map(
+            &self.object.plate.image,
+            self.object.inside,
+            |pixel, screen, inside| {
                 if inside.0 > 0.0 {
                     factor(&solver, pixel.into(), screen.into())
                 } else {
                     Factor::default()
                 }
-            })
+            },
+        )
     }
 
     /// Makes paint opaque, fills what glints hide, and says how certain the colours are.
@@ -258,14 +256,19 @@ impl FilmInput<'_> {
         Tint { flat, uncertainty }: Tint,
         watch: &mut Stopwatch,
     ) -> ColorUncertainty {
-        let (inside, longer_side) = (self.inside, self.longer_side);
+        let (inside, longer_side) = (self.object.inside, self.object.longer_side);
         let most = flat.into_iter().fold(0.0, f32::max);
         let guessed = uncertainty::guessed(factors, inside, self.opts.thickness_spread, most);
-        let screen_hue =
-            bright::make_opaque(factors, &self.calm, &self.plate.image, inside, longer_side);
+        let screen_hue = bright::make_opaque(
+            factors,
+            &self.calm,
+            &self.object.plate.image,
+            inside,
+            longer_side,
+        );
         let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
         watch.lap("paint");
-        let clipped = bright::fill_glints(factors, self.photo, inside, self.opts.clipped);
+        let clipped = bright::fill_glints(factors, self.object.photo, inside, self.opts.clipped);
         watch.lap("glints");
         ColorUncertainty {
             keyed_away,
@@ -278,14 +281,15 @@ impl FilmInput<'_> {
 
     /// F, T and V from the factors by which the pixels are flat plastic.
     fn composed(&self, factors: &Image<Factor>, flat: LinearRgb) -> FilmMatte {
-        let inside = self.inside;
+        let inside = self.object.inside;
         let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
         let transmittance = plastic.zip_map(inside, covered);
-        let reflected = self
-            .photo
-            .zip3_map(&self.plate.image, &transmittance, |p, k, t| {
-                without(p, t * k)
-            });
+        let reflected =
+            self.object
+                .photo
+                .zip3_map(&self.object.plate.image, &transmittance, |p, k, t| {
+                    without(p, t * k)
+                });
         let seen = view(&plastic, flat, inside);
         let film = reflected.zip3_map(&seen, inside, |f, v, c| {
             Film::new(f.scale(c.0), covered(v, c))

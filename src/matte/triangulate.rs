@@ -5,6 +5,7 @@ mod lines;
 
 use super::film::{covered, view};
 use super::plate::ScreenPlate;
+use super::prepared::refused;
 use super::register;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -358,10 +359,6 @@ fn square_distance(a: LinearRgb, b: LinearRgb) -> f64 {
 
 fn strongest_noise(noise: LinearRgb) -> f32 {
     noise.r.max(noise.g).max(noise.b)
-}
-
-fn refused(what: impl Into<String>) -> Error {
-    Error::Photo { what: what.into() }
 }
 
 /// `photo` counts from 1.
