@@ -1,8 +1,8 @@
 //! Random views of a rectangle with a known camera: what tests, benches and reports measure the solver against.
 
 use super::label::Label;
-pub(crate) use super::pinhole::distorted;
-use super::problem::corner_points;
+use super::pinhole::distorted;
+use super::rectangle::corner_points;
 use crate::camera::Camera;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use nalgebra::{Matrix3, Rotation3};

@@ -8,7 +8,7 @@ use crate::deep::{DeepImage, DeepSample};
 use crate::error::{Error, Result};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
-use crate::io::exr_parts::{Part, Plane};
+use crate::io::exr::{ChannelSamples, Part};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
 use crate::scene::Shot;
 use std::str::FromStr;
@@ -126,7 +126,7 @@ impl AovSource<'_> {
         let ids = self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0));
         Part {
             name: "id".into(),
-            channels: vec![("id".into(), Plane::Whole(ids.collect()))],
+            channels: vec![("id".into(), ChannelSamples::Integer(ids.collect()))],
             metadata: Vec::new(),
         }
     }
@@ -259,8 +259,8 @@ mod tests {
 
     fn plane<'a>(part: &'a Part, name: &str) -> &'a [f32] {
         match &part.channels.iter().find(|(n, _)| n == name).unwrap().1 {
-            Plane::Float(samples) => samples,
-            Plane::Whole(_) => panic!("whole numbers"),
+            ChannelSamples::Float(samples) => samples,
+            ChannelSamples::Integer(_) => panic!("integers"),
         }
     }
 
@@ -293,7 +293,7 @@ mod tests {
         let (_, parts) = made(&["id", "depth", "position", "uv", "coverage"]);
         let middle = 12 * 32 + 16;
         assert!(
-            matches!(&parts[0].channels[0].1, Plane::Whole(ids) if ids[middle] == 7 && ids[0] == 0)
+            matches!(&parts[0].channels[0].1, ChannelSamples::Integer(ids) if ids[middle] == 7 && ids[0] == 0)
         );
         assert!(
             (plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5

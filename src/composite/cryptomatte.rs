@@ -2,7 +2,7 @@
 
 use crate::composite::part::{float_part, pixels_of};
 use crate::deep::{DeepImage, DeepSample};
-use crate::io::exr_parts::Part;
+use crate::io::exr::Part;
 use crate::pixel::ObjectId;
 use crate::render::{attribute_name, hex_id, id_of_name};
 use std::collections::BTreeMap;
@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::deep::DeepSample;
     use crate::image::Image;
-    use crate::io::exr_parts::Plane;
+    use crate::io::exr::ChannelSamples;
     use crate::pixel::{Depth, LinearRgb};
 
     #[test]
@@ -112,8 +112,8 @@ mod tests {
         let deep = DeepImage::from_pixels(Image::filled(2, 1, LinearRgb::WHITE), lists);
         let part = cryptomatte(&deep, |id| format!("bottle {}", id.0));
         let at = |c: usize| match &part.channels[c].1 {
-            Plane::Float(v) => (v[0], v[1]),
-            Plane::Whole(_) => panic!("whole numbers"),
+            ChannelSamples::Float(v) => (v[0], v[1]),
+            ChannelSamples::Integer(_) => panic!("integers"),
         };
         assert_eq!(at(0), (id_of_name("bottle 2"), 0.0));
         assert_eq!(

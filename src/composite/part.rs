@@ -1,7 +1,7 @@
 //! Parts of a picture as channels of floats.
 
 use crate::deep::DeepImage;
-use crate::io::exr_parts::{Part, Plane};
+use crate::io::exr::{ChannelSamples, Part};
 
 /// Every pixel's column and row, in reading order.
 pub(super) fn pixels_of(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> + use<> {
@@ -24,7 +24,7 @@ pub(super) fn float_part<const N: usize>(
     let channels = names
         .iter()
         .zip(planes)
-        .map(|(name, plane)| (name.to_string(), Plane::Float(plane)))
+        .map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)))
         .collect();
     Part {
         name: name.into(),

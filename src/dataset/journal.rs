@@ -21,7 +21,7 @@ use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Name of the journal in a dataset's folder.
-pub(crate) const JOURNAL: &str = "index.jsonl";
+pub const JOURNAL: &str = "index.jsonl";
 
 /// What the journal says of one finished sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,7 +125,7 @@ impl Line {
 impl Finished {
     /// Reads the file back: what counts is what is on the disk.
     pub(crate) fn of(folder: &Path, path: &Path) -> Result<Self> {
-        let Checksum { bytes, crc32 } = Checksum::of(io::inside(folder, path)?)?;
+        let Checksum { bytes, crc32 } = Checksum::from_file(io::inside(folder, path)?)?;
         let names: Vec<_> = path.iter().map(|name| name.to_string_lossy()).collect();
         Ok(Self {
             path: names.join("/"),

@@ -1,19 +1,20 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
-mod doubts;
 mod planes;
 mod solve;
 pub(super) mod tint;
+mod uncertainty;
 mod view;
 
-pub use doubts::ColorDoubts;
 pub use planes::film_planes;
+pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
-use super::remark::Remark;
+use super::prepared::{check_finite, longer_side, refused};
 use super::screen::{is_keyable, strongest_channel};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
@@ -61,13 +62,13 @@ pub struct FilmMatte {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
     /// What makes its colours wrong.
-    pub doubts: ColorDoubts,
+    pub color_uncertainty: ColorUncertainty,
     /// What a person should know.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl FilmMatte {
@@ -82,7 +83,7 @@ impl FilmMatte {
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
 /// garbage matte). A screen with little colour tells little of T: then what may be plastic by its light is guessed to be
-/// that, and a [`Remark`] says so.
+/// that, and a [`Diagnostic`] says so.
 ///
 /// # Method
 /// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the plastic is clear or has
@@ -109,41 +110,42 @@ pub fn film(
     inside: &Image<Coverage>,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
-    let longer_side = photo.width().max(photo.height());
-    film_of_part(
+    opts.check()?;
+    check_finite(photo)?;
+    let object = FilmInput {
         photo,
         plate,
         inside,
-        PartOf {
-            screen: plate.color(),
-            longer_side,
-        },
-        opts,
-    )
+        screen: plate.color(),
+        longer_side: longer_side(photo),
+    };
+    solve_film(object, opts)
 }
 
-/// What a part of a photo does not tell of all of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PartOf {
-    /// Mean colour of the screen.
+/// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
+/// one size.
+#[derive(Clone, Copy)]
+pub(super) struct FilmInput<'a> {
+    /// Finite.
+    pub(super) photo: &'a Image<LinearRgb>,
+    pub(super) plate: &'a ScreenPlate,
+    /// Coverage of the object.
+    pub(super) inside: &'a Image<Coverage>,
+    /// Mean colour of the whole screen.
     pub(super) screen: LinearRgb,
-    /// Longer side of the photo, pixels.
+    /// Longer side of the whole photo, pixels.
     pub(super) longer_side: usize,
 }
 
-/// As [`film`], of the part of a photo around the object: there is nothing to solve elsewhere. All pictures are of the
-/// part's size.
-pub(super) fn film_of_part(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    PartOf {
+/// As [`film`], with options that are checked.
+pub(super) fn solve_film(object: FilmInput<'_>, opts: &FilmOptions) -> Result<FilmMatte> {
+    let FilmInput {
+        photo,
+        plate,
+        inside,
         screen,
         longer_side,
-    }: PartOf,
-    opts: &FilmOptions,
-) -> Result<FilmMatte> {
-    opts.check()?;
+    } = object;
     let mut watch = Stopwatch::start();
     assert_eq!(
         photo.size(),
@@ -152,19 +154,11 @@ pub(super) fn film_of_part(
     );
     assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
     if !inside.pixels().iter().any(|c| c.0 > 0.0) {
-        return Err(Error::Photo {
-            what: "the mask of the object is empty".into(),
-        });
-    }
-    if let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) {
-        let (x, y) = (i % photo.width(), i / photo.width());
-        return Err(Error::Photo {
-            what: format!("pixel ({x}, {y}) is not a finite number"),
-        });
+        return Err(refused("the mask of the object is empty"));
     }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);
-    let grey = (!is_keyable(screen)).then_some(Remark::GreyScreen(screen));
+    let grey = (!is_keyable(screen)).then(|| grey_screen(screen));
     let (flat, tint) = match (opts.flat, &grey) {
         (Some(flat), _) => (flat.into(), 0.0),
         // That the tint may be another is part of the guess.
@@ -187,23 +181,26 @@ pub(super) fn film_of_part(
     });
     watch.lap("factors");
     let most = flat.into_iter().fold(0.0, f32::max);
-    let guessed = doubts::guessed(&factors, inside, opts.thickness_spread, most);
+    let guessed = uncertainty::guessed(&factors, inside, opts.thickness_spread, most);
     let screen_hue = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
-    let keyed_away = doubts::keyed_away(&factors, inside, flat[key], longer_side);
+    let keyed_away = uncertainty::keyed_away(&factors, inside, flat[key], longer_side);
     watch.lap("paint");
     let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
     watch.lap("glints");
-    let doubts = ColorDoubts {
+    let color_uncertainty = ColorUncertainty {
         keyed_away,
         screen_hue,
         clipped,
         guessed,
         tint,
     };
-    let remarks = grey.into_iter().chain(doubts.remarks()).collect();
+    let diagnostics = grey
+        .into_iter()
+        .chain(color_uncertainty.diagnostics())
+        .collect();
     let matte = FilmMatte {
-        doubts,
-        remarks,
+        color_uncertainty,
+        diagnostics,
         ..composed(photo, plate, inside, &factors, flat.into())
     };
     watch.lap("compose");
@@ -265,14 +262,14 @@ fn composed(
         Film::new(f.scale(c.0), covered(v, c))
     });
     let most = flat.r.max(flat.g).max(flat.b);
-    let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
+    let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
     FilmMatte {
         film,
         transmittance,
         uncertainty,
         flat,
-        doubts: ColorDoubts::default(),
-        remarks: Vec::new(),
+        color_uncertainty: ColorUncertainty::default(),
+        diagnostics: Vec::new(),
     }
 }
 
@@ -287,6 +284,16 @@ pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
         (light.r - taken.r).max(0.0),
         (light.g - taken.g).max(0.0),
         (light.b - taken.b).max(0.0),
+    )
+}
+
+fn grey_screen(screen: LinearRgb) -> Diagnostic {
+    let LinearRgb { r, g, b } = screen;
+    Diagnostic::warning(
+        Code::GreyScreen,
+        format_args!(
+            "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to measure transmittance: that of plastic is assumed"
+        ),
     )
 }
 

@@ -6,10 +6,10 @@ mod lines;
 use super::film::{covered, view};
 use super::plate::ScreenPlate;
 use super::register;
-use super::remark::Remark;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb};
 use lines::{Borrowed, Line, Pixel};
 use serde::{Deserialize, Serialize};
@@ -45,7 +45,7 @@ pub struct Triangulated {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1, of the channel that is told worst.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// Which channels of T the screens determine; another one is told from these.
     pub determined: [bool; 3],
     /// T of the plastic where it lies flat: what relates V to T.
@@ -55,7 +55,7 @@ pub struct Triangulated {
     /// Root mean square of what the film does not explain of the photos inside the object, scene-linear.
     pub residual: f32,
     /// What a person should know.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Solves `photo = F + T * plate` for F and T by least squares over several photos, each with its own screen.
@@ -106,13 +106,13 @@ pub fn triangulate(
     let solved = lines.map(|line| borrowed.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|shot| shot.shift_px).collect();
     let moves = (1..).zip(&shift_px).filter(|(_, s)| **s != [0.0; 2]);
-    let moved = moves.map(|(photo, &shift_px)| Remark::Moved { photo, shift_px });
+    let moved = moves.map(|(photo, shift_px)| moved_photo(photo, *shift_px));
     let names = CHANNELS
         .into_iter()
         .zip(determined)
         .filter(|(_, told)| !told);
-    let remarks = moved
-        .chain(names.map(|(name, _)| Remark::Undetermined(name)))
+    let diagnostics = moved
+        .chain(names.map(|(name, _)| similar_screens(name)))
         .collect();
     let flat = lines::flat(&solved, inside);
     let transmittance = solved.zip_map(inside, |p, c| covered(p.transmittance, c));
@@ -122,11 +122,11 @@ pub fn triangulate(
         residual: residual(&aligned, &solved, inside),
         film: reflected.zip_map(&seen, Film::new),
         transmittance,
-        uncertainty: solved.zip_map(inside, |p, c| Coverage((p.sigma * c.0).min(1.0))),
+        uncertainty: solved.zip_map(inside, |p, c| (p.sigma * c.0).min(1.0)),
         determined,
         flat,
         shift_px,
-        remarks,
+        diagnostics,
     })
 }
 
@@ -221,7 +221,7 @@ fn aligned(
 fn turned_px(
     first: &Image<LinearRgb>,
     photo: &Image<LinearRgb>,
-    near: &Image<bool>,
+    near: &Mask,
     across: [f32; 3],
 ) -> Option<f64> {
     let [low, high] = ends(near).map(|end| register::shift(first, photo, &end, across));
@@ -239,7 +239,7 @@ const MOST_APART_PX: f64 = 1.0;
 const SURE: f64 = 4.0;
 
 /// The two halves of an object, cut across the longer side of its box.
-fn ends(mask: &Image<bool>) -> [Image<bool>; 2] {
+fn ends(mask: &Mask) -> [Mask; 2] {
     let (w, h) = mask.size();
     let set = || {
         (0..w * h)
@@ -336,6 +336,25 @@ fn loudest(noise: LinearRgb) -> f32 {
 
 fn refused(what: impl Into<String>) -> Error {
     Error::Photo { what: what.into() }
+}
+
+/// `photo` counts from 1.
+fn moved_photo(photo: usize, [x, y]: [f64; 2]) -> Diagnostic {
+    Diagnostic::note(
+        Code::Moved,
+        format_args!(
+            "photo {photo} is offset by ({x:.2}, {y:.2}) px from the first; it was aligned"
+        ),
+    )
+}
+
+fn similar_screens(channel: &str) -> Diagnostic {
+    Diagnostic::note(
+        Code::SimilarScreens,
+        format_args!(
+            "the screens are too similar in {channel}: its transmittance is inferred from the other channels"
+        ),
+    )
 }
 
 #[cfg(test)]

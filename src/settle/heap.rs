@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::scene::{Background, CameraSource, Choice, Range, Recipe, Scene, Start};
 
 /// Cards of 200 x 70 and 190 x 80 mm, 2 to 11 mm thick, over a surface of 0.6 x 0.4 m: scene `k`.
-pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
+pub fn heap(k: u64, cards: usize) -> Result<Scene> {
     let tray = Background {
         name: "tray".into(),
         size: [0.6, 0.4],
@@ -30,7 +30,7 @@ pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
 }
 
 /// An octagon that touches the middle half of each side of its card.
-pub(crate) fn octagon([w, h]: [f64; 2]) -> Vec<[f64; 2]> {
+pub fn octagon([w, h]: [f64; 2]) -> Vec<[f64; 2]> {
     let (x, y) = (w / 2.0, h / 2.0);
     let half = [[x, -y / 2.0], [x, y / 2.0], [x / 2.0, y], [-x / 2.0, y]];
     half.into_iter()

@@ -266,12 +266,12 @@ fn specks_all_over_are_told() {
             }
         })
     };
-    let told = |count: usize| {
-        find(&taken(count))
-            .unwrap()
-            .remarks
-            .contains(&Remark::Specks(count))
-    };
+    let told =
+        |count: usize| {
+            find(&taken(count)).unwrap().diagnostics.iter().any(|d| {
+                d.code == Code::Specks && d.message.starts_with(&format!("{count} specks"))
+            })
+        };
     assert!(told(4) && !told(1));
 }
 
@@ -298,7 +298,7 @@ fn impossible_options_are_named() {
     );
     assert!(
         said(SegmentOptions {
-            tone: Tone::Grey([0.0; 3]),
+            tone: LumaMode::Grey([0.0; 3]),
             ..Default::default()
         })
         .starts_with("tone.grey")

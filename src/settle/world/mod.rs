@@ -83,7 +83,7 @@ pub(super) struct Fall {
 ///
 /// # Panics
 /// When nothing falls.
-pub(crate) fn typical_length(scene: &Scene) -> f64 {
+pub fn typical_length(scene: &Scene) -> f64 {
     median(scene, |object| object.size[0].max(object.size[1]))
 }
 
