@@ -17,7 +17,7 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self};
 use crate::scene::{
-    Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, locate, stock,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, Scene, Shot, catalog, locate,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub struct Studio {
     library: Library,
     places: Vec<Place>,
     backgrounds: Vec<Background>,
-    stock: Vec<Choice>,
+    catalog: Vec<AssetVariant>,
     surroundings: Surroundings,
     /// Turns true when no picture is to be finished any more.
     stop: &'static AtomicBool,
@@ -106,14 +106,14 @@ impl Studio {
             .iter()
             .map(|place| place.background.clone())
             .collect();
-        let stock = stock(&library);
+        let catalog = catalog(&library);
         let surroundings = Surroundings::of(&setup);
         Ok(Self {
             setup,
             library,
             places,
             backgrounds,
-            stock,
+            catalog,
             surroundings,
             stop: &NEVER,
         })
@@ -142,7 +142,7 @@ impl Studio {
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         self.setup
             .scene
-            .check_room(&self.backgrounds, &self.stock)
+            .check_room(&self.backgrounds, &self.catalog)
             .map_err(|e| e.within("scene"))?;
         let (folder, labels) = (folder.into(), &self.setup.labels);
         let mut inputs = Inputs::kept(&folder);
@@ -184,7 +184,7 @@ impl Studio {
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
         self.setup
             .scene
-            .explained(seed, k, &self.backgrounds, &self.stock)
+            .explained(seed, k, &self.backgrounds, &self.catalog)
     }
 
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.
@@ -293,7 +293,7 @@ impl Studio {
             scene = light::match_plate(scene, plate);
         }
         let shot = scene.resolve(
-            |object| Look::of(&self.library, object),
+            |object| Appearance::from_library(&self.library, object),
             plate,
             self.panorama(&scene)?,
         )?;

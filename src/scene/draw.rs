@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::fmt;
 
-/// Source of every random number of one scene: a draw is a pure function of `(seed, k, path)`.
+/// Variation of every random number of one scene: a draw is a pure function of `(seed, k, path)`.
 ///
 /// No draw depends on how many were made before it, so a new object or a changed range re-rolls nothing else.
 ///

@@ -25,7 +25,7 @@ pub struct SettleOptions {
     /// Default: 0.0025 (0.5 mm for 200 mm).
     pub max_overlap: f64,
     /// Most energy, potential and kinetic, that may appear from nothing between two steps, as a share of the drop's;
-    /// more is [`Verdict::Exploded`](crate::settle::Verdict::Exploded). Default: 0.01.
+    /// more is [`SettleVerdict::Exploded`](crate::settle::SettleVerdict::Exploded). Default: 0.01.
     pub max_energy_rise: f64,
     /// Longest fall, seconds of a world in which the typical card is 200 mm long, 0.01 to 600. Default: 30.
     pub time_limit: f64,

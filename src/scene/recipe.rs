@@ -9,10 +9,10 @@ use crate::scene::bounds::{
     MOST_OBJECTS, RADIANCE, SCALE, SHARE, TURN,
 };
 use crate::scene::check::{check_cast, check_count, check_image};
-use crate::scene::stack::{Column, Start, too_large};
+use crate::scene::stack::{Column, DropRanges, too_large};
 use crate::scene::{
-    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure,
-    FinishRanges, Grade, LightShape, Limit, Object, Range, Scene, SettleOptions, Source, Surface,
+    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, Grade,
+    LightShape, Object, PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -26,11 +26,11 @@ pub struct Recipe {
     /// Width and height of the pictures, pixels. Default: `[640, 480]`.
     pub image: [u32; 2],
     /// Sources of variation that are switched off; all other draws stay as they are. Default: none.
-    pub off: Vec<Source>,
+    pub off: Vec<Variation>,
     /// Labelled photos of the place that are used, each a viewpoint: the first so many. Default: `"all"`.
-    pub viewpoints: Limit,
+    pub viewpoints: Take,
     /// Photos of each asset that are used: the first so many. Default: `"all"`.
-    pub photos: Limit,
+    pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
     pub objects: Range,
     /// Share of the scenes that stay empty: pictures of the place alone, 0 to 1. Default: 0.
@@ -40,7 +40,7 @@ pub struct Recipe {
     /// Factor on an object's size and thickness, its mass following. Default: `[0.9, 1.1]`.
     pub scale: Range,
     /// How objects start.
-    pub start: Start,
+    pub start: DropRanges,
     /// Change of an object's colours.
     pub grade: GradeRanges,
     /// Lights; `lights = []` makes scenes without shadows. Default: one.
@@ -65,7 +65,7 @@ pub struct Recipe {
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
     pub cast: Cast,
     /// What happens to the finished frame. Default: nothing.
-    pub finish: FinishRanges,
+    pub finish: PostProcessRanges,
     /// How objects come to rest.
     pub settle: SettleOptions,
 }
@@ -162,7 +162,7 @@ pub struct LightRanges {
 
 /// An asset as a recipe sees it: what may be chosen, without its pictures.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct AssetVariant {
     /// Name of the asset.
     pub asset: String,
     /// Width and height of the card of each of its photos, metres; at least one.
@@ -191,13 +191,13 @@ impl Default for Recipe {
         Self {
             image: [640, 480],
             off: Vec::new(),
-            viewpoints: Limit::All,
-            photos: Limit::All,
+            viewpoints: Take::All,
+            photos: Take::All,
             objects: Range::new(4.0, 12.0),
             negatives: 0.0,
             selections: Selections::Unique,
             scale: Range::new(0.9, 1.1),
-            start: Start::default(),
+            start: DropRanges::default(),
             grade: GradeRanges::default(),
             lights: vec![LightRanges::default()],
             ambient: Range::new(0.3, 0.8),
@@ -208,7 +208,7 @@ impl Default for Recipe {
             collider: Collider::Box,
             surface_albedo: None,
             cast: Cast::default(),
-            finish: FinishRanges::default(),
+            finish: PostProcessRanges::default(),
             settle: SettleOptions::default(),
         }
     }
@@ -240,25 +240,25 @@ impl Default for LightRanges {
 }
 
 impl Recipe {
-    /// Scene `k`: a pure function of the recipe, `seed` and `k`, the backgrounds and the stock (both in their order).
+    /// Scene `k`: a pure function of the recipe, `seed` and `k`, the backgrounds and the catalog (both in their order).
     ///
     /// Objects are dropped: they start in a stack over the surface, without overlap, within its walls. The camera and
     /// the exposure are left for the stages that know the photo.
     ///
     /// # Method
     /// Every number is drawn by its own path ([`Draws`]), so that one more object or another range re-rolls nothing
-    /// else. Objects are drawn without repetition until the stock is used up, then again from all of it.
+    /// else. Objects are drawn without repetition until the catalog is used up, then again from all of it.
     /// # Errors
-    /// A range that cannot be right; no background; no stock while objects are asked for; a card that fits the surface
+    /// A range that cannot be right; no background; no catalog while objects are asked for; a card that fits the surface
     /// in no direction.
     pub fn scene(
         &self,
         seed: u64,
         k: u64,
         backgrounds: &[Background],
-        stock: &[Choice],
+        catalog: &[AssetVariant],
     ) -> Result<Scene> {
-        self.explained(seed, k, backgrounds, stock)
+        self.explained(seed, k, backgrounds, catalog)
             .map(|(scene, _)| scene)
     }
 
@@ -271,11 +271,17 @@ impl Recipe {
         seed: u64,
         k: u64,
         backgrounds: &[Background],
-        stock: &[Choice],
+        catalog: &[AssetVariant],
     ) -> Result<(Scene, Vec<Drawn>)> {
         let log = DrawLog::default();
         let recipe = self.narrowed();
-        let scene = recipe.compose(seed, k, &log, recipe.viewpoints.of(backgrounds), stock)?;
+        let scene = recipe.compose(
+            seed,
+            k,
+            &log,
+            recipe.viewpoints.slice_of(backgrounds),
+            catalog,
+        )?;
         Ok((scene, log.into_draws()))
     }
 
@@ -285,7 +291,7 @@ impl Recipe {
         k: u64,
         log: &DrawLog,
         backgrounds: &[Background],
-        stock: &[Choice],
+        catalog: &[AssetVariant],
     ) -> Result<Scene> {
         self.check()?;
         let draws = Draws::new(seed, k).logged(log);
@@ -295,7 +301,7 @@ impl Recipe {
         let mut objects = if empty {
             Vec::new()
         } else {
-            self.choose(seed, k, log, stock)?
+            self.choose(seed, k, log, catalog)?
         };
         for (i, object) in objects.iter_mut().enumerate() {
             self.vary(object, &draws, &format!("objects[{i}]"));
@@ -339,16 +345,16 @@ impl Recipe {
 
     /// Fails on the first asset that at its largest fits between the walls of some background in no direction: a scene with
     /// both would be refused, however late it comes.
-    pub fn check_room(&self, backgrounds: &[Background], stock: &[Choice]) -> Result<()> {
+    pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
         let recipe = self.narrowed();
         if recipe.objects.max < 1.0 {
             return Ok(());
         }
-        for background in recipe.viewpoints.of(backgrounds) {
-            let photos = stock.iter().flat_map(|choice| {
+        for background in recipe.viewpoints.slice_of(backgrounds) {
+            let photos = catalog.iter().flat_map(|choice| {
                 recipe
                     .photos
-                    .of(&choice.photo_sizes)
+                    .slice_of(&choice.photo_sizes)
                     .iter()
                     .map(move |s| (choice, s))
             });
@@ -402,7 +408,13 @@ impl Recipe {
     }
 
     /// Assets and photos of one selection, at their own size and colour.
-    fn choose(&self, seed: u64, k: u64, log: &DrawLog, stock: &[Choice]) -> Result<Vec<Object>> {
+    fn choose(
+        &self,
+        seed: u64,
+        k: u64,
+        log: &DrawLog,
+        catalog: &[AssetVariant],
+    ) -> Result<Vec<Object>> {
         let selection = match self.selections {
             Selections::Unique => k,
             Selections::Of(0) => return Err(Error::value("selections", "0, expected at least 1")),
@@ -410,7 +422,7 @@ impl Recipe {
         };
         let draws = Draws::new(seed, selection).logged(log);
         let count = self.objects.draw_count(&draws, "selection.objects");
-        if count > 0 && stock.is_empty() {
+        if count > 0 && catalog.is_empty() {
             return Err(Error::value(
                 "objects",
                 format!("{count} asked for, but there is no asset to choose from"),
@@ -420,9 +432,9 @@ impl Recipe {
         (0..count)
             .map(|i| {
                 if left.is_empty() {
-                    left = (0..stock.len()).collect();
+                    left = (0..catalog.len()).collect();
                 }
-                let choice = &stock
+                let choice = &catalog
                     [left.swap_remove(draws.choose(&format!("selection[{i}].asset"), left.len()))];
                 choice.object(
                     &draws,
@@ -457,12 +469,12 @@ impl Recipe {
     }
 }
 
-impl Choice {
+impl AssetVariant {
     fn object(
         &self,
         draws: &Draws,
         path: &str,
-        photos: Limit,
+        photos: Take,
         collider: Collider,
     ) -> Result<Object> {
         if self.photo_sizes.is_empty() {
@@ -471,7 +483,7 @@ impl Choice {
                 "no photo, expected at least one",
             ));
         }
-        let photo = draws.choose(path, photos.of(&self.photo_sizes).len());
+        let photo = draws.choose(path, photos.slice_of(&self.photo_sizes).len());
         let outline = match collider {
             Collider::Box => Vec::new(),
             Collider::Hull => self.photo_outlines.get(photo).cloned().unwrap_or_default(),
@@ -484,7 +496,7 @@ impl Choice {
             thickness: self.thickness,
             outline,
             mass: self.mass,
-            placement: Start::unplaced(),
+            placement: DropRanges::unplaced(),
             grade: Grade::default(),
         })
     }
@@ -576,8 +588,8 @@ mod tests {
         }
     }
 
-    fn stock(n: usize) -> Vec<Choice> {
-        let choice = |i| Choice {
+    fn catalog(n: usize) -> Vec<AssetVariant> {
+        let choice = |i| AssetVariant {
             asset: format!("b{i}"),
             photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
             photo_outlines: vec![vec![[-0.1, -0.03], [0.1, -0.03], [0.0, 0.035]], vec![]],
@@ -589,7 +601,7 @@ mod tests {
 
     fn scene(recipe: &Recipe, k: u64) -> Scene {
         recipe
-            .scene(7, k, &[tray("a"), tray("b")], &stock(10))
+            .scene(7, k, &[tray("a"), tray("b")], &catalog(10))
             .unwrap()
     }
 
@@ -656,7 +668,7 @@ mod tests {
             (recipe.lights.len(), recipe.lights[0].size),
             (1, Range::fixed(0.1))
         );
-        assert_eq!(recipe.start.gap, Start::default().gap);
+        assert_eq!(recipe.start.gap, DropRanges::default().gap);
     }
 
     #[test]
@@ -674,22 +686,22 @@ mod tests {
 
     #[test]
     fn nothing_to_choose_from_is_told() {
-        let told = |backgrounds: &[Background], stock: &[Choice]| {
+        let told = |backgrounds: &[Background], catalog: &[AssetVariant]| {
             Recipe::default()
-                .scene(0, 0, backgrounds, stock)
+                .scene(0, 0, backgrounds, catalog)
                 .unwrap_err()
                 .to_string()
         };
         assert_eq!(
-            told(&[], &stock(1)),
+            told(&[], &catalog(1)),
             "backgrounds: none, expected at least one labelled photo"
         );
         assert!(
             told(&[tray("a")], &[]).ends_with("asked for, but there is no asset to choose from")
         );
-        let bare = Choice {
+        let bare = AssetVariant {
             photo_sizes: vec![],
-            ..stock(1).remove(0)
+            ..catalog(1).remove(0)
         };
         assert_eq!(
             told(&[tray("a")], &[bare]),

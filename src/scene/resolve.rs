@@ -17,7 +17,7 @@ pub const CATCHER: f64 = 3.0;
 
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
-pub struct Look {
+pub struct Appearance {
     /// Index into the class list.
     pub class: u32,
     /// The cut-out, premultiplied, scene-linear.
@@ -31,7 +31,7 @@ pub struct Look {
 impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
-    /// `look` finds an object's asset and photo, or nothing; for a library that is [`Look::of`]. `plate` is the background at the picture's
+    /// `look` finds an object's asset and photo, or nothing; for a library that is [`Appearance::from_library`]. `plate` is the background at the picture's
     /// size; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id `i + 1`; the shadow catcher is the plane of the
     /// labelled surface, [`CATCHER`] times as large.
     ///
@@ -41,7 +41,7 @@ impl Scene {
     /// without its picture.
     pub fn resolve(
         &self,
-        look: impl Fn(&Object) -> Option<Look>,
+        look: impl Fn(&Object) -> Option<Appearance>,
         plate: Option<Arc<Image<LinearRgb>>>,
         panorama: Option<Arc<Panorama>>,
     ) -> Result<Shot> {
@@ -235,10 +235,10 @@ mod tests {
         }
     }
 
-    fn look(object: &Object) -> Option<Look> {
+    fn look(object: &Object) -> Option<Appearance> {
         let texture = Texture::from(Image::filled(2, 2, PremulRgba::default()));
         let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
-        (object.asset == "b1").then_some(Look {
+        (object.asset == "b1").then_some(Appearance {
             class: 3,
             texture,
             back: None,

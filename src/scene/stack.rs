@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-12;
 /// How objects start: each over the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Start {
+pub struct DropRanges {
     /// Position along the surface's width: -1 at the left wall, 1 at the right one, 0 in the middle. Default: `[-1, 1]`.
     pub x: Range,
     /// Position along the surface's height: -1 at the lower wall, 1 at the upper one. Default: `[-1, 1]`.
@@ -31,7 +31,7 @@ pub struct Start {
     pub gap: Range,
 }
 
-impl Default for Start {
+impl Default for DropRanges {
     fn default() -> Self {
         Self {
             x: Range::new(-1.0, 1.0),
@@ -44,7 +44,7 @@ impl Default for Start {
     }
 }
 
-impl Start {
+impl DropRanges {
     /// What an object has before it is stacked.
     pub(super) fn unplaced() -> Placement {
         Placement::Drop {
@@ -69,7 +69,7 @@ pub(super) struct Column<'a> {
     /// Name of the place, for messages.
     pub(super) place: &'a str,
     pub(super) surface: Surface,
-    pub(super) start: &'a Start,
+    pub(super) start: &'a DropRanges,
     pub(super) options: &'a SettleOptions,
     pub(super) draws: &'a Draws<'a>,
 }
@@ -143,7 +143,7 @@ impl Column<'_> {
     }
 }
 
-impl Start {
+impl DropRanges {
     /// Whether a card of this size, as thick as it may be, fits between walls in some direction that it may start in.
     pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
         self.level_turns(surface, &(Vector3::new(w, h, 0.0) / 2.0))
@@ -200,7 +200,7 @@ mod tests {
     use crate::scene::Grade;
 
     fn cards(n: usize, size: [f64; 2]) -> Vec<Object> {
-        let placement = Start::unplaced();
+        let placement = DropRanges::unplaced();
         let card = |i: usize| Object {
             asset: format!("b{i}"),
             photo: 0,
@@ -215,7 +215,7 @@ mod tests {
         (0..n).map(card).collect()
     }
 
-    fn stacked(k: u64, start: &Start, mut objects: Vec<Object>) -> Result<Vec<Object>> {
+    fn stacked(k: u64, start: &DropRanges, mut objects: Vec<Object>) -> Result<Vec<Object>> {
         let (surface, options) = (Surface::new([0.4, 0.3]), SettleOptions::default());
         Column {
             place: "tray",
@@ -249,9 +249,9 @@ mod tests {
     #[test]
     fn every_card_starts_wholly_above_the_one_before_it() {
         for k in 0..50 {
-            let tilted = Start {
+            let tilted = DropRanges {
                 tilt_deg: Range::new(0.0, 90.0),
-                ..Start::default()
+                ..DropRanges::default()
             };
             let objects = stacked(k, &tilted, cards(12, [0.2, 0.08])).unwrap();
             let mut top = 0.0;
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn every_card_starts_between_the_walls() {
         for k in 0..200 {
-            for corner in stacked(k, &Start::default(), cards(5, [0.25, 0.2]))
+            for corner in stacked(k, &DropRanges::default(), cards(5, [0.25, 0.2]))
                 .unwrap()
                 .iter()
                 .flat_map(corners)
@@ -286,13 +286,13 @@ mod tests {
     #[test]
     fn a_card_that_fits_one_way_only_is_turned_until_it_fits() {
         for k in 0..50 {
-            stacked(k, &Start::default(), cards(3, [0.39, 0.1])).unwrap();
+            stacked(k, &DropRanges::default(), cards(3, [0.39, 0.1])).unwrap();
         }
     }
 
     #[test]
     fn a_card_that_fits_no_way_is_told() {
-        let told = stacked(0, &Start::default(), cards(2, [0.5, 0.31]))
+        let told = stacked(0, &DropRanges::default(), cards(2, [0.5, 0.31]))
             .unwrap_err()
             .to_string();
         let expected = "objects[0].size: \"b0\", 0.500 x 0.310 m, does not fit between the walls of \"tray\", 0.400 x 0.300 m: \
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn a_card_longer_than_the_room_is_wide_does_not_start_across_it() {
         for k in 0..200 {
-            for object in stacked(k, &Start::default(), cards(5, [0.31, 0.1])).unwrap() {
+            for object in stacked(k, &DropRanges::default(), cards(5, [0.31, 0.1])).unwrap() {
                 let half = lying(&object);
                 assert!(
                     half.x <= 0.2 + 1e-12 && half.y <= 0.15 + 1e-12,
@@ -328,7 +328,7 @@ mod tests {
     fn a_card_as_long_as_the_room_starts_level_and_along_it() {
         for k in 0..20 {
             // So wide that it does not fit along the diagonal, which a narrow one does.
-            let objects = stacked(k, &Start::default(), cards(3, [0.4, 0.28])).unwrap();
+            let objects = stacked(k, &DropRanges::default(), cards(3, [0.4, 0.28])).unwrap();
             objects
                 .iter()
                 .for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
@@ -337,9 +337,9 @@ mod tests {
                 .flat_map(corners)
                 .for_each(|c| assert!(c.x.abs() <= 0.2 + 1e-12, "scene {k}: {c}"));
         }
-        let one_way = Start {
+        let one_way = DropRanges {
             yaw_deg: Range::fixed(30.0),
-            ..Start::default()
+            ..DropRanges::default()
         };
         assert!(stacked(0, &one_way, cards(1, [0.4, 0.28])).is_err());
         assert!(

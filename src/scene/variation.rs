@@ -3,13 +3,13 @@
 //! Draws are keyed by their path and not by what was drawn before, so two recipes that differ in one switch give scenes
 //! that differ in nothing else: scene `k` of one and scene `k` of the other are a pair.
 
-use crate::scene::{EnvironmentRanges, GradeRanges, LightRanges, Limit, Range, Recipe, Selections};
+use crate::scene::{EnvironmentRanges, GradeRanges, LightRanges, Range, Recipe, Selections, Take};
 use serde::{Deserialize, Serialize};
 
 /// A source of variation that a recipe can do without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Source {
+pub enum Variation {
     /// Change of the objects' colours: they keep those of their photos.
     Colour,
     /// Labelled photos of the place: only the first is used.
@@ -23,7 +23,7 @@ pub enum Source {
     Selection,
 }
 
-impl Source {
+impl Variation {
     /// All of them.
     pub const ALL: [Self; 5] = [
         Self::Colour,
@@ -43,7 +43,7 @@ pub struct Ablation {
     /// Name, as of its folder.
     pub name: &'static str,
     /// What is off.
-    pub off: &'static [Source],
+    pub off: &'static [Variation],
 }
 
 impl Ablation {
@@ -55,27 +55,27 @@ impl Ablation {
         },
         Self {
             name: "original_colour",
-            off: &[Source::Colour],
+            off: &[Variation::Colour],
         },
         Self {
             name: "single_viewpoint",
-            off: &[Source::Viewpoint],
+            off: &[Variation::Viewpoint],
         },
         Self {
             name: "single_photo",
-            off: &[Source::Photo],
+            off: &[Variation::Photo],
         },
         Self {
             name: "single_light",
-            off: &[Source::Light],
+            off: &[Variation::Light],
         },
         Self {
             name: "repeat_selections",
-            off: &[Source::Selection],
+            off: &[Variation::Selection],
         },
         Self {
             name: "all_off",
-            off: &Source::ALL,
+            off: &Variation::ALL,
         },
     ];
 }
@@ -92,25 +92,25 @@ impl Recipe {
         )
     }
 
-    fn without(self, source: Source) -> Self {
+    fn without(self, source: Variation) -> Self {
         match source {
-            Source::Colour => Self {
+            Variation::Colour => Self {
                 grade: GradeRanges::UNCHANGED,
                 ..self
             },
-            Source::Viewpoint => Self {
-                viewpoints: Limit::First(1),
+            Variation::Viewpoint => Self {
+                viewpoints: Take::First(1),
                 ..self
             },
-            Source::Photo => Self {
-                photos: Limit::First(1),
+            Variation::Photo => Self {
+                photos: Take::First(1),
                 ..self
             },
-            Source::Selection => Self {
+            Variation::Selection => Self {
                 selections: Selections::Of(REPEATED),
                 ..self
             },
-            Source::Light => Self {
+            Variation::Light => Self {
                 lights: self.lights.iter().map(LightRanges::still).collect(),
                 ambient: self.ambient.middle(),
                 environment: self.environment.still(),
@@ -158,10 +158,10 @@ impl LightRanges {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Background, CameraSource, Choice, Scene};
+    use crate::scene::{AssetVariant, Background, CameraSource, Scene};
     use std::collections::BTreeSet;
 
-    fn scenes(off: &[Source]) -> Vec<Scene> {
+    fn scenes(off: &[Variation]) -> Vec<Scene> {
         let recipe = Recipe {
             off: off.to_vec(),
             ..Recipe::default()
@@ -176,33 +176,33 @@ mod tests {
             size: [0.6, 0.4],
             camera,
         };
-        let choice = |i| Choice {
+        let choice = |i| AssetVariant {
             asset: format!("b{i}"),
             photo_sizes: vec![[0.2, 0.07]; 3],
             photo_outlines: vec![],
             thickness: 0.005,
             mass: 0.03,
         };
-        let stock: Vec<Choice> = (0..9).map(choice).collect();
+        let catalog: Vec<AssetVariant> = (0..9).map(choice).collect();
         (0..120)
             .map(|k| {
                 recipe
-                    .scene(5, k, &[place("a"), place("b")], &stock)
+                    .scene(5, k, &[place("a"), place("b")], &catalog)
                     .unwrap()
             })
             .collect()
     }
 
     /// The scene with everything that a source decides set to the same.
-    fn apart_from(source: Source, mut scene: Scene) -> Scene {
+    fn apart_from(source: Variation, mut scene: Scene) -> Scene {
         match source {
-            Source::Colour => scene
+            Variation::Colour => scene
                 .objects
                 .iter_mut()
                 .for_each(|object| object.grade = Default::default()),
-            Source::Viewpoint => scene.plate.clear(),
-            Source::Photo => scene.objects.iter_mut().for_each(|object| object.photo = 0),
-            Source::Light => {
+            Variation::Viewpoint => scene.plate.clear(),
+            Variation::Photo => scene.objects.iter_mut().for_each(|object| object.photo = 0),
+            Variation::Light => {
                 let size = scene.lights[0].size;
                 scene.lights[0] = crate::scene::AreaLight {
                     size,
@@ -211,7 +211,7 @@ mod tests {
                 scene.ambient = Default::default();
                 scene.exposure = Default::default();
             }
-            Source::Selection => {}
+            Variation::Selection => {}
         }
         scene
     }
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn pairs_differ_in_what_is_off_and_in_nothing_else() {
         let all = scenes(&[]);
-        for source in Source::ALL {
+        for source in Variation::ALL {
             let off = scenes(&[source]);
             assert_ne!(off, all, "{source:?} changes nothing");
             // Choices of objects are the same in the first 50 scenes, where none repeats yet.
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn what_is_off_does_not_vary() {
-        let off = scenes(&Source::ALL);
+        let off = scenes(&Variation::ALL);
         let distinct =
             |of: &dyn Fn(&Scene) -> String| off.iter().map(of).collect::<BTreeSet<_>>().len();
         assert_eq!(distinct(&|s| s.plate.clone()), 1);
@@ -266,7 +266,7 @@ mod tests {
         let recipe = Recipe::default();
         assert_eq!(recipe.narrowed(), recipe);
         let off = Recipe {
-            off: Source::ALL.to_vec(),
+            off: Variation::ALL.to_vec(),
             ..recipe
         };
         assert_eq!(off.narrowed().narrowed(), off.narrowed());

@@ -1,7 +1,7 @@
 //! Heaps to measure the stage on.
 
 use crate::error::Result;
-use crate::scene::{Background, CameraSource, Choice, Range, Recipe, Scene, Start};
+use crate::scene::{AssetVariant, Background, CameraSource, DropRanges, Range, Recipe, Scene};
 
 /// Cards of 200 x 70 and 190 x 80 mm, 2 to 11 mm thick, over a surface of 0.6 x 0.4 m: scene `k`.
 pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
@@ -14,7 +14,7 @@ pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
             focal_px: None,
         },
     };
-    let choice = |i: usize| Choice {
+    let choice = |i: usize| AssetVariant {
         asset: format!("b{i}"),
         photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
         photo_outlines: vec![],
@@ -23,7 +23,7 @@ pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
     };
     let recipe = Recipe {
         objects: Range::fixed(cards as f64),
-        start: Start::default(),
+        start: DropRanges::default(),
         ..Recipe::default()
     };
     recipe.scene(0, k, &[tray], &(0..20).map(choice).collect::<Vec<_>>())

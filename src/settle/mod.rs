@@ -24,7 +24,7 @@ mod world;
 pub use crate::scene::{SettleMode, SettleOptions};
 pub(crate) use heap::{heap, octagon};
 pub use preview::preview;
-pub use trace::{Sample, csv as trace_csv};
+pub use trace::{MotionSample, csv as trace_csv};
 pub(crate) use world::typical_length;
 
 pub use crate::allowance::Allowance;
@@ -37,12 +37,12 @@ use world::{Drop, Fall};
 /// What came of a fall.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settled {
-    /// The scene at rest; as it was given unless the verdict is [`Verdict::Rested`].
+    /// The scene at rest; as it was given unless the verdict is [`SettleVerdict::Rested`].
     pub scene: Scene,
     /// How the last try ended.
-    pub verdict: Verdict,
-    /// How the tries before the last one ended; none of them is [`Verdict::Rested`].
-    pub rejected: Vec<Verdict>,
+    pub verdict: SettleVerdict,
+    /// How the tries before the last one ended; none of them is [`SettleVerdict::Rested`].
+    pub rejected: Vec<SettleVerdict>,
     /// Length of the last fall, seconds.
     pub seconds: f64,
     /// Deepest overlap of a dropped body with another body, the floor or a wall at the end, metres.
@@ -54,7 +54,7 @@ pub struct Settled {
 
 /// How a fall ended.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Verdict {
+pub enum SettleVerdict {
     /// Everything lies still, inside the walls, overlapping by no more than is accepted.
     Rested,
     /// Something still moved at the time limit.
@@ -75,12 +75,12 @@ impl Settled {
     /// [`Error::Unsettled`] for every other verdict.
     pub fn into_scene(self) -> Result<Scene> {
         let what = match self.verdict {
-            Verdict::Rested => return Ok(self.scene),
-            Verdict::TimedOut => format!("something still moves after {:.1} s", self.seconds),
-            Verdict::Escaped(ids) => format!("objects {ids:?} left the surface"),
-            Verdict::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
-            Verdict::Hanging(ids) => format!("objects {ids:?} hang in the air"),
-            Verdict::Exploded(share) => format!(
+            SettleVerdict::Rested => return Ok(self.scene),
+            SettleVerdict::TimedOut => format!("something still moves after {:.1} s", self.seconds),
+            SettleVerdict::Escaped(ids) => format!("objects {ids:?} left the surface"),
+            SettleVerdict::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
+            SettleVerdict::Hanging(ids) => format!("objects {ids:?} hang in the air"),
+            SettleVerdict::Exploded(share) => format!(
                 "energy rose by {:.1} % of the drop's in a step",
                 share * 100.0
             ),
@@ -110,7 +110,7 @@ pub fn settle_traced(
     scene: Scene,
     options: &SettleOptions,
     every: usize,
-) -> Result<(Settled, Vec<Sample>)> {
+) -> Result<(Settled, Vec<MotionSample>)> {
     settle_within(scene, options, every, &Allowance::new(options.most_work))
 }
 
@@ -126,13 +126,13 @@ pub fn settle_within(
     options: &SettleOptions,
     every: usize,
     allowance: &Allowance,
-) -> Result<(Settled, Vec<Sample>)> {
+) -> Result<(Settled, Vec<MotionSample>)> {
     scene.check()?;
     options.check()?;
     check_starts(&scene)?;
     let mut rejected = Vec::new();
     if !scene.objects.iter().any(is_dropped) {
-        let (verdict, seconds, overlap, energy_rise) = (Verdict::Rested, 0.0, 0.0, 0.0);
+        let (verdict, seconds, overlap, energy_rise) = (SettleVerdict::Rested, 0.0, 0.0, 0.0);
         return Ok((
             Settled {
                 scene,
@@ -173,7 +173,7 @@ pub fn settle_within(
         };
         let end = with_poses(scene.clone(), &poses);
         let (verdict, overlap) = judge(&scene, &end, options, rests, energy_rise);
-        let last = verdict == Verdict::Rested
+        let last = verdict == SettleVerdict::Rested
             || seconds == 0.0
             || rejected.len() + 1 >= options.attempts as usize;
         if last {
@@ -182,7 +182,7 @@ pub fn settle_within(
                 rejected.len() + 1,
                 allowance.taken()
             );
-            let scene = if verdict == Verdict::Rested {
+            let scene = if verdict == SettleVerdict::Rested {
                 end
             } else {
                 scene
@@ -206,7 +206,8 @@ pub fn settle_within(
         // What has sunk in needs stiffer contacts, which shorter steps bear; what has gained energy met too hard in one step,
         // and would again from most heights.
         let sank = overlap.is_finite() && overlap > most_overlap(&scene, options);
-        finer = (finer + u32::from(sank || matches!(verdict, Verdict::Exploded(_)))).min(FINEST);
+        finer =
+            (finer + u32::from(sank || matches!(verdict, SettleVerdict::Exploded(_)))).min(FINEST);
         rejected.push(verdict);
     }
 }
@@ -323,20 +324,20 @@ fn judge(
     options: &SettleOptions,
     rests: bool,
     energy_rise: f64,
-) -> (Verdict, f64) {
+) -> (SettleVerdict, f64) {
     let bodies = solids_at_rest(start, end, options);
     let escaped = overlap::outside(&bodies, end.surface.size);
     if !escaped.is_empty() {
-        return (Verdict::Escaped(escaped), f64::INFINITY);
+        return (SettleVerdict::Escaped(escaped), f64::INFINITY);
     }
     let touching = overlap::touching(&bodies, reach(start));
     let depth = overlap::deepest(&bodies, &touching, end.surface.size);
     let verdict = if !rests {
-        Verdict::TimedOut
+        SettleVerdict::TimedOut
     } else if depth > most_overlap(start, options) {
-        Verdict::Penetrating(depth)
+        SettleVerdict::Penetrating(depth)
     } else if energy_rise > options.max_energy_rise {
-        Verdict::Exploded(energy_rise)
+        SettleVerdict::Exploded(energy_rise)
     } else {
         supported(start, options, &bodies, &touching)
     };
@@ -349,15 +350,15 @@ fn supported(
     options: &SettleOptions,
     bodies: &[Solid],
     touching: &[Touch],
-) -> Verdict {
+) -> SettleVerdict {
     if options.mode == SettleMode::Flat {
-        return Verdict::Rested;
+        return SettleVerdict::Rested;
     }
     let hanging = support::hanging(start, options, bodies, touching);
     if hanging.is_empty() {
-        Verdict::Rested
+        SettleVerdict::Rested
     } else {
-        Verdict::Hanging(hanging)
+        SettleVerdict::Hanging(hanging)
     }
 }
 
@@ -429,7 +430,7 @@ mod tests {
 
     fn settled(scene: Scene) -> Settled {
         let settled = settle(scene, &SettleOptions::default()).unwrap();
-        assert_eq!(settled.verdict, Verdict::Rested);
+        assert_eq!(settled.verdict, SettleVerdict::Rested);
         settled
     }
 
@@ -551,9 +552,9 @@ mod tests {
         let settled = settle(scene.clone(), &options).unwrap();
         assert_eq!(
             (&settled.verdict, &settled.scene),
-            (&Verdict::TimedOut, &scene)
+            (&SettleVerdict::TimedOut, &scene)
         );
-        assert_eq!(settled.rejected, vec![Verdict::TimedOut; 3]);
+        assert_eq!(settled.rejected, vec![SettleVerdict::TimedOut; 3]);
         let told = settled.into_scene().unwrap_err().to_string();
         assert_eq!(
             told,
@@ -585,7 +586,7 @@ mod tests {
                 },
             )
             .unwrap();
-            assert_eq!(rest.verdict, Verdict::Rested);
+            assert_eq!(rest.verdict, SettleVerdict::Rested);
             pose(&rest, 0).translation.x + 0.15
         };
         let steep = libm::tan(FRAC_PI_6);
@@ -645,9 +646,10 @@ mod tests {
     #[test]
     fn a_trace_ends_where_the_cards_rest_and_its_energy_falls() {
         let (rest, samples) = settle_traced(dropped(1, 6), &SettleOptions::default(), 8).unwrap();
-        assert_eq!(rest.verdict, Verdict::Rested);
-        let energy = |part: &[Sample]| part.iter().map(|s| s.kinetic + s.potential).sum::<f64>();
-        let steps: Vec<&[Sample]> = samples.chunks(6).collect();
+        assert_eq!(rest.verdict, SettleVerdict::Rested);
+        let energy =
+            |part: &[MotionSample]| part.iter().map(|s| s.kinetic + s.potential).sum::<f64>();
+        let steps: Vec<&[MotionSample]> = samples.chunks(6).collect();
         assert!(
             steps
                 .iter()
@@ -759,11 +761,11 @@ mod tests {
         };
         let rest = settle(heap(), &options).unwrap();
         assert!(
-            matches!(rest.rejected[..], [Verdict::Penetrating(_), ..]),
+            matches!(rest.rejected[..], [SettleVerdict::Penetrating(_), ..]),
             "{:?}",
             rest.rejected
         );
-        assert_eq!(rest.verdict, Verdict::Rested);
+        assert_eq!(rest.verdict, SettleVerdict::Rested);
     }
 
     #[test]
@@ -809,7 +811,7 @@ mod tests {
         assert!(
             matches!(
                 settled.verdict,
-                Verdict::Penetrating(_) | Verdict::Escaped(_)
+                SettleVerdict::Penetrating(_) | SettleVerdict::Escaped(_)
             ),
             "{:?}",
             settled.verdict

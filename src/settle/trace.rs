@@ -4,7 +4,7 @@ use crate::geom::Pose;
 
 /// One object at one time of a fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct MotionSample {
     /// Since the start, seconds.
     pub seconds: f64,
     /// Id: index + 1.
@@ -22,9 +22,9 @@ pub struct Sample {
 }
 
 /// Samples as comma-separated values, titles first: SI units, rotation as a quaternion.
-pub fn csv(samples: &[Sample]) -> String {
+pub fn csv(samples: &[MotionSample]) -> String {
     let head = "seconds,object,x,y,z,qw,qx,qy,qz,speed,spin,kinetic,potential\n";
-    let line = |s: &Sample| {
+    let line = |s: &MotionSample| {
         let (t, q) = (s.pose.translation, s.pose.rotation);
         let numbers = [
             t.x,

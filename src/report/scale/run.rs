@@ -13,7 +13,9 @@ use crate::label::{LabelOptions, label};
 use crate::render::{RenderOptions, cast};
 use crate::report::pile::{above, lamp};
 use crate::report::settle::median_and_worst;
-use crate::scene::{CameraSource, Exposure, Grade, Look, Object, Placement, Scene, Shot, Surface};
+use crate::scene::{
+    Appearance, CameraSource, Exposure, Grade, Object, Placement, Scene, Shot, Surface,
+};
 use crate::settle::{SettleOptions, heap, settle};
 use crate::{Error, Image, LinearRgb, PremulRgba, Result, composite, work};
 use std::sync::Arc;
@@ -115,7 +117,7 @@ impl World {
             .into();
         let look = |object: &Object| {
             let texture = textures[object.photo % CUT_OUTS].clone();
-            Some(Look {
+            Some(Appearance {
                 class: 0,
                 texture,
                 back: None,

@@ -1,9 +1,11 @@
 //! A shot as a folder for the reference renderer.
 
 use super::file::{
-    Camera, Environment, File, Ground, Light, Picture, Quad, Render, Shape, Side, Size, Tray,
+    CyclesCamera, CyclesEnvironment, CyclesFile, CyclesGround, CyclesLight, CyclesPicture,
+    CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
 };
 use crate::asset::Texture;
+use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::{Pose, Vector3};
 use crate::image::Image;
@@ -36,16 +38,16 @@ pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<(
         .as_ref()
         .map(|plate| picture(folder, "plate.exr", plate))
         .transpose()?;
-    let file = File {
-        render: Render {
+    let file = CyclesFile {
+        render: CyclesRender {
             width: shot.camera.image[0],
             height: shot.camera.image[1],
             samples: SAMPLES,
             max_bounces: 0,
         },
         camera: camera(&shot.camera),
-        tray: Tray { size },
-        plate: plate.map(|path| Picture { path }),
+        tray: CyclesTray { size },
+        plate: plate.map(|path| CyclesPicture { path }),
         quads: shot
             .cards
             .iter()
@@ -57,7 +59,7 @@ pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<(
             .map(|l| light(l, shot.exposure))
             .collect(),
         environment: Some(environment(folder, shot)?),
-        ground: Some(Ground {
+        ground: Some(CyclesGround {
             extent: shot.catcher.map(|side| side.min(FAR)),
         }),
     };
@@ -74,11 +76,11 @@ fn picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result
     Ok(name.into())
 }
 
-fn camera(camera: &crate::Camera) -> Camera {
+fn camera(camera: &Camera) -> CyclesCamera {
     let rows =
         |m: nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
     let pose = &camera.camera_from_world;
-    Camera {
+    CyclesCamera {
         K: rows(camera.intrinsics()),
         R: rows(*pose.rotation.to_rotation_matrix().matrix()),
         t: pose.translation.vector.into(),
@@ -86,7 +88,7 @@ fn camera(camera: &crate::Camera) -> Camera {
     }
 }
 
-fn quad(folder: &Path, card: &Card) -> Result<Quad> {
+fn quad(folder: &Path, card: &Card) -> Result<CyclesQuad> {
     let id = card.id.0;
     if !(1..=u32::from(u16::MAX)).contains(&id) {
         return Err(Error::value(
@@ -94,7 +96,7 @@ fn quad(folder: &Path, card: &Card) -> Result<Quad> {
             format!("id {id}, expected 1 to {}", u16::MAX),
         ));
     }
-    Ok(Quad {
+    Ok(CyclesQuad {
         id,
         size: card.quad.size,
         pose: matrix(&card.quad.world_from_card),
@@ -115,13 +117,13 @@ fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
     std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
 }
 
-fn side(folder: &Path, name: &str, texture: &Texture) -> Result<Side> {
+fn side(folder: &Path, name: &str, texture: &Texture) -> Result<CyclesSide> {
     match texture {
-        Texture::Rgba(pyramid) => Ok(Side {
+        Texture::Rgba(pyramid) => Ok(CyclesSide {
             texture: picture(folder, &format!("{name}.exr"), pyramid.base())?,
             film: None,
         }),
-        Texture::Film(pyramid) => Ok(Side {
+        Texture::Film(pyramid) => Ok(CyclesSide {
             texture: picture(
                 folder,
                 &format!("{name}.exr"),
@@ -136,15 +138,15 @@ fn side(folder: &Path, name: &str, texture: &Texture) -> Result<Side> {
     }
 }
 
-fn light(light: &AreaLight, exposure: f32) -> Light {
+fn light(light: &AreaLight, exposure: f32) -> CyclesLight {
     let apart = (Vector3::from(light.target) - Vector3::from(light.position)).norm() > 0.0;
     let [x, y, z] = light.position;
-    Light {
+    CyclesLight {
         shape: match light.shape {
-            LightShape::Rectangle => Shape::Rectangle,
-            LightShape::Ellipse => Shape::Ellipse,
+            LightShape::Rectangle => CyclesShape::Rectangle,
+            LightShape::Ellipse => CyclesShape::Ellipse,
         },
-        size: Size::Two(light.size),
+        size: CyclesSize::Two(light.size),
         power: light.power * f64::from(exposure),
         color: light.color,
         position: light.position,
@@ -154,7 +156,7 @@ fn light(light: &AreaLight, exposure: f32) -> Light {
 }
 
 /// One environment for the constant one and the picture.
-fn environment(folder: &Path, shot: &Shot) -> Result<Environment> {
+fn environment(folder: &Path, shot: &Shot) -> Result<CyclesEnvironment> {
     let Some(EnvironmentMap {
         panorama,
         rotation,
@@ -162,7 +164,7 @@ fn environment(folder: &Path, shot: &Shot) -> Result<Environment> {
     }) = &shot.environment
     else {
         let color = Some(shot.ambient.scale(shot.exposure));
-        return Ok(Environment {
+        return Ok(CyclesEnvironment {
             color,
             path: None,
             strength: 1.0,
@@ -173,7 +175,7 @@ fn environment(folder: &Path, shot: &Shot) -> Result<Environment> {
         .image()
         .map(|c: LinearRgb| (c.scale(*strength) + shot.ambient).scale(shot.exposure));
     let path = Some(picture(folder, "environment.exr", &both)?);
-    Ok(Environment {
+    Ok(CyclesEnvironment {
         color: None,
         path,
         strength: 1.0,

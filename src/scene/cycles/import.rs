@@ -1,8 +1,10 @@
 //! A shot from a file of the reference renderer.
 
-use super::file::{Environment, File, Light, Quad, Shape, Side, Size};
-use crate::Camera;
+use super::file::{
+    CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesShape, CyclesSide, CyclesSize,
+};
 use crate::asset::{Panorama, Texture};
+use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
@@ -22,8 +24,8 @@ use std::sync::Arc;
 /// A file that cannot be read or misses a key; a picture that it names and that cannot be read.
 pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let path = path.as_ref();
-    let file: File = io::read_json(path)?;
-    let files = &Files::of(path)?;
+    let file: CyclesFile = io::read_json(path)?;
+    let files = &PictureFolder::of(path)?;
     let camera = camera(&file).resized(size.unwrap_or([file.render.width, file.render.height]));
     let mut shot = Shot::new(camera);
     if let Some(plate) = &file.plate {
@@ -52,7 +54,7 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
 }
 
 /// The pictures of a scene: they lie in its folder or, where scenes share them, in the folder beside it.
-struct Files {
+struct PictureFolder {
     /// The scene's file.
     scene: PathBuf,
     /// The folder that holds the scene's own.
@@ -61,7 +63,7 @@ struct Files {
     own: PathBuf,
 }
 
-impl Files {
+impl PictureFolder {
     fn of(scene: &Path) -> Result<Self> {
         let whole = std::path::absolute(scene).map_err(|e| Error::file(scene, e))?;
         let folder = whole.parent().unwrap_or(&whole);
@@ -94,7 +96,7 @@ impl Files {
     }
 }
 
-fn camera(file: &File) -> Camera {
+fn camera(file: &CyclesFile) -> Camera {
     let c = &file.camera;
     Camera {
         image: c
@@ -111,24 +113,24 @@ fn rotation(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix))
 }
 
-fn light(l: &Light) -> AreaLight {
+fn light(l: &CyclesLight) -> AreaLight {
     AreaLight {
         shape: match l.shape {
-            Shape::Rectangle | Shape::Square => LightShape::Rectangle,
-            Shape::Disk | Shape::Ellipse => LightShape::Ellipse,
+            CyclesShape::Rectangle | CyclesShape::Square => LightShape::Rectangle,
+            CyclesShape::Disk | CyclesShape::Ellipse => LightShape::Ellipse,
         },
         position: l.position,
         target: l.target,
         size: match l.size {
-            Size::One(side) => [side; 2],
-            Size::Two(sides) => sides,
+            CyclesSize::One(side) => [side; 2],
+            CyclesSize::Two(sides) => sides,
         },
         power: l.power,
         color: l.color,
     }
 }
 
-fn card(files: &Files, q: &Quad) -> Result<Card> {
+fn card(files: &PictureFolder, q: &CyclesQuad) -> Result<Card> {
     let axes = std::array::from_fn(|i| std::array::from_fn(|j| q.pose[i][j]));
     let at = Vector3::new(q.pose[0][3], q.pose[1][3], q.pose[2][3]);
     Ok(Card {
@@ -155,7 +157,7 @@ fn card(files: &Files, q: &Quad) -> Result<Card> {
     })
 }
 
-fn texture(files: &Files, side: &Side) -> Result<Texture> {
+fn texture(files: &PictureFolder, side: &CyclesSide) -> Result<Texture> {
     let color: Image<PremulRgba> = io::read(files.find(&side.texture)?)?;
     let Some(film) = &side.film else {
         return Ok(color.into());
@@ -178,7 +180,7 @@ fn texture(files: &Files, side: &Side) -> Result<Texture> {
         .into())
 }
 
-fn map(files: &Files, around: &Environment) -> Result<Option<EnvironmentMap>> {
+fn map(files: &PictureFolder, around: &CyclesEnvironment) -> Result<Option<EnvironmentMap>> {
     let Some(path) = &around.path else {
         return Ok(None);
     };
@@ -240,7 +242,7 @@ mod tests {
         for name in ["set/textures/a.exr", "set/case/b.exr", "secret.exr"] {
             std::fs::write(at(name), "").unwrap();
         }
-        let files = Files::of(&at("set/case/scene.json")).unwrap();
+        let files = PictureFolder::of(&at("set/case/scene.json")).unwrap();
         assert!(files.find("../textures/a.exr").is_ok() && files.find("b.exr").is_ok());
         for outside in [
             "../../secret.exr",

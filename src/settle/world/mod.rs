@@ -12,7 +12,7 @@ mod run;
 mod units;
 
 use super::is_dropped;
-use super::trace::Sample;
+use super::trace::MotionSample;
 use crate::allowance::Allowance;
 use crate::error::Result;
 use crate::geom::{Pose, Vector3};
@@ -76,7 +76,7 @@ pub(super) struct Fall {
     /// Least and greatest x and y of the room that was passed through; metres of the scene.
     pub(super) swept: [[f64; 2]; 2],
     /// The motion, as often as was asked for.
-    pub(super) samples: Vec<Sample>,
+    pub(super) samples: Vec<MotionSample>,
 }
 
 /// Median of the longer sides of the cards that fall, metres.

@@ -10,7 +10,7 @@ use super::units::Units;
 use super::{CARD, Fall, MASS};
 use crate::allowance::Allowance;
 use crate::error::Result;
-use crate::settle::trace::Sample;
+use crate::settle::trace::MotionSample;
 use crate::work::{self, Kind};
 use rapier3d::prelude::{PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle};
 
@@ -130,20 +130,21 @@ impl Run<'_> {
         }
         let seconds = step as f64 * dt / self.units.time;
         let (per_length, per_time) = (1.0 / self.units.length, self.units.time);
-        fall.samples.extend(
-            self.ids
-                .iter()
-                .zip(self.moving())
-                .map(|(&object, body)| Sample {
-                    seconds,
-                    object,
-                    pose: self.units.to_scene(body.position()),
-                    speed: f64::from(body.linvel().length()) * per_length * per_time,
-                    spin: f64::from(body.angvel().length()) * per_time,
-                    kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
-                    potential: potential(body, &self.world) / self.units.energy(),
-                }),
-        );
+        fall.samples
+            .extend(
+                self.ids
+                    .iter()
+                    .zip(self.moving())
+                    .map(|(&object, body)| MotionSample {
+                        seconds,
+                        object,
+                        pose: self.units.to_scene(body.position()),
+                        speed: f64::from(body.linvel().length()) * per_length * per_time,
+                        spin: f64::from(body.angvel().length()) * per_time,
+                        kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
+                        potential: potential(body, &self.world) / self.units.energy(),
+                    }),
+            );
     }
 }
 

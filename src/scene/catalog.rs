@@ -2,14 +2,14 @@
 
 use crate::asset::{Asset, Library};
 use crate::scene::hull::prism;
-use crate::scene::{Choice, Look, Object};
+use crate::scene::{Appearance, AssetVariant, Object};
 
 /// The assets of a library as a recipe sees them, in the library's order.
-pub fn stock(library: &Library) -> Vec<Choice> {
-    library.assets.iter().map(Choice::from).collect()
+pub fn catalog(library: &Library) -> Vec<AssetVariant> {
+    library.assets.iter().map(AssetVariant::from).collect()
 }
 
-impl From<&Asset> for Choice {
+impl From<&Asset> for AssetVariant {
     fn from(asset: &Asset) -> Self {
         Self {
             asset: asset.name.clone(),
@@ -25,9 +25,9 @@ impl From<&Asset> for Choice {
     }
 }
 
-impl Look {
+impl Appearance {
     /// What an object looks like by a library; none where it lacks the asset or the photo.
-    pub fn of(library: &Library, object: &Object) -> Option<Self> {
+    pub fn from_library(library: &Library, object: &Object) -> Option<Self> {
         let asset = library.find(&object.asset)?;
         let photo = asset.photos.get(object.photo)?;
         let back = match object.back {
