@@ -70,27 +70,34 @@ fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> V
         .collect()
 }
 
-/// Contacts of two bodies: the corners of what their faces, edges or corners that are turned to each
-/// other share.
+/// Contacts of two bodies, of which the higher one is pushed.
 fn pair_contacts(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
-    let Touch {
-        pair: [i, j],
-        towards,
-        ..
-    } = *touch;
-    let near_i = nearest_corners(&solids[i], &towards, reach);
-    let near_j = nearest_corners(&solids[j], &-towards, reach);
-    let height = (near_i.height - near_j.height) / 2.0;
-    let (u, v) = perpendicular_axes(&towards);
-    let shared = shared_corners(&near_i.ring(&u, &v), &near_j.ring(&u, &v), reach);
-    let contact = |p: Vector2<f64>| Contact {
-        body: i,
-        by: Some(j),
-        point: u * p.x + v * p.y + towards * height,
-        normal: -towards,
-        rough: true,
-    };
-    shared.into_iter().map(contact).collect()
+    let [body, by] = touch.pair;
+    let points = shared_points(&solids[body], &solids[by], &touch.towards, reach);
+    points
+        .into_iter()
+        .map(|point| Contact {
+            body,
+            by: Some(by),
+            point,
+            normal: -touch.towards,
+            rough: true,
+        })
+        .collect()
+}
+
+/// The corners of what the faces, edges or corners of two bodies that are turned to each other
+/// share, halfway between the bodies; `towards` is the direction from the first to the second.
+fn shared_points(a: &Solid, b: &Solid, towards: &Vector3<f64>, reach: f64) -> Vec<Vector3<f64>> {
+    let near_a = NearestCorners::new(a, towards, reach);
+    let near_b = NearestCorners::new(b, &-towards, reach);
+    let height = (near_a.height - near_b.height) / 2.0;
+    let (u, v) = perpendicular_axes(towards);
+    let shared = shared_corners(&near_a.ring(&u, &v), &near_b.ring(&u, &v), reach);
+    shared
+        .into_iter()
+        .map(|p| u * p.x + v * p.y + towards * height)
+        .collect()
 }
 
 /// Two unit vectors across another one.
@@ -111,22 +118,22 @@ struct NearestCorners {
     corners: Vec<Vector3<f64>>,
 }
 
-/// The corners that lie farthest in a direction, to within `reach`.
-fn nearest_corners(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> NearestCorners {
-    let height = solid
-        .corners()
-        .map(|corner| corner.dot(towards))
-        .fold(f64::NEG_INFINITY, f64::max);
-    let near = solid
-        .corners()
-        .filter(|corner| corner.dot(towards) > height - reach);
-    NearestCorners {
-        height,
-        corners: near.collect(),
-    }
-}
-
 impl NearestCorners {
+    /// Those of a body, to within `reach`.
+    fn new(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Self {
+        let height = solid
+            .corners()
+            .map(|corner| corner.dot(towards))
+            .fold(f64::NEG_INFINITY, f64::max);
+        let near = solid
+            .corners()
+            .filter(|corner| corner.dot(towards) > height - reach);
+        Self {
+            height,
+            corners: near.collect(),
+        }
+    }
+
     /// Their convex hull in the plane of two axes.
     fn ring(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Vec<Vector2<f64>> {
         convex_hull(self.corners.iter().map(|p| [p.dot(u), p.dot(v)].into()))

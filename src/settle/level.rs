@@ -5,7 +5,7 @@
 //! `flat` mode.
 
 use super::bodies::{rectangle, solids};
-use super::overlap::{Solid, overlap_depth, past_walls};
+use super::overlap::{Solid, falling_from_lowest, overlap_depth, past_walls};
 use crate::allowance::Allowance;
 use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
@@ -82,13 +82,6 @@ pub(super) fn flat(
     }
     let fallen = bodies.iter().filter(|solid| solid.falls);
     Ok(fallen.map(|solid| solid.world_from_body).collect())
-}
-
-/// Indices of the bodies that fall, from the lowest to the highest.
-fn falling_from_lowest(bodies: &[Solid]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..bodies.len()).filter(|&i| bodies[i].falls).collect();
-    order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
-    order
 }
 
 /// Height of the highest body that lies under one; 0 is the surface.

@@ -75,6 +75,13 @@ impl Solid {
     }
 }
 
+/// Indices of the bodies that fall, from the lowest to the highest.
+pub(super) fn falling_from_lowest(solids: &[Solid]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..solids.len()).filter(|&i| solids[i].falls).collect();
+    order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
+    order
+}
+
 /// Ids (index + 1) of dropped bodies whose centre is not over the surface, below it, or not finite.
 pub(super) fn escaped_ids(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
     let numbered = solids.iter().enumerate();
@@ -171,19 +178,30 @@ fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
     for direction in of_a.separating(&of_b) {
         let [low_a, high_a] = a.projection(&of_a.axes, &direction);
         let [low_b, high_b] = b.projection(&of_b.axes, &direction);
-        let (ahead, behind) = (low_b - high_a, low_a - high_b);
-        if ahead.max(behind) > widest.0 {
-            widest = if ahead > behind {
-                (ahead, direction)
-            } else {
-                (behind, -direction)
-            };
-        }
+        widest = wider_gap(widest, [low_b - high_a, low_a - high_b], direction);
         if widest.0 >= reach {
             return None;
         }
     }
     Some(widest)
+}
+
+/// The widest gap so far, or one of those ahead and behind along a direction.
+#[inline]
+fn wider_gap(
+    widest: (f64, Vector3<f64>),
+    [ahead, behind]: [f64; 2],
+    direction: Vector3<f64>,
+) -> (f64, Vector3<f64>) {
+    if ahead.max(behind) > widest.0 {
+        if ahead > behind {
+            (ahead, direction)
+        } else {
+            (behind, -direction)
+        }
+    } else {
+        widest
+    }
 }
 
 /// Directions of a prism in the world.

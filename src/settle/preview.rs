@@ -93,18 +93,24 @@ impl Views {
 
     fn draw_body(&self, canvas: &mut Image<Srgb8>, index: usize, body: &Solid) {
         let color = class_color(index as u32);
-        for face in faces(body) {
-            let ring: Vec<_> = face.iter().map(|p| self.seen_from_above(*p)).collect();
-            outline(canvas, &ring, color);
-        }
-        for face in faces(body) {
-            let ring: Vec<_> = face.iter().map(|p| self.seen_from_front(*p)).collect();
-            outline(canvas, &ring, color);
-        }
+        draw_faces(canvas, body, color, |p| self.seen_from_above(p));
+        draw_faces(canvas, body, color, |p| self.seen_from_front(p));
         let at = self.seen_from_above(body.center().into());
         let at = [at.x as isize, at.y as isize];
         let id = (index + 1).to_string();
         text(canvas, at, &id, ink_on(PAPER_COLOR), TextSize::Small);
+    }
+}
+
+fn draw_faces(
+    canvas: &mut Image<Srgb8>,
+    body: &Solid,
+    color: Srgb8,
+    project: impl Fn(Point3<f64>) -> Point2<f64>,
+) {
+    for face in faces(body) {
+        let ring: Vec<_> = face.into_iter().map(&project).collect();
+        outline(canvas, &ring, color);
     }
 }
 

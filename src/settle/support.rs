@@ -16,7 +16,7 @@
 use super::bodies::{touch_distance, typical_length};
 use super::contact::{Contact, contacts, perpendicular_axes};
 use super::envelope::EnvelopeMatrix;
-use super::overlap::{Solid, Touch};
+use super::overlap::{Solid, Touch, falling_from_lowest};
 use crate::geom::Vector3;
 use crate::scene::{Scene, SettleOptions};
 
@@ -90,8 +90,7 @@ struct SpringModel {
 
 impl SpringModel {
     fn new(scene: &Scene, options: &SettleOptions, solids: &[Solid], contacts: &[Contact]) -> Self {
-        let mut order: Vec<usize> = (0..solids.len()).filter(|&i| solids[i].falls).collect();
-        order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
+        let order = falling_from_lowest(solids);
         let masses = relative_masses(scene, &order);
         let geometry = SpringGeometry::new(solids, &order, typical_length(scene));
         let friction = FRICTION_FACTOR * scene.surface.friction;

@@ -118,16 +118,7 @@ impl Drop<'_> {
         let units = WorldUnits::new(self.scene, self.options);
         let pace = self.pace(members.len());
         self.check_work(members, &units, &pace)?;
-        let mut world = self.empty_world(pace.step);
-        self.add_room(&mut world, &units, members);
-        let standing = self.scene.objects.iter().filter(|o| !is_dropped(o));
-        for object in standing {
-            self.add_body(&mut world, object, 0.0, &units);
-        }
-        let bodies = members
-            .iter()
-            .map(|&i| self.add_body(&mut world, &self.scene.objects[i], self.heights[i], &units))
-            .collect();
+        let (world, bodies) = self.filled_world(members, &units, pace.step);
         FallRun {
             world,
             bodies,
@@ -138,6 +129,26 @@ impl Drop<'_> {
             allowance: self.allowance,
         }
         .run_to_rest()
+    }
+
+    /// The room, all that stands in it, and what falls: the handles of that.
+    fn filled_world(
+        &self,
+        members: &[usize],
+        units: &WorldUnits,
+        step: f64,
+    ) -> (PhysicsWorld, Vec<RigidBodyHandle>) {
+        let mut world = self.empty_world(step);
+        self.add_room(&mut world, units, members);
+        let standing = self.scene.objects.iter().filter(|o| !is_dropped(o));
+        for object in standing {
+            self.add_body(&mut world, object, 0.0, units);
+        }
+        let bodies = members
+            .iter()
+            .map(|&i| self.add_body(&mut world, &self.scene.objects[i], self.heights[i], units))
+            .collect();
+        (world, bodies)
     }
 
     fn pace(&self, objects: usize) -> Pace {

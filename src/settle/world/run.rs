@@ -50,34 +50,17 @@ impl FallRun<'_> {
     /// Steps until everything rests or the time is over.
     pub(super) fn run_to_rest(mut self) -> Result<Fall> {
         let steps = (self.pace.time_limit / self.pace.step).ceil() as usize;
-        let mut stillness = Stillness::default();
-        let mut energy = EnergyTrack::new(&self);
-        let mut fall = Fall {
-            swept: [[f64::INFINITY, -f64::INFINITY]; 2],
-            ..Fall::default()
-        };
-        self.record_samples(&mut fall, 0);
+        let mut record = FallRecord::new(&self);
         for step in 1..=steps {
             // Nothing is active before the first step.
             self.step_world()?;
-            let now = step as f64 * self.pace.step;
-            let kinetic = energy.update(&self);
-            self.extend_swept(&mut fall.swept);
-            self.record_samples(&mut fall, step);
-            fall.seconds = now / self.units.time;
-            if self.is_asleep()
-                || (stillness.lasts(&self, now) && kinetic < self.trembling_energy())
-            {
-                fall.rests = self.world.quarantine().is_empty();
+            let comes_to_rest = record.add_step(&self, step);
+            if comes_to_rest {
+                record.fall.rests = self.world.quarantine().is_empty();
                 break;
             }
         }
-        fall.energy_rise = energy.relative_rise();
-        fall.poses = self
-            .moving_bodies()
-            .map(|body| self.units.to_scene(body.position()))
-            .collect();
-        Ok(fall)
+        Ok(record.finish(&self))
     }
 
     fn step_world(&mut self) -> Result<()> {
@@ -139,6 +122,47 @@ impl FallRun<'_> {
             kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
             potential: potential_energy(body, &self.world) / self.units.energy(),
         }
+    }
+}
+
+/// What is recorded of a fall while it lasts.
+struct FallRecord {
+    stillness: Stillness,
+    energy: EnergyTrack,
+    fall: Fall,
+}
+
+impl FallRecord {
+    fn new(run: &FallRun) -> Self {
+        let mut fall = Fall {
+            swept: [[f64::INFINITY, -f64::INFINITY]; 2],
+            ..Fall::default()
+        };
+        run.record_samples(&mut fall, 0);
+        Self {
+            stillness: Stillness::default(),
+            energy: EnergyTrack::new(run),
+            fall,
+        }
+    }
+
+    /// Takes in the state after a step; returns whether everything is at rest.
+    fn add_step(&mut self, run: &FallRun, step: usize) -> bool {
+        let now = step as f64 * run.pace.step;
+        let kinetic = self.energy.update(run);
+        run.extend_swept(&mut self.fall.swept);
+        run.record_samples(&mut self.fall, step);
+        self.fall.seconds = now / run.units.time;
+        run.is_asleep() || (self.stillness.lasts(run, now) && kinetic < run.trembling_energy())
+    }
+
+    fn finish(mut self, run: &FallRun) -> Fall {
+        self.fall.energy_rise = self.energy.relative_rise();
+        self.fall.poses = run
+            .moving_bodies()
+            .map(|body| run.units.to_scene(body.position()))
+            .collect();
+        self.fall
     }
 }
 
