@@ -27,19 +27,19 @@ CORE         := 0
 .PHONY: peers demo test lint bench golden formats python packages blender soak soak-dataset fuzz
 
 demo: packages
-	$(CARGO) build --release --locked --bins
+	$(CARGO) build --release --locked -p petcomp-cli
 	target/release/petcomp demo -o $(OUT)
 
 test: packages python
 	PETCOMP_PYTHON=$(PYTHON) $(CARGO) test --release --locked
 	@for f in $(FEATURES); do \
 	  echo "features [$$f] alone"; \
-	  $(CARGO) check --release --locked --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
+	  $(CARGO) check --release --locked -p petcomp --no-default-features --features "$$f" --lib --tests --quiet || exit 1; \
 	done
 
 # 100,000 damaged pictures.
 soak: packages
-	$(CARGO) test --release --locked --test io -- --ignored --nocapture sweep::soak
+	$(CARGO) test --release --locked -p petcomp-cli --test io -- --ignored --nocapture sweep::soak
 
 # Kills, a full disk and a Slurm of one machine; what comes out must be what an unbroken run gives.
 soak-dataset: demo
@@ -57,13 +57,13 @@ fuzz: packages
 	  done; \
 	else \
 	  echo "no cargo-fuzz here: seeds and chance instead"; \
-	  $(CARGO) test --release --locked --test io -- --ignored --nocapture fuzz::; \
+	  $(CARGO) test --release --locked -p petcomp-cli --test io -- --ignored --nocapture fuzz::; \
 	fi
 
 lint: packages
 	$(CARGO) fmt --check
 	$(CARGO) clippy --release --locked --all-targets -- -D warnings
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --locked --no-deps --lib -p petcomp
 
 # Only the tests that ask the programs that datasets are written for, and what those say.
 formats: packages python
@@ -72,9 +72,9 @@ formats: packages python
 # About ten minutes on two cores: what each stage takes (criterion, inputs made in code), then error against run time of
 # every approximate stage on one page.
 bench: packages
-	$(CARGO) bench --locked $(addprefix --bench ,$(BENCHES)) -- --warm-up-time 1 --measurement-time 2
 	$(CARGO) build --release --locked --bins
-	target/release/petcomp report all -o $(REPORT)
+	$(CARGO) bench --locked -p petcomp $(addprefix --bench ,$(BENCHES)) -- --warm-up-time 1 --measurement-time 2
+	target/release/petcomp-report all -o $(REPORT)
 
 # petcomp and other programs on the same input and core, by turns: target/peers/*.json and a table. What cannot be
 # installed is named there as absent.

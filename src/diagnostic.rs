@@ -112,6 +112,11 @@ codes! {
     SidesSwapped "camera.sides_swapped" "Width and height of the surface look exchanged"
     PoseAmbiguous "camera.pose_ambiguous" "Another pose fits almost as well"
     OutlierPhoto "camera.outlier_photo" "A photo contradicts the others and was left out"
+    // Asset.
+    SizeMismatch "asset.size_mismatch" "The given size has other proportions than the outline"
+    ScreenSizeMismatch "asset.screen_size_mismatch" "The screen does not look like one of the given size"
+    ScreenSidesAmbiguous "asset.screen_sides_ambiguous" "Width and height of the screen may be exchanged"
+    Uncoded "asset.uncoded" "A warning written by a version without codes"
     // Matte.
     LeftOut "matte.left_out" "Something beside the object was left out"
     TwoObjects "matte.two_objects" "The object may be two objects"
@@ -134,6 +139,20 @@ codes! {
     ClippedObject "matte.clipped_object" "A part of the object is overexposed"
     Moved "matte.moved" "The object moved between two photos and was aligned"
     SimilarScreens "matte.similar_screens" "The screens do not differ in a channel"
+}
+
+impl Code {
+    /// Concerns the colour and the transmittance inside the outline, not the outline itself.
+    pub const fn is_about_color(self) -> bool {
+        matches!(
+            self,
+            Self::GreyScreen
+                | Self::ScreenHue
+                | Self::KeyedAway
+                | Self::TintUncertain
+                | Self::ClippedObject
+        )
+    }
 }
 
 impl fmt::Display for Code {

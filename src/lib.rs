@@ -27,7 +27,6 @@ mod pixel;
 pub mod plot;
 mod quality;
 pub mod render;
-pub mod report;
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;

@@ -133,7 +133,7 @@ pub fn counted<T: Send>(job: impl FnOnce() -> T + Send) -> std::io::Result<(T, W
 }
 
 /// A pool whose threads are listened to by whoever listens to this one.
-pub(crate) fn pool(threads: usize) -> std::io::Result<rayon::ThreadPool> {
+pub fn pool(threads: usize) -> std::io::Result<rayon::ThreadPool> {
     pool_for(LISTENER.with_borrow(Clone::clone), threads)
 }
 

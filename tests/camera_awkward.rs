@@ -1,4 +1,4 @@
-//! Awkward and wrong labels: what happens, exactly. The extreme ones are rows of `petcomp report stability`.
+//! Awkward and wrong labels: what happens, exactly. The extreme ones are rows of `petcomp-report stability`.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 

@@ -20,8 +20,8 @@ pub struct Built {
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
     pub refused: Vec<String>,
-    /// Cut-outs that a person should look at, and why.
-    pub doubtful: Vec<String>,
+    /// Cut-outs that a person should review, and why.
+    pub needs_review: Vec<String>,
 }
 
 /// Names of the lists that a folder may hold.
@@ -69,10 +69,11 @@ pub fn build(
             }
             other => other.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?,
         };
-        if !record.doubts.is_empty() {
+        if record.needs_review() {
+            let reasons = record.review_reasons();
             built
-                .doubtful
-                .push(format!("{}: {}", record.file, record.doubts.join("; ")));
+                .needs_review
+                .push(format!("{}: {reasons}", record.file));
         }
         built.lengths.push([record.object_m[0], record.error_m]);
         let inserted = manifest.insert(asset_of(add, record));
@@ -150,6 +151,7 @@ fn list_in(path: &Path) -> Result<PathBuf> {
 mod tests {
     use super::super::{Library, MANIFEST, PhotoRecord, contact_sheet};
     use super::*;
+    use crate::diagnostic::Code;
     use crate::image::Image;
     use crate::io;
     use crate::pixel::LinearRgb;
@@ -430,24 +432,24 @@ mod tests {
         let built = build(folder.path().join("photos.toml"), &out, &|_, _| ()).unwrap();
         assert!(
             built
-                .doubtful
+                .needs_review
                 .iter()
                 .any(|d| d.contains("two.exr") && d.contains("too grey")),
             "{:?}",
-            built.doubtful
+            built.needs_review
         );
         let library = Library::open(&out).unwrap();
         let [one, two] = [0, 1].map(|i| &library.assets[0].photos[i].record);
         assert!(
-            two.doubts.iter().any(|doubt| doubt.contains("guessed")),
+            two.diagnostics.iter().any(|d| d.code == Code::GreyScreen),
             "{:?}",
-            two.doubts
+            two.diagnostics
         );
         assert!(
             one.color_confidence > Some(0.6) && two.color_confidence < Some(0.55),
             "{one:?} {two:?}"
         );
-        let plain = built_sheet_height(&library, |record| record.doubts.clear());
+        let plain = built_sheet_height(&library, |record| record.diagnostics.clear());
         assert!(plain < built_sheet_height(&library, |_| ()));
     }
 
@@ -463,18 +465,16 @@ mod tests {
     }
 
     #[test]
-    fn a_told_size_that_contradicts_the_outline_is_doubted() {
-        let is_doubted = |width: &str| {
+    fn a_given_size_that_contradicts_the_outline_needs_review() {
+        let needs_review = |width: &str| {
             let list = TWO.replace("length = 0.3", &format!("length = 0.3\nwidth = {width}"));
-            let doubts = built(&list).unwrap().assets[0].photos[0]
-                .record
-                .doubts
-                .clone();
-            doubts
-                .iter()
-                .any(|doubt| doubt.contains("times as long as wide"))
+            let library = built(&list).unwrap();
+            let diagnostics = &library.assets[0].photos[0].record.diagnostics;
+            diagnostics.iter().any(|d| {
+                d.code == Code::SizeMismatch && d.message.contains("times as long as wide")
+            })
         };
-        assert!(!is_doubted("0.15") && is_doubted("0.25"));
+        assert!(!needs_review("0.15") && needs_review("0.25"));
     }
 
     #[test]

@@ -72,18 +72,18 @@ fn strip(photo: &Photo) -> Image<Srgb8> {
     let width = BACKGROUNDS.len() * (SIDE + GAP);
     let [length, across] = record.object_m.map(|m| 1e3 * m);
     let title = format!(
-        "{}  {length:.1} x {across:.1} mm (+- {:.1})  sure of outline {:.2}{}",
+        "{}  {length:.1} x {across:.1} mm (+- {:.1})  outline confidence {:.2}{}",
         record.file,
         1e3 * record.error_m,
         record.outline_confidence,
         record
             .color_confidence
-            .map(|sure| format!(", of colour {sure:.2}"))
+            .map(|sure| format!(", colour {sure:.2}"))
             .unwrap_or_default()
     );
-    let told =
-        std::iter::once((&title, INK)).chain(record.doubts.iter().map(|doubt| (doubt, WARNING)));
-    let lines: Vec<(String, Srgb8)> = told
+    let reasons = record.diagnostics.iter().map(|d| (&d.message, WARNING));
+    let lines: Vec<(String, Srgb8)> = std::iter::once((&title, INK))
+        .chain(reasons)
         .flat_map(|(text, ink)| {
             draw::wrapped(text, width, TextSize::Small)
                 .into_iter()
@@ -131,12 +131,16 @@ mod tests {
     use super::super::manifest::tests::photo;
     use super::*;
     use crate::asset::Asset;
+    use crate::diagnostic::{Code, Diagnostic};
     use crate::pixel::PremulRgba;
     use std::sync::Arc;
 
-    fn library(doubts: &[&str], count: usize) -> Library {
+    fn library(warnings: &[&str], count: usize) -> Library {
         let mut record = photo("a.exr");
-        record.doubts = doubts.iter().map(|d| (*d).into()).collect();
+        record.diagnostics = warnings
+            .iter()
+            .map(|text| Diagnostic::warning(Code::Uncoded, text))
+            .collect();
         let texture = Image::filled(480, 240, PremulRgba::TRANSPARENT).into();
         let one = Photo {
             size: [0.4, 0.2],
@@ -170,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn doubts_are_written_and_make_room() {
+    fn diagnostics_are_written_and_make_room() {
         let heights = [&[][..], &["two objects"], &["two objects", "blurred"]]
             .map(|d| contact_sheet(&library(d, 1)).height());
         assert!(heights[0] < heights[1] && heights[1] < heights[2]);

@@ -8,9 +8,10 @@ use super::measure::Measured;
 use super::screen_source::ScreenSource;
 use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
 use crate::bounds::{MASS, OBJECT, PX_PER_METRE, SURFACE, THICKNESS, WIDTH, number};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::matte::{ColorDoubts, CutOut, CutOutOptions, Remark, cut_out_on};
+use crate::matte::{ColorDoubts, CutOut, CutOutOptions, cut_out_on};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
@@ -190,13 +191,13 @@ pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result
     let cut =
         cut_out_on(&on_screen.photo, empty.as_ref(), &options).map_err(|e| named(e, photo))?;
     watch.lap("cut out");
-    for remark in &cut.remarks {
-        let level = if matches!(remark, Remark::ScreenHue(_)) {
+    for diagnostic in &cut.diagnostics {
+        let level = if diagnostic.code == Code::ScreenHue {
             log::Level::Warn
         } else {
             log::Level::Info
         };
-        log::log!(level, "{}: {remark}", photo.display());
+        log::log!(level, "{}: {diagnostic}", photo.display());
     }
     let record = record(&cut, add, &on_screen, photo);
     add.check_length(&record)?;
@@ -251,13 +252,13 @@ fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> P
     let measured = Measured::of(cut, add, on_screen);
     let file = cut_out_file(photo, add);
     let (w, h) = cut.film.size();
-    let doubts = cut
-        .remarks
+    let diagnostics = cut
+        .diagnostics
         .iter()
-        .filter(|r| r.is_doubt())
-        .map(Remark::to_string)
-        .chain(measured.doubt)
-        .chain(on_screen.doubt());
+        .filter(|d| Diagnostic::needs_review(d))
+        .cloned()
+        .chain(measured.size_mismatch)
+        .chain(on_screen.diagnostic());
     PhotoRecord {
         file,
         source: photo
@@ -276,8 +277,8 @@ fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> P
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.doubts.map(ColorDoubts::confidence),
-        doubts: doubts.collect(),
         truncated: cut.segmentation.touches.contains(&true),
         outline_px: cut.hull.iter().map(files::rounded).collect(),
+        diagnostics: diagnostics.collect(),
     }
 }

@@ -1,6 +1,7 @@
 //! The plane of the screen in a photo, by what lies in it: the screen's own four corners, or a printed marker.
 
 use crate::camera::{self, Camera, Label, Marker, Solution, TELLING, any_markers, rectify};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::geom::{Point2, Point3, Pose, UnitQuaternion, Vector3};
@@ -251,19 +252,21 @@ impl OnScreen {
             .map(|view| [view.px_per_metre, view.ground.sigma(view.place(at))])
     }
 
-    /// Why a person should look at a size that is told by this.
-    pub(super) fn doubt(&self) -> Option<String> {
+    /// The warning about a size that is measured by this.
+    pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
         let ground = &self.view.as_ref()?.ground;
         let ([w, h], percent) = (ground.size, 100.0 * ground.exchanged);
         let odd = || {
-            format!(
+            let message = format!(
                 "the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?"
-            )
+            );
+            Diagnostic::warning(Code::ScreenSizeMismatch, message)
         };
         let turned = || {
-            format!(
-                "which side of the screen is the longer one cannot be seen: lengths may be {percent:.0} % other"
-            )
+            let message = format!(
+                "the longer side of the screen cannot be identified: lengths may be off by {percent:.0} %"
+            );
+            Diagnostic::warning(Code::ScreenSidesAmbiguous, message)
         };
         let is_turned = ground.exchanged > NOTEWORTHY;
         ground.is_odd.then(odd).or_else(|| is_turned.then(turned))
@@ -536,12 +539,13 @@ mod tests {
                 photo: Image::new(0, 0),
                 view: Some(View::of_screen(ground, 0.0)),
             }
-            .doubt()
+            .diagnostic()
         };
         assert_eq!(doubt(SCREEN), None);
         assert!(
             doubt([0.5, 0.5])
                 .unwrap()
+                .message
                 .ends_with("0.500 x 0.500 m; are width and height right?")
         );
     }
@@ -580,9 +584,10 @@ mod tests {
             view: Some(View::of_screen(ground, 0.0)),
         };
         assert!(
-            seen.doubt()
+            seen.diagnostic()
                 .unwrap()
-                .starts_with("which side of the screen is the longer one cannot be seen")
+                .message
+                .starts_with("the longer side of the screen cannot be identified")
         );
     }
 

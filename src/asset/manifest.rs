@@ -2,11 +2,12 @@
 
 use super::MANIFEST;
 use crate::bounds::{Bounds, MASS, OBJECT, PX_PER_METRE, THICKNESS, WIDTH};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::MatteMethod;
 use crate::pixel::LinearRgb;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
 /// What is in an asset folder, without the pictures.
@@ -72,14 +73,53 @@ pub struct PhotoRecord {
     /// How far colour and transmittance can be believed, 0 to 1; missing where nobody has asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color_confidence: Option<f64>,
-    /// Why a person should look at this cut-out; empty where nothing is odd.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub doubts: Vec<String>,
     /// The object reached a border of the photo: part of it is missing.
     #[serde(default)]
     pub truncated: bool,
     /// Convex hull in pixels of the cut-out, clockwise as seen.
     pub outline_px: Vec<[f64; 2]>,
+    /// Why a person should review this cut-out; empty where there is no reason.
+    #[serde(
+        default,
+        alias = "doubts",
+        deserialize_with = "coded_or_plain",
+        skip_serializing_if = "Vec::is_empty"
+    )]
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl PhotoRecord {
+    /// A person should review this cut-out.
+    pub fn needs_review(&self) -> bool {
+        self.diagnostics.iter().any(Diagnostic::needs_review)
+    }
+
+    /// The messages of the diagnostics, in one line.
+    pub fn review_reasons(&self) -> String {
+        let messages: Vec<&str> = self.diagnostics.iter().map(|d| &*d.message).collect();
+        messages.join("; ")
+    }
+}
+
+/// Reads diagnostics, and the plain texts (`doubts`) that earlier versions wrote in their place.
+fn coded_or_plain<'de, D: Deserializer<'de>>(
+    input: D,
+) -> std::result::Result<Vec<Diagnostic>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(
+        untagged,
+        expecting = "a table of code, severity and message, or a text"
+    )]
+    enum CodedOrPlain {
+        Coded(Diagnostic),
+        Plain(String),
+    }
+    let entries = Vec::<CodedOrPlain>::deserialize(input)?;
+    let diagnostics = entries.into_iter().map(|entry| match entry {
+        CodedOrPlain::Coded(diagnostic) => diagnostic,
+        CodedOrPlain::Plain(text) => Diagnostic::warning(Code::Uncoded, text),
+    });
+    Ok(diagnostics.collect())
 }
 
 fn certain() -> f64 {
@@ -338,9 +378,9 @@ pub(super) mod tests {
             unevenness: 0.1,
             outline_confidence: 0.9,
             color_confidence: Some(0.8),
-            doubts: Vec::new(),
             truncated: false,
             outline_px: vec![[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]],
+            diagnostics: Vec::new(),
         }
     }
 
@@ -534,5 +574,25 @@ pub(super) mod tests {
         assert_eq!(manifest.assets[1].photos.len(), 1);
         assert_eq!(manifest.assets[1].photos[0].px_per_metre, 120.0);
         assert!(manifest.insert(asset("a", "cap")).is_err());
+    }
+
+    #[test]
+    fn diagnostics_keep_their_codes_and_texts_of_earlier_versions_become_warnings() {
+        let mut record = photo("a.exr");
+        record.diagnostics = vec![
+            Diagnostic::warning(Code::Truncated, "the object reaches the left border"),
+            Diagnostic::note(Code::Moved, "photo 2 was aligned"),
+        ];
+        let written = toml::to_string(&record).unwrap();
+        assert!(written.contains("matte.truncated"), "{written}");
+        assert_eq!(toml::from_str::<PhotoRecord>(&written).unwrap(), record);
+        let earlier = toml::to_string(&photo("a.exr")).unwrap()
+            + "doubts = [\"two objects\", \"the outline is unsure\"]\n";
+        let read: PhotoRecord = toml::from_str(&earlier).unwrap();
+        assert_eq!(read.review_reasons(), "two objects; the outline is unsure");
+        assert!(read.needs_review() && read.diagnostics.iter().all(|d| d.code == Code::Uncoded));
+        let wrong = earlier.replace("\"two objects\"", "7");
+        let error = toml::from_str::<PhotoRecord>(&wrong).unwrap_err();
+        assert!(error.to_string().contains("or a text"), "{error}");
     }
 }

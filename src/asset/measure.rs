@@ -3,6 +3,7 @@
 use super::folder::{AddPhoto, Scale};
 use super::ground::OnScreen;
 use super::size::oriented_size;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Vector2};
 use crate::matte::CutOut;
 
@@ -16,8 +17,8 @@ pub(super) struct Measured {
     pub(super) hull_m: [f64; 2],
     /// Standard error of the length.
     pub(super) error_m: f64,
-    /// The told size does not fit the outline.
-    pub(super) doubt: Option<String>,
+    /// The given size does not fit the outline.
+    pub(super) size_mismatch: Option<Diagnostic>,
 }
 
 /// Standard error of one side of an outline, pixels of the picture that was searched: root mean square over the four sides
@@ -48,7 +49,7 @@ impl Measured {
             object_m: tight.map(metres),
             hull_m: hull.map(metres),
             error_m: libm::hypot(metres(error_px), sigma * metres(tight[0])),
-            doubt: doubt(tight, error_px, add.scale),
+            size_mismatch: size_mismatch(tight, error_px, add.scale),
         }
     }
 }
@@ -63,17 +64,19 @@ fn middle(cut: &CutOut) -> Point2<f64> {
     Point2::from(middle / cut.scale + Vector2::new(cut.roi.x as f64, cut.roi.y as f64))
 }
 
-fn doubt(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<String> {
+/// The warning about a given size of other proportions than the outline.
+fn size_mismatch(tight: [f64; 2], error_px: f64, scale: Scale) -> Option<Diagnostic> {
     let Scale::Size([length, width]) = scale else {
         return None;
     };
-    let (told, seen) = (width / length, tight[1] / tight[0]);
+    let (given, seen) = (width / length, tight[1] / tight[0]);
     let slack = PROPORTION_SLACK + error_px / tight[1];
-    ((told / seen - 1.0).abs() > slack).then(|| {
-        format!(
-            "the outline is {:.2} times as long as wide, the size that was told {:.2} times",
+    ((given / seen - 1.0).abs() > slack).then(|| {
+        let message = format!(
+            "the outline is {:.2} times as long as wide, the given size {:.2} times",
             1.0 / seen,
-            1.0 / told
-        )
+            1.0 / given
+        );
+        Diagnostic::warning(Code::SizeMismatch, message)
     })
 }

@@ -59,6 +59,8 @@ pub use marker::{FAMILY as MARKER_FAMILY, Marker, find_markers, with_markers};
 pub use options::{CornerOrder, Effort, Priors, SolveOptions};
 pub use overlay::overlay;
 pub use pinhole::Camera;
+#[doc(hidden)]
+pub use pinhole::distorted;
 pub use read::{
     Labelled, check_distance, check_size, photo_of, read_label, read_labels, with_photo,
 };

@@ -51,7 +51,7 @@ pub struct Priors {
     /// Of the principal point of a whole picture, in picture diagonals. Default: 0.005.
     pub principal_sigma: f64,
     /// Of the principal point of a picture that is cropped, or may be, in picture diagonals. Default: 0.12 (somebody who
-    /// cuts a third away on one side moves it by 0.2 diagonals; see `petcomp report camera`).
+    /// cuts a third away on one side moves it by 0.2 diagonals; see `petcomp-report camera`).
     pub cropped_sigma: f64,
     /// Relative, of the ratio of the sides. Default: 0.005.
     pub ratio_sigma: f64,

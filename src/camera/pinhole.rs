@@ -82,7 +82,7 @@ impl Camera {
 }
 
 /// Where a point is seen through a lens with distortion; not finite behind the camera.
-pub(crate) fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
+pub fn distorted(camera: &Camera, kappa: f64, point: Point3<f64>) -> Point2<f64> {
     let half = libm::hypot(f64::from(camera.image[0]), f64::from(camera.image[1])) / 2.0;
     let Some((px, _)) = camera.project(point) else {
         return Point2::new(f64::NAN, f64::NAN);

@@ -1,7 +1,7 @@
 //! Random views of a rectangle with a known camera: what tests, benches and reports measure the solver against.
 
 use super::label::Label;
-pub(crate) use super::pinhole::distorted;
+use super::pinhole::distorted;
 use super::problem::corner_points;
 use crate::camera::Camera;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};

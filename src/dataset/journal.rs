@@ -21,7 +21,7 @@ use std::io::{BufRead, BufReader, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 /// Name of the journal in a dataset's folder.
-pub(crate) const JOURNAL: &str = "index.jsonl";
+pub const JOURNAL: &str = "index.jsonl";
 
 /// What the journal says of one finished sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

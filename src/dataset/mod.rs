@@ -60,7 +60,8 @@ pub use estimate::LongRun;
 pub use formats::{Extent, Format, LabelSetup};
 pub use generate::{Plan, generate};
 pub use inputs::Inputs;
-pub(crate) use journal::JOURNAL;
+#[doc(hidden)]
+pub use journal::JOURNAL;
 pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report, mend};
 pub use layers::Layers;

@@ -213,7 +213,7 @@ pub(super) fn encode(
 }
 
 /// A picture as it comes back from a file of a quality, 1 to 100; nothing for one without pixels.
-pub(crate) fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
+pub fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
     let file = encode(
         image.size(),
         bytemuck::cast_slice(image.pixels()),

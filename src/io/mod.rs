@@ -91,7 +91,8 @@ pub use document::{
 pub(crate) use document::{from_table, read_bytes, suggestion};
 pub use format::Format;
 pub use header::Header;
-pub(crate) use jpeg::through_jpeg;
+#[doc(hidden)]
+pub use jpeg::through_jpeg;
 pub use limits::{Limits, Raise};
 pub use overrides::Override;
 pub use picture::Picture;

@@ -111,7 +111,8 @@ pub enum AmodalBox {
 }
 
 /// The outline of a card as the camera sees it, clipped to the picture: one ring per part, pixels.
-pub(crate) fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
+#[doc(hidden)]
+pub fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
     outline::rings(&outline::region(card, camera))
 }
 

@@ -4,10 +4,10 @@ use super::film::{ColorDoubts, FilmMatte, FilmOptions, PartOf, film_of_part};
 use super::key::{KeyOptions, Keying, Screen};
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
-use super::remark::Remark;
 use super::screen::{screen_color, screen_pixels};
 use super::segment::{SegmentOptions, Segmentation, segment};
 use crate::bounds::Bounds;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
@@ -124,7 +124,7 @@ pub struct CutOut {
     /// What makes its colours and its transmittance wrong; of the physical matte only.
     pub doubts: Option<ColorDoubts>,
     /// What a person should know, of the segmentation, the screen and the matte.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
     /// Where the object was found in the photo.
     pub segmentation: Segmentation,
 }
@@ -136,20 +136,20 @@ impl CutOut {
     }
 }
 
-/// A matte that leaves more than this of the screen is worth a remark: what it leaves veils the object, too.
+/// A matte that leaves more than this of the screen is worth a warning: what it leaves veils the object, too.
 const RESIDUE: f32 = 0.2;
 
 /// A screen that is clipped in more of its pixels than this is worth a look: a plate goes on under the object, so a corner
 /// beside a lamp may be clipped.
 const CLIPPED_SCREEN: f32 = 0.1;
 
-/// The remark on a screen that is too bright for the camera; none where the matte does not ask for the screen.
+/// The warning about a screen that is too bright for the camera; none where the matte does not ask for the screen.
 fn clipped_screen(
     photo: &Image<LinearRgb>,
     found: &Segmentation,
     method: MatteMethod,
     clipped: f32,
-) -> Option<Remark> {
+) -> Option<Diagnostic> {
     if method == MatteMethod::Outline {
         return None;
     }
@@ -162,12 +162,29 @@ fn clipped_screen(
         (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped))
     });
     let share = count as f32 / all.max(1) as f32;
-    (share > CLIPPED_SCREEN).then_some(Remark::ClippedScreen(share))
+    (share > CLIPPED_SCREEN).then(|| {
+        let message = format!(
+            "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",
+            100.0 * share
+        );
+        Diagnostic::warning(Code::ClippedScreen, message)
+    })
+}
+
+/// `share` is the mean matte on the screen.
+fn residual_matte(share: f32) -> Diagnostic {
+    Diagnostic::warning(
+        Code::ResidualMatte,
+        format_args!(
+            "residual matte of {:.0} % on the screen: uneven light, or an object of the screen's hue",
+            100.0 * share
+        ),
+    )
 }
 
 /// Cuts the one object out of a photo on a uniform screen or board.
 ///
-/// `photo` is scene-linear. On a screen too grey to be keyed what is see-through is guessed, and a [`Remark`] says so.
+/// `photo` is scene-linear. On a screen too grey to be keyed what is see-through is guessed, and a [`Diagnostic`] says so.
 ///
 /// # Errors
 /// Those of [`segment`] and of [`ScreenPlate::fit`]; [`Error::Value`] (`key.clip_black`, `soften_px`, ..) for an option
@@ -227,10 +244,10 @@ pub fn cut_out_on(
     let scale = (opts.longest_side as f64 / roi.width.max(roi.height) as f64).min(1.0);
     let corner = Point2::new(roi.x as f64, roi.y as f64);
     let moved = |p: Point2<f64>| Point2::from((p - corner) * scale);
-    let mut remarks = segmentation.remarks.clone();
-    remarks.extend(matted.remarks);
-    remarks.extend((matted.residue > RESIDUE).then_some(Remark::Residue(matted.residue)));
-    remarks.extend(clipped_screen(
+    let mut diagnostics = segmentation.diagnostics.clone();
+    diagnostics.extend(matted.diagnostics);
+    diagnostics.extend((matted.residue > RESIDUE).then(|| residual_matte(matted.residue)));
+    diagnostics.extend(clipped_screen(
         photo,
         &segmentation,
         method,
@@ -254,7 +271,7 @@ pub fn cut_out_on(
         method,
         residue: matted.residue,
         doubts: matted.doubts,
-        remarks,
+        diagnostics,
         segmentation,
     })
 }
@@ -321,7 +338,7 @@ struct Matted {
     uncertainty: Image<Coverage>,
     residue: f32,
     doubts: Option<ColorDoubts>,
-    remarks: Vec<Remark>,
+    diagnostics: Vec<Diagnostic>,
 }
 
 impl Matted {
@@ -339,7 +356,7 @@ impl Matted {
             transmittance,
             uncertainty,
             doubts,
-            remarks,
+            diagnostics,
             ..
         } = solved;
         // Film is empty outside the cut.
@@ -349,7 +366,7 @@ impl Matted {
             uncertainty,
             residue: 0.0,
             doubts: Some(doubts),
-            remarks,
+            diagnostics,
         })
     }
 
@@ -379,7 +396,7 @@ impl Matted {
             uncertainty: Image::new(image.width(), image.height()),
             residue,
             doubts: None,
-            remarks: Vec::new(),
+            diagnostics: Vec::new(),
         }
     }
 }
@@ -480,11 +497,11 @@ mod tests {
         );
         assert_eq!(image[(0, 0)].a, 0.0);
         assert!(
-            cut.remarks
+            cut.diagnostics
                 .iter()
-                .any(|r| matches!(r, Remark::GreyScreen(_)) && r.is_doubt()),
+                .any(|d| d.code == Code::GreyScreen && d.needs_review()),
             "{:?}",
-            cut.remarks
+            cut.diagnostics
         );
     }
 

@@ -12,8 +12,8 @@ pub use planes::film_planes;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
-use super::remark::Remark;
 use super::screen::{is_keyable, strongest_channel};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
@@ -67,7 +67,7 @@ pub struct FilmMatte {
     /// What makes its colours wrong.
     pub doubts: ColorDoubts,
     /// What a person should know.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl FilmMatte {
@@ -82,7 +82,7 @@ impl FilmMatte {
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
 /// garbage matte). A screen with little colour tells little of T: then what may be plastic by its light is guessed to be
-/// that, and a [`Remark`] says so.
+/// that, and a [`Diagnostic`] says so.
 ///
 /// # Method
 /// Three values a pixel for six unknowns, so two models tie them together. *Transmittance*: the plastic is clear or has
@@ -164,7 +164,7 @@ pub(super) fn film_of_part(
     }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);
-    let grey = (!is_keyable(screen)).then_some(Remark::GreyScreen(screen));
+    let grey = (!is_keyable(screen)).then(|| grey_screen(screen));
     let (flat, tint) = match (opts.flat, &grey) {
         (Some(flat), _) => (flat.into(), 0.0),
         // That the tint may be another is part of the guess.
@@ -200,10 +200,10 @@ pub(super) fn film_of_part(
         guessed,
         tint,
     };
-    let remarks = grey.into_iter().chain(doubts.remarks()).collect();
+    let diagnostics = grey.into_iter().chain(doubts.diagnostics()).collect();
     let matte = FilmMatte {
         doubts,
-        remarks,
+        diagnostics,
         ..composed(photo, plate, inside, &factors, flat.into())
     };
     watch.lap("compose");
@@ -272,7 +272,7 @@ fn composed(
         uncertainty,
         flat,
         doubts: ColorDoubts::default(),
-        remarks: Vec::new(),
+        diagnostics: Vec::new(),
     }
 }
 
@@ -287,6 +287,16 @@ pub(super) fn without(light: LinearRgb, taken: LinearRgb) -> LinearRgb {
         (light.r - taken.r).max(0.0),
         (light.g - taken.g).max(0.0),
         (light.b - taken.b).max(0.0),
+    )
+}
+
+fn grey_screen(screen: LinearRgb) -> Diagnostic {
+    let LinearRgb { r, g, b } = screen;
+    Diagnostic::warning(
+        Code::GreyScreen,
+        format_args!(
+            "the background ({r:.2}, {g:.2}, {b:.2}) is too grey to measure transmittance: that of plastic is assumed"
+        ),
     )
 }
 

@@ -1,7 +1,8 @@
 //! Key colour: one colour for the screen, and whether the object has it, too.
 
-use super::remark::Remark;
+use super::film::ColorDoubts;
 use super::screen::{screen_color, screen_pixels, strongest_channel};
+use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
 use crate::image::Image;
@@ -27,7 +28,7 @@ pub struct KeyColor {
     /// Standard deviation of the pixels around it, per channel, by their median distance: noise and uneven light.
     pub spread: LinearRgb,
     /// What a person should know: the object has the screen's hue.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// The colour of the screen, from the pixels outside `mask` and a margin around it.
@@ -60,11 +61,11 @@ pub fn key_color(
         KeyAverage::Mean => mean,
         KeyAverage::Robust => LinearRgb::new(r.0, g.0, b.0),
     };
-    let remarks = screen_hue(photo, mask, color).into_iter().collect();
+    let diagnostics = screen_hue(photo, mask, color).into_iter().collect();
     Ok(KeyColor {
         color,
         spread: LinearRgb::new(r.1, g.1, b.1),
-        remarks,
+        diagnostics,
     })
 }
 
@@ -126,12 +127,12 @@ const RIM: f64 = 0.01;
 /// Share of the object below which nothing is said.
 const WORTH_SAYING: f32 = 0.002;
 
-/// The remark on an object that has the screen's hue, brighter than the screen.
+/// The diagnostic of an object that has the screen's hue, brighter than the screen.
 fn screen_hue(
     photo: &Image<LinearRgb>,
     mask: &Image<Coverage>,
     screen: LinearRgb,
-) -> Option<Remark> {
+) -> Option<Diagnostic> {
     let key = strongest_channel(screen);
     let excess = |p: LinearRgb| {
         let c: [f32; 3] = p.into();
@@ -146,12 +147,13 @@ fn screen_hue(
         .filter(|(p, inside)| **inside && excess(**p) > limit)
         .count();
     let share = hued as f32 / object.max(1) as f32;
-    (excess(screen) > 0.0 && share > WORTH_SAYING).then_some(Remark::ScreenHue(share))
+    (excess(screen) > 0.0 && share > WORTH_SAYING).then(|| ColorDoubts::screen_hue(share))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnostic::Code;
 
     const GREEN: LinearRgb = LinearRgb::new(0.05, 0.4, 0.1);
 
@@ -175,10 +177,11 @@ mod tests {
             let (photo, mask) = slab(paint);
             key_color(&photo, &mask, KeyAverage::Robust)
                 .unwrap()
-                .remarks
+                .diagnostics
         };
         assert!(
-            matches!(said(LinearRgb::new(0.1, 0.7, 0.15))[..], [Remark::ScreenHue(share)] if share > 0.9)
+            matches!(&said(LinearRgb::new(0.1, 0.7, 0.15))[..], [one] if one.code == Code::ScreenHue
+                && one.message.starts_with("100.0 % of the object"))
         );
         assert!(said(LinearRgb::new(0.6, 0.6, 0.6)).is_empty());
         assert!(

@@ -18,8 +18,8 @@ pub use confidence::Confidence;
 pub use threshold::Threshold;
 
 use super::Outline;
-use super::remark::Remark;
 use crate::bounds::Bounds;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
@@ -90,7 +90,7 @@ pub struct Segmentation {
     /// Pixels of the photo for a pixel of the picture that was searched; above 1 where noise or size asked for it.
     pub reduction: f64,
     /// What a person should know.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
     /// Every intermediate picture, in the order of the work.
     pub steps: Vec<Step>,
 }
@@ -194,12 +194,12 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
         stray_px: hull::growth(&outline.hull(), &hull) / reduction,
         ..chosen.confidence
     };
-    let mut remarks = found.remarks.clone();
-    remarks.extend(truncation(found.touches));
-    remarks.extend(is_hollow.then_some(Remark::Hollow));
+    let mut diagnostics = found.diagnostics.clone();
+    diagnostics.extend(truncation(found.touches));
+    diagnostics.extend(is_hollow.then(screen_like_parts));
     let halved = picture.width() as f64 / found.inside.width() as f64;
-    remarks.extend((halved > 1.0).then_some(Remark::Noisy(halved)));
-    remarks.extend(confidence.remarks());
+    diagnostics.extend((halved > 1.0).then(|| noisy(halved)));
+    diagnostics.extend(confidence.diagnostics());
     watch.lap("outline");
     let mask = Outline {
         rings: vec![hull.clone()],
@@ -218,7 +218,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
         confidence,
         levels,
         reduction,
-        remarks,
+        diagnostics,
         steps,
     })
 }
@@ -369,15 +369,38 @@ fn shown(set: &Image<bool>) -> Image<Coverage> {
 /// Names of the borders in the order of [`Segmentation::touches`].
 const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
 
-/// The remark on an object that the photo cuts off; none for a whole one.
-fn truncation(touches: [bool; 4]) -> Option<Remark> {
+/// The warning about an object that the photo cuts off; none for a whole one.
+fn truncation(touches: [bool; 4]) -> Option<Diagnostic> {
     let reached: Vec<_> = BORDERS
         .into_iter()
         .zip(touches)
         .filter(|(_, t)| *t)
         .map(|(name, _)| name)
         .collect();
-    (!reached.is_empty()).then_some(Remark::Truncated(reached))
+    (!reached.is_empty()).then(|| {
+        let message = format!(
+            "the object reaches the {} border: the part beyond is missing from its size",
+            reached.join(" and ")
+        );
+        Diagnostic::warning(Code::Truncated, message)
+    })
+}
+
+fn screen_like_parts() -> Diagnostic {
+    Diagnostic::warning(
+        Code::ScreenLikeParts,
+        "parts of the object look like the screen: treated as holes, or on a grey board as clear plastic; are they?",
+    )
+}
+
+/// `reduction` is how many times smaller the picture is that was searched.
+fn noisy(reduction: f64) -> Diagnostic {
+    Diagnostic::warning(
+        Code::Noisy,
+        format_args!(
+            "the photo is noisy: the outline was found at 1/{reduction:.0} of the resolution and is accurate to one of its pixels"
+        ),
+    )
 }
 
 #[cfg(test)]

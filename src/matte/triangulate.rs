@@ -6,7 +6,7 @@ mod lines;
 use super::film::{covered, view};
 use super::plate::ScreenPlate;
 use super::register;
-use super::remark::Remark;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
@@ -55,7 +55,7 @@ pub struct Triangulated {
     /// Root mean square of what the film does not explain of the photos inside the object, scene-linear.
     pub residual: f32,
     /// What a person should know.
-    pub remarks: Vec<Remark>,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Solves `photo = F + T * plate` for F and T by least squares over several photos, each with its own screen.
@@ -106,13 +106,13 @@ pub fn triangulate(
     let solved = lines.map(|line| borrowed.complete(&line));
     let shift_px: Vec<[f64; 2]> = aligned.iter().map(|shot| shot.shift_px).collect();
     let moves = (1..).zip(&shift_px).filter(|(_, s)| **s != [0.0; 2]);
-    let moved = moves.map(|(photo, &shift_px)| Remark::Moved { photo, shift_px });
+    let moved = moves.map(|(photo, shift_px)| moved_photo(photo, *shift_px));
     let names = CHANNELS
         .into_iter()
         .zip(determined)
         .filter(|(_, told)| !told);
-    let remarks = moved
-        .chain(names.map(|(name, _)| Remark::Undetermined(name)))
+    let diagnostics = moved
+        .chain(names.map(|(name, _)| similar_screens(name)))
         .collect();
     let flat = lines::flat(&solved, inside);
     let transmittance = solved.zip_map(inside, |p, c| covered(p.transmittance, c));
@@ -126,7 +126,7 @@ pub fn triangulate(
         determined,
         flat,
         shift_px,
-        remarks,
+        diagnostics,
     })
 }
 
@@ -336,6 +336,25 @@ fn loudest(noise: LinearRgb) -> f32 {
 
 fn refused(what: impl Into<String>) -> Error {
     Error::Photo { what: what.into() }
+}
+
+/// `photo` counts from 1.
+fn moved_photo(photo: usize, [x, y]: [f64; 2]) -> Diagnostic {
+    Diagnostic::note(
+        Code::Moved,
+        format_args!(
+            "photo {photo} is offset by ({x:.2}, {y:.2}) px from the first; it was aligned"
+        ),
+    )
+}
+
+fn similar_screens(channel: &str) -> Diagnostic {
+    Diagnostic::note(
+        Code::SimilarScreens,
+        format_args!(
+            "the screens are too similar in {channel}: its transmittance is inferred from the other channels"
+        ),
+    )
 }
 
 #[cfg(test)]

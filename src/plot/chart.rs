@@ -50,11 +50,11 @@ pub struct Chart {
 
 /// What a large chart has beyond a small one.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Beside {
+pub struct Beside {
     /// Words beside points; those without room are left out.
-    pub(crate) labels: Vec<([f64; 2], String)>,
+    pub labels: Vec<([f64; 2], String)>,
     /// Points of one curve have nothing between them, and no line.
-    pub(crate) apart: bool,
+    pub apart: bool,
 }
 
 /// The points of a curve, from left to right; points that are not finite, or not positive on a logarithmic axis, are left out.
@@ -160,7 +160,8 @@ impl Chart {
     }
 
     /// A chart by itself, larger than in a row, as an SVG document.
-    pub(crate) fn alone(&self, beside: &Beside) -> String {
+    #[doc(hidden)]
+    pub fn alone(&self, beside: &Beside) -> String {
         Self::drawing(std::slice::from_ref(self), ALONE, beside)
     }
 

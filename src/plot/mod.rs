@@ -1,13 +1,17 @@
 //! Tables, charts and pages: HTML and SVG that need nothing beside them.
 
-pub(crate) mod chart;
+mod chart;
 pub(crate) mod heat;
 mod histogram;
-pub(crate) mod number;
+mod number;
 mod page;
 mod table;
 
+#[doc(hidden)]
+pub use chart::Beside;
 pub use chart::{Axis, Chart, Curve};
 pub use histogram::Histogram;
+#[doc(hidden)]
+pub use number::three;
 pub use page::{Page, base64, escaped};
 pub use table::Table;

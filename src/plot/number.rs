@@ -6,7 +6,7 @@ const DIGITS: i32 = 3;
 const WRITTEN_OUT: [f64; 2] = [1e-3, 1e5];
 
 /// Three digits that count: `0.00123`, `12.3`, `1234`, `1.2e-7`; `0` only for zero.
-pub(crate) fn three(value: f64) -> String {
+pub fn three(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }

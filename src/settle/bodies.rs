@@ -17,7 +17,7 @@ pub(super) fn is_dropped(object: &Object) -> bool {
 ///
 /// # Panics
 /// When nothing falls.
-pub(crate) fn typical_length(scene: &Scene) -> f64 {
+pub fn typical_length(scene: &Scene) -> f64 {
     median_of_dropped(scene, |object| object.size[0].max(object.size[1]))
 }
 

@@ -7,7 +7,7 @@ use crate::scene::{AssetVariant, Background, CameraSource, Range, Recipe, Scene}
 const CATALOG_SIZE: usize = 20;
 
 /// Cards of 200 x 70 and 190 x 80 mm, 2 to 11 mm thick, over a surface of 0.6 x 0.4 m: scene `k`.
-pub(crate) fn heap(k: u64, cards: usize) -> Result<Scene> {
+pub fn heap(k: u64, cards: usize) -> Result<Scene> {
     let recipe = Recipe {
         objects: Range::fixed(cards as f64),
         ..Recipe::default()
@@ -40,7 +40,7 @@ fn bottle(i: usize) -> AssetVariant {
 }
 
 /// An octagon that touches the middle half of each side of its card.
-pub(crate) fn octagon([w, h]: [f64; 2]) -> Vec<[f64; 2]> {
+pub fn octagon([w, h]: [f64; 2]) -> Vec<[f64; 2]> {
     let (x, y) = (w / 2.0, h / 2.0);
     let half = [[x, -y / 2.0], [x, y / 2.0], [x / 2.0, y], [-x / 2.0, y]];
     half.into_iter()

@@ -48,8 +48,10 @@ mod trace;
 mod world;
 
 pub use crate::scene::{SettleMode, SettleOptions};
-pub(crate) use bodies::typical_length;
-pub(crate) use heap::{heap, octagon};
+#[doc(hidden)]
+pub use bodies::typical_length;
+#[doc(hidden)]
+pub use heap::{heap, octagon};
 pub use preview::preview;
 pub use trace::{MotionSample, csv as trace_csv};
 

@@ -3,9 +3,9 @@
 use super::bright::{rim_px, share};
 use super::solve::Factor;
 use super::tint::WHOLE;
+use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::filter;
 use crate::image::Image;
-use crate::matte::remark::Remark;
 use crate::pixel::Coverage;
 
 /// What makes the colours of a cut-out wrong, 0 where nothing does.
@@ -55,14 +55,67 @@ impl ColorDoubts {
     }
 
     /// What a person should know.
-    pub(super) fn remarks(self) -> Vec<Remark> {
-        let remarks = [
-            (self.keyed_away > HUE_WORTH_SAYING).then_some(Remark::KeyedAway(self.keyed_away)),
-            (self.screen_hue > HUE_WORTH_SAYING).then_some(Remark::ScreenHue(self.screen_hue)),
-            (self.tint > Self::LOOK.tint).then_some(Remark::TintUnsure(self.tint)),
-            (self.clipped > CLIPPED_WORTH_SAYING).then_some(Remark::Clipped(self.clipped)),
+    pub(super) fn diagnostics(self) -> Vec<Diagnostic> {
+        let all = [
+            (self.keyed_away > HUE_WORTH_SAYING).then(|| Self::keyed_away(self.keyed_away)),
+            (self.screen_hue > HUE_WORTH_SAYING).then(|| Self::screen_hue(self.screen_hue)),
+            (self.tint > Self::LOOK.tint).then(|| Self::tint_uncertain(self.tint)),
+            (self.clipped > CLIPPED_WORTH_SAYING).then(|| Self::clipped_object(self.clipped)),
         ];
-        remarks.into_iter().flatten().collect()
+        all.into_iter().flatten().collect()
+    }
+
+    /// `share` of the object looks like bare screen, where plastic is.
+    fn keyed_away(share: f32) -> Diagnostic {
+        Diagnostic::new(
+            Code::KeyedAway,
+            warning_above(Self::LOOK.keyed_away, share),
+            format_args!(
+                "{:.1} % of the object looks like bare screen: keyed away, but it may be paint of the screen's hue; photograph it on another screen colour",
+                100.0 * share
+            ),
+        )
+    }
+
+    /// `share` of the object is brighter in the screen's hue than plastic in front of the screen can be.
+    pub(in crate::matte) fn screen_hue(share: f32) -> Diagnostic {
+        Diagnostic::new(
+            Code::ScreenHue,
+            warning_above(Self::LOOK.screen_hue, share),
+            format_args!(
+                "{:.1} % of the object has the screen's hue: treated as opaque; photograph it on another screen colour to verify",
+                100.0 * share
+            ),
+        )
+    }
+
+    /// Tints that explain the photo as well let through `off` more or less.
+    fn tint_uncertain(off: f32) -> Diagnostic {
+        Diagnostic::warning(
+            Code::TintUncertain,
+            format_args!(
+                "the plastic may have the screen's hue: its tint is uncertain by +- {off:.2}; photograph it on another screen colour"
+            ),
+        )
+    }
+
+    /// `share` of the object is brighter than the camera can measure.
+    fn clipped_object(share: f32) -> Diagnostic {
+        Diagnostic::note(
+            Code::ClippedObject,
+            format_args!(
+                "{:.1} % of the object is clipped: its transmittance there is taken from the surrounding pixels",
+                100.0 * share
+            ),
+        )
+    }
+}
+
+fn warning_above(limit: f32, value: f32) -> Severity {
+    if value > limit {
+        Severity::Warning
+    } else {
+        Severity::Note
     }
 }
 
@@ -151,7 +204,7 @@ mod tests {
     fn what_was_keyed_away_is_not_said_to_be_opaque() {
         let said = |doubts: ColorDoubts| {
             doubts
-                .remarks()
+                .diagnostics()
                 .iter()
                 .map(ToString::to_string)
                 .collect::<Vec<_>>()
@@ -169,18 +222,19 @@ mod tests {
             ..ColorDoubts::default()
         });
         assert!(
-            matches!(&painted[..], [one] if one.contains("taken for opaque")),
+            matches!(&painted[..], [one] if one.contains("treated as opaque")),
             "{painted:?}"
         );
         let tint = ColorDoubts {
             tint: 0.1,
             ..ColorDoubts::default()
         }
-        .remarks();
+        .diagnostics();
         assert!(
-            matches!(tint[..], [Remark::TintUnsure(_)])
-                && tint[0].is_doubt()
-                && tint[0].is_about_color()
+            tint.len() == 1
+                && tint[0].code == Code::TintUncertain
+                && tint[0].needs_review()
+                && tint[0].code.is_about_color()
         );
     }
 }

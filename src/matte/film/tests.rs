@@ -128,9 +128,9 @@ fn clear_plastic_and_a_white_label_are_recomposited() {
         );
         assert!(film < 0.012 && label < 0.012, "{film} {label}");
         assert!(
-            (found.flat.r - CLEAR.r).abs() < 0.02 && found.remarks.is_empty(),
+            (found.flat.r - CLEAR.r).abs() < 0.02 && found.diagnostics.is_empty(),
             "{:?}",
-            found.remarks
+            found.diagnostics
         );
     }
 }
@@ -271,12 +271,10 @@ fn a_label_of_the_screens_hue_is_opaque_and_said() {
     let found = world.solved();
     assert!(world.error(&found, is_label) < 0.08);
     assert!(
-        found
-            .remarks
-            .iter()
-            .any(|r| matches!(r, Remark::ScreenHue(share) if *share > 0.1)),
+        found.diagnostics.iter().any(|d| d.code == Code::ScreenHue)
+            && found.doubts.screen_hue > 0.1,
         "{:?}",
-        found.remarks
+        found.diagnostics
     );
 }
 
@@ -294,9 +292,9 @@ fn a_label_of_a_hue_beside_the_screens_is_opaque() {
         let error = world.error(&found, is_label);
         assert!(error < 0.03, "{error}");
         assert!(
-            found.film[(95, 60)].opacity.g > 0.98 && found.remarks.is_empty(),
+            found.film[(95, 60)].opacity.g > 0.98 && found.diagnostics.is_empty(),
             "{:?}",
-            found.remarks
+            found.diagnostics
         );
     }
 }
@@ -339,9 +337,9 @@ fn on_a_board_without_a_hue_film_is_guessed_and_said_and_better_than_a_slab_or_t
         };
         let (photo, found) = (world.photo(), world.solved());
         assert!(
-            matches!(found.remarks[..], [Remark::GreyScreen(_)]),
+            matches!(&found.diagnostics[..], [one] if one.code == Code::GreyScreen),
             "{:?}",
-            found.remarks
+            found.diagnostics
         );
         assert!(
             found.uncertainty[(50, 60)].0 > 0.1 && found.doubts.confidence() < 0.7,
@@ -434,23 +432,23 @@ fn a_label_of_the_screens_colour_is_keyed_away_and_that_is_said() {
         let [plain, painted] = [plain.solved(), painted.solved()];
         let keyed = |found: &FilmMatte| {
             found
-                .remarks
+                .diagnostics
                 .iter()
-                .any(|r| matches!(r, Remark::KeyedAway(_)) && r.is_doubt())
+                .any(|d| d.code == Code::KeyedAway && d.needs_review())
         };
         assert!(
             keyed(&painted) && !keyed(&plain),
             "{:?} {:?}",
-            painted.remarks,
-            plain.remarks
+            painted.diagnostics,
+            plain.diagnostics
         );
         assert!(
             !painted
-                .remarks
+                .diagnostics
                 .iter()
-                .any(|r| matches!(r, Remark::ScreenHue(_))),
+                .any(|d| d.code == Code::ScreenHue),
             "{:?}",
-            painted.remarks
+            painted.diagnostics
         );
         let sure = [plain.doubts.confidence(), painted.doubts.confidence()];
         assert!(sure[0] > 0.7 && sure[1] < 0.2, "{sure:?}");

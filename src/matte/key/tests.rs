@@ -1,5 +1,5 @@
 //! Single pixels and rows with the digits that Blender prints. Whole pictures are held against Blender in `tests/golden`, numbers
-//! at their extremes are rows of `petcomp report stability`.
+//! at their extremes are rows of `petcomp-report stability`.
 
 #![expect(
     clippy::excessive_precision,

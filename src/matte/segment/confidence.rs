@@ -1,6 +1,6 @@
 //! How far a segmentation can be believed.
 
-use crate::matte::remark::Remark;
+use crate::diagnostic::{Code, Diagnostic};
 use serde::{Deserialize, Serialize};
 
 /// How far an outline can be believed.
@@ -45,16 +45,76 @@ impl Confidence {
     }
 
     /// Why it is low; nothing where it is not.
-    pub(super) fn remarks(self) -> Vec<Remark> {
-        let doubts = [
-            (self.agreement < LEAST_AGREEMENT).then_some(Remark::Unstable(self.agreement)),
-            (self.support < LEAST_SUPPORT).then_some(Remark::Unsupported(self.support)),
-            (self.drift_px > MOST_DRIFT_PX).then_some(Remark::Drifting(self.drift_px)),
-            (self.stray_px > MOST_STRAY_PX).then_some(Remark::Strayed(self.stray_px)),
-            (self.blur_px > MOST_BLUR_PX).then_some(Remark::Blurred(self.blur_px)),
-            (self.width_px < LEAST_WIDTH_PX).then_some(Remark::Narrow(self.width_px)),
+    pub(super) fn diagnostics(self) -> Vec<Diagnostic> {
+        let warnings = [
+            (self.agreement < LEAST_AGREEMENT).then(|| self.unstable_outline()),
+            (self.support < LEAST_SUPPORT).then(|| self.weak_edges()),
+            (self.drift_px > MOST_DRIFT_PX).then(|| self.threshold_sensitive()),
+            (self.stray_px > MOST_STRAY_PX).then(|| self.box_beyond_outline()),
+            (self.blur_px > MOST_BLUR_PX).then(|| self.blurred()),
+            (self.width_px < LEAST_WIDTH_PX).then(|| self.small_object()),
         ];
-        doubts.into_iter().flatten().collect()
+        warnings.into_iter().flatten().collect()
+    }
+
+    fn unstable_outline(self) -> Diagnostic {
+        Diagnostic::warning(
+            Code::UnstableOutline,
+            format_args!(
+                "low confidence: searches at other pyramid depths overlap with the outline by only {:.0} %",
+                100.0 * self.agreement
+            ),
+        )
+    }
+
+    fn weak_edges(self) -> Diagnostic {
+        Diagnostic::warning(
+            Code::WeakEdges,
+            format_args!(
+                "low confidence: only {:.0} % of the outline lies on edges; is the object in focus and completely visible?",
+                100.0 * self.support
+            ),
+        )
+    }
+
+    fn threshold_sensitive(self) -> Diagnostic {
+        Diagnostic::warning(
+            Code::ThresholdSensitive,
+            format_args!(
+                "low confidence: bounding box moves {:.0} px at a higher edge threshold; is a part of the object as faint as the screen?",
+                self.drift_px
+            ),
+        )
+    }
+
+    fn box_beyond_outline(self) -> Diagnostic {
+        Diagnostic::warning(
+            Code::BoxBeyondOutline,
+            format_args!(
+                "low confidence: bounding box extends {:.0} px beyond the outline, where edges enclose no area",
+                self.stray_px
+            ),
+        )
+    }
+
+    fn blurred(self) -> Diagnostic {
+        Diagnostic::warning(
+            Code::Blurred,
+            format_args!(
+                "edges are blurred by {:.1} px: out of focus, or motion blur",
+                self.blur_px
+            ),
+        )
+    }
+
+    fn small_object(self) -> Diagnostic {
+        Diagnostic::warning(
+            Code::SmallObject,
+            format_args!(
+                "the object is only {:.0} px wide, and its outline is accurate to about 1 px; photograph it from closer up",
+                self.width_px
+            ),
+        )
     }
 }
 
@@ -72,13 +132,11 @@ mod tests {
             blur_px: 0.7,
             width_px: 100.0,
         };
-        assert!(sure.remarks().is_empty());
+        assert!(sure.diagnostics().is_empty());
         let said = |unsure: Confidence| {
-            unsure
-                .remarks()
-                .iter()
-                .map(ToString::to_string)
-                .collect::<Vec<_>>()
+            let warnings = unsure.diagnostics();
+            assert!(warnings.iter().all(Diagnostic::needs_review));
+            warnings.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
         for (unsure, reason) in [
             (
@@ -86,42 +144,42 @@ mod tests {
                     support: 0.5,
                     ..sure
                 },
-                "50 % of it lies on edges",
+                "50 % of the outline lies on edges",
             ),
             (
                 Confidence {
                     agreement: 0.5,
                     ..sure
                 },
-                "agree with it to 50 %",
+                "by only 50 %",
             ),
             (
                 Confidence {
                     drift_px: 7.0,
                     ..sure
                 },
-                "7 pixels",
+                "bounding box moves 7 px",
             ),
             (
                 Confidence {
                     blur_px: 2.0,
                     ..sure
                 },
-                "blurred by 2.0 pixels",
+                "blurred by 2.0 px",
             ),
             (
                 Confidence {
                     stray_px: 5.0,
                     ..sure
                 },
-                "5 pixels beyond its outline",
+                "5 px beyond the outline",
             ),
             (
                 Confidence {
                     width_px: 12.0,
                     ..sure
                 },
-                "only 12 pixels wide",
+                "only 12 px wide",
             ),
         ] {
             assert!(

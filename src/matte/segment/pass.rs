@@ -4,12 +4,12 @@ use super::band::{self, Bands};
 use super::cluster::{self, Groups};
 use super::hull;
 use super::{SegmentOptions, longer_side, refused};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
 use crate::geom::Point2;
 use crate::image::Image;
 use crate::matte::Outline;
-use crate::matte::remark::Remark;
 use crate::pixel::{Coverage, LinearRgb};
 
 /// A picture ready to be searched at any depth.
@@ -40,7 +40,7 @@ pub(super) struct Pass {
     /// Left, top, right and bottom border are reached.
     pub(super) touches: [bool; 4],
     /// What was left out.
-    pub(super) remarks: Vec<Remark>,
+    pub(super) diagnostics: Vec<Diagnostic>,
 }
 
 /// How far the first band smears an edge, pixels: the reach of its kernel.
@@ -93,7 +93,7 @@ impl Search {
         let both = first_binary.zip_map(&last_binary, |a, b| a && b);
         let edges = cluster::without_specks(&both.zip_map(&self.ridges, |a, b| a && b), opts.speck);
         let join_px = (opts.join * longer_side(&edges) as f64).max(LEAST_JOIN_PX);
-        let (object, remarks) = main_cluster(&edges, join_px)?;
+        let (object, diagnostics) = main_cluster(&edges, join_px)?;
         let hull = hull::convex_hull(&object);
         let touches = touches(&object);
         check_object(&hull, touches, edges.size())?;
@@ -106,7 +106,7 @@ impl Search {
             hull,
             inside,
             touches,
-            remarks,
+            diagnostics,
         })
     }
 }
@@ -124,7 +124,7 @@ const SPECKS: usize = 2;
 ///
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
 /// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
-fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<Remark>)> {
+fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<Diagnostic>)> {
     let groups = Groups::of(&filter::dilate(edges, join_px / 2.0));
     let sizes = groups.sizes(edges);
     let Some(main) = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i))) else {
@@ -140,7 +140,7 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
     let object = member(main);
     let hull = under_hull(&object, 0.0);
     let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
-    let mut remarks = Vec::new();
+    let mut diagnostics = Vec::new();
     let mut specks = 0;
     for i in (0..sizes.len()).filter(|&i| i != main && 2 * inside[i] < sizes[i]) {
         let share = sizes[i] as f64 / sizes[main] as f64;
@@ -152,28 +152,39 @@ fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<R
             )));
         }
         if share >= REMNANT {
-            remarks.push(Remark::LeftOut {
-                what: place(&member(i)),
-                object: place(&object),
-            });
+            let message = format!(
+                "left out what is {}: too far from the object {}",
+                place(&member(i)),
+                place(&object)
+            );
+            diagnostics.push(Diagnostic::warning(Code::LeftOut, message));
         } else {
             specks += 1;
         }
     }
-    remarks.extend((specks >= SPECKS).then_some(Remark::Specks(specks)));
+    diagnostics.extend((specks >= SPECKS).then(|| specks_on_screen(specks)));
     let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
     let object = groups
         .only(belongs)
         .zip_map(edges, |near, edge| near && edge);
-    remarks.extend(parted(&object, PARTED * join_px));
-    Ok((object, remarks))
+    diagnostics.extend(parted(&object, PARTED * join_px));
+    Ok((object, diagnostics))
+}
+
+fn specks_on_screen(count: usize) -> Diagnostic {
+    Diagnostic::warning(
+        Code::Specks,
+        format_args!(
+            "{count} specks on the screen: one beside the object may have been treated as part of it; clean the screen, or check the outline"
+        ),
+    )
 }
 
 /// Edges that fall apart into two clusters when they are joined over this share of the gap may be of two objects.
 const PARTED: f64 = 0.5;
 
-/// The remark on an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
-fn parted(object: &Image<bool>, join_px: f64) -> Option<Remark> {
+/// The warning about an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
+fn parted(object: &Image<bool>, join_px: f64) -> Option<Diagnostic> {
     let groups = Groups::of(&filter::dilate(object, join_px / 2.0));
     let sizes = groups.sizes(object);
     let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
@@ -189,7 +200,12 @@ fn parted(object: &Image<bool>, join_px: f64) -> Option<Remark> {
         *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64
     };
     let other = (0..sizes.len()).find(rival)?;
-    Some(Remark::Parted([place(&first), place(&member(other))]))
+    let message = format!(
+        "possibly two objects, {} and {}: only a narrow gap separates them",
+        place(&first),
+        place(&member(other))
+    );
+    Some(Diagnostic::warning(Code::TwoObjects, message))
 }
 
 /// The pixels of which more than a share lies in the convex hull of a set.

@@ -266,12 +266,12 @@ fn specks_all_over_are_told() {
             }
         })
     };
-    let told = |count: usize| {
-        find(&taken(count))
-            .unwrap()
-            .remarks
-            .contains(&Remark::Specks(count))
-    };
+    let told =
+        |count: usize| {
+            find(&taken(count)).unwrap().diagnostics.iter().any(|d| {
+                d.code == Code::Specks && d.message.starts_with(&format!("{count} specks"))
+            })
+        };
     assert!(told(4) && !told(1));
 }
 

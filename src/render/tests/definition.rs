@@ -521,7 +521,7 @@ fn a_finite_catcher_ends_the_shadow() {
     }
 }
 
-/// Shots in which something is missing or of one colour; `petcomp report stability` has those that are hard to look at.
+/// Shots in which something is missing or of one colour; `petcomp-report stability` has those that are hard to look at.
 fn awkward() -> Vec<(&'static str, Shot)> {
     let base = || {
         Shot::new(above(16, 12, 20.0))

@@ -3,11 +3,11 @@
 
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/render.py [SCENE] [-o FOLDER] [--size W H]
-    target/release/petcomp report render SCENE --size W H --cycles FOLDER/render    (the same points as a chart of its own)
+    target/release/petcomp-report render SCENE --size W H --cycles FOLDER/render    (the same points as a chart of its own)
 
 The scene is a file of golden/render/scene_reference.py: one of golden/render, or one that
 `petcomp scene export SCENE --to cycles DIR` wrote. Seconds are those of the rendering alone, without start, files and
-textures' pyramids, as each program tells its own processor time. Error: `petcomp report render` measures both programs'
+textures' pyramids, as each program tells its own processor time. Error: `petcomp-report render` measures both programs'
 against the picture of the largest count, which has its own seed and is kept for the next run. FOLDER/render gets Cycles'
 pictures (spp_00016.exr) and times.json.
 """
@@ -73,11 +73,11 @@ class Cycles:
 
 
 class Report:
-    """What `petcomp report render` tells, once a round."""
+    """What `petcomp-report render` tells, once a round."""
 
     def __init__(self, args, cycles):
         self.rounds, self.folder = [], args.output / "render" / "report"
-        self.command = pinned(args.petcomp, "-q", "-j", len(CORES), "report", "render", args.scene, "-o", self.folder, "--size",
+        self.command = pinned(args.report, "-q", "-j", len(CORES), "render", args.scene, "-o", self.folder, "--size",
                               *args.size, "--cycles", cycles, "--golden", self.folder / "no_golden", "--repeats", 1)
 
     def rows(self, number):

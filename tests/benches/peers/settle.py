@@ -4,7 +4,7 @@
     make peers
     taskset -c 0 target/peers-python/bin/python tests/benches/peers/settle.py [-o FOLDER]
 
-Three heaps each of 20 and of 5 cards (and of 60, `--counts 20 5 60`, which takes minutes a round), which `petcomp report settle --peers` draws and settles. Bullet gets the same boxes,
+Three heaps each of 20 and of 5 cards (and of 60, `--counts 20 5 60`, which takes minutes a round), which `petcomp-report settle --peers` draws and settles. Bullet gets the same boxes,
 masses, friction, walls and starts, in three settings: its own defaults; petcomp's step and the scale that is recommended
 for small bodies (lengths times ten, gravity too); and that with a larger solver effort. It stops as petcomp does: all
 bodies slower than 1 cm/s and 0.5 rad/s for 0.5 s, or after 30 s. Seconds are those of one heap in memory: petcomp's
@@ -154,7 +154,7 @@ def main():
     args = parser.parse_args()
     (args.output / "settle").mkdir(parents=True, exist_ok=True)
     drawn = args.output / "settle" / "heaps.json"
-    seconds_of(pinned(args.petcomp, "-q", "-j", 1, "report", "settle", "--peers", drawn))
+    seconds_of(pinned(args.report, "-q", "-j", 1, "settle", "--peers", drawn))
     cases = json.loads(drawn.read_text())
     heaps = {count: [case for case in cases if len(case["boxes"]) == count] for count in args.counts}
     comparison = Comparison("settle", args, INSIDE, "heaps of cards that fall into a tray", "deepest overlap, mm",

@@ -121,6 +121,7 @@ def arguments(doc):
     parser.add_argument("-o", "--output", type=pathlib.Path, default=pathlib.Path("target/peers"), metavar="FOLDER")
     parser.add_argument("-n", "--runs", type=int, default=5, help="rounds (default: %(default)s)")
     parser.add_argument("--petcomp", default="target/release/petcomp", metavar="PROGRAM")
+    parser.add_argument("--report", default="target/release/petcomp-report", metavar="PROGRAM")
     os.chdir(ROOT)
     return parser
 

@@ -288,7 +288,7 @@ fn errors_on_rendered_photos() {
             flat.r,
             flat.g,
             flat.b,
-            one.remarks
+            one.diagnostics
         );
         rows.push(row);
     }

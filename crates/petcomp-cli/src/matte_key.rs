@@ -1,0 +1,122 @@
+//! `petcomp matte key`: Blender's Keying node on one picture.
+
+use anyhow::Result;
+use petcomp::io::{self, Bits, Override, ToFile, WriteOptions};
+use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
+use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
+use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
+use std::path::{Path, PathBuf};
+
+/// Keys a picture against a screen colour or plate, as Blender's Keying node does.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Args {
+    /// The picture to key; alpha is taken as premultiplied
+    input: PathBuf,
+    /// Where the premultiplied cut-out goes; an EXR holds 32-bit floats
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Where the matte goes
+    #[arg(long, value_name = "FILE")]
+    matte: Option<PathBuf>,
+    /// Where the edges go that the levels leave alone
+    #[arg(long, value_name = "FILE")]
+    edges: Option<PathBuf>,
+    /// Colour of the screen, scene-linear
+    #[arg(long, value_name = "R,G,B", value_parser = color, required_unless_present = "plate", conflicts_with = "plate")]
+    screen: Option<LinearRgb>,
+    /// A picture of the screen alone: every pixel is keyed against its own colour
+    #[arg(long, value_name = "FILE")]
+    plate: Option<PathBuf>,
+    /// A matte of what is surely not foreground
+    #[arg(long, value_name = "FILE")]
+    garbage: Option<PathBuf>,
+    /// A matte of what is surely foreground
+    #[arg(long, value_name = "FILE")]
+    core: Option<PathBuf>,
+    /// Find the object first: what lies around it is garbage, and what surely lets nothing through is core
+    #[arg(long, conflicts_with_all = ["garbage", "core"])]
+    auto_mattes: bool,
+    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust
+    #[arg(long, value_name = "NAME", default_value = "blender-3.4")]
+    profile: Profile,
+    /// A setting under Blender's name, such as key.clip_black=0.1
+    #[arg(long = "set", value_name = "key.NAME=VALUE")]
+    settings: Vec<Override>,
+}
+
+impl Args {
+    /// Garbage and core matte, those that there are.
+    fn mattes(&self, plate: Option<&Image<LinearRgb>>) -> Result<[Option<Image<Coverage>>; 2]> {
+        if !self.auto_mattes {
+            let [garbage, core] =
+                [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
+            return Ok([garbage?, core?]);
+        }
+        let photo: Image<LinearRgb> = io::read(&self.input)?;
+        let found =
+            segment(&photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
+        crate::matte::warn(&self.input, &found.diagnostics);
+        let [garbage, core] = match plate {
+            Some(plate) => found.mattes(&photo, plate),
+            None => found.mattes(
+                &photo,
+                &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image,
+            ),
+        };
+        Ok([Some(garbage), Some(core)])
+    }
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let opts = KeyOptions {
+        profile: args.profile,
+        ..io::from_overrides("key", &args.settings)?
+    };
+    let photo: Image<PremulRgba> = io::read(&args.input)?;
+    let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
+    let [garbage, core] = args.mattes(plate.as_ref())?;
+    let screen = plate.as_ref().map_or(
+        Screen::Color(args.screen.unwrap_or_default()),
+        Screen::Plate,
+    );
+    let mut job = Keying::new(&photo, screen);
+    job = garbage
+        .iter()
+        .fold(job, |job, matte| job.with_garbage(matte));
+    job = core.iter().fold(job, |job, matte| job.with_core(matte));
+    let keyed = job.run(&opts)?;
+    if keyed.deviations != Deviations::default() {
+        log::warn!("{}: {}", args.input.display(), keyed.deviations);
+    }
+    write(&args.output, &keyed.cutout)?;
+    args.matte
+        .as_ref()
+        .map(|path| write(path, &keyed.matte))
+        .transpose()?;
+    args.edges
+        .as_ref()
+        .map(|path| write(path, &job.edges(&opts)?))
+        .transpose()?;
+    Ok(())
+}
+
+/// A colour from `R,G,B`.
+pub(crate) fn color(text: &str) -> Result<LinearRgb, String> {
+    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
+    let channels: Result<[f32; 3], _> = numbers.map_err(|e| e.to_string())?.try_into();
+    channels
+        .map(LinearRgb::from)
+        .map_err(|n| format!("{} numbers, expected R,G,B", n.len()))
+}
+
+/// Writes a picture, in an EXR with all its bits.
+pub(crate) fn write<P: ToFile>(path: &Path, image: &Image<P>) -> Result<()> {
+    let is_exr = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+    let options = WriteOptions {
+        bits: is_exr.then_some(Bits::Float),
+        ..WriteOptions::default()
+    };
+    Ok(io::write_with(path, image, &options)?)
+}

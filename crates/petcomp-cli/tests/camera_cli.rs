@@ -1,0 +1,468 @@
+//! Labels and cameras as a person meets them: the real program in an empty folder.
+#![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
+
+use petcomp::camera::CameraFile;
+use petcomp::camera::simulate::Scenario;
+use petcomp::{Camera, Image, LinearRgb, Srgb8, io};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Picture size and rectangle of all photos here.
+const IMAGE: [u32; 2] = [640, 480];
+const SIZE: [f64; 2] = [0.56, 0.37];
+
+/// A folder with backgrounds, a class and a recipe of empty scenes.
+struct Desk(tempfile::TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        let desk = Self(tempfile::tempdir().unwrap());
+        desk.write("assets/assets.toml", "classes = [\"cap\"]");
+        desk.write(
+            "recipe.toml",
+            "backgrounds = \"bg\"\n[scene]\nobjects = 0\nimage = [320, 240]\n",
+        );
+        desk
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_petcomp"))
+            .args(args)
+            .current_dir(self.0.path())
+            .output()
+            .unwrap()
+    }
+
+    /// What a run that must succeed prints: results and messages.
+    fn ok(&self, args: &[&str]) -> [String; 2] {
+        let output = self.run(args);
+        let said = [&output.stdout, &output.stderr]
+            .map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+        assert!(
+            output.status.success(),
+            "petcomp {args:?}\n{}{}",
+            said[0],
+            said[1]
+        );
+        said
+    }
+
+    /// The last line of a run that must fail.
+    fn refused(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(
+            output
+                .status
+                .code()
+                .is_some_and(|code| code != 0 && code != 101),
+            "petcomp {args:?}: {err}"
+        );
+        err
+    }
+
+    /// A photo of a rectangle, and its label.
+    fn photo(&self, name: &str, image: [u32; 2]) -> Value {
+        let scenario = Scenario {
+            image,
+            focal_px: 0.8 * f64::from(image[0]),
+            size: SIZE,
+            ..Scenario::default()
+        };
+        let view = scenario.tilted(30.0).view(4, 1);
+        let [w, h] = image.map(|side| side as usize);
+        std::fs::create_dir_all(self.path("bg")).unwrap();
+        io::write(
+            self.path(&format!("bg/{name}.png")),
+            &Image::filled(
+                w,
+                h,
+                Srgb8 {
+                    r: 90,
+                    g: 90,
+                    b: 90,
+                },
+            ),
+        )
+        .unwrap();
+        json!({
+            "format": "plane-label", "version": 1,
+            "image": { "file": format!("{name}.png"), "width": image[0], "height": image[1] },
+            "surface": { "id": "tray", "width_m": SIZE[0], "height_m": SIZE[1],
+                         "corners_px": view.label.surface.corners_px.unwrap() }
+        })
+    }
+
+    fn label(&self, name: &str, label: &Value) {
+        self.write(&format!("bg/{name}.label.json"), &label.to_string());
+    }
+
+    /// The camera of scene 0 and what was said.
+    fn scene(&self, more: &[&str]) -> (Camera, String) {
+        let args = ["scene", "draw", "recipe.toml", "-o", "scene.json"];
+        let [_, said] = self.ok(&[&args[..], more].concat());
+        let scene: Value = io::read_json(self.path("scene.json")).unwrap();
+        (
+            serde_json::from_value(scene["camera"]["known"].clone()).unwrap(),
+            said,
+        )
+    }
+}
+
+fn exchanged(mut label: Value) -> Value {
+    let surface = &mut label["surface"];
+    (surface["width_m"], surface["height_m"]) = (json!(SIZE[1]), json!(SIZE[0]));
+    label
+}
+
+#[test]
+fn a_label_with_its_sides_exchanged_is_refused_by_every_command() {
+    let desk = Desk::new();
+    desk.label("a", &exchanged(desk.photo("a", IMAGE)));
+    let generate = ["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"];
+    for args in [
+        &["camera", "solve", "bg/a.label.json"][..],
+        &["camera", "joint", "bg/a.label.json"],
+        &["camera", "doctor", "bg/a.label.json"],
+        &[
+            "camera",
+            "rectify",
+            "bg/a.png",
+            "bg/a.label.json",
+            "-o",
+            "top.png",
+        ],
+        &["scene", "draw", "recipe.toml", "-o", "scene.json"],
+        &generate,
+    ] {
+        desk.refused(args);
+        let said = String::from_utf8_lossy(&desk.run(args).stderr).into_owned();
+        assert!(
+            said.contains("no camera fits") && said.contains("exchange width_m and height_m"),
+            "{args:?}: {said}"
+        );
+    }
+    assert!(!desk.path("bg/a.camera.json").exists() && !desk.path("out/images").exists());
+    desk.scene(&["--set", "force_cameras=true"]);
+    // One that was forced where it was solved is wanted.
+    desk.ok(&["camera", "solve", "--force", "bg/a.label.json"]);
+    desk.scene(&[]);
+    desk.ok(&generate);
+}
+
+#[test]
+fn a_camera_beside_its_label_is_used_and_decides_the_dataset() {
+    let desk = Desk::new();
+    let label = desk.photo("a", IMAGE);
+    desk.label("a", &label);
+    let (alone, _) = desk.scene(&[]);
+    desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    let generate = ["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"];
+    desk.ok(&generate);
+    assert_eq!(desk.scene(&[]).0, alone);
+    // As `camera joint` would have found it.
+    let path = desk.path("bg/a.camera.json");
+    let mut file: CameraFile = io::read_json(&path).unwrap();
+    file.found.model.f_px *= 1.1;
+    io::write_json(&path, &file).unwrap();
+    let (used, said) = desk.scene(&[]);
+    assert!(
+        (used.focal_px.x / alone.focal_px.x - 1.1).abs() < 1e-12 && said.is_empty(),
+        "{said}"
+    );
+    assert!(
+        desk.refused(&generate).contains("out"),
+        "another camera is another dataset"
+    );
+    let mut changed = label.clone();
+    changed["surface"]["corners_px"][0][0] =
+        json!(changed["surface"]["corners_px"][0][0].as_f64().unwrap() + 0.5);
+    desk.label("a", &changed);
+    let (again, said) = desk.scene(&[]);
+    assert!((again.focal_px.x / alone.focal_px.x - 1.0).abs() < 0.05);
+    assert!(
+        said.contains("a.camera.json: solved from another version of its label")
+            && said.lines().count() <= 2,
+        "{said}"
+    );
+    desk.write("bg/a.camera.json", "{\"format\": \"plane-camera\"}");
+    let broken = desk.refused(&["scene", "draw", "recipe.toml", "-o", "scene.json"]);
+    assert!(
+        broken.contains("a.camera.json: line 1: missing key")
+            && broken.contains("run `petcomp camera solve` again"),
+        "{broken}"
+    );
+}
+
+#[test]
+fn photos_solved_together_are_used_together() {
+    let desk = Desk::new();
+    for (name, k) in [("a", 0), ("b", 1), ("c", 2)] {
+        let scenario = Scenario {
+            image: IMAGE,
+            focal_px: 512.0,
+            size: SIZE,
+            corner_sigma_px: 0.5,
+            ..Scenario::default()
+        };
+        let view = &scenario.views(9, 1, 3, [3.0, 35.0])[k];
+        let mut label = desk.photo(name, IMAGE);
+        label["surface"]["corners_px"] = json!(view.label.surface.corners_px);
+        label["camera"] = json!({ "id": "phone" });
+        desk.label(name, &label);
+    }
+    let labels = ["bg/a.label.json", "bg/b.label.json", "bg/c.label.json"];
+    desk.ok(&[&["camera", "joint"][..], &labels].concat());
+    let focal = |name: &str| {
+        io::read_json::<CameraFile>(desk.path(&format!("bg/{name}.camera.json")))
+            .unwrap()
+            .found
+            .model
+            .f_px
+    };
+    assert!(focal("a") == focal("b") && focal("b") == focal("c"));
+    assert_eq!(desk.scene(&[]).0.focal_px.x, focal("a") / 2.0);
+    // A label of the three that changes makes the others' cameras old.
+    let mut label: Value = io::read_json(desk.path("bg/b.label.json")).unwrap();
+    label["surface"]["corner_sigma_px"] = json!(3.0);
+    desk.label("b", &label);
+    let (_, said) = desk.scene(&[]);
+    assert!(
+        said.contains("solved together with another version of b"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_label_comes_from_nothing() {
+    let desk = Desk::new();
+    let label = desk.photo("a", IMAGE);
+    let missing = desk.refused(&["camera", "solve", "bg/a.png"]);
+    assert!(
+        missing.contains("a picture, expected a label")
+            && missing.contains("petcomp camera init bg/a.png"),
+        "{missing}"
+    );
+    let [said, _] = desk.ok(&["camera", "init", "bg/a.png", "--size", "0.56x0.37"]);
+    assert!(said.contains("fill in surface.corners_px"), "{said}");
+    assert!(
+        desk.refused(&["camera", "init", "bg/a.png", "--size", "1x1"])
+            .contains("is there already")
+    );
+    assert!(
+        desk.refused(&["camera", "solve", "bg/a.label.json"])
+            .contains("corners_px is missing or not filled in")
+    );
+    assert!(
+        desk.refused(&["camera", "solve", "bg/a.png"])
+            .contains("bg/a.label.json lies beside it")
+    );
+    let corners: Vec<[f64; 2]> =
+        serde_json::from_value(label["surface"]["corners_px"].clone()).unwrap();
+    let corners = corners
+        .iter()
+        .map(|[x, y]| format!("{x},{y}"))
+        .collect::<Vec<_>>()
+        .join(" ");
+    desk.ok(&[
+        "camera",
+        "init",
+        "bg/a.png",
+        "--size",
+        "0.56x0.37",
+        "--corners",
+        &corners,
+        "--force",
+    ]);
+    let [said, _] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    assert!(said.contains("tilt 30."), "{said}");
+    assert!(desk.path("bg/a.overlay.png").is_file());
+    let empty = desk.path("bg/b.label.json");
+    std::fs::write(&empty, "{\"image\": {\"file\": \"b.png\"}}").unwrap();
+    let error = desk.refused(&["camera", "solve", "bg/b.label.json"]);
+    for key in [
+        "format",
+        "version",
+        "image.width",
+        "image.height",
+        "surface.id",
+        "corners_px",
+        "width_m",
+    ] {
+        assert!(error.contains(key), "{key}: {error}");
+    }
+    assert!(
+        desk.refused(&["camera", "init", "bg/a.png", "--size", "0.56"])
+            .contains("WIDTHxHEIGHT")
+    );
+}
+
+/// The same four corners as other programs write them.
+fn drawn(label: &Value) -> [(&'static str, String); 3] {
+    let corners: Vec<[f64; 2]> =
+        serde_json::from_value(label["surface"]["corners_px"].clone()).unwrap();
+    let [w, h] = IMAGE;
+    let labelme = json!({ "version": "5.4.1", "imagePath": "a.png", "imageData": null, "imageWidth": w, "imageHeight": h,
+        "shapes": corners.iter().map(|p| json!({ "label": "tray", "points": [p], "shape_type": "point" })).collect::<Vec<_>>() });
+    let points = corners
+        .iter()
+        .map(|[x, y]| format!("{x},{y}"))
+        .collect::<Vec<_>>()
+        .join(";");
+    let cvat = format!(
+        "<?xml version=\"1.0\"?><annotations><version>1.1</version><image id=\"0\" name=\"a.png\" width=\"{w}\" \
+         height=\"{h}\"><polygon label=\"tray\" points=\"{points}\"/></image></annotations>"
+    );
+    let percent: Vec<[f64; 2]> = corners
+        .iter()
+        .map(|[x, y]| [100.0 * x / f64::from(w), 100.0 * y / f64::from(h)])
+        .collect();
+    let studio = json!([{ "id": 1, "data": { "image": "/data/upload/1/01234567-a.png" }, "annotations": [{ "result": [{
+        "original_width": w, "original_height": h, "image_rotation": 0, "type": "polygonlabels",
+        "value": { "points": percent, "closed": true, "polygonlabels": ["tray"] } }] }] }]);
+    [
+        ("a.json", labelme.to_string()),
+        ("annotations.xml", cvat),
+        ("export.json", studio.to_string()),
+    ]
+}
+
+#[test]
+fn labels_of_other_programs_are_labels_everywhere() {
+    for (file, text) in drawn(&Desk::new().photo("a", IMAGE)) {
+        let desk = Desk::new();
+        desk.photo("a", IMAGE);
+        desk.write(&format!("bg/{file}"), &text);
+        let error = desk.refused(&["scene", "draw", "recipe.toml", "-o", "scene.json"]);
+        assert!(
+            error.contains("surface_size") && error.contains("--size"),
+            "{file}: {error}"
+        );
+        let (given, _) = desk.scene(&["--set", "surface_size=[0.56,0.37]"]);
+        let path = format!("bg/{file}");
+        let [said, _] = desk.ok(&["camera", "solve", &path, "--size", "0.56x0.37"]);
+        assert!(said.contains("tilt 30."), "{file}: {said}");
+        desk.ok(&["camera", "doctor", &path, "--size", "0.56x0.37"]);
+        desk.ok(&["camera", "joint", &path, "--size", "0.56x0.37"]);
+        assert!(desk.path("bg/a.camera.json").is_file(), "{file}");
+        // Where it was solved its size is known.
+        let (stored, said) = desk.scene(&[]);
+        assert!(
+            (stored.focal_px.x / given.focal_px.x - 1.0).abs() < 1e-9 && said.is_empty(),
+            "{file}: {said}"
+        );
+        desk.ok(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
+    }
+}
+
+#[test]
+fn other_files_beside_the_photos_are_left_alone() {
+    let desk = Desk::new();
+    desk.label("a", &desk.photo("a", IMAGE));
+    desk.write("bg/notes.json", "{\"camera\": \"mine\"}");
+    desk.write("bg/broken.json", "{");
+    desk.write("bg/page.xml", "<html></html>");
+    let [labelme, ..] = drawn(&desk.photo("a", IMAGE));
+    desk.write("bg/a.json", &labelme.1.replace("0.", "1."));
+    desk.scene(&[]);
+    desk.write("bg/b.json", "{\"shapes\": [], \"imagePath\": \"a.png\"}");
+    assert!(
+        desk.refused(&["scene", "draw", "recipe.toml", "-o", "scene.json"])
+            .contains("b.json")
+    );
+}
+
+#[test]
+fn warnings_about_a_background_are_said_where_it_is_solved_and_in_the_report() {
+    let desk = Desk::new();
+    // Nothing says that the picture is whole.
+    desk.label("a", &desk.photo("a", IMAGE));
+    let (_, unsolved) = desk.scene(&[]);
+    assert_eq!(unsolved.lines().count(), 1, "{unsolved}");
+    assert!(
+        unsolved.contains("petcomp camera doctor") && unsolved.split_whitespace().count() < 20,
+        "{unsolved}"
+    );
+    let [_, solved] = desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    assert!(solved.contains("known"), "{solved}");
+    assert_eq!(desk.scene(&[]).1, "");
+    desk.ok(&[
+        "dataset",
+        "generate",
+        "-q",
+        "recipe.toml",
+        "-n",
+        "1",
+        "-o",
+        "out",
+    ]);
+    desk.ok(&["dataset", "report", "out"]);
+    let page = std::fs::read_to_string(desk.path("out/report.html")).unwrap();
+    assert!(
+        page.contains("above the surface is known"),
+        "not in the report"
+    );
+}
+
+#[test]
+fn a_portrait_photo_is_not_cropped_in_silence() {
+    let desk = Desk::new();
+    desk.label("p", &desk.photo("p", [480, 640]));
+    let (_, said) = desk.scene(&[]);
+    let line = said
+        .lines()
+        .find(|line| line.contains("another shape"))
+        .unwrap_or_default();
+    assert!(
+        line.contains("1 of 1 backgrounds") && line.contains("the middle 480 x 360"),
+        "{said}"
+    );
+    assert!(
+        !desk
+            .scene(&["--set", "scene.image=[240,320]"])
+            .1
+            .contains("another shape")
+    );
+}
+
+#[test]
+fn the_overlay_has_a_legend_below_the_photo() {
+    let desk = Desk::new();
+    desk.label("a", &desk.photo("a", IMAGE));
+    desk.ok(&["camera", "solve", "bg/a.label.json"]);
+    let overlay: Image<LinearRgb> = io::read(desk.path("bg/a.overlay.png")).unwrap();
+    assert!(
+        overlay.width() == 640 && overlay.height() > 480 + 5 * 16,
+        "{:?}",
+        overlay.size()
+    );
+}
+
+#[test]
+fn the_samples_are_taken_with_their_cameras() {
+    // The label of a sample, its sides exchanged: the case that was reported.
+    let desk = Desk::new();
+    let samples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/samples/backgrounds");
+    std::fs::create_dir_all(desk.path("bg")).unwrap();
+    std::fs::copy(samples.join("bg0000.jpg"), desk.path("bg/bg0000.jpg")).unwrap();
+    let label: Value = io::read_json(samples.join("bg0000.label.json")).unwrap();
+    desk.label("bg0000", &exchanged(label.clone()));
+    let error = desk.refused(&["camera", "solve", "bg/bg0000.label.json"]);
+    assert!(
+        error.contains("exchange width_m and height_m (chi squared 11"),
+        "{error}"
+    );
+    desk.label("bg0000", &label);
+    desk.ok(&["camera", "solve", "bg/bg0000.label.json"]);
+}

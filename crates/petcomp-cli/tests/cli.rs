@@ -1,0 +1,728 @@
+//! The real program in an empty folder, as a person types it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of its own for one test, and the program run in it.
+struct Desk(tempfile::TempDir);
+
+impl Desk {
+    fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::create_dir_all(path.parent().expect("inside the desk")).expect("a folder");
+        std::fs::write(&path, content).expect("a file");
+        path
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_petcomp"));
+        command
+            .args(args)
+            .current_dir(self.0.path())
+            .output()
+            .expect("the program starts")
+    }
+
+    /// Runs what must succeed and returns what it printed.
+    fn ok(&self, args: &[&str]) -> String {
+        let output = self.run(args);
+        let (out, err) = (text(&output.stdout), text(&output.stderr));
+        assert!(output.status.success(), "petcomp {args:?}\n{out}{err}");
+        out
+    }
+
+    /// Runs what must fail and returns the one line that says why, having checked that nothing was left behind.
+    fn refused(&self, args: &[&str]) -> String {
+        let before = self.files();
+        let output = self.run(args);
+        let err = text(&output.stderr);
+        assert!(!output.status.success(), "petcomp {args:?} succeeded");
+        assert!(
+            output.status.code().is_some_and(|code| code != 101),
+            "petcomp {args:?} panicked: {err}"
+        );
+        let errors: Vec<&str> = err
+            .lines()
+            .filter(|line| line.starts_with("error: "))
+            .collect();
+        assert_eq!(errors.len(), 1, "petcomp {args:?} said:\n{err}");
+        assert_eq!(
+            self.files(),
+            before,
+            "petcomp {args:?} left something behind"
+        );
+        errors[0].to_owned()
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        walk(self.0.path(), &mut found);
+        found.sort();
+        found
+    }
+}
+
+fn walk(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
+        if entry.path().is_dir() {
+            walk(&entry.path(), found);
+        } else {
+            found.push(entry.path());
+        }
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn samples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/samples")
+}
+
+fn sample(name: &str) -> String {
+    samples().join(name).to_string_lossy().into_owned()
+}
+
+/// A label file with these corners for a picture that need not exist.
+fn label(corners: &str) -> String {
+    format!(
+        r#"{{"format": "plane-label", "version": 1, "image": {{"file": "a.jpg", "width": 640, "height": 480}},
+            "surface": {{"id": "tray", "width_m": 0.6, "height_m": 0.4, "corners_px": {corners}}}}}"#
+    )
+}
+
+const SQUARE: &str = "[[100, 100], [500, 110], [510, 400], [90, 390]]";
+
+#[test]
+fn every_subcommand_explains_itself() {
+    let desk = Desk::new();
+    let help = desk.ok(&["--help"]);
+    for stage in [
+        "demo", "matte", "asset", "camera", "scene", "settle", "render", "label", "dataset",
+        "diff", "doctor",
+    ] {
+        assert!(help.contains(stage), "--help does not name {stage}");
+        assert!(
+            desk.ok(&[stage, "--help"]).len() > 100,
+            "{stage} --help says little"
+        );
+    }
+}
+
+#[test]
+fn the_program_does_not_load_openimageio() {
+    let Ok(ldd) = Command::new("ldd")
+        .arg(env!("CARGO_BIN_EXE_petcomp"))
+        .output()
+    else {
+        return;
+    };
+    assert!(
+        !text(&ldd.stdout).contains("OpenImageIO"),
+        "petcomp links OpenImageIO"
+    );
+}
+
+#[test]
+fn doctor_finds_nothing_wrong() {
+    Desk::new().ok(&["doctor"]);
+}
+
+#[test]
+fn global_options_are_explained_once() {
+    let desk = Desk::new();
+    assert!(
+        desk.ok(&["--help"])
+            .contains("Global options:\n  -j, --threads <N>")
+    );
+    let help = desk.ok(&["dataset", "generate", "--help"]);
+    let last = help.lines().last().unwrap_or_default();
+    assert!(
+        last.starts_with("Global options (see `petcomp --help`): -j, -q"),
+        "{help}"
+    );
+    assert!(!help.contains("--oiio <"), "{help}");
+    // Hidden in the help, they are taken as before.
+    desk.ok(&[
+        "dataset",
+        "init",
+        "recipe.toml",
+        "-q",
+        "--oiio",
+        "off",
+        "-j",
+        "1",
+    ]);
+}
+
+#[test]
+fn a_check_fails_on_what_needs_review_where_that_is_asked_for() {
+    let desk = Desk::new();
+    let photo = sample("bottles/b0006_0.png");
+    desk.ok(&[
+        "asset", "add", &photo, "--class", "none", "--length", "0.2", "-o", "assets",
+    ]);
+    let said = desk.ok(&["asset", "check", "assets"]);
+    assert!(
+        said.contains("b0006_0.exr: ") && said.contains("1 to review"),
+        "the sample has the screen's hue: {said}"
+    );
+    let strict = desk.run(&["asset", "check", "assets", "--strict"]);
+    assert_eq!(strict.status.code(), Some(1), "{}", text(&strict.stderr));
+}
+
+/// What a terminal shows of a job, from its start.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_progress_bar_begins_at_nothing() {
+    let desk = Desk::new();
+    let job = format!(
+        "stty cols 80; {} asset build list.csv -o assets",
+        env!("CARGO_BIN_EXE_petcomp")
+    );
+    desk.write(
+        "list.csv",
+        format!(
+            "file,asset,class,length\n{},a,none,0.2\n",
+            sample("bottles/b0006_0.png")
+        ),
+    );
+    let mut command = Command::new("script");
+    let output = command
+        .args(["-qec", &job, "/dev/null"])
+        .current_dir(desk.0.path())
+        .output()
+        .expect("Debian has script");
+    let shown = text(&output.stdout);
+    let first = shown
+        .split(['\r', '\n'])
+        .find(|line| line.contains("cut-outs"))
+        .unwrap_or_default();
+    assert!(
+        first.contains("0/1") && !first.contains('█'),
+        "{first:?} of {shown}"
+    );
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = Desk::new().refused(&["matte", "cut", "nowhere.png", "-o", "out.exr"]);
+    assert!(error.contains("nowhere.png: no such file"), "{error}");
+}
+
+#[test]
+fn text_named_png_is_not_a_picture() {
+    let desk = Desk::new();
+    desk.write("note.png", "this is a note");
+    let error = desk.refused(&["matte", "cut", "note.png", "-o", "out.exr"]);
+    assert!(
+        error.contains("note.png") && error.contains("expected"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_truncated_png_is_refused() {
+    let desk = Desk::new();
+    let whole = std::fs::read(samples().join("bottles/b0000_0.png")).expect("a sample");
+    desk.write("half.png", &whole[..whole.len() / 2]);
+    let error = desk.refused(&["matte", "cut", "half.png", "-o", "out.exr"]);
+    assert!(error.contains("half.png"), "{error}");
+}
+
+#[test]
+fn a_picture_without_pixels_is_refused() {
+    let desk = Desk::new();
+    let mut png = std::fs::read(samples().join("bottles/b0000_0.png")).expect("a sample");
+    png[16..24].fill(0);
+    desk.write("empty.png", png);
+    let error = desk.refused(&["matte", "cut", "empty.png", "-o", "out.exr"]);
+    assert!(error.contains("empty.png"), "{error}");
+}
+
+#[test]
+fn a_label_with_three_corners_is_refused() {
+    let desk = Desk::new();
+    desk.write(
+        "a.label.json",
+        label("[[100, 100], [500, 110], [510, 400]]"),
+    );
+    let error = desk.refused(&["camera", "solve", "a.label.json"]);
+    assert!(
+        error.contains("a.label.json") && error.contains("corners_px"),
+        "{error}"
+    );
+}
+
+#[test]
+fn corners_that_are_not_convex_are_refused() {
+    let desk = Desk::new();
+    desk.write(
+        "a.label.json",
+        label("[[100, 100], [500, 110], [200, 150], [90, 390]]"),
+    );
+    let error = desk.refused(&["camera", "solve", "a.label.json"]);
+    assert!(error.contains("not convex"), "{error}");
+}
+
+#[test]
+fn crossed_corners_are_put_in_order_and_said() {
+    let desk = Desk::new();
+    desk.write(
+        "a.label.json",
+        label("[[100, 100], [510, 400], [500, 110], [90, 390]]"),
+    );
+    let output = desk.run(&["camera", "solve", "a.label.json"]);
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert!(
+        output.status.success() && said.contains("sorted clockwise"),
+        "{said}"
+    );
+}
+
+#[test]
+fn an_unknown_key_is_met_with_the_one_that_was_meant() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nobjcts = [1, 2]\n");
+    let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
+    assert!(
+        error.contains("recipe.toml: scene: unknown key \"objcts\", did you mean \"objects\"?"),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_impossible_range_is_named() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", "[scene]\nscale = [0.0, -1.0]\n");
+    let error = desk.refused(&["dataset", "generate", "recipe.toml", "-n", "1", "-o", "out"]);
+    assert!(error.contains("recipe.toml: scene.scale"), "{error}");
+}
+
+#[test]
+fn an_output_folder_that_is_a_file_is_refused() {
+    let desk = Desk::new();
+    desk.write("taken", "a file");
+    let error = desk.refused(&["demo", "--samples", &sample(""), "-o", "taken"]);
+    assert!(error.contains("taken"), "{error}");
+}
+
+#[test]
+fn diff_speaks_like_idiff() {
+    let desk = Desk::new();
+    let (a, b) = (sample("bottles/b0000_0.png"), sample("bottles/b0001_0.png"));
+    assert_eq!(desk.run(&["diff", &a, &a]).status.code(), Some(0));
+    assert_eq!(desk.run(&["diff", &a, &b]).status.code(), Some(3));
+    assert_eq!(
+        desk.run(&["diff", "-fail", "0.1", &a, "nowhere.png"])
+            .status
+            .code(),
+        Some(4)
+    );
+}
+
+#[test]
+fn the_demo_makes_the_same_files_at_any_thread_count() {
+    let desk = Desk::new();
+    let demo = |threads: &str, folder: &str| {
+        let args = [
+            "demo",
+            "--samples",
+            &sample(""),
+            "-n",
+            "4",
+            "--seed",
+            "0",
+            "-q",
+            "-j",
+            threads,
+            "-o",
+            folder,
+        ];
+        desk.ok(&args);
+        let root = desk.path(folder);
+        let mut files = Vec::new();
+        walk(&root, &mut files);
+        // How long the run took, and when its inputs were written, are not part of the dataset.
+        files.retain(|f| !f.ends_with(".runs.jsonl") && !f.ends_with(".inputs.json"));
+        files.sort();
+        let named = |f: &PathBuf| f.strip_prefix(&root).expect("below the root").to_owned();
+        files
+            .iter()
+            .map(|f| (named(f), std::fs::read(f).expect("a file")))
+            .collect::<Vec<_>>()
+    };
+    let (one, four) = (demo("1", "one"), demo("4", "four"));
+    assert!(one.len() > 20, "the demo wrote only {} files", one.len());
+    for ((name, a), (other, b)) in one.iter().zip(&four) {
+        assert_eq!(name, other);
+        assert!(a == b, "{} depends on the thread count", name.display());
+    }
+    desk.ok(&["dataset", "check", "one/dataset"]);
+}
+
+#[test]
+fn a_scene_goes_through_the_stages_one_by_one() {
+    let desk = Desk::new();
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
+    desk.ok(&[
+        "scene",
+        "draw",
+        "demo/recipe.toml",
+        "-k",
+        "3",
+        "--seed",
+        "5",
+        "-o",
+        "scene.toml",
+    ]);
+    desk.ok(&["scene", "check", "scene.toml"]);
+    desk.ok(&[
+        "settle",
+        "scene.toml",
+        "-o",
+        "rest.json",
+        "--trace",
+        "fall.csv",
+        "--preview",
+        "rest.png",
+    ]);
+    assert!(
+        std::fs::read_to_string(desk.path("fall.csv"))
+            .is_ok_and(|csv| csv.starts_with("seconds,object,x,y,z,"))
+    );
+    assert!(desk.path("rest.png").exists());
+    desk.ok(&["render", "rest.json", "demo/recipe.toml", "-o", "frame.exr"]);
+    desk.ok(&[
+        "render",
+        "scene.toml",
+        "demo/recipe.toml",
+        "-o",
+        "again.exr",
+    ]);
+    desk.ok(&["diff", "frame.exr", "again.exr"]);
+    desk.ok(&[
+        "label",
+        "rest.json",
+        "demo/recipe.toml",
+        "-o",
+        "labels.json",
+        "--overlay",
+        "overlay.png",
+    ]);
+    assert!(desk.path("overlay.png").exists());
+
+    // Borders of the masks, with every corner and with fewer.
+    let corners = |tolerance: &str| -> usize {
+        let set = format!("labels.simplify={tolerance}");
+        let args = [
+            "label",
+            "rest.json",
+            "demo/recipe.toml",
+            "-o",
+            "again.json",
+            "--polygons",
+            "borders.json",
+        ];
+        desk.ok(&[&args[..], &["--set", &set]].concat());
+        let borders: Vec<petcomp::label::Border> =
+            petcomp::io::read_json(desk.path("borders.json")).unwrap();
+        borders
+            .iter()
+            .flat_map(|border| &border.amodal)
+            .map(Vec::len)
+            .sum()
+    };
+    let [all, few] = ["0", "2"].map(corners);
+    assert!(few >= 3 && all > 4 * few, "{all} {few}");
+    let refused = desk.refused(&[
+        "label",
+        "rest.json",
+        "demo/recipe.toml",
+        "-o",
+        "no.json",
+        "--set",
+        "labels.simplify=-1",
+    ]);
+    assert!(
+        refused.contains("labels.simplify: -1, expected 0 to 1000 (pixels)"),
+        "{refused}"
+    );
+
+    // The same picture in parts, at another quality, and for Blender.
+    let parts = [
+        "render",
+        "rest.json",
+        "demo/recipe.toml",
+        "-o",
+        "parts.exr",
+        "--quality",
+        "draft",
+    ];
+    desk.ok(&[
+        &parts[..],
+        &[
+            "--aov",
+            "beauty,id,depth,cryptomatte,layers",
+            "--preview",
+            "look.png",
+        ],
+    ]
+    .concat());
+    assert!(desk.path("look.png").exists());
+    let told = text(&desk.run(&["diff", "frame.exr", "parts.exr"]).stdout);
+    assert!(
+        told.contains("SSIM = 0.9") && told.contains("FLIP = 0.0"),
+        "{told}"
+    );
+    assert!(
+        text(
+            &desk
+                .run(&[&parts[..], &["--aov", "normals"]].concat())
+                .stderr
+        )
+        .contains("expected some of beauty")
+    );
+    desk.ok(&[
+        "scene",
+        "export",
+        "rest.json",
+        "demo/recipe.toml",
+        "--to",
+        "cycles",
+        "blender",
+    ]);
+    assert!(
+        [
+            "scene.json",
+            "plate.exr",
+            "card_1.exr",
+            "scene_reference.py"
+        ]
+        .iter()
+        .all(|f| desk.path("blender").join(f).exists())
+    );
+}
+
+#[test]
+fn an_environment_map_lies_beside_its_recipe() {
+    let desk = Desk::new();
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
+    let sky = petcomp::Image::filled(8, 4, petcomp::LinearRgb::new(0.2, 0.4, 0.9));
+    petcomp::io::write(desk.path("demo/sky.exr"), &sky).unwrap();
+    let set = ["--set", "scene.environment.files=[\"sky.exr\"]"];
+    desk.ok(&[
+        &[
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "1",
+            "-o",
+            "out",
+        ][..],
+        &set,
+    ]
+    .concat());
+    // Its content decides the pictures, so another one is another dataset.
+    petcomp::io::write(desk.path("demo/sky.exr"), &sky.map(|p| p.scale(2.0))).unwrap();
+    let again = desk.run(
+        &[
+            &[
+                "dataset",
+                "generate",
+                "demo/recipe.toml",
+                "-n",
+                "2",
+                "-o",
+                "out",
+            ][..],
+            &set,
+        ]
+        .concat(),
+    );
+    let told = text(&again.stderr);
+    assert!(
+        told.contains(
+            "out/dataset.json: recipe.environments[sky.exr].content: the dataset was begun with"
+        ),
+        "{told}"
+    );
+    // A scene file names it as the recipe does, and no file of elsewhere.
+    desk.ok(&[
+        &["scene", "draw", "demo/recipe.toml", "-o", "scene.toml"][..],
+        &set,
+    ]
+    .concat());
+    let render = [
+        "render",
+        "scene.toml",
+        "demo/recipe.toml",
+        "-o",
+        "frame.png",
+    ];
+    desk.ok(&[&render[..], &set].concat());
+    desk.ok(&render);
+    let scene = std::fs::read_to_string(desk.path("scene.toml"))
+        .unwrap()
+        .replace("sky.exr", "../sky.exr");
+    desk.write("scene.toml", scene);
+    let refused = desk.refused(&render);
+    assert!(
+        refused.contains(
+            "scene.toml: environment.file: \"../sky.exr\", expected one that the recipe lists"
+        ),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_summary_tells_what_is_there_and_is_a_result() {
+    let desk = Desk::new();
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
+    let made = |folder: &str, set: &str| {
+        let few = [
+            "--set",
+            "scene.objects=6",
+            "--set",
+            "scene.image=[160,120]",
+            "--set",
+            set,
+        ];
+        let call = [
+            "-q",
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "3",
+            "--seed",
+            "2",
+            "-o",
+            folder,
+        ];
+        desk.ok(&[&call[..], &few].concat())
+    };
+    let told = made("keep", "labels.obstructed=\"keep\"");
+    assert!(
+        told.contains("objects      18, 18 labelled, ") && !told.contains(" 0 obstructed"),
+        "{told}"
+    );
+    assert!(
+        told.contains(" obstructed (labelled like the others)\n")
+            && told.ends_with("keep/data.yaml\n"),
+        "{told}"
+    );
+    let told = made("drop", "labels.obstructed=\"drop\"");
+    assert!(told.contains(" obstructed (without a label)\n"), "{told}");
+    let told = made("coco", "labels.formats=[\"coco\"]");
+    let places: Vec<&str> = told
+        .lines()
+        .filter(|line| line.starts_with("coco/"))
+        .collect();
+    assert_eq!(
+        places,
+        [
+            "coco/annotations/instances_train.json",
+            "coco/annotations/instances_val.json"
+        ]
+    );
+    assert!(places.iter().all(|place| desk.path(place).is_file()));
+}
+
+#[test]
+fn one_camera_solve_says_what_it_found() {
+    let desk = Desk::new();
+    desk.write("a.label.json", label(SQUARE));
+    let said = desk.ok(&["camera", "solve", "a.label.json"]);
+    assert!(
+        said.contains("tilt") && desk.path("a.camera.json").exists(),
+        "{said}"
+    );
+}
+
+#[test]
+fn one_word_says_how_finely_every_stage_works() {
+    let desk = Desk::new();
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
+    let made = |quality: &[&str], folder: &str| {
+        let call = [
+            "dataset",
+            "generate",
+            "demo/recipe.toml",
+            "-n",
+            "1",
+            "-q",
+            "-o",
+            folder,
+        ];
+        desk.ok(&[&call[..], quality].concat());
+        let at = |part: &str| desk.path(folder).join(format!("images/{part}/000000.png"));
+        std::fs::read(at("train"))
+            .or_else(|_| std::fs::read(at("val")))
+            .expect("a picture")
+    };
+    let usual = made(&[], "usual");
+    assert!(
+        usual == made(&["--quality", "normal"], "normal"),
+        "normal is what there is without a word"
+    );
+    assert!(usual != made(&["--quality", "draft"], "draft"));
+    let told = desk.refused(&[
+        "dataset",
+        "generate",
+        "demo/recipe.toml",
+        "-n",
+        "1",
+        "-o",
+        "x",
+        "--quality",
+        "fast",
+    ]);
+    assert!(told.contains("draft, normal, reference"), "{told}");
+}

@@ -1,0 +1,527 @@
+//! Kinds of valid file that few programs write: they are read, and read right, or named for what they are.
+
+use crate::build::{ihdr, png, stored};
+use crate::make::{Folder, behind, tiff};
+use petcomp::io::exr_parts::{Part, Plane, write_parts};
+use petcomp::io::{self, exr::write_channels};
+use petcomp::{Coverage, Depth, Image, LinearRgb, PremulRgba, Srgb8, color};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+type Tag = (u16, u16, u32, u32);
+
+/// Tags of strips, and of tiles: where they lie and how long they are.
+const STRIPS: [u16; 2] = [273, 279];
+const TILES: [u16; 2] = [324, 325];
+
+/// A TIFF out of tags and several strips or tiles.
+fn in_pieces(tags: &[Tag], [offsets, counts]: [u16; 2], pieces: &[Vec<u8>]) -> Vec<u8> {
+    let (n, start) = (pieces.len() as u32, behind(tags.len() + 2));
+    let lists = if n > 1 { 8 * n } else { 0 };
+    let ends: Vec<u32> = pieces
+        .iter()
+        .scan(start + lists, |at, p| {
+            Some(std::mem::replace(at, *at + p.len() as u32))
+        })
+        .collect();
+    let lengths: Vec<u32> = pieces.iter().map(|p| p.len() as u32).collect();
+    let mut all = tags.to_vec();
+    let inline = |list: &[u32], at: u32| if n > 1 { at } else { list[0] };
+    all.extend([
+        (offsets, 4, n, inline(&ends, start)),
+        (counts, 4, n, inline(&lengths, start + 4 * n)),
+    ]);
+    all.sort_unstable();
+    let lists = ends
+        .iter()
+        .chain(&lengths)
+        .filter(|_| n > 1)
+        .flat_map(|v| v.to_le_bytes());
+    tiff(&all, &lists.chain(pieces.concat()).collect::<Vec<u8>>())
+}
+
+/// What every TIFF says of its size and samples.
+fn about(width: u32, height: u32, bits: u32, channels: u32) -> Vec<Tag> {
+    let kind = if channels == 1 { 1 } else { 2 };
+    vec![
+        (256, 4, 1, width),
+        (257, 4, 1, height),
+        (258, 3, 1, bits),
+        (262, 3, 1, kind),
+        (277, 3, 1, channels),
+    ]
+}
+
+fn deflated(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// A code for a place and a channel.
+fn code(x: usize, y: usize, c: usize) -> u8 {
+    (40 * x + 7 * y + 80 * c) as u8
+}
+
+fn codes_of(path: &Path) -> Image<Srgb8> {
+    io::read::<LinearRgb>(path)
+        .unwrap()
+        .map(color::encode_srgb8)
+}
+
+fn assert_codes(path: &Path, size: (usize, usize)) {
+    let read = codes_of(path);
+    assert_eq!(read.size(), size);
+    let expected = Image::from_fn(size.0, size.1, |x, y| Srgb8 {
+        r: code(x, y, 0),
+        g: code(x, y, 1),
+        b: code(x, y, 2),
+    });
+    assert_eq!(read.pixels(), expected.pixels(), "{}", path.display());
+}
+
+/// As caspian.tif of libtiff's sample pictures: OpenImageIO cannot go back from the last row of a plane to the next of
+/// the first.
+#[test]
+fn compressed_planes_of_a_tiff_are_read() {
+    let folder = Folder::new();
+    let strip = |c: usize, rows: std::ops::Range<usize>| {
+        rows.flat_map(move |y| (0..5).map(move |x| code(x, y, c)))
+    };
+    let strips = (0..3)
+        .flat_map(|c| [0..4, 4..6].map(|rows| deflated(&strip(c, rows).collect::<Vec<_>>())))
+        .collect::<Vec<_>>();
+    let tags = [
+        about(5, 6, 8, 3),
+        vec![(259, 3, 1, 8), (278, 3, 1, 4), (284, 3, 1, 2)],
+    ]
+    .concat();
+    assert_codes(
+        &folder.with("planes.tif", &in_pieces(&tags, STRIPS, &strips)),
+        (5, 6),
+    );
+
+    let doubles = |c: usize| {
+        (0..30)
+            .flat_map(move |i| (f64::from(i) + 0.25 * c as f64).to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let tags = [
+        about(5, 6, 64, 3),
+        vec![
+            (259, 3, 1, 8),
+            (278, 3, 1, 6),
+            (284, 3, 1, 2),
+            (339, 3, 1, 3),
+        ],
+    ]
+    .concat();
+    let strips = [0, 1, 2].map(|c| deflated(&doubles(c)));
+    let read =
+        io::read::<LinearRgb>(folder.with("doubles.tif", &in_pieces(&tags, STRIPS, &strips)))
+            .unwrap();
+    assert_eq!(read[(3, 2)], LinearRgb::new(13.0, 13.25, 13.5));
+}
+
+/// Tiles of 16 x 16 for a picture of 5 x 6: what reaches over is cut, and no column stays black.
+#[test]
+fn tiles_larger_than_the_picture_are_cut() {
+    let folder = Folder::new();
+    let tile = |left: usize| {
+        (0..16)
+            .flat_map(move |y| (0..16).flat_map(move |x| (0..3).map(move |c| code(left + x, y, c))))
+            .collect::<Vec<u8>>()
+    };
+    let tags = |width| {
+        [
+            about(width, 6, 8, 3),
+            vec![(259, 3, 1, 1), (322, 3, 1, 16), (323, 3, 1, 16)],
+        ]
+        .concat()
+    };
+    assert_codes(
+        &folder.with("one.tif", &in_pieces(&tags(5), TILES, &[tile(0)])),
+        (5, 6),
+    );
+    assert_codes(
+        &folder.with(
+            "two.tif",
+            &in_pieces(&tags(19), TILES, &[tile(0), tile(16)]),
+        ),
+        (19, 6),
+    );
+}
+
+/// As quad-tile.tif and cramps-tile.tif of libtiff's sample pictures: what is in tiles stands under the tags of strips.
+#[test]
+fn tiles_under_the_tags_of_strips_are_read() {
+    let folder = Folder::new();
+    let tile = |left: usize| {
+        (0..16)
+            .flat_map(move |y| (0..16).map(move |x| code(left + x, y, 0)))
+            .collect::<Vec<u8>>()
+    };
+    let tags = |width| {
+        [
+            about(width, 6, 8, 1),
+            vec![(259, 3, 1, 1), (322, 3, 1, 16), (323, 3, 1, 16)],
+        ]
+        .concat()
+    };
+    // The number of tiles is that of strips, too, in the second one.
+    for (width, tiles) in [(19, vec![tile(0), tile(16)]), (5, vec![tile(0)])] {
+        let read = codes_of(&folder.with("tiles.tif", &in_pieces(&tags(width), STRIPS, &tiles)));
+        for (i, code) in read.pixels().iter().enumerate() {
+            assert_eq!(
+                code.g,
+                self::code(i % width as usize, i / width as usize, 0),
+                "{width}: {i}"
+            );
+        }
+    }
+}
+
+/// Integers are display-encoded, whether they have a sign or not.
+#[test]
+fn signed_and_long_integers_of_a_tiff_are_display_codes() {
+    let folder = Folder::new();
+    let expected = color::srgb_to_linear(0.5);
+    let values: [(&str, u32, u32, Vec<u8>); 4] = [
+        ("int8.tif", 8, 2, 64_i8.to_le_bytes().to_vec()),
+        ("int16.tif", 16, 2, 16_384_i16.to_le_bytes().to_vec()),
+        ("int32.tif", 32, 2, (1_i32 << 30).to_le_bytes().to_vec()),
+        ("uint32.tif", 32, 1, (1_u32 << 31).to_le_bytes().to_vec()),
+    ];
+    for (name, bits, format, value) in values {
+        let tags = [
+            about(1, 1, bits, 1),
+            vec![(259, 3, 1, 1), (278, 3, 1, 1), (339, 3, 1, format)],
+        ]
+        .concat();
+        let read =
+            io::read::<LinearRgb>(folder.with(name, &in_pieces(&tags, STRIPS, &[value]))).unwrap();
+        assert!(
+            (read[(0, 0)].g - expected).abs() < 0.005,
+            "{name}: {read:?}, expected {expected}"
+        );
+    }
+}
+
+#[test]
+fn old_lzw_and_bits_from_the_lowest_up_are_left_to_openimageio() {
+    let folder = Folder::new();
+    let one = |more: &[Tag], strip: &[u8]| {
+        in_pieces(
+            &[about(1, 1, 8, 1), more.to_vec()].concat(),
+            STRIPS,
+            &[strip.to_vec()],
+        )
+    };
+    // The codes 256 (begin), 200 and 257 (end), nine bits each, from the lowest bit up.
+    let codes = 256_u32 | 200 << 9 | 257 << 18;
+    let old = codes_of(&folder.with(
+        "old.tif",
+        &one(&[(259, 3, 1, 5), (278, 3, 1, 1)], &codes.to_le_bytes()),
+    ));
+    assert_eq!(old[(0, 0)].g, 200);
+    let turned = one(
+        &[(259, 3, 1, 1), (266, 3, 1, 2), (278, 3, 1, 1)],
+        &[0b0000_0011],
+    );
+    assert_eq!(
+        codes_of(&folder.with("turned.tif", &turned))[(0, 0)].g,
+        0b1100_0000
+    );
+}
+
+#[test]
+fn grey_tiffs_have_alpha() {
+    let folder = Folder::new();
+    let tags = [
+        about(2, 1, 8, 2),
+        vec![(259, 3, 1, 1), (278, 3, 1, 1), (338, 3, 1, 2)],
+    ]
+    .concat();
+    let grey: Vec<Tag> = tags
+        .into_iter()
+        .map(|tag| if tag.0 == 262 { (262, 3, 1, 1) } else { tag })
+        .collect();
+    let read = io::read::<PremulRgba>(folder.with(
+        "a.tif",
+        &in_pieces(&grey, STRIPS, &[vec![255, 51, 255, 255]]),
+    ))
+    .unwrap();
+    assert_eq!(read[(0, 0)], PremulRgba::new(0.2, 0.2, 0.2, 0.2));
+    assert_eq!(read[(1, 0)], PremulRgba::new(1.0, 1.0, 1.0, 1.0));
+}
+
+fn sample(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/io/files")
+        .join(name)
+}
+
+/// Arithmetic coding is read by OpenImageIO; 12 bits by neither, which is not the file's fault.
+#[test]
+fn other_kinds_of_jpeg_are_read_or_named() {
+    let (arithmetic, other) = (
+        codes_of(&sample("arithmetic.jpg")),
+        codes_of(&sample("progressive.jpg")),
+    );
+    let apart = |(p, q): (&Srgb8, &Srgb8)| {
+        p.r.abs_diff(q.r)
+            .max(p.g.abs_diff(q.g))
+            .max(p.b.abs_diff(q.b))
+    };
+    let worst = arithmetic
+        .pixels()
+        .iter()
+        .zip(other.pixels())
+        .map(apart)
+        .max();
+    assert!(
+        arithmetic.size() == (24, 16) && worst <= Some(2),
+        "{worst:?}"
+    );
+    assert_eq!(
+        io::read_header(sample("arithmetic.jpg")).unwrap().channels,
+        ["R", "G", "B"]
+    );
+    let e = io::read::<LinearRgb>(sample("twelve_bits.jpg"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        e.contains(
+            "twelve_bits.jpg: unsupported JPEG: 12 bits a sample, expected 8 (OpenImageIO: "
+        ),
+        "{e}"
+    );
+}
+
+/// A grey pixel of code 128, with chunks before it.
+fn grey_png(chunks: &[(&'static [u8; 4], Vec<u8>)]) -> Vec<u8> {
+    let data = [(b"IDAT", stored(&[0, 128])), (b"IEND", vec![])];
+    png(&[&[ihdr(1, 1, 8, 0, 0)], chunks, &data].concat())
+}
+
+#[test]
+fn what_a_png_says_of_its_gamma_is_done() {
+    let folder = Folder::new();
+    let light = |gama: u32| {
+        let path = folder.with(
+            "a.png",
+            &grey_png(&[(b"gAMA", gama.to_be_bytes().to_vec())]),
+        );
+        (
+            io::read::<LinearRgb>(&path).unwrap()[(0, 0)].g,
+            io::read::<Coverage>(&path).unwrap()[(0, 0)].0,
+        )
+    };
+    let code = 128.0_f32 / 255.0;
+    let (srgb, matte) = light(45_455);
+    assert!(
+        (srgb - color::srgb_to_linear(code)).abs() < 1e-6 && matte == code,
+        "{srgb} {matte}"
+    );
+    let ((linear, matte), (mac, _)) = (light(100_000), light(55_556));
+    assert_eq!(matte, code, "a matte is never decoded");
+    assert!(
+        (linear - code).abs() < 1e-6 && (mac - code.powf(1.8)).abs() < 1e-4,
+        "{linear} {mac}"
+    );
+}
+
+#[test]
+fn layers_of_an_exr_are_found_by_name_and_single_channels_are_grey() {
+    let folder = Folder::new();
+    let path = folder.file("a.exr");
+    let values: Vec<f32> = (0..7).map(|v| v as f32).collect();
+    let read = |names: &[&str]| {
+        let channels: Vec<(&str, &[f32])> = names
+            .iter()
+            .zip(values.chunks(1))
+            .map(|(n, v)| (*n, v))
+            .collect();
+        write_channels(&path, (1, 1), &channels, &[]).unwrap();
+        io::read::<PremulRgba>(&path)
+            .map(|image| image[(0, 0)])
+            .map_err(|e| e.to_string())
+    };
+    assert_eq!(
+        read(&["diffuse.R", "diffuse.G", "diffuse.B"]),
+        Ok(PremulRgba::new(0.0, 1.0, 2.0, 1.0))
+    );
+    let blender = [
+        "V.Alb.R",
+        "V.Alb.G",
+        "V.Alb.B",
+        "V.Combined.R",
+        "V.Combined.G",
+        "V.Combined.B",
+        "V.Combined.A",
+    ];
+    assert_eq!(read(&blender), Ok(PremulRgba::new(3.0, 4.0, 5.0, 6.0)));
+    assert_eq!(
+        read(&["Z", "mask"]),
+        Ok(PremulRgba::new(1.0, 1.0, 1.0, 1.0))
+    );
+    assert_eq!(read(&["Z"]), Ok(PremulRgba::new(0.0, 0.0, 0.0, 1.0)));
+    assert!(
+        read(&["u", "v"])
+            .unwrap_err()
+            .contains("has the channels u v, expected R G B or Y")
+    );
+    assert!(io::read::<Depth>(&path).is_err());
+}
+
+#[test]
+fn the_part_with_colours_is_taken_wherever_it_stands() {
+    let folder = Folder::new();
+    let path = folder.file("a.exr");
+    let part = |name: &str, channels: &[(&str, f32)]| Part {
+        name: name.into(),
+        channels: channels
+            .iter()
+            .map(|(name, v)| (name.to_string(), Plane::Float(vec![*v])))
+            .collect(),
+        metadata: Vec::new(),
+    };
+    let rgb = |layer: &str, v: f32| {
+        let names = ["R", "G", "B"].map(|c| format!("{layer}{c}"));
+        part(
+            &format!("part {layer}{v}"),
+            &names.each_ref().map(|n| (n.as_str(), v)),
+        )
+    };
+    let parts = [
+        part("depth", &[("Z", 9.0)]),
+        rgb("diffuse.", 1.0),
+        rgb("", 2.0),
+        rgb("", 3.0),
+    ];
+    let taken = |parts: &[Part]| {
+        write_parts(&path, (1, 1), parts).unwrap();
+        io::read::<LinearRgb>(&path).unwrap()[(0, 0)].g
+    };
+    assert_eq!(
+        [taken(&parts), taken(&parts[..2]), taken(&parts[..1])],
+        [2.0, 1.0, 9.0]
+    );
+}
+
+/// An EXR of 4 x 4 halves with luminance for each pixel and a pair of colour differences for four of them.
+fn chroma_exr(by: [f32; 4], ry: [f32; 4]) -> Vec<u8> {
+    let text = |name: &str, kind: &str, value: &[u8]| {
+        [
+            name.as_bytes(),
+            b"\0",
+            kind.as_bytes(),
+            b"\0",
+            &(value.len() as u32).to_le_bytes(),
+            value,
+        ]
+        .concat()
+    };
+    let channel = |name: &str, every: u32| {
+        [
+            name.as_bytes(),
+            b"\0",
+            &[1, 0, 0, 0, 0, 0, 0, 0],
+            &every.to_le_bytes(),
+            &every.to_le_bytes(),
+        ]
+        .concat()
+    };
+    let window: Vec<u8> = [0_u32, 0, 3, 3]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    let one = 1.0_f32.to_le_bytes();
+    let mut file = [
+        b"\x76\x2f\x31\x01\x02\0\0\0".to_vec(),
+        text(
+            "channels",
+            "chlist",
+            &[channel("BY", 2), channel("RY", 2), channel("Y", 1), vec![0]].concat(),
+        ),
+        text("compression", "compression", &[0]),
+        text("dataWindow", "box2i", &window),
+        text("displayWindow", "box2i", &window),
+        text("lineOrder", "lineOrder", &[0]),
+        text("pixelAspectRatio", "float", &one),
+        text("screenWindowCenter", "v2f", &[0; 8]),
+        text("screenWindowWidth", "float", &one),
+        vec![0],
+    ]
+    .concat();
+    let halves = |v: &[f32]| {
+        v.iter()
+            .flat_map(|&v| half::f16::from_f32(v).to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let lines: Vec<Vec<u8>> = (0..4_usize)
+        .map(|y| {
+            let chroma = if y % 2 == 0 {
+                [halves(&by[y..y + 2]), halves(&ry[y..y + 2])].concat()
+            } else {
+                Vec::new()
+            };
+            [chroma, halves(&[0.5; 4])].concat()
+        })
+        .collect();
+    let mut at = file.len() + 8 * lines.len();
+    for line in &lines {
+        file.extend((at as u64).to_le_bytes());
+        at += 8 + line.len();
+    }
+    for (y, line) in lines.iter().enumerate() {
+        file.extend([(y as u32).to_le_bytes(), (line.len() as u32).to_le_bytes()].concat());
+        file.extend(line);
+    }
+    file
+}
+
+/// `RY = (R - Y) / Y` and `BY = (B - Y) / Y`; OpenImageIO does not read such files.
+#[test]
+fn luminance_with_colour_of_half_the_size_is_read() {
+    let folder = Folder::new();
+    let path = folder.with("a.exr", &chroma_exr([0.0, 1.0, 1.0, 1.0], [-1.0; 4]));
+    let read = io::read::<LinearRgb>(&path).unwrap();
+    assert_eq!(io::read_header(&path).unwrap().channels, ["BY", "RY", "Y"]);
+    let weights = color::xyz_from_rgb(&color::RgbSpace::REC709);
+    for ((x, y), blue) in [
+        ((0, 0), 0.5),
+        ((1, 0), 0.75),
+        ((2, 0), 1.0),
+        ((0, 1), 0.75),
+        ((0, 2), 1.0),
+        ((3, 3), 1.0),
+    ] {
+        let p = read[(x, y)];
+        let luminance = f64::from(p.r) * weights[(1, 0)]
+            + f64::from(p.g) * weights[(1, 1)]
+            + f64::from(p.b) * weights[(1, 2)];
+        assert!(
+            p.r == 0.0 && (p.b - blue).abs() < 1e-6 && (luminance - 0.5).abs() < 1e-6,
+            "{x} {y}: {p:?}"
+        );
+    }
+}
+
+#[test]
+fn an_hdr_may_call_itself_rgbe_and_go_upwards() {
+    let folder = Folder::new();
+    let pixels = [[128, 0, 0, 129], [0, 128, 0, 129]].concat();
+    let file = [
+        b"#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n+Y 2 +X 1\n".to_vec(),
+        pixels,
+    ]
+    .concat();
+    let path = folder.with("a.hdr", &file);
+    let read = io::read::<LinearRgb>(&path).unwrap();
+    assert_eq!(
+        (read[(0, 0)], read[(0, 1)]),
+        (LinearRgb::new(0.0, 1.0, 0.0), LinearRgb::new(1.0, 0.0, 0.0))
+    );
+    assert_eq!(io::read_header(&path).unwrap().height, 2);
+}

@@ -1,0 +1,248 @@
+//! Everything that is measured, in one document: error against run time of every approximate stage, the qualities that move
+//! along those curves, other programs, and extreme cases.
+//!
+//! Inputs are made in code or come with the repository (the golden scenes of Blender's Cycles), so that a fresh clone will
+//! do; photos with known mattes and other programs' measurements are added where they are.
+
+use super::section::{Document, Section};
+use super::{
+    Diagram, camera, color, encode, keying, label, light, machine, matte, peers, render, scale,
+    settle, stability, work,
+};
+use petcomp::Quality;
+use petcomp::Result;
+use std::path::{Path, PathBuf};
+
+/// What the report is made from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AllOptions {
+    /// Folder of golden scenes; one without scenes is left out. Default: `golden/render`.
+    pub golden: PathBuf,
+    /// Folder of other programs' measurements ([`peers`]); one that is not there is left out. Default: `target/peers`.
+    pub peers: PathBuf,
+    /// Folder of photos with known mattes, as the sample world has them; empty = photos made in code. Default: empty.
+    pub truth: PathBuf,
+    /// Fewer runs and inputs: a look in half a minute, with noisier times. Default: no.
+    pub quick: bool,
+    /// When it was made, as it is to be told. Default: nothing.
+    pub date: String,
+}
+
+impl Default for AllOptions {
+    fn default() -> Self {
+        Self {
+            golden: "golden/render".into(),
+            peers: "target/peers".into(),
+            truth: PathBuf::new(),
+            quick: false,
+            date: String::new(),
+        }
+    }
+}
+
+/// How much is measured.
+struct Amount {
+    views: u64,
+    bottles: usize,
+    heaps: u64,
+    runs: usize,
+}
+
+impl AllOptions {
+    fn amount(&self) -> Amount {
+        match self.quick {
+            true => Amount {
+                views: 20,
+                bottles: 1,
+                heaps: 2,
+                runs: 1,
+            },
+            false => Amount {
+                views: 200,
+                bottles: 4,
+                heaps: 10,
+                runs: 5,
+            },
+        }
+    }
+}
+
+/// One thing to measure: the diagrams of a stage.
+type Measure = fn(&AllOptions, &Amount) -> Result<Vec<Diagram>>;
+
+/// What is measured, in the order of the data.
+const STAGES: [Measure; 10] = [
+    |_, _| color::diagrams(),
+    |options, _| matte::diagrams(&options.truth),
+    |_, amount| matte::searches(amount.bottles),
+    |_, _| keying::diagrams(),
+    |_, amount| Ok(camera::diagrams(amount.views)),
+    |_, amount| {
+        let rows = settle::measure(
+            &settle::SettleReportOptions {
+                heaps: amount.heaps,
+            },
+            |_, _| (),
+        )?;
+        Ok(settle::diagrams(&rows))
+    },
+    |_, _| light::diagrams(),
+    |options, amount| render::diagrams(&options.golden, amount.runs),
+    |_, _| label::diagrams(),
+    |_, _| encode::diagrams(),
+];
+
+/// What follows the diagrams, and takes its time.
+const REST: [fn() -> Result<Section>; 3] = [stability_of_stages, paid_for, memory_and_scale];
+
+/// Measures everything; `progress` hears of each step and of how many there are.
+///
+/// Times are CPU seconds of one thread. Takes about three minutes on two to four cores, half a minute when it is to be quick, which
+/// leaves out extreme cases, counted work and scale.
+///
+/// # Errors
+/// An input that cannot be read; a thread or scratch folder that cannot be had; memory and scale need Linux's `/proc`.
+pub fn measure(options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
+    let amount = options.amount();
+    let rest = if options.quick { &[][..] } else { &REST };
+    let steps = (STAGES.len() + rest.len()) as u64;
+    let mut diagrams = Vec::new();
+    for (done, stage) in (0..).zip(STAGES) {
+        progress(done, steps);
+        diagrams.extend(stage(options, &amount)?);
+    }
+    let others = peers::read(&options.peers)?;
+    let mut sections = vec![
+        about(options),
+        curves(&diagrams),
+        qualities(),
+        beside_others(&others, &options.peers),
+    ];
+    for (done, section) in (STAGES.len() as u64..).zip(rest) {
+        progress(done, steps);
+        sections.push(section()?);
+    }
+    progress(steps, steps);
+    Ok(Document {
+        title: "petcomp: what it does, how well, and at what cost".into(),
+        sections,
+    })
+}
+
+/// Measures everything and writes `report.html`, `report.md` and the data of each plot and table (`.csv`) into a folder.
+///
+/// # Errors
+/// As [`measure`]; files that cannot be written. Nothing is written before everything is measured.
+pub fn write(folder: &Path, options: &AllOptions, progress: impl Fn(u64, u64)) -> Result<Document> {
+    let document = measure(options, progress)?;
+    document.write(folder)?;
+    Ok(document)
+}
+
+fn about(options: &AllOptions) -> Section {
+    let quick = if options.quick {
+        " It was made in a hurry (`--quick`): times are of few runs; extreme cases, counted work and scale are left out."
+    } else {
+        ""
+    };
+    Section::new("What this is")
+        .text(format!(
+            "One run of `petcomp-report all` on the machine below. Times are CPU seconds of one thread, medians; errors are \
+             the same at every run.{quick}"
+        ))
+        .table("machine", machine::machine(&options.date))
+}
+
+fn curves(diagrams: &[Diagram]) -> Section {
+    Section::new("Error against run time")
+        .text(
+            "Each point is a setting: further left is cheaper, further down is more exact, and what nothing beats in both is \
+             the efficient front. A ring marks the default. Names in brackets are the qualities that use a setting.",
+        )
+        .table("defaults", Diagram::summary(diagrams))
+        .diagrams(diagrams)
+}
+
+fn qualities() -> Section {
+    Section::new("Quality")
+        .text(
+            "`--quality draft|normal|reference` moves every approximate stage of a run along its curve at once. What is not \
+             in the table is exact at every quality, or so quick that nothing is gained: colour transfer, the keyer, masks \
+             and boxes, the camera.",
+        )
+        .table("quality", Quality::table())
+}
+
+fn beside_others(comparisons: &[peers::Comparison], folder: &Path) -> Section {
+    let section = Section::new("Other programs");
+    if comparisons.is_empty() {
+        let folder = folder.display();
+        return section.text(format!(
+            "There are no measurements in {folder}: `make peers` runs the other programs that can be had."
+        ));
+    }
+    let notes = comparisons
+        .iter()
+        .map(|c| (c.stage.clone(), c.missing()))
+        .filter(|(_, text)| !text.is_empty());
+    let section = notes.fold(section, |section, (stage, text)| {
+        section.text(format!("{stage}: {text}"))
+    });
+    let drawn: Vec<Diagram> = comparisons
+        .iter()
+        .map(peers::Comparison::diagram)
+        .filter(|d| !d.points.is_empty())
+        .collect();
+    section
+        .text("Measured in one run of `make peers`, on the same cores and the same input.")
+        .table("peers", peers::ratios(comparisons))
+        .diagrams(&drawn)
+        .table("peers_commands", peers::commands(comparisons))
+}
+
+fn stability_of_stages() -> Result<Section> {
+    let rows = stability::measure(|_, _| ())?;
+    let passed = rows.iter().filter(|row| row.outcome.passed).count();
+    Ok(Section::new("Stability")
+        .text(format!(
+            "{passed} of {} stiff and extreme cases come out as they must.",
+            rows.len()
+        ))
+        .table("stability_summary", stability::summary(&rows))
+        .table("stability", stability::table(&rows)))
+}
+
+fn paid_for() -> Result<Section> {
+    let rows = work::measure(|_, _| ())?;
+    let kept = rows.iter().filter(|row| row.is_as_promised()).count();
+    Ok(Section::new("A scene pays for what it uses")
+        .text(format!(
+            "Work, counted and not timed: the same at every run and on every machine. A marked zero is promised; {kept} of {} \
+             scenes keep their promises.",
+            rows.len()
+        ))
+        .table("work", work::table(&rows).transposed()))
+}
+
+fn memory_and_scale() -> Result<Section> {
+    let measured = scale::measure(&scale::ScaleOptions::default(), |_, _| ())?;
+    let tables = scale::tables(&measured)?;
+    let data = tables
+        .first()
+        .map(|(_, table)| table.clone())
+        .unwrap_or_default();
+    let section = scale::charts(&measured)?.into_iter().fold(
+        Section::new("Memory and scale"),
+        |section, (svg, caption)| section.figure("scale_points", svg, caption, data.clone()),
+    );
+    Ok(tables.into_iter().fold(section, |section, (title, table)| {
+        section
+            .text(format!("{title}:"))
+            .table(format!("scale_{}", file_name(&title)), table)
+    }))
+}
+
+/// A title as a file may be called.
+fn file_name(title: &str) -> String {
+    title.to_lowercase().replace(' ', "_")
+}

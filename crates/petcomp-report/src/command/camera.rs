@@ -1,0 +1,36 @@
+//! `petcomp-report camera`: the camera solver on simulated views.
+
+use crate::Common;
+use petcomp_report::camera::{self, CameraReportOptions};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+    /// Simulated views per kind of camera, noise and tilt, 1 to 100000
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = CameraReportOptions::default().views,
+        value_parser = clap::value_parser!(u64).range(1..=100_000)
+    )]
+    views: u64,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    let progress = common.progress("measuring");
+    let rows = camera::write(
+        &args.output,
+        &CameraReportOptions { views: args.views },
+        |done, of| progress.at(done, of),
+    )?;
+    drop(progress);
+    common.say(format_args!(
+        "{}: camera.csv ({} lines), camera_coverage.csv, camera.md and six plots",
+        args.output.display(),
+        rows.len()
+    ));
+    Ok(())
+}

@@ -1,0 +1,17 @@
+//! `petcomp-report matte`: the matting methods on photos with known mattes.
+
+use super::TruthArgs;
+use crate::Common;
+use petcomp_report::matte;
+
+pub(crate) fn run(args: &TruthArgs, common: &Common) -> anyhow::Result<()> {
+    let progress = common.progress("measuring");
+    let summaries = matte::write(&args.truth, &args.output, |done, of| progress.at(done, of))?;
+    drop(progress);
+    println!("{}", matte::table(&summaries).markdown().trim_end());
+    common.say(format_args!(
+        "{}: matte.csv, matte.md, matte.svg and matte.html",
+        args.output.display()
+    ));
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! `petcomp-report`: how good a stage is, measured: one file per stage.
+
+mod all;
+mod camera;
+mod experiments;
+mod flags;
+mod matte;
+mod render;
+mod scale;
+mod settle;
+mod stability;
+mod work;
+
+use crate::Common;
+use clap::builder::RangedU64ValueParser;
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+
+/// What a report of photos with known mattes needs.
+#[derive(clap::Args)]
+pub(crate) struct TruthArgs {
+    /// Folder with photos and their truth, as the sample world has them
+    #[arg(long, value_name = "FOLDER")]
+    truth: PathBuf,
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+}
+
+#[derive(clap::Subcommand)]
+pub(crate) enum Command {
+    /// Everything that is measured on one page, in about three minutes: report.html, report.md and the data as CSV
+    All(all::Args),
+    /// Error of the camera solver against run time and against tilt: camera.csv, camera.md and plots (SVG)
+    Camera(camera::Args),
+    /// Error of the settle stage against run time: settle.csv, settle.md and a plot (SVG)
+    Settle(settle::Args),
+    /// Every stage on stiff and extreme input: stability.csv and stability.md
+    Stability(stability::Args),
+    /// Our trainings beside the values of the paper, with intervals and a test
+    Experiments(experiments::Args),
+    /// Error of the matting methods against run time, on photos with known mattes: matte.csv, matte.md, matte.svg, matte.html
+    Matte(TruthArgs),
+    /// Whether cut-outs that are wrong say so, on photos with known outlines made harder in many ways: flags.csv, flags.md
+    Flags(TruthArgs),
+    /// Error of the renderer against run time, beside Cycles: render.csv, render.md, a plot and the golden scenes
+    Render(render::Args),
+    /// What scenes pay for, counted: work.csv and work.md
+    Work(work::Args),
+    /// Memory and rate by threads, pixels and cards, and a million pictures: scale.csv, scale.md and charts (SVG)
+    Scale(scale::Args),
+}
+
+pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
+    match command {
+        Command::All(args) => all::run(args, common),
+        Command::Camera(args) => camera::run(args, common),
+        Command::Settle(args) => settle::run(args, common),
+        Command::Stability(args) => stability::run(args, common),
+        Command::Experiments(args) => experiments::run(args, common),
+        Command::Matte(args) => matte::run(args, common),
+        Command::Flags(args) => flags::run(args, common),
+        Command::Render(args) => render::run(args, common),
+        Command::Work(args) => work::run(args, common),
+        Command::Scale(args) => scale::run(args, common),
+    }
+}
+
+/// A number of things within a range: more of them would take days, or all of the memory.
+fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(range)
+}

@@ -1,0 +1,52 @@
+//! `petcomp-report render`: the renderer against Cycles and against the quadrature of its definition.
+
+use super::count;
+use crate::Common;
+use petcomp_report::render::{self, RenderReportOptions};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Scene file of the reference renderer: a golden one, or one that `scene export` wrote
+    #[arg(default_value = "golden/render/pile_of_20/scene.json")]
+    scene: PathBuf,
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+    /// Width and height of the pictures, 1 to 4096
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["W", "H"],
+        default_values_t = [320, 240],
+        value_parser = clap::value_parser!(u32).range(1..=4096)
+    )]
+    size: Vec<u32>,
+    /// Cycles' pictures of the same scene and size, made by tests/benches/peers/render.py
+    #[arg(long, value_name = "FOLDER", default_value = "report/cycles")]
+    cycles: PathBuf,
+    /// Golden scenes to compare as well
+    #[arg(long, value_name = "FOLDER", default_value = "golden/render")]
+    golden: PathBuf,
+    /// Renderings per preset, of which the median is told, 1 to 1000
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
+    repeats: usize,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    let options = RenderReportOptions {
+        scene: args.scene.clone(),
+        size: [args.size[0], args.size[1]],
+        cycles: args.cycles.clone(),
+        golden: args.golden.clone(),
+        repeats: args.repeats,
+    };
+    let (rows, golden) = render::write(&args.output, &options)?;
+    println!("{}", render::table(&rows).markdown());
+    common.say(format_args!(
+        "{}: render.csv, render.md, render.svg; {} golden pictures",
+        args.output.display(),
+        golden.len()
+    ));
+    Ok(())
+}

@@ -1,0 +1,43 @@
+//! `petcomp-report settle`: the settle stage on heaps and closed forms.
+
+use crate::Common;
+use petcomp::io;
+use petcomp_report::settle::{self, SettleReportOptions};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Folder to write
+    #[arg(short, long, value_name = "FOLDER", default_value = "report")]
+    output: PathBuf,
+    /// Heaps for each setting of the solver, 1 to 10000
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = SettleReportOptions::default().heaps,
+        value_parser = clap::value_parser!(u64).range(1..=10_000)
+    )]
+    heaps: u64,
+    /// Instead, settle heaps for a comparison with another program: writes their scenes, ends and times as JSON
+    #[arg(long, value_name = "FILE")]
+    peers: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    if let Some(path) = &args.peers {
+        return Ok(io::write_document(path, &settle::peer_cases()?)?);
+    }
+    let progress = common.progress("measuring");
+    let rows = settle::write(
+        &args.output,
+        &SettleReportOptions { heaps: args.heaps },
+        |done, of| progress.at(done, of),
+    )?;
+    drop(progress);
+    common.say(format_args!(
+        "{}: settle.csv ({} lines), settle.md and a plot",
+        args.output.display(),
+        rows.len()
+    ));
+    Ok(())
+}

@@ -1,0 +1,28 @@
+//! What a camera makes of light: noise and codes.
+
+use crate::matte::normal;
+use petcomp::Image;
+use petcomp::LinearRgb;
+use petcomp::color::{decode_srgb8, encode_srgb8, linear_to_srgb, srgb_to_linear};
+use petcomp::io;
+
+/// A value as a camera of 8 bits stores it.
+pub(super) fn coded(p: LinearRgb) -> LinearRgb {
+    p.map(|v| srgb_to_linear((255.0 * linear_to_srgb(v.clamp(0.0, 1.0))).round() / 255.0))
+}
+
+/// The photo with noise of a standard deviation.
+pub(super) fn noisy(photo: &Image<LinearRgb>, sigma: f32, seed: u64) -> Image<LinearRgb> {
+    let mut draw = normal(seed);
+    let mut noisy = photo.clone();
+    noisy
+        .pixels_mut()
+        .iter_mut()
+        .for_each(|p| *p = p.map(|v| v + sigma * draw() as f32));
+    noisy
+}
+
+/// The photo as a JPEG file of a quality holds it; nothing where it cannot be one.
+pub(super) fn jpeg(photo: &Image<LinearRgb>, quality: u8) -> Option<Image<LinearRgb>> {
+    io::through_jpeg(&photo.map(encode_srgb8), quality).map(|codes| codes.map(decode_srgb8))
+}

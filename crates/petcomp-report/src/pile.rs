@@ -1,0 +1,116 @@
+//! A pile of cards made in code: something to render where no photograph is at hand.
+
+use petcomp::Camera;
+use petcomp::Image;
+use petcomp::asset::Texture;
+use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::scene::{AreaLight, Card, Grade, LightShape, Shot};
+use petcomp::{LinearRgb, ObjectId, PremulRgba};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// Height of the camera over the surface, metres.
+const HEIGHT: f64 = 1.1;
+/// Focal length in widths of the picture.
+const FOCAL: f64 = 1.16;
+/// Texels of a card.
+const TEXELS: (usize, usize) = (96, 288);
+/// Textures that the cards share.
+const TEXTURES: u32 = 5;
+
+/// A camera that looks straight down from `height` metres over the origin.
+pub(super) fn above(image: [u32; 2], height: f64) -> Camera {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    let [w, h] = image.map(f64::from);
+    Camera {
+        image,
+        focal_px: Vector2::repeat(FOCAL * w),
+        principal_px: Point2::new(0.5 * w, 0.5 * h),
+        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, height).into(), down),
+    }
+}
+
+/// A square lamp that shines at the origin from above its right.
+pub(super) fn lamp(color: LinearRgb) -> AreaLight {
+    AreaLight {
+        shape: LightShape::Rectangle,
+        position: [0.5, 0.3, 1.2],
+        target: [0.0; 3],
+        size: [0.35; 2],
+        power: 9.0,
+        color,
+    }
+}
+
+/// So many see-through bottles on and over each other, under one light and a dim sky.
+pub(super) fn pile(cards: u32, image: [u32; 2]) -> Shot {
+    let shot = Shot::new(above(image, HEIGHT))
+        .with_light(lamp(LinearRgb::new(1.0, 0.95, 0.85)))
+        .with_ambient(LinearRgb::new(0.3, 0.35, 0.4));
+    let textures: Vec<Texture> = (0..TEXTURES).map(|k| bottle(k).into()).collect();
+    (0..cards)
+        .map(|k| card(k, &textures))
+        .fold(shot, Shot::with_card)
+}
+
+/// Spread by sines of incommensurable steps, each a little higher than the last.
+fn card(k: u32, textures: &[Texture]) -> Card {
+    let f = f64::from(k);
+    let rotation = UnitQuaternion::from_euler_angles(
+        0.12 * libm::sin(1.7 * f),
+        0.12 * libm::cos(2.3 * f),
+        2.4 * f,
+    );
+    let center = Vector3::new(
+        0.17 * libm::sin(3.1 * f),
+        0.1 * libm::cos(4.7 * f),
+        0.02 + 0.004 * f,
+    );
+    Card {
+        id: ObjectId(k + 1),
+        class: 0,
+        quad: Quad {
+            world_from_card: Pose::from_parts(center.into(), rotation),
+            size: [0.07, 0.21],
+        },
+        texture: textures[k as usize % textures.len()].clone(),
+        back: None,
+        outline_uv: Arc::new([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(Point2::from)),
+        grade: Grade::default(),
+    }
+}
+
+/// A bottle with a soft outline, a neck, a label and stripes.
+fn bottle(k: u32) -> Image<PremulRgba> {
+    let (w, h) = TEXELS;
+    Image::from_fn(w, h, |x, y| {
+        let (across, along) = (2.0 * x as f32 / w as f32 - 1.0, y as f32 / h as f32);
+        let half_width = if along < 0.2 { 0.35 } else { 0.9 };
+        let on_label = (0.4..0.6).contains(&along);
+        let alpha = (40.0 * (half_width - across.abs())).clamp(0.0, 1.0)
+            * if on_label { 0.95 } else { 0.5 };
+        let stripe = 0.5 + 0.4 * libm::sinf(along * 60.0 + k as f32);
+        PremulRgba::new(alpha * stripe, alpha * 0.6, alpha * (1.0 - stripe), alpha)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use petcomp::Quality;
+    use petcomp::render::{cast, check};
+
+    #[test]
+    fn a_pile_can_be_rendered_and_every_card_is_seen() {
+        let shot = pile(12, [160, 120]);
+        assert!(check(&shot).is_ok());
+        let deep = cast(&shot, &Quality::Draft.render());
+        let mut seen = vec![false; 12];
+        for (x, y) in (0..120).flat_map(|y| (0..160).map(move |x| (x, y))) {
+            deep.at(x, y)
+                .iter()
+                .for_each(|s| seen[s.object.0 as usize - 1] = true);
+        }
+        assert!(seen.iter().all(|s| *s), "{seen:?}");
+    }
+}

@@ -1,0 +1,183 @@
+//! What many pictures take on many machines, from the model of one.
+
+use super::{Case, Measured, Model, Point, grid, missing};
+use petcomp::Result;
+
+/// What a dataset of usual pictures is expected to take.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forecast {
+    /// Pictures.
+    pub images: f64,
+    /// Kind of the pictures.
+    pub case: Case,
+    /// Seconds of a processor per picture, its cards already lying: what the model says, and between what nine in ten lie.
+    pub picture_seconds: [f64; 3],
+    /// Seconds of a processor until its cards lie.
+    pub fall_seconds: f64,
+    /// Share of `cores` times the rate of one thread that all threads together have.
+    pub efficiency: f64,
+    /// Cores of a machine: most threads that were measured.
+    pub cores: usize,
+    /// Hours of one core for all: expected, least, most.
+    pub core_hours: [f64; 3],
+    /// Most memory of a process on all cores: expected, least, most, bytes.
+    pub bytes: [f64; 3],
+}
+
+/// Forecasts a dataset of the usual pictures: 640 x 480 pixels, 12 cards that fall first.
+///
+/// # Errors
+/// As [`Model::of`]; without a point of that kind.
+pub fn forecast(measured: &Measured, images: f64) -> Result<Forecast> {
+    let model = Model::of(measured)?;
+    let usual = |point: &&Point| {
+        Case {
+            threads: 1,
+            ..point.case
+        } == grid::USUAL
+    };
+    let on = |threads: usize| {
+        measured
+            .points
+            .iter()
+            .filter(usual)
+            .find(|point| point.case.threads == threads)
+    };
+    let cores = measured
+        .points
+        .iter()
+        .filter(usual)
+        .map(|point| point.case.threads)
+        .max();
+    let cores = cores.ok_or_else(|| missing("no usual pictures"))?;
+    let (one, all) = on(1)
+        .zip(on(cores))
+        .ok_or_else(|| missing("no usual pictures on one thread"))?;
+    let fall_seconds = fall_seconds(&measured.falls, grid::USUAL.cards);
+    let efficiency = all.rate / (cores as f64 * one.rate);
+    let picture_seconds = around(model.seconds(one), model.time.spread());
+    let core_hours =
+        picture_seconds.map(|s| images * (s + fall_seconds) / efficiency.min(1.0) / 3600.0);
+    let bytes = around(model.bytes(all), model.memory.spread());
+    Ok(Forecast {
+        images,
+        case: grid::USUAL,
+        picture_seconds,
+        fall_seconds,
+        efficiency,
+        cores,
+        core_hours,
+        bytes,
+    })
+}
+
+/// A value and what is this share of it less and more.
+fn around(value: f64, share: f64) -> [f64; 3] {
+    [value, value * (1.0 - share).max(0.0), value * (1.0 + share)]
+}
+
+/// Seconds of a fall of so many cards, in proportion between the numbers that were measured.
+fn fall_seconds(falls: &[(usize, f64)], cards: usize) -> f64 {
+    let below = falls.iter().rev().find(|(n, _)| *n <= cards);
+    let above = falls.iter().find(|(n, _)| *n >= cards);
+    match (below, above) {
+        (Some(&(a, s)), Some(&(b, t))) if b > a => {
+            s + (t - s) * (cards - a) as f64 / (b - a) as f64
+        }
+        (Some(&(_, s)), _) | (None, Some(&(_, s))) => s,
+        (None, None) => 0.0,
+    }
+}
+
+impl Forecast {
+    /// Hours on so many machines of [`cores`](Self::cores) cores: expected, least, most.
+    pub fn hours(&self, machines: usize) -> [f64; 3] {
+        self.core_hours
+            .map(|hours| hours / (machines * self.cores) as f64)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// Measurements of a machine that is exactly as the model says, and half as good on two threads.
+    pub(in super::super) fn measured() -> Measured {
+        let point = |case: Case| {
+            let layers = 0.01 * case.cards as f64 * case.scale * case.scale;
+            let in_hand = case.megapixels() * case.threads as f64;
+            let cpu_seconds =
+                0.01 + case.megapixels() * (0.1 + 0.2 * layers) + 0.001 * case.cards as f64;
+            let rate = if case.threads > 1 {
+                1.0
+            } else {
+                1.0 / cpu_seconds
+            };
+            Point {
+                case,
+                layers,
+                pictures: 3,
+                cpu_seconds,
+                rate,
+                peak_bytes: 1e7 + in_hand * (1e8 + 5e7 * layers),
+            }
+        };
+        Measured {
+            points: grid::cases(2).into_iter().map(point).collect(),
+            falls: vec![(10, 0.1), (20, 0.3)],
+        }
+    }
+
+    #[test]
+    fn a_forecast_multiplies_what_one_picture_takes() {
+        let mut measured = measured();
+        let one = measured
+            .points
+            .iter()
+            .find(|p| p.case == grid::USUAL)
+            .unwrap()
+            .cpu_seconds;
+        measured
+            .points
+            .iter_mut()
+            .filter(|p| p.case.threads == 2)
+            .for_each(|p| p.rate = 1.0 / one);
+        let told = forecast(&measured, 1e6).unwrap();
+        assert!(
+            (told.picture_seconds[0] / one - 1.0).abs() < 1e-6
+                && (told.efficiency - 0.5).abs() < 1e-9
+        );
+        let hours = 1e6 * (one + 0.14) / 0.5 / 3600.0;
+        assert!((told.core_hours[0] / hours - 1.0).abs() < 1e-6);
+        assert!((told.hours(10)[0] / (hours / 20.0) - 1.0).abs() < 1e-6);
+        assert!(told.bytes[1] <= told.bytes[0] && told.bytes[0] <= told.bytes[2]);
+    }
+
+    #[test]
+    fn falls_between_those_measured_are_in_proportion() {
+        let falls = [(10, 0.1), (20, 0.3)];
+        assert!((fall_seconds(&falls, 12) - 0.14).abs() < 1e-12);
+        assert_eq!(
+            (
+                fall_seconds(&falls, 3),
+                fall_seconds(&falls, 99),
+                fall_seconds(&[], 3)
+            ),
+            (0.1, 0.3, 0.0)
+        );
+    }
+
+    #[test]
+    fn nothing_measured_is_no_forecast() {
+        assert!(
+            forecast(
+                &Measured {
+                    points: vec![],
+                    falls: vec![]
+                },
+                1e6
+            )
+            .is_err()
+        );
+    }
+}

@@ -1,0 +1,250 @@
+//! Sections of a document of measurements, which becomes a page, Markdown, and a file of data for each table and plot.
+
+use super::Diagram;
+use petcomp::Result;
+use petcomp::io;
+use petcomp::plot::{Page, Table, escaped};
+use std::path::Path;
+
+/// A part of a document under a heading of its own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Section {
+    /// What it is about.
+    pub title: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Part {
+    Text(String),
+    Table {
+        file: String,
+        table: Table,
+    },
+    Figure {
+        file: String,
+        svg: String,
+        caption: String,
+        data: Table,
+    },
+}
+
+impl Section {
+    /// An empty one.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            parts: Vec::new(),
+        }
+    }
+
+    /// A paragraph; nothing for no text.
+    pub fn text(mut self, text: impl Into<String>) -> Self {
+        let text = text.into();
+        if !text.is_empty() {
+            self.parts.push(Part::Text(text));
+        }
+        self
+    }
+
+    /// A table, also written as `<file>.csv`; one without rows is left out.
+    pub fn table(mut self, file: impl Into<String>, table: Table) -> Self {
+        if !table.rows.is_empty() {
+            self.parts.push(Part::Table {
+                file: file.into(),
+                table,
+            });
+        }
+        self
+    }
+
+    /// A drawing with its caption and its data, written as `<file>.csv`.
+    pub fn figure(
+        mut self,
+        file: impl Into<String>,
+        svg: String,
+        caption: impl Into<String>,
+        data: Table,
+    ) -> Self {
+        self.parts.push(Part::Figure {
+            file: file.into(),
+            svg,
+            caption: caption.into(),
+            data,
+        });
+        self
+    }
+
+    /// A work-precision diagram.
+    pub fn diagram(self, diagram: &Diagram) -> Self {
+        self.figure(
+            diagram.file.clone(),
+            diagram.svg(),
+            diagram.caption(),
+            diagram.table(),
+        )
+    }
+
+    /// Several of them.
+    pub fn diagrams(self, diagrams: &[Diagram]) -> Self {
+        diagrams.iter().fold(self, Self::diagram)
+    }
+}
+
+/// A document of sections.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Document {
+    /// What it is about.
+    pub title: String,
+    /// Its parts, in order.
+    pub sections: Vec<Section>,
+}
+
+impl Document {
+    /// The whole of it as one HTML page that needs no other file.
+    pub fn html(&self) -> String {
+        let mut page = Page::new(&self.title);
+        let link = |(i, section): (usize, &Section)| {
+            format!(
+                "<li><a href=\"#section{i}\">{}</a></li>\n",
+                escaped(&section.title)
+            )
+        };
+        let links: String = self.sections.iter().enumerate().map(link).collect();
+        page.html(&format!("<ol>\n{links}</ol>\n"));
+        for (i, section) in self.sections.iter().enumerate() {
+            page.html(&format!(
+                "<h2 id=\"section{i}\">{}</h2>\n",
+                escaped(&section.title)
+            ));
+            section.parts.iter().for_each(|part| part.put_on(&mut page));
+        }
+        page.document()
+    }
+
+    /// Its text and tables as Markdown; plots as their captions.
+    pub fn markdown(&self) -> String {
+        let mut text = format!("# {}\n", self.title);
+        for section in &self.sections {
+            text += &format!("\n## {}\n", section.title);
+            text += &section.parts.iter().map(Part::markdown).collect::<String>();
+        }
+        text
+    }
+
+    /// Writes `report.html`, `report.md` and the data of each table and plot (`.csv`) into a folder; the page comes last.
+    ///
+    /// # Errors
+    /// Files that cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        io::create_folder(folder)?;
+        for part in self.sections.iter().flat_map(|section| &section.parts) {
+            if let Part::Table { file, table }
+            | Part::Figure {
+                file, data: table, ..
+            } = part
+            {
+                io::write_text(folder.join(format!("{file}.csv")), &table.csv())?;
+            }
+        }
+        io::write_text(folder.join("report.md"), &self.markdown())?;
+        io::write_text(folder.join("report.html"), &self.html())
+    }
+}
+
+impl Part {
+    fn put_on(&self, page: &mut Page) {
+        match self {
+            Self::Text(text) => page.html(&format!("<p>{}</p>\n", with_code(text))),
+            Self::Table { table, .. } => page.table(table),
+            Self::Figure {
+                svg, caption, data, ..
+            } => {
+                let points = format!(
+                    "<details><summary>Its points</summary>{}</details>\n",
+                    data.html()
+                );
+                let caption = with_code(caption);
+                page.html(&format!(
+                    "<figure>{svg}<figcaption>{caption}</figcaption></figure>\n{points}"
+                ))
+            }
+        };
+    }
+
+    fn markdown(&self) -> String {
+        match self {
+            Self::Text(text) => format!("\n{text}\n"),
+            Self::Table { table, .. } => format!("\n{}", table.markdown()),
+            Self::Figure { file, caption, .. } => format!("\n* `{file}.csv`: {caption}\n"),
+        }
+    }
+}
+
+/// Text for HTML, with what stands between backticks as code.
+fn with_code(text: &str) -> String {
+    let part = |(i, part): (usize, &str)| match i % 2 {
+        0 => escaped(part),
+        _ => format!("<code>{}</code>", escaped(part)),
+    };
+    text.split('`').enumerate().map(part).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use petcomp::plot::Chart;
+
+    fn document() -> Document {
+        let mut table = Table::new(["a", "b"]);
+        table.push(["1", "2"]);
+        let section = Section::new("One & two")
+            .text("Said.")
+            .text("")
+            .table("numbers", table.clone())
+            .table("none", Table::new(["a"]))
+            .figure("plot", Chart::row(&[]), "What is seen.", table);
+        Document {
+            title: "All".into(),
+            sections: vec![section],
+        }
+    }
+
+    #[test]
+    fn a_document_is_one_page_and_a_file_of_data_for_each_part() {
+        let folder = tempfile::tempdir().unwrap();
+        document().write(folder.path()).unwrap();
+        let mut names: Vec<_> = std::fs::read_dir(folder.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        assert_eq!(
+            names,
+            ["numbers.csv", "plot.csv", "report.html", "report.md"]
+        );
+        let html = io::read_text(folder.path().join("report.html")).unwrap();
+        assert!(
+            html.contains("One &amp; two") && html.contains("<svg") && html.contains("<td>2</td>")
+        );
+        assert!(
+            !html.contains("src=") && !html.contains("href=\"http"),
+            "needs no other file"
+        );
+    }
+
+    #[test]
+    fn code_is_code_and_text_is_text() {
+        assert_eq!(with_code("a < `b < c` d"), "a &lt; <code>b &lt; c</code> d");
+    }
+
+    #[test]
+    fn markdown_has_the_tables_and_says_where_plots_are() {
+        let text = document().markdown();
+        assert!(
+            text.starts_with("# All\n\n## One & two\n\nSaid.\n\n| a | b |\n"),
+            "{text}"
+        );
+        assert!(text.contains("* `plot.csv`: What is seen."));
+    }
+}

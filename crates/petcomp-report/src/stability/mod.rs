@@ -1,0 +1,225 @@
+//! Stability: every stage on stiff and extreme input, held against what must come out.
+//!
+//! What must come out is a closed form, a conservation law, the limit of neighbours that are easy, or an error that names
+//! its cause; it is never what came out before. A case that panics, or that fails where it should not, is a row that
+//! failed, and the others go on.
+
+mod bottle;
+mod camera;
+mod case;
+mod composite;
+mod dataset;
+mod eval;
+mod io;
+mod keyer;
+mod label;
+mod light;
+mod matte;
+mod memory;
+mod render;
+mod render_light;
+mod settle;
+mod staged;
+
+pub use case::{Case, Outcome};
+
+use petcomp::io::{create_folder, write_text};
+use petcomp::plot::Table;
+use petcomp::{Error, Result};
+use std::path::Path;
+
+/// Makes the cases of a stage.
+type Cases = fn() -> Result<Vec<Case>>;
+
+/// The stages that have cases, in the order of the data.
+const STAGES: &[(&str, Cases)] = &[
+    ("matte", matte::cases),
+    ("camera", camera::cases),
+    ("settle", settle::cases),
+    ("light", light::cases),
+    ("render", render::cases),
+    ("composite", composite::cases),
+    ("label", label::cases),
+    ("dataset", dataset::cases),
+    ("io", io::cases),
+    ("eval", eval::cases),
+];
+
+/// How a case ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Whose case it is.
+    pub stage: &'static str,
+    /// What is extreme about it.
+    pub name: String,
+    /// What goes in.
+    pub input: String,
+    /// What must come out.
+    pub expectation: String,
+    /// What came out, and whether that is as it must be.
+    pub outcome: Outcome,
+    /// Time that it took, milliseconds.
+    pub wall_ms: f64,
+}
+
+/// Names of the stages that have cases.
+pub fn stages() -> impl Iterator<Item = &'static str> {
+    STAGES.iter().map(|(name, _)| *name)
+}
+
+/// The cases of one stage, or of all (an empty name), each with its stage's name.
+///
+/// # Errors
+/// [`Error::Value`] for a stage that has none.
+pub fn cases(stage: &str) -> Result<Vec<(&'static str, Case)>> {
+    let asked: Vec<_> = STAGES
+        .iter()
+        .filter(|(name, _)| stage.is_empty() || *name == stage)
+        .collect();
+    if asked.is_empty() {
+        let names = stages().collect::<Vec<_>>().join(", ");
+        return Err(Error::value(
+            "stage",
+            format!("\"{stage}\", expected one of {names}"),
+        ));
+    }
+    let mut all = Vec::new();
+    for (name, cases) in asked {
+        all.extend(cases()?.into_iter().map(|case| (*name, case)));
+    }
+    Ok(all)
+}
+
+/// Runs every case of every stage; `progress` hears of each and of how many there are.
+///
+/// # Errors
+/// None that a caller can cause: cases are made in code.
+pub fn measure(progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+    Ok(run(&cases("")?, progress))
+}
+
+/// Runs cases one after another; `progress` hears of each and of how many there are.
+pub fn run(cases: &[(&'static str, Case)], progress: impl Fn(u64, u64)) -> Vec<Row> {
+    let row = |(i, (stage, case)): (usize, &(&'static str, Case))| {
+        progress(i as u64, cases.len() as u64);
+        case.row(stage)
+    };
+    cases.iter().enumerate().map(row).collect()
+}
+
+/// Cases as a table, a row each.
+pub fn table(rows: &[Row]) -> Table {
+    let mut table = Table::new([
+        "stage",
+        "case",
+        "input",
+        "expectation",
+        "result",
+        "pass",
+        "time ms",
+    ]);
+    for row in rows {
+        let pass = if row.outcome.passed { "pass" } else { "FAIL" };
+        let time = format!("{:.1}", row.wall_ms);
+        table.push([
+            row.stage,
+            &row.name,
+            &row.input,
+            &row.expectation,
+            &row.outcome.measured,
+            pass,
+            &time,
+        ]);
+    }
+    table
+}
+
+/// How many cases each stage has and how many of them pass.
+pub fn summary(rows: &[Row]) -> Table {
+    let mut table = Table::new(["stage", "cases", "pass", "fail"]);
+    for stage in stages() {
+        let of_stage = || rows.iter().filter(|row| row.stage == stage);
+        let passed = of_stage().filter(|row| row.outcome.passed).count();
+        let counts = [of_stage().count(), passed, of_stage().count() - passed];
+        if counts[0] > 0 {
+            table.push(std::iter::once(stage.into()).chain(counts.map(|n| n.to_string())));
+        }
+    }
+    table
+}
+
+/// Runs the cases of a stage, or of all (an empty name), and writes `stability.csv` and `stability.md` into a folder.
+///
+/// # Errors
+/// As [`cases`]; files that cannot be written. A case that fails is a row, not an error.
+pub fn write(folder: &Path, stage: &str, progress: impl Fn(u64, u64)) -> Result<Vec<Row>> {
+    let rows = run(&cases(stage)?, progress);
+    create_folder(folder)?;
+    write_text(folder.join("stability.csv"), &table(&rows).csv())?;
+    let text = format!("{}\n{}", summary(&rows).markdown(), table(&rows).markdown());
+    write_text(folder.join("stability.md"), &text)?;
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_stage_is_told_with_those_that_are_known() {
+        let told = cases("physics")
+            .err()
+            .map(|e| e.to_string())
+            .unwrap_or_default();
+        assert!(
+            told.starts_with("stage: \"physics\", expected one of "),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn every_stage_has_cases_and_their_names_are_their_own() {
+        for stage in stages() {
+            let names: Vec<String> = cases(stage)
+                .unwrap()
+                .into_iter()
+                .map(|(_, case)| case.name)
+                .collect();
+            let distinct: std::collections::BTreeSet<&String> = names.iter().collect();
+            assert!(
+                !names.is_empty() && distinct.len() == names.len(),
+                "{stage}: {names:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_case_that_panics_or_fails_is_a_row_that_failed() {
+        let cases = [
+            ("a", Case::new("panics", "", "", || panic!("index 3 of 2"))),
+            (
+                "a",
+                Case::new("errs", "", "", || Err(Error::value("size", "0"))),
+            ),
+            (
+                "b",
+                Case::new("good", "", "", || Ok(Outcome::near(1.0, 1.0, 0.0, "m"))),
+            ),
+        ];
+        let rows = run(&cases, |_, _| ());
+        assert_eq!(
+            rows.iter()
+                .map(|row| row.outcome.passed)
+                .collect::<Vec<_>>(),
+            [false, false, true]
+        );
+        assert!(
+            rows[0].outcome.measured.contains("index 3 of 2")
+                && rows[1].outcome.measured.contains("size: 0")
+        );
+        assert_eq!(
+            table(&rows).rows[2][4..6],
+            ["1 m".to_string(), "pass".to_string()]
+        );
+    }
+}

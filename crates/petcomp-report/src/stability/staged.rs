@@ -1,0 +1,163 @@
+//! Shots that cases are made of: a camera straight above, level cards, small lights.
+
+use petcomp::Image;
+use petcomp::asset::Texture;
+use petcomp::camera::Camera;
+use petcomp::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+use petcomp::scene::{
+    AreaLight, CameraSource, Card, Exposure, Grade, LightShape, Scene, Shot, Surface,
+};
+use petcomp::{LinearRgb, ObjectId, PremulRgba};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// The outline of a whole card in texture coordinates.
+const WHOLE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+/// A camera at height 1 over the origin, looking straight down; picture up is world `+y`.
+pub(super) fn above(image: [u32; 2], focal_px: f64) -> Camera {
+    let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI);
+    Camera {
+        image,
+        focal_px: Vector2::repeat(focal_px),
+        principal_px: Point2::from(image.map(|side| 0.5 * f64::from(side))),
+        camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+    }
+}
+
+/// A camera at `eye` whose middle sees `target`.
+pub(super) fn looking_at(
+    eye: [f64; 3],
+    target: [f64; 3],
+    image: [u32; 2],
+    focal_px: f64,
+) -> Camera {
+    let world_from_camera =
+        Pose::face_towards(&Point3::from(eye), &Point3::from(target), &-Vector3::z());
+    Camera {
+        camera_from_world: world_from_camera.inverse(),
+        ..above(image, focal_px)
+    }
+}
+
+/// A card with one texture on both sides.
+pub(super) fn card(
+    id: u32,
+    center: [f64; 3],
+    rotation: UnitQuaternion<f64>,
+    size: [f64; 2],
+    texture: impl Into<Texture>,
+) -> Card {
+    Card {
+        id: ObjectId(id),
+        class: 0,
+        quad: Quad {
+            world_from_card: Pose::from_parts(Vector3::from(center).into(), rotation),
+            size,
+        },
+        texture: texture.into(),
+        back: None,
+        outline_uv: WHOLE.iter().map(|&uv| uv.into()).collect::<Arc<[_]>>(),
+        grade: Grade::default(),
+    }
+}
+
+/// A level square card of one texel value, with so many texels that the fade of the outermost half is small.
+pub(super) fn level(id: u32, center: [f64; 3], size: f64, texel: PremulRgba) -> Card {
+    card(
+        id,
+        center,
+        UnitQuaternion::identity(),
+        [size; 2],
+        Image::filled(64, 64, texel),
+    )
+}
+
+/// Turned about the world's `+y`.
+pub(super) fn tilted(angle: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle)
+}
+
+/// A premultiplied grey of straight value 1/2.
+pub(super) fn grey(alpha: f32) -> PremulRgba {
+    PremulRgba::new(0.5 * alpha, 0.5 * alpha, 0.5 * alpha, alpha)
+}
+
+/// A square light of this side at `position`, turned to the origin.
+pub(super) fn lamp(position: [f64; 3], side: f64, power: f64) -> AreaLight {
+    let (target, color) = ([0.0; 3], LinearRgb::WHITE);
+    AreaLight {
+        shape: LightShape::Rectangle,
+        position,
+        target,
+        size: [side; 2],
+        power,
+        color,
+    }
+}
+
+/// A shot from above, 5 x 5 pixels of a centimetre.
+pub(super) fn small() -> Shot {
+    Shot::new(above([5, 5], 100.0))
+}
+
+/// A scene of nothing on a surface that fills the picture.
+pub(super) fn scene(camera: Camera) -> Scene {
+    Scene {
+        image: camera.image,
+        plate: "plate".into(),
+        camera: CameraSource::Known(camera),
+        surface: Surface::new([2.0, 2.0]),
+        objects: Vec::new(),
+        lights: Vec::new(),
+        ambient: LinearRgb::BLACK,
+        environment: None,
+        exposure: Exposure::Ev(0.0),
+        cast: Default::default(),
+        finish: Default::default(),
+    }
+}
+
+/// The part of a card's square that a camera sees, pixels: the area of its projected corners.
+pub(super) fn projected_area(card: &Card, camera: &Camera) -> f64 {
+    let corners: Vec<_> = card
+        .quad
+        .corners()
+        .iter()
+        .filter_map(|&corner| camera.project(corner))
+        .collect();
+    let next = corners.iter().cycle().skip(1);
+    0.5 * corners
+        .iter()
+        .zip(next)
+        .map(|((a, _), (b, _))| a.x * b.y - b.x * a.y)
+        .sum::<f64>()
+        .abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_card_covers_its_size_over_its_distance() {
+        let area = projected_area(
+            &level(1, [0.0, 0.0, 0.1], 0.2, grey(1.0)),
+            &above([96, 96], 400.0),
+        );
+        assert!(
+            (area - (0.2 * 400.0 / 0.9) * (0.2 * 400.0 / 0.9)).abs() < 1e-9,
+            "{area}"
+        );
+    }
+
+    #[test]
+    fn the_middle_of_a_picture_sees_the_target() {
+        let camera = looking_at([0.3, -0.2, 0.8], [0.1, 0.0, 0.0], [40, 30], 50.0);
+        let seen = camera.project(Point3::new(0.1, 0.0, 0.0)).map(|(px, _)| px);
+        assert!(
+            seen.is_some_and(|px| (px - Point2::new(20.0, 15.0)).norm() < 1e-9),
+            "{seen:?}"
+        );
+    }
+}

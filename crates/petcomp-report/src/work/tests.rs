@@ -1,0 +1,283 @@
+//! What is promised of work: zeros where a thing is absent, more than zero where it is there, and idle switches.
+
+use super::world::dropped;
+use super::*;
+use petcomp::LinearRgb;
+use petcomp::dataset::{Progress, Setup};
+use petcomp::scene::{AreaLight, Noise, PostProcess, Scene};
+use petcomp::work::Kind::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+#[test]
+fn scenes_pay_for_what_they_use_and_for_nothing_else() {
+    let world = World::make().unwrap();
+    for case in cases(&world) {
+        let work = work_of(&world, &case).unwrap();
+        let paid: Vec<_> = case
+            .absent()
+            .into_iter()
+            .filter(|kind| work[*kind] != 0)
+            .collect();
+        assert!(paid.is_empty(), "{}: {paid:?} in {work:?}", case.name);
+        let idle: Vec<_> = case.used.iter().filter(|kind| work[**kind] == 0).collect();
+        assert!(
+            idle.is_empty(),
+            "{}: no {idle:?}, so that a zero elsewhere says nothing",
+            case.name
+        );
+    }
+}
+
+#[test]
+fn work_is_the_same_at_any_thread_count_and_beside_other_scenes() {
+    let world = World::make().unwrap();
+    let all = || {
+        cases(&world)
+            .iter()
+            .map(|case| work_of(&world, case).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let [one, four] = [1, 4].map(|n| petcomp::work::pool(n).unwrap().install(all));
+    assert_eq!(one, four);
+    let beside = rayon::join(all, all);
+    assert_eq!((&beside.0, &beside.1), (&one, &one));
+}
+
+#[test]
+fn a_scene_reads_the_files_that_it_names_and_no_others() {
+    let world = World::make().unwrap();
+    let cases = cases(&world);
+    let read = |name: &str| {
+        let case = cases.iter().find(|case| case.name == name).unwrap();
+        work_of(&world, case).unwrap()[FilesRead]
+    };
+    // Manifest, label, cut-out, photo.
+    assert_eq!(read("usual"), 4);
+    assert_eq!((read("plate alone"), read("nothing")), (3, 2));
+    assert_eq!((read("labels"), read("map"), read("dim map")), (3, 5, 4));
+}
+
+/// What the program writes for a scene: the picture as it is displayed and its scene-linear values.
+fn made(world: &World, setup: &Setup, scene: &Scene) -> (Vec<u8>, Work) {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, work) = counted(|| {
+        let studio = Studio::open_for(setup.clone(), scene).unwrap();
+        let (scene, shot) = studio.resolve(scene.clone()).unwrap();
+        let (_, frame) = studio.shoot(&scene, &shot);
+        io::write(folder.path().join("a.png"), &frame.map(PremulRgba::color)).unwrap();
+        io::write(folder.path().join("a.exr"), &frame).unwrap();
+    })
+    .unwrap();
+    let bytes = ["a.png", "a.exr"].map(|file| std::fs::read(folder.path().join(file)).unwrap());
+    assert!(world.setup().assets.exists());
+    (bytes.concat(), work)
+}
+
+#[test]
+fn idle_switches_leave_every_byte_and_cost_nothing() {
+    let world = World::make().unwrap();
+    let (setup, scene) = (world.setup(), world.scene());
+    let usual = made(&world, &setup, &scene);
+    let out = AreaLight {
+        power: 0.0,
+        ..scene.lights[0]
+    };
+    let black = AreaLight {
+        color: LinearRgb::BLACK,
+        ..scene.lights[0]
+    };
+    let finish = |finish| Scene {
+        finish,
+        ..scene.clone()
+    };
+    let quiet = Noise::Known {
+        shot: 0.0,
+        read: 0.0,
+    };
+    let idle = [
+        (
+            "a lamp without power",
+            Scene {
+                lights: vec![scene.lights[0], out],
+                ..scene.clone()
+            },
+        ),
+        (
+            "a black lamp",
+            Scene {
+                lights: vec![black, scene.lights[0]],
+                ..scene.clone()
+            },
+        ),
+        (
+            "a map of strength 0",
+            Scene {
+                environment: Some(world.environment(0.0)),
+                ..scene.clone()
+            },
+        ),
+        (
+            "noise of variance 0",
+            finish(PostProcess {
+                noise: quiet,
+                noise_seed: 7,
+                ..PostProcess::default()
+            }),
+        ),
+        (
+            "sharpening by 0",
+            finish(PostProcess {
+                sharpening: 0.0,
+                ..PostProcess::default()
+            }),
+        ),
+        (
+            "0 stops and even white",
+            finish(PostProcess {
+                exposure_ev: 0.0,
+                white_balance: LinearRgb::WHITE,
+                ..PostProcess::default()
+            }),
+        ),
+    ];
+    for (what, scene) in &idle {
+        assert!(
+            made(&world, &setup, scene) == usual,
+            "{what} changes bytes or costs work"
+        );
+    }
+}
+
+#[test]
+fn quality_where_it_does_not_apply_changes_nothing() {
+    let world = World::make().unwrap();
+    let scene = world.scene();
+    let with = |change: fn(&mut Setup), scene: &Scene| {
+        let mut setup = world.setup();
+        change(&mut setup);
+        made(&world, &setup, scene)
+    };
+    let no_lamp = Scene {
+        lights: vec![],
+        ..scene.clone()
+    };
+    assert!(with(|setup| setup.render.light_samples = 9, &no_lamp) == with(|_| {}, &no_lamp));
+    let no_sky = Scene {
+        ambient: LinearRgb::BLACK,
+        ..scene.clone()
+    };
+    assert!(with(|setup| setup.render.ambient_samples = 99, &no_sky) == with(|_| {}, &no_sky));
+    let no_cards = Scene {
+        objects: vec![],
+        ..scene.clone()
+    };
+    let finest = |setup: &mut Setup| setup.render = petcomp::render::Preset::Reference.options();
+    assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
+    // How cards fall does not matter to cards that lie.
+    let longer = |setup: &mut Setup| setup.scene.settle.time_limit *= 2.0;
+    assert!(with(longer, &scene) == with(|_| {}, &scene));
+    assert!(
+        with(finest, &scene).0 != with(|_| {}, &scene).0,
+        "quality matters where it applies"
+    );
+}
+
+/// A dataset of three scenes: every file and its bytes, but for notes of how long it took.
+fn dataset(
+    world: &World,
+    threads: usize,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> BTreeMap<PathBuf, Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    let studio = Studio::open(world.setup()).unwrap();
+    let plan = studio.plan(3, 0, folder.path()).unwrap();
+    let make = |_| studio.take(dropped(world.scene()));
+    let pool = petcomp::work::pool(threads).unwrap();
+    pool.install(|| generate(&plan, make, progress, &AtomicBool::new(false)))
+        .unwrap();
+    files(folder.path())
+        .into_iter()
+        .map(|(path, bytes)| (path.strip_prefix(folder.path()).unwrap().into(), bytes))
+        .collect()
+}
+
+fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let entries = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path());
+    let shown =
+        entries.filter(|path| !path.file_name().unwrap().to_string_lossy().starts_with('.'));
+    let below = |path: PathBuf| {
+        if path.is_dir() {
+            files(&path)
+        } else {
+            BTreeMap::from([(path.clone(), std::fs::read(&path).unwrap())])
+        }
+    };
+    shown.flat_map(below).collect()
+}
+
+#[test]
+fn jobs_and_progress_leave_every_byte() {
+    let world = World::make().unwrap();
+    let alone = dataset(&world, 1, &|_| {});
+    let told = AtomicU64::new(0);
+    let watched = dataset(&world, 3, &|progress| {
+        told.store(progress.done, Ordering::Relaxed)
+    });
+    assert_eq!(
+        (told.into_inner(), alone.len()),
+        (3, 3 * 3 + 3),
+        "pictures, labels, scenes; and three lists"
+    );
+    assert!(alone == watched);
+}
+
+#[test]
+fn labels_without_a_picture_are_those_with_one() {
+    let world = World::make().unwrap();
+    for case in cases(&world) {
+        let studio = Studio::open(world.setup()).unwrap();
+        let labels = studio.label(case.scene.clone()).unwrap();
+        assert_eq!(
+            labels,
+            studio.take(case.scene).unwrap().labels,
+            "{}",
+            case.name
+        );
+    }
+}
+
+#[test]
+fn parts_of_a_picture_that_are_asked_for_leave_the_picture_alone() {
+    let world = World::make().unwrap();
+    let studio = Studio::open(world.setup()).unwrap();
+    let (scene, shot) = studio.resolve(world.scene()).unwrap();
+    let (deep, frame) = studio.shoot(&scene, &shot);
+    let before = frame.clone();
+    let all = petcomp::composite::Aov::ALL.map(|(_, aov)| aov);
+    let (parts, work) = counted(|| petcomp::composite::parts(&all, &deep, &shot, &frame)).unwrap();
+    assert!(parts.len() >= all.len() && frame == before && studio.shoot(&scene, &shot).1 == before);
+    assert_eq!(
+        (work[ShadowRays], work[TextureSamples], work[LabelSamples]),
+        (0, 0, 0),
+        "folds over what is there"
+    );
+}
+
+#[test]
+fn a_broken_promise_is_marked() {
+    let row = |count| Row {
+        scene: "a",
+        about: "b",
+        counts: vec![(Masks, count), (Encodes, 3)],
+        absent: vec![Masks],
+    };
+    let cells = table(&[row(0), row(2)]).rows;
+    assert_eq!(cells[0][2..], ["0 ✓", "3"]);
+    assert_eq!(cells[1][2..], ["2 ✗", "3"]);
+    assert!(row(0).is_as_promised() && !row(2).is_as_promised());
+    assert!(table(&[]).rows.is_empty());
+}
