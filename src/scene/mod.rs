@@ -25,7 +25,7 @@ mod stack;
 mod take;
 mod variation;
 
-pub use catalog::catalog;
+pub use catalog::{AssetVariant, Background, catalog};
 pub use draw::{Distribution, DrawLog, Drawn, Draws};
 pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
@@ -37,10 +37,8 @@ pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
 pub use post_process::{Noise, PostProcess, PostProcessRanges, white_balance};
 pub use range::Range;
-pub use recipe::{
-    AssetVariant, Background, Collider, GradeRanges, LightRanges, Recipe, Selections,
-};
-pub use resolve::{Appearance, CATCHER};
+pub use recipe::{Collider, GradeRanges, LightRanges, Recipe, Selections};
+pub use resolve::{Appearance, CATCHER_RATIO};
 pub use shot::{Card, Shot};
 pub use stack::DropRanges;
 pub use take::Take;

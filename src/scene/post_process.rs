@@ -42,7 +42,7 @@ pub enum Noise {
     /// None.
     #[default]
     None,
-    /// As much as is told.
+    /// This much.
     Known {
         /// Variance per value: photon noise.
         shot: f64,
@@ -54,7 +54,7 @@ pub enum Noise {
 }
 
 impl PostProcess {
-    /// Nothing is to be done.
+    /// Whether it leaves the frame alone.
     pub fn is_identity(&self) -> bool {
         let Self {
             exposure_ev,
@@ -69,7 +69,7 @@ impl PostProcess {
             && sharpening == 0.0
     }
 
-    /// Fails on the first value that cannot be right.
+    /// Fails on the first impossible value.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         let field = |name: &str| format!("{at}.{name}");
         EV.check(&field("exposure_ev"), self.exposure_ev)?;
@@ -79,11 +79,17 @@ impl PostProcess {
             return Err(Error::value(field("white_balance"), what));
         }
         SHARPENING.check(&field("sharpening"), self.sharpening)?;
-        let Noise::Known { shot, read } = self.noise else {
+        self.noise.check(&field("noise"))
+    }
+}
+
+impl Noise {
+    fn check(&self, at: &str) -> Result<()> {
+        let Self::Known { shot, read } = *self else {
             return Ok(());
         };
-        NOISE.check(&field("noise.known.shot"), shot)?;
-        NOISE.check(&field("noise.known.read"), read)
+        NOISE.check(&format!("{at}.known.shot"), shot)?;
+        NOISE.check(&format!("{at}.known.read"), read)
     }
 }
 
@@ -93,7 +99,7 @@ impl PostProcess {
 pub struct PostProcessRanges {
     /// Stops. Default: 0.
     pub exposure_ev: Range,
-    /// Temperature of the light that the camera takes for white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
+    /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
     pub white_k: Range,
     /// Noise of rendered cards. Default: `"none"`.
     pub noise: Noise,
@@ -134,22 +140,26 @@ impl PostProcessRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
-        PostProcess {
-            noise: self.noise,
-            ..PostProcess::default()
-        }
-        .check("finish")
+        self.noise.check("finish.noise")
     }
 }
 
-/// Gains that turn light of a temperature into what light of 6504 K looks like, green left alone.
+/// Gains that make light of a temperature look like light of 6504 K, green left alone.
 pub fn white_balance(white_k: f64) -> LinearRgb {
     if white_k == NEUTRAL_K {
         return LinearRgb::WHITE;
     }
     let (wanted, seen) = (planckian(NEUTRAL_K), planckian(white_k));
-    let gain = |w: f32, s: f32| (w / wanted.g) / (s / seen.g).max(f32::MIN_POSITIVE);
-    LinearRgb::new(gain(wanted.r, seen.r), 1.0, gain(wanted.b, seen.b))
+    LinearRgb::new(
+        relative_gain([wanted.r, wanted.g], [seen.r, seen.g]),
+        1.0,
+        relative_gain([wanted.b, wanted.g], [seen.b, seen.g]),
+    )
+}
+
+/// The gain of a channel, each beside its green.
+fn relative_gain([wanted, wanted_green]: [f32; 2], [seen, seen_green]: [f32; 2]) -> f32 {
+    (wanted / wanted_green) / (seen / seen_green).max(f32::MIN_POSITIVE)
 }
 
 #[cfg(test)]

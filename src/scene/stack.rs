@@ -8,10 +8,10 @@ use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 
-/// Times that a card which does not fit between the walls is turned anew.
-const TURNS: u32 = 64;
-/// What a card may be longer than the way between walls, as a share: rounding.
-const ROUNDING: f64 = 1e-12;
+/// Times that the direction of a card is drawn until it fits between the walls.
+const MAX_YAW_DRAWS: u32 = 64;
+/// How much longer than the space between the walls a card may be, as a share: rounding.
+const FIT_TOLERANCE: f64 = 1e-12;
 
 /// How objects start: each over the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,19 +65,22 @@ impl DropRanges {
 }
 
 /// The column over a surface that objects are stacked in.
-pub(super) struct Column<'a> {
-    /// Name of the place, for messages.
-    pub(super) place: &'a str,
+pub(super) struct DropColumn<'a> {
+    /// Name of the background, for messages.
+    pub(super) background: &'a str,
     pub(super) surface: Surface,
     pub(super) start: &'a DropRanges,
     pub(super) options: &'a SettleOptions,
     pub(super) draws: &'a Draws<'a>,
 }
 
-impl Column<'_> {
-    /// Places objects one over the other: between the walls over the edges of the surface, with a gap under each.
+impl DropColumn<'_> {
+    /// Places objects one over the other: between the walls over the edges of the surface, with a gap
+    /// under each.
     ///
-    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents as they are turned.
+    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents as
+    /// they are turned.
+    ///
     /// # Errors
     /// An object that fits between the walls in no direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
@@ -85,21 +88,15 @@ impl Column<'_> {
         for (i, object) in objects.iter_mut().enumerate() {
             let path = format!("objects[{i}].start");
             let half = self.options.half_body(object);
-            let fitting = self.fitting_rotation(&half, &path);
-            let rotation = fitting.ok_or_else(|| {
-                Error::value(
-                    format!("objects[{i}].size"),
-                    too_large(&object.asset, object.size, self.place, self.surface.size),
-                )
+            let rotation = self.fitting_rotation(&half, &path).ok_or_else(|| {
+                Error::value(format!("objects[{i}].size"), self.fit_problem(object))
             })?;
             let extent = half_extent(&rotation, &half);
-            let x = self.start.x.draw(self.draws, &format!("{path}.x"));
-            let y = self.start.y.draw(self.draws, &format!("{path}.y"));
-            let [free_x, free_y] = free(self.surface.size, &extent);
-            let height = top + self.start.gap.draw(self.draws, &format!("{path}.gap")) + extent.z;
+            let above = self.draw_position(&extent, &path);
+            let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
             top = height + extent.z;
             object.placement = Placement::Drop {
-                above: [x * free_x, y * free_y],
+                above,
                 height,
                 rotation,
             };
@@ -107,39 +104,56 @@ impl Column<'_> {
         Ok(())
     }
 
-    /// The first turn drawn with which the body fits between the walls, tilted as it starts and level as it may end: what
-    /// starts across a room that is too narrow for it never lies down there. Where none does, one that fits level.
-    fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
-        let mut drawn = (0..TURNS).map(|turn| self.rotation(path, turn));
-        let fits = |rotation: &UnitQuaternion<f64>| fits(self.surface.size, half, rotation);
-        drawn
-            .find(|rotation| fits(rotation) && fits(&level(rotation)))
-            .or_else(|| {
-                let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
-                (!turns.is_empty())
-                    .then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
-            })
+    fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
+        range.draw(self.draws, &format!("{path}.{name}"))
     }
 
-    /// First a turn about the vertical, the `turn`-th drawn for this object, then the tilt.
-    fn rotation(&self, path: &str, turn: u32) -> UnitQuaternion<f64> {
-        let radians = |range: &Range, name: &str| {
-            range
-                .draw(self.draws, &format!("{path}.{name}"))
-                .to_radians()
-        };
-        let yaw_name = if turn == 0 {
+    /// A point of the surface over which a body of this half extent is between the walls.
+    fn draw_position(&self, extent: &Vector3<f64>, path: &str) -> [f64; 2] {
+        let x = self.draw(&self.start.x, path, "x");
+        let y = self.draw(&self.start.y, path, "y");
+        let [free_x, free_y] = free_offsets(self.surface.size, extent);
+        [x * free_x, y * free_y]
+    }
+
+    fn fit_problem(&self, object: &Object) -> String {
+        let room = self.surface.size;
+        too_large(&object.asset, object.size, self.background, room)
+    }
+
+    /// The first rotation drawn with which the body fits between the walls, tilted as it starts and
+    /// level as it may end: what starts across a room that is too narrow for it never lies down there.
+    /// Where none does, one that fits level.
+    fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
+        let room = self.surface.size;
+        (0..MAX_YAW_DRAWS)
+            .map(|number| self.draw_rotation(path, number))
+            .find(|rotation| fits(room, half, rotation) && fits(room, half, &level(rotation)))
+            .or_else(|| self.draw_level_rotation(half, path))
+    }
+
+    /// One of the level rotations with which the body fits, if there is any.
+    fn draw_level_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
+        let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
+        (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
+    }
+
+    /// First a turn about the vertical, drawn for this object for the `number`-th time, then the tilt.
+    fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
+        let yaw_name = if number == 0 {
             "yaw_deg".into()
         } else {
-            format!("yaw_deg#{turn}")
+            format!("yaw_deg#{number}")
         };
-        let yaw = UnitQuaternion::from_axis_angle(
-            &Vector3::z_axis(),
-            radians(&self.start.yaw_deg, &yaw_name),
-        );
-        let towards = radians(&self.start.tilt_axis_deg, "tilt_axis_deg");
+        let yaw = self.draw(&self.start.yaw_deg, path, &yaw_name).to_radians();
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+        let towards = self.draw(&self.start.tilt_axis_deg, path, "tilt_axis_deg");
+        let towards = towards.to_radians();
         let axis = Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0));
-        UnitQuaternion::from_axis_angle(&axis, radians(&self.start.tilt_deg, "tilt_deg")) * yaw
+        let tilt = self
+            .draw(&self.start.tilt_deg, path, "tilt_deg")
+            .to_radians();
+        UnitQuaternion::from_axis_angle(&axis, tilt) * yaw
     }
 }
 
@@ -151,7 +165,8 @@ impl DropRanges {
             .is_some()
     }
 
-    /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the range.
+    /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the
+    /// range.
     fn level_turns(
         &self,
         surface: [f64; 2],
@@ -161,36 +176,37 @@ impl DropRanges {
         let whole = (0..360)
             .map(move |i| min.ceil() + f64::from(i))
             .take_while(move |degrees| *degrees < max);
-        let turn = |degrees: f64| {
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
-        };
         [min, max]
             .into_iter()
             .chain(whole)
-            .map(turn)
+            .map(level_turn)
             .filter(move |rotation| fits(surface, half, rotation))
     }
 }
 
+fn level_turn(degrees: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
+}
+
 /// How far from the middle an object of this half extent may be, in both directions.
-fn free(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
+fn free_offsets(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
     [0, 1].map(|axis| surface[axis] / 2.0 - extent[axis])
 }
 
 /// Whether a body turned so fits between the walls.
 fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
-    let free = free(surface, &half_extent(rotation, half));
+    let free = free_offsets(surface, &half_extent(rotation, half));
     free.iter()
         .zip(surface)
-        .all(|(free, side)| *free >= -ROUNDING * side)
+        .all(|(free, side)| *free >= -FIT_TOLERANCE * side)
 }
 
-/// What is wrong with a card that fits nowhere.
-pub(super) fn too_large(asset: &str, card: [f64; 2], place: &str, room: [f64; 2]) -> String {
+/// The message for a card that fits nowhere.
+pub(super) fn too_large(asset: &str, card: [f64; 2], background: &str, room: [f64; 2]) -> String {
+    let ([w, h], [room_w, room_h]) = (card, room);
     format!(
-        "\"{asset}\", {:.3} x {:.3} m, does not fit between the walls of \"{place}\", {:.3} x {:.3} m: expected a smaller \
-         object (scene.scale) or a larger surface",
-        card[0], card[1], room[0], room[1]
+        "\"{asset}\", {w:.3} x {h:.3} m, does not fit between the walls of \"{background}\", \
+         {room_w:.3} x {room_h:.3} m: expected a smaller object (scene.scale) or a larger surface"
     )
 }
 
@@ -217,8 +233,8 @@ mod tests {
 
     fn stacked(k: u64, start: &DropRanges, mut objects: Vec<Object>) -> Result<Vec<Object>> {
         let (surface, options) = (Surface::new([0.4, 0.3]), SettleOptions::default());
-        Column {
-            place: "tray",
+        DropColumn {
+            background: "tray",
             surface,
             start,
             options: &options,

@@ -45,7 +45,7 @@ impl From<Take> for TakeInFile {
 }
 
 impl Take {
-    /// The part of a list that is used; nothing only of an empty list.
+    /// The part of a list that is used; empty only for an empty list.
     pub fn slice_of<T>(self, list: &[T]) -> &[T] {
         match self {
             Self::All => list,

@@ -3,7 +3,7 @@
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
 
-/// The whole file. Keys that only Blender needs (physics, material) are passed over.
+/// The whole file. Keys that only Blender needs (physics, material) are ignored.
 #[derive(Serialize, Deserialize)]
 pub(super) struct CyclesFile {
     pub(super) render: CyclesRender,
