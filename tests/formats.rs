@@ -323,7 +323,7 @@ fn a_mask_is_what_the_layer_of_its_object_shows() {
             let alpha = |x: u32, y: u32| plane(layer).samples[(y * IMAGE[0] + x) as usize];
             assert_eq!(
                 *mask,
-                petcomp::label::Mask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1)
+                petcomp::label::RleMask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1)
             );
         }
         assert!(object.visible_mask.pixels().count() <= object.amodal_mask.pixels().count());

@@ -48,7 +48,16 @@ impl Studio {
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
     pub fn open(setup: Setup) -> Result<Self> {
-        let studio = Self::with_assets(setup, |_| true)?;
+        let library = Library::open(&setup.assets)?;
+        Self::with_library(setup, library)
+    }
+
+    /// The same with the assets in memory, which [`build`](crate::asset::build) returns.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn with_library(setup: Setup, library: Library) -> Result<Self> {
+        let studio = Self::new(setup, library)?;
         studio
             .places
             .iter()
@@ -85,13 +94,12 @@ impl Studio {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
-        Self::with_assets(setup, |name| {
-            scene.objects.iter().any(|object| object.asset == name)
-        })
+        let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
+        let library = Library::open_some(&setup.assets, is_named)?;
+        Self::new(setup, library)
     }
 
-    fn with_assets(setup: Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        let library = Library::open_some(&setup.assets, wanted)?;
+    fn new(setup: Setup, library: Library) -> Result<Self> {
         let (image, surface_size, force) =
             (setup.scene.image, setup.surface_size, setup.force_cameras);
         let places = Place::all(

@@ -89,6 +89,9 @@ impl Channels for StraightRgba {
 impl Channels for Coverage {
     const NAMES: &'static [&'static str] = &["A"];
 }
+impl Channels for f32 {
+    const NAMES: &'static [&'static str] = &["Y"];
+}
 impl Channels for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
 }

@@ -3,7 +3,7 @@
 use super::format::{Format, Source};
 use super::limits::{Limits, affordable};
 use super::profile::Profile;
-use super::raster::{Fit, FromFile, Raster, Refusal, Wanted};
+use super::raster::{Fit, FromFile, Opaque, Raster, Refusal, Wanted};
 use super::{ReadOptions, camera_notes, caught, raster_of};
 use crate::{Error, Image, Result};
 use std::ops::Range;
@@ -91,6 +91,24 @@ impl Picture {
         self.raster
             .pixels(self.profile.as_ref(), rows)
             .expect("colours were found when the picture was read")
+    }
+
+    /// All colours, as [`read`](super::read) makes them.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a picture with alpha below 1 where `LinearRgb` is asked for.
+    ///
+    /// # Panics
+    /// When the pixels asked for are no colours.
+    pub fn pixels<P: FromFile>(&self) -> Result<Image<P>> {
+        let rows = 0..self.raster.height;
+        P::check(&Opaque {
+            raster: &self.raster,
+            profile: self.profile.as_ref(),
+            rows: rows.clone(),
+        })
+        .map_err(|e| Error::file(&self.path, e))?;
+        Ok(self.rows(rows))
     }
 
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {

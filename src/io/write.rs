@@ -235,6 +235,16 @@ impl ToFile for Coverage {
     }
 }
 
+impl ToFile for f32 {
+    const NAMES: &'static [&'static str] = Coverage::NAMES;
+    fn codes<C: Code>(self) -> [C; 4] {
+        Coverage(self).codes()
+    }
+    fn linear(self) -> [f32; CHANNELS] {
+        Coverage(self).linear()
+    }
+}
+
 impl ToFile for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
     const CODED: bool = false;

@@ -1,6 +1,6 @@
 //! Cut-out: segmentation, screen plate and matte in one go, trimmed to the object.
 
-use super::film::{ColorDoubts, FilmMatte, FilmOptions, PartOf, film_of_part};
+use super::film::{ColorUncertainty, FilmMatte, FilmOptions, PartOf, film_of_part};
 use super::key::{KeyOptions, Keying, Screen};
 use super::outline::Outline;
 use super::plate::{PlateOptions, ScreenPlate};
@@ -11,7 +11,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::{Image, Roi};
+use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, Film, LinearRgb, Mix, PremulRgba};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -104,7 +104,7 @@ pub struct CutOut {
     /// Transmittance as measured, the object's own shadow on the screen included; 1 outside. Of the size of `film`.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of the transmittance, 0 to 1. Of the size of `film`.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// Convex hull of the object in pixels of `film`, clockwise as seen.
     pub hull: Vec<Point2<f64>>,
     /// Tight outline of the object in pixels of `film`.
@@ -122,7 +122,7 @@ pub struct CutOut {
     /// Mean matte on the screen outside the object, where it should be 0.
     pub residue: f32,
     /// What makes its colours and its transmittance wrong; of the physical matte only.
-    pub doubts: Option<ColorDoubts>,
+    pub color_uncertainty: Option<ColorUncertainty>,
     /// What a person should know, of the segmentation, the screen and the matte.
     pub diagnostics: Vec<Diagnostic>,
     /// Where the object was found in the photo.
@@ -270,7 +270,7 @@ pub fn cut_out_on(
         unevenness: plate.unevenness,
         method,
         residue: matted.residue,
-        doubts: matted.doubts,
+        color_uncertainty: matted.color_uncertainty,
         diagnostics,
         segmentation,
     })
@@ -335,9 +335,9 @@ fn plate(
 struct Matted {
     film: Image<Film>,
     transmittance: Image<LinearRgb>,
-    uncertainty: Image<Coverage>,
+    uncertainty: Image<f32>,
     residue: f32,
-    doubts: Option<ColorDoubts>,
+    color_uncertainty: Option<ColorUncertainty>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -355,7 +355,7 @@ impl Matted {
             film,
             transmittance,
             uncertainty,
-            doubts,
+            color_uncertainty,
             diagnostics,
             ..
         } = solved;
@@ -365,7 +365,7 @@ impl Matted {
             transmittance,
             uncertainty,
             residue: 0.0,
-            doubts: Some(doubts),
+            color_uncertainty: Some(color_uncertainty),
             diagnostics,
         })
     }
@@ -395,7 +395,7 @@ impl Matted {
             transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
             uncertainty: Image::new(image.width(), image.height()),
             residue,
-            doubts: None,
+            color_uncertainty: None,
             diagnostics: Vec::new(),
         }
     }
@@ -409,7 +409,7 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
     filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
-fn mean(matte: &Image<Coverage>, set: &Image<bool>) -> f32 {
+fn mean(matte: &Image<Coverage>, set: &Mask) -> f32 {
     let chosen = matte
         .pixels()
         .iter()

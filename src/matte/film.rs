@@ -1,14 +1,14 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
-mod doubts;
 mod planes;
 mod solve;
 pub(super) mod tint;
+mod uncertainty;
 mod view;
 
-pub use doubts::ColorDoubts;
 pub use planes::film_planes;
+pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
@@ -61,11 +61,11 @@ pub struct FilmMatte {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
     /// What makes its colours wrong.
-    pub doubts: ColorDoubts,
+    pub color_uncertainty: ColorUncertainty,
     /// What a person should know.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -187,22 +187,25 @@ pub(super) fn film_of_part(
     });
     watch.lap("factors");
     let most = flat.into_iter().fold(0.0, f32::max);
-    let guessed = doubts::guessed(&factors, inside, opts.thickness_spread, most);
+    let guessed = uncertainty::guessed(&factors, inside, opts.thickness_spread, most);
     let screen_hue = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
-    let keyed_away = doubts::keyed_away(&factors, inside, flat[key], longer_side);
+    let keyed_away = uncertainty::keyed_away(&factors, inside, flat[key], longer_side);
     watch.lap("paint");
     let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
     watch.lap("glints");
-    let doubts = ColorDoubts {
+    let color_uncertainty = ColorUncertainty {
         keyed_away,
         screen_hue,
         clipped,
         guessed,
         tint,
     };
-    let diagnostics = grey.into_iter().chain(doubts.diagnostics()).collect();
+    let diagnostics = grey
+        .into_iter()
+        .chain(color_uncertainty.diagnostics())
+        .collect();
     let matte = FilmMatte {
-        doubts,
+        color_uncertainty,
         diagnostics,
         ..composed(photo, plate, inside, &factors, flat.into())
     };
@@ -265,13 +268,13 @@ fn composed(
         Film::new(f.scale(c.0), covered(v, c))
     });
     let most = flat.r.max(flat.g).max(flat.b);
-    let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
+    let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
     FilmMatte {
         film,
         transmittance,
         uncertainty,
         flat,
-        doubts: ColorDoubts::default(),
+        color_uncertainty: ColorUncertainty::default(),
         diagnostics: Vec::new(),
     }
 }

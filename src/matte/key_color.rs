@@ -1,11 +1,11 @@
 //! Key colour: one colour for the screen, and whether the object has it, too.
 
-use super::film::ColorDoubts;
+use super::film::ColorUncertainty;
 use super::screen::{screen_color, screen_pixels, strongest_channel};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 use serde::{Deserialize, Serialize};
 
@@ -79,7 +79,7 @@ const SIGMA_OF_MEDIAN: f32 = 1.4826;
 const FINEST: f32 = 1e-3;
 
 /// Centre and standard deviation of a channel.
-fn robust(photo: &Image<LinearRgb>, set: &Image<bool>, channel: usize) -> (f32, f32) {
+fn robust(photo: &Image<LinearRgb>, set: &Mask, channel: usize) -> (f32, f32) {
     let all: Vec<usize> = (0..photo.pixels().len())
         .filter(|&i| set.pixels()[i])
         .collect();
@@ -140,14 +140,14 @@ fn screen_hue(
     };
     let rim_px = RIM * photo.width().max(photo.height()) as f64;
     let interior = filter::erode(&mask.map(|c| c.0 > 0.5), rim_px);
-    let object = interior.pixels().iter().filter(|p| **p).count();
+    let object = interior.count();
     let limit = BEYOND_SCREEN * excess(screen);
     let pairs = photo.pixels().iter().zip(interior.pixels());
     let hued = pairs
         .filter(|(p, inside)| **inside && excess(**p) > limit)
         .count();
     let share = hued as f32 / object.max(1) as f32;
-    (excess(screen) > 0.0 && share > WORTH_SAYING).then(|| ColorDoubts::screen_hue(share))
+    (excess(screen) > 0.0 && share > WORTH_SAYING).then(|| ColorUncertainty::screen_hue(share))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::register::{self, Registered};
 use super::screen::{screen_pixels, strongest_channel};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::{Image, Roi};
+use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, LinearRgb};
 use polynomial::Polynomial;
 use serde::{Deserialize, Serialize};
@@ -73,11 +73,7 @@ impl ScreenPlate {
     /// When the sizes differ.
     ///
     /// [Tukey]: https://doi.org/10.1080/03610927708827533
-    pub fn fit(
-        photo: &Image<LinearRgb>,
-        background: &Image<bool>,
-        opts: &PlateOptions,
-    ) -> Result<Self> {
+    pub fn fit(photo: &Image<LinearRgb>, background: &Mask, opts: &PlateOptions) -> Result<Self> {
         opts.check()?;
         let cells = cells::means(photo, background);
         let fitted = Polynomial::fit(&cells, photo.size(), opts)?;
@@ -104,7 +100,7 @@ impl ScreenPlate {
     pub fn from_photo(
         empty: &Image<LinearRgb>,
         photo: &Image<LinearRgb>,
-        background: &Image<bool>,
+        background: &Mask,
         opts: &PlateOptions,
     ) -> Result<Self> {
         opts.check()?;
@@ -215,7 +211,7 @@ impl ScreenPlate {
     fn of(
         image: Image<LinearRgb>,
         photo: &Image<LinearRgb>,
-        background: &Image<bool>,
+        background: &Mask,
         degree: Option<usize>,
         shift_px: [f64; 2],
     ) -> Self {
@@ -234,7 +230,7 @@ impl ScreenPlate {
     fn check_mismatch(
         &self,
         photo: &Image<LinearRgb>,
-        background: &Image<bool>,
+        background: &Mask,
         opts: &PlateOptions,
     ) -> Result<()> {
         let mismatch = cells::mismatch(

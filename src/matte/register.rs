@@ -1,7 +1,7 @@
 //! How far one picture lies from another, to a fraction of a pixel.
 
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb, Mix};
 use nalgebra::{Matrix2, Vector2};
 
@@ -44,13 +44,13 @@ const SIGNIFICANT: f64 = 3.0;
 pub(super) fn shift(
     a: &Image<LinearRgb>,
     b: &Image<LinearRgb>,
-    mask: &Image<bool>,
+    mask: &Mask,
     weights: [f32; 3],
 ) -> Registered {
     let tone = |image: &Image<LinearRgb>| {
-        image.map(|p| Coverage(weights[0] * p.r + weights[1] * p.g + weights[2] * p.b))
+        image.map(|p| weights[0] * p.r + weights[1] * p.g + weights[2] * p.b)
     };
-    let mask = mask.map(|set| Coverage(f32::from(u8::from(set))));
+    let mask = mask.to_coverage();
     let mut levels = vec![(tone(a), tone(b), mask)];
     while let Some((a, b, mask)) = levels
         .last()
@@ -100,18 +100,15 @@ pub(super) fn moved<P: Mix>(image: &Image<P>, [dx, dy]: [f64; 2]) -> Image<P> {
     })
 }
 
-fn high_passed(image: &Image<Coverage>) -> Image<Coverage> {
+fn high_passed(image: &Image<f32>) -> Image<f32> {
     let smooth = filter::gaussian_blur(image, HIGH_PASS_PX);
-    filter::gaussian_blur(
-        &image.zip_map(&smooth, |v, mean| Coverage(v.0 - mean.0)),
-        1.0,
-    )
+    filter::gaussian_blur(&image.zip_map(&smooth, |v, mean| v - mean), 1.0)
 }
 
 /// Gauss and Newton from a start; the shift and the last step, nothing where there is no structure.
 fn refined(
-    a: &Image<Coverage>,
-    b: &Image<Coverage>,
+    a: &Image<f32>,
+    b: &Image<f32>,
     mask: &Image<Coverage>,
     start: Vector2<f64>,
 ) -> Option<(Vector2<f64>, Step)> {
@@ -134,7 +131,7 @@ struct Step {
 }
 
 /// One step: the gain by regression of `a` on `b`, the shift by regression of what is left on the gradient.
-fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Option<Step> {
+fn step(a: &Image<f32>, b: &Image<f32>, mask: &Image<Coverage>) -> Option<Step> {
     let (w, h) = a.size();
     let inside = || {
         let rows =
@@ -143,17 +140,17 @@ fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Opt
     };
     let (mut aa, mut ab, mut bb) = (0.0_f64, 0.0_f64, 0.0_f64);
     for at in inside() {
-        aa += f64::from(a[at].0 * a[at].0);
-        ab += f64::from(a[at].0 * b[at].0);
-        bb += f64::from(b[at].0 * b[at].0);
+        aa += f64::from(a[at] * a[at]);
+        ab += f64::from(a[at] * b[at]);
+        bb += f64::from(b[at] * b[at]);
     }
     let gain = if bb > 0.0 { ab / bb } else { return None };
     let (mut normal, mut right, mut square, mut count) =
         (Matrix2::zeros(), Vector2::zeros(), 0.0, 0.0);
     for (x, y) in inside() {
-        let slope = |p: (usize, usize), q: (usize, usize)| 0.5 * gain * f64::from(b[p].0 - b[q].0);
+        let slope = |p: (usize, usize), q: (usize, usize)| 0.5 * gain * f64::from(b[p] - b[q]);
         let g = Vector2::new(slope((x + 1, y), (x - 1, y)), slope((x, y + 1), (x, y - 1)));
-        let left = f64::from(a[(x, y)].0) - gain * f64::from(b[(x, y)].0);
+        let left = f64::from(a[(x, y)]) - gain * f64::from(b[(x, y)]);
         normal += g * g.transpose();
         right -= g * left;
         square += left * left;
@@ -200,7 +197,7 @@ mod tests {
     }
 
     /// All but a rim that the shift moves out of the picture.
-    fn interior() -> Image<bool> {
+    fn interior() -> Mask {
         Image::from_fn(120, 90, |x, y| {
             (12..108).contains(&x) && (12..78).contains(&y)
         })

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 
 /// Width of the zone around the object that is not asked, as a share of the longer side: contact shadows and spill.
@@ -25,17 +25,17 @@ pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<
 }
 
 /// The pixels outside a mask and a margin around it.
-pub(super) fn screen_pixels(mask: &Image<Coverage>) -> Image<bool> {
+pub(super) fn screen_pixels(mask: &Image<Coverage>) -> Mask {
     background(mask, MARGIN)
 }
 
-fn background(mask: &Image<Coverage>, margin: f64) -> Image<bool> {
+fn background(mask: &Image<Coverage>, margin: f64) -> Mask {
     let margin_px = margin * mask.width().max(mask.height()) as f64;
-    filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).map(|near| !near)
+    filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).complement()
 }
 
 /// Sums in double precision and in the order of the pixels: the same at any thread count.
-fn mean(photo: &Image<LinearRgb>, set: &Image<bool>) -> Option<LinearRgb> {
+fn mean(photo: &Image<LinearRgb>, set: &Mask) -> Option<LinearRgb> {
     assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
     let (mut sum, mut count) = ([0.0; 3], 0u64);
     for (p, _) in photo

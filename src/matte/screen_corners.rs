@@ -7,8 +7,8 @@ use crate::color::rgb_to_hsv;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::{Line, Point2, Vector2};
-use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb, Mix};
+use crate::image::{Image, Mask};
+use crate::pixel::{LinearRgb, Mix};
 
 /// Longer side of the picture that is searched, pixels.
 const WORKING_SIZE: usize = 1024;
@@ -206,7 +206,7 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
 }
 
 /// The largest connected region of a set.
-fn largest_region(set: &Image<bool>) -> Option<Region> {
+fn largest_region(set: &Mask) -> Option<Region> {
     let groups = Groups::of(set);
     let sizes = groups.sizes(set);
     let largest = (0..sizes.len()).max_by_key(|&i| sizes[i])?;
@@ -216,7 +216,7 @@ fn largest_region(set: &Image<bool>) -> Option<Region> {
         .flat_map(|x| [(x, 0), (x, h - 1)])
         .chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
     let is_cut = border.into_iter().any(|at| only[at]);
-    let hull = Outline::around(&only.map(|inside| Coverage(f32::from(u8::from(inside))))).hull();
+    let hull = Outline::around(&only.to_coverage()).hull();
     let is_covered = is_covered(&only, &hull);
     Some(Region {
         pixels: sizes[largest],
@@ -227,7 +227,7 @@ fn largest_region(set: &Image<bool>) -> Option<Region> {
 }
 
 /// Something lies within the hull of a region, away from its border.
-fn is_covered(region: &Image<bool>, hull: &[Point2<f64>]) -> bool {
+fn is_covered(region: &Mask, hull: &[Point2<f64>]) -> bool {
     let (w, h) = region.size();
     let within = Outline {
         rings: vec![hull.to_vec()],
@@ -240,7 +240,7 @@ fn is_covered(region: &Image<bool>, hull: &[Point2<f64>]) -> bool {
         .into_iter()
         .max()
         .unwrap_or(0);
-    largest as f64 > LEAST_OBJECT * within.pixels().iter().filter(|inside| **inside).count() as f64
+    largest as f64 > LEAST_OBJECT * within.count() as f64
 }
 
 /// The four points of a convex polygon that enclose the most of it, in its order.
@@ -353,6 +353,7 @@ fn border(
 mod tests {
     use super::*;
     use crate::geom::{Pose, UnitQuaternion, Vector3};
+    use crate::pixel::Coverage;
     use crate::{Camera, camera::project_picture, filter::Pyramid};
 
     const BROWN: LinearRgb = LinearRgb {

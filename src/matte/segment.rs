@@ -12,7 +12,7 @@ mod pass;
 mod snap;
 mod threshold;
 
-pub use band::Tone;
+pub use band::LumaMode;
 pub(super) use cluster::Groups;
 pub use confidence::Confidence;
 pub use threshold::Threshold;
@@ -23,7 +23,7 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentOptions {
     /// What the pyramid is made of. Default: each channel by itself.
-    pub tone: Tone,
+    pub tone: LumaMode,
     /// Which band of the pyramid is the coarse one, 2 to 8; the fine one is the first. Default: nothing = the depth that
     /// the others agree with best.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -57,7 +57,7 @@ pub struct SegmentOptions {
 impl Default for SegmentOptions {
     fn default() -> Self {
         Self {
-            tone: Tone::Channels,
+            tone: LumaMode::Channels,
             levels: None,
             first_threshold: Threshold::Otsu,
             last_threshold: Threshold::Otsu,
@@ -101,24 +101,23 @@ pub struct Step {
     /// What it is: a file name without ending.
     pub name: &'static str,
     /// The picture, of the size that was searched; bands are in units of noise.
-    pub image: Image<Coverage>,
+    pub image: Image<f32>,
 }
 
 impl Step {
     /// The picture in the range 0 to 1 that files show: where values go above 1, their logarithms as shares of the
     /// largest.
-    pub fn shown(&self) -> Image<Coverage> {
+    pub fn shown(&self) -> Image<f32> {
         let most = self
             .image
             .pixels()
             .iter()
-            .fold(0.0f32, |most, c| most.max(c.0));
+            .fold(0.0f32, |most, v| most.max(*v));
         if most <= 1.0 {
             return self.image.clone();
         }
         let scale = 1.0 / libm::log1pf(most);
-        self.image
-            .map(|c| Coverage(scale * libm::log1pf(c.0.max(0.0))))
+        self.image.map(|v| scale * libm::log1pf(v.max(0.0)))
     }
 }
 
@@ -131,7 +130,7 @@ impl Step {
 /// A cut of a Laplacian pyramid ([Burt and Adelson 1983]): the first and the last band, brought to full size, are
 /// binarised and combined by AND. Noise has no coarse structure and soft shadows have no fine one, so that what is left
 /// are the object's edges; the hull is theirs. Departs from the plain method in that
-/// * bands are those of the square roots of the three channels, in units of their noise along the border ([`Tone`]);
+/// * bands are those of the square roots of the three channels, in units of their noise along the border ([`LumaMode`]);
 /// * the thresholds are Otsu's on a logarithmic scale ([`Threshold`]);
 /// * the last band is spread by one of its pixels, since it passes through 0 on an edge;
 /// * edges are thinned to their ridge and specks dropped;
@@ -176,7 +175,7 @@ pub fn segment(photo: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Segmen
     } else {
         found.inside.clone()
     };
-    let around = Outline::around(&filter::gaussian_blur(&shown(&solid), CRACK_BLUR_PX));
+    let around = Outline::around(&filter::gaussian_blur(&solid.to_coverage(), CRACK_BLUR_PX));
     watch.lap("holes");
     let roots = photo.map(|p| p.map(|v| v.max(0.0).sqrt()));
     let outline = snap::snapped(&around.map(to_photo), &roots, reduction);
@@ -284,7 +283,7 @@ impl SegmentOptions {
         };
         share("ridge", f64::from(self.ridge))?;
         share("join", self.join)?;
-        let weights = if let Tone::Grey(weights) = self.tone {
+        let weights = if let LumaMode::Grey(weights) = self.tone {
             weights
         } else {
             [1.0; 3]
@@ -362,8 +361,8 @@ fn reduced(
     ))
 }
 
-fn shown(set: &Image<bool>) -> Image<Coverage> {
-    set.map(|p| Coverage(f32::from(u8::from(p))))
+fn shown(set: &Mask) -> Image<f32> {
+    set.map(|p| f32::from(u8::from(p)))
 }
 
 /// Names of the borders in the order of [`Segmentation::touches`].

@@ -9,7 +9,7 @@ use super::register;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb};
 use lines::{Borrowed, Line, Pixel};
 use serde::{Deserialize, Serialize};
@@ -45,7 +45,7 @@ pub struct Triangulated {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1, of the channel that is told worst.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// Which channels of T the screens determine; another one is told from these.
     pub determined: [bool; 3],
     /// T of the plastic where it lies flat: what relates V to T.
@@ -122,7 +122,7 @@ pub fn triangulate(
         residual: residual(&aligned, &solved, inside),
         film: reflected.zip_map(&seen, Film::new),
         transmittance,
-        uncertainty: solved.zip_map(inside, |p, c| Coverage((p.sigma * c.0).min(1.0))),
+        uncertainty: solved.zip_map(inside, |p, c| (p.sigma * c.0).min(1.0)),
         determined,
         flat,
         shift_px,
@@ -221,7 +221,7 @@ fn aligned(
 fn turned_px(
     first: &Image<LinearRgb>,
     photo: &Image<LinearRgb>,
-    near: &Image<bool>,
+    near: &Mask,
     across: [f32; 3],
 ) -> Option<f64> {
     let [low, high] = ends(near).map(|end| register::shift(first, photo, &end, across));
@@ -239,7 +239,7 @@ const MOST_APART_PX: f64 = 1.0;
 const SURE: f64 = 4.0;
 
 /// The two halves of an object, cut across the longer side of its box.
-fn ends(mask: &Image<bool>) -> [Image<bool>; 2] {
+fn ends(mask: &Mask) -> [Mask; 2] {
     let (w, h) = mask.size();
     let set = || {
         (0..w * h)

@@ -1,6 +1,6 @@
 //! What recipes and shots can choose from: the assets of a library, and labelled backgrounds.
 
-use crate::asset::{Asset, Library};
+use crate::asset::{Asset, Library, Photo};
 use crate::scene::hull::prism_outline;
 use crate::scene::{Appearance, CameraSource, Object};
 
@@ -35,14 +35,14 @@ pub fn catalog(library: &Library) -> Vec<AssetVariant> {
     library.assets.iter().map(AssetVariant::from).collect()
 }
 
-impl From<&Asset> for AssetVariant {
-    fn from(asset: &Asset) -> Self {
+impl From<&Asset<Photo>> for AssetVariant {
+    fn from(asset: &Asset<Photo>) -> Self {
         let photos = || asset.photos.iter();
         Self {
             asset: asset.name.clone(),
-            photo_sizes: photos().map(|photo| photo.size).collect(),
+            photo_sizes: photos().map(Photo::size).collect(),
             photo_outlines: photos()
-                .map(|photo| prism_outline(&photo.outline_uv, photo.size))
+                .map(|photo| prism_outline(&photo.outline_uv, photo.size()))
                 .collect(),
             thickness: asset.thickness,
             mass: asset.mass,
@@ -60,7 +60,7 @@ impl Appearance {
             None => None,
         };
         Some(Self {
-            class: asset.class,
+            class: library.class_number(asset),
             texture: photo.texture.clone(),
             back,
             outline_uv: photo.outline_uv.clone(),

@@ -33,9 +33,9 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     }
     io::create_folder(&args.output)?;
     let recipe = write_recipe(args)?;
-    asset::build(&list, &args.output.join("assets"), common)?;
+    let library = asset::build(&list, &args.output.join("assets"), common)?;
     let folder = args.output.join("dataset");
-    let studio = Studio::open(Setup::read(&recipe, &[])?)?;
+    let studio = Studio::with_library(Setup::read(&recipe, &[])?, library)?;
     let report = dataset::make(
         &studio,
         &studio.plan(args.count, args.seed, &folder)?,

@@ -72,7 +72,9 @@ pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
             let mattes = mattes
                 .into_iter()
                 .flat_map(|[garbage, core]| [("garbage", garbage), ("core", core)]);
-            for (i, (name, picture)) in steps.chain(outcome).chain(mattes).enumerate() {
+            let mattes = outcome.into_iter().chain(mattes);
+            let mattes = mattes.map(|(name, matte)| (name, matte.map(|c| c.0)));
+            for (i, (name, picture)) in steps.chain(mattes).enumerate() {
                 let path = output.join(format!("{i}_{name}.png"));
                 io::write(&path, &picture)?;
                 common.say(path.display());

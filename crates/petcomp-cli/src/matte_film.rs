@@ -146,7 +146,7 @@ impl Files {
         plate: &ScreenPlate,
         film: &Image<FilmPixel>,
         transmittance: &Image<LinearRgb>,
-        uncertainty: &Image<Coverage>,
+        uncertainty: &Image<f32>,
     ) -> Result<()> {
         let planes = film_planes(film, transmittance);
         let planes: Vec<(&str, &[f32])> = planes

@@ -1,7 +1,7 @@
 //! `petcomp matte key`: Blender's Keying node on one picture.
 
 use anyhow::Result;
-use petcomp::io::{self, Bits, Override, ToFile, WriteOptions};
+use petcomp::io::{self, Bits, Override, Picture, ToFile, WriteOptions};
 use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
@@ -45,26 +45,51 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// Garbage and core matte, those that there are.
-    fn mattes(&self, plate: Option<&Image<LinearRgb>>) -> Result<[Option<Image<Coverage>>; 2]> {
-        if !self.auto_mattes {
-            let [garbage, core] =
-                [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
-            return Ok([garbage?, core?]);
+    /// The input and its mattes, those that there are.
+    fn read(&self, plate: Option<&Image<LinearRgb>>) -> Result<Input> {
+        if self.auto_mattes {
+            let picture = Picture::read(&self.input)?;
+            let [garbage, core] = self.find_mattes(&picture.pixels()?, plate)?;
+            return Ok(Input {
+                photo: picture.pixels()?,
+                garbage: Some(garbage),
+                core: Some(core),
+            });
         }
-        let photo: Image<LinearRgb> = io::read(&self.input)?;
-        let found =
-            segment(&photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
-        crate::matte::warn(&self.input, &found.diagnostics);
-        let [garbage, core] = match plate {
-            Some(plate) => found.mattes(&photo, plate),
-            None => found.mattes(
-                &photo,
-                &ScreenPlate::fit_outside(&photo, &found.mask, &PlateOptions::default())?.image,
-            ),
-        };
-        Ok([Some(garbage), Some(core)])
+        let [garbage, core] =
+            [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
+        Ok(Input {
+            photo: io::read(&self.input)?,
+            garbage: garbage?,
+            core: core?,
+        })
     }
+
+    /// Garbage and core matte around and inside the object that is found in the photo.
+    fn find_mattes(
+        &self,
+        photo: &Image<LinearRgb>,
+        plate: Option<&Image<LinearRgb>>,
+    ) -> Result<[Image<Coverage>; 2]> {
+        let found =
+            segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
+        crate::matte::warn(&self.input, &found.diagnostics);
+        Ok(match plate {
+            Some(plate) => found.mattes(photo, plate),
+            None => {
+                let options = PlateOptions::default();
+                let plate = ScreenPlate::fit_outside(photo, &found.mask, &options)?;
+                found.mattes(photo, &plate.image)
+            }
+        })
+    }
+}
+
+/// What is keyed, and where it is sure not to be foreground, or to be foreground.
+struct Input {
+    photo: Image<PremulRgba>,
+    garbage: Option<Image<Coverage>>,
+    core: Option<Image<Coverage>>,
 }
 
 pub(crate) fn run(args: &Args) -> Result<()> {
@@ -72,9 +97,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         profile: args.profile,
         ..io::from_overrides("key", &args.settings)?
     };
-    let photo: Image<PremulRgba> = io::read(&args.input)?;
     let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
-    let [garbage, core] = args.mattes(plate.as_ref())?;
+    let Input {
+        photo,
+        garbage,
+        core,
+    } = args.read(plate.as_ref())?;
     let screen = plate.as_ref().map_or(
         Screen::Color(args.screen.unwrap_or_default()),
         Screen::Plate,

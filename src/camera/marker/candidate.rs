@@ -3,8 +3,8 @@
 use crate::color::linear_to_srgb;
 use crate::filter::box_blur;
 use crate::geom::{Point2, Vector2};
-use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::image::{Image, Mask};
+use crate::pixel::LinearRgb;
 
 /// Half the window of the local mean, in longer picture sides: larger than a marker's border, smaller than its ground.
 const WINDOW: f64 = 1.0 / 40.0;
@@ -22,12 +22,12 @@ pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
     if photo.is_empty() {
         return Vec::new();
     }
-    let tone = photo.map(|p| Coverage(linear_to_srgb(p.luminance())));
+    let tone = photo.map(|p| linear_to_srgb(p.luminance()));
     let radius = (WINDOW * photo.width().max(photo.height()) as f64)
         .ceil()
         .max(5.0) as usize;
     let ground = box_blur(&tone, radius);
-    let dark = tone.zip_map(&ground, |t, g| t.0 < g.0 - DARKER);
+    let dark = tone.zip_map(&ground, |t, g| t < g - DARKER);
     regions(dark)
         .into_iter()
         .filter_map(|region| quad(&region))
@@ -35,7 +35,7 @@ pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
 }
 
 /// The outermost pixels of every connected dark region, row by row: its left and right ends.
-fn regions(mut dark: Image<bool>) -> Vec<Vec<Point2<f64>>> {
+fn regions(mut dark: Mask) -> Vec<Vec<Point2<f64>>> {
     let (w, h) = dark.size();
     let mut found = Vec::new();
     let mut stack = Vec::new();

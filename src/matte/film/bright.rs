@@ -1,7 +1,7 @@
 //! Pixels that are no bare plastic: paint, and glints that hide what is seen through.
 
 use super::solve::Factor;
-use super::tint::WHOLE;
+use super::tint::OPAQUE;
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb};
@@ -43,8 +43,8 @@ pub(super) fn make_opaque(
     if !painted.pixels().iter().any(|p| *p) {
         return 0.0;
     }
-    let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px(longer_side));
-    let painted = painted.zip_map(&interior, |p, i| Coverage(f32::from(u8::from(p && i))));
+    let interior = filter::erode(&inside.map(|c| c.0 >= OPAQUE), rim_px(longer_side));
+    let painted = painted.zip_map(&interior, |p, i| p && i).to_coverage();
     let painted = filter::gaussian_blur(&painted, BLUR_PX);
     let paint = painted.map(|p| ((p.0 - TURNS[0]) / (TURNS[1] - TURNS[0])).clamp(0.0, 1.0));
     for (factor, paint) in factors.pixels_mut().iter_mut().zip(paint.pixels()) {

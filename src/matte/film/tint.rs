@@ -108,7 +108,7 @@ fn darkest(
         let (pixel, screen): Pair = (photo.pixels()[i].into(), plate.image.pixels()[i].into());
         pixel[key] >= BARE * screen[key] && is_screen(pixel, screen)
     };
-    let is_whole = |i: usize| inside.pixels()[i].0 >= WHOLE && !is_bare(i);
+    let is_whole = |i: usize| inside.pixels()[i].0 >= OPAQUE && !is_bare(i);
     let whole: Vec<usize> = (0..photo.pixels().len()).filter(|&i| is_whole(i)).collect();
     let step = (whole.len() / ASKED[0]).max(1);
     let others = |i: usize| {
@@ -128,7 +128,7 @@ fn darkest(
 }
 
 /// Coverage from which on a pixel is wholly inside: one 8-bit code below 1.
-pub(in crate::matte) const WHOLE: f32 = 0.99;
+pub(in crate::matte) const OPAQUE: f32 = 0.99;
 
 fn judged(flat: [f32; 3], pixels: &[Pair], handicap: f32) -> Tint {
     let scattered = body(flat);

@@ -1,6 +1,6 @@
 //! Means over small cells of the picture: little noise, few numbers, and medians where outliers must not count.
 
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::LinearRgb;
 
 /// Cells along the longer side of a picture: enough for any smooth screen, few enough to be fitted in no time.
@@ -20,7 +20,7 @@ pub(super) struct Cell {
 }
 
 /// The cells of a picture where it shows the screen, row by row.
-pub(super) fn means(photo: &Image<LinearRgb>, background: &Image<bool>) -> Vec<Cell> {
+pub(super) fn means(photo: &Image<LinearRgb>, background: &Mask) -> Vec<Cell> {
     assert_eq!(
         photo.size(),
         background.size(),
@@ -36,7 +36,7 @@ pub(super) fn means(photo: &Image<LinearRgb>, background: &Image<bool>) -> Vec<C
 
 fn mean(
     photo: &Image<LinearRgb>,
-    background: &Image<bool>,
+    background: &Mask,
     index: [usize; 2],
     side: usize,
 ) -> Option<Cell> {
@@ -117,7 +117,7 @@ pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 pub(super) fn deviation(
     photo: &Image<LinearRgb>,
     plate: &Image<LinearRgb>,
-    background: &Image<bool>,
+    background: &Mask,
 ) -> LinearRgb {
     let step = (photo.pixels().len() / SAMPLES).max(1);
     let free = || {

@@ -2,14 +2,14 @@
 
 use crate::filter;
 use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What the pyramid is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Tone {
+pub enum LumaMode {
     /// Each channel by itself: sees a red cap on a blue screen of the same grey.
     #[default]
     Channels,
@@ -20,25 +20,25 @@ pub enum Tone {
 /// The bands of a photo, in units of noise.
 pub(super) struct Bands {
     /// What is finer than about 2 pixels, of the photo's size.
-    pub(super) first: Image<Coverage>,
+    pub(super) first: Image<f32>,
     /// The other bands, each of its own size, from the second one.
-    coarser: Vec<Image<Coverage>>,
+    coarser: Vec<Image<f32>>,
     /// Sizes of the pyramid's levels, the photo's own first.
     sizes: Vec<(usize, usize)>,
 }
 
 impl Bands {
     /// Splits a photo into so many bands.
-    pub(super) fn of(photo: &Image<LinearRgb>, tone: Tone, count: usize) -> Self {
+    pub(super) fn of(photo: &Image<LinearRgb>, tone: LumaMode, count: usize) -> Self {
         let pictures = match tone {
-            Tone::Channels => {
+            LumaMode::Channels => {
                 vec![
                     root(photo, [1.0, 0.0, 0.0]),
                     root(photo, [0.0, 1.0, 0.0]),
                     root(photo, [0.0, 0.0, 1.0]),
                 ]
             }
-            Tone::Grey(weights) => vec![root(photo, weights)],
+            LumaMode::Grey(weights) => vec![root(photo, weights)],
         };
         let mut channels: Vec<_> = pictures
             .into_iter()
@@ -61,7 +61,7 @@ impl Bands {
     ///
     /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the very edge that it
     /// tells of.
-    pub(super) fn last(&self, level: usize) -> Image<Coverage> {
+    pub(super) fn last(&self, level: usize) -> Image<f32> {
         let band = self.coarser[level - 2].clone();
         let finer = self.sizes[..level - 1].iter().rev();
         finer.fold(band, |picture, &(w, h)| filter::expand(&picture, w, h))
@@ -73,22 +73,22 @@ impl Bands {
 /// The square root makes the shot noise of a sensor the same everywhere (the transform of Anscombe without its offset)
 /// and is near to what a display-encoded picture holds. Equal weights keep a blue screen from going black, which
 /// luminance would do.
-pub(super) fn root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<Coverage> {
+pub(super) fn root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
     let sum: f32 = weights.iter().sum();
     let [r, g, b] = weights.map(|w| w / sum);
     photo.map(|p| {
         let root = p.map(|v| v.max(0.0).sqrt());
-        Coverage(r * root.r + g * root.g + b * root.b)
+        r * root.r + g * root.g + b * root.b
     })
 }
 
 /// Magnitudes of the bands of one picture, each of its own size.
-fn magnitudes(picture: Image<Coverage>, count: usize) -> Vec<Image<Coverage>> {
+fn magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
     let mut smooth = picture;
     let band = |_| {
         let coarse = filter::reduce(&smooth);
         let expanded = filter::expand(&coarse, smooth.width(), smooth.height());
-        let band = smooth.zip_map(&expanded, |a, b| Coverage((a.0 - b.0).abs()));
+        let band = smooth.zip_map(&expanded, |a, b| (a - b).abs());
         smooth = coarse;
         band
     };
@@ -99,21 +99,21 @@ fn magnitudes(picture: Image<Coverage>, count: usize) -> Vec<Image<Coverage>> {
 ///
 /// No channel counts as less noisy than half their median: square roots have the same shot noise in all of them, and one
 /// that seems to have none is clipped.
-fn joined(bands: Vec<Image<Coverage>>) -> Image<Coverage> {
+fn joined(bands: Vec<Image<f32>>) -> Image<f32> {
     let noises: Vec<f32> = bands.iter().map(noise).collect();
     let mut sorted = noises.clone();
     sorted.sort_by(f32::total_cmp);
     let median = sorted.get(sorted.len() / 2).copied().unwrap_or(ROUNDING);
     let units = bands.iter().zip(&noises).map(|(band, noise)| {
         let unit = 1.0 / noise.max(0.5 * median);
-        band.map(|c| Coverage((c.0 * unit) * (c.0 * unit)))
+        band.map(|c| (c * unit) * (c * unit))
     });
-    let sum = units.reduce(|a, b| a.zip_map(&b, |a, b| Coverage(a.0 + b.0)));
-    sum.unwrap_or_default().map(|c| Coverage(c.0.sqrt()))
+    let sum = units.reduce(|a, b| a.zip_map(&b, |a, b| a + b));
+    sum.unwrap_or_default().map(f32::sqrt)
 }
 
 /// The largest value at most `reach` columns and rows away, for every pixel.
-pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Coverage> {
+pub(super) fn largest_around(band: &Image<f32>, reach: usize) -> Image<f32> {
     let (w, h) = band.size();
     let mut along = band.clone();
     along.par_rows_mut().enumerate().for_each(|(y, row)| {
@@ -130,9 +130,9 @@ pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Cove
 }
 
 /// Raises values to others, where those are larger.
-fn raise(row: &mut [Coverage], other: &[Coverage]) {
-    for (value, other) in row.iter_mut().zip(other) {
-        value.0 = if other.0 > value.0 { other.0 } else { value.0 };
+fn raise(row: &mut [f32], other: &[f32]) {
+    for (value, &other) in row.iter_mut().zip(other) {
+        *value = if other > *value { other } else { *value };
     }
 }
 
@@ -150,20 +150,15 @@ const ROUNDING: f32 = 1.0 / 255.0 / 3.464;
 /// # Method
 /// As the median absolute deviation, but from the lower quartile and along the border of the picture, where an object
 /// is not: `quartile / 0.3186` for normal noise.
-fn noise(magnitudes: &Image<Coverage>) -> f32 {
+fn noise(magnitudes: &Image<f32>) -> f32 {
     let (w, h) = magnitudes.size();
     let frame = ((w.max(h) as f64 * FRAME) as usize).max(1);
     let (left, right) = (frame.min(w), w.saturating_sub(frame).max(frame.min(w)));
-    let on_frame = |(y, row): (usize, &'_ [Coverage])| match y < frame || y + frame >= h {
+    let on_frame = |(y, row): (usize, &'_ [f32])| match y < frame || y + frame >= h {
         true => row.to_vec(),
         false => [&row[..left], &row[right..]].concat(),
     };
-    let mut values: Vec<f32> = magnitudes
-        .rows()
-        .enumerate()
-        .flat_map(on_frame)
-        .map(|c| c.0)
-        .collect();
+    let mut values: Vec<f32> = magnitudes.rows().enumerate().flat_map(on_frame).collect();
     let rank = (values.len() as f64 * QUIET) as usize;
     if rank >= values.len() {
         return ROUNDING;
@@ -182,13 +177,13 @@ mod tests {
         (0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0
     }
 
-    fn noisy(size: usize, sigma: f32) -> Image<Coverage> {
+    fn noisy(size: usize, sigma: f32) -> Image<f32> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         Image::from_vec(
             size,
             size,
             (0..size * size)
-                .map(|_| Coverage((sigma * normal(&mut rng)).abs()))
+                .map(|_| (sigma * normal(&mut rng)).abs())
                 .collect(),
         )
     }
@@ -202,30 +197,28 @@ mod tests {
     #[test]
     fn noise_does_not_see_an_object_even_at_two_borders() {
         let quiet = noisy(200, 0.02);
-        let busy = Image::from_fn(200, 200, |x, y| {
-            if x < 90 || y < 50 {
-                Coverage(0.5)
-            } else {
-                quiet[(x, y)]
-            }
-        });
+        let busy = Image::from_fn(
+            200,
+            200,
+            |x, y| {
+                if x < 90 || y < 50 { 0.5 } else { quiet[(x, y)] }
+            },
+        );
         // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the noise, 3.7 times its own.
         assert!(noise(&busy) < 4.0 * noise(&quiet));
     }
 
     #[test]
     fn the_largest_around_a_pixel_is_found_up_to_the_border() {
-        let band = Image::from_fn(7, 5, |x, y| {
-            Coverage(((x * 7919 + y * 104_729) % 31) as f32)
-        });
+        let band = Image::from_fn(7, 5, |x, y| ((x * 7919 + y * 104_729) % 31) as f32);
         for reach in [1, 2, 9] {
             let found = largest_around(&band, reach);
             for (x, y) in (0..35_usize).map(|i| (i % 7, i / 7)) {
                 let near = (0..35_usize)
                     .filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
                 assert_eq!(
-                    found[(x, y)].0,
-                    near.map(|i| band.pixels()[i].0).fold(0.0, f32::max)
+                    found[(x, y)],
+                    near.map(|i| band.pixels()[i]).fold(0.0, f32::max)
                 );
             }
         }
@@ -235,7 +228,7 @@ mod tests {
     fn a_constant_has_no_bands() {
         let bands = Bands::of(
             &Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)),
-            Tone::Channels,
+            LumaMode::Channels,
             4,
         );
         assert!(
@@ -244,7 +237,7 @@ mod tests {
                 .pixels()
                 .iter()
                 .chain(bands.last(4).pixels())
-                .all(|c| c.0 < 0.01)
+                .all(|v| *v < 0.01)
         );
     }
 
@@ -257,7 +250,7 @@ mod tests {
                 LinearRgb::new(0.04, 0.25, 0.0)
             }
         });
-        let seen = |tone| Bands::of(&photo, tone, 4).first[(32, 32)].0;
-        assert!(seen(Tone::Grey([1.0; 3])) < 0.01 && seen(Tone::Channels) > 50.0);
+        let seen = |tone| Bands::of(&photo, tone, 4).first[(32, 32)];
+        assert!(seen(LumaMode::Grey([1.0; 3])) < 0.01 && seen(LumaMode::Channels) > 50.0);
     }
 }

@@ -4,8 +4,8 @@ use super::pass::{Pass, Search};
 use super::{Confidence, SegmentOptions, hull};
 use crate::error::Result;
 use crate::filter;
-use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::image::{Image, Mask};
+use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
 /// The search that is believed.
@@ -13,9 +13,9 @@ pub(super) struct Chosen {
     /// What it found.
     pub(super) pass: Pass,
     /// Its first band.
-    pub(super) first: Image<Coverage>,
+    pub(super) first: Image<f32>,
     /// Where that is above its cut.
-    pub(super) first_binary: Image<bool>,
+    pub(super) first_binary: Mask,
     /// The band that served as the last one.
     pub(super) levels: usize,
     /// How far it can be believed.
@@ -54,7 +54,7 @@ pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<
             .swap_remove(first)
             .chosen(scales, Confidence::default());
     }
-    let outlines: Vec<Option<Image<bool>>> = searched
+    let outlines: Vec<Option<Mask>> = searched
         .iter()
         .map(|s| s.compared(picture.size()))
         .collect();
@@ -185,11 +185,11 @@ impl Searched {
     }
 
     /// The inside in a picture small enough to be compared quickly.
-    fn compared(&self, (w, h): (usize, usize)) -> Option<Image<bool>> {
+    fn compared(&self, (w, h): (usize, usize)) -> Option<Mask> {
         let pass = self.pass.as_ref().ok()?;
         let longer = w.max(h);
         let side = |len: usize| (len * COMPARED.min(longer)).div_ceil(longer);
-        let inside = pass.inside.map(|p| Coverage(f32::from(u8::from(p))));
+        let inside = pass.inside.to_coverage();
         Some(filter::resize(&inside, side(w), side(h)).map(|c| c.0 > 0.5))
     }
 
@@ -216,7 +216,7 @@ impl Searched {
 const EDGE_REACH_PX: f64 = 2.0;
 
 /// Mean overlap of one outline with the others.
-fn agreement(outlines: &[Option<Image<bool>>], i: usize) -> f64 {
+fn agreement(outlines: &[Option<Mask>], i: usize) -> f64 {
     let others = (0..outlines.len()).filter(|&j| j != i);
     let overlap = |j: usize| {
         outlines[i]
@@ -228,7 +228,7 @@ fn agreement(outlines: &[Option<Image<bool>>], i: usize) -> f64 {
 }
 
 /// Intersection over union.
-fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
+fn overlap(a: &Mask, b: &Mask) -> f64 {
     let count = |holds: fn(bool, bool) -> bool| {
         a.pixels()
             .iter()
@@ -243,7 +243,7 @@ fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
 mod tests {
     use super::*;
 
-    fn square(side: usize) -> Option<Image<bool>> {
+    fn square(side: usize) -> Option<Mask> {
         Some(Image::from_fn(20, 20, |x, y| x < side && y < side))
     }
 

@@ -1,6 +1,6 @@
 //! Connected groups of pixels.
 
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use std::ops::Range;
 
 /// The connected groups (8 neighbours) of a set, in the order of their first pixel, row by row.
@@ -22,7 +22,7 @@ struct Run {
 
 impl Groups {
     /// Finds the groups: runs that touch the same run, corners included, are of one.
-    pub(in super::super) fn of(set: &Image<bool>) -> Self {
+    pub(in super::super) fn of(set: &Mask) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         let (mut above, mut here) = (0, 0);
         for (row, pixels) in set.rows().enumerate() {
@@ -56,7 +56,7 @@ impl Groups {
     }
 
     /// How many pixels of `members` are in each group.
-    pub(in super::super) fn sizes(&self, members: &Image<bool>) -> Vec<usize> {
+    pub(in super::super) fn sizes(&self, members: &Mask) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
             sizes[run.group] += members.row(run.row)[run.columns.clone()]
@@ -68,7 +68,7 @@ impl Groups {
     }
 
     /// The pixels of the groups for which a claim, by index from 0, holds.
-    pub(in super::super) fn only(&self, holds: impl Fn(usize) -> bool) -> Image<bool> {
+    pub(in super::super) fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
         let mut only = Image::new(self.size.0, self.size.1);
         for run in self.runs.iter().filter(|run| holds(run.group)) {
             only.row_mut(run.row)[run.columns.clone()].fill(true);
@@ -131,7 +131,7 @@ fn number(runs: &mut [Run]) -> usize {
 }
 
 /// The set without its groups of fewer than `least` pixels.
-pub(super) fn without_specks(set: &Image<bool>, least: usize) -> Image<bool> {
+pub(super) fn without_specks(set: &Mask, least: usize) -> Mask {
     let groups = Groups::of(set);
     let sizes = groups.sizes(set);
     groups.only(|group| sizes[group] >= least)
@@ -139,7 +139,7 @@ pub(super) fn without_specks(set: &Image<bool>, least: usize) -> Image<bool> {
 
 /// The set with its holes filled: all that cannot be reached from the border of the picture. Outlines must be two
 /// pixels thick, since the way around goes over corners too.
-pub(super) fn filled(set: &Image<bool>) -> Image<bool> {
+pub(super) fn filled(set: &Mask) -> Mask {
     let groups = Groups::of(&set.map(|inside| !inside));
     let reaching = groups.reaching_border();
     groups.only(|group| reaching[group]).map(|open| !open)
@@ -149,23 +149,19 @@ pub(super) fn filled(set: &Image<bool>) -> Image<bool> {
 mod tests {
     use super::*;
 
-    fn count(set: &Image<bool>) -> usize {
-        set.pixels().iter().filter(|p| **p).count()
-    }
-
     #[test]
     fn groups_are_joined_over_corners_and_counted() {
         let set = Image::from_fn(6, 3, |x, y| {
             matches!((x, y), (0, 0) | (1, 1) | (4, 1) | (5, 1) | (4, 2))
         });
         assert_eq!(Groups::of(&set).sizes(&set), [2, 3]);
-        assert_eq!(count(&without_specks(&set, 3)), 3);
+        assert_eq!(without_specks(&set, 3).count(), 3);
     }
 
     #[test]
     fn a_ring_is_filled_and_a_horseshoe_is_not() {
         let ring = Image::from_fn(9, 9, |x, y| x.abs_diff(4).max(y.abs_diff(4)) == 2);
-        assert_eq!(count(&filled(&ring)), 25);
+        assert_eq!(filled(&ring).count(), 25);
         let horseshoe = Image::from_fn(9, 9, |x, y| ring[(x, y)] && y != 6);
         assert_eq!(filled(&horseshoe), horseshoe);
     }

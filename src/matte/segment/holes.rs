@@ -2,7 +2,7 @@
 
 use super::cluster::Groups;
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
 use crate::matte::screen::is_keyable;
 use crate::pixel::LinearRgb;
@@ -22,11 +22,7 @@ const RIM_PX: [f64; 2] = [2.0, 5.0];
 /// What is enclosed, without the holes.
 ///
 /// A hole looks like the screen all over and has a rim that does not: a rim of clear plastic encloses clear plastic.
-pub(super) fn without_holes(
-    picture: &Image<LinearRgb>,
-    inside: &Image<bool>,
-    background: &Image<bool>,
-) -> Image<bool> {
+pub(super) fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -> Mask {
     let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else {
         return inside.clone();
     };
@@ -37,7 +33,7 @@ pub(super) fn without_holes(
         inside && (0..3).all(|c| off[c] <= (LIKE_SHARE * k[c]).max(LIKE_NOISE * noise[c]))
     });
     let groups = Groups::of(&filter::erode(&like, 1.0));
-    let (sizes, area) = (groups.sizes(&like), count(inside) as f64);
+    let (sizes, area) = (groups.sizes(&like), inside.count() as f64);
     let large: Vec<usize> = (0..sizes.len())
         .filter(|&g| sizes[g] as f64 >= LEAST_AREA * area)
         .collect();
@@ -61,7 +57,7 @@ pub(super) fn without_holes(
             .pixels()
             .iter()
             .all(|p| *p);
-        if enclosed && count(&opaque) as f64 >= OPAQUE_RIM * count(&rim) as f64 {
+        if enclosed && opaque.count() as f64 >= OPAQUE_RIM * rim.count() as f64 {
             kept = kept.zip_map(&hole, |kept, hole| kept && !hole);
         }
     }
@@ -69,7 +65,7 @@ pub(super) fn without_holes(
 }
 
 /// Whether the screen has enough colour to be told from clear plastic.
-pub(super) fn are_told(picture: &Image<LinearRgb>, background: &Image<bool>) -> bool {
+pub(super) fn are_told(picture: &Image<LinearRgb>, background: &Mask) -> bool {
     let seen = picture
         .pixels()
         .iter()
@@ -82,13 +78,9 @@ fn differences(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     [(a.r - b.r).abs(), (a.g - b.g).abs(), (a.b - b.b).abs()]
 }
 
-fn count(set: &Image<bool>) -> usize {
-    set.pixels().iter().filter(|p| **p).count()
-}
-
 /// The pixels of the picture that was searched that surely show the screen.
-pub(super) fn around(inside: &Image<bool>, margin_px: f64) -> Image<bool> {
-    filter::dilate(inside, margin_px).map(|near| !near)
+pub(super) fn around(inside: &Mask, margin_px: f64) -> Mask {
+    filter::dilate(inside, margin_px).complement()
 }
 
 #[cfg(test)]
@@ -97,13 +89,13 @@ mod tests {
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 
-    fn disc(radius: f64) -> Image<bool> {
+    fn disc(radius: f64) -> Mask {
         Image::from_fn(120, 100, |x, y| {
             (x as f64 - 60.0).hypot(y as f64 - 50.0) < radius
         })
     }
 
-    fn kept(rim: LinearRgb) -> Image<bool> {
+    fn kept(rim: LinearRgb) -> Mask {
         let (outer, inner) = (disc(40.0), disc(20.0));
         let photo = outer.zip_map(
             &inner,
@@ -117,7 +109,7 @@ mod tests {
         let kept = kept(LinearRgb::new(0.5, 0.05, 0.05));
         assert!(!kept[(60, 50)] && kept[(60, 80)] && kept[(60, 79)]);
         assert!(
-            (count(&disc(20.0)) as f64 / (count(&disc(40.0)) - count(&kept)) as f64 - 1.0).abs()
+            (disc(20.0).count() as f64 / (disc(40.0).count() - kept.count()) as f64 - 1.0).abs()
                 < 0.15
         );
     }

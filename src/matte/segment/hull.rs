@@ -1,14 +1,14 @@
 //! The convex hull of a set of pixels.
 
 use crate::geom::Point2;
-use crate::image::Image;
+use crate::image::Mask;
 use geo::{Area, ConvexHull, MultiPoint, Point};
 
 /// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where there is no area.
 ///
 /// It goes through the pixels' centres: an edge marks the pixel on either side of it, so that the outer one's centre is
 /// nearer to the edge than its outer corner. Where a pixel lies on the border of the picture, so does the hull.
-pub(super) fn convex_hull(edges: &Image<bool>) -> Vec<Point2<f64>> {
+pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
     let ends = edges.rows().enumerate().filter_map(|(y, row)| {
         let first = row.iter().position(|p| *p)?;
         let last = row.iter().rposition(|p| *p)?;
@@ -74,6 +74,7 @@ pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Image;
 
     #[test]
     fn the_hull_goes_through_centres_and_clockwise() {

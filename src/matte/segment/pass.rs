@@ -8,9 +8,9 @@ use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::Outline;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::pixel::LinearRgb;
 
 /// A picture ready to be searched at any depth.
 pub(super) struct Search {
@@ -18,25 +18,25 @@ pub(super) struct Search {
     /// Cut of the first band, in units of noise.
     cut: f32,
     /// Where the first band is above its cut.
-    first_binary: Image<bool>,
+    first_binary: Mask,
     /// Where the first band is no mere smear of a stronger edge.
-    ridges: Image<bool>,
+    ridges: Mask,
 }
 
 /// What a search at one depth found, in pixels of the picture that was searched.
 pub(super) struct Pass {
     /// The band that served as the last one.
-    pub(super) last: Image<Coverage>,
+    pub(super) last: Image<f32>,
     /// Where that is above its cut.
-    pub(super) last_binary: Image<bool>,
+    pub(super) last_binary: Mask,
     /// The edges, specks left out.
-    pub(super) edges: Image<bool>,
+    pub(super) edges: Mask,
     /// Those of the object.
-    pub(super) object: Image<bool>,
+    pub(super) object: Mask,
     /// Convex hull of the object.
     pub(super) hull: Vec<Point2<f64>>,
     /// What its edges enclose.
-    pub(super) inside: Image<bool>,
+    pub(super) inside: Mask,
     /// Left, top, right and bottom border are reached.
     pub(super) touches: [bool; 4],
     /// What was left out.
@@ -54,9 +54,9 @@ impl Search {
         let bands = Bands::of(picture, opts.tone, deepest);
         let first = &bands.first;
         let cut = opts.first_threshold.of(first).max(opts.least_contrast);
-        let first_binary = first.map(|c| c.0 > cut);
+        let first_binary = first.map(|v| v > cut);
         let strongest = band::largest_around(first, SMEAR);
-        let ridges = first.zip_map(&strongest, |c, most| c.0 >= opts.ridge * most.0);
+        let ridges = first.zip_map(&strongest, |v, most| v >= opts.ridge * most);
         Self {
             bands,
             cut,
@@ -66,7 +66,7 @@ impl Search {
     }
 
     /// The first band and where it is above its cut.
-    pub(super) fn into_first(self) -> (Image<Coverage>, Image<bool>) {
+    pub(super) fn into_first(self) -> (Image<f32>, Mask) {
         (self.bands.first, self.first_binary)
     }
 
@@ -78,18 +78,13 @@ impl Search {
     /// The same with so many times the cut of the first band.
     pub(super) fn at_cut(&self, levels: usize, times: f32, opts: &SegmentOptions) -> Result<Pass> {
         let cut = times * self.cut;
-        self.pass(levels, &self.bands.first.map(|c| c.0 > cut), opts)
+        self.pass(levels, &self.bands.first.map(|v| v > cut), opts)
     }
 
-    fn pass(
-        &self,
-        levels: usize,
-        first_binary: &Image<bool>,
-        opts: &SegmentOptions,
-    ) -> Result<Pass> {
+    fn pass(&self, levels: usize, first_binary: &Mask, opts: &SegmentOptions) -> Result<Pass> {
         let last = self.bands.last(levels);
         let cut = opts.last_threshold.of(&last);
-        let last_binary = last.map(|c| c.0 > cut);
+        let last_binary = last.map(|v| v > cut);
         let both = first_binary.zip_map(&last_binary, |a, b| a && b);
         let edges = cluster::without_specks(&both.zip_map(&self.ridges, |a, b| a && b), opts.speck);
         let join_px = (opts.join * longer_side(&edges) as f64).max(LEAST_JOIN_PX);
@@ -124,7 +119,7 @@ const SPECKS: usize = 2;
 ///
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
 /// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
-fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<Diagnostic>)> {
+fn main_cluster(edges: &Mask, join_px: f64) -> Result<(Mask, Vec<Diagnostic>)> {
     let groups = Groups::of(&filter::dilate(edges, join_px / 2.0));
     let sizes = groups.sizes(edges);
     let Some(main) = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i))) else {
@@ -184,7 +179,7 @@ fn specks_on_screen(count: usize) -> Diagnostic {
 const PARTED: f64 = 0.5;
 
 /// The warning about an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
-fn parted(object: &Image<bool>, join_px: f64) -> Option<Diagnostic> {
+fn parted(object: &Mask, join_px: f64) -> Option<Diagnostic> {
     let groups = Groups::of(&filter::dilate(object, join_px / 2.0));
     let sizes = groups.sizes(object);
     let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
@@ -209,7 +204,7 @@ fn parted(object: &Image<bool>, join_px: f64) -> Option<Diagnostic> {
 }
 
 /// The pixels of which more than a share lies in the convex hull of a set.
-fn under_hull(set: &Image<bool>, share: f32) -> Image<bool> {
+fn under_hull(set: &Mask, share: f32) -> Mask {
     let hull = Outline {
         rings: vec![hull::convex_hull(set)],
     };
@@ -218,7 +213,7 @@ fn under_hull(set: &Image<bool>, share: f32) -> Image<bool> {
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.
-fn place(set: &Image<bool>) -> String {
+fn place(set: &Mask) -> String {
     let hull = hull::convex_hull(set);
     let n = hull.len().max(1) as f64;
     let percent = |sum: f64, len: usize| (100.0 * sum / n / len as f64).round();
@@ -232,9 +227,9 @@ const LEAK: f64 = 1.1;
 
 /// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
 /// area jump, for then the outline had a gap through which the inside leaked out.
-fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
+fn enclosed(edges: &Mask, join_px: f64) -> Mask {
     let hull = under_hull(edges, 0.5);
-    let area = |set: &Image<bool>| set.pixels().iter().filter(|p| **p).count() as f64;
+    let area = |set: &Mask| set.count() as f64;
     let mut narrow = closed(edges, &hull, join_px / 2.0);
     for times in [1.0, 2.0, 4.0] {
         let wide = closed(edges, &hull, times * join_px);
@@ -246,7 +241,7 @@ fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
     hull
 }
 
-fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool> {
+fn closed(edges: &Mask, hull: &Mask, radius_px: f64) -> Mask {
     let whole = filter::erode(
         &cluster::filled(&filter::dilate(edges, radius_px)),
         radius_px,
@@ -258,7 +253,7 @@ fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool
 /// seen a few pixels late.
 const NEAR_BORDER: usize = 4;
 
-fn touches(set: &Image<bool>) -> [bool; 4] {
+fn touches(set: &Mask) -> [bool; 4] {
     let (w, h) = set.size();
     let columns =
         |xs: std::ops::Range<usize>| set.rows().any(|row| row[xs.clone()].contains(&true));

@@ -1,7 +1,6 @@
 //! Where to cut a picture of magnitudes in two.
 
 use crate::image::Image;
-use crate::pixel::Coverage;
 use serde::{Deserialize, Serialize};
 
 /// How a band is binarised.
@@ -17,7 +16,7 @@ pub enum Threshold {
 
 impl Threshold {
     /// The value to cut a band at, in units of noise.
-    pub(super) fn of(self, band: &Image<Coverage>) -> f32 {
+    pub(super) fn of(self, band: &Image<f32>) -> f32 {
         match self {
             Self::Otsu => otsu(band),
             Self::Noise(times) => times,
@@ -36,15 +35,15 @@ const BINS: usize = 256;
 /// instead of between edges and background.
 ///
 /// [Otsu 1979]: https://doi.org/10.1109/TSMC.1979.4310076
-fn otsu(band: &Image<Coverage>) -> f32 {
-    let largest = band.pixels().iter().map(|c| c.0).fold(0.0, f32::max);
+fn otsu(band: &Image<f32>) -> f32 {
+    let largest = band.pixels().iter().copied().fold(0.0, f32::max);
     let span = libm::logf(largest.max(1.0));
     if span <= 0.0 {
         return largest;
     }
     let mut histogram = [0u64; BINS];
     for c in band.pixels() {
-        let bin = (libm::logf(c.0.max(1.0)) / span * BINS as f32) as usize;
+        let bin = (libm::logf(c.max(1.0)) / span * BINS as f32) as usize;
         histogram[bin.min(BINS - 1)] += 1;
     }
     libm::expf((best_split(&histogram) + 1) as f32 / BINS as f32 * span)
@@ -81,7 +80,7 @@ mod tests {
 
     #[test]
     fn otsu_cuts_between_two_groups() {
-        let img = Image::from_fn(40, 10, |x, _| Coverage(if x < 30 { 2.0 } else { 80.0 }));
+        let img = Image::from_fn(40, 10, |x, _| if x < 30 { 2.0 } else { 80.0 });
         let cut = Threshold::Otsu.of(&img);
         assert!(cut > 2.0 && cut < 80.0, "{cut}");
     }
@@ -89,7 +88,7 @@ mod tests {
     #[test]
     fn highlights_do_not_hide_faint_edges() {
         let img = Image::from_fn(100, 10, |x, _| {
-            Coverage([2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)])
+            [2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)]
         });
         let cut = Threshold::Otsu.of(&img);
         assert!(cut > 2.0 && cut < 20.0, "{cut}");
@@ -98,7 +97,7 @@ mod tests {
     #[test]
     fn nothing_is_above_the_cut_of_noise() {
         for level in [0.0, 0.5, 1.0] {
-            assert!(Threshold::Otsu.of(&Image::filled(4, 4, Coverage(level))) >= level);
+            assert!(Threshold::Otsu.of(&Image::filled(4, 4, level)) >= level);
         }
         assert_eq!(Threshold::Otsu.of(&Image::new(0, 4)), 0.0);
     }

@@ -56,7 +56,7 @@ fn clearer(pixels: &Image<Pixel>, inside: &Image<Coverage>, determined: [bool; 3
             .pixels()
             .iter()
             .zip(inside.pixels())
-            .filter(|(_, c)| c.0 >= tint::WHOLE)
+            .filter(|(_, c)| c.0 >= tint::OPAQUE)
             .map(|(p, _)| p)
     };
     let Some(middle) = median(object().map(mean)) else {

@@ -95,22 +95,19 @@ impl PictureFolder {
     }
 
     fn read_card(&self, quad: &CyclesQuad) -> Result<Card> {
+        let placed = Quad {
+            world_from_card: world_from_card(&quad.pose),
+            size: quad.size,
+        };
         let back = quad.back.as_ref();
         Ok(Card {
-            id: ObjectId(quad.id),
-            class: 0,
-            quad: Quad {
-                world_from_card: world_from_card(&quad.pose),
-                size: quad.size,
-            },
-            texture: self.read_texture(&quad.front)?,
             back: back.map(|back| self.read_texture(back)).transpose()?,
-            outline_uv: UNIT_SQUARE.map(Point2::from).into(),
             grade: Grade {
                 hue_deg: quad.hue_shift,
                 saturation: quad.saturation,
                 value: quad.value,
             },
+            ..Card::new(ObjectId(quad.id), placed, self.read_texture(&quad.front)?)
         })
     }
 
@@ -143,9 +140,6 @@ impl PictureFolder {
         }))
     }
 }
-
-/// The outline of a whole card, in texture coordinates.
-const UNIT_SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
 
 fn film_pixel(color: PremulRgba, opacity: PremulRgba) -> Film {
     Film {

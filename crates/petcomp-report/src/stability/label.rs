@@ -6,7 +6,7 @@ use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::BBox;
 use petcomp::geom::Point2;
-use petcomp::label::{AmodalBox, LabelOptions, Labels, Mask, ObjectLabel, label};
+use petcomp::label::{AmodalBox, LabelOptions, Labels, ObjectLabel, RleMask, label};
 use petcomp::render::{RenderOptions, cast};
 use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample};
@@ -363,7 +363,7 @@ fn mask_of_16k() -> Case {
         "every pixel of every other column",
         "2^27 pixels, the whole box but the last column, in 16385 runs",
         || {
-            let mask = Mask::from_fn([SIDE; 2], |x, _| x.is_multiple_of(2));
+            let mask = RleMask::from_fn([SIDE; 2], |x, _| x.is_multiple_of(2));
             let bounds = mask.bounds();
             let passed = mask.area() == 1 << 27
                 && [bounds.x0, bounds.y0, bounds.x1, bounds.y1]

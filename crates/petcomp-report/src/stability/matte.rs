@@ -462,7 +462,7 @@ fn underexposed() -> Case {
                 .uncertainty
                 .pixels()
                 .iter()
-                .map(|c| f64::from(c.0))
+                .map(|u| f64::from(*u))
                 .sum::<f64>()
                 / inside_area();
             Ok(Outcome::new(
@@ -586,7 +586,7 @@ fn clipped_screen() -> Case {
                 .uncertainty
                 .pixels()
                 .iter()
-                .map(|c| f64::from(c.0))
+                .map(|u| f64::from(*u))
                 .sum::<f64>()
                 / inside_area();
             let doubts = found

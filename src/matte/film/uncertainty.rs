@@ -2,7 +2,7 @@
 
 use super::bright::{rim_px, share};
 use super::solve::Factor;
-use super::tint::WHOLE;
+use super::tint::OPAQUE;
 use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::filter;
 use crate::image::Image;
@@ -10,7 +10,7 @@ use crate::pixel::Coverage;
 
 /// What makes the colours of a cut-out wrong, 0 where nothing does.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ColorDoubts {
+pub struct ColorUncertainty {
     /// Share of the object that looks like bare screen in its middle, where plastic is: it was keyed away, and may be paint
     /// of the screen's hue.
     pub keyed_away: f32,
@@ -24,12 +24,12 @@ pub struct ColorDoubts {
     pub tint: f32,
 }
 
-impl ColorDoubts {
+impl ColorUncertainty {
     /// From which on a person should look at a cut-out. Of 48 photos with truth the 7 that have more keyed away had lost a
     /// cap, a label or their tint to the screen; the most of the others is 0.0022, one of which had lost some, too. The tint
     /// of 9 of 10 bottles of the screen's own hue is less sure, that of no other by more than 0.024. Hue: caps and labels (a
     /// fifth of a bottle) are taken for opaque, which they are; where more has it, it is the plastic itself.
-    pub const LOOK: Self = Self {
+    pub const NEEDS_REVIEW: Self = Self {
         keyed_away: 0.005,
         screen_hue: 0.25,
         clipped: 0.3,
@@ -37,9 +37,9 @@ impl ColorDoubts {
         tint: 0.04,
     };
 
-    /// How far colour and transmittance can be believed, 0 to 1: 0.5 where one doubt reaches [`LOOK`](Self::LOOK).
+    /// How far colour and transmittance can be believed, 0 to 1: 0.5 where one doubt reaches [`NEEDS_REVIEW`](Self::NEEDS_REVIEW).
     pub fn confidence(self) -> f64 {
-        let all = self.causes().into_iter().zip(Self::LOOK.causes());
+        let all = self.causes().into_iter().zip(Self::NEEDS_REVIEW.causes());
         all.map(|(doubt, look)| f64::from(look) / (f64::from(look) + f64::from(doubt)))
             .product()
     }
@@ -59,7 +59,7 @@ impl ColorDoubts {
         let all = [
             (self.keyed_away > HUE_WORTH_SAYING).then(|| Self::keyed_away(self.keyed_away)),
             (self.screen_hue > HUE_WORTH_SAYING).then(|| Self::screen_hue(self.screen_hue)),
-            (self.tint > Self::LOOK.tint).then(|| Self::tint_uncertain(self.tint)),
+            (self.tint > Self::NEEDS_REVIEW.tint).then(|| Self::tint_uncertain(self.tint)),
             (self.clipped > CLIPPED_WORTH_SAYING).then(|| Self::clipped_object(self.clipped)),
         ];
         all.into_iter().flatten().collect()
@@ -69,7 +69,7 @@ impl ColorDoubts {
     fn keyed_away(share: f32) -> Diagnostic {
         Diagnostic::new(
             Code::KeyedAway,
-            warning_above(Self::LOOK.keyed_away, share),
+            warning_above(Self::NEEDS_REVIEW.keyed_away, share),
             format_args!(
                 "{:.1} % of the object looks like bare screen: keyed away, but it may be paint of the screen's hue; photograph it on another screen colour",
                 100.0 * share
@@ -81,7 +81,7 @@ impl ColorDoubts {
     pub(in crate::matte) fn screen_hue(share: f32) -> Diagnostic {
         Diagnostic::new(
             Code::ScreenHue,
-            warning_above(Self::LOOK.screen_hue, share),
+            warning_above(Self::NEEDS_REVIEW.screen_hue, share),
             format_args!(
                 "{:.1} % of the object has the screen's hue: treated as opaque; photograph it on another screen colour to verify",
                 100.0 * share
@@ -139,7 +139,7 @@ pub(super) fn keyed_away(
     if !bare.pixels().contains(&true) {
         return 0.0;
     }
-    let interior = filter::erode(&inside.map(|c| c.0 >= WHOLE), rim_px(longer_side));
+    let interior = filter::erode(&inside.map(|c| c.0 >= OPAQUE), rim_px(longer_side));
     share(
         bare.pixels()
             .iter()
@@ -179,19 +179,19 @@ mod tests {
 
     #[test]
     fn a_doubt_that_is_worth_a_look_halves_the_confidence() {
-        assert_eq!(ColorDoubts::default().confidence(), 1.0);
-        let tint = ColorDoubts {
-            tint: ColorDoubts::LOOK.tint,
-            ..ColorDoubts::default()
+        assert_eq!(ColorUncertainty::default().confidence(), 1.0);
+        let tint = ColorUncertainty {
+            tint: ColorUncertainty::NEEDS_REVIEW.tint,
+            ..ColorUncertainty::default()
         };
         assert!((tint.confidence() - 0.5).abs() < 1e-6);
-        let both = ColorDoubts {
+        let both = ColorUncertainty {
             keyed_away: 0.1,
             ..tint
         };
         assert!(
             both.confidence() < 0.1
-                && ColorDoubts {
+                && ColorUncertainty {
                     guessed: 0.56,
                     ..both
                 }
@@ -202,32 +202,32 @@ mod tests {
 
     #[test]
     fn what_was_keyed_away_is_not_said_to_be_opaque() {
-        let said = |doubts: ColorDoubts| {
+        let said = |doubts: ColorUncertainty| {
             doubts
                 .diagnostics()
                 .iter()
                 .map(ToString::to_string)
                 .collect::<Vec<_>>()
         };
-        let keyed = said(ColorDoubts {
+        let keyed = said(ColorUncertainty {
             keyed_away: 0.1,
-            ..ColorDoubts::default()
+            ..ColorUncertainty::default()
         });
         assert!(
             matches!(&keyed[..], [one] if one.contains("keyed away") && !one.contains("opaque")),
             "{keyed:?}"
         );
-        let painted = said(ColorDoubts {
+        let painted = said(ColorUncertainty {
             screen_hue: 0.1,
-            ..ColorDoubts::default()
+            ..ColorUncertainty::default()
         });
         assert!(
             matches!(&painted[..], [one] if one.contains("treated as opaque")),
             "{painted:?}"
         );
-        let tint = ColorDoubts {
+        let tint = ColorUncertainty {
             tint: 0.1,
-            ..ColorDoubts::default()
+            ..ColorUncertainty::default()
         }
         .diagnostics();
         assert!(
