@@ -104,6 +104,8 @@ fn sample(k: u64) -> Result<Sample> {
         exposure: Exposure::default(),
         cast: Cast::default(),
         finish: PostProcess::default(),
+        files: None,
+        settings: Default::default(),
     };
     Ok(Sample {
         frame,

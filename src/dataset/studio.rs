@@ -57,7 +57,8 @@ impl Studio {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn with_library(setup: Setup, library: Library) -> Result<Self> {
-        let studio = Self::new(setup, library)?;
+        let places = labelled_places(&setup)?;
+        let studio = Self::new(setup, library, places)?;
         studio
             .places
             .iter()
@@ -96,20 +97,15 @@ impl Studio {
     pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
         let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
         let library = Library::open_some(&setup.assets, is_named)?;
-        Self::new(setup, library)
+        let places = if scene.plate.is_empty() {
+            Vec::new()
+        } else {
+            labelled_places(&setup)?
+        };
+        Self::new(setup, library, places)
     }
 
-    fn new(setup: Setup, library: Library) -> Result<Self> {
-        let (image, surface_size, force) =
-            (setup.scene.image, setup.surface_size, setup.force_cameras);
-        let places = Place::all(
-            &setup.backgrounds,
-            PlaceOptions {
-                image,
-                surface_size,
-                force,
-            },
-        )?;
+    fn new(setup: Setup, library: Library, places: Vec<Place>) -> Result<Self> {
         let backgrounds = places
             .iter()
             .map(|place| place.background.clone())
@@ -347,6 +343,16 @@ impl Studio {
             }
         }
     }
+}
+
+/// The labelled photos that a setup names.
+fn labelled_places(setup: &Setup) -> Result<Vec<Place>> {
+    let options = PlaceOptions {
+        image: setup.scene.image,
+        surface_size: setup.surface_size,
+        force: setup.force_cameras,
+    };
+    Place::all(&setup.backgrounds, options)
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

@@ -88,7 +88,7 @@ pub use document::{
     from_overrides, parse_json, parse_toml, read_document, read_json, read_json_data, read_text,
     read_toml, read_toml_with, write_document, write_json, write_text, write_toml,
 };
-pub(crate) use document::{from_table, read_bytes, suggestion};
+pub(crate) use document::{from_table, from_table_with, read_bytes, suggestion};
 pub use format::Format;
 pub use header::Header;
 #[doc(hidden)]

@@ -281,6 +281,8 @@ mod tests {
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

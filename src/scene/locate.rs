@@ -65,6 +65,8 @@ mod tests {
             exposure: Exposure::default(),
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

@@ -12,6 +12,7 @@ pub mod cycles;
 mod draw;
 mod environment;
 mod fall;
+mod files;
 mod hull;
 mod light;
 mod locate;
@@ -32,6 +33,8 @@ pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 pub use fall::{SettleMode, SettleOptions};
 #[cfg(feature = "settle")]
 pub(crate) use fall::{half_extent, level};
+pub(crate) use files::relative_to_file;
+pub use files::{SceneFiles, SceneSettings};
 pub use light::{AreaLight, Cast, Exposure, LightShape};
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
@@ -82,6 +85,12 @@ pub struct Scene {
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
+    /// Where the files that it names lie; without it a recipe says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub files: Option<SceneFiles>,
+    /// How its picture and labels are made, where no recipe is given.
+    #[serde(default, skip_serializing_if = "SceneSettings::is_empty")]
+    pub settings: SceneSettings,
 }
 
 impl Scene {

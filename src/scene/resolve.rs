@@ -232,6 +232,8 @@ mod tests {
             exposure: Exposure::Ev(1.0),
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

@@ -5,7 +5,7 @@ use crate::pixel::LinearRgb;
 use crate::scene::stack::DropColumn;
 use crate::scene::{
     AreaLight, AssetVariant, Background, DrawLog, Draws, Exposure, Grade, Object, Range, Recipe,
-    Scene, Surface,
+    Scene, SceneSettings, Surface,
 };
 use std::f64::consts::PI;
 
@@ -70,6 +70,8 @@ impl Recipe {
             exposure: self.exposure(self.gain_ev.draw(draws, "gain_ev")),
             cast: self.cast,
             finish: self.finish.draw(draws),
+            files: None,
+            settings: SceneSettings::default(),
         }
     }
 

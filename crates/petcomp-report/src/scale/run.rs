@@ -213,6 +213,8 @@ fn scene(case: &Case) -> Scene {
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
         finish: Default::default(),
+        files: None,
+        settings: Default::default(),
     }
 }
 
