@@ -12,6 +12,7 @@ pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
+use super::prepared::{check_finite, longer_side, refused};
 use super::screen::{is_keyable, strongest_channel};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -109,41 +110,42 @@ pub fn film(
     inside: &Image<Coverage>,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
-    let longer_side = photo.width().max(photo.height());
-    film_of_part(
+    opts.check()?;
+    check_finite(photo)?;
+    let object = FilmInput {
         photo,
         plate,
         inside,
-        PartOf {
-            screen: plate.color(),
-            longer_side,
-        },
-        opts,
-    )
+        screen: plate.color(),
+        longer_side: longer_side(photo),
+    };
+    solve_film(object, opts)
 }
 
-/// What a part of a photo does not tell of all of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PartOf {
-    /// Mean colour of the screen.
+/// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
+/// one size.
+#[derive(Clone, Copy)]
+pub(super) struct FilmInput<'a> {
+    /// Finite.
+    pub(super) photo: &'a Image<LinearRgb>,
+    pub(super) plate: &'a ScreenPlate,
+    /// Coverage of the object.
+    pub(super) inside: &'a Image<Coverage>,
+    /// Mean colour of the whole screen.
     pub(super) screen: LinearRgb,
-    /// Longer side of the photo, pixels.
+    /// Longer side of the whole photo, pixels.
     pub(super) longer_side: usize,
 }
 
-/// As [`film`], of the part of a photo around the object: there is nothing to solve elsewhere. All pictures are of the
-/// part's size.
-pub(super) fn film_of_part(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    PartOf {
+/// As [`film`], with options that are checked.
+pub(super) fn solve_film(object: FilmInput<'_>, opts: &FilmOptions) -> Result<FilmMatte> {
+    let FilmInput {
+        photo,
+        plate,
+        inside,
         screen,
         longer_side,
-    }: PartOf,
-    opts: &FilmOptions,
-) -> Result<FilmMatte> {
-    opts.check()?;
+    } = object;
     let mut watch = Stopwatch::start();
     assert_eq!(
         photo.size(),
@@ -152,15 +154,7 @@ pub(super) fn film_of_part(
     );
     assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
     if !inside.pixels().iter().any(|c| c.0 > 0.0) {
-        return Err(Error::Photo {
-            what: "the mask of the object is empty".into(),
-        });
-    }
-    if let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) {
-        let (x, y) = (i % photo.width(), i / photo.width());
-        return Err(Error::Photo {
-            what: format!("pixel ({x}, {y}) is not a finite number"),
-        });
+        return Err(refused("the mask of the object is empty"));
     }
     let key = strongest_channel(screen);
     let calm = calmed(photo, plate.residual);

@@ -51,6 +51,11 @@ impl Outline {
         }
     }
 
+    /// A single ring, clockwise as seen.
+    pub(super) fn from_ring(ring: Vec<Point2<f64>>) -> Self {
+        Self { rings: vec![ring] }
+    }
+
     /// The convex hull, clockwise as seen.
     pub fn hull(&self) -> Vec<Point2<f64>> {
         let points = self.rings.iter().flatten().map(|p| Point::new(p.x, p.y));

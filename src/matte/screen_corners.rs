@@ -2,7 +2,7 @@
 
 use super::outline::Outline;
 use super::screen::is_keyable;
-use super::segment::Groups;
+use super::segment::PixelGroups;
 use crate::color::rgb_to_hsv;
 use crate::error::{Error, Result};
 use crate::filter;
@@ -207,7 +207,7 @@ fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
 
 /// The largest connected region of a set.
 fn largest_region(set: &Mask) -> Option<Region> {
-    let groups = Groups::of(set);
+    let groups = PixelGroups::new(set);
     let sizes = groups.sizes(set);
     let largest = (0..sizes.len()).max_by_key(|&i| sizes[i])?;
     let only = groups.only(|i| i == largest);
@@ -235,7 +235,7 @@ fn is_covered(region: &Mask, hull: &[Point2<f64>]) -> bool {
     .coverage(w, h)
     .map(|c| c.0 > 0.5);
     let free = filter::erode(&within, RIM_PX).zip_map(region, |inside, screen| inside && !screen);
-    let largest = Groups::of(&free)
+    let largest = PixelGroups::new(&free)
         .sizes(&free)
         .into_iter()
         .max()

@@ -118,8 +118,10 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
             program: "petcomp".into(),
             setting: name.into(),
             cpu_seconds,
-            cycles: best.as_ref().and_then(|best| Likeness::of(&picture, best)),
-            quadrature: Likeness::of(&render(&small, &sampling), &truth),
+            cycles: best
+                .as_ref()
+                .and_then(|best| Likeness::measure(&picture, best)),
+            quadrature: Likeness::measure(&render(&small, &sampling), &truth),
         });
     }
     for entry in &others.pictures {
@@ -132,7 +134,7 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
             cycles: best
                 .as_ref()
                 .filter(|_| !is_best)
-                .and_then(|best| Likeness::of(&picture, best)),
+                .and_then(|best| Likeness::measure(&picture, best)),
             quadrature: None,
         });
     }
@@ -216,7 +218,7 @@ pub fn golden(folder: &Path, shown: Preset) -> Result<(Vec<GoldenRow>, Option<Im
             .unwrap_or_default();
         for (quality_name, quality) in Preset::ALL {
             let picture = render(&shot, &quality.options());
-            let likeness = Likeness::of(&picture, &wanted).ok_or_else(|| {
+            let likeness = Likeness::measure(&picture, &wanted).ok_or_else(|| {
                 Error::file(
                     &case,
                     format!(
@@ -284,7 +286,7 @@ pub fn table(rows: &[Row]) -> Table {
             format!("{cpu_seconds:.4}"),
             number(cycles.map(|l| l.rmse), 5),
             number(cycles.map(|l| l.bias), 6),
-            number(cycles.map(|l| l.ssim), 5),
+            number(cycles.and_then(|l| l.ssim), 5),
             number(cycles.map(|l| l.flip), 4),
             number(quadrature.map(|l| l.rmse), 5),
             number(speed_up(row, rows), 0),
@@ -321,7 +323,7 @@ pub fn charts(rows: &[Row]) -> Vec<Chart> {
     let measures: [(&str, Measure); 3] = [
         ("RMSE, scene-linear", |l| l.rmse),
         ("FLIP", |l| l.flip),
-        ("1 - SSIM", |l| 1.0 - l.ssim),
+        ("1 - SSIM", |l| l.ssim.map_or(f64::NAN, |s| 1.0 - s)),
     ];
     let mut names: Vec<String> = rows.iter().map(|row| row.program.clone()).collect();
     names.dedup();
@@ -369,7 +371,7 @@ pub fn golden_table(rows: &[GoldenRow]) -> Table {
             quality.to_string(),
             format!("{rmse:.5}"),
             format!("{bias:+.6}"),
-            format!("{ssim:.5}"),
+            ssim.map_or_else(String::new, |ssim| format!("{ssim:.5}")),
             format!("{flip:.4}"),
         ]);
     }
@@ -401,7 +403,7 @@ mod tests {
         let cycles = Some(Likeness {
             rmse,
             bias: 0.0,
-            ssim: 0.9,
+            ssim: Some(0.9),
             flip: 0.01,
         });
         Row {

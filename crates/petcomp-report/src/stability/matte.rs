@@ -50,7 +50,7 @@ impl Promise {
             Self::Right => {
                 found.is_right
                     && found.doubts.is_empty()
-                    && cut.residue < MOST_RESIDUE
+                    && cut.residual_matte < MOST_RESIDUE
                     && is_reduced(cut)
             }
             Self::RightOrTold => found.is_right || !found.doubts.is_empty(),
@@ -82,7 +82,7 @@ fn cut_out_of(name: &str, promise: Promise, take: Take) -> Case {
                 };
                 let told = format!(
                     "IoU {:.4}, box off by {:.2} px, residue {:.4}, {doubts}",
-                    found.iou, found.box_px, cut.residue
+                    found.iou, found.box_px, cut.residual_matte
                 );
                 Ok(Outcome::new(told, promise.is_kept(&cut, &found)))
             }

@@ -1,11 +1,13 @@
 //! `petcomp matte key`: Blender's Keying node on one picture.
 
+use super::picture::{color, write, write_some};
+use crate::common::report_diagnostics;
 use anyhow::Result;
-use petcomp::io::{self, Bits, Override, Picture, ToFile, WriteOptions};
+use petcomp::io::{self, Override, Picture};
 use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
 use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
 use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Keys a picture against a screen colour or plate, as Blender's Keying node does.
 #[derive(clap::Args, Debug)]
@@ -73,7 +75,7 @@ impl Args {
     ) -> Result<[Image<Coverage>; 2]> {
         let found =
             segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
-        crate::matte::warn(&self.input, &found.diagnostics);
+        report_diagnostics(&self.input, &found.diagnostics);
         Ok(match plate {
             Some(plate) => found.mattes(photo, plate),
             None => {
@@ -98,53 +100,33 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         ..io::from_overrides("key", &args.settings)?
     };
     let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
-    let Input {
-        photo,
-        garbage,
-        core,
-    } = args.read(plate.as_ref())?;
-    let screen = plate.as_ref().map_or(
-        Screen::Color(args.screen.unwrap_or_default()),
-        Screen::Plate,
-    );
-    let mut job = Keying::new(&photo, screen);
-    job = garbage
-        .iter()
-        .fold(job, |job, matte| job.with_garbage(matte));
-    job = core.iter().fold(job, |job, matte| job.with_core(matte));
+    let input = args.read(plate.as_ref())?;
+    let screen = match &plate {
+        Some(plate) => Screen::Plate(plate),
+        None => Screen::Color(args.screen.unwrap_or_default()),
+    };
+    let job = input.keying(screen);
     let keyed = job.run(&opts)?;
     if keyed.deviations != Deviations::default() {
         log::warn!("{}: {}", args.input.display(), keyed.deviations);
     }
     write(&args.output, &keyed.cutout)?;
-    args.matte
-        .as_ref()
-        .map(|path| write(path, &keyed.matte))
-        .transpose()?;
-    args.edges
-        .as_ref()
-        .map(|path| write(path, &job.edges(&opts)?))
-        .transpose()?;
+    write_some(&args.matte, &keyed.matte)?;
+    if let Some(path) = &args.edges {
+        write(path, &job.edges(&opts)?)?;
+    }
     Ok(())
 }
 
-/// A colour from `R,G,B`.
-pub(crate) fn color(text: &str) -> Result<LinearRgb, String> {
-    let numbers: Result<Vec<f32>, _> = text.split(',').map(|n| n.trim().parse()).collect();
-    let channels: Result<[f32; 3], _> = numbers.map_err(|e| e.to_string())?.try_into();
-    channels
-        .map(LinearRgb::from)
-        .map_err(|n| format!("{} numbers, expected R,G,B", n.len()))
-}
-
-/// Writes a picture, in an EXR with all its bits.
-pub(crate) fn write<P: ToFile>(path: &Path, image: &Image<P>) -> Result<()> {
-    let is_exr = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-    let options = WriteOptions {
-        bits: is_exr.then_some(Bits::Float),
-        ..WriteOptions::default()
-    };
-    Ok(io::write_with(path, image, &options)?)
+impl Input {
+    fn keying<'a>(&'a self, screen: Screen<'a>) -> Keying<'a, PremulRgba> {
+        let mut job = Keying::new(&self.photo, screen);
+        if let Some(garbage) = &self.garbage {
+            job = job.with_garbage(garbage);
+        }
+        if let Some(core) = &self.core {
+            job = job.with_core(core);
+        }
+        job
+    }
 }

@@ -1,6 +1,6 @@
 //! `petcomp matte chroma-key`, `channel-key`, `difference-key`, `color-spill`, `keying-screen`: Blender's other keyers.
 
-use crate::matte_key::{color, write};
+use super::picture::{color, write, write_some};
 use anyhow::Result;
 use nalgebra::Point2;
 use petcomp::io::{Override, from_overrides};
@@ -49,19 +49,33 @@ pub(crate) enum Command {
     /// Take the screen's light from the subject
     ColorSpill(Pictures),
     /// Make a plate from points where the screen is seen
-    KeyingScreen {
-        /// The picture whose size the plate gets
-        input: PathBuf,
-        /// Where the plate goes
-        #[arg(short, long, value_name = "FILE")]
-        output: PathBuf,
-        /// Where the screen is seen, pixels from the top left; its colour is that of the picture there
-        #[arg(long = "point", value_name = "X,Y", value_parser = point, required = true)]
-        points: Vec<[usize; 2]>,
-        /// How far the colour of a point reaches, 0 to 1
-        #[arg(long, default_value_t = 0.0)]
-        smoothness: f64,
-    },
+    KeyingScreen(ScreenPoints),
+}
+
+/// A plate from a few points.
+#[derive(clap::Args, Debug)]
+pub(crate) struct ScreenPoints {
+    /// The picture whose size the plate gets
+    input: PathBuf,
+    /// Where the plate goes
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Where the screen is seen, pixels from the top left; its colour is that of the picture there
+    #[arg(long = "point", value_name = "X,Y", value_parser = point, required = true)]
+    points: Vec<[usize; 2]>,
+    /// How far the colour of a point reaches, 0 to 1
+    #[arg(long, default_value_t = 0.0)]
+    smoothness: f64,
+}
+
+impl ScreenPoints {
+    fn run(&self) -> Result<()> {
+        let photo: Image<PremulRgba> = io::read(&self.input)?;
+        let points = self.points.iter().map(|&at| screen_point(&photo, at));
+        let points = points.collect::<Result<Vec<_>>>()?;
+        let plate = keying_screen(photo.size(), &points, self.smoothness)?;
+        write(&self.output, &plate)
+    }
 }
 
 pub(crate) fn run(command: &Command) -> Result<()> {
@@ -71,44 +85,29 @@ pub(crate) fn run(command: &Command) -> Result<()> {
         Command::DifferenceKey { pictures, clean } => {
             let clean: Image<PremulRgba> = io::read(clean)?;
             pictures.cut(|photo, given| {
-                Ok(difference_key(
-                    photo,
-                    &clean,
-                    &from_overrides("key", given)?,
-                )?)
+                let options = from_overrides("key", given)?;
+                Ok(difference_key(photo, &clean, &options)?)
             })
         }
-        Command::ChannelKey(pictures) => {
-            let keyed = channel_key(
-                &io::read::<PremulRgba>(&pictures.input)?,
-                &from_overrides("key", &pictures.settings)?,
-            );
-            pictures.write(&keyed.cutout, &keyed.matte)
-        }
-        Command::ColorSpill(pictures) => {
-            let photo: Image<PremulRgba> = io::read(&pictures.input)?;
-            write(
-                &pictures.output,
-                &color_spill(&photo, &from_overrides("key", &pictures.settings)?),
-            )
-        }
-        Command::KeyingScreen {
-            input,
-            output,
-            points,
-            smoothness,
-        } => {
-            let photo: Image<PremulRgba> = io::read(input)?;
-            let seen = points
-                .iter()
-                .map(|&at| seen(&photo, at))
-                .collect::<Result<Vec<_>>>()?;
-            write(output, &keying_screen(photo.size(), &seen, *smoothness)?)
-        }
+        Command::ChannelKey(pictures) => pictures.channel_key(),
+        Command::ColorSpill(pictures) => pictures.color_spill(),
+        Command::KeyingScreen(args) => args.run(),
     }
 }
 
 impl Pictures {
+    fn channel_key(&self) -> Result<()> {
+        let options = from_overrides("key", &self.settings)?;
+        let keyed = channel_key(&io::read::<PremulRgba>(&self.input)?, &options);
+        self.write(&keyed.cutout, &keyed.matte)
+    }
+
+    fn color_spill(&self) -> Result<()> {
+        let photo: Image<PremulRgba> = io::read(&self.input)?;
+        let options = from_overrides("key", &self.settings)?;
+        write(&self.output, &color_spill(&photo, &options))
+    }
+
     /// Writes the picture seen through a matte.
     fn cut(
         &self,
@@ -121,16 +120,12 @@ impl Pictures {
 
     fn write(&self, cutout: &Image<PremulRgba>, matte: &Image<Coverage>) -> Result<()> {
         write(&self.output, cutout)?;
-        self.matte
-            .as_ref()
-            .map(|path| write(path, matte))
-            .transpose()?;
-        Ok(())
+        write_some(&self.matte, matte)
     }
 }
 
 /// The screen where it is seen.
-fn seen(photo: &Image<PremulRgba>, [x, y]: [usize; 2]) -> Result<ScreenPoint> {
+fn screen_point(photo: &Image<PremulRgba>, [x, y]: [usize; 2]) -> Result<ScreenPoint> {
     let (width, height) = photo.size();
     anyhow::ensure!(
         x < width && y < height,

@@ -1,8 +1,7 @@
 //! `petcomp matte film`, `triangulate`: film from one photo, or from several on different screens.
 
-use crate::common::Common;
-use crate::matte::warn;
-use crate::matte_key::write;
+use super::picture::write_some;
+use crate::common::{Common, report_diagnostics};
 use anyhow::Result;
 use petcomp::io::{self, Override, from_overrides};
 use petcomp::matte::{
@@ -58,7 +57,7 @@ impl Film {
         let plate = self.files.plate(0, &self.photo, &photo, &inside)?;
         let options = from_overrides("film", &self.files.settings)?;
         let found = film(&photo, &plate, &inside, &options).map_err(|e| e.in_file(&self.photo))?;
-        warn(&self.photo, &found.diagnostics);
+        report_diagnostics(&self.photo, &found.diagnostics);
         self.files.write(
             &plate,
             &found.film,
@@ -68,7 +67,7 @@ impl Film {
         common.say(format_args!(
             "{}: {}",
             self.files.output.display(),
-            told(&plate, found.flat)
+            summary(&plate, found.flat)
         ));
         Ok(())
     }
@@ -79,19 +78,11 @@ impl Triangulate {
         let photos: Vec<Image<LinearRgb>> =
             self.photos.iter().map(io::read).collect::<Result<_, _>>()?;
         let inside = self.files.inside(&self.photos[0], &photos[0])?;
-        let plate = |(i, photo)| self.files.plate(i, &self.photos[i], photo, &inside);
-        let plates: Vec<ScreenPlate> = photos
-            .iter()
-            .enumerate()
-            .map(plate)
-            .collect::<Result<_>>()?;
+        let plates = self.plates(&photos, &inside)?;
         let shots: Vec<_> = photos.iter().zip(&plates).collect();
-        let found = triangulate(
-            &shots,
-            &inside,
-            &from_overrides("film", &self.files.settings)?,
-        )?;
-        warn(&self.photos[0], &found.diagnostics);
+        let options = from_overrides("film", &self.files.settings)?;
+        let found = triangulate(&shots, &inside, &options)?;
+        report_diagnostics(&self.photos[0], &found.diagnostics);
         self.files.write(
             &plates[0],
             &found.film,
@@ -102,9 +93,21 @@ impl Triangulate {
         common.say(format_args!(
             "{}: {}; residual {residual:.4}",
             self.files.output.display(),
-            told(&plates[0], found.flat)
+            summary(&plates[0], found.flat)
         ));
         Ok(())
+    }
+}
+
+impl Triangulate {
+    fn plates(
+        &self,
+        photos: &[Image<LinearRgb>],
+        inside: &Image<Coverage>,
+    ) -> Result<Vec<ScreenPlate>> {
+        let each = self.photos.iter().zip(photos).enumerate();
+        each.map(|(i, (path, photo))| self.files.plate(i, path, photo, inside))
+            .collect()
     }
 }
 
@@ -120,7 +123,7 @@ impl Files {
             return Ok(mask);
         }
         let found = segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(path))?;
-        warn(path, &found.diagnostics);
+        report_diagnostics(path, &found.diagnostics);
         Ok(found.tight)
     }
 
@@ -154,20 +157,13 @@ impl Files {
             .map(|(name, plane)| (*name, &plane[..]))
             .collect();
         io::exr::write_channels(&self.output, film.size(), &planes, &[])?;
-        self.plate_out
-            .as_ref()
-            .map(|path| write(path, &plate.image))
-            .transpose()?;
-        self.uncertainty
-            .as_ref()
-            .map(|path| write(path, uncertainty))
-            .transpose()?;
-        Ok(())
+        write_some(&self.plate_out, &plate.image)?;
+        write_some(&self.uncertainty, uncertainty)
     }
 }
 
 /// The screen and the plastic in a few words.
-fn told(plate: &ScreenPlate, flat: LinearRgb) -> String {
+fn summary(plate: &ScreenPlate, flat: LinearRgb) -> String {
     let fitted = plate.degree.map_or("photographed".into(), |degree| {
         format!("fitted by degree {degree}")
     });
