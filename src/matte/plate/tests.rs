@@ -192,7 +192,7 @@ fn another_screen_is_not_taken_for_the_empty_one() {
         small
             .unwrap_err()
             .to_string()
-            .contains("8 x 8 pixels, the photo 240 x 160")
+            .contains("8 x 8 pixels, expected 240 x 160")
     );
 }
 
