@@ -256,6 +256,19 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
     filter::gaussian_blur(mask, sigma_px).map(|c| Coverage(c.0.clamp(0.0, 1.0)))
 }
 
+/// Share of the pixels outside a mask with a channel of `clipped` or more.
+fn clipped_share(photo: &Image<LinearRgb>, mask: &Image<Coverage>, clipped: f32) -> f32 {
+    let outside = photo
+        .pixels()
+        .iter()
+        .zip(mask.pixels())
+        .filter(|(_, m)| m.0 <= 0.0);
+    let (all, count) = outside.fold((0_u64, 0_u64), |(all, count), (p, _)| {
+        (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped))
+    });
+    count as f32 / all.max(1) as f32
+}
+
 /// A matte that leaves more than this of the screen is worth a warning: what it leaves veils the object, too.
 const MAX_RESIDUAL_MATTE: f32 = 0.2;
 
@@ -298,15 +311,7 @@ fn clipped_screen(
     mask: &Image<Coverage>,
     clipped: f32,
 ) -> Option<Diagnostic> {
-    let outside = photo
-        .pixels()
-        .iter()
-        .zip(mask.pixels())
-        .filter(|(_, m)| m.0 <= 0.0);
-    let (all, count) = outside.fold((0_u64, 0_u64), |(all, count), (p, _)| {
-        (all + 1, count + u64::from(p.r.max(p.g).max(p.b) >= clipped))
-    });
-    let share = count as f32 / all.max(1) as f32;
+    let share = clipped_share(photo, mask, clipped);
     (share > MAX_CLIPPED_SHARE).then(|| {
         let message = format!(
             "{:.0} % of the screen is clipped: transmittance cannot be measured; use a shorter exposure",

@@ -106,18 +106,21 @@ fn robust_mean(values: &[f32]) -> RobustMean {
     let center = median(values.to_vec());
     let sigma = SIGMA_OF_MEDIAN * median(values.iter().map(|v| (v - center).abs()).collect());
     let reach = TUKEY_SIGMAS * sigma.max(MIN_SIGMA);
+    RobustMean {
+        center: biweight_mean(values, center, reach).unwrap_or(center),
+        sigma,
+    }
+}
+
+/// Mean weighted by Tukey's biweight around a centre; none where no value is within reach.
+fn biweight_mean(values: &[f32], center: f32, reach: f32) -> Option<f32> {
     let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
     for &v in values {
         let weight = f64::from((1.0 - ((v - center) / reach).powi(2)).max(0.0).powi(2));
         sum += weight * f64::from(v);
         weights += weight;
     }
-    let center = if weights > 0.0 {
-        (sum / weights) as f32
-    } else {
-        center
-    };
-    RobustMean { center, sigma }
+    (weights > 0.0).then(|| (sum / weights) as f32)
 }
 
 fn median(mut values: Vec<f32>) -> f32 {
@@ -144,18 +147,23 @@ fn screen_hue(
     screen: LinearRgb,
 ) -> Option<Diagnostic> {
     let channel = strongest_channel(screen);
-    let rim_px = RIM_SHARE * photo.width().max(photo.height()) as f64;
-    let interior = filter::erode(&mask.map(|c| c.0 > 0.5), rim_px);
     let screen_excess = excess(screen, channel);
     let limit = SCREEN_EXCESS_FACTOR * screen_excess;
-    let hued = photo
-        .pixels()
-        .iter()
-        .zip(interior.pixels())
-        .filter(|(p, inside)| **inside && excess(**p, channel) > limit)
-        .count();
-    let share = hued as f32 / interior.count().max(1) as f32;
+    let share = object_share(photo, mask, |p| excess(p, channel) > limit);
     (screen_excess > 0.0 && share > MIN_HUED_SHARE).then(|| ColorUncertainty::screen_hue(share))
+}
+
+/// Share of the object's pixels for which a claim holds, its rim left out.
+fn object_share(
+    photo: &Image<LinearRgb>,
+    mask: &Image<Coverage>,
+    holds: impl Fn(LinearRgb) -> bool,
+) -> f32 {
+    let rim_px = RIM_SHARE * photo.width().max(photo.height()) as f64;
+    let interior = filter::erode(&mask.map(|c| c.0 > 0.5), rim_px);
+    let pixels = photo.pixels().iter().zip(interior.pixels());
+    let count = pixels.filter(|(p, inside)| **inside && holds(**p)).count();
+    count as f32 / interior.count().max(1) as f32
 }
 
 /// By how much a channel exceeds the larger of the two others.

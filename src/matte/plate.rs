@@ -4,8 +4,8 @@ mod cells;
 mod polynomial;
 
 use super::prepared::refused;
-use super::register::{self, Registered};
-use super::screen::{screen_pixels, strongest_channel};
+use super::register;
+use super::screen::{mean_color, screen_pixels, strongest_channel};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::{Image, Mask, Roi};
@@ -106,17 +106,7 @@ impl ScreenPlate {
     ) -> Result<Self> {
         opts.check()?;
         check_same_size(empty, photo)?;
-        let gain = gain_on_background(photo, empty, background)?;
-        // The object's edges must not be seen: the filters of the search reach over them into the free screen.
-        let without_object = photo.zip3_map(
-            empty,
-            background,
-            |p, e, free| {
-                if free { p } else { e * gain }
-            },
-        );
-        let Registered { shift_px, .. } =
-            register::shift(&without_object, empty, background, [1.0; 3]);
+        let shift_px = shift_onto(photo, empty, background)?;
         opts.check_shift(shift_px)?;
         let moved = register::moved(empty, shift_px);
         let smooth = filter::gaussian_blur(&moved, PHOTO_BLUR_PX);
@@ -170,7 +160,7 @@ impl ScreenPlate {
 
     /// Mean colour of the plate, scene-linear.
     pub fn color(&self) -> LinearRgb {
-        mean_color(&self.image)
+        whole_mean(&self.image)
     }
 
     /// The part of the plate behind a part of the photo; what describes all of it stays.
@@ -282,6 +272,24 @@ fn check_same_size(empty: &Image<LinearRgb>, photo: &Image<LinearRgb>) -> Result
     )))
 }
 
+/// How far a photo of the empty screen must be moved to lie on the photo, pixels right and down.
+fn shift_onto(
+    photo: &Image<LinearRgb>,
+    empty: &Image<LinearRgb>,
+    background: &Mask,
+) -> Result<[f64; 2]> {
+    let gain = gain_on_background(photo, empty, background)?;
+    // The object's edges must not be seen: the filters of the search reach over them into the free screen.
+    let without_object = photo.zip3_map(
+        empty,
+        background,
+        |p, e, free| {
+            if free { p } else { e * gain }
+        },
+    );
+    Ok(register::shift(&without_object, empty, background, [1.0; 3]).shift_px)
+}
+
 /// The factor per channel from a photo of the empty screen to the photo.
 fn gain_on_background(
     photo: &Image<LinearRgb>,
@@ -293,21 +301,13 @@ fn gain_on_background(
         .ok_or_else(|| refused("the object leaves no background to check the empty screen on"))
 }
 
-fn mean_color(image: &Image<LinearRgb>) -> LinearRgb {
-    let mut sum = [0.0_f64; 3];
-    for p in image.pixels() {
-        let channels: [f32; 3] = (*p).into();
-        for (sum, channel) in sum.iter_mut().zip(channels) {
-            *sum += f64::from(channel);
-        }
-    }
-    let n = image.pixels().len().max(1) as f64;
-    sum.map(|s| (s / n) as f32).into()
+fn whole_mean(plate: &Image<LinearRgb>) -> LinearRgb {
+    mean_color(plate.pixels().iter().copied()).unwrap_or(LinearRgb::BLACK)
 }
 
 /// 1 minus darkest over brightest of the strongest channel.
 fn unevenness(plate: &Image<LinearRgb>) -> f32 {
-    let strongest = strongest_channel(mean_color(plate));
+    let strongest = strongest_channel(whole_mean(plate));
     let values = plate
         .pixels()
         .iter()

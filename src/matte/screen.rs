@@ -34,7 +34,6 @@ fn background(mask: &Image<Coverage>, margin: f64) -> Mask {
     filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).complement()
 }
 
-/// Sums in double precision and in the order of the pixels: the same at any thread count.
 fn mean(photo: &Image<LinearRgb>, set: &Mask) -> Option<LinearRgb> {
     assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
     let inside = photo
@@ -42,10 +41,14 @@ fn mean(photo: &Image<LinearRgb>, set: &Mask) -> Option<LinearRgb> {
         .iter()
         .zip(set.pixels())
         .filter(|(_, set)| **set);
-    let (sum, count) = inside.fold(([0.0; 3], 0u64), |(sum, count), (p, _)| {
-        let channels: [f32; 3] = (*p).into();
-        let added: [f64; 3] = std::array::from_fn(|c| sum[c] + f64::from(channels[c]));
-        (added, count + 1)
+    mean_color(inside.map(|(p, _)| *p))
+}
+
+/// Mean of colours; none of none. Sums in double precision and in the order of the pixels: the same at any thread count.
+pub(super) fn mean_color(pixels: impl Iterator<Item = LinearRgb>) -> Option<LinearRgb> {
+    let (sum, count) = pixels.fold(([0.0_f64; 3], 0_u64), |([r, g, b], count), p| {
+        let sum = [r + f64::from(p.r), g + f64::from(p.g), b + f64::from(p.b)];
+        (sum, count + 1)
     });
     (count > 0).then(|| sum.map(|s| (s / count as f64) as f32).into())
 }

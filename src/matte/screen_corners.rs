@@ -384,10 +384,7 @@ impl BorderProbe<'_> {
         let square = dot(change, change);
         let inside_length: f64 = (0..steps)
             .map(|k| self.color_at(-reach + (k as f64 + 0.5) * step))
-            .map(|color| {
-                let inside_share = dot(color.add_scaled(-1.0, outside), change) / square;
-                step * f64::from(inside_share)
-            })
+            .map(|color| step * f64::from(dot(color.add_scaled(-1.0, outside), change) / square))
             .sum();
         let at = inside_length - reach;
         (square > MIN_CHANGE * MIN_CHANGE && at.abs() < MAX_OFFSET_SHARE * reach)

@@ -22,7 +22,7 @@ pub use threshold::Threshold;
 
 use super::Outline;
 use super::prepared::Prepared;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::geom::Point2;
 use crate::image::Image;
@@ -122,13 +122,13 @@ pub(super) fn segment_prepared(
     let shape = ObjectShape::new(prepared, &chosen, &object.solid);
     let confidence = shape.confidence(prepared, chosen.confidence);
     let mut diagnostics = chosen.diagnostics(prepared.small.width());
-    diagnostics.extend(object.has_screen_like_parts.then(screen_like_parts));
+    diagnostics.extend(object.diagnostic());
     diagnostics.extend(confidence.diagnostics());
     watch.lap("outline");
-    let (w, h) = prepared.photo.size();
+    let [mask, tight] = shape.coverages(prepared.photo.size());
     let found = Segmentation {
-        mask: Outline::from_ring(shape.hull.clone()).coverage(w, h),
-        tight: shape.outline.coverage(w, h),
+        mask,
+        tight,
         hull: shape.hull,
         outline: shape.outline,
         touches: chosen.pass.touches,
@@ -141,13 +141,6 @@ pub(super) fn segment_prepared(
     watch.lap("masks");
     watch.log("segment");
     Ok(found)
-}
-
-fn screen_like_parts() -> Diagnostic {
-    Diagnostic::warning(
-        Code::ScreenLikeParts,
-        "parts of the object look like the screen: treated as holes, or on a grey board as clear plastic; are they?",
-    )
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use super::{Deviations, Keying, Screen};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
 use crate::image::Image;
+use crate::matte::screen::mean_color;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -131,17 +132,7 @@ fn nearest_known(levels: &Pyramid<PremulRgba>, x: usize, y: usize) -> LinearRgb 
 /// Mean of the usable pixels; black where there is none.
 fn usable_mean(plate: &Image<LinearRgb>) -> LinearRgb {
     let usable = plate.pixels().iter().filter(|c| is_usable(c.opaque()));
-    let (sum, count) = usable.fold(([0.0f64; 3], 0.0), |(sum, count), c| {
-        (
-            [
-                sum[0] + f64::from(c.r),
-                sum[1] + f64::from(c.g),
-                sum[2] + f64::from(c.b),
-            ],
-            count + 1.0,
-        )
-    });
-    LinearRgb::from(sum.map(|s| (s / f64::max(count, 1.0)) as f32))
+    mean_color(usable.copied()).unwrap_or(LinearRgb::BLACK)
 }
 
 /// A value of a garbage or core matte that the robust profile takes as it is.

@@ -2,6 +2,7 @@
 
 use crate::image::{Image, Mask};
 use crate::pixel::LinearRgb;
+use std::ops::Range;
 
 /// Cells along the longer side of a picture: enough for any smooth screen, few enough to be fitted in no time.
 const CELLS_ALONG_SIDE: usize = 48;
@@ -41,17 +42,23 @@ fn cell_mean(
     side: usize,
 ) -> Option<Cell> {
     let (w, h) = photo.size();
-    let [x0, y0] = index.map(|i| i * side);
-    let (x1, y1) = ((x0 + side).min(w), (y0 + side).min(h));
+    let columns = cell_range(index[0], side, w);
+    let rows = cell_range(index[1], side, h);
+    let area = (columns.len() * rows.len()) as f64;
     let mut sums = CellSums::default();
-    for y in y0..y1 {
-        let (pixels, free) = (&photo.row(y)[x0..x1], &background.row(y)[x0..x1]);
-        sums.add_row([x0, y], pixels, free);
+    for y in rows {
+        let free = &background.row(y)[columns.clone()];
+        sums.add_row([columns.start, y], &photo.row(y)[columns.clone()], free);
     }
-    let area = ((x1 - x0) * (y1 - y0)) as f64;
     (f64::from(sums.count) >= MIN_SCREEN_SHARE * area)
         .then(|| sums.mean(index))
         .flatten()
+}
+
+/// The pixels of the cell `index` along a side of the picture.
+fn cell_range(index: usize, side: usize, len: usize) -> Range<usize> {
+    let start = index * side;
+    start..(start + side).min(len)
 }
 
 /// Sums over the screen's pixels in a cell.
@@ -158,18 +165,19 @@ pub(super) fn deviation(
         .step_by(step)
         .filter(|&i| background.pixels()[i])
         .collect();
+    let differences: Vec<[f64; 3]> = sampled
+        .into_iter()
+        .map(|i| channel_differences(photo.pixels()[i], plate.pixels()[i]))
+        .collect();
     let [r, g, b] = [0, 1, 2].map(|c| {
-        let differences = sampled.iter().map(|&i| {
-            let [a, b] = [photo, plate].map(|image| channel(image.pixels()[i], c));
-            f64::from((a - b).abs())
-        });
-        (SIGMA_OF_MEDIAN * median(differences).unwrap_or(0.0)) as f32
+        let sigma = SIGMA_OF_MEDIAN * median(differences.iter().map(|d| d[c])).unwrap_or(0.0);
+        sigma as f32
     });
     LinearRgb::new(r, g, b)
 }
 
-fn channel(color: LinearRgb, c: usize) -> f32 {
-    <[f32; 3]>::from(color)[c]
+fn channel_differences(a: LinearRgb, b: LinearRgb) -> [f64; 3] {
+    [a.r - b.r, a.g - b.g, a.b - b.b].map(|d| f64::from(d.abs()))
 }
 
 /// Pixels that are sampled for a standard deviation: 1 % of error.

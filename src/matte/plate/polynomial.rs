@@ -170,9 +170,7 @@ fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
 
 /// The lowest degree that no higher one beats by the least gain, by the error at cells that are left out.
 fn chosen_degree(samples: &[Sample], opts: &PlateOptions) -> usize {
-    let degrees: Vec<usize> = (0..=opts.max_degree)
-        .filter(|&d| d == 0 || samples.len() >= MIN_CELLS_PER_COEFFICIENT * terms(d))
-        .collect();
+    let degrees = usable_degrees(samples.len(), opts.max_degree);
     let split = HeldOut::new(samples);
     let errors: Vec<f64> = degrees.iter().map(|&d| split.error(d)).collect();
     let best = errors
@@ -183,6 +181,13 @@ fn chosen_degree(samples: &[Sample], opts: &PlateOptions) -> usize {
     let enough = best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE);
     let lowest = errors.iter().position(|e| *e <= enough);
     degrees[lowest.unwrap_or(degrees.len() - 1)]
+}
+
+/// The degrees whose coefficients so many cells can determine.
+fn usable_degrees(cells: usize, max_degree: usize) -> Vec<usize> {
+    (0..=max_degree)
+        .filter(|&d| d == 0 || cells >= MIN_CELLS_PER_COEFFICIENT * terms(d))
+        .collect()
 }
 
 /// Samples parted in those that are fitted and those that the fit is judged by.

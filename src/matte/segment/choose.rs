@@ -58,11 +58,9 @@ pub(super) fn best_search<'a>(
 ) -> Result<ChosenSearch<'a>> {
     let scales = scales(picture, opts);
     let mut searched = searches(&scales, opts);
-    let failed = searched.iter().filter(|s| s.pass.is_err()).count();
-    if 2 * failed > searched.len() {
-        let first = searched.iter().position(|s| s.pass.is_err()).unwrap_or(0);
+    if let Some(failed) = first_of_many_failures(&searched) {
         return searched
-            .swap_remove(first)
+            .swap_remove(failed)
             .into_chosen(scales, Confidence::default());
     }
     let confidences = confidences(&searched, picture.size());
@@ -72,6 +70,17 @@ pub(super) fn best_search<'a>(
         ..confidences[pick]
     };
     searched.swap_remove(pick).into_chosen(scales, confidence)
+}
+
+/// The first search that failed, where more than half of them did.
+fn first_of_many_failures(searched: &[SearchResult]) -> Option<usize> {
+    let failed: Vec<usize> = (0..searched.len())
+        .filter(|&i| searched[i].pass.is_err())
+        .collect();
+    failed
+        .first()
+        .copied()
+        .filter(|_| 2 * failed.len() > searched.len())
 }
 
 /// Support and agreement of each search.
@@ -249,13 +258,11 @@ impl SearchResult {
         let Ok(pass) = &self.pass else { return 0.0 };
         let near = filter::dilate(&pass.object, EDGE_REACH_PX);
         let core = filter::erode(&pass.inside, 1.0);
-        let rim = pass.inside.zip_map(&core, |inside, core| inside && !core);
-        let (mut length, mut on_edges) = (0u64, 0u64);
-        for at in off_border(rim.size()).filter(|&at| rim[at]) {
-            length += 1;
-            on_edges += u64::from(near[at]);
-        }
-        on_edges as f64 / length.max(1) as f64
+        let outline: Vec<_> = off_border(core.size())
+            .filter(|&at| pass.inside[at] && !core[at])
+            .collect();
+        let on_edges = outline.iter().filter(|at| near[**at]).count();
+        on_edges as f64 / outline.len().max(1) as f64
     }
 }
 

@@ -1,6 +1,7 @@
 //! Holes: where the screen is seen through an opaque object, as in a ring.
 
 use super::cluster::PixelGroups;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::filter;
 use crate::image::{Image, Mask};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
@@ -27,7 +28,19 @@ pub(super) struct ObjectArea {
     /// What its edges enclose, without holes where the screen has the colour to recognise them.
     pub(super) solid: Mask,
     /// Something inside looks like the screen.
-    pub(super) has_screen_like_parts: bool,
+    has_screen_like_parts: bool,
+}
+
+impl ObjectArea {
+    /// The warning about parts that look like the screen.
+    pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
+        self.has_screen_like_parts.then(|| {
+            Diagnostic::warning(
+                Code::ScreenLikeParts,
+                "parts of the object look like the screen: treated as holes, or on a grey board as clear plastic; are they?",
+            )
+        })
+    }
 }
 
 /// The area of the object whose edges enclose `inside`.

@@ -5,9 +5,10 @@ use super::confidence::Confidence;
 use super::{blur, hull, snap};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::Mask;
+use crate::image::{Image, Mask};
 use crate::matte::Outline;
 use crate::matte::prepared::Prepared;
+use crate::pixel::Coverage;
 
 /// Blur that turns the cracks between pixels into a line, pixels of the search.
 const CRACK_BLUR_PX: f32 = 0.7;
@@ -51,16 +52,20 @@ impl ObjectShape {
         let blurred = filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX);
         let rough = Outline::around(&blurred).map(|p| scale.to_photo(p));
         let outline = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
-        let tips: Vec<_> = inset(&chosen.pass.hull, TIP_INSET_PX)
-            .into_iter()
-            .map(|p| scale.to_photo(p))
-            .collect();
-        let rings = outline.rings.iter().cloned().chain([tips]).collect();
+        let mut rings = outline.rings.clone();
+        let tips = inset(&chosen.pass.hull, TIP_INSET_PX);
+        rings.push(tips.into_iter().map(|p| scale.to_photo(p)).collect());
         Self {
             hull: Outline { rings }.hull(),
             outline,
             scale,
         }
+    }
+
+    /// Coverage of the hull and of what the outline encloses.
+    pub(super) fn coverages(&self, (w, h): (usize, usize)) -> [Image<Coverage>; 2] {
+        let hull = Outline::from_ring(self.hull.clone());
+        [&hull, &self.outline].map(|outline| outline.coverage(w, h))
     }
 
     /// The confidence of a search, with what the outline itself adds to it.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::diagnostic::Code;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 
