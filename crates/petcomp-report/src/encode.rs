@@ -10,7 +10,7 @@ use petcomp::Image;
 use petcomp::Quality;
 use petcomp::io::{self, Bits, Compression, WriteOptions};
 use petcomp::plot::three;
-use petcomp::render::cast;
+use petcomp::render::render;
 use petcomp::{Error, Result};
 use petcomp::{LinearRgb, PremulRgba};
 use petcomp::{Shot, composite};
@@ -220,7 +220,7 @@ fn picture() -> Image<LinearRgb> {
         .iter_mut()
         .for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
     let shot: Shot = pile(CARDS, SIZE).with_plate(Arc::new(plate));
-    let deep = cast(&shot, &Quality::default().render());
+    let deep = render(&shot, &Quality::default().render());
     composite::frame(&deep, shot.plate.as_deref()).map(PremulRgba::color)
 }
 

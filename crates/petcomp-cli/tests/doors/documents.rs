@@ -579,7 +579,7 @@ fn reference_scene(world: &World) {
         return;
     };
     if ends(render::check(&shot)).is_some() && shot.cards.len() < 5 && shot.lights.len() < 5 {
-        render::cast(&shot, &RenderOptions::default());
+        render::render(&shot, &RenderOptions::default());
     }
 }
 
