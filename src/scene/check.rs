@@ -11,7 +11,7 @@ use crate::scene::bounds::{
 };
 use crate::scene::hull::doubled_corner_area;
 use crate::scene::{
-    AreaLight, CameraSource, Cast, Exposure, Grade, Object, Placement, Scene, Surface,
+    AreaLight, CameraSource, Exposure, Grade, LightTint, Object, Placement, Scene, Surface,
 };
 use std::fmt::{Debug, Display};
 
@@ -115,10 +115,10 @@ fn check_pose(pose: &Pose, at: &str) -> Result<()> {
     check_rotation(&pose.rotation, &format!("{at}.rotation"))
 }
 
-pub(super) fn check_cast(cast: &Cast) -> Result<()> {
+pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     match *cast {
-        Cast::Known(color) => check_color(color, "cast.known"),
-        Cast::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
+        LightTint::Known(color) => check_color(color, "cast.known"),
+        LightTint::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
     }
 }
 

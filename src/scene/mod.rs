@@ -64,7 +64,7 @@ pub use fall::{SettleMode, SettleOptions};
 pub(crate) use fall::{half_extent, level};
 pub(crate) use files::relative_to_file;
 pub use files::{SceneFiles, SceneSettings};
-pub use light::{AreaLight, Cast, Exposure, LightShape};
+pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
 pub use post_process::{Noise, PostProcess, PostProcessRanges, white_balance};
@@ -109,8 +109,8 @@ pub struct Scene {
     #[serde(default)]
     pub exposure: Exposure,
     /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings bring their own.
-    #[serde(default, skip_serializing_if = "Cast::is_white")]
-    pub cast: Cast,
+    #[serde(default, skip_serializing_if = "LightTint::is_white")]
+    pub cast: LightTint,
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
     pub finish: PostProcess,
@@ -131,7 +131,7 @@ impl Scene {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: Exposure::Ev(0.0),
-            cast: Cast::default(),
+            cast: LightTint::default(),
             finish: PostProcess::default(),
             ..self
         }

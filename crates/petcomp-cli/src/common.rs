@@ -4,7 +4,7 @@ use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
-use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
+use petcomp::io::{Fallback, LimitOverride, Limits, Override, ReadOptions};
 use petcomp::{Diagnostic, Result, Scene, Severity, io, printable};
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal, Write as _};
@@ -34,7 +34,7 @@ pub(crate) struct Common {
     /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
     /// document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
-    limits: Vec<Raise>,
+    limits: Vec<LimitOverride>,
     /// What reads pictures that petcomp's own decoders do not know
     #[arg(long, value_enum, default_value_t, global = true)]
     oiio: OpenImageIo,

@@ -14,7 +14,7 @@ use crate::scene::bounds::{ALBEDO, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIAN
 use crate::scene::check::{check_cast, check_count, check_each, check_image};
 use crate::scene::stack::too_large;
 use crate::scene::{
-    AssetVariant, Background, Cast, DrawLog, Drawn, DropRanges, EnvironmentRanges,
+    AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
     PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
 };
 use compose::SceneNumber;
@@ -68,7 +68,7 @@ pub struct Recipe {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_albedo: Option<f64>,
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
-    pub cast: Cast,
+    pub cast: LightTint,
     /// What happens to the finished frame. Default: nothing.
     pub finish: PostProcessRanges,
     /// How objects come to rest.
@@ -96,7 +96,7 @@ impl Default for Recipe {
             restitution: Range::fixed(0.0),
             collider: Collider::Box,
             surface_albedo: None,
-            cast: Cast::default(),
+            cast: LightTint::default(),
             finish: PostProcessRanges::default(),
             settle: SettleOptions::default(),
         }

@@ -545,8 +545,8 @@ fn two_screens() -> Vec<Case> {
         Case::new(
             name,
             "neutral film on both",
-            "refused, by \"too alike\"",
-            move || Ok(Outcome::refused(triangulated(screens, 1.0), "too alike")),
+            "refused, by \"too similar\"",
+            move || Ok(Outcome::refused(triangulated(screens, 1.0), "too similar")),
         )
     };
     vec![
@@ -564,11 +564,11 @@ fn saturated() -> Case {
     Case::new(
         "two photos clipped all over",
         "film on green and blue, 100 times too bright: screens and photos are white",
-        "refused, by \"too alike\"",
+        "refused, by \"too similar\"",
         || {
             Ok(Outcome::refused(
                 triangulated([GREEN, BLUE], 100.0),
-                "too alike",
+                "too similar",
             ))
         },
     )
