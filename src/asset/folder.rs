@@ -165,7 +165,7 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         error_m: measured.error_m,
         screen: cut.screen,
         matte: cut.method,
-        residue: f64::from(cut.residue),
+        residue: f64::from(cut.residual_matte),
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),

@@ -1,7 +1,7 @@
 //! Where a camera stands over a screen, by a rectangle of known size in the screen's plane, and how well the scale is
 //! known from that.
 
-use crate::camera::{self, Camera, Label, Solution, TELLING};
+use crate::camera::{self, CHI2_99, Camera, Label, Solution};
 use crate::error::{Error, Result};
 use crate::geom::{Point2, Point3};
 use crate::io::Header;
@@ -47,7 +47,7 @@ impl ScreenPose {
     ) -> Result<Self> {
         let (best, other) = reference.solutions(image, header)?;
         check_fit(&best, reference.size)?;
-        let other = other.filter(|other| other.fit.chi2 < best.fit.chi2 + TELLING);
+        let other = other.filter(|other| other.fit.chi2 < best.fit.chi2 + CHI2_99);
         let swap_error = other.map_or(0.0, |other| {
             best.fit.px_per_metre / other.fit.px_per_metre - 1.0
         });
@@ -102,7 +102,7 @@ impl ReferenceRectangle {
         let mut label = Label::new(image, self.corners_px.map(Into::into), size);
         label.surface.corner_sigma_px = Some(self.sigma_px);
         label.surface.dimension_sigma_m = Some(TAPE_SIGMA * size[0].min(size[1]));
-        camera::learn(&mut label, header);
+        camera::apply_exif(&mut label, header);
         camera::solve(&label, &Default::default()).map_err(|e| scale_unknown(&e.to_string()))
     }
 

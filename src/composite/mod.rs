@@ -4,6 +4,7 @@ mod aov;
 mod cryptomatte;
 mod finish;
 mod frame;
+mod part;
 mod porter_duff;
 
 pub use aov::{Aov, FRONT_ALPHA, front, parts};

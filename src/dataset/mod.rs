@@ -62,6 +62,7 @@ pub use generate::{Plan, generate};
 pub use inputs::Inputs;
 #[doc(hidden)]
 pub use journal::JOURNAL;
+#[cfg(feature = "fuzzing")]
 pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report, mend};
 pub use layers::Layers;
@@ -84,6 +85,7 @@ pub use voc::Voc;
 pub use webdataset::WebDataset;
 pub use yolo::{Yolo, YoloTask};
 pub use yolo_set::YoloSet;
+#[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;
 
 use crate::deep::DeepImage;

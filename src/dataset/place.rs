@@ -1,6 +1,6 @@
 //! Labelled photos of the place that scenes are set in.
 
-use crate::camera::{self, Camera, Labelled, Sighting};
+use crate::camera::{self, Camera, LabelledPhoto, PhotoCamera};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point3;
@@ -53,7 +53,7 @@ impl Place {
             let what = "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
             return Err(Error::file(folder, what));
         }
-        let sightings = camera::sightings(&labels, options.force)?;
+        let sightings = camera::photo_cameras(&labels, options.force)?;
         said(&labels, &sightings);
         let opened = labels
             .iter()
@@ -64,7 +64,7 @@ impl Place {
         Ok(places)
     }
 
-    fn open(labelled: &Labelled, seen: &Sighting, image: [u32; 2]) -> Result<Self> {
+    fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
         let taken = labelled.label.image_size();
         let kept = middle(taken, image);
         let camera = cropped(seen.camera, kept).resized(image);
@@ -160,7 +160,7 @@ impl Place {
 
 /// Says what is odd about cameras: that some are not used, each; what was said where it was solved not again; and of those
 /// solved now, only where to read it.
-fn said(labels: &[Labelled], sightings: &[Sighting]) {
+fn said(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
     for stale in sightings.iter().filter_map(|seen| seen.stale.as_ref()) {
         log::warn!("{stale}");
     }

@@ -267,7 +267,7 @@ impl Studio {
     pub fn label(&self, scene: Scene) -> Result<Labels> {
         let (_, shot) = self.resolve(scene.unlit())?;
         Ok(label::label(
-            &render::cover(&shot, &self.setup.render),
+            &render::render_coverage(&shot, &self.setup.render),
             &shot,
             &self.setup.labels.options(),
         ))
@@ -275,7 +275,7 @@ impl Studio {
 
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
-        let deep = render::cast(shot, &self.setup.render);
+        let deep = render::render(shot, &self.setup.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
         let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
         (deep, frame)
