@@ -4,14 +4,14 @@ use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix, PremulRgba};
-use crate::scene::{Finish, Noise};
+use crate::scene::{Noise, PostProcess};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
 /// Standard deviation of the blur that sharpening removes.
 const SHARPENING_SIGMA_PX: f32 = 1.0;
 
-/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`Finish::default`] gives the same bits.
+/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`PostProcess::default`] gives the same bits.
 ///
 /// Cards get the noise that a photograph of them would have, and no pixel more than that: what is seen of the plate
 /// already has its own, so that a pixel without card or shadow keeps its bits. Exposure, white balance and sharpening
@@ -24,7 +24,7 @@ pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,
     plate: Option<&Image<LinearRgb>>,
-    finish: &Finish,
+    finish: &PostProcess,
 ) -> Image<PremulRgba> {
     let noisy = match finish.noise {
         Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => SensorNoise {
@@ -43,7 +43,7 @@ pub fn finish(
 }
 
 /// Exposure and white balance.
-fn apply_gain(frame: Image<PremulRgba>, finish: &Finish) -> Image<PremulRgba> {
+fn apply_gain(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
     // An infinite gain would make NaN of black.
     let gain = finish
         .white_balance
@@ -177,7 +177,7 @@ mod tests {
         )
     }
 
-    fn finished(change: Finish) -> (Image<PremulRgba>, Image<PremulRgba>) {
+    fn finished(change: PostProcess) -> (Image<PremulRgba>, Image<PremulRgba>) {
         let deep = deep(64);
         let plate = Image::from_fn(64, 64, |x, y| {
             LinearRgb::grey(0.1 + 0.01 * ((x + y) % 7) as f32)
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn nothing_asked_leaves_every_bit() {
-        let (before, after) = finished(Finish::default());
+        let (before, after) = finished(PostProcess::default());
         assert_eq!(before, after);
     }
 
@@ -198,10 +198,10 @@ mod tests {
             shot: 0.002,
             read: 0.01,
         };
-        let (before, after) = finished(Finish {
+        let (before, after) = finished(PostProcess {
             noise,
             noise_seed: 5,
-            ..Finish::default()
+            ..PostProcess::default()
         });
         let differences = |columns: std::ops::Range<usize>| -> Vec<f64> {
             let pixels = (0..64).flat_map(|y| columns.clone().map(move |x| (x, y)));
@@ -228,13 +228,13 @@ mod tests {
     #[test]
     fn another_seed_is_another_noise() {
         let of = |noise_seed| {
-            finished(Finish {
+            finished(PostProcess {
                 noise: Noise::Known {
                     shot: 0.0,
                     read: 0.01,
                 },
                 noise_seed,
-                ..Finish::default()
+                ..PostProcess::default()
             })
             .1
         };
@@ -245,10 +245,10 @@ mod tests {
     #[test]
     fn a_stop_doubles_and_balance_scales_each_channel() {
         let white_balance = LinearRgb::new(0.5, 1.0, 2.0);
-        let (before, after) = finished(Finish {
+        let (before, after) = finished(PostProcess {
             exposure_ev: 1.0,
             white_balance,
-            ..Finish::default()
+            ..PostProcess::default()
         });
         let (p, q) = (before[(3, 9)], after[(3, 9)]);
         assert_eq!([q.r, q.g, q.b, q.a], [p.r, 2.0 * p.g, 4.0 * p.b, 1.0]);
@@ -256,9 +256,9 @@ mod tests {
 
     #[test]
     fn sharpening_leaves_flat_parts_and_lifts_edges() {
-        let (before, after) = finished(Finish {
+        let (before, after) = finished(PostProcess {
             sharpening: 1.0,
-            ..Finish::default()
+            ..PostProcess::default()
         });
         assert!((after[(50, 30)].g - before[(50, 30)].g).abs() < 1e-6);
         assert!(after[(32, 30)].g > before[(32, 30)].g + 0.05);

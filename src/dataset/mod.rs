@@ -38,6 +38,7 @@ mod pictures;
 mod place;
 mod quality;
 mod run;
+mod scene_setup;
 mod setup;
 mod shard;
 mod sharing;

@@ -95,7 +95,7 @@ pub use worker::serve as serve_worker;
 #[cfg(feature = "oiio")]
 pub use worker::worker_version;
 
-pub(crate) use document::{from_table, read_bytes, suggestion};
+pub(crate) use document::{from_table, from_table_with, read_bytes, suggestion};
 pub(crate) use fs::{length_inside, open_own, refuse_foreign};
 #[cfg(feature = "fuzzing")]
 pub(crate) use fuzz::header_of;

@@ -97,6 +97,8 @@ pub(super) mod tests {
             exposure: Exposure::Ev(0.0),
             cast,
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

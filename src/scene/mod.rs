@@ -6,43 +6,46 @@
 //! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
 
 pub(crate) mod bounds;
+mod catalog;
 mod check;
 pub mod cycles;
 mod draw;
 mod environment;
 mod fall;
-mod finish;
+mod files;
 mod hull;
 mod light;
-mod limit;
 mod locate;
 mod placement;
+mod post_process;
 mod range;
 mod recipe;
 mod resolve;
 mod shot;
 mod stack;
-mod stock;
+mod take;
 mod variation;
 
+pub use catalog::{AssetVariant, Background, catalog};
 pub use draw::{Distribution, DrawLog, Drawn, Draws};
 pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 pub use fall::{SettleMode, SettleOptions};
 #[cfg(feature = "settle")]
 pub(crate) use fall::{half_extent, level};
-pub use finish::{Finish, FinishRanges, Noise, white_balance};
+pub(crate) use files::relative_to_file;
+pub use files::{SceneFiles, SceneSettings};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
-pub use limit::Limit;
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
+pub use post_process::{Noise, PostProcess, PostProcessRanges, white_balance};
 pub use range::Range;
-pub use recipe::{Background, Choice, Collider, GradeRanges, LightRanges, Recipe, Selections};
-pub use resolve::{CATCHER, Look};
+pub use recipe::{Collider, GradeRanges, LightRanges, Recipe, Selections};
+pub use resolve::{Appearance, CATCHER_RATIO};
 pub use shot::{Card, Shot};
-pub use stack::Start;
-pub use stock::stock;
-pub use variation::{Ablation, Source};
+pub use stack::DropRanges;
+pub use take::Take;
+pub use variation::{Ablation, Variation};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;
@@ -80,8 +83,14 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
     /// What happens to the finished frame.
-    #[serde(default, skip_serializing_if = "Finish::is_nothing")]
-    pub finish: Finish,
+    #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
+    pub finish: PostProcess,
+    /// Where the files that it names lie; without it a recipe says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub files: Option<SceneFiles>,
+    /// How its picture and labels are made, where no recipe is given.
+    #[serde(default, skip_serializing_if = "SceneSettings::is_empty")]
+    pub settings: SceneSettings,
 }
 
 impl Scene {
@@ -94,7 +103,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
-            finish: Finish::default(),
+            finish: PostProcess::default(),
             ..self
         }
     }
@@ -108,7 +117,7 @@ pub struct Surface {
     pub size: [f64; 2],
     /// Coefficient of friction of everything that touches here, the cards among themselves too; the walls over the edges,
     /// which nobody sees, are smooth. Default: 0.5.
-    #[serde(default = "Surface::usual_friction")]
+    #[serde(default = "Surface::default_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
     #[serde(default)]
@@ -120,13 +129,13 @@ impl Surface {
     pub const fn new(size: [f64; 2]) -> Self {
         Self {
             size,
-            friction: Self::usual_friction(),
+            friction: Self::default_friction(),
             restitution: 0.0,
         }
     }
 
     /// Between plastics, and between plastic and wood: 0.2 to 0.6 in tables.
-    const fn usual_friction() -> f64 {
+    const fn default_friction() -> f64 {
         0.5
     }
 }
