@@ -1,5 +1,7 @@
 //! Laws of labels, against pictures cast by brute force: many rays a pixel, no code shared with the library's renderer.
 
+#![cfg(feature = "pipeline")]
+
 use geo::Contains;
 use petcomp::camera::Camera;
 use petcomp::geom::BBox;
