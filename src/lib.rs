@@ -46,6 +46,7 @@ mod draw;
 mod error;
 pub mod eval;
 pub mod filter;
+#[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
 pub mod geom;
@@ -63,7 +64,10 @@ pub mod scene;
 pub mod settle;
 mod stopwatch;
 pub mod train;
+#[cfg(feature = "counters")]
 pub mod work;
+#[cfg(not(feature = "counters"))]
+mod work;
 
 pub use allowance::Allowance;
 pub use camera::Camera;

@@ -4,11 +4,12 @@ use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
-use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
-use petcomp::printable;
+use petcomp::io::{Fallback, LimitOverride, Limits, Override, ReadOptions};
+use petcomp::{Diagnostic, Result, Scene, Severity, io, printable};
+use serde::de::DeserializeOwned;
 use std::io::{IsTerminal, Write as _};
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -33,7 +34,7 @@ pub(crate) struct Common {
     /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
     /// document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
-    limits: Vec<Raise>,
+    limits: Vec<LimitOverride>,
     /// What reads pictures that petcomp's own decoders do not know
     #[arg(long, value_enum, default_value_t, global = true)]
     oiio: OpenImageIo,
@@ -179,6 +180,23 @@ impl Common {
     }
 }
 
+/// Logs what a stage noticed about a file: `FILE: message [code]`, a note at the level of notes.
+pub(crate) fn report_diagnostics(file: &Path, diagnostics: &[Diagnostic]) {
+    for diagnostic in diagnostics {
+        let level = match diagnostic.severity {
+            Severity::Note => log::Level::Info,
+            _ => log::Level::Warn,
+        };
+        let (file, code) = (file.display(), diagnostic.code);
+        log::log!(level, "{file}: {diagnostic} [{code}]");
+    }
+}
+
+/// Options from a TOML file, or the defaults where there is none.
+pub(crate) fn options_file<T: Default + DeserializeOwned>(file: Option<&Path>) -> Result<T> {
+    file.map_or_else(|| Ok(T::default()), io::read_toml)
+}
+
 /// A recipe file, and values in it that are to be different.
 #[derive(clap::Args)]
 pub(crate) struct RecipeArgs {
@@ -199,6 +217,34 @@ impl RecipeArgs {
     /// Opens the folders that the recipe names.
     pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
         Ok(Studio::open(self.setup()?)?)
+    }
+}
+
+/// A scene file, and where the files that it names are.
+#[derive(clap::Args)]
+pub(crate) struct SceneArgs {
+    /// Scene, TOML or JSON; what is unknown in it is solved first
+    #[arg(value_name = "SCENE")]
+    pub(crate) path: PathBuf,
+    /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's own `[files]` does
+    #[arg(value_name = "RECIPE")]
+    recipe: Option<PathBuf>,
+    /// Replace a value of the recipe or of the scene's settings: render.subsamples=8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+}
+
+impl SceneArgs {
+    pub(crate) fn read(&self) -> anyhow::Result<Scene> {
+        Ok(io::read_document(&self.path)?)
+    }
+
+    /// The recipe's setup or, without a recipe, that which the scene brings.
+    pub(crate) fn setup_for(&self, scene: &Scene) -> anyhow::Result<Setup> {
+        Ok(match &self.recipe {
+            Some(recipe) => Setup::read(recipe, &self.overrides)?,
+            None => Setup::for_scene(scene, &self.path, &self.overrides)?,
+        })
     }
 }
 

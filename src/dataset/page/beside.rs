@@ -298,7 +298,7 @@ fn figure(set: &Set, picture: &Labelled) -> Option<Figure> {
     let mut figure = Figure::whole(&picture.path, size)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    let (letter, top) = (figure.letter(), figure.top());
+    let (letter, top) = (figure.letter_height(), figure.top());
     for (class, [x, y, w, h]) in picture.boxes.iter().flatten() {
         let b = BBox {
             x0: x - w / 2.0,

@@ -263,7 +263,7 @@ fn sides(glance: &Glance) -> impl Iterator<Item = f64> {
 fn figure(shown: &Shown, classes: &[String], why: Option<&str>) -> Result<Figure> {
     let record = &shown.record;
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
-    let (letter, objects) = (figure.letter(), &record.labels.objects);
+    let (letter, objects) = (figure.letter_height(), &record.labels.objects);
     let reason = |object: &ObjectLabel| NoLabel::of(object, record);
     let (mut boxes, mut masks, mut others, mut labelled) =
         (String::new(), String::new(), String::new(), 0);
@@ -468,7 +468,7 @@ fn without_label(page: &mut Page, summary: &Summary) {
     ));
     histograms(
         page,
-        &[Histogram::of(
+        &[Histogram::new(
             "seen share of objects without a label",
             &summary.unlabelled_visible,
             [0.0, 1.0],
@@ -489,7 +489,7 @@ fn drawn(page: &mut Page, summary: &Summary) {
         match summary.range(key) {
             Some(([low, high], _)) if low == high => fixed.push([key.clone(), low.to_string()]),
             Some(([low, high], true)) => {
-                let mut h = Histogram::of(
+                let mut h = Histogram::new(
                     key,
                     values,
                     [low - 0.5, high + 0.5],
@@ -499,8 +499,8 @@ fn drawn(page: &mut Page, summary: &Summary) {
                 h.ends = [low.to_string(), high.to_string()];
                 charts.push(h);
             }
-            Some((range, false)) => charts.push(Histogram::of(key, values, range, BINS).uniform()),
-            None => charts.push(Histogram::of(key, values, extremes(values), BINS)),
+            Some((range, false)) => charts.push(Histogram::new(key, values, range, BINS).uniform()),
+            None => charts.push(Histogram::new(key, values, extremes(values), BINS)),
         }
     }
     charts.extend(
@@ -578,7 +578,7 @@ fn seen(page: &mut Page, summary: &Summary) {
             .map(|glance| of(glance) as f64)
             .collect();
         let most = counts.iter().copied().fold(1.0, f64::max);
-        let mut h = Histogram::of(
+        let mut h = Histogram::new(
             title,
             &counts,
             [-0.5, most + 0.5],
@@ -593,19 +593,19 @@ fn seen(page: &mut Page, summary: &Summary) {
         &[
             count("objects in a picture", |glance| glance.objects),
             count("labels in a picture", |glance| glance.labels.len()),
-            Histogram::of(
+            Histogram::new(
                 "seen share of an object",
                 &summary.visible,
                 [0.0, 1.0],
                 BINS,
             ),
-            Histogram::of(
+            Histogram::new(
                 "width of labelled boxes, pixels",
                 &side(0),
                 [0.0, largest],
                 BINS,
             ),
-            Histogram::of(
+            Histogram::new(
                 "height of labelled boxes, pixels",
                 &side(1),
                 [0.0, largest],

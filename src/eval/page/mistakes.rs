@@ -141,10 +141,10 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
     let case = Case::of(run, mistake);
     let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
     let view = case.view(*size);
-    let mut figure = Figure::of(path, *size, view)
+    let mut figure = Figure::cropped(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    figure.drawing = case.drawing(&view, figure.letter(), figure.top(), options);
+    figure.drawing = case.drawing(&view, figure.letter_height(), figure.top(), options);
     figure.caption = case.caption(options);
     Some(figure)
 }

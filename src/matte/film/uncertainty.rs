@@ -1,10 +1,8 @@
-//! How far the colour and the transmittance of a film can be believed.
+//! How certain the colour and the transmittance of a film are.
 
-use super::bright::{rim_px, share};
+use super::object::{interior, share};
 use super::solve::Factor;
-use super::tint::OPAQUE;
 use crate::diagnostic::{Code, Diagnostic, Severity};
-use crate::filter;
 use crate::image::Image;
 use crate::pixel::Coverage;
 
@@ -14,21 +12,22 @@ pub struct ColorUncertainty {
     /// Share of the object that looks like bare screen in its middle, where plastic is: it was keyed away, and may be paint
     /// of the screen's hue.
     pub keyed_away: f32,
-    /// Share of the object that is brighter in the screen's hue than the screen through plastic, and was taken for opaque.
+    /// Share of the object that is brighter in the screen's hue than the screen through plastic, and was treated as opaque.
     pub screen_hue: f32,
     /// Share of the object that is clipped.
     pub clipped: f32,
-    /// Transmittance that is not told by the photo but is what plastic usually has, mean over the object.
+    /// Transmittance that is not measured in the photo but is the prior of plastic, mean over the object.
     pub guessed: f32,
     /// How far other tints that explain the photo as well differ in what they let through.
     pub tint: f32,
 }
 
 impl ColorUncertainty {
-    /// From which on a person should look at a cut-out. Of 48 photos with truth the 7 that have more keyed away had lost a
-    /// cap, a label or their tint to the screen; the most of the others is 0.0022, one of which had lost some, too. The tint
-    /// of 9 of 10 bottles of the screen's own hue is less sure, that of no other by more than 0.024. Hue: caps and labels (a
-    /// fifth of a bottle) are taken for opaque, which they are; where more has it, it is the plastic itself.
+    /// From which on a person should look at a cut-out. Of 48 rendered photos with ground truth the 7 that have more keyed
+    /// away had lost a cap, a label or their tint to the screen; the most of the others is 0.0022, one of which had lost
+    /// some, too. The tint of 9 of 10 bottles of the screen's own hue is less certain, that of no other by more than 0.024.
+    /// Hue: caps and labels (a fifth of a bottle) are treated as opaque, which they are; where more has it, it is the
+    /// plastic itself.
     pub const NEEDS_REVIEW: Self = Self {
         keyed_away: 0.005,
         screen_hue: 0.25,
@@ -37,10 +36,10 @@ impl ColorUncertainty {
         tint: 0.04,
     };
 
-    /// How far colour and transmittance can be believed, 0 to 1: 0.5 where one doubt reaches [`NEEDS_REVIEW`](Self::NEEDS_REVIEW).
+    /// How certain colour and transmittance are, 0 to 1: 0.5 where one cause reaches [`NEEDS_REVIEW`](Self::NEEDS_REVIEW).
     pub fn confidence(self) -> f64 {
         let all = self.causes().into_iter().zip(Self::NEEDS_REVIEW.causes());
-        all.map(|(doubt, look)| f64::from(look) / (f64::from(look) + f64::from(doubt)))
+        all.map(|(cause, limit)| f64::from(limit) / (f64::from(limit) + f64::from(cause)))
             .product()
     }
 
@@ -54,13 +53,13 @@ impl ColorUncertainty {
         ]
     }
 
-    /// What a person should know.
+    /// What is worth reporting.
     pub(super) fn diagnostics(self) -> Vec<Diagnostic> {
         let all = [
-            (self.keyed_away > HUE_WORTH_SAYING).then(|| Self::keyed_away(self.keyed_away)),
-            (self.screen_hue > HUE_WORTH_SAYING).then(|| Self::screen_hue(self.screen_hue)),
+            (self.keyed_away > MIN_REPORTED_HUE).then(|| Self::keyed_away(self.keyed_away)),
+            (self.screen_hue > MIN_REPORTED_HUE).then(|| Self::screen_hue(self.screen_hue)),
             (self.tint > Self::NEEDS_REVIEW.tint).then(|| Self::tint_uncertain(self.tint)),
-            (self.clipped > CLIPPED_WORTH_SAYING).then(|| Self::clipped_object(self.clipped)),
+            (self.clipped > MIN_REPORTED_CLIPPED).then(|| Self::clipped_object(self.clipped)),
         ];
         all.into_iter().flatten().collect()
     }
@@ -119,13 +118,13 @@ fn warning_above(limit: f32, value: f32) -> Severity {
     }
 }
 
-/// Share of the object in the screen's hue below which nothing is said.
-const HUE_WORTH_SAYING: f32 = 0.002;
-/// Share of the object that may be clipped without a word: glints.
-const CLIPPED_WORTH_SAYING: f32 = 0.03;
+/// Share of the object in the screen's hue up to which nothing is reported.
+const MIN_REPORTED_HUE: f32 = 0.002;
+/// Share of the object that may be clipped without a report: glints.
+const MIN_REPORTED_CLIPPED: f32 = 0.03;
 /// Transmittance of the screen's channel from which on nothing seems to lie on the screen: two clear walls pass 0.56, one of
 /// them three quarters.
-const BARE: f32 = 0.85;
+const BARE_TRANSMITTANCE: f32 = 0.85;
 
 /// The share of the object that looks like bare screen, away from its rim, and was left see-through. `flat` is what flat
 /// plastic passes in the screen's channel, `longer_side` that of the whole photo, pixels.
@@ -135,22 +134,21 @@ pub(super) fn keyed_away(
     flat: f32,
     longer_side: usize,
 ) -> f32 {
-    let bare = factors.map(|f| f.value * flat > BARE);
+    let bare = factors.map(|f| f.value * flat > BARE_TRANSMITTANCE);
     if !bare.pixels().contains(&true) {
         return 0.0;
     }
-    let interior = filter::erode(&inside.map(|c| c.0 >= OPAQUE), rim_px(longer_side));
     share(
         bare.pixels()
             .iter()
-            .zip(interior.pixels())
+            .zip(interior(inside, longer_side).pixels())
             .map(|(bare, interior)| *bare && *interior),
         inside,
     )
 }
 
-/// How much of the transmittance is the prior's, mean over the object: nothing of it where there is paint. `spread` is the deviation of the prior, `flat` the
-/// most that flat plastic passes.
+/// How much of the transmittance is the prior's, mean over the object: none of it where there is paint. `spread` is the
+/// deviation of the prior, `flat` the most that flat plastic passes.
 pub(super) fn guessed(
     factors: &Image<Factor>,
     inside: &Image<Coverage>,
@@ -178,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_doubt_that_is_worth_a_look_halves_the_confidence() {
+    fn a_cause_at_its_limit_halves_the_confidence() {
         assert_eq!(ColorUncertainty::default().confidence(), 1.0);
         let tint = ColorUncertainty {
             tint: ColorUncertainty::NEEDS_REVIEW.tint,

@@ -1,5 +1,6 @@
 //! Bands of a Laplacian pyramid, in units of their noise.
 
+use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::LinearRgb;
@@ -17,10 +18,37 @@ pub enum LumaMode {
     Grey([f32; 3]),
 }
 
+impl LumaMode {
+    /// # Errors
+    /// [`Error::Value`] (`tone.grey`) for weights that cannot be right.
+    pub(super) fn check(self) -> Result<()> {
+        let Self::Grey(weights) = self else {
+            return Ok(());
+        };
+        if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
+            return Err(Error::value(
+                "tone.grey",
+                format!("{weights:?}, expected weights of 0 to 1e6, not all 0"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The pictures whose bands are taken.
+    fn pictures(self, photo: &Image<LinearRgb>) -> Vec<Image<f32>> {
+        match self {
+            Self::Channels => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|channel| luma_root(photo, channel))
+                .into(),
+            Self::Grey(weights) => vec![luma_root(photo, weights)],
+        }
+    }
+}
+
 /// The bands of a photo, in units of noise.
 pub(super) struct Bands {
     /// What is finer than about 2 pixels, of the photo's size.
-    pub(super) first: Image<f32>,
+    pub(super) finest: Image<f32>,
     /// The other bands, each of its own size, from the second one.
     coarser: Vec<Image<f32>>,
     /// Sizes of the pyramid's levels, the photo's own first.
@@ -29,29 +57,21 @@ pub(super) struct Bands {
 
 impl Bands {
     /// Splits a photo into so many bands.
-    pub(super) fn of(photo: &Image<LinearRgb>, tone: LumaMode, count: usize) -> Self {
-        let pictures = match tone {
-            LumaMode::Channels => {
-                vec![
-                    root(photo, [1.0, 0.0, 0.0]),
-                    root(photo, [0.0, 1.0, 0.0]),
-                    root(photo, [0.0, 0.0, 1.0]),
-                ]
-            }
-            LumaMode::Grey(weights) => vec![root(photo, weights)],
-        };
-        let mut channels: Vec<_> = pictures
+    pub(super) fn new(photo: &Image<LinearRgb>, luma: LumaMode, count: usize) -> Self {
+        let mut channels: Vec<_> = luma
+            .pictures(photo)
             .into_iter()
-            .map(|picture| magnitudes(picture, count).into_iter())
+            .map(|picture| band_magnitudes(picture, count).into_iter())
             .collect();
-        let mut bands =
-            (0..count).map(|_| joined(channels.iter_mut().filter_map(Iterator::next).collect()));
-        let first = bands.next().unwrap_or_default();
+        let mut bands = (0..count)
+            .map(|_| in_units_of_noise(channels.iter_mut().filter_map(Iterator::next).collect()));
+        let finest = bands.next().unwrap_or_default();
         let coarser: Vec<_> = bands.map(|band| largest_around(&band, 1)).collect();
-        let mut sizes = vec![first.size()];
-        sizes.extend(coarser.iter().map(Image::size));
+        let sizes = std::iter::once(finest.size())
+            .chain(coarser.iter().map(Image::size))
+            .collect();
         Self {
-            first,
+            finest,
             coarser,
             sizes,
         }
@@ -60,8 +80,8 @@ impl Bands {
     /// What is about `2^level` pixels wide, brought to the photo's size; `level` is 2 or more.
     ///
     /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the very edge that it
-    /// tells of.
-    pub(super) fn last(&self, level: usize) -> Image<f32> {
+    /// shows.
+    pub(super) fn at_full_size(&self, level: usize) -> Image<f32> {
         let band = self.coarser[level - 2].clone();
         let finer = self.sizes[..level - 1].iter().rev();
         finer.fold(band, |picture, &(w, h)| filter::expand(&picture, w, h))
@@ -73,7 +93,7 @@ impl Bands {
 /// The square root makes the shot noise of a sensor the same everywhere (the transform of Anscombe without its offset)
 /// and is near to what a display-encoded picture holds. Equal weights keep a blue screen from going black, which
 /// luminance would do.
-pub(super) fn root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
+pub(super) fn luma_root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
     let sum: f32 = weights.iter().sum();
     let [r, g, b] = weights.map(|w| w / sum);
     photo.map(|p| {
@@ -83,33 +103,35 @@ pub(super) fn root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
 }
 
 /// Magnitudes of the bands of one picture, each of its own size.
-fn magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
+fn band_magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
     let mut smooth = picture;
-    let band = |_| {
+    let mut bands = Vec::with_capacity(count);
+    for _ in 0..count {
         let coarse = filter::reduce(&smooth);
         let expanded = filter::expand(&coarse, smooth.width(), smooth.height());
-        let band = smooth.zip_map(&expanded, |a, b| (a - b).abs());
+        bands.push(smooth.zip_map(&expanded, |a, b| (a - b).abs()));
         smooth = coarse;
-        band
-    };
-    (0..count).map(band).collect()
+    }
+    bands
 }
 
 /// The bands of some channels as one, in units of noise: root of the sum of squares.
 ///
 /// No channel counts as less noisy than half their median: square roots have the same shot noise in all of them, and one
 /// that seems to have none is clipped.
-fn joined(bands: Vec<Image<f32>>) -> Image<f32> {
-    let noises: Vec<f32> = bands.iter().map(noise).collect();
-    let mut sorted = noises.clone();
-    sorted.sort_by(f32::total_cmp);
-    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(ROUNDING);
-    let units = bands.iter().zip(&noises).map(|(band, noise)| {
-        let unit = 1.0 / noise.max(0.5 * median);
-        band.map(|c| (c * unit) * (c * unit))
-    });
-    let sum = units.reduce(|a, b| a.zip_map(&b, |a, b| a + b));
-    sum.unwrap_or_default().map(f32::sqrt)
+fn in_units_of_noise(bands: Vec<Image<f32>>) -> Image<f32> {
+    let noises: Vec<f32> = bands.iter().map(noise_sigma).collect();
+    let least = 0.5 * median(&noises);
+    bands
+        .iter()
+        .zip(&noises)
+        .map(|(band, noise)| {
+            let unit = 1.0 / noise.max(least);
+            band.map(|v| (v * unit) * (v * unit))
+        })
+        .reduce(|a, b| a.zip_map(&b, |a, b| a + b))
+        .unwrap_or_default()
+        .map(f32::sqrt)
 }
 
 /// The largest value at most `reach` columns and rows away, for every pixel.
@@ -136,35 +158,56 @@ fn raise(row: &mut [f32], other: &[f32]) {
     }
 }
 
+/// The upper one of the values in the middle; the least noise where there is none.
+fn median(values: &[f32]) -> f32 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    sorted
+        .get(sorted.len() / 2)
+        .copied()
+        .unwrap_or(ROUNDING_SIGMA)
+}
+
 /// Width of the frame along the border that shows the background, as a share of the longer side.
-const FRAME: f64 = 1.0 / 24.0;
+const FRAME_WIDTH: f64 = 1.0 / 24.0;
 /// Share of the frame that the noise is read from: an object may cover almost three quarters of it.
-const QUIET: f64 = 0.25;
+const QUIET_SHARE: f64 = 0.25;
 /// The magnitude below which a quarter of a normal variate of deviation 1 lies.
-const QUIET_OF_NORMAL: f32 = 0.318_64;
+const QUARTILE_OF_NORMAL: f32 = 0.318_64;
 /// Least noise: the rounding of an 8-bit picture, one step over the square root of 12.
-const ROUNDING: f32 = 1.0 / 255.0 / 3.464;
+const ROUNDING_SIGMA: f32 = 1.0 / 255.0 / 3.464;
 
 /// Standard deviation of a band on the background, robust against an object that reaches into the frame.
 ///
 /// # Method
 /// As the median absolute deviation, but from the lower quartile and along the border of the picture, where an object
 /// is not: `quartile / 0.3186` for normal noise.
-fn noise(magnitudes: &Image<f32>) -> f32 {
-    let (w, h) = magnitudes.size();
-    let frame = ((w.max(h) as f64 * FRAME) as usize).max(1);
-    let (left, right) = (frame.min(w), w.saturating_sub(frame).max(frame.min(w)));
-    let on_frame = |(y, row): (usize, &'_ [f32])| match y < frame || y + frame >= h {
-        true => row.to_vec(),
-        false => [&row[..left], &row[right..]].concat(),
-    };
-    let mut values: Vec<f32> = magnitudes.rows().enumerate().flat_map(on_frame).collect();
-    let rank = (values.len() as f64 * QUIET) as usize;
+fn noise_sigma(magnitudes: &Image<f32>) -> f32 {
+    let mut values = frame_values(magnitudes);
+    let rank = (values.len() as f64 * QUIET_SHARE) as usize;
     if rank >= values.len() {
-        return ROUNDING;
+        return ROUNDING_SIGMA;
     }
     let (_, quartile, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    (*quartile / QUIET_OF_NORMAL).max(ROUNDING)
+    (*quartile / QUARTILE_OF_NORMAL).max(ROUNDING_SIGMA)
+}
+
+/// The values in a frame along the border.
+fn frame_values(image: &Image<f32>) -> Vec<f32> {
+    let (w, h) = image.size();
+    let frame = ((w.max(h) as f64 * FRAME_WIDTH) as usize).max(1);
+    let left = frame.min(w);
+    let right = w.saturating_sub(frame).max(left);
+    let mut values = Vec::new();
+    for (y, row) in image.rows().enumerate() {
+        if y < frame || y + frame >= h {
+            values.extend_from_slice(row);
+        } else {
+            values.extend_from_slice(&row[..left]);
+            values.extend_from_slice(&row[right..]);
+        }
+    }
+    values
 }
 
 #[cfg(test)]
@@ -190,7 +233,7 @@ mod tests {
 
     #[test]
     fn noise_is_the_standard_deviation_of_normal_noise() {
-        let measured = noise(&noisy(200, 0.02));
+        let measured = noise_sigma(&noisy(200, 0.02));
         assert!((measured / 0.02 - 1.0).abs() < 0.05, "{measured}");
     }
 
@@ -205,7 +248,7 @@ mod tests {
             },
         );
         // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the noise, 3.7 times its own.
-        assert!(noise(&busy) < 4.0 * noise(&quiet));
+        assert!(noise_sigma(&busy) < 4.0 * noise_sigma(&quiet));
     }
 
     #[test]
@@ -226,17 +269,17 @@ mod tests {
 
     #[test]
     fn a_constant_has_no_bands() {
-        let bands = Bands::of(
+        let bands = Bands::new(
             &Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)),
             LumaMode::Channels,
             4,
         );
         assert!(
             bands
-                .first
+                .finest
                 .pixels()
                 .iter()
-                .chain(bands.last(4).pixels())
+                .chain(bands.at_full_size(4).pixels())
                 .all(|v| *v < 0.01)
         );
     }
@@ -250,7 +293,7 @@ mod tests {
                 LinearRgb::new(0.04, 0.25, 0.0)
             }
         });
-        let seen = |tone| Bands::of(&photo, tone, 4).first[(32, 32)];
+        let seen = |luma| Bands::new(&photo, luma, 4).finest[(32, 32)];
         assert!(seen(LumaMode::Grey([1.0; 3])) < 0.01 && seen(LumaMode::Channels) > 50.0);
     }
 }

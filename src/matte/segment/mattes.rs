@@ -1,4 +1,4 @@
-//! What a segmentation tells a keyer: the screen, and what surely is not or surely is the object.
+//! Garbage and core mattes for a keyer, from a segmentation.
 
 use super::Segmentation;
 use crate::filter;
