@@ -19,7 +19,7 @@ pub fn uv_to_direction([u, v]: [f64; 2]) -> Vector3<f64> {
     Vector3::new(radius * cos, radius * sin, z)
 }
 
-/// The colour at a place of a picture: bilinear between texel centres, around in `u`, the outermost row going on in `v`.
+/// The colour at a place of a picture (in one piece: light sums call it several times a texel): bilinear between texel centres, around in `u`, the outermost row going on in `v`.
 pub(super) fn sample(image: &Image<LinearRgb>, [u, v]: [f64; 2]) -> LinearRgb {
     let (width, height) = image.size();
     let x = u * width as f64 - 0.5;

@@ -9,12 +9,12 @@ use super::measure::Measured;
 use super::rectified::RectifiedPhoto;
 use super::scale::Scale;
 use super::screen_source::EmptyScreens;
-use crate::diagnostic::Code;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
 use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
-use crate::pixel::LinearRgb;
+use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
 use std::borrow::Cow;
 use std::path::Path;
@@ -79,13 +79,18 @@ impl CutOutWriter<'_> {
         log_diagnostics(&cut, &entry.file);
         let record = record(&cut, entry, &photo)?;
         watch.lap("measure");
-        io::create_folder(self.folder.join(&entry.asset))?;
-        let path = self.folder.join(&record.file);
-        let film = files::write(&path, &cut)?;
-        check_pixels(&film).map_err(|what| Error::file(path, what))?;
+        let film = self.write_files(&cut, &record)?;
         watch.lap("write");
         watch.log(entry.file.display());
         Ok(Photo::new(film, record))
+    }
+
+    fn write_files(&self, cut: &CutOut, record: &PhotoRecord) -> Result<Image<Film>> {
+        let path = self.folder.join(&record.file);
+        io::create_folder(path.parent().unwrap_or(self.folder))?;
+        let film = files::write(&path, cut)?;
+        check_pixels(&film).map_err(|what| Error::file(path, what))?;
+        Ok(film)
     }
 
     /// The empty screen as the photo shows it, where there is a photo of it.
@@ -143,6 +148,11 @@ fn log_diagnostics(cut: &CutOut, photo: &Path) {
     }
 }
 
+/// The diagnostics of a cut-out that a person should review.
+fn to_review(cut: &CutOut) -> impl Iterator<Item = Diagnostic> {
+    cut.diagnostics.iter().filter(|d| d.needs_review()).cloned()
+}
+
 /// What the manifest says of a cut-out.
 ///
 /// # Errors
@@ -154,11 +164,7 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
     let (w, h) = cut.film.size();
     let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);
     let outline_px = cut.hull.iter().map(files::rounded).collect();
-    let to_review = cut.diagnostics.iter().filter(|d| d.needs_review());
-    let diagnostics = to_review
-        .cloned()
-        .chain(measured.size_mismatch)
-        .chain(photo.diagnostic());
+    let warnings = measured.size_mismatch.into_iter().chain(photo.diagnostic());
     Ok(PhotoRecord {
         source: entry.source(),
         object_m: measured.object_m,
@@ -170,7 +176,7 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
-        diagnostics: diagnostics.collect(),
+        diagnostics: to_review(cut).chain(warnings).collect(),
         ..PhotoRecord::new(
             entry.cut_out_file(),
             measured.px_per_metre,

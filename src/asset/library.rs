@@ -68,15 +68,7 @@ impl Library {
         manifest: Manifest,
         added: Vec<Photo>,
     ) -> Result<Self> {
-        let records: Vec<(String, &PhotoRecord)> = places_and_records(&manifest).collect();
-        let photos: Vec<Result<Photo>> = records
-            .par_iter()
-            .map(|(at, record)| {
-                let added = added.iter().find(|photo| photo.record == **record);
-                added.map_or_else(|| load(folder, record, at), |photo| Ok(photo.clone()))
-            })
-            .collect();
-        let mut photos = photos.into_iter();
+        let mut photos = load_all(folder, &manifest, &added).into_iter();
         let assets = manifest.assets.into_iter().map(|asset| {
             let count = asset.photos.len();
             Ok(asset.with_photos(photos.by_ref().take(count).collect::<Result<_>>()?))
@@ -99,6 +91,18 @@ impl Library {
     pub fn class_number(&self, asset: &Asset<Photo>) -> u32 {
         class_number(&self.classes, &asset.class).expect("a class of the library")
     }
+}
+
+/// The photos of a manifest in its order: those that are there, and the others from their files.
+fn load_all(folder: &Path, manifest: &Manifest, added: &[Photo]) -> Vec<Result<Photo>> {
+    let records: Vec<(String, &PhotoRecord)> = places_and_records(manifest).collect();
+    records
+        .par_iter()
+        .map(|(at, record)| {
+            let added = added.iter().find(|photo| photo.record == **record);
+            added.map_or_else(|| load(folder, record, at), |photo| Ok(photo.clone()))
+        })
+        .collect()
 }
 
 /// All photos of a manifest, with where they stand in it.

@@ -248,7 +248,7 @@ fn summed_area_table(rows: &[Vec<Moments>]) -> Vec<Moments> {
     corners
 }
 
-/// Cells of a row of the grid, each the sum over places inside that are denser than the panorama's texels.
+/// Cells of a row of the grid (in one loop: it visits every texel of a map several times), each the sum over places inside that are denser than the panorama's texels.
 fn grid_row(panorama: &Image<LinearRgb>, j: usize) -> Vec<Moments> {
     let (width, height) = panorama.size();
     let across = 2 * width.div_ceil(GRID_CELLS[0]);

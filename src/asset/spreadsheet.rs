@@ -48,14 +48,11 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<Row>> {
         names: headers.iter().map(column_name).collect::<Result<_>>()?,
         has_decimal_commas: separator != b',',
     };
-    let mut rows = Vec::new();
-    for record in reader.records() {
-        let row = sheet.row(&record.map_err(|e| csv_error(&e))?)?;
-        if !row.cells.is_empty() {
-            rows.push(row);
-        }
-    }
-    Ok(rows)
+    reader
+        .records()
+        .map(|record| sheet.row(&record.map_err(|e| csv_error(&e))?))
+        .filter(|row| !matches!(row, Ok(row) if row.cells.is_empty()))
+        .collect()
 }
 
 /// What stands in the columns of a spreadsheet.

@@ -29,15 +29,17 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     }
     let outline = Polygon::new(LineString(px), Vec::new());
     let parts = outline.intersection_with_fill_rule(&picture(camera), FillRule::NonZero);
-    let [w, h] = camera.image.map(f64::from);
     without_slivers(parts)
-        .map(|part| {
-            part.map_coords(|c| Coord {
-                x: c.x.clamp(0.0, w),
-                y: c.y.clamp(0.0, h),
-            })
-        })
+        .map(|part| part.map_coords(|c| clamp_to_picture(c, camera)))
         .collect()
+}
+
+fn clamp_to_picture(c: Coord<f64>, camera: &Camera) -> Coord<f64> {
+    let [w, h] = camera.image.map(f64::from);
+    Coord {
+        x: c.x.clamp(0.0, w),
+        y: c.y.clamp(0.0, h),
+    }
 }
 
 /// What two outlines share, slivers left out.

@@ -42,14 +42,17 @@ pub(crate) fn draw_labels(
         draw::outline(canvas, &ring, UNLABELLED);
     }
     for object in boxed {
-        let b = object.amodal_box;
-        let b = BBox {
-            x0: b.x0 * scale_x,
-            y0: b.y0 * scale_y,
-            x1: b.x1 * scale_x,
-            y1: b.y1 * scale_y,
-        };
+        let b = scaled(&object.amodal_box, [scale_x, scale_y]);
         draw::border(canvas, &b, draw::class_color(object.class), 1);
+    }
+}
+
+fn scaled(b: &BBox, [x, y]: [f64; 2]) -> BBox {
+    BBox {
+        x0: b.x0 * x,
+        y0: b.y0 * y,
+        x1: b.x1 * x,
+        y1: b.y1 * y,
     }
 }
 

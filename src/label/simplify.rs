@@ -145,12 +145,19 @@ impl CornerLinks {
         }
         let own = [self.before[at], at, self.after[at]];
         let triangle = own.map(|i| self.positions[i]);
+        !self
+            .corners_near(triangle)
+            .any(|i| self.kept[i] && !own.contains(&i) && holds(triangle, self.positions[i]))
+    }
+
+    /// The corners within the bounds of a triangle.
+    fn corners_near(&self, triangle: [[f64; 2]; 3]) -> impl Iterator<Item = usize> {
         let [left, right] = extent(triangle.map(|c| c[0]));
         let [top, bottom] = extent(triangle.map(|c| c[1]));
         let in_rows = self.rows[top as usize..=bottom as usize].iter().flatten();
-        !in_rows
-            .filter(|i| (left..=right).contains(&self.positions[**i][0]))
-            .any(|i| self.kept[*i] && !own.contains(i) && holds(triangle, self.positions[*i]))
+        in_rows
+            .copied()
+            .filter(move |i| (left..=right).contains(&self.positions[*i][0]))
     }
 
     /// Drops a corner and returns those beside it.

@@ -33,13 +33,17 @@ pub(crate) fn occluders(
             let Some(center) = overlap_center(&first.region, &second.region, iou) else {
                 continue;
             };
-            let first_is_nearer = inverse_depth(first.card, camera, center)
-                >= inverse_depth(second.card, camera, center);
-            let (above, below) = if first_is_nearer { (i, j) } else { (j, i) };
+            let first_is_above = is_above(first.card, second.card, camera, center);
+            let (above, below) = if first_is_above { (i, j) } else { (j, i) };
             occluders[below].push(objects[above].card.id);
         }
     }
     occluders
+}
+
+/// Of two cards that meet at a pixel position, the first is at least as near.
+fn is_above(first: &Card, second: &Card, camera: &Camera, px: Point2<f64>) -> bool {
+    inverse_depth(first, camera, px) >= inverse_depth(second, camera, px)
 }
 
 /// The objects of cyclic overlaps: each lies, through others, over itself (A over B over C over A).
