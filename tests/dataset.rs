@@ -1,5 +1,7 @@
 //! A dataset's folder: the same bytes whoever made it and however often they were stopped, and trainers accept it.
 
+#![cfg(feature = "pipeline")]
+
 use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{

@@ -3,6 +3,8 @@
 //! The programs are Python packages: `$PETCOMP_PYTHON` (or `python3`) is asked for them, and where it has none, the test
 //! says so and passes. `make formats` fetches pycocotools and runs all of this.
 
+#![cfg(feature = "pipeline")]
+
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{

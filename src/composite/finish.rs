@@ -83,6 +83,23 @@ struct ExposedValue {
     plate: f32,
 }
 
+/// Factor on the plate at a pixel, and the plate; black where there is none.
+#[inline(always)]
+fn seen_plate(
+    deep: &DeepImage,
+    plate: Option<&Image<LinearRgb>>,
+    at: (usize, usize),
+    pixel: PremulRgba,
+) -> ([f32; 3], [f32; 3]) {
+    match plate {
+        Some(plate) => {
+            let passes = deep.flat(at.0, at.1).transmittance() * deep.shadow()[at];
+            (passes.into(), plate[at].into())
+        }
+        None => ([1.0 - pixel.a; 3], [0.0; 3]),
+    }
+}
+
 impl SensorNoise {
     fn add_to(
         &self,
@@ -93,15 +110,9 @@ impl SensorNoise {
         work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
-            let (passes, behind): ([f32; 3], [f32; 3]) = match plate {
-                Some(plate) => {
-                    let passes = deep.flat(x, y).transmittance() * deep.shadow()[(x, y)];
-                    (passes.into(), plate[(x, y)].into())
-                }
-                None => ([1.0 - p.a; 3], [0.0; 3]),
-            };
-            let value: [f32; 3] = p.color().into();
+            let (passes, behind) = seen_plate(deep, plate, (x, y), p);
             let index = 3 * (y * frame.width() + x) as u64;
+            let value: [f32; 3] = p.color().into();
             let noisy: [f32; 3] = std::array::from_fn(|c| {
                 let exposed = ExposedValue {
                     value: value[c],

@@ -12,7 +12,7 @@ use crate::dataset::folder::{self, IDENTITY};
 use crate::dataset::{Entry, Inputs, Obstructed, Part, Plan, Written};
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
-use crate::label::knotted;
+use crate::label::cyclic_overlaps;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -75,7 +75,7 @@ impl Line {
             part: entry.part,
             classes,
             obstructed: objects.iter().filter(|object| !object.is_topmost()).count() as u32,
-            knotted: knotted(objects).len() as u32,
+            knotted: cyclic_overlaps(objects).len() as u32,
             retries: entry.sample.rejected.len() as u32,
             files: files
                 .iter()

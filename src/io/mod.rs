@@ -40,7 +40,7 @@
 //!   a mistake is named with its line.
 //!
 //! Not guaranteed: that decoders have no mistakes ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
-//! and Debian does not repair them), that a kernel without Landlock or seccomp has an equal sandbox (one warning says so;
+//! and Debian does not repair them), that a kernel without Landlock or seccomp has an equal sandbox (one warning reports it;
 //! [`Fallback::StrictWorker`] refuses), that the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
 //! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be distinguished from real ones.
 

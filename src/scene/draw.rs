@@ -47,7 +47,7 @@ pub enum Distribution {
     Uniform([f64; 2]),
     /// Integers from the first to the second, both included.
     Whole([f64; 2]),
-    /// The places in a list of so many.
+    /// The places in a list of this length.
     Choice(usize),
 }
 

@@ -1,9 +1,38 @@
-//! Scene: everything an author says of one picture, unknowns included.
+//! Scene: everything that is known of one picture, unknowns included.
 //!
 //! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and enter the pipeline
 //! here. What is not known yet is an enum variant ([`CameraSource::Rectangle`], [`Placement::Drop`],
 //! [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each turn their own unknown into the known one
 //! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
+//!
+//! # Examples
+//! A scene is drawn from a recipe, and is a pure function of it, the seed and the number:
+//! ```
+//! use petcomp::scene::{AssetVariant, Background, CameraSource, Recipe};
+//!
+//! let recipe: Recipe = toml::from_str("objects = 3\ngrade = { hue_deg = 0 }")?;
+//! let tray = Background {
+//!     name: "tray".into(),
+//!     size: [0.6, 0.4],
+//!     camera: CameraSource::Rectangle {
+//!         corners_px: [[20.0, 40.0], [620.0, 40.0], [620.0, 440.0], [20.0, 440.0]],
+//!         photo: [640, 480],
+//!         focal_px: None,
+//!     },
+//! };
+//! let bottle = AssetVariant {
+//!     asset: "bottle".into(),
+//!     photo_sizes: vec![[0.2, 0.07]],
+//!     photo_outlines: vec![],
+//!     thickness: 0.005,
+//!     mass: 0.03,
+//! };
+//! let (backgrounds, catalog) = ([tray], [bottle]);
+//! let scene = recipe.scene(7, 0, &backgrounds, &catalog)?;
+//! assert_eq!(scene.objects.len(), 3);
+//! assert_eq!(scene, recipe.scene(7, 0, &backgrounds, &catalog)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub(crate) mod bounds;
 mod catalog;
@@ -116,7 +145,7 @@ pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
     /// Coefficient of friction of everything that touches here, the cards among themselves too; the walls over the edges,
-    /// which nobody sees, are smooth. Default: 0.5.
+    /// which are invisible, are smooth. Default: 0.5.
     #[serde(default = "Surface::default_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
@@ -125,7 +154,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// A surface of this width and height (metres), with the usual friction and no bounce.
+    /// A surface of this width and height (metres), with the default friction and no bounce.
     pub const fn new(size: [f64; 2]) -> Self {
         Self {
             size,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PostProcess {
-    /// Brighter or darker by so many stops. Default: 0.
+    /// Brighter or darker by this many stops. Default: 0.
     pub exposure_ev: f64,
     /// Factor on each channel. Default: 1, 1, 1.
     pub white_balance: LinearRgb,

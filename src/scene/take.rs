@@ -1,15 +1,15 @@
-//! How much of a list a recipe uses.
+//! How much of a list a recipe takes.
 
 use serde::{Deserialize, Serialize};
 
-/// All of a list, or the first so many; in files `"all"` or a number above 0.
+/// All of a list, or its first entries; in files `"all"` or a number above 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "TakeInFile", into = "TakeInFile")]
 pub enum Take {
     /// All of it.
     #[default]
     All,
-    /// The first so many, or all where there are fewer; at least one.
+    /// This many from the start, or all where there are fewer; at least one.
     First(usize),
 }
 

@@ -83,10 +83,10 @@ pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
 /// Where OpenImageIO runs.
 #[derive(Clone, Copy, Default, clap::ValueEnum)]
 enum OpenImageIo {
-    /// In a confined process of its own
+    /// In a sandboxed process of its own
     #[default]
     Worker,
-    /// The same, and no such picture is read where the system lacks Landlock or seccomp to confine it
+    /// The same, and no such picture is read where the system lacks Landlock or seccomp for its sandbox
     WorkerStrict,
     /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
     InProcess,

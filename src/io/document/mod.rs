@@ -104,7 +104,7 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
     })
 }
 
-/// Reads a document that says by its extension whether it is JSON (`.json`) or TOML (any other).
+/// Reads a document whose extension shows whether it is JSON (`.json`) or TOML (any other).
 ///
 /// # Errors
 /// As [`read_toml`].

@@ -20,7 +20,7 @@ pub const SCRIPT: &str = "scene_reference.py";
 const SCRIPT_TEXT: &str = include_str!("../../../golden/render/scene_reference.py");
 /// Samples of a pixel that the scene asks for: noise of about 1e-3.
 const SAMPLES_PER_PIXEL: u32 = 1024;
-/// Side of a surface without end, for a program that wants a number, metres.
+/// Side of an endless surface for a program that needs a number, metres.
 const ENDLESS_SIDE_M: f64 = 1000.0;
 
 /// Writes `scene.json`, its plate, textures and environment (float EXR), and the script that renders them in Blender.

@@ -30,15 +30,9 @@ pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     if let Some(plate) = &file.plate {
         shot = shot.with_plate(Arc::new(folder.read_plate(&plate.path, size)?));
     }
-    shot.catcher = match &file.ground {
-        Some(ground) => ground.extent,
-        None => file.tray.size.map(|side| CATCHER_RATIO * side),
-    };
+    shot.catcher = catcher_size(&file);
     shot.lights = file.lights.iter().map(area_light).collect();
-    let quads = file.quads.iter();
-    shot.cards = quads
-        .map(|quad| folder.read_card(quad))
-        .collect::<Result<_>>()?;
+    shot.cards = folder.read_cards(&file.quads)?;
     if let Some(around) = &file.environment {
         shot.ambient = around.color.unwrap_or_default().scale(around.strength);
         shot.environment = folder.read_environment(around)?;
@@ -94,6 +88,10 @@ impl PictureFolder {
         Ok(averaged(&photo.map(PremulRgba::color), size))
     }
 
+    fn read_cards(&self, quads: &[CyclesQuad]) -> Result<Vec<Card>> {
+        quads.iter().map(|quad| self.read_card(quad)).collect()
+    }
+
     fn read_card(&self, quad: &CyclesQuad) -> Result<Card> {
         let placed = Quad {
             world_from_card: world_from_card(&quad.pose),
@@ -138,6 +136,14 @@ impl PictureFolder {
             rotation: around.rotation_z.to_radians(),
             strength: around.strength,
         }))
+    }
+}
+
+/// Width and height of the part of the floor that receives shadows, metres.
+fn catcher_size(file: &CyclesFile) -> [f64; 2] {
+    match &file.ground {
+        Some(ground) => ground.extent,
+        None => file.tray.size.map(|side| CATCHER_RATIO * side),
     }
 }
 

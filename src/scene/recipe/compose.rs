@@ -32,9 +32,7 @@ impl Recipe {
         } else {
             self.select_objects(number, log, catalog)?
         };
-        for (i, object) in objects.iter_mut().enumerate() {
-            self.vary_object(object, &draws, &format!("objects[{i}]"));
-        }
+        self.vary_objects(&mut objects, &draws);
         let surface = self.draw_surface(&draws, background.size);
         DropColumn {
             background: &background.name,
@@ -99,6 +97,12 @@ impl Recipe {
         match self.surface_albedo {
             None => Exposure::MatchPlate { gain_ev },
             Some(albedo) => Exposure::MatchSurface { albedo, gain_ev },
+        }
+    }
+
+    fn vary_objects(&self, objects: &mut [Object], draws: &Draws) {
+        for (i, object) in objects.iter_mut().enumerate() {
+            self.vary_object(object, draws, &format!("objects[{i}]"));
         }
     }
 

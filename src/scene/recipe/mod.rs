@@ -24,7 +24,7 @@ const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to
 
 /// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this document.
 ///
-/// A file only says what it wants otherwise: every field has a default.
+/// Every field has a default, so a file only holds what differs from it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Recipe {
@@ -32,9 +32,9 @@ pub struct Recipe {
     pub image: [u32; 2],
     /// Sources of variation that are switched off; all other draws stay as they are. Default: none.
     pub off: Vec<Variation>,
-    /// Labelled photos of the place that are used, each a viewpoint: the first so many. Default: `"all"`.
+    /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default: `"all"`.
     pub viewpoints: Take,
-    /// Photos of each asset that are used: the first so many. Default: `"all"`.
+    /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
     pub photos: Take,
     /// Objects in a scene. Default: `[4, 12]`.
     pub objects: Range,

@@ -25,7 +25,7 @@ pub enum Selections {
     /// A new choice for every scene.
     #[default]
     Unique,
-    /// So many; scene `k` has choice `k` modulo this.
+    /// This many; scene `k` has choice `k` modulo this.
     Count(u64),
 }
 

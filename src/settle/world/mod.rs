@@ -99,7 +99,7 @@ pub(super) struct Fall {
     pub(super) samples: Vec<MotionSample>,
 }
 
-/// Times that the step must be halved for so many objects.
+/// Times that the step must be halved for this number of objects.
 fn halvings_for(objects: usize) -> u32 {
     objects
         .div_ceil(OBJECTS_PER_STEP_RATE)
@@ -203,7 +203,7 @@ impl Drop<'_> {
     }
 
     /// Adds the floor and four walls, which reach above the highest start. The walls are smooth: what
-    /// nobody sees supports nothing.
+    /// is invisible supports nothing.
     fn add_room(&self, world: &mut PhysicsWorld, units: &WorldUnits, members: &[usize]) {
         let half_sides = self
             .scene
