@@ -12,8 +12,8 @@ OUT       := demo
 REPORT    := target/report
 PYTHON    := $(CURDIR)/target/python/bin/python
 BENCHES   := $(notdir $(basename $(wildcard tests/benches/*.rs)))
-# Each set of features that stands alone; the first, empty one builds without a C++ compiler.
-FEATURES  := "" markers oiio settle
+# Each set of features that stands alone; the first, empty one is the matte without a C++ compiler.
+FEATURES  := "" pipeline markers oiio settle
 
 # Seconds for each door of fuzz/.
 FUZZ      := 60

@@ -64,7 +64,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// A [`Error::File`] from anything that says what is wrong; the system's numbers of errors are left out.
+    /// A [`Error::File`] from any message; the system's numbers of errors are left out.
     pub fn file(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
         Self::File {
             path: path.as_ref().into(),
@@ -80,7 +80,7 @@ impl Error {
         }
     }
 
-    /// The same error, its field path told from one level further out: `count` within `scene` is `scene.count`.
+    /// The same error, its field path from one level further out: `count` within `scene` is `scene.count`.
     pub fn within(self, outer: &str) -> Self {
         match self {
             Self::Value { at, what } => Self::Value {
@@ -91,7 +91,7 @@ impl Error {
         }
     }
 
-    /// The same error, told of the document that the value stands in.
+    /// The same error, with the document that the value stands in.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         let path = path.as_ref().to_path_buf();
         match self {
@@ -105,10 +105,10 @@ impl Error {
     }
 }
 
-/// What the system says of an error without its number, in our spelling: `no such file or directory`.
-fn without_number(said: &str) -> String {
-    let Some((front, rest)) = said.split_once(" (os error ") else {
-        return said.into();
+/// The system's message without its number, in our spelling: `no such file or directory`.
+fn without_number(message: &str) -> String {
+    let Some((front, rest)) = message.split_once(" (os error ") else {
+        return message.into();
     };
     let behind = rest.split_once(')').map_or("", |(_, behind)| behind);
     // The system's own words are the last of the message, and the only ones that begin with a capital.
@@ -143,6 +143,18 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
+/// Letters of a foreign message that are shown; a damaged file may make a decoder list thousands of numbers.
+const SHOWN_LETTERS: usize = 300;
+
+/// The beginning of a text of any form on one line.
+pub(crate) fn one_line(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(SHOWN_LETTERS) {
+        Some((end, _)) => format!("{}..", &line[..end]),
+        None => line,
+    }
+}
+
 /// Control characters, separators of lines and paragraphs, and marks of direction (Unicode Bidirectional Algorithm,
 /// "explicit directional embeddings, overrides and isolates").
 fn is_control(c: char) -> bool {
@@ -174,6 +186,15 @@ mod tests {
         );
         assert_eq!(printable("exe\u{202e}gpj"), "exe\\x202egpj");
         assert_eq!(printable("größe 3 \\ µm"), "größe 3 \\ µm");
+    }
+
+    #[test]
+    fn long_messages_are_cut() {
+        assert_eq!(one_line(" a\n b "), "a b");
+        assert_eq!(
+            one_line(&"ö ".repeat(9999)).chars().count(),
+            SHOWN_LETTERS + 2
+        );
     }
 
     #[test]

@@ -30,43 +30,68 @@
 //! let frame = composite::picture(&shot, &Default::default());
 //! assert!(frame[(32, 24)].r > frame[(32, 24)].g);
 //! ```
+#![cfg_attr(
+    not(feature = "pipeline"),
+    allow(dead_code, unused_imports, reason = "the pipeline uses it")
+)]
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
+#[cfg(feature = "pipeline")]
 mod allowance;
+#[cfg(feature = "pipeline")]
 pub mod asset;
 mod bounds;
+#[cfg(feature = "pipeline")]
 pub mod camera;
 pub mod color;
+#[cfg(feature = "pipeline")]
 pub mod composite;
+#[cfg(feature = "pipeline")]
 pub mod dataset;
+#[cfg(feature = "pipeline")]
 mod deep;
 mod diagnostic;
 pub mod diff;
+#[cfg(feature = "pipeline")]
 mod draw;
 mod error;
+#[cfg(feature = "pipeline")]
 pub mod eval;
 pub mod filter;
+#[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
 pub mod geom;
 mod image;
 pub mod io;
+#[cfg(feature = "pipeline")]
 pub mod label;
+#[cfg(feature = "pipeline")]
 pub mod light;
 pub mod matte;
 mod pixel;
+#[cfg(feature = "pipeline")]
 pub mod plot;
 mod quality;
+#[cfg(feature = "pipeline")]
 pub mod render;
+#[cfg(feature = "pipeline")]
 pub mod scene;
 #[cfg(feature = "settle")]
 pub mod settle;
 mod stopwatch;
+#[cfg(feature = "pipeline")]
 pub mod train;
+#[cfg(feature = "counters")]
 pub mod work;
+#[cfg(not(feature = "counters"))]
+mod work;
 
+#[cfg(feature = "pipeline")]
 pub use allowance::Allowance;
+#[cfg(feature = "pipeline")]
 pub use camera::Camera;
+#[cfg(feature = "pipeline")]
 pub use deep::{DeepImage, DeepSample};
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use error::{Error, Result, printable};
@@ -75,4 +100,5 @@ pub use pixel::{
     Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
 };
 pub use quality::Quality;
+#[cfg(feature = "pipeline")]
 pub use scene::{Scene, Shot};

@@ -3,6 +3,8 @@
 //! Every view is a function of a seed and its number. The tables were measured with another program (the prototype), with
 //! other random views; hence the slack.
 
+#![cfg(feature = "pipeline")]
+#![cfg(feature = "pipeline")]
 #![expect(
     clippy::unwrap_used,
     clippy::print_stdout,

@@ -1,5 +1,7 @@
 //! Awkward and wrong labels: what happens, exactly. The extreme ones are rows of `petcomp-report stability`.
 
+#![cfg(feature = "pipeline")]
+#![cfg(feature = "pipeline")]
 #![expect(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 use petcomp::camera::simulate::{Scenario, View};

@@ -1,5 +1,7 @@
 //! Printed markers on a tray, in pictures from steep sides.
 
+#![cfg(feature = "pipeline")]
+
 use petcomp::camera::simulate::Scenario;
 use petcomp::camera::{self, project_picture};
 use petcomp::filter::Pyramid;

@@ -1,4 +1,7 @@
 //! The sample backgrounds: cameras from their labels, and from their printed markers, against the renderer's truth.
+
+#![cfg(feature = "pipeline")]
+
 use petcomp::camera::{self, CameraFile, Label, SolveOptions};
 use petcomp::geom::{Point2, Point3};
 use petcomp::{Image, LinearRgb, io};

@@ -1,5 +1,7 @@
 //! A dataset's folder: the same bytes whoever made it and however often they were stopped, and trainers accept it.
 
+#![cfg(feature = "pipeline")]
+
 use petcomp::DeepImage;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
@@ -37,6 +39,8 @@ fn scene(k: u64) -> Scene {
         exposure: Exposure::default(),
         cast: Default::default(),
         finish: Default::default(),
+        files: None,
+        settings: Default::default(),
     }
 }
 

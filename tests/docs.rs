@@ -1,5 +1,7 @@
 //! What the documentation says is what the code has.
 
+#![cfg(feature = "pipeline")]
+
 use petcomp::Code;
 use std::fs;
 use std::path::Path;

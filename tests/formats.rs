@@ -3,6 +3,8 @@
 //! The programs are Python packages: `$PETCOMP_PYTHON` (or `python3`) is asked for them, and where it has none, the test
 //! says so and passes. `make formats` fetches pycocotools and runs all of this.
 
+#![cfg(feature = "pipeline")]
+
 use petcomp::asset::Texture;
 use petcomp::camera::Camera;
 use petcomp::dataset::{
@@ -12,7 +14,7 @@ use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{CameraSource, Card, Cast, Exposure, Finish, Grade, Surface};
+use petcomp::scene::{CameraSource, Card, Exposure, Grade, LightTint, PostProcess, Surface};
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -89,7 +91,7 @@ fn shot(k: u64) -> Shot {
 
 fn sample(k: u64) -> Result<Sample> {
     let shot = shot(k);
-    let deep = render::cast(&shot, &Default::default());
+    let deep = render::render(&shot, &Default::default());
     let frame = composite::frame(&deep, shot.plate.as_deref());
     let labels = label(&deep, &shot, &LabelOptions::default());
     let scene = Scene {
@@ -102,8 +104,10 @@ fn sample(k: u64) -> Result<Sample> {
         ambient: LinearRgb::grey(1.0),
         environment: None,
         exposure: Exposure::default(),
-        cast: Cast::default(),
-        finish: Finish::default(),
+        cast: LightTint::default(),
+        finish: PostProcess::default(),
+        files: None,
+        settings: Default::default(),
     };
     Ok(Sample {
         frame,
@@ -342,7 +346,7 @@ fn a_box_is_that_of_the_object_rendered_alone() {
                 ..shot.clone()
             };
             let alone = label(
-                &render::cast(&alone, &Default::default()),
+                &render::render(&alone, &Default::default()),
                 &alone,
                 &LabelOptions::default(),
             );

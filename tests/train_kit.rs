@@ -1,5 +1,7 @@
 //! The Python part of the training kit, run by Python where PyTorch is there.
 
+#![cfg(feature = "pipeline")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 

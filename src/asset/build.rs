@@ -47,8 +47,7 @@ pub fn build(
     let path = path.as_path();
     let list = List::read(path)?;
     let mut manifest = read_or_new(folder)?;
-    list.check(&mut manifest).map_err(|e| e.in_file(path))?;
-    let list = list.located_in(path.parent().unwrap_or(Path::new("")));
+    let list = checked(list, path, &mut manifest)?;
     let outcomes = cut_out_all(&list, folder, progress);
     let (photos, refused) =
         insert_all(&list, outcomes, &mut manifest).map_err(|e| e.in_file(path))?;
@@ -59,14 +58,17 @@ pub fn build(
     manifest.write(folder)?;
     Ok(Built {
         photos: photos.len(),
-        lengths: photos
-            .iter()
-            .map(|photo| [photo.record.object_m[0], photo.record.error_m])
-            .collect(),
+        lengths: photos.iter().map(length_and_error).collect(),
         needs_review: photos.iter().filter_map(review_line).collect(),
         refused,
-        library: Library::of_manifest(folder, manifest, photos)?,
+        library: Library::from_manifest(folder, manifest, photos)?,
     })
+}
+
+/// A list from a file, whose classes the manifest takes in; its paths are made relative to the working folder.
+fn checked(list: List, path: &Path, manifest: &mut Manifest) -> Result<List> {
+    list.check(manifest).map_err(|e| e.in_file(path))?;
+    Ok(list.located_in(path.parent().unwrap_or(Path::new(""))))
 }
 
 /// Cuts out and writes the photos of a list.
@@ -112,6 +114,10 @@ fn insert_all(
         }
     }
     Ok((photos, refused))
+}
+
+fn length_and_error(photo: &Photo) -> [f64; 2] {
+    [photo.record.object_m[0], photo.record.error_m]
 }
 
 /// Why a person should review a cut-out, after the name of its file.

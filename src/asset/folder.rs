@@ -11,9 +11,12 @@ use super::scale::Scale;
 use super::screen_source::EmptyScreens;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::io;
 use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
+use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
@@ -68,29 +71,43 @@ impl CutOutWriter<'_> {
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
         let mut watch = Stopwatch::start();
         let photo = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;
-        let empty = self
-            .empty_screens
-            .get(&entry.screen)?
-            .map(|empty| photo.same_view(empty))
-            .transpose()?;
+        let empty = self.empty_screen(entry, &photo)?;
         watch.lap("read");
-        let options = CutOutOptions {
-            screen: entry.screen.color().or(self.options.screen),
-            ..self.options.clone()
-        };
-        let cut = cut_out_on(&photo.photo, empty.as_deref(), &options)
+        let cut = cut_out_on(&photo.photo, empty.as_deref(), &self.options_for(entry))
             .map_err(|e| with_name(e, &entry.file))?;
         watch.lap("cut out");
         log_diagnostics(&cut, &entry.file);
         let record = record(&cut, entry, &photo)?;
         watch.lap("measure");
-        io::create_folder(self.folder.join(&entry.asset))?;
-        let path = self.folder.join(&record.file);
-        let film = files::write(&path, &cut)?;
-        check_pixels(&film).map_err(|what| Error::file(path, what))?;
+        let film = self.write_files(&cut, &record)?;
         watch.lap("write");
         watch.log(entry.file.display());
         Ok(Photo::new(film, record))
+    }
+
+    fn write_files(&self, cut: &CutOut, record: &PhotoRecord) -> Result<Image<Film>> {
+        let path = self.folder.join(&record.file);
+        io::create_folder(path.parent().unwrap_or(self.folder))?;
+        let film = files::write(&path, cut)?;
+        check_pixels(&film).map_err(|what| Error::file(path, what))?;
+        Ok(film)
+    }
+
+    /// The empty screen as the photo shows it, where there is a photo of it.
+    fn empty_screen(
+        &self,
+        entry: &PhotoEntry,
+        photo: &RectifiedPhoto,
+    ) -> Result<Option<Cow<'_, Image<LinearRgb>>>> {
+        let empty = self.empty_screens.get(&entry.screen)?;
+        empty.map(|empty| photo.same_view(empty)).transpose()
+    }
+
+    fn options_for(&self, entry: &PhotoEntry) -> CutOutOptions {
+        CutOutOptions {
+            screen: entry.screen.color().or(self.options.screen),
+            ..self.options.clone()
+        }
     }
 }
 
@@ -131,6 +148,11 @@ fn log_diagnostics(cut: &CutOut, photo: &Path) {
     }
 }
 
+/// The diagnostics of a cut-out that a person should review.
+fn to_review(cut: &CutOut) -> impl Iterator<Item = Diagnostic> {
+    cut.diagnostics.iter().filter(|d| d.needs_review()).cloned()
+}
+
 /// What the manifest says of a cut-out.
 ///
 /// # Errors
@@ -142,14 +164,7 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
     let (w, h) = cut.film.size();
     let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);
     let outline_px = cut.hull.iter().map(files::rounded).collect();
-    let file = entry.cut_out_file();
-    let diagnostics = cut
-        .diagnostics
-        .iter()
-        .filter(|d| Diagnostic::needs_review(d))
-        .cloned()
-        .chain(measured.size_mismatch)
-        .chain(photo.diagnostic());
+    let warnings = measured.size_mismatch.into_iter().chain(photo.diagnostic());
     Ok(PhotoRecord {
         source: entry.source(),
         object_m: measured.object_m,
@@ -161,7 +176,12 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         outline_confidence: cut.segmentation.confidence.value(),
         color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
-        diagnostics: diagnostics.collect(),
-        ..PhotoRecord::new(file, measured.px_per_metre, size_m, outline_px)
+        diagnostics: to_review(cut).chain(warnings).collect(),
+        ..PhotoRecord::new(
+            entry.cut_out_file(),
+            measured.px_per_metre,
+            size_m,
+            outline_px,
+        )
     })
 }

@@ -256,17 +256,9 @@ impl Bundle {
 
     /// A photo's part of the normal equations, by pose and by what is shared.
     fn photo_block(&self, equations: &BundleEquations, index: usize) -> PhotoBlock {
-        let (normal, count) = (&equations.normals[index], self.shared.len());
+        let normal = &equations.normals[index];
         let information = &normal.information;
-        let mut block = PhotoBlock {
-            pose: information
-                .fixed_view::<POSE_UNKNOWNS, POSE_UNKNOWNS>(0, 0)
-                .into(),
-            pose_right: -Vector6::from(normal.slope.fixed_rows::<POSE_UNKNOWNS>(0)),
-            coupling: Matrix6xX::zeros(count),
-            own: DMatrix::zeros(count, count),
-            own_right: DVector::zeros(count),
-        };
+        let mut block = PhotoBlock::uncoupled(normal, self.shared.len());
         for (unknown, column) in self.columns(index) {
             let coupling = information.fixed_view::<POSE_UNKNOWNS, 1>(0, unknown);
             block.coupling.set_column(column, &coupling);
@@ -363,6 +355,20 @@ impl BundleEquations {
 }
 
 impl PhotoBlock {
+    /// A pose, and nothing yet of so many shared unknowns.
+    fn uncoupled(normal: &NormalEquations, shared: usize) -> Self {
+        let pose = normal
+            .information
+            .fixed_view::<POSE_UNKNOWNS, POSE_UNKNOWNS>(0, 0);
+        Self {
+            pose: pose.into(),
+            pose_right: -Vector6::from(normal.slope.fixed_rows::<POSE_UNKNOWNS>(0)),
+            coupling: Matrix6xX::zeros(shared),
+            own: DMatrix::zeros(shared, shared),
+            own_right: DVector::zeros(shared),
+        }
+    }
+
     /// Inverse of the pose's block, damped in proportion to its diagonal.
     fn inverse_pose(&self, damping: f64) -> Option<Matrix6<f64>> {
         let mut pose = self.pose;
@@ -405,11 +411,11 @@ fn shared_priors(problems: &[Problem], surface: &[usize]) -> Option<Vec<Prior>> 
     let lens = best_known.residuals.priors;
     let principal = Prior::at_zero(lens.principal_sigma);
     let mut shared = vec![lens.ln_focal, principal, principal, lens.kappa];
-    for s in 0..surface.iter().max().map_or(0, |last| last + 1) {
+    let surfaces = surface.iter().max().map_or(0, |last| last + 1);
+    shared.extend((0..surfaces).map(|s| {
         let shown = surface.iter().position(|&x| x == s).unwrap_or(0);
-        let stretch_sigma = problems[shown].residuals.priors.stretch_sigma;
-        shared.push(Prior::at_zero(stretch_sigma));
-    }
+        Prior::at_zero(problems[shown].residuals.priors.stretch_sigma)
+    }));
     Some(shared)
 }
 

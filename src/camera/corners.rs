@@ -107,9 +107,7 @@ fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
     let areas = triangle_areas(&c.map(|p| p.coords));
     let limit_px = COLLINEAR_SIGMAS * sigma;
     for (left_out, area) in areas.into_iter().enumerate() {
-        let [i, j, k] = [1, 2, 3].map(|n| c[(left_out + n) % 4]);
-        let longest = (i - j).norm().max((j - k).norm()).max((k - i).norm());
-        let height_px = area / longest;
+        let height_px = area / longest_side_without(c, left_out);
         if height_px <= -limit_px.max(f64::MIN_POSITIVE) {
             return Err(SolveError::NotConvex);
         }
@@ -122,6 +120,12 @@ fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
         }
     }
     Ok(())
+}
+
+/// The longest side of the triangle of the other three corners.
+fn longest_side_without(c: &[Point2<f64>; 4], left_out: usize) -> f64 {
+    let [i, j, k] = [1, 2, 3].map(|n| c[(left_out + n) % 4]);
+    (i - j).norm().max((j - k).norm()).max((k - i).norm())
 }
 
 fn small_quad(c: &[Point2<f64>; 4]) -> Option<Diagnostic> {

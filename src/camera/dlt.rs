@@ -18,9 +18,10 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
     let to = normalisation(pairs.iter().map(|p| p.1))?;
     let mut square = SMatrix::<f64, 9, 9>::zeros();
     for (p, q) in pairs {
-        for row in equations(&(from * p.to_homogeneous()), &(to * q.to_homogeneous())) {
-            square += row * row.transpose();
-        }
+        let (p, q) = (from * p.to_homogeneous(), to * q.to_homogeneous());
+        square = equations(&p, &q)
+            .iter()
+            .fold(square, |square, row| square + row * row.transpose());
     }
     let h = null_vector(square, SINGULAR_EIGENVALUE * pairs.len() as f64)?;
     let map = to.try_inverse()? * Matrix3::from_fn(|i, j| h[3 * i + j]) * from;

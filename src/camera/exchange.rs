@@ -1,10 +1,10 @@
-//! Cameras as other programs say them: Blender, OpenCV, COLMAP.
+//! Cameras in the terms of other programs: Blender, OpenCV, COLMAP.
 //!
 //! # Method
 //! Blender looks along -z with +y up, so its frame is ours turned by diag(1, -1, -1); its lens shifts are in units of the
 //! side that the sensor is fitted to. OpenCV's pixel centres are integers. COLMAP's pixels are ours.
 
-use crate::camera::Camera;
+use super::pinhole::Camera;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -74,7 +74,7 @@ pub struct ColmapModel {
 
 impl BlenderCamera {
     /// The fitted side, pixels of the picture's width.
-    fn view(&self, [w, h]: [f64; 2]) -> f64 {
+    fn fitted_side(&self, [w, h]: [f64; 2]) -> f64 {
         let tall = self.pixel_aspect * h;
         match self.sensor_fit {
             SensorFit::Horizontal => w,
@@ -83,7 +83,7 @@ impl BlenderCamera {
         }
     }
 
-    fn sensor(&self) -> f64 {
+    fn sensor_mm(&self) -> f64 {
         if self.sensor_fit == SensorFit::Vertical {
             self.sensor_height
         } else {
@@ -107,8 +107,8 @@ impl Camera {
             pixel_aspect,
             matrix_world: self.matrix_world(),
         };
-        let view = camera.view([w, h]);
-        camera.lens = self.focal_px.x * camera.sensor() / view;
+        let view = camera.fitted_side([w, h]);
+        camera.lens = self.focal_px.x * camera.sensor_mm() / view;
         camera.shift_x = (w / 2.0 - self.principal_px.x) / view;
         camera.shift_y = (self.principal_px.y - h / 2.0) * pixel_aspect / view;
         camera
@@ -116,16 +116,17 @@ impl Camera {
 
     fn matrix_world(&self) -> [[f64; 4]; 4] {
         let turned = self.rotation().transpose() * blender_flip();
-        let (at, row) = (self.center(), |i: usize| turned.row(i).into_owned());
-        let line = |i: usize| [row(i)[0], row(i)[1], row(i)[2], at[i]];
-        [line(0), line(1), line(2), [0.0, 0.0, 0.0, 1.0]]
+        let center = self.center();
+        let [x, y, z] =
+            [0, 1, 2].map(|i| [turned[(i, 0)], turned[(i, 1)], turned[(i, 2)], center[i]]);
+        [x, y, z, [0.0, 0.0, 0.0, 1.0]]
     }
 
     /// The camera that Blender renders a picture of this size with.
     pub fn from_blender(blender: &BlenderCamera, image: [u32; 2]) -> Self {
         let [w, h] = image.map(f64::from);
-        let view = blender.view([w, h]);
-        let fx = blender.lens / blender.sensor() * view;
+        let view = blender.fitted_side([w, h]);
+        let fx = blender.lens / blender.sensor_mm() * view;
         let principal_px = Point2::new(
             w / 2.0 - blender.shift_x * view,
             h / 2.0 + blender.shift_y * view / blender.pixel_aspect,
@@ -147,10 +148,9 @@ impl Camera {
         let mut k = self.intrinsics();
         k[(0, 2)] -= 0.5;
         k[(1, 2)] -= 0.5;
-        let rows = |m: Matrix3<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)]));
         OpencvCamera {
-            k: rows(k),
-            r: rows(self.rotation()),
+            k: matrix_rows(&k),
+            r: matrix_rows(&self.rotation()),
             t: self.camera_from_world.translation.vector.into(),
         }
     }
@@ -235,25 +235,36 @@ impl ColmapModel {
     pub fn new<'a>(views: impl IntoIterator<Item = (&'a str, &'a Camera)>) -> Self {
         let mut model = Self::default();
         for (i, (name, camera)) in views.into_iter().enumerate() {
-            let (id, [w, h]) = (i + 1, camera.image);
-            let (f, c) = (camera.focal_px, camera.principal_px);
+            let id = i + 1;
+            let pose = colmap_pose(camera);
             // Writing to a string cannot fail.
-            let _ = writeln!(
-                model.cameras,
-                "{id} PINHOLE {w} {h} {:?} {:?} {:?} {:?}",
-                f.x, f.y, c.x, c.y
-            );
-            let (q, t) = (
-                camera.camera_from_world.rotation,
-                camera.camera_from_world.translation.vector,
-            );
-            let pose = [q.w, q.i, q.j, q.k, t.x, t.y, t.z]
-                .map(|v| format!("{v:?}"))
-                .join(" ");
+            let _ = writeln!(model.cameras, "{id} PINHOLE {}", colmap_intrinsics(camera));
             let _ = writeln!(model.images, "{id} {pose} {id} {name}\n");
         }
         model
     }
+}
+
+fn colmap_intrinsics(camera: &Camera) -> String {
+    let [w, h] = camera.image;
+    let (f, c) = (camera.focal_px, camera.principal_px);
+    format!("{w} {h} {:?} {:?} {:?} {:?}", f.x, f.y, c.x, c.y)
+}
+
+/// Rotation as a quaternion, w first, and translation.
+fn colmap_pose(camera: &Camera) -> String {
+    let Pose {
+        rotation: q,
+        translation,
+    } = camera.camera_from_world;
+    let t = translation.vector;
+    [q.w, q.i, q.j, q.k, t.x, t.y, t.z]
+        .map(|v| format!("{v:?}"))
+        .join(" ")
+}
+
+pub(crate) fn matrix_rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)]))
 }
 
 /// Our camera frame and Blender's: y and z point the other way.

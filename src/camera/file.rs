@@ -1,11 +1,11 @@
 //! Solution files (`NAME.camera.json`): a solved camera with everything that is known of it.
 
-use super::exchange::{BlenderCamera, OpencvCamera};
+use super::exchange::{BlenderCamera, OpencvCamera, matrix_rows};
 use super::focal::FocalSource;
 use super::label::{Framing, Label, LabelImage};
 use super::label_check::MAX_MAGNITUDE;
 use super::pinhole::Camera;
-use super::solution::Solution;
+use super::solution::{FocalFinding, Solution};
 use super::uncertainty::UNKNOWN_NAMES;
 use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
@@ -234,7 +234,30 @@ impl CameraFile {
     }
 }
 
+impl FittedSurface {
+    fn new([width_m, height_m]: [f64; 2]) -> Self {
+        Self { width_m, height_m }
+    }
+}
+
+impl FocalPrior {
+    fn new(focal: &FocalFinding) -> Self {
+        Self {
+            px: focal.prior_px,
+            sigma: finite(focal.prior_sigma),
+        }
+    }
+}
+
 impl Model {
+    fn new(solution: &Solution) -> Self {
+        Self {
+            f_px: solution.camera.focal_px.x,
+            principal_point_px: solution.camera.principal_px.into(),
+            kappa: solution.kappa,
+        }
+    }
+
     fn check(&self) -> Result<()> {
         check_positive("model.f_px", self.f_px)?;
         self.principal_point_px
@@ -309,30 +332,20 @@ impl FoundCamera {
         let camera = &solution.camera;
         let homography = camera.pixel_from_surface().0;
         Self {
-            model: Model {
-                f_px: camera.focal_px.x,
-                principal_point_px: camera.principal_px.into(),
-                kappa: solution.kappa,
-            },
+            model: Model::new(solution),
             opencv: camera.to_opencv(),
             center_m: camera.center().into(),
             tilt_deg: camera.tilt().to_degrees(),
             blender: camera.to_blender(),
-            surface: FittedSurface {
-                width_m: solution.size[0],
-                height_m: solution.size[1],
-            },
-            homography: [0, 1, 2].map(|i| [0, 1, 2].map(|j| homography[(i, j)])),
+            surface: FittedSurface::new(solution.size),
+            homography: matrix_rows(&homography),
             sigma: SigmaRecord::new(solution),
             fit: FitRecord::new(solution),
             framing: solution.framing,
             focal_source: solution.focal_source,
             data_share: solution.focal.share,
             focal_from_data: solution.focal.from_data_px,
-            focal_prior: FocalPrior {
-                px: solution.focal.prior_px,
-                sigma: finite(solution.focal.prior_sigma),
-            },
+            focal_prior: FocalPrior::new(&solution.focal),
             warnings: solution.warnings.clone(),
             alternative: solution
                 .alternative
@@ -345,7 +358,6 @@ impl FoundCamera {
 impl SigmaRecord {
     fn new(solution: &Solution) -> Self {
         let sigma = &solution.sigma;
-        let row = |i: usize| sigma.covariance.row(i).iter().map(|&v| finite(v)).collect();
         Self {
             ln_f: finite(sigma.ln_focal),
             tilt_deg: finite(sigma.tilt.to_degrees()),
@@ -354,7 +366,11 @@ impl SigmaRecord {
             height_ref_m: sigma.reference_height,
             principal_point_px: finite(sigma.principal_px),
             unknowns: UNKNOWN_NAMES.map(String::from).into(),
-            covariance: (0..UNKNOWN_NAMES.len()).map(row).collect(),
+            covariance: sigma
+                .covariance
+                .row_iter()
+                .map(|row| row.iter().map(|&v| finite(v)).collect())
+                .collect(),
         }
     }
 }

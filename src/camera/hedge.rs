@@ -16,6 +16,7 @@ use super::solution::{Sigma, Solution};
 use super::uncertainty::{grid_at_height, repaired_variance};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Point3, Vector2};
+use nalgebra::Matrix2;
 
 /// Corners that cost so much in a whole picture, and so little in one that may be cropped, are of a cropped one.
 pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
@@ -72,24 +73,25 @@ impl Solution {
         let (camera, other, sigma) = (&self.camera, &loose.camera, &loose.sigma);
         let moved = other.center() - camera.center();
         let middle = other.principal_px - camera.principal_px;
-        let corners = [0, 1, 2, 3].map(|i| {
-            let off =
-                loose.sees(corner_points(loose.size)[i]) - self.sees(corner_points(self.size)[i]);
-            sigma.corners_px[i] + off * off.transpose()
-        });
+        let ln_focal_off = libm::log(other.focal_px.x / camera.focal_px.x);
         Sigma {
-            ln_focal: libm::hypot(
-                sigma.ln_focal,
-                libm::log(other.focal_px.x / camera.focal_px.x),
-            ),
+            ln_focal: libm::hypot(sigma.ln_focal, ln_focal_off),
             tilt: libm::hypot(sigma.tilt, other.tilt() - camera.tilt()),
             center: sigma.center + moved * moved.transpose(),
-            corners_px: corners,
+            corners_px: self.corner_covariances_with(loose),
             reference_height: self.sigma.reference_height,
             height_px: libm::hypot(sigma.height_px, self.height_apart_px(loose)),
             principal_px: libm::hypot(sigma.principal_px, middle.norm() / std::f64::consts::SQRT_2),
             covariance: sigma.covariance + apart * apart.transpose(),
         }
+    }
+
+    fn corner_covariances_with(&self, loose: &Self) -> [Matrix2<f64>; 4] {
+        let (own, other) = (corner_points(self.size), corner_points(loose.size));
+        [0, 1, 2, 3].map(|i| {
+            let off = loose.sees(other[i]) - self.sees(own[i]);
+            loose.sigma.corners_px[i] + off * off.transpose()
+        })
     }
 
     /// Root mean square distance of points at the reference height as two cameras see them.

@@ -51,36 +51,50 @@ impl OutlierPhoto {
 /// # Errors
 /// [`SolveError::DifferentPictures`] where the shapes differ; the first photo's error where no photo can be used.
 pub fn solve_joint(labels: &[Label], options: &SolveOptions) -> Result<Joint, SolveError> {
-    if let Some(other) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
-        return Err(SolveError::DifferentPictures { photo: other });
+    if let Some(photo) = labels.iter().position(|l| !same_frame(l, &labels[0])) {
+        return Err(SolveError::DifferentPictures { photo });
     }
-    let mut photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
+    let photos: Vec<_> = labels.iter().map(|label| solve(label, options)).collect();
     if let Some(Err(error)) = photos.first().filter(|_| photos.iter().all(Result::is_err)) {
         return Err(error.clone());
     }
-    let mut outliers: Vec<OutlierPhoto> = photos
-        .iter()
-        .enumerate()
-        .filter_map(|(photo, solution)| misfit_outlier(photo, solution.as_ref().ok()?))
-        .collect();
     let solver = JointSolver {
         labels,
         alone: &photos,
         options,
     };
-    if let Some(estimate) = solver.whole_or_cropped()? {
-        for (solution, photo) in estimate.solutions.into_iter().zip(estimate.used) {
-            photos[photo] = Ok(solution);
-        }
-        outliers.extend(estimate.outliers);
+    let estimate = solver.whole_or_cropped()?;
+    let mut joint = Joint {
+        outliers: misfit_outliers(&photos),
+        photos,
+    };
+    if let Some(estimate) = estimate {
+        joint.apply(estimate);
     }
-    Ok(Joint { photos, outliers })
+    Ok(joint)
 }
 
-/// A photo that no camera fits when it is alone.
-fn misfit_outlier(photo: usize, solution: &Solution) -> Option<OutlierPhoto> {
-    let chi2 = solution.fit.chi2;
-    solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
+impl Joint {
+    /// Replaces the solutions of the photos that agree.
+    fn apply(&mut self, estimate: JointEstimate) {
+        for (solution, photo) in estimate.solutions.into_iter().zip(estimate.used) {
+            self.photos[photo] = Ok(solution);
+        }
+        self.outliers.extend(estimate.outliers);
+    }
+}
+
+/// The photos that no camera fits when they are alone.
+fn misfit_outliers(photos: &[Result<Solution, SolveError>]) -> Vec<OutlierPhoto> {
+    photos
+        .iter()
+        .enumerate()
+        .filter_map(|(photo, solution)| {
+            let solution = solution.as_ref().ok()?;
+            let chi2 = solution.fit.chi2;
+            solution.misfit().map(|_| OutlierPhoto { photo, chi2 })
+        })
+        .collect()
 }
 
 /// Photos of one camera, and what each gives alone.
@@ -129,19 +143,18 @@ impl JointSolver<'_> {
             let bundle = Bundle::new(self.labels, &used, unknown, self.options)?;
             let best = bundle.best(self.alone).ok_or(SolveError::NoPose)?;
             let outlier = worst_photo(&best.chi2).filter(|_| outliers.len() < most_outliers);
-            let Some((worst, chi2)) = outlier else {
-                return Ok(Some(JointEstimate {
-                    used,
-                    solutions: bundle.solutions(&best, self.options),
-                    states: best.states,
-                    cost: best.cost,
-                    outliers,
-                }));
-            };
-            outliers.push(OutlierPhoto {
-                photo: used.remove(worst),
-                chi2,
-            });
+            if let Some((worst, chi2)) = outlier {
+                let photo = used.remove(worst);
+                outliers.push(OutlierPhoto { photo, chi2 });
+                continue;
+            }
+            return Ok(Some(JointEstimate {
+                used,
+                solutions: bundle.solutions(&best, self.options),
+                states: best.states,
+                cost: best.cost,
+                outliers,
+            }));
         }
         Ok(None)
     }

@@ -111,19 +111,23 @@ fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
     let grown = (width * 2).div_ceil(LEGEND_COLUMNS).max(1);
     let columns = width.div_ceil(grown).max(1);
     let text_columns = columns.saturating_sub(TEXT_LEFT_PX + MARGIN_PX);
-    let entries = entries(solution);
-    let lines: Vec<LegendEntry> = entries
+    let lines: Vec<LegendEntry> = entries(solution)
         .iter()
         .flat_map(|entry| entry.wrapped(text_columns))
         .collect();
+    let canvas = draw_lines(&lines, columns);
+    Image::from_fn(width, canvas.height() * grown, |x, y| {
+        decode_srgb8(canvas[(x / grown, y / grown)])
+    })
+}
+
+fn draw_lines(lines: &[LegendEntry], columns: usize) -> Image<Srgb8> {
     let rows = 2 * MARGIN_PX + lines.len() * LEGEND_SIZE.height();
     let mut canvas = Image::filled(columns, rows, PAPER);
     for (i, line) in lines.iter().enumerate() {
         line.draw(&mut canvas, MARGIN_PX + i * LEGEND_SIZE.height());
     }
-    Image::from_fn(width, canvas.height() * grown, |x, y| {
-        decode_srgb8(canvas[(x / grown, y / grown)])
-    })
+    canvas
 }
 
 fn entries(solution: &Solution) -> Vec<LegendEntry> {
@@ -226,11 +230,16 @@ impl OverlayDrawing {
             drawing.line(line, GRID_COLOR, GRID_WEIGHT);
         }
         drawing.draw_box(solution.size, solution.sigma.reference_height);
-        for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
-            drawing.cross(corner * zoom);
-            drawing.ellipse(corner * zoom, &(covariance * zoom * zoom));
-        }
+        drawing.draw_corners(solution, zoom);
         drawing
+    }
+
+    /// Labelled corners and their error ellipses, in a picture enlarged by `zoom`.
+    fn draw_corners(&mut self, solution: &Solution, zoom: f64) {
+        for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
+            self.cross(corner * zoom);
+            self.ellipse(corner * zoom, &(covariance * zoom * zoom));
+        }
     }
 
     /// The rectangle, and a box of some height over it.
@@ -272,15 +281,9 @@ impl OverlayDrawing {
         let radii = eigen
             .eigenvalues
             .map(|v| ELLIPSE_SIGMAS * v.max(0.0).sqrt());
-        let points: Vec<_> = (0..=ELLIPSE_POINTS)
-            .map(|i| {
-                let angle = std::f64::consts::TAU * i as f64 / ELLIPSE_POINTS as f64;
-                let along = Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle));
-                center + eigen.eigenvectors * along
-            })
-            .collect();
-        for ends in points.windows(2) {
-            self.stroke([ends[0], ends[1]], LABEL_COLOR, self.line_px);
+        for i in 0..ELLIPSE_POINTS {
+            let ends = [i, i + 1].map(|i| center + eigen.eigenvectors * on_ellipse(&radii, i));
+            self.stroke(ends, LABEL_COLOR, self.line_px);
         }
     }
 
@@ -309,6 +312,12 @@ impl OverlayDrawing {
             range_near([a.y, b.y], reach, self.picture.height()),
         )
     }
+}
+
+/// One of the points around an ellipse along the axes.
+fn on_ellipse(radii: &Vector2<f64>, i: usize) -> Vector2<f64> {
+    let angle = std::f64::consts::TAU * i as f64 / ELLIPSE_POINTS as f64;
+    Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle))
 }
 
 /// The pixels of a row or column of so many that are within a distance of an interval.

@@ -70,20 +70,22 @@ impl Problem {
         let sides = MeasuredSides::new(label, options)?;
         let (corners_px, warnings) = used_corners(label, sides, options)?;
         let units = SolverUnits::for_picture(label);
-        let (mut ln_focal, prior_source) = focal::length_prior(label, framing, &options.priors);
-        ln_focal.mean -= libm::log(units.unit_px);
+        let (ln_focal, prior_source) = units.focal_prior(label, framing, &options.priors);
         let prior_focal = libm::exp(ln_focal.mean);
         let kappa = kappa_prior(label, focal.unwrap_or(prior_focal), &options.priors);
-        let quad = corners_px.map(|c| undistorted(units.from_px(c), kappa.mean));
-        let projected = ProjectedRectangle::new(&quad);
+        let projected = units.projected(&corners_px, kappa.mean);
         let size = sides.completed(|| ratio_by_right_angle(&projected, prior_focal));
         let units = units.for_rectangle(size);
-        let priors = ParameterPriors {
-            ln_focal,
-            stretch_sigma: sides.stretch_sigma(label, &options.priors),
-            principal_sigma: principal_sigma(label, framing, &options.priors),
-            kappa,
-            ln_height: height_prior(label, &units),
+        let residuals = Residuals {
+            observations: units.observations(label, size, &corners_px, sides.stretch_shares()),
+            priors: ParameterPriors {
+                ln_focal,
+                stretch_sigma: sides.stretch_sigma(label, &options.priors),
+                principal_sigma: principal_sigma(label, framing, &options.priors),
+                kappa,
+                ln_height: height_prior(label, &units),
+            },
+            ln_focal_range: units.ln_focal_range(label),
         };
         Ok(Self {
             image: label.image_size(),
@@ -93,11 +95,7 @@ impl Problem {
             projected,
             size,
             stretch_shares: sides.stretch_shares(),
-            residuals: Residuals {
-                observations: units.observations(label, size, &corners_px, sides.stretch_shares()),
-                priors,
-                ln_focal_range: units.ln_focal_range(label),
-            },
+            residuals,
             prior_source,
             warnings,
         })
@@ -190,6 +188,23 @@ impl SolverUnits {
         }
     }
 
+    /// Prior of the logarithm of the focal length.
+    fn focal_prior(
+        &self,
+        label: &Label,
+        framing: Framing,
+        priors: &Priors,
+    ) -> (Prior, PriorSource) {
+        let (mut ln_focal, source) = focal::length_prior(label, framing, priors);
+        ln_focal.mean -= libm::log(self.unit_px);
+        (ln_focal, source)
+    }
+
+    /// The rectangle as a camera without distortion would show it.
+    fn projected(&self, corners_px: &[Point2<f64>; 4], kappa: f64) -> ProjectedRectangle {
+        ProjectedRectangle::new(&corners_px.map(|c| undistorted(self.from_px(c), kappa)))
+    }
+
     fn from_px(&self, px: Point2<f64>) -> Vector2<f64> {
         (px - self.principal_px) / self.unit_px
     }
@@ -214,27 +229,24 @@ impl SolverUnits {
         stretch_shares: StretchShares,
     ) -> Vec<Observation> {
         let sigma_px = corner_sigma_px(label);
-        let count = if label.surface.corners_px.is_some() {
-            4
-        } else {
-            0
-        };
+        let is_labelled = label.surface.corners_px.is_some();
         let corners = corner_points(size)
             .into_iter()
             .zip(corners_px)
-            .take(count)
+            .filter(|_| is_labelled)
             .map(|(point, &px)| self.observation(point, px, sigma_px));
         // Where both sides were measured, so was the point, with the same tape.
         let rigid = stretch_shares != StretchShares::BOTH;
-        let further = label.points.iter().map(|p: &LabelPoint| Observation {
+        let further = label.points.iter().map(|point| Observation {
             rigid,
-            ..self.observation(
-                p.xyz_m.into(),
-                label.pixel(p.px),
-                p.sigma_px.unwrap_or(sigma_px),
-            )
+            ..self.point_observation(label, point)
         });
         corners.chain(further).collect()
+    }
+
+    fn point_observation(&self, label: &Label, point: &LabelPoint) -> Observation {
+        let sigma_px = point.sigma_px.unwrap_or(corner_sigma_px(label));
+        self.observation(point.xyz_m.into(), label.pixel(point.px), sigma_px)
     }
 
     /// Of a point that stretches with the rectangle.

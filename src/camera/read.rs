@@ -192,9 +192,7 @@ fn own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
     labels
         .into_iter()
         .map(|label| {
-            if !label.image.file.is_empty() {
-                io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
-            }
+            check_photo_path(&label).map_err(|e| e.in_file(path))?;
             Ok(LabelledPhoto {
                 name: match is_array {
                     true => stem(Path::new(&label.image.file)),
@@ -205,6 +203,15 @@ fn own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
             })
         })
         .collect()
+}
+
+/// A photo that is named lies in or below the folder of its label.
+fn check_photo_path(label: &Label) -> Result<()> {
+    let file = &label.image.file;
+    if file.is_empty() {
+        return Ok(());
+    }
+    io::below("", file).map(drop).map_err(|e| e.within("image"))
 }
 
 /// `bg0001` of `bg0001.label.json`, or of `bg0001.json`.
@@ -288,14 +295,20 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let folder = path.parent().unwrap_or(Path::new(""));
     io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
     let header = io::read_header(&photo)?;
-    let ([w, h], [expected_w, expected_h]) = ([header.width, header.height], label.image_size());
-    if [w, h] != [expected_w as usize, expected_h as usize] {
-        let photo = photo.display();
-        let what = format!("{expected_w} x {expected_h} pixels, but {photo} has {w} x {h}");
-        return Err(Error::value("image", what).in_file(path));
-    }
+    check_photo_size(&label, &photo, &header).map_err(|e| e.in_file(path))?;
     apply_exif(&mut label, &header);
     Ok(label)
+}
+
+/// A photo has the size that its label says.
+fn check_photo_size(label: &Label, photo: &Path, header: &io::Header) -> Result<()> {
+    let ([w, h], [expected_w, expected_h]) = ([header.width, header.height], label.image_size());
+    if [w, h] == [expected_w as usize, expected_h as usize] {
+        return Ok(());
+    }
+    let photo = photo.display();
+    let what = format!("{expected_w} x {expected_h} pixels, but {photo} has {w} x {h}");
+    Err(Error::value("image", what))
 }
 
 /// Takes over what the photo's file says of its camera and the label does not.

@@ -77,12 +77,8 @@ impl ProjectedRectangle {
         let ((a, dw), (b, dh)) = (self.along, self.down);
         let along = a.push(focal * dw);
         let up = -b.push(focal * dh);
-        let (x, y) = (along.normalize(), up.normalize());
-        let (sum, difference) = ((x + y).normalize(), (x - y).normalize());
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let (x, y) = ((sum + difference) * half, (sum - difference) * half);
         ScaledPose {
-            rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]),
+            rotation: rotation_between(&along, &up),
             center: self.center.xy() / self.center.z,
             scale: (along.norm() / size[0] + up.norm() / size[1]) / (2.0 * self.center.z),
         }
@@ -103,16 +99,31 @@ impl ProjectedRectangle {
         let leans = (lean, if dot > 0.0 { -other } else { other });
         let (scale, center) = (squared.sqrt(), self.center.xy() / self.center.z);
         [1.0, -1.0].map(|sign| {
-            let x = (along / scale).push(sign * leans.0).normalize();
+            let x = (along / scale).push(sign * leans.0);
             let y = (up / scale).push(sign * leans.1);
-            let y = (y - x * x.dot(&y)).normalize();
             ScaledPose {
-                rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]),
+                rotation: rotation_along_x(&x, &y),
                 center,
                 scale,
             }
         })
     }
+}
+
+/// The rotation whose x axis is along a vector, and whose y axis is nearest to another.
+fn rotation_along_x(x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix3<f64> {
+    let x = x.normalize();
+    let y = (y - x * x.dot(y)).normalize();
+    Matrix3::from_columns(&[x, y, x.cross(&y)])
+}
+
+/// The rotation whose x and y axes are both equally near to two vectors.
+fn rotation_between(x: &Vector3<f64>, y: &Vector3<f64>) -> Matrix3<f64> {
+    let (x, y) = (x.normalize(), y.normalize());
+    let (sum, difference) = ((x + y).normalize(), (x - y).normalize());
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let (x, y) = ((sum + difference) * half, (sum - difference) * half);
+    Matrix3::from_columns(&[x, y, x.cross(&y)])
 }
 
 /// The depth component of a unit axis, from its squared length in the picture and that of an axis seen from the front.

@@ -1,7 +1,7 @@
 //! The surface as a map: photo to metric top view, and a picture on the surface to the photo.
 
+use super::pinhole::Camera;
 use crate::bounds::number;
-use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::filter::{Pyramid, sample_bilinear};
 use crate::geom::{Homography, Point2, Vector2};
@@ -10,9 +10,9 @@ use crate::pixel::Mix;
 use nalgebra::{Matrix2, Matrix3};
 
 /// No pixel is the mean of more samples along an axis than this; beyond, they are taken from coarser levels.
-const MOST_SAMPLES: f64 = 32.0;
+const MAX_SAMPLES: f64 = 32.0;
 /// Larger pictures are a typing error; so many take 800 MB.
-const MOST_PIXELS: f64 = 67_108_864.0;
+const MAX_MAP_PIXELS: f64 = 67_108_864.0;
 
 /// The rectangle of `size` metres seen from straight above, `px_per_metre` pixels to the metre, its top left corner first.
 ///
@@ -28,11 +28,11 @@ pub fn rectify<P: Mix>(
     px_per_metre: f64,
 ) -> Result<Image<P>> {
     let [width, height] = size.map(|metres| (metres * px_per_metre).round());
-    if !(width >= 1.0 && height >= 1.0 && width * height <= MOST_PIXELS) {
+    if !(width >= 1.0 && height >= 1.0 && width * height <= MAX_MAP_PIXELS) {
         return Err(Error::value(
             "px_per_metre",
             format!(
-                "{px_per_metre} makes a map of {} x {} pixels, expected at most {MOST_PIXELS}",
+                "{px_per_metre} makes a map of {} x {} pixels, expected at most {MAX_MAP_PIXELS}",
                 number(width),
                 number(height)
             ),
@@ -71,17 +71,12 @@ pub fn project_picture<P: Mix>(picture: &Pyramid<P>, camera: &Camera, size: [f64
 /// Surface metres from the pixels of a map of so many.
 fn surface_from_map(size: [f64; 2], pixels: [f64; 2]) -> Homography {
     let [x, y] = [size[0] / pixels[0], size[1] / pixels[1]];
-    Homography(Matrix3::new(
-        x,
-        0.0,
-        -size[0] / 2.0,
-        0.0,
-        -y,
-        size[1] / 2.0,
-        0.0,
-        0.0,
-        1.0,
-    ))
+    let rows = [
+        [x, 0.0, -size[0] / 2.0],
+        [0.0, -y, size[1] / 2.0],
+        [0.0, 0.0, 1.0],
+    ];
+    Homography(Matrix3::from_fn(|i, j| rows[i][j]))
 }
 
 /// A picture seen through a projective map: the value of each target pixel is the mean over what it covers of the source.
@@ -112,12 +107,13 @@ pub fn warp<P: Mix>(
     })
 }
 
+/// The mean over what a pixel covers. In one piece: most of the time of a warp is spent here.
 fn footprint_mean<P: Mix>(source: &Pyramid<P>, at: Vector2<f64>, slope: &Matrix2<f64>) -> P {
     let axes = axes(slope);
     let [long, short] = axes.map(|axis| axis.norm());
-    let level = level_below((0.5 * short).max(long / MOST_SAMPLES)).min(source.levels() - 1);
+    let level = level_below((0.5 * short).max(long / MAX_SAMPLES)).min(source.levels() - 1);
     let (picture, scale) = (source.level(level), f64::from(1_u32 << level));
-    let counts = [long, short].map(|length| (length / scale).round().clamp(1.0, MOST_SAMPLES));
+    let counts = [long, short].map(|length| (length / scale).round().clamp(1.0, MAX_SAMPLES));
     let weight = (1.0 / (counts[0] * counts[1])) as f32;
     let mut sum = P::default();
     for i in 0..counts[0] as u32 {
@@ -136,12 +132,12 @@ fn level_below(size: f64) -> usize {
     if size < 2.0 {
         0
     } else {
-        libm::log2(size).min(MOST_LEVELS) as usize
+        libm::log2(size).min(MAX_PYRAMID_LEVELS) as usize
     }
 }
 
 /// No picture has more levels.
-const MOST_LEVELS: f64 = 31.0;
+const MAX_PYRAMID_LEVELS: f64 = 31.0;
 
 /// The long and the short axis of a footprint, whole, pixels of the source: the eigenvectors of the slope times its
 /// transpose, as long as the roots of the eigenvalues.
@@ -151,11 +147,12 @@ fn axes(slope: &Matrix2<f64>) -> [Vector2<f64>; 2] {
         square.trace() / 2.0,
         (square[(0, 0)] - square[(1, 1)]) / 2.0,
     );
-    let spread = (half * half + square[(0, 1)] * square[(0, 1)]).sqrt();
+    let mixed = square[(0, 1)];
+    let spread = (half * half + mixed * mixed).sqrt();
     // Two ways to write the same direction; the one that does not cancel.
     let direction = match half >= 0.0 {
-        true => Vector2::new(spread + half, square[(0, 1)]),
-        false => Vector2::new(square[(0, 1)], spread - half),
+        true => Vector2::new(spread + half, mixed),
+        false => Vector2::new(mixed, spread - half),
     };
     let along = direction.try_normalize(0.0).unwrap_or(Vector2::x());
     [

@@ -17,7 +17,7 @@ const ON_SURFACE_SHARE: f64 = 0.01;
 /// A surface more than so many times longer than the span of its points is poorly constrained by them.
 const MAX_SPAN_RATIO: f64 = 3.0;
 
-/// The sides that somebody measured, metres.
+/// The measured sides, metres.
 #[derive(Clone, Copy)]
 pub(crate) enum MeasuredSides {
     Both([f64; 2]),
@@ -28,13 +28,12 @@ pub(crate) enum MeasuredSides {
 impl MeasuredSides {
     pub(crate) fn new(label: &Label, options: &SolveOptions) -> Result<Self, SolveError> {
         let (w, h) = (label.surface.width_m, label.surface.height_m);
-        let size = [w.unwrap_or(1.0), h.unwrap_or(1.0)];
-        if !size.into_iter().all(is_plausible_side) {
-            return Err(SolveError::BadDimensions(size));
-        }
+        check_sides(
+            [w.unwrap_or(1.0), h.unwrap_or(1.0)],
+            w.is_some() && h.is_some(),
+        )?;
         match (w, h) {
-            (Some(w), Some(h)) if (w / h).max(h / w) <= MAX_SIDE_RATIO => Ok(Self::Both([w, h])),
-            (Some(_), Some(_)) => Err(SolveError::BadDimensions(size)),
+            (Some(w), Some(h)) => Ok(Self::Both([w, h])),
             (Some(w), None) => Ok(Self::Width(w)),
             (None, Some(h)) => Ok(Self::Height(h)),
             (None, None) if options.unit_scale => Ok(Self::Width(1.0)),
@@ -95,8 +94,15 @@ impl MeasuredSides {
     }
 }
 
-fn is_plausible_side(metres: f64) -> bool {
-    (1.0 / MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&metres)
+/// Lengths that a rectangle can have, and where both are measured, a ratio.
+fn check_sides([w, h]: [f64; 2], are_both_measured: bool) -> Result<(), SolveError> {
+    let range = 1.0 / MAX_MAGNITUDE..=MAX_MAGNITUDE;
+    let is_plausible = range.contains(&w)
+        && range.contains(&h)
+        && (!are_both_measured || (w / h).max(h / w) <= MAX_SIDE_RATIO);
+    is_plausible
+        .then_some(())
+        .ok_or(SolveError::BadDimensions([w, h]))
 }
 
 /// Corners, or points enough to predict them from.

@@ -1,9 +1,8 @@
 //! Random views of a rectangle with a known camera: what tests, benches and reports measure the solver against.
 
 use super::label::Label;
-use super::pinhole::distorted;
+use super::pinhole::{Camera, distorted};
 use super::rectangle::corner_points;
-use crate::camera::Camera;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use nalgebra::{Matrix3, Rotation3};
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +10,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 
 /// Width of the edge of the picture that corners are kept out of, in picture sides.
-const MARGIN: f64 = 0.02;
+const MARGIN_SIDES: f64 = 0.02;
+/// Cameras are at least so high above the surface, in distances from the rectangle's centre.
+const LEAST_HEIGHT: f64 = 0.05;
 
 /// A kind of view; the default is the ideal camera of the accuracy tables, from straight above, without noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +63,7 @@ impl Default for Scenario {
 /// One view: what a person would label, and the truth.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// Noisy corners and the sides as measured; of the camera it is said at most that the picture is whole.
+    /// Noisy corners and the sides as measured; of the camera at most that the picture is whole.
     pub label: Label,
     /// The camera that took the picture.
     pub camera: Camera,
@@ -74,14 +75,14 @@ pub struct View {
 
 /// What the photos of one camera share: its intrinsics, and the tape measure's error.
 #[derive(Clone, Copy, Debug)]
-struct Lens {
+struct SharedLens {
     principal_px: Point2<f64>,
     kappa: f64,
     ln_ratio: f64,
 }
 
 impl Scenario {
-    /// A camera with errors as real ones have: corners to 1 px, the principal point to 0.005 diagonals, a slight distortion,
+    /// A camera with realistic errors: corners to 1 px, the principal point to 0.005 diagonals, a slight distortion,
     /// the sides to 0.5 %.
     pub fn realistic() -> Self {
         Self {
@@ -119,7 +120,7 @@ impl Scenario {
         (0..count).map(one).collect()
     }
 
-    fn lens(&self, dice: &mut Dice) -> Lens {
+    fn lens(&self, dice: &mut Dice) -> SharedLens {
         let center = Point2::from(self.image.map(|s| f64::from(s) / 2.0));
         let mut off = Vector2::new(dice.normal(), dice.normal()) * self.principal_sigma_px;
         if self.off_center > 0.0 {
@@ -132,17 +133,18 @@ impl Scenario {
         } else {
             self.kappa
         };
-        Lens {
+        SharedLens {
             principal_px: center + off,
             kappa,
             ln_ratio: dice.normal() * self.ratio_sigma,
         }
     }
 
-    fn view_through(&self, lens: &Lens, dice: &mut Dice) -> View {
+    fn view_through(&self, lens: &SharedLens, dice: &mut Dice) -> View {
         let camera = self.camera(lens, dice);
-        let seen = corner_points(self.size).map(|p| distorted(&camera, lens.kappa, p));
-        let noisy = seen.map(|p| [0, 1].map(|axis| p[axis] + dice.normal() * self.corner_sigma_px));
+        let noisy = corner_points(self.size)
+            .map(|p| distorted(&camera, lens.kappa, p))
+            .map(|p| [0, 1].map(|axis| p[axis] + dice.normal() * self.corner_sigma_px));
         // The person measured another ratio than there is.
         let half = libm::exp(lens.ln_ratio / 2.0);
         let mut label = Label::new(
@@ -161,23 +163,16 @@ impl Scenario {
         }
     }
 
-    fn camera(&self, lens: &Lens, dice: &mut Dice) -> Camera {
+    fn camera(&self, lens: &SharedLens, dice: &mut Dice) -> Camera {
         let rotation = self.rotation(dice);
         let turned = corner_points(self.size).map(|p| rotation * p.coords);
-        let image = Vector2::from(self.image.map(f64::from));
-        let distance = self.distance(&turned, image);
-        let (low, high) = self.extent(&turned, distance);
-        let mut center = (image - low - high) / 2.0 - lens.principal_px.coords;
-        for _ in 0..100 {
-            let from = image * MARGIN - low - lens.principal_px.coords;
-            let to = image * (1.0 - MARGIN) - high - lens.principal_px.coords;
-            let tried = Vector2::new(dice.between(from.x, to.x), dice.between(from.y, to.y));
-            let t = translation(tried, distance, self.focal_px);
-            if -rotation.matrix().column(2).dot(&t) > 0.05 * distance {
-                center = tried;
-                break;
-            }
-        }
+        let distance = self.distance(&turned, Vector2::from(self.image.map(f64::from)));
+        let bounds = self.extent(&turned, distance);
+        let normal: Vector3<f64> = rotation.matrix().column(2).into();
+        let center = self.center_px(lens, bounds, dice, |center| {
+            let t = translation(center, distance, self.focal_px);
+            -normal.dot(&t) > LEAST_HEIGHT * distance
+        });
         let t = translation(center, distance, self.focal_px);
         Camera {
             image: self.image,
@@ -188,6 +183,27 @@ impl Scenario {
                 UnitQuaternion::from_rotation_matrix(&rotation),
             ),
         }
+    }
+
+    /// Where the rectangle's centre is seen, relative to the principal point, so that its bounds are in the picture: random
+    /// where the camera is then above the surface, or else the middle.
+    fn center_px(
+        &self,
+        lens: &SharedLens,
+        (low, high): (Vector2<f64>, Vector2<f64>),
+        dice: &mut Dice,
+        is_above: impl Fn(Vector2<f64>) -> bool,
+    ) -> Vector2<f64> {
+        let image = Vector2::from(self.image.map(f64::from));
+        for _ in 0..100 {
+            let from = image * MARGIN_SIDES - low - lens.principal_px.coords;
+            let to = image * (1.0 - MARGIN_SIDES) - high - lens.principal_px.coords;
+            let tried = Vector2::new(dice.between(from.x, to.x), dice.between(from.y, to.y));
+            if is_above(tried) {
+                return tried;
+            }
+        }
+        (image - low - high) / 2.0 - lens.principal_px.coords
     }
 
     fn rotation(&self, dice: &mut Dice) -> Rotation3<f64> {

@@ -222,7 +222,7 @@ mod tests {
                 .remove(0)
         }
 
-        /// A camera file whose focal length tells it from a camera solved anew.
+        /// A camera file whose focal length differs from that of a camera solved anew.
         fn store(&self, labelled: &LabelledPhoto, edit: impl Fn(&mut CameraFile)) {
             let solution = solve(&labelled.label, &SolveOptions::default()).unwrap();
             let mut file = CameraFile::new(&labelled.label, &solution);
@@ -330,7 +330,7 @@ mod tests {
                 |f| f.found.model.principal_point_px[0] = 1e300,
                 "model.principal_point_px: 1e300",
             ),
-            (|f| f.found.opencv.r[0][0] = 7.0, "opencv.R: no rotation"),
+            (|f| f.found.opencv.r[0][0] = 7.0, "opencv.R: not a rotation"),
             (|f| f.found.opencv.t = [0.0, 0.0, -1.0], "below the surface"),
             (|f| f.found.surface.width_m = 0.0, "surface: 0e0"),
         ];

@@ -166,11 +166,7 @@ fn covariance(information: &Square) -> (Square, f64) {
     };
     inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
     let mut response = -(inverse * coupling);
-    let own = if information[(LN_FOCAL, LN_FOCAL)] > 0.0 {
-        1.0
-    } else {
-        0.0
-    };
+    let own = f64::from(information[(LN_FOCAL, LN_FOCAL)] > 0.0);
     let left = (own + coupling.dot(&response)).max(0.0);
     response[LN_FOCAL] = 1.0;
     if own > 0.0 {

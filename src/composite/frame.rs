@@ -3,7 +3,7 @@
 use crate::deep::DeepImage;
 use crate::image::Image;
 use crate::pixel::{Film, LinearRgb, PremulRgba};
-use crate::render::{RenderOptions, cast};
+use crate::render::{RenderOptions, render};
 use crate::scene::Shot;
 
 /// Folds deep samples into a picture, over `plate` where there is one.
@@ -50,7 +50,7 @@ pub fn frame(deep: &DeepImage, plate: Option<&Image<LinearRgb>>) -> Image<Premul
 /// # Panics
 /// When the plate's size is not the camera's.
 pub fn picture(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    frame(&cast(shot, options), shot.plate.as_deref())
+    frame(&render(shot, options), shot.plate.as_deref())
 }
 
 /// Folds deep samples into a picture of their light and of what they let pass, per channel; scene-linear.

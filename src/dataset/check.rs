@@ -406,7 +406,7 @@ fn look(folder: &Path, image: &Path, class_count: Option<usize>) -> Look {
         }
         Ok(picture) => look.small = Some(Thumbnail::of(&picture.map(|p| p.color()))),
     }
-    look.bytes = io::Checksum::of(folder.join(image))
+    look.bytes = io::Checksum::from_file(folder.join(image))
         .ok()
         .map(|sum| (sum.bytes, sum.crc32));
     let label = YoloSet::label_of(image);

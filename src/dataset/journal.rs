@@ -12,7 +12,7 @@ use crate::dataset::folder::{self, IDENTITY};
 use crate::dataset::{Entry, Inputs, Obstructed, Part, Plan, Written};
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
-use crate::label::knotted;
+use crate::label::cyclic_overlaps;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -75,7 +75,7 @@ impl Line {
             part: entry.part,
             classes,
             obstructed: objects.iter().filter(|object| !object.is_topmost()).count() as u32,
-            knotted: knotted(objects).len() as u32,
+            knotted: cyclic_overlaps(objects).len() as u32,
             retries: entry.sample.rejected.len() as u32,
             files: files
                 .iter()
@@ -125,7 +125,7 @@ impl Line {
 impl Finished {
     /// Reads the file back: what counts is what is on the disk.
     pub(crate) fn of(folder: &Path, path: &Path) -> Result<Self> {
-        let Checksum { bytes, crc32 } = Checksum::of(io::inside(folder, path)?)?;
+        let Checksum { bytes, crc32 } = Checksum::from_file(io::inside(folder, path)?)?;
         let names: Vec<_> = path.iter().map(|name| name.to_string_lossy()).collect();
         Ok(Self {
             path: names.join("/"),

@@ -38,6 +38,7 @@ mod pictures;
 mod place;
 mod quality;
 mod run;
+mod scene_setup;
 mod setup;
 mod shard;
 mod sharing;
@@ -62,6 +63,7 @@ pub use generate::{Plan, generate};
 pub use inputs::Inputs;
 #[doc(hidden)]
 pub use journal::JOURNAL;
+#[cfg(feature = "fuzzing")]
 pub(crate) use journal::read as journal_lines;
 pub use journal::{ClassCount, Report, mend};
 pub use layers::Layers;
@@ -84,6 +86,7 @@ pub use voc::Voc;
 pub use webdataset::WebDataset;
 pub use yolo::{Yolo, YoloTask};
 pub use yolo_set::YoloSet;
+#[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;
 
 use crate::deep::DeepImage;

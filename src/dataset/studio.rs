@@ -17,7 +17,7 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self};
 use crate::scene::{
-    Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, locate, stock,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, Scene, Shot, catalog, locate,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub struct Studio {
     library: Library,
     places: Vec<Place>,
     backgrounds: Vec<Background>,
-    stock: Vec<Choice>,
+    catalog: Vec<AssetVariant>,
     surroundings: Surroundings,
     /// Turns true when no picture is to be finished any more.
     stop: &'static AtomicBool,
@@ -57,7 +57,8 @@ impl Studio {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn with_library(setup: Setup, library: Library) -> Result<Self> {
-        let studio = Self::new(setup, library)?;
+        let places = labelled_places(&setup)?;
+        let studio = Self::new(setup, library, places)?;
         studio
             .places
             .iter()
@@ -96,32 +97,27 @@ impl Studio {
     pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
         let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
         let library = Library::open_some(&setup.assets, is_named)?;
-        Self::new(setup, library)
+        let places = if scene.plate.is_empty() {
+            Vec::new()
+        } else {
+            labelled_places(&setup)?
+        };
+        Self::new(setup, library, places)
     }
 
-    fn new(setup: Setup, library: Library) -> Result<Self> {
-        let (image, surface_size, force) =
-            (setup.scene.image, setup.surface_size, setup.force_cameras);
-        let places = Place::all(
-            &setup.backgrounds,
-            PlaceOptions {
-                image,
-                surface_size,
-                force,
-            },
-        )?;
+    fn new(setup: Setup, library: Library, places: Vec<Place>) -> Result<Self> {
         let backgrounds = places
             .iter()
             .map(|place| place.background.clone())
             .collect();
-        let stock = stock(&library);
+        let catalog = catalog(&library);
         let surroundings = Surroundings::of(&setup);
         Ok(Self {
             setup,
             library,
             places,
             backgrounds,
-            stock,
+            catalog,
             surroundings,
             stop: &NEVER,
         })
@@ -150,7 +146,7 @@ impl Studio {
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         self.setup
             .scene
-            .check_room(&self.backgrounds, &self.stock)
+            .check_room(&self.backgrounds, &self.catalog)
             .map_err(|e| e.within("scene"))?;
         let (folder, labels) = (folder.into(), &self.setup.labels);
         let mut inputs = Inputs::kept(&folder);
@@ -192,7 +188,7 @@ impl Studio {
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
         self.setup
             .scene
-            .explained(seed, k, &self.backgrounds, &self.stock)
+            .explained(seed, k, &self.backgrounds, &self.catalog)
     }
 
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.
@@ -267,7 +263,7 @@ impl Studio {
     pub fn label(&self, scene: Scene) -> Result<Labels> {
         let (_, shot) = self.resolve(scene.unlit())?;
         Ok(label::label(
-            &render::cover(&shot, &self.setup.render),
+            &render::render_coverage(&shot, &self.setup.render),
             &shot,
             &self.setup.labels.options(),
         ))
@@ -275,7 +271,7 @@ impl Studio {
 
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
-        let deep = render::cast(shot, &self.setup.render);
+        let deep = render::render(shot, &self.setup.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
         let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
         (deep, frame)
@@ -301,7 +297,7 @@ impl Studio {
             scene = light::match_plate(scene, plate);
         }
         let shot = scene.resolve(
-            |object| Look::of(&self.library, object),
+            |object| Appearance::from_library(&self.library, object),
             plate,
             self.panorama(&scene)?,
         )?;
@@ -347,6 +343,16 @@ impl Studio {
             }
         }
     }
+}
+
+/// The labelled photos that a setup names.
+fn labelled_places(setup: &Setup) -> Result<Vec<Place>> {
+    let options = PlaceOptions {
+        image: setup.scene.image,
+        surface_size: setup.surface_size,
+        force: setup.force_cameras,
+    };
+    Place::all(&setup.backgrounds, options)
 }
 
 /// The seed of the `n`-th try of scene `k`: the first is the dataset's own.

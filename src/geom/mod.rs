@@ -112,7 +112,7 @@ impl Homography {
         Point2::new(q.x / q.z, q.y / q.z)
     }
 
-    /// The way back; none for a map that squeezes the plane into a line.
+    /// The inverse; none for a map of the plane onto a line.
     pub fn inverse(&self) -> Option<Self> {
         self.0.try_inverse().map(Self)
     }
@@ -125,8 +125,8 @@ pub(crate) struct Line {
     pub(crate) offset: f64,
 }
 
-/// Lines that meet at a smaller angle than this, radians, meet nowhere.
-const LEAST_ANGLE: f64 = 0.05;
+/// Lines at a smaller angle than this, radians, count as parallel.
+const MIN_ANGLE_RAD: f64 = 0.05;
 
 impl Line {
     /// The line with the least squared distances from some points; none through fewer than two.
@@ -138,12 +138,7 @@ impl Line {
             .iter()
             .fold(Vector2::zeros(), |sum, p| sum + p.coords)
             / points.len() as f64;
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-        for p in points {
-            let d = p.coords - mean;
-            (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
-        }
-        let angle = libm::atan2(2.0 * xy, xx - yy) / 2.0;
+        let angle = main_direction(points, mean);
         let normal = Vector2::new(-libm::sin(angle), libm::cos(angle));
         Some(Self {
             normal,
@@ -162,8 +157,18 @@ impl Line {
         let x = self.offset * other.normal.y - other.offset * self.normal.y;
         let y = self.normal.x * other.offset - other.normal.x * self.offset;
         let p = Point2::new(x / det, y / det);
-        (det.abs() > LEAST_ANGLE && p.coords.iter().all(|v| v.is_finite())).then_some(p)
+        (det.abs() > MIN_ANGLE_RAD && p.coords.iter().all(|v| v.is_finite())).then_some(p)
     }
+}
+
+/// The direction in which points spread most around their mean, radians from x.
+fn main_direction(points: &[Point2<f64>], mean: Vector2<f64>) -> f64 {
+    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+    for p in points {
+        let d = p.coords - mean;
+        (xx, xy, yy) = (xx + d.x * d.x, xy + d.x * d.y, yy + d.y * d.y);
+    }
+    libm::atan2(2.0 * xy, xx - yy) / 2.0
 }
 
 #[cfg(test)]

@@ -1,8 +1,19 @@
-//! What a file says about its picture before the pixels.
+//! The description of a picture in front of its pixels.
 
-use super::Format;
+use super::format::Format;
 
-/// What a picture file says about itself; reading it decodes no pixel.
+/// Which part of an EXR is the picture. Other formats have only one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Window {
+    /// What is meant to be shown: stored pixels outside are cut, missing ones are transparent black.
+    #[default]
+    Display,
+    /// What is stored, wherever it lies: [`Header::data_at`].
+    Data,
+}
+
+/// How a picture file describes itself; reading it decodes no pixel.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {

@@ -65,10 +65,8 @@ impl Figure {
             x1: columns.end as f64 / scale_x,
             y1: rows.end as f64 / scale_y,
         };
-        let part = shrunk(&picture.crop(Roi::spanning(columns, rows)));
-        let jpeg = io::jpeg_bytes(&to_srgb8(&part), JPEG_QUALITY)?;
         Ok(Self {
-            jpeg,
+            jpeg: page_jpeg(&picture.crop(Roi::spanning(columns, rows)))?,
             view,
             drawing: String::new(),
             caption: String::new(),
@@ -138,6 +136,11 @@ impl Figure {
 fn pixel_span([start, end]: [f64; 2], scale: f64, length: usize) -> Range<usize> {
     let whole = |v: f64| ((v * scale).max(0.0) as usize).min(length);
     whole(start)..whole(end + 1.0 / scale)
+}
+
+/// A picture as small as it is shown, in the bytes of a file.
+fn page_jpeg(picture: &Image<LinearRgb>) -> Result<Vec<u8>> {
+    io::jpeg_bytes(&to_srgb8(&shrunk(picture)), JPEG_QUALITY)
 }
 
 /// A picture no larger than is shown.

@@ -47,7 +47,7 @@ pub struct CutOut {
     pub residual_matte: f32,
     /// What makes its colours and its transmittance wrong; of the physical matte only.
     pub color_uncertainty: Option<ColorUncertainty>,
-    /// What a person should know, of the segmentation, the screen and the matte.
+    /// Notes and warnings about the segmentation, the screen and the matte.
     pub diagnostics: Vec<Diagnostic>,
     /// Where the object was found in the photo.
     pub segmentation: Segmentation,
@@ -92,23 +92,9 @@ pub fn cut_out_on(
     watch.lap("cut");
     let matted = Matted::new(&prepared, &screen, &region, opts)?;
     watch.lap("matte");
+    let diagnostics = diagnostics(photo, &segmentation, &matted, opts);
     let trim = region.trim(opts.longest_side);
-    let cut = CutOut {
-        hull: segmentation.hull.iter().map(|p| trim.moved(*p)).collect(),
-        outline: segmentation.outline.map(|p| trim.moved(p)),
-        roi: trim.roi,
-        scale: trim.scale,
-        screen: screen.color,
-        unevenness: screen.plate.unevenness,
-        method: opts.method.unwrap_or_default(),
-        residual_matte: matted.residual_matte,
-        color_uncertainty: matted.color_uncertainty,
-        diagnostics: diagnostics(photo, &segmentation, &matted, opts),
-        film: trim.cropped(&matted.film),
-        transmittance: trim.cropped(&matted.transmittance),
-        uncertainty: trim.cropped(&matted.uncertainty),
-        segmentation,
-    };
+    let cut = trim.cut_out(matted, segmentation, &screen, diagnostics);
     watch.lap("trim");
     watch.log("cut out");
     Ok(cut)
@@ -203,6 +189,32 @@ struct Trim {
 }
 
 impl Trim {
+    /// The matte of the region, trimmed.
+    fn cut_out(
+        &self,
+        matted: Matted,
+        found: Segmentation,
+        screen: &CleanScreen,
+        diagnostics: Vec<Diagnostic>,
+    ) -> CutOut {
+        CutOut {
+            film: self.cropped(&matted.film),
+            transmittance: self.cropped(&matted.transmittance),
+            uncertainty: self.cropped(&matted.uncertainty),
+            hull: found.hull.iter().map(|p| self.moved(*p)).collect(),
+            outline: found.outline.map(|p| self.moved(p)),
+            roi: self.roi,
+            scale: self.scale,
+            screen: screen.color,
+            unevenness: screen.plate.unevenness,
+            method: matted.method,
+            residual_matte: matted.residual_matte,
+            color_uncertainty: matted.color_uncertainty,
+            diagnostics,
+            segmentation: found,
+        }
+    }
+
     /// A point of the photo in pixels of the cut-out.
     fn moved(&self, p: Point2<f64>) -> Point2<f64> {
         let corner = Point2::new(self.roi.x as f64, self.roi.y as f64);
@@ -215,8 +227,9 @@ impl Trim {
         if self.scale >= 1.0 {
             return image;
         }
-        let side = |len: usize| ((len as f64 * self.scale).round() as usize).max(1);
-        filter::resize(&image, side(image.width()), side(image.height()))
+        let [width, height] = [image.width(), image.height()]
+            .map(|side| ((side as f64 * self.scale).round() as usize).max(1));
+        filter::resize(&image, width, height)
     }
 }
 
@@ -246,7 +259,7 @@ fn softened(mask: &Image<Coverage>, sigma_px: f32) -> Image<Coverage> {
 /// A matte that leaves more than this of the screen is worth a warning: what it leaves veils the object, too.
 const MAX_RESIDUAL_MATTE: f32 = 0.2;
 
-/// What a person should know, of the segmentation, the matte and the screen.
+/// Those of the segmentation, the matte and the screen.
 fn diagnostics(
     photo: &Image<LinearRgb>,
     found: &Segmentation,
@@ -258,7 +271,7 @@ fn diagnostics(
     let residual = matted.residual_matte;
     diagnostics.extend((residual > MAX_RESIDUAL_MATTE).then(|| residual_matte(residual)));
     // An outline alone does not depend on the screen.
-    if opts.method != Some(MatteMethod::Outline) {
+    if matted.method != MatteMethod::Outline {
         diagnostics.extend(clipped_screen(photo, &found.mask, opts.film.clipped));
     }
     diagnostics
@@ -338,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn a_white_board_leaves_paint_opaque_and_is_a_doubt() {
+    fn a_white_board_leaves_paint_opaque_and_gives_a_warning() {
         let cut = cut_out(
             &slab(LinearRgb::new(0.6, 0.62, 0.7)),
             &CutOutOptions::default(),

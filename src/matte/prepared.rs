@@ -97,3 +97,34 @@ fn at_working_size(photo: &Image<LinearRgb>, working_size: usize) -> Cow<'_, Ima
     });
     Cow::Owned(filter::resize(photo, w, h))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(w: usize, h: usize) -> Image<LinearRgb> {
+        Image::filled(w, h, LinearRgb::grey(0.25))
+    }
+
+    #[test]
+    fn a_photo_of_the_search_size_is_not_copied() {
+        let photo = grey(640, 300);
+        let prepared = Prepared::new(&photo, 640).unwrap();
+        assert!(matches!(prepared.small, Cow::Borrowed(small) if std::ptr::eq(small, &photo)));
+        assert_eq!(prepared.sqrt[(3, 5)], LinearRgb::grey(0.5));
+    }
+
+    #[test]
+    fn large_photos_are_reduced_and_small_ones_enlarged() {
+        let size = |w, h| Prepared::new(&grey(w, h), 640).unwrap().small.size();
+        assert_eq!((size(1000, 500), size(100, 50)), ((640, 320), (300, 150)));
+    }
+
+    #[test]
+    fn a_pixel_that_is_not_finite_is_named() {
+        let mut photo = grey(40, 30);
+        photo[(7, 9)].g = f32::NAN;
+        let error = Prepared::new(&photo, 640).err().map(|e| e.to_string());
+        assert!(error.is_some_and(|e| e.contains("pixel (7, 9)")));
+    }
+}

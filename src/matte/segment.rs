@@ -47,9 +47,9 @@ pub struct Segmentation {
     pub confidence: Confidence,
     /// Which band of the pyramid served as the coarse one.
     pub levels: usize,
-    /// Pixels of the photo for a pixel of the picture that was searched; above 1 where noise or size asked for it.
+    /// Pixels of the photo for a pixel of the picture that was searched; above 1 where noise or size called for a reduction.
     pub reduction: f64,
-    /// What a person should know.
+    /// Notes and warnings about the photo and the outline.
     pub diagnostics: Vec<Diagnostic>,
     /// Every intermediate picture, in the order of the work.
     pub steps: Vec<SegmentStep>,
@@ -121,10 +121,8 @@ pub(super) fn segment_prepared(
     watch.lap("holes");
     let shape = ObjectShape::new(prepared, &chosen, &object.solid);
     let confidence = shape.confidence(prepared, chosen.confidence);
-    let mut diagnostics = chosen.pass.diagnostics.clone();
-    diagnostics.extend(truncated(chosen.pass.touches));
+    let mut diagnostics = chosen.diagnostics(prepared.small.width());
     diagnostics.extend(object.has_screen_like_parts.then(screen_like_parts));
-    diagnostics.extend(noisy(prepared.small.width(), chosen.picture.width()));
     diagnostics.extend(confidence.diagnostics());
     watch.lap("outline");
     let (w, h) = prepared.photo.size();
@@ -145,44 +143,11 @@ pub(super) fn segment_prepared(
     Ok(found)
 }
 
-/// Names of the borders in the order of [`Segmentation::touches`].
-const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
-
-/// The warning about an object that the photo cuts off; none for a whole one.
-fn truncated(touches: [bool; 4]) -> Option<Diagnostic> {
-    let reached: Vec<_> = BORDERS
-        .into_iter()
-        .zip(touches)
-        .filter(|(_, touches)| *touches)
-        .map(|(name, _)| name)
-        .collect();
-    (!reached.is_empty()).then(|| {
-        let message = format!(
-            "the object reaches the {} border: the part beyond is missing from its size",
-            reached.join(" and ")
-        );
-        Diagnostic::warning(Code::Truncated, message)
-    })
-}
-
 fn screen_like_parts() -> Diagnostic {
     Diagnostic::warning(
         Code::ScreenLikeParts,
         "parts of the object look like the screen: treated as holes, or on a grey board as clear plastic; are they?",
     )
-}
-
-/// The warning about an object that was found at a lower resolution than asked for; from the widths of the pictures.
-fn noisy(asked: usize, searched: usize) -> Option<Diagnostic> {
-    let reduction = asked as f64 / searched as f64;
-    (reduction > 1.0).then(|| {
-        Diagnostic::warning(
-            Code::Noisy,
-            format_args!(
-                "the photo is noisy: the outline was found at 1/{reduction:.0} of the resolution and is accurate to one of its pixels"
-            ),
-        )
-    })
 }
 
 #[cfg(test)]

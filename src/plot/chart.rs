@@ -118,7 +118,7 @@ impl Axis {
     }
 
     /// Values with a line through the chart.
-    fn marks(&self) -> Vec<f64> {
+    fn marked_values(&self) -> Vec<f64> {
         let [low, high] = self.range;
         if !self.logarithmic {
             return (0..=4)
@@ -172,22 +172,29 @@ impl Chart {
 
 fn drawing(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
     let names = charts.first().map_or(&[][..], |c| &c.names);
-    let longest = names.iter().map(|name| name.chars().count()).max();
-    let legend_width = LEGEND_WIDTH + LEGEND_LETTER_WIDTH * longest.unwrap_or(0) as f64;
-    let width = charts.len() as f64 * (LEFT_MARGIN + frame[0]) + legend_width;
+    let legend_left = charts.len() as f64 * (LEFT_MARGIN + frame[0]);
+    let width = legend_left + legend_width(names);
     let height = TOP_MARGIN + frame[1] + BOTTOM_MARGIN;
+    let framed = (0..).zip(charts).map(|(i, chart)| Framed {
+        chart,
+        left: LEFT_MARGIN + f64::from(i) * (LEFT_MARGIN + frame[0]),
+        size: frame,
+    });
     html! {
         svg xmlns="http://www.w3.org/2000/svg" viewBox=(format_args!("0 0 {width} {height}")) width=(width)
             height=(height) font-family="sans-serif" font-size="12" {
             rect width=(width) height=(height) fill="white" {}
-            @for (i, chart) in charts.iter().enumerate() {
-                (Framed { chart, left: LEFT_MARGIN + i as f64 * (LEFT_MARGIN + frame[0]), size: frame }.svg(beside))
-            }
-            (legend(names, width - legend_width + 16.0))
+            @for chart in framed { (chart.svg(beside)) }
+            (legend(names, legend_left + 16.0))
         }
     }
     .into_string()
         + "\n"
+}
+
+fn legend_width(names: &[String]) -> f64 {
+    let longest = names.iter().map(|name| name.chars().count()).max();
+    LEGEND_WIDTH + LEGEND_LETTER_WIDTH * longest.unwrap_or(0) as f64
 }
 
 /// A line and a name for each curve.
@@ -195,14 +202,14 @@ fn legend(names: &[String], left: f64) -> Markup {
     html! {
         @for (i, name) in names.iter().enumerate() {
             @let y = TOP_MARGIN + 14.0 + 20.0 * i as f64;
-            path d=(format_args!("M{left} {y}h24")) stroke=(color(i)) stroke-width="2" {}
+            path d=(format_args!("M{left} {y}h24")) stroke=(curve_color(i)) stroke-width="2" {}
             (label(left + 32.0, y + 4.0, "start", name))
         }
     }
 }
 
 /// The colour of a curve.
-fn color(i: usize) -> &'static str {
+fn curve_color(i: usize) -> &'static str {
     COLORS[i % COLORS.len()]
 }
 
@@ -235,11 +242,11 @@ impl Framed<'_> {
 
     fn svg(&self, beside: &Beside) -> Markup {
         html! {
-            (self.grid())
+            (self.grid_lines())
             rect x=(self.left) y=(TOP_MARGIN) width=(self.size[0]) height=(self.size[1]) fill="none" stroke="#888" {}
-            (self.titles())
+            (self.axis_titles())
             @for (i, curve) in self.chart.curves.iter().enumerate() {
-                (self.curve(curve, color(i), !beside.apart))
+                (self.curve_svg(curve, curve_color(i), !beside.apart))
             }
             @for [x, y] in self.chart.defaults.iter().filter_map(|p| self.place(p)) {
                 circle cx=(tenths(x)) cy=(tenths(y)) r="6" fill="none" stroke="#c00" {}
@@ -249,25 +256,25 @@ impl Framed<'_> {
     }
 
     /// Lines at round values, with the values.
-    fn grid(&self) -> Markup {
+    fn grid_lines(&self) -> Markup {
         let [w, h] = self.size;
         html! {
-            @for mark in self.chart.across.marks() {
+            @for mark in self.chart.across.marked_values() {
                 @if let Some(x) = self.x(mark) {
                     path d=(format_args!("M{x:.1} {TOP_MARGIN}v{h}")) stroke="#ddd" {}
-                    (label(x, self.bottom() + 16.0, "middle", &short(mark)))
+                    (label(x, self.bottom() + 16.0, "middle", &short_number(mark)))
                 }
             }
-            @for mark in self.chart.up.marks() {
+            @for mark in self.chart.up.marked_values() {
                 @if let Some(y) = self.y(mark) {
                     path d=(format_args!("M{} {y:.1}h{w}", self.left)) stroke="#ddd" {}
-                    (label(self.left - 6.0, y + 4.0, "end", &short(mark)))
+                    (label(self.left - 6.0, y + 4.0, "end", &short_number(mark)))
                 }
             }
         }
     }
 
-    fn titles(&self) -> Markup {
+    fn axis_titles(&self) -> Markup {
         let middle = self.left + self.size[0] / 2.0;
         html! {
             (label(middle, TOP_MARGIN - 10.0, "middle", &self.chart.title))
@@ -277,7 +284,7 @@ impl Framed<'_> {
     }
 
     /// The points of a curve, joined by a line where it is asked for.
-    fn curve(&self, curve: &Curve, color: &str, joined: bool) -> Markup {
+    fn curve_svg(&self, curve: &Curve, color: &str, joined: bool) -> Markup {
         let places: Vec<_> = curve.iter().filter_map(|p| self.place(p)).collect();
         let points: Vec<String> = places
             .iter()
@@ -361,7 +368,21 @@ impl Area {
 /// Words beside points, where they cover neither each other nor another point, and stay in the frame; lines that run behind
 /// them are kept off by a rim.
 fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Area) -> Markup {
-    let mut taken: Vec<Area> = points.into_iter().map(Area::of_point).collect();
+    let taken = points.into_iter().map(Area::of_point).collect();
+    html! {
+        @for ([x, y], word) in free_places(labels, taken, frame) {
+            text x=(tenths(x)) y=(tenths(y)) font-size=(POINT_LABEL_SIZE) fill="#444" stroke="white" stroke-width="3"
+                stroke-linejoin="round" paint-order="stroke" { (text(word)) }
+        }
+    }
+}
+
+/// Where the words that have room begin, first come, first served.
+fn free_places<'a>(
+    labels: Vec<([f64; 2], &'a str)>,
+    mut taken: Vec<Area>,
+    frame: Area,
+) -> Vec<([f64; 2], &'a str)> {
     let mut placed = Vec::new();
     for (point, word) in labels {
         let width = POINT_LABEL_LETTER_WIDTH * word.chars().count() as f64;
@@ -374,12 +395,7 @@ fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Ar
             placed.push((place, word));
         }
     }
-    html! {
-        @for ([x, y], word) in placed {
-            text x=(tenths(x)) y=(tenths(y)) font-size=(POINT_LABEL_SIZE) fill="#444" stroke="white" stroke-width="3"
-                stroke-linejoin="round" paint-order="stroke" { (text(word)) }
-        }
-    }
+    placed
 }
 
 /// Where a word beside a point may begin, best first: to its right or left, above or below.
@@ -390,7 +406,7 @@ fn places_beside([x, y]: [f64; 2], width: f64) -> [[f64; 2]; 4] {
 }
 
 /// A number as short as it can be; beyond a thousandth and a hundred thousand with a power of ten.
-fn short(value: f64) -> String {
+fn short_number(value: f64) -> String {
     if value != 0.0 && !(9e-4..9e4).contains(&value.abs()) {
         return power(value);
     }
@@ -438,8 +454,8 @@ mod tests {
             (range(&[0.2, 5.0]), range(&[1.0]), range(&[])),
             ([0.2, 5.0], [1.0, 2.0], [1.0, 10.0])
         );
-        assert_eq!(Axis::around("", [0.003, 0.04]).marks().len(), 5);
-        assert_eq!(Axis::around("", [0.003, 4.0]).marks().len(), 3);
+        assert_eq!(Axis::around("", [0.003, 0.04]).marked_values().len(), 5);
+        assert_eq!(Axis::around("", [0.003, 4.0]).marked_values().len(), 3);
     }
 
     #[test]
@@ -470,7 +486,7 @@ mod tests {
     #[test]
     fn small_numbers_are_not_called_nothing() {
         assert_eq!(
-            [0.0, 1e-6, 2e-4, 0.001, 0.5, 20.0, 1e4, 1e6].map(short),
+            [0.0, 1e-6, 2e-4, 0.001, 0.5, 20.0, 1e4, 1e6].map(short_number),
             ["0", "1e-6", "2e-4", "0.001", "0.5", "20", "10000", "1e6"]
         );
     }

@@ -18,7 +18,7 @@ pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
         svg xmlns="http://www.w3.org/2000/svg" class="heat" width=(width) height=(whole_height)
             viewBox=(format_args!("0 0 {width} {whole_height}")) font-family="sans-serif" font-size="11" {
             text x="0" y="14" { (text(title)) }
-            (cells(&counts(places)))
+            (filled_cells(&counts_by_cell(places)))
             rect x="0.5" y=(TITLE_HEIGHT) width=(width - 1.0) height=(height - 0.5) fill="none" stroke="#888" {}
         }
     }
@@ -27,7 +27,7 @@ pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
 }
 
 /// Places in each cell, row by row.
-fn counts(places: &[[f64; 2]]) -> Vec<u64> {
+fn counts_by_cell(places: &[[f64; 2]]) -> Vec<u64> {
     let mut counts = vec![0_u64; GRID_CELLS[0] * GRID_CELLS[1]];
     let inside = places
         .iter()
@@ -41,7 +41,7 @@ fn counts(places: &[[f64; 2]]) -> Vec<u64> {
 }
 
 /// The cells with something in them.
-fn cells(counts: &[u64]) -> Markup {
+fn filled_cells(counts: &[u64]) -> Markup {
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     html! {
         @for (i, count) in counts.iter().copied().enumerate().filter(|(_, count)| *count > 0) {

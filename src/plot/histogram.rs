@@ -45,7 +45,7 @@ impl Histogram {
         }
         Self {
             title: title.into(),
-            ends: [short(low), short(high)],
+            ends: [short_number(low), short_number(high)],
             counts,
             expected: None,
         }
@@ -78,13 +78,13 @@ impl Histogram {
         html! {
             svg xmlns="http://www.w3.org/2000/svg" class="histogram" width=(width)
                 height=(BASELINE + BOTTOM_MARGIN) font-family="sans-serif" font-size="11" {
-                @if let Some(expected) = self.expected { (self.band(expected)) }
+                @if let Some(expected) = self.expected { (self.expected_band(expected)) }
                 (self.bars())
                 @if let Some(expected) = self.expected {
-                    path d=(across(&tenths(self.y(expected)))) stroke="#d55e00" stroke-dasharray="5 3" {}
+                    path d=(line_across(&tenths(self.y(expected)))) stroke="#d55e00" stroke-dasharray="5 3" {}
                 }
-                path d=(across(&BASELINE.to_string())) stroke="#888" {}
-                (self.words(width))
+                path d=(line_across(&BASELINE.to_string())) stroke="#888" {}
+                (self.word_labels(width))
             }
         }
         .into_string()
@@ -103,7 +103,7 @@ impl Histogram {
     }
 
     /// Two standard deviations on either side of what is expected.
-    fn band(&self, expected: f64) -> Markup {
+    fn expected_band(&self, expected: f64) -> Markup {
         let spread = 2.0 * (expected * (1.0 - 1.0 / self.counts.len().max(1) as f64)).sqrt();
         let (top, bottom) = (self.y(expected + spread), self.y(expected - spread));
         html! {
@@ -124,34 +124,34 @@ impl Histogram {
         }
     }
 
-    fn words(&self, width: f64) -> Markup {
+    fn word_labels(&self, width: f64) -> Markup {
         let [w, below] = [FRAME_SIZE[0], BASELINE + 14.0];
         let [low, high] = &self.ends;
         html! {
-            (clipped([LEFT_MARGIN, TOP_MARGIN - 10.0], width - LEFT_MARGIN, "start", &self.title))
-            (clipped([LEFT_MARGIN - 4.0, TOP_MARGIN + 8.0], LEFT_MARGIN - 4.0, "end", &short(self.top_count())))
-            (clipped([LEFT_MARGIN, below], w / 2.0, "start", low))
-            (clipped([LEFT_MARGIN + w, below], w / 2.0, "end", high))
+            (clipped_label([LEFT_MARGIN, TOP_MARGIN - 10.0], width - LEFT_MARGIN, "start", &self.title))
+            (clipped_label([LEFT_MARGIN - 4.0, TOP_MARGIN + 8.0], LEFT_MARGIN - 4.0, "end", &short_number(self.top_count())))
+            (clipped_label([LEFT_MARGIN, below], w / 2.0, "start", low))
+            (clipped_label([LEFT_MARGIN + w, below], w / 2.0, "end", high))
         }
     }
 }
 
 /// A line through the frame at a height.
-fn across(y: &str) -> String {
+fn line_across(y: &str) -> String {
     format!("M{LEFT_MARGIN} {y}h{}", FRAME_SIZE[0])
 }
 
 /// A text, cut where there is no more room for it; the whole appears where it is pointed at.
-fn clipped([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Markup {
+fn clipped_label([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Markup {
     html! {
         text x=(tenths(x)) y=(tenths(y)) text-anchor=(anchor) {
-            (text(&fitted(whole, room))) title { (text(whole)) }
+            (text(&cut_to_room(whole, room))) title { (text(whole)) }
         }
     }
 }
 
 /// A text, cut where there is no more room for it.
-fn fitted(text: &str, room: f64) -> String {
+fn cut_to_room(text: &str, room: f64) -> String {
     let most = (room / LETTER_WIDTH) as usize;
     if text.chars().count() <= most {
         return text.to_owned();
@@ -163,7 +163,7 @@ fn fitted(text: &str, room: f64) -> String {
 }
 
 /// A number with as many digits as help.
-fn short(value: f64) -> String {
+fn short_number(value: f64) -> String {
     let text = if value.abs() >= 100.0 {
         format!("{value:.0}")
     } else {

@@ -3,38 +3,62 @@
 //! Everything in a shot is planar, so each map between two planes seen from a point is a homography and visibility
 //! needs no ray tracing. Work is split by frequency: textures are sharp and are sampled several times a pixel
 //! (`layers`), irradiance is smooth and is computed once per receiver on a coarse lattice of the picture and looked up
-//! (`irradiance`). [`reference()`] computes the same definition sample by sample without any of this, to test against.
+//! (`irradiance`). [`render_reference`] computes the same definition sample by sample without any of this, to test against.
 //!
 //! The definition: cards are Lambert surfaces that scatter a share `alpha` of the light and let the rest pass; lights
 //! are seen through the product of `1 - alpha` of the cards in between; the plate is multiplied by the ratio of shadowed
 //! to unshadowed irradiance of the surface `z = 0`; a pixel is the average under a Blackman-Harris window three pixels
 //! wide.
+//!
+//! ```
+//! use petcomp::geom::{Pose, Quad};
+//! use petcomp::render::{RenderOptions, render};
+//! use petcomp::scene::Card;
+//! use petcomp::{Camera, Image, LinearRgb, ObjectId, PremulRgba, Shot};
+//!
+//! let quad = Quad { world_from_card: Pose::translation(0.0, 0.0, 0.05), size: [0.2, 0.1] };
+//! let half = Image::filled(8, 8, PremulRgba::new(0.25, 0.25, 0.25, 0.5));
+//! let shot = Shot::new(Camera::looking_down(1.0, 80.0, [64, 48]))
+//!     .with_card(Card::new(ObjectId(1), quad, half))
+//!     .with_ambient(LinearRgb::WHITE);
+//! let deep = render(&shot, &RenderOptions::default());
+//! let sample = deep.at(32, 24)[0];
+//! assert!((sample.alpha - 0.5).abs() < 1e-5 && (sample.depth.0 - 0.95).abs() < 1e-5);
+//! ```
 
-mod cast;
+mod block;
 mod check;
 mod cryptomatte;
-mod four;
+mod deep;
+mod float4;
+mod grade;
 mod half_plane;
 mod interreflection;
 mod irradiance;
 mod lattice;
 mod layers;
+mod light_samples;
+mod occluders;
+mod opacity;
 mod options;
 mod pixel_filter;
+mod ranges;
 mod receiver;
 mod reference;
+mod resample;
 mod shadow;
-mod source;
+mod shadow_ray;
 #[cfg(test)]
 mod tests;
+mod texel_grid;
 mod texture;
-mod through;
+mod transmittance;
 mod view;
 
-pub use cast::{cast, cover};
 pub use check::check;
 pub use cryptomatte::Cryptomatte;
-pub(crate) use cryptomatte::{id_of, murmur3};
+pub(crate) use cryptomatte::{attribute_name, hex_id, id_of_name};
+pub use deep::{render, render_coverage};
 pub use interreflection::interreflect;
-pub use options::{Preset, RenderOptions};
-pub use reference::reference;
+pub use options::RenderOptions;
+pub use reference::render_reference;

@@ -1,4 +1,4 @@
-//! Lights and exposure as a scene tells them.
+//! Lights and exposure as a scene gives them.
 
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub struct AreaLight {
     /// Power, watts.
     pub power: f64,
     /// Colour, scene-linear. Default: white.
-    #[serde(default = "white")]
+    #[serde(default = "default_color")]
     pub color: LinearRgb,
 }
 
@@ -63,24 +63,24 @@ pub enum Exposure {
 /// Colour that all lights and the constant environment are multiplied with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Cast {
+pub enum LightTint {
     /// This one.
     Known(LinearRgb),
     /// Found by the `light` stage: that of the surface in the plate, to the power of `share`.
     MatchSurface {
-        /// 0 keeps white light, 1 takes the surface for grey.
+        /// 0 keeps white light, 1 treats the surface as grey.
         share: f64,
     },
 }
 
-impl Default for Cast {
+impl Default for LightTint {
     fn default() -> Self {
         Self::Known(LinearRgb::WHITE)
     }
 }
 
-impl Cast {
-    /// Nothing is changed.
+impl LightTint {
+    /// Whether it changes nothing.
     pub fn is_white(&self) -> bool {
         *self == Self::default()
     }
@@ -92,6 +92,6 @@ impl Default for Exposure {
     }
 }
 
-fn white() -> LinearRgb {
+fn default_color() -> LinearRgb {
     LinearRgb::WHITE
 }

@@ -4,8 +4,8 @@ use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{Setup, Studio};
-use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
-use petcomp::{Diagnostic, Result, Severity, io, printable};
+use petcomp::io::{Fallback, LimitOverride, Limits, Override, ReadOptions};
+use petcomp::{Diagnostic, Result, Scene, Severity, io, printable};
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal, Write as _};
 use std::ops::RangeInclusive;
@@ -34,7 +34,7 @@ pub(crate) struct Common {
     /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
     /// document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
-    limits: Vec<Raise>,
+    limits: Vec<LimitOverride>,
     /// What reads pictures that petcomp's own decoders do not know
     #[arg(long, value_enum, default_value_t, global = true)]
     oiio: OpenImageIo,
@@ -83,10 +83,10 @@ pub(crate) fn count(range: RangeInclusive<u64>) -> RangedU64ValueParser<usize> {
 /// Where OpenImageIO runs.
 #[derive(Clone, Copy, Default, clap::ValueEnum)]
 enum OpenImageIo {
-    /// In a confined process of its own
+    /// In a sandboxed process of its own
     #[default]
     Worker,
-    /// The same, and no such picture is read where the system lacks Landlock or seccomp to confine it
+    /// The same, and no such picture is read where the system lacks Landlock or seccomp for its sandbox
     WorkerStrict,
     /// In this process: a damaged file may crash it (needs a build with the feature in-process-oiio)
     InProcess,
@@ -217,6 +217,34 @@ impl RecipeArgs {
     /// Opens the folders that the recipe names.
     pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
         Ok(Studio::open(self.setup()?)?)
+    }
+}
+
+/// A scene file, and where the files that it names are.
+#[derive(clap::Args)]
+pub(crate) struct SceneArgs {
+    /// Scene, TOML or JSON; what is unknown in it is solved first
+    #[arg(value_name = "SCENE")]
+    pub(crate) path: PathBuf,
+    /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's own `[files]` does
+    #[arg(value_name = "RECIPE")]
+    recipe: Option<PathBuf>,
+    /// Replace a value of the recipe or of the scene's settings: render.subsamples=8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+}
+
+impl SceneArgs {
+    pub(crate) fn read(&self) -> anyhow::Result<Scene> {
+        Ok(io::read_document(&self.path)?)
+    }
+
+    /// The recipe's setup or, without a recipe, that which the scene brings.
+    pub(crate) fn setup_for(&self, scene: &Scene) -> anyhow::Result<Setup> {
+        Ok(match &self.recipe {
+            Some(recipe) => Setup::read(recipe, &self.overrides)?,
+            None => Setup::for_scene(scene, &self.path, &self.overrides)?,
+        })
     }
 }
 

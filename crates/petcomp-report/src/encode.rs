@@ -8,9 +8,9 @@ use super::pile::pile;
 use super::{Diagram, Point};
 use petcomp::Image;
 use petcomp::Quality;
-use petcomp::io::{self, Bits, Compression, PngEffort, WriteOptions};
+use petcomp::io::{self, Bits, Compression, WriteOptions};
 use petcomp::plot::three;
-use petcomp::render::cast;
+use petcomp::render::render;
 use petcomp::{Error, Result};
 use petcomp::{LinearRgb, PremulRgba};
 use petcomp::{Shot, composite};
@@ -104,7 +104,7 @@ fn beside_jpeg(ways: &[Way], stored: &[Stored]) -> String {
             .position(|way| way.curve == curve && way.setting == setting)
             .map(|i| &stored[i])
     };
-    let (Some(png), Some(jpeg)) = (of(PNG, "fast"), of("JPEG", "95")) else {
+    let (Some(png), Some(jpeg)) = (of(PNG, "normal"), of("JPEG", "95")) else {
         return String::new();
     };
     format!(
@@ -134,7 +134,7 @@ fn ways() -> Vec<Way> {
         extension: "png",
         options: WriteOptions {
             bits: Some(bits),
-            png: effort,
+            png_effort: effort,
             ..WriteOptions::default()
         },
     };
@@ -148,11 +148,10 @@ fn ways() -> Vec<Way> {
         },
     });
     let mut all = vec![
-        png(PNG, "least", Bits::Eight, PngEffort::Least),
-        png(PNG, "fast", Bits::Eight, PngEffort::Fast),
-        png(PNG, "usual", Bits::Eight, PngEffort::Usual),
-        png(PNG, "most", Bits::Eight, PngEffort::Most),
-        png("PNG, 16 bits", "fast", Bits::Sixteen, PngEffort::Fast),
+        png(PNG, "draft", Bits::Eight, Quality::Draft),
+        png(PNG, "normal", Bits::Eight, Quality::Normal),
+        png(PNG, "reference", Bits::Eight, Quality::Reference),
+        png("PNG, 16 bits", "normal", Bits::Sixteen, Quality::Normal),
         exr(HALF, "uncompressed", Bits::Half, Compression::None),
         exr(HALF, "PIZ", Bits::Half, Compression::Piz),
         exr(HALF, "ZIP", Bits::Half, Compression::Zip),
@@ -182,7 +181,7 @@ impl Way {
         let is = |curve, setting| self.curve == curve && self.setting == setting;
         Point::new(self.curve, self.setting.clone(), cost, error).used_where(|quality| {
             let with_exr = quality.pictures(Default::default()).exr;
-            is(PNG, "fast") || with_exr && is(HALF, "ZIP")
+            is(PNG, "normal") || with_exr && is(HALF, "ZIP")
         })
     }
 }
@@ -221,7 +220,7 @@ fn picture() -> Image<LinearRgb> {
         .iter_mut()
         .for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
     let shot: Shot = pile(CARDS, SIZE).with_plate(Arc::new(plate));
-    let deep = cast(&shot, &Quality::default().render());
+    let deep = render(&shot, &Quality::default().render());
     composite::frame(&deep, shot.plate.as_deref()).map(PremulRgba::color)
 }
 
@@ -243,12 +242,12 @@ mod tests {
             way.store(&ramp, folder.path()).unwrap().error
         };
         assert_eq!(error("EXR, float", "ZIP"), 0.0);
-        assert!(error(HALF, "ZIP") < 1e-3 && error("PNG, 16 bits", "fast") < 1e-4);
+        assert!(error(HALF, "ZIP") < 1e-3 && error("PNG, 16 bits", "normal") < 1e-4);
         // A code of sRGB spans at most 0.0098 of light.
         assert!(
-            (1e-4..0.0098 / 2.0).contains(&error(PNG, "fast")),
+            (1e-4..0.0098 / 2.0).contains(&error(PNG, "normal")),
             "{}",
-            error(PNG, "fast")
+            error(PNG, "normal")
         );
         assert!(error("JPEG", "50") > error("JPEG", "95"));
     }

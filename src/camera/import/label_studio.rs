@@ -126,22 +126,27 @@ impl AnnotationResult {
     fn shape(&self) -> Option<AnnotatedShape> {
         let geometry = self.value.as_ref().unwrap_or(&self.own);
         let (kind, points) = match (&geometry.points, geometry.x.zip(geometry.y)) {
-            (Some(points), _) => (
-                ShapeKind::Polygon,
-                points.iter().map(|p| self.to_px(*p)).collect(),
-            ),
+            (Some(points), _) => (ShapeKind::Polygon, points.clone()),
             (None, Some((x, y))) if geometry.keypointlabels.is_some() => {
-                (ShapeKind::Points, vec![self.to_px([x, y])])
+                (ShapeKind::Points, vec![[x, y]])
             }
-            (None, Some((x, y))) => {
-                let size = self.to_px([geometry.width?, geometry.height?]);
-                let corners = turned_about_corner(self.to_px([x, y]), size, geometry.rotation);
-                (ShapeKind::Rectangle, corners)
-            }
+            (None, Some((x, y))) => return self.rectangle(geometry, [x, y]),
             _ => return None,
         };
-        let name = geometry.name();
-        Some(AnnotatedShape { kind, name, points })
+        Some(AnnotatedShape {
+            kind,
+            name: geometry.name(),
+            points: points.into_iter().map(|p| self.to_px(p)).collect(),
+        })
+    }
+
+    fn rectangle(&self, geometry: &ResultGeometry, corner: [f64; 2]) -> Option<AnnotatedShape> {
+        let size = self.to_px([geometry.width?, geometry.height?]);
+        Some(AnnotatedShape {
+            kind: ShapeKind::Rectangle,
+            name: geometry.name(),
+            points: turned_about_corner(self.to_px(corner), size, geometry.rotation),
+        })
     }
 
     /// Pixels from percent of the picture.

@@ -90,22 +90,30 @@ impl Annotation {
 
     /// Name and corners of the only shape that can be the surface.
     fn rectangle(&self) -> Result<NamedCorners> {
-        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
-        if numbers.any(|v| !v.is_finite()) {
-            return Err(Error::value("shapes", "a point is not finite"));
-        }
+        self.check_finite()?;
         let quads = self.four_cornered(ShapeKind::Polygon);
         let boxes = self.four_cornered(ShapeKind::Rectangle);
-        let points: Vec<_> = self
-            .shapes_of(ShapeKind::Points)
-            .flat_map(|s| s.points.iter().map(|p| (&s.name, *p)))
-            .collect();
+        let points = self.named_points();
         match (quads.as_slice(), boxes.as_slice(), points.as_slice()) {
             ([quad], ..) => Ok(quad.clone()),
             ([], [one], _) => Ok(one.clone()),
             ([], [], [a, b, c, d]) => Ok(corners_from_points([*a, *b, *c, *d])),
             _ => Err(self.unclear([quads.len(), boxes.len(), points.len()])),
         }
+    }
+
+    fn check_finite(&self) -> Result<()> {
+        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
+        match numbers.all(|v| v.is_finite()) {
+            true => Ok(()),
+            false => Err(Error::value("shapes", "a point is not finite")),
+        }
+    }
+
+    fn named_points(&self) -> Vec<(&String, [f64; 2])> {
+        self.shapes_of(ShapeKind::Points)
+            .flat_map(|s| s.points.iter().map(|p| (&s.name, *p)))
+            .collect()
     }
 
     fn shapes_of(&self, kind: ShapeKind) -> impl Iterator<Item = &AnnotatedShape> {

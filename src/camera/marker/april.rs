@@ -207,12 +207,12 @@ mod tests {
 
     #[test]
     fn a_wrong_artwork_is_seen_and_put_right() {
-        for (printed, told) in [
+        for (printed, stated) in [
             (Artwork::Opencv, Artwork::Apriltag),
             (Artwork::Apriltag, Artwork::Apriltag),
         ] {
             let (photo, camera) = photo(4, printed, 25.0, 7);
-            let label = with_markers(label(told, &camera), &photo).unwrap();
+            let label = with_markers(label(stated, &camera), &photo).unwrap();
             let solution = camera::solve(&label, &SolveOptions::default()).unwrap();
             for corner in [[-0.3, 0.2], [0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]] {
                 let at = |c: &crate::Camera| {

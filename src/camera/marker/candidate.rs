@@ -63,19 +63,26 @@ fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
         pixels += 1;
         let end = ends.entry(y).or_insert((x, x));
         *end = (end.0.min(x), end.1.max(x));
-        let next = [
-            (x > 0, at.wrapping_sub(1)),
-            (x + 1 < width, at + 1),
-            (y > 0, at.wrapping_sub(width)),
-            (y + 1 < height, at + width),
-        ];
-        for (_, neighbour) in next.into_iter().filter(|(inside, _)| *inside) {
+        for neighbour in neighbours(at, [width, height]) {
             if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
                 stack.push(neighbour);
             }
         }
     }
     (pixels, ends)
+}
+
+/// The pixels beside, above and below one that are in the picture.
+fn neighbours(at: usize, [width, height]: [usize; 2]) -> impl Iterator<Item = usize> {
+    let (x, y) = (at % width, at / width);
+    [
+        (x > 0).then(|| at - 1),
+        (x + 1 < width).then_some(at + 1),
+        (y > 0).then(|| at - width),
+        (y + 1 < height).then_some(at + width),
+    ]
+    .into_iter()
+    .flatten()
 }
 
 /// The corners of the first and last pixel of each row.

@@ -171,17 +171,11 @@ impl MarkerLayout<'_> {
         };
         let sigma_px = marker.sigma_px.max(self.min_sigma_px);
         let marker = *marker;
-        center.into_iter().flat_map(move |[x, y, z]| {
-            let places = [
-                [x - half, y + half],
-                [x + half, y + half],
-                [x + half, y - half],
-                [x - half, y - half],
-            ];
+        center.into_iter().flat_map(move |center| {
             [0, 1, 2, 3].map(|i| {
                 let px = marker.corners_px[(i + turns) % 4];
                 LabelPoint {
-                    xyz_m: [places[i][0], places[i][1], z],
+                    xyz_m: square_corner(center, half, i),
                     px: [px.x - offset, px.y - offset],
                     sigma_px: Some(sigma_px),
                     note: Some(format!("marker {}", marker.id)),
@@ -210,6 +204,16 @@ impl MarkerLayout<'_> {
         let label = self.label_turned(turns);
         let solution = solve(&label, &SolveOptions::default()).ok()?;
         Some(solution.fit)
+    }
+}
+
+/// A corner of a square on the surface, from the top left, clockwise.
+fn square_corner([x, y, z]: [f64; 3], half: f64, corner: usize) -> [f64; 3] {
+    match corner {
+        0 => [x - half, y + half, z],
+        1 => [x + half, y + half, z],
+        2 => [x + half, y - half, z],
+        _ => [x - half, y - half, z],
     }
 }
 

@@ -11,6 +11,7 @@ use crate::pixel::{Coverage, Film, LinearRgb, PremulRgba};
 
 /// A matte in the region around the object.
 pub(super) struct Matted {
+    pub(super) method: MatteMethod,
     pub(super) film: Image<Film>,
     pub(super) transmittance: Image<LinearRgb>,
     pub(super) uncertainty: Image<f32>,
@@ -21,7 +22,7 @@ pub(super) struct Matted {
 }
 
 impl Matted {
-    /// By the method that is asked for.
+    /// Applies the method of the options.
     pub(super) fn new(
         prepared: &Prepared<'_>,
         screen: &CleanScreen,
@@ -31,12 +32,12 @@ impl Matted {
         match opts.method.unwrap_or_default() {
             MatteMethod::Physical => Self::physical(prepared, screen, region, opts),
             MatteMethod::Key => Self::keyed(prepared, screen, region, opts),
-            MatteMethod::Outline => Ok(Self::grey(
-                region
+            MatteMethod::Outline => {
+                let cutout = region
                     .photo
-                    .zip_map(&region.cut, |p, m| p.opaque().masked(m)),
-                0.0,
-            )),
+                    .zip_map(&region.cut, |p, m| p.opaque().masked(m));
+                Ok(Self::grey(MatteMethod::Outline, cutout, 0.0))
+            }
         }
     }
 
@@ -63,6 +64,7 @@ impl Matted {
         } = solve_film(object, &opts.film)?;
         // Film is empty outside the cut.
         Ok(Self {
+            method: MatteMethod::Physical,
             film,
             transmittance,
             uncertainty,
@@ -83,14 +85,16 @@ impl Matted {
             .map_err(|e| e.within("key"))?;
         let cutout = keyed.cutout.crop(region.around);
         Ok(Self::grey(
+            MatteMethod::Key,
             cutout.zip_map(&region.cut, |p, m| p.masked(m)),
             mean_matte(&keyed.matte, &screen.background),
         ))
     }
 
     /// A cut-out of one alpha for all channels, which is used as the transmittance as well.
-    fn grey(image: Image<PremulRgba>, residual_matte: f32) -> Self {
+    fn grey(method: MatteMethod, image: Image<PremulRgba>, residual_matte: f32) -> Self {
         Self {
+            method,
             film: image.map(Film::from),
             transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
             uncertainty: Image::new(image.width(), image.height()),

@@ -19,7 +19,7 @@ pub struct CutOutOptions {
     pub plate: PlateOptions,
     /// How film is solved for.
     pub film: FilmOptions,
-    /// How the object is keyed, where that is asked for.
+    /// How the object is keyed, where the method is `key`.
     pub key: KeyOptions,
     /// Colour of an evenly lit screen, scene-linear; nothing = fitted to the photo. Default: nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -54,12 +54,12 @@ impl Default for CutOutOptions {
     }
 }
 
-/// Where a matte comes from.
+/// How a matte is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MatteMethod {
     /// From reflected light and transmittance, solved for in every pixel: see-through plastic keeps its own light only.
-    /// Guessed on a screen without a hue, and that is said.
+    /// Assumed to be that of plastic on a screen without a hue, with a warning.
     #[default]
     Physical,
     /// From the screen's colour, as Blender's Keying node does: see-through plastic is see-through.

@@ -1,7 +1,6 @@
 //! How blurred the edges of an object are.
 
-use super::snap::{EdgePoint, distance, evenly_spaced};
-use crate::geom::Point2;
+use super::snap::{EdgePoint, distance, edge_points, evenly_spaced};
 use crate::image::Image;
 use crate::matte::Outline;
 use crate::pixel::LinearRgb;
@@ -28,7 +27,7 @@ pub(super) fn edge_blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f
     let points: Vec<_> = outline
         .rings
         .iter()
-        .flat_map(|ring| edge_points(&evenly_spaced(ring, PROFILE_SPACING_PX * scale.max(1.0))))
+        .flat_map(|ring| edge_points(&evenly_spaced(ring, PROFILE_SPACING_PX * scale.max(1.0)), 1))
         .collect();
     let mut slopes: Vec<f32> = points
         .par_iter()
@@ -40,14 +39,6 @@ pub(super) fn edge_blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f
     let middle = slopes.len() / 2;
     let (_, median, _) = slopes.select_nth_unstable_by(middle, f32::total_cmp);
     GAUSSIAN_SLOPE / f64::from(*median)
-}
-
-/// The points of a ring with the normals there.
-fn edge_points(ring: &[Point2<f64>]) -> Vec<EdgePoint> {
-    let n = ring.len();
-    (0..n)
-        .map(|i| EdgePoint::new(ring[i], [ring[(i + n - 1) % n], ring[(i + 1) % n]]))
-        .collect()
 }
 
 /// The photo along the normal, at steps of half a pixel of the search.
@@ -76,6 +67,7 @@ fn steepest_share(profile: &[LinearRgb]) -> Option<f32> {
 mod tests {
     use super::*;
     use crate::filter;
+    use crate::geom::Point2;
 
     #[test]
     fn the_blur_of_a_disc_is_measured() {

@@ -3,10 +3,12 @@
 use super::confidence::Confidence;
 use super::holes::{self, ObjectArea};
 use super::pass::{Pass, Search};
-use super::{SegmentOptions, SegmentStep, band, hull};
+use super::{SegmentOptions, SegmentStep, band};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
 use crate::image::{Image, Mask};
+use crate::matte::prepared::longer_side;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -153,7 +155,7 @@ fn scales<'a>(picture: &'a Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Searc
         .collect()
 }
 
-/// The depths at which a picture of a longer side still has a coarsest band worth its name, and the one that is asked for.
+/// The depths at which a picture of a longer side still has enough pixels in its coarsest band, and the one that is asked for.
 fn usable_depths(depths: &[usize], longer: usize, asked: Option<usize>) -> Vec<usize> {
     let mut usable: Vec<usize> = depths
         .iter()
@@ -204,16 +206,15 @@ fn drift_px(
     let stricter = scale
         .search
         .at_threshold(own.levels, STRICTER_FACTOR, opts)
-        .map_or(
-            pass.inside.width().max(pass.inside.height()) as f64,
-            |other| hull::farthest_side(&pass.hull, &other.hull),
-        );
-    let moved = searched
+        .map_or(longer_side(&pass.inside) as f64, |other| {
+            pass.distance(&other)
+        });
+    let other_depths = searched
         .iter()
         .filter(|other| other.scale == own.scale)
         .filter_map(|other| other.pass.as_ref().ok())
-        .map(|other| hull::farthest_side(&pass.hull, &other.hull));
-    scale.reduction as f64 * moved.fold(stricter, f64::max)
+        .map(|other| pass.distance(other));
+    scale.reduction as f64 * other_depths.fold(stricter, f64::max)
 }
 
 impl SearchResult {
@@ -238,9 +239,9 @@ impl SearchResult {
     fn small_area(&self, (w, h): (usize, usize)) -> Option<Mask> {
         let pass = self.pass.as_ref().ok()?;
         let longer = w.max(h);
-        let side = |len: usize| (len * COMPARED_SIDE_PX.min(longer)).div_ceil(longer);
+        let [w, h] = [w, h].map(|side| (side * COMPARED_SIDE_PX.min(longer)).div_ceil(longer));
         let inside = pass.inside.to_coverage();
-        Some(filter::resize(&inside, side(w), side(h)).map(|c| c.0 > 0.5))
+        Some(filter::resize(&inside, w, h).map(|c| c.0 > 0.5))
     }
 
     /// Share of the outline that lies on edges; what lies on the picture's border does not count.
@@ -286,6 +287,14 @@ fn overlap(a: &Mask, b: &Mask) -> f64 {
 }
 
 impl ChosenSearch<'_> {
+    /// What it left out or saw only in part; `asked` is the width of the picture that should have been searched.
+    pub(super) fn diagnostics(&self, asked: usize) -> Vec<Diagnostic> {
+        let mut diagnostics = self.pass.diagnostics.clone();
+        diagnostics.extend(truncated(self.pass.touches));
+        diagnostics.extend(noisy(asked, self.picture.width()));
+        diagnostics
+    }
+
     /// What the edges enclose, without holes.
     pub(super) fn object_area(&self) -> ObjectArea {
         holes::object_area(&self.picture, &self.pass.inside)
@@ -317,6 +326,39 @@ impl ChosenSearch<'_> {
 /// 1 where set, 0 elsewhere.
 fn as_plane(set: &Mask) -> Image<f32> {
     set.map(|set| f32::from(u8::from(set)))
+}
+
+/// Names of the borders in the order of [`Pass::touches`].
+const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
+
+/// The warning about an object that the photo cuts off; none for a whole one.
+fn truncated(touches: [bool; 4]) -> Option<Diagnostic> {
+    let reached: Vec<_> = BORDERS
+        .into_iter()
+        .zip(touches)
+        .filter(|(_, touches)| *touches)
+        .map(|(name, _)| name)
+        .collect();
+    (!reached.is_empty()).then(|| {
+        let message = format!(
+            "the object reaches the {} border: the part beyond is missing from its size",
+            reached.join(" and ")
+        );
+        Diagnostic::warning(Code::Truncated, message)
+    })
+}
+
+/// The warning about an object that was found at a lower resolution than asked for; from the widths of the pictures.
+fn noisy(asked: usize, searched: usize) -> Option<Diagnostic> {
+    let reduction = asked as f64 / searched as f64;
+    (reduction > 1.0).then(|| {
+        Diagnostic::warning(
+            Code::Noisy,
+            format_args!(
+                "the photo is noisy: the outline was found at 1/{reduction:.0} of the resolution and is accurate to one of its pixels"
+            ),
+        )
+    })
 }
 
 #[cfg(test)]
@@ -359,6 +401,21 @@ mod tests {
             .unwrap();
             assert_eq!(chosen.levels, levels);
             assert_eq!(chosen.pass.inside.size(), photo.size());
+        }
+    }
+
+    #[test]
+    fn the_picture_of_the_chosen_search_is_kept_and_not_made_again() {
+        let disc = |x: f64, y: f64| (x - 150.0).hypot(y - 100.0) < 60.0;
+        let photo = Image::from_fn(300, 200, |x, y| {
+            LinearRgb::grey(if disc(x as f64, y as f64) { 0.8 } else { 0.1 })
+        });
+        let opts = SegmentOptions::default();
+        let whole = best_search(&photo, &opts).unwrap();
+        assert!(matches!(whole.picture, Cow::Borrowed(picture) if std::ptr::eq(picture, &photo)));
+        for scale in scales(&photo, &opts) {
+            let searched = scale.search.at_depth(2, &opts).unwrap().inside.size();
+            assert_eq!(scale.picture.size(), searched);
         }
     }
 }

@@ -46,6 +46,13 @@ pub(super) struct Pass {
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
+impl Pass {
+    /// The largest distance between a side of the hull's box and that of another search.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        hull::farthest_side(&self.hull, &other.hull)
+    }
+}
+
 /// How far the finest band smears an edge, pixels: the reach of its kernel.
 const SMEAR_PX: usize = 2;
 /// Edges nearer than this belong together in the smallest picture, too, pixels: the width of a smeared edge.
@@ -93,13 +100,18 @@ impl Search {
         self.pass(levels, &finest_binary, opts)
     }
 
+    /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck.
+    fn thin_edges(&self, finest: &Mask, coarsest: &Mask, speck: usize) -> Mask {
+        let both = finest.zip_map(coarsest, |a, b| a && b);
+        let thin = both.zip_map(&self.ridges, |both, ridge| both && ridge);
+        cluster::without_specks(&thin, speck)
+    }
+
     fn pass(&self, levels: usize, finest_binary: &Mask, opts: &SegmentOptions) -> Result<Pass> {
         let coarsest = self.bands.at_full_size(levels);
         let threshold = opts.coarsest_threshold.of_band(&coarsest);
         let coarsest_binary = coarsest.map(|v| v > threshold);
-        let both = finest_binary.zip_map(&coarsest_binary, |a, b| a && b);
-        let thin = both.zip_map(&self.ridges, |both, ridge| both && ridge);
-        let edges = cluster::without_specks(&thin, opts.speck);
+        let edges = self.thin_edges(finest_binary, &coarsest_binary, opts.speck);
         let join_px = (opts.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
         let (object, diagnostics) = main_object(&edges, join_px)?;
         let hull = hull::convex_hull(&object);
@@ -123,7 +135,7 @@ impl Search {
 const RIVAL_SHARE: f64 = 0.3;
 /// A smaller cluster is worth a warning from this share on.
 const REMNANT_SHARE: f64 = 0.05;
-/// So many clusters too small for a warning are worth one together: where they lie on the screen, one may lie beside the
+/// So many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
 /// object.
 const SPECK_COUNT: usize = 2;
 
@@ -258,11 +270,15 @@ fn under_hull(set: &Mask, share: f32) -> Mask {
 /// Where a set of pixels is, in words, as shares of the picture.
 fn place(set: &Mask) -> String {
     let hull = hull::convex_hull(set);
-    let n = hull.len().max(1) as f64;
-    let percent = |sum: f64, len: usize| (100.0 * sum / n / len as f64).round();
-    let x = percent(hull.iter().map(|p| p.x).sum(), set.width());
-    let y = percent(hull.iter().map(|p| p.y).sum(), set.height());
+    let x = mean_percent(hull.iter().map(|p| p.x), set.width());
+    let y = mean_percent(hull.iter().map(|p| p.y), set.height());
     format!("at {x} % of the width and {y} % of the height")
+}
+
+/// Mean of coordinates as a rounded percentage of a length.
+fn mean_percent(coordinates: impl ExactSizeIterator<Item = f64>, len: usize) -> f64 {
+    let n = coordinates.len().max(1) as f64;
+    (100.0 * coordinates.sum::<f64>() / n / len as f64).round()
 }
 
 /// The area may grow by this factor when twice the gap is bridged; by more, and it had leaked.

@@ -48,9 +48,7 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
     if n < 2 * MEDIAN_REACH + 1 {
         return ring.to_vec();
     }
-    let points: Vec<EdgePoint> = (0..n)
-        .map(|i| EdgePoint::new(ring[i], [ring[(i + n - 2) % n], ring[(i + 2) % n]]))
-        .collect();
+    let points = edge_points(ring, 2);
     let profiles: Vec<EdgeProfile> = points
         .par_iter()
         .map(|point| EdgeProfile::new(roots, point, scale))
@@ -61,6 +59,14 @@ fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> V
         .iter()
         .enumerate()
         .map(|(i, point)| point.displaced(median_around(&found, i), roots.size(), scale))
+        .collect()
+}
+
+/// The points of a ring, with normals across the chords between the neighbours `reach` points away.
+pub(super) fn edge_points(ring: &[Point2<f64>], reach: usize) -> Vec<EdgePoint> {
+    let n = ring.len();
+    (0..n)
+        .map(|i| EdgePoint::new(ring[i], [ring[(i + n - reach) % n], ring[(i + reach) % n]]))
         .collect()
 }
 
@@ -89,7 +95,7 @@ pub(super) struct EdgePoint {
 
 impl EdgePoint {
     /// A point of a ring that goes clockwise as seen, and two neighbours of it, the earlier one first.
-    pub(super) fn new(at: Point2<f64>, [before, after]: [Point2<f64>; 2]) -> Self {
+    fn new(at: Point2<f64>, [before, after]: [Point2<f64>; 2]) -> Self {
         let along = after - before;
         let normal = Vector2::new(along.y, -along.x)
             .try_normalize(0.0)
@@ -138,21 +144,14 @@ impl EdgeProfile {
         let outside: Vec<_> = (0..(OUTSIDE_PX * STEPS_PER_PX as f64) as usize)
             .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * step, scale))
             .collect();
-        let mean = outside
-            .iter()
-            .fold(LinearRgb::BLACK, |sum, p| sum + *p)
-            .scale(1.0 / outside.len() as f32);
-        let square: f32 = outside
-            .iter()
-            .map(|p| distance(*p, mean) * distance(*p, mean))
-            .sum();
+        let (mean, noise) = mean_and_deviation(&outside);
         let change = (0..=(2.0 * PROFILE_REACH_PX * STEPS_PER_PX as f64) as usize).map(|k| {
             let inwards = point.mean_at(roots, PROFILE_REACH_PX - k as f64 * step, scale);
             distance(inwards, mean)
         });
         Self {
             change: change.collect(),
-            noise: (square / outside.len() as f32).sqrt(),
+            noise,
         }
     }
 
@@ -176,6 +175,20 @@ impl EdgeProfile {
             change[k] >= least && change.get(k + 1).is_none_or(|next| *next <= change[k])
         })
     }
+}
+
+/// The mean of some colours, and the root mean square of their distances from it.
+fn mean_and_deviation(colors: &[LinearRgb]) -> (LinearRgb, f32) {
+    let n = colors.len() as f32;
+    let mean = colors
+        .iter()
+        .fold(LinearRgb::BLACK, |sum, p| sum + *p)
+        .scale(1.0 / n);
+    let square: f32 = colors
+        .iter()
+        .map(|p| distance(*p, mean) * distance(*p, mean))
+        .sum();
+    (mean, (square / n).sqrt())
 }
 
 /// Euclidean distance of two colours.

@@ -46,7 +46,7 @@ fn film_scans_are_read_by_the_worker() {
 
 /// A program that takes no chance does not ask a worker that the system leaves loose.
 #[test]
-fn a_worker_that_is_not_confined_is_refused_where_that_is_asked_for() {
+fn a_worker_without_a_full_sandbox_is_refused_where_that_is_asked_for() {
     let folder = Folder::new();
     let picture = folder.with("palette.tif", &palette_tiff());
     let worker = folder.file("worker");
@@ -54,7 +54,7 @@ fn a_worker_that_is_not_confined_is_refused_where_that_is_asked_for() {
         "#!/bin/sh\necho '{{\"petcomp\":\"{}\",\"openimageio\":\"0\",\"missing\":[\"Landlock: not in this kernel\"]}}'\nexec sleep 9\n",
         env!("CARGO_PKG_VERSION")
     );
-    // Written by a process of its own: see `write_program` in `src/io/worker.rs`.
+    // Written by a process of its own: see `write_program` in `src/io/worker/pool.rs`.
     let mut shell = std::process::Command::new("/bin/sh");
     let written = shell
         .args(["-c", "printf %s \"$1\" >\"$0\" && chmod 755 \"$0\""])
@@ -71,7 +71,7 @@ fn a_worker_that_is_not_confined_is_refused_where_that_is_asked_for() {
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(4), "{told}");
     assert!(
-        told.contains("its worker cannot be confined here (Landlock: not in this kernel)"),
+        told.contains("its worker has no full sandbox here (Landlock: not in this kernel)"),
         "{told}"
     );
 }

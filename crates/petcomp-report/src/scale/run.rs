@@ -12,9 +12,9 @@ use petcomp::dataset::{
 };
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{
-    CameraSource, Exposure, Grade, Look, Object, Placement, Scene, Shot, Surface,
+    Appearance, CameraSource, Exposure, Grade, Object, Placement, Scene, Shot, Surface,
 };
 use petcomp::settle::{SettleOptions, heap, settle};
 use petcomp::{Error, Image, LinearRgb, PremulRgba, Result, composite, work};
@@ -117,7 +117,7 @@ impl World {
             .into();
         let look = |object: &Object| {
             let texture = textures[object.photo % CUT_OUTS].clone();
-            Some(Look {
+            Some(Appearance {
                 class: 0,
                 texture,
                 back: None,
@@ -149,7 +149,7 @@ impl World {
     }
 
     fn sample(&self) -> Sample {
-        let deep = cast(&self.shot, &RenderOptions::default());
+        let deep = render(&self.shot, &RenderOptions::default());
         let frame = composite::frame(&deep, self.shot.plate.as_deref());
         let labels = label(&deep, &self.shot, &LabelOptions::default());
         Sample {
@@ -213,6 +213,8 @@ fn scene(case: &Case) -> Scene {
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
         finish: Default::default(),
+        files: None,
+        settings: Default::default(),
     }
 }
 

@@ -6,8 +6,8 @@ use petcomp::Image;
 use petcomp::Result;
 use petcomp::composite::{finish, frame};
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, cast};
-use petcomp::scene::{Finish, Shot};
+use petcomp::render::{RenderOptions, render};
+use petcomp::scene::{PostProcess, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
 use std::sync::Arc;
@@ -84,12 +84,12 @@ fn everything_off() -> Case {
         || {
             let plate = Arc::new(plate(64, 48));
             let shot = Shot::new(above([64, 48], 60.0)).with_plate(plate.clone());
-            let deep = cast(&shot, &RenderOptions::default());
+            let deep = render(&shot, &RenderOptions::default());
             let out = finish(
                 frame(&deep, Some(&plate)),
                 &deep,
                 Some(&plate),
-                &Finish::default(),
+                &PostProcess::default(),
             );
             let pixels = out
                 .pixels()
@@ -120,7 +120,7 @@ fn empty_without_plate() -> Case {
         "no card, no plate",
         "transparent black everywhere: 0 pixels differ",
         || {
-            let deep = cast(
+            let deep = render(
                 &Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE),
                 &RenderOptions::default(),
             );
@@ -200,7 +200,7 @@ fn broken_plate() -> Case {
             let mut plate = plate(64, 48);
             plate[(20, 30)].g = f32::NAN;
             let out = frame(
-                &cast(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
+                &render(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
                 Some(&plate),
             );
             let broken = out
@@ -222,9 +222,9 @@ fn exposed(ev: f64) -> Case {
             let values = [0.0, 1e-4, 1.0];
             let picture =
                 Image::from_vec(3, 1, values.map(|v| LinearRgb::grey(v).opaque()).to_vec());
-            let change = Finish {
+            let change = PostProcess {
                 exposure_ev: ev,
-                ..Finish::default()
+                ..PostProcess::default()
             };
             let out = finish(picture, &row(vec![vec![]; 3]), None, &change);
             let found = [0, 1, 2].map(|x| out[(x, 0)].g);
@@ -246,9 +246,9 @@ fn sharpened() -> Case {
             let picture = Image::from_fn(33, 33, |x, y| {
                 LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque()
             });
-            let change = Finish {
+            let change = PostProcess {
                 sharpening: 2.0,
-                ..Finish::default()
+                ..PostProcess::default()
             };
             let out = finish(picture, &row(vec![]), None, &change);
             let [least, most] = [f32::min, f32::max]

@@ -9,7 +9,7 @@ use petcomp::dataset::{
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{Background, CameraSource, Range, Recipe, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Error, Result};
@@ -45,7 +45,7 @@ pub(super) fn cases() -> Result<Vec<Case>> {
 
 /// A picture of a shot, its labels, and what it was made from.
 fn taken(shot: &Shot) -> Sample {
-    let deep = cast(shot, &RenderOptions::default());
+    let deep = render(shot, &RenderOptions::default());
     sample(shot, deep)
 }
 
@@ -402,7 +402,7 @@ fn tray() -> Background {
 fn negatives() -> Case {
     Case::new(
         "recipe of empty scenes alone",
-        "negatives = 1, and objects = 0, 20 scenes of each, without stock",
+        "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
         "no object in any: 0",
         || {
             let none = Recipe {
@@ -468,7 +468,7 @@ fn seeds() -> Case {
 fn recipes() -> Vec<Case> {
     vec![
         refused("recipe without a background", "background", &[], |_| ()),
-        refused("recipe without stock", "no asset", &[tray()], |_| ()),
+        refused("recipe without a catalog", "no asset", &[tray()], |_| ()),
         refused("pictures of 0 x 48", "image", &[tray()], |recipe| {
             recipe.image = [0, 48]
         }),

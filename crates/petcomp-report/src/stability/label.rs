@@ -7,7 +7,7 @@ use petcomp::Result;
 use petcomp::geom::BBox;
 use petcomp::geom::Point2;
 use petcomp::label::{AmodalBox, LabelOptions, Labels, ObjectLabel, RleMask, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
@@ -43,7 +43,7 @@ fn shot(image: [u32; 2], cards: impl IntoIterator<Item = Card>) -> Shot {
 
 fn labelled(shot: &Shot) -> Labels {
     label(
-        &cast(shot, &RenderOptions::default()),
+        &render(shot, &RenderOptions::default()),
         shot,
         &LabelOptions::default(),
     )
@@ -276,7 +276,7 @@ fn edge_on() -> Case {
                     opaque(3, [3.0, 0.0, 0.0], 0.2),
                 ],
             );
-            let deep = cast(&shot, &RenderOptions::default());
+            let deep = render(&shot, &RenderOptions::default());
             let around = |amodal| {
                 label(
                     &deep,

@@ -4,7 +4,7 @@ use super::world::dropped;
 use super::*;
 use petcomp::LinearRgb;
 use petcomp::dataset::{Progress, Setup};
-use petcomp::scene::{AreaLight, Finish, Noise, Scene};
+use petcomp::scene::{AreaLight, Noise, PostProcess, Scene};
 use petcomp::work::Kind::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -120,25 +120,25 @@ fn idle_switches_leave_every_byte_and_cost_nothing() {
         ),
         (
             "noise of variance 0",
-            finish(Finish {
+            finish(PostProcess {
                 noise: quiet,
                 noise_seed: 7,
-                ..Finish::default()
+                ..PostProcess::default()
             }),
         ),
         (
             "sharpening by 0",
-            finish(Finish {
+            finish(PostProcess {
                 sharpening: 0.0,
-                ..Finish::default()
+                ..PostProcess::default()
             }),
         ),
         (
             "0 stops and even white",
-            finish(Finish {
+            finish(PostProcess {
                 exposure_ev: 0.0,
                 white_balance: LinearRgb::WHITE,
-                ..Finish::default()
+                ..PostProcess::default()
             }),
         ),
     ];
@@ -173,7 +173,7 @@ fn quality_where_it_does_not_apply_changes_nothing() {
         objects: vec![],
         ..scene.clone()
     };
-    let finest = |setup: &mut Setup| setup.render = petcomp::render::Preset::Reference.options();
+    let finest = |setup: &mut Setup| setup.render = petcomp::Quality::Reference.render();
     assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
     // How cards fall does not matter to cards that lie.
     let longer = |setup: &mut Setup| setup.scene.settle.time_limit *= 2.0;

@@ -1,0 +1,215 @@
+//! What happens to a finished frame before it is written: the other half of a camera.
+
+use crate::color::planckian;
+use crate::error::{Error, Result};
+use crate::pixel::LinearRgb;
+use crate::scene::bounds::{EV, GAIN, KELVIN, NOISE, SHARPENING};
+use crate::scene::{Draws, Range};
+use serde::{Deserialize, Serialize};
+
+/// Exposure, white balance, noise and sharpening of the whole frame, plate included; the default leaves every bit alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PostProcess {
+    /// Brighter or darker by this many stops. Default: 0.
+    pub exposure_ev: f64,
+    /// Factor on each channel. Default: 1, 1, 1.
+    pub white_balance: LinearRgb,
+    /// Noise that rendered cards get, as the plate has it. Default: none.
+    pub noise: Noise,
+    /// Where in the noise: another number is another frame of it. Default: 0.
+    pub noise_seed: u64,
+    /// Amount of sharpening (unsharp mask of one pixel). Default: 0.
+    pub sharpening: f64,
+}
+
+impl Default for PostProcess {
+    fn default() -> Self {
+        Self {
+            exposure_ev: 0.0,
+            white_balance: LinearRgb::WHITE,
+            noise: Noise::default(),
+            noise_seed: 0,
+            sharpening: 0.0,
+        }
+    }
+}
+
+/// Noise of a sensor: variance `shot * value + read^2` of each scene-linear channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Noise {
+    /// None.
+    #[default]
+    None,
+    /// This much.
+    Known {
+        /// Variance per value: photon noise.
+        shot: f64,
+        /// Standard deviation in the dark.
+        read: f64,
+    },
+    /// Found by the `light` stage: as much as the plate has.
+    MatchPlate,
+}
+
+impl PostProcess {
+    /// Whether it leaves the frame alone.
+    pub fn is_identity(&self) -> bool {
+        let Self {
+            exposure_ev,
+            white_balance,
+            noise,
+            noise_seed: _,
+            sharpening,
+        } = *self;
+        exposure_ev == 0.0
+            && white_balance == LinearRgb::WHITE
+            && noise == Noise::None
+            && sharpening == 0.0
+    }
+
+    /// Fails on the first impossible value.
+    pub(super) fn check(&self, at: &str) -> Result<()> {
+        let field = |name: &str| format!("{at}.{name}");
+        EV.check(&field("exposure_ev"), self.exposure_ev)?;
+        let gains: [f32; 3] = self.white_balance.into();
+        if !gains.iter().all(|gain| GAIN.contains((*gain).into())) {
+            let what = format!("{gains:?}, expected three numbers of {GAIN}");
+            return Err(Error::value(field("white_balance"), what));
+        }
+        SHARPENING.check(&field("sharpening"), self.sharpening)?;
+        self.noise.check(&field("noise"))
+    }
+}
+
+impl Noise {
+    fn check(&self, at: &str) -> Result<()> {
+        let Self::Known { shot, read } = *self else {
+            return Ok(());
+        };
+        NOISE.check(&format!("{at}.known.shot"), shot)?;
+        NOISE.check(&format!("{at}.known.read"), read)
+    }
+}
+
+/// What the finish of a scene is drawn from; every default leaves the frame alone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PostProcessRanges {
+    /// Stops. Default: 0.
+    pub exposure_ev: Range,
+    /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
+    pub white_k: Range,
+    /// Noise of rendered cards. Default: `"none"`.
+    pub noise: Noise,
+    /// Amount of sharpening. Default: 0.
+    pub sharpening: Range,
+}
+
+/// Temperature of the white of Rec. 709, kelvin: nothing is changed there.
+pub(super) const NEUTRAL_K: f64 = 6504.0;
+
+impl Default for PostProcessRanges {
+    fn default() -> Self {
+        Self {
+            exposure_ev: Range::fixed(0.0),
+            white_k: Range::fixed(NEUTRAL_K),
+            noise: Noise::None,
+            sharpening: Range::fixed(0.0),
+        }
+    }
+}
+
+impl PostProcessRanges {
+    pub(super) fn draw(&self, draws: &Draws) -> PostProcess {
+        PostProcess {
+            exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
+            white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
+            noise: self.noise,
+            noise_seed: if self.noise == Noise::None {
+                0
+            } else {
+                draws.bits("finish.noise") >> 11
+            },
+            sharpening: self.sharpening.draw(draws, "finish.sharpening"),
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        self.exposure_ev.check("finish.exposure_ev", &EV)?;
+        self.white_k.check("finish.white_k", &KELVIN)?;
+        self.sharpening.check("finish.sharpening", &SHARPENING)?;
+        self.noise.check("finish.noise")
+    }
+}
+
+/// Gains that make light of a temperature look like light of 6504 K, green left alone.
+pub fn white_balance(white_k: f64) -> LinearRgb {
+    if white_k == NEUTRAL_K {
+        return LinearRgb::WHITE;
+    }
+    let (wanted, seen) = (planckian(NEUTRAL_K), planckian(white_k));
+    LinearRgb::new(
+        relative_gain([wanted.r, wanted.g], [seen.r, seen.g]),
+        1.0,
+        relative_gain([wanted.b, wanted.g], [seen.b, seen.g]),
+    )
+}
+
+/// The gain of a channel, each beside its green.
+fn relative_gain([wanted, wanted_green]: [f32; 2], [seen, seen_green]: [f32; 2]) -> f32 {
+    (wanted / wanted_green) / (seen / seen_green).max(f32::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_do_nothing_and_draw_nothing() {
+        let finish = PostProcessRanges::default().draw(&Draws::new(3, 4));
+        assert_eq!(finish, PostProcess::default());
+        assert!(finish.is_identity());
+    }
+
+    #[test]
+    fn a_warm_white_makes_the_frame_bluer() {
+        let gains = white_balance(3000.0);
+        assert!(
+            gains.r < 0.8 && gains.g == 1.0 && gains.b > 2.0,
+            "{gains:?}"
+        );
+        let balanced = planckian(3000.0) * gains;
+        let neutral = planckian(NEUTRAL_K);
+        assert!((balanced.r / balanced.b - neutral.r / neutral.b).abs() < 1e-5);
+    }
+
+    #[test]
+    fn what_cannot_be_right_is_told() {
+        let told = |f: PostProcess| f.check("finish").unwrap_err().to_string();
+        let good = PostProcess::default();
+        assert!(good.check("finish").is_ok());
+        assert!(
+            told(PostProcess {
+                exposure_ev: f64::NAN,
+                ..good
+            })
+            .starts_with("finish.exposure_ev: NaN")
+        );
+        assert!(
+            told(PostProcess {
+                white_balance: LinearRgb::BLACK,
+                ..good
+            })
+            .starts_with("finish.white_balance")
+        );
+        let noise = Noise::Known {
+            shot: -1.0,
+            read: 0.0,
+        };
+        assert!(told(PostProcess { noise, ..good }).starts_with("finish.noise.known.shot: -1,"));
+        let read: PostProcess = toml::from_str("noise = 'match_plate'").unwrap();
+        assert_eq!(read.noise, Noise::MatchPlate);
+    }
+}
