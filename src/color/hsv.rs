@@ -19,8 +19,8 @@ pub struct Hsv {
 
 /// Hue, saturation and value of a colour; the largest channel may be above 1 and any channel below 0.
 ///
-/// The way back is exact up to rounding, but for one case: where the largest channel is exactly 0 saturation has no
-/// value, and the colour counts as black.
+/// The inverse is exact up to rounding, but for one case: where the largest channel is exactly 0 saturation has no
+/// value, and the colour becomes black.
 ///
 /// # Method
 /// The hexcone model of [Smith 1978], whose formulas need no bounds on the channels.

@@ -107,13 +107,13 @@ const CELL_BITS16: u32 = 15;
 /// The way from light to the nearest code, with 2^`CELL_BITS` cells an octave.
 struct Encoder<const CELL_BITS: u32> {
     /// From the cell of the first threshold to that of 1.
-    cells: Vec<Cell>,
+    cells: Vec<LightCell>,
     /// The number of the first of them.
     first: u32,
 }
 
 /// The floats that agree in their exponent and their first fraction bits.
-struct Cell {
+struct LightCell {
     /// The code of the least of them.
     code: u16,
     /// The least light of the next code, in this cell or further on.
@@ -125,31 +125,20 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
     const REST_BITS: u32 = f32::MANTISSA_DIGITS - 1 - CELL_BITS;
 
     fn new(max: u16) -> Self {
-        let next = |code: u16| {
-            if code < max {
-                least_light(code + 1, max)
-            } else {
-                f32::INFINITY
+        let first = next_light(0, max).to_bits() >> Self::REST_BITS;
+        let last = 1.0_f32.to_bits() >> Self::REST_BITS;
+        let mut code = 0;
+        let cells = (first..=last).map(|number| {
+            while next_light(code, max) <= f32::from_bits(number << Self::REST_BITS) {
+                code += 1;
             }
-        };
-        let first = next(0).to_bits() >> Self::REST_BITS;
-        let mut cell = Cell {
-            code: 0,
-            next: next(0),
-        };
-        let from = |number: u32| {
-            while cell.next <= f32::from_bits(number << Self::REST_BITS) {
-                cell = Cell {
-                    code: cell.code + 1,
-                    next: next(cell.code + 1),
-                };
+            LightCell {
+                code,
+                next: next_light(code, max),
             }
-            Cell { ..cell }
-        };
+        });
         Self {
-            cells: (first..=1.0_f32.to_bits() >> Self::REST_BITS)
-                .map(from)
-                .collect(),
+            cells: cells.collect(),
             first,
         }
     }
@@ -165,6 +154,15 @@ impl<const CELL_BITS: u32> Encoder<CELL_BITS> {
         let number = (light.to_bits() >> Self::REST_BITS).saturating_sub(self.first);
         let cell = &self.cells[number as usize];
         cell.code + u16::from(light >= cell.next)
+    }
+}
+
+/// The least light of the next code; infinite after the last.
+fn next_light(code: u16, max: u16) -> f32 {
+    if code < max {
+        least_light(code + 1, max)
+    } else {
+        f32::INFINITY
     }
 }
 

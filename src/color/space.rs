@@ -47,7 +47,7 @@ pub fn xyz_from_rgb(space: &RgbSpace) -> Matrix3<f64> {
     primaries * Matrix3::from_diagonal(&(inverse(&primaries) * xyz_of(space.white)))
 }
 
-/// The way back from XYZ to an RGB space.
+/// The inverse of [`xyz_from_rgb`]: from XYZ to an RGB space.
 pub fn rgb_from_xyz(space: &RgbSpace) -> Matrix3<f64> {
     inverse(&xyz_from_rgb(space))
 }

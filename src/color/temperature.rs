@@ -11,34 +11,43 @@ use crate::pixel::LinearRgb;
 /// Cubic splines through the Planckian locus in CIE 1931 x, y (Kang et al., "Design of advanced color temperature control
 /// system for HDTV applications", 2002).
 pub fn planckian(kelvin: f64) -> LinearRgb {
-    let t = kelvin.clamp(1667.0, 25_000.0);
-    let cubic = |[a, b, c, d]: [f64; 4], v: f64| ((a * v + b) * v + c) * v + d;
-    let x = if t <= 4000.0 {
-        cubic(
-            [-0.266_123_9e9, -0.234_358_9e6, 0.877_695_6e3, 0.179_910],
-            1.0 / t,
-        )
-    } else {
-        cubic(
-            [-3.025_846_9e9, 2.107_037_9e6, 0.222_634_7e3, 0.240_390],
-            1.0 / t,
-        )
-    };
-    let y = if t <= 2222.0 {
-        cubic(
-            [-1.106_381_4, -1.348_110_20, 2.185_558_32, -0.202_196_83],
-            x,
-        )
-    } else if t <= 4000.0 {
-        cubic(
-            [-0.954_947_6, -1.374_185_93, 2.091_370_15, -0.167_488_67],
-            x,
-        )
-    } else {
-        cubic([3.081_758_0, -5.873_386_70, 3.751_129_97, -0.370_014_83], x)
-    };
+    let t = kelvin.clamp(MIN_KELVIN, MAX_KELVIN);
+    let x = polynomial(
+        if t <= 4000.0 {
+            X_BELOW_4000_K
+        } else {
+            X_ABOVE_4000_K
+        },
+        1.0 / t,
+    );
+    let y = polynomial(
+        if t <= 2222.0 {
+            Y_BELOW_2222_K
+        } else if t <= 4000.0 {
+            Y_BELOW_4000_K
+        } else {
+            Y_ABOVE_4000_K
+        },
+        x,
+    );
     let xyz = [x / y, 1.0, (1.0 - x - y) / y].map(|v| v as f32);
     LinearRgb::from(ColorMatrix::linear_from_xyz().apply(xyz)).map(|v| v.max(0.0))
+}
+
+/// Where the splines begin (Kang et al. 2002).
+const MIN_KELVIN: f64 = 1667.0;
+/// Where they end.
+const MAX_KELVIN: f64 = 25_000.0;
+/// Chromaticity x by the inverse of the temperature, highest power first (Kang et al. 2002).
+const X_BELOW_4000_K: [f64; 4] = [-0.266_123_9e9, -0.234_358_9e6, 0.877_695_6e3, 0.179_910];
+const X_ABOVE_4000_K: [f64; 4] = [-3.025_846_9e9, 2.107_037_9e6, 0.222_634_7e3, 0.240_390];
+/// Chromaticity y by x, highest power first (Kang et al. 2002).
+const Y_BELOW_2222_K: [f64; 4] = [-1.106_381_4, -1.348_110_20, 2.185_558_32, -0.202_196_83];
+const Y_BELOW_4000_K: [f64; 4] = [-0.954_947_6, -1.374_185_93, 2.091_370_15, -0.167_488_67];
+const Y_ABOVE_4000_K: [f64; 4] = [3.081_758_0, -5.873_386_70, 3.751_129_97, -0.370_014_83];
+
+fn polynomial([a, b, c, d]: [f64; 4], v: f64) -> f64 {
+    ((a * v + b) * v + c) * v + d
 }
 
 #[cfg(test)]

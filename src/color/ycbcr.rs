@@ -75,12 +75,12 @@ impl Ycbcr {
 
 /// A signal's zero and unit as fractions of the largest code.
 #[derive(Clone, Copy)]
-struct Scale {
+struct CodeScale {
     zero: f64,
     unit: f64,
 }
 
-impl Scale {
+impl CodeScale {
     fn code(self, signal: f64) -> f64 {
         self.zero + self.unit * signal
     }
@@ -92,10 +92,10 @@ impl Scale {
 
 impl CodeRange {
     /// Of luma and of the differences.
-    fn scales(self) -> [Scale; 2] {
+    fn scales(self) -> [CodeScale; 2] {
         match self {
             Self::Full => {
-                [Scale {
+                [CodeScale {
                     zero: 0.0,
                     unit: 1.0,
                 }; 2]
@@ -104,11 +104,11 @@ impl CodeRange {
                 let max = libm::exp2(bits.into()) - 1.0;
                 let step = libm::exp2(f64::from(bits) - 8.0) / max;
                 [
-                    Scale {
+                    CodeScale {
                         zero: 16.0 * step,
                         unit: 219.0 * step,
                     },
-                    Scale {
+                    CodeScale {
                         zero: 128.0 * step,
                         unit: 224.0 * step,
                     },

@@ -6,9 +6,9 @@ use crate::pixel::Mix;
 use crate::work::{self, Kind};
 
 /// Standard deviations at which the Gaussian window ends; what lies beyond weighs 6e-5 of the whole.
-const GAUSSIAN_REACH: f64 = 4.0;
+const GAUSSIAN_REACH_SIGMAS: f64 = 4.0;
 
-/// A picture blurred by a Gaussian of standard deviation `sigma_px`; unchanged where that is 0 or less, or not a number.
+/// A picture blurred by a Gaussian of standard deviation `sigma_px`; unchanged where that is 0 or less, or NaN.
 ///
 /// # Method
 /// The Gaussian at pixel centres, ended at 4 sigma and made to add up to 1.
@@ -16,9 +16,10 @@ pub fn gaussian_blur<P: Mix>(image: &Image<P>, sigma_px: f32) -> Image<P> {
     if sigma_px.is_nan() || sigma_px <= 0.0 {
         return image.clone();
     }
-    let taps = |len: usize| gaussian(len, f64::from(sigma_px));
     work::add(Kind::Filters, 1);
-    filter(image, &taps(image.width()), &taps(image.height()))
+    let [columns, rows] =
+        [image.width(), image.height()].map(|len| gaussian(len, f64::from(sigma_px)));
+    filter(image, &columns, &rows)
 }
 
 /// A picture of which each pixel is the mean of the square of `2 radius + 1` pixels around it; unchanged where that is
@@ -28,13 +29,13 @@ pub fn box_blur<P: Mix>(image: &Image<P>, radius: usize) -> Image<P> {
         return image.clone();
     }
     work::add(Kind::Filters, 1);
-    let taps = |len: usize| windows(len, radius, |_| 1.0);
-    filter(image, &taps(image.width()), &taps(image.height()))
+    let [columns, rows] = [image.width(), image.height()].map(|len| windows(len, radius, |_| 1.0));
+    filter(image, &columns, &rows)
 }
 
 /// A Gaussian around every sample of a line.
 fn gaussian(len: usize, sigma: f64) -> Vec<Taps> {
-    windows(len, (GAUSSIAN_REACH * sigma).ceil() as usize, |d| {
+    windows(len, (GAUSSIAN_REACH_SIGMAS * sigma).ceil() as usize, |d| {
         libm::exp(-0.5 * (d as f64 / sigma).powi(2))
     })
 }

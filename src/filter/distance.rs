@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// Distance of every set pixel's centre to the centre of the nearest one that is not set, pixels; 0 where not set.
 ///
-/// Beyond the picture's border the mask is taken to go on; where nothing is unset the distance is infinite.
+/// Beyond the picture's border the mask continues; where nothing is unset the distance is infinite.
 ///
 /// # Method
 /// [Felzenszwalb and Huttenlocher 2012]: distances along each column first, then the lower envelope of the parabolas
@@ -32,24 +32,16 @@ struct Parabola {
     from: f64,
 }
 
+impl Parabola {
+    /// Where another one crosses it, whose foot is farther right.
+    fn crossing(&self, foot: f64, floor: f64) -> f64 {
+        0.5 * ((floor + foot * foot) - (self.floor + self.foot * self.foot)) / (foot - self.foot)
+    }
+}
+
 /// The distances along one row whose columns are so far from their nearest unset pixel.
 fn nearest(row: &mut [f32], columns: &[u32]) {
-    let mut envelope: Vec<Parabola> = Vec::new();
-    for (x, &column) in columns
-        .iter()
-        .enumerate()
-        .filter(|(_, column)| **column < u32::MAX)
-    {
-        let (foot, floor) = (x as f64, f64::from(column) * f64::from(column));
-        let meets = |p: &Parabola| {
-            0.5 * ((floor + foot * foot) - (p.floor + p.foot * p.foot)) / (foot - p.foot)
-        };
-        while envelope.last().is_some_and(|last| meets(last) <= last.from) {
-            envelope.pop();
-        }
-        let from = envelope.last().map_or(f64::NEG_INFINITY, meets);
-        envelope.push(Parabola { foot, floor, from });
-    }
+    let envelope = lower_envelope(columns);
     let mut lowest = 0;
     for (x, pixel) in row.iter_mut().enumerate() {
         while envelope
@@ -63,6 +55,25 @@ fn nearest(row: &mut [f32], columns: &[u32]) {
             .map_or(f64::INFINITY, |p| p.floor + (x as f64 - p.foot).powi(2));
         *pixel = square.sqrt() as f32;
     }
+}
+
+/// The parabolas over the columns' distances that are the lowest somewhere, from left to right.
+fn lower_envelope(columns: &[u32]) -> Vec<Parabola> {
+    let mut envelope: Vec<Parabola> = Vec::new();
+    for (x, &column) in columns.iter().enumerate().filter(|(_, c)| **c < u32::MAX) {
+        let (foot, floor) = (x as f64, f64::from(column) * f64::from(column));
+        while envelope
+            .last()
+            .is_some_and(|last| last.crossing(foot, floor) <= last.from)
+        {
+            envelope.pop();
+        }
+        let from = envelope
+            .last()
+            .map_or(f64::NEG_INFINITY, |last| last.crossing(foot, floor));
+        envelope.push(Parabola { foot, floor, from });
+    }
+    envelope
 }
 
 #[cfg(test)]

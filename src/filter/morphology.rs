@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 /// The mask grown by `radius_px`: every pixel whose centre is at most that far from the centre of a set pixel.
 ///
-/// Unchanged where `radius_px` is below 1 or not a number.
+/// Unchanged where `radius_px` is below 1 or NaN.
 ///
 /// # Method
 /// Exact and in time independent of the radius: each column knows how far its nearest set pixel is, and along a row a
@@ -32,7 +32,7 @@ pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
 
 /// The mask shrunk by `radius_px`: every pixel of it that is farther than that from every pixel outside it.
 ///
-/// Beyond the picture's border the mask is taken to go on. Unchanged where `radius_px` is below 1 or not a number.
+/// Beyond the picture's border the mask continues. Unchanged where `radius_px` is below 1 or NaN.
 pub fn erode(mask: &Mask, radius_px: f64) -> Mask {
     dilate(&mask.complement(), radius_px).complement()
 }

@@ -61,12 +61,12 @@ pub fn halve<P: Mix>(image: &Image<P>) -> Image<P> {
 }
 
 fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
-    let taps = |len: usize| {
+    let [columns, rows] = [image.width(), image.height()].map(|len| {
         lines(len.div_ceil(2), |i| {
             Taps::new(2 * i..2 * i + 2, len, |_| 1.0)
         })
-    };
-    filter(image, &taps(image.width()), &taps(image.height()))
+    });
+    filter(image, &columns, &rows)
 }
 
 /// A picture of half the size, smoothed by the binomial kernel (1 4 6 4 1)/16; odd sizes round up.
@@ -80,15 +80,15 @@ fn halved<P: Mix>(image: &Image<P>) -> Image<P> {
 /// [Burt and Adelson 1983]: https://doi.org/10.1109/TCOM.1983.1095851
 pub fn reduce<P: Mix>(image: &Image<P>) -> Image<P> {
     work::add(Kind::Filters, 1);
-    let taps = |len: usize| {
+    let [columns, rows] = [image.width(), image.height()].map(|len| {
         lines(len.div_ceil(2), |i| {
             Taps::new(2 * i - 2..2 * i + 3, len, |j| binomial(j - 2 * i))
         })
-    };
-    filter(image, &taps(image.width()), &taps(image.height()))
+    });
+    filter(image, &columns, &rows)
 }
 
-/// The way back from [`reduce`]: a smooth picture of `width` x `height` through the pixels of one of half that size.
+/// The inverse of [`reduce`]: a smooth picture of `width` x `height` through the pixels of one of half that size.
 ///
 /// A picture minus the expansion of its reduction is a level of its Laplacian pyramid.
 ///
@@ -103,12 +103,12 @@ pub fn expand<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P>
     let half = (width.div_ceil(2), height.div_ceil(2));
     assert_eq!(image.size(), half, "not half of {width} x {height}");
     work::add(Kind::Filters, 1);
-    let taps = |from, to| {
+    let [columns, rows] = [(half.0, width), (half.1, height)].map(|(from, to)| {
         lines(to, |i| {
             Taps::new(i / 2 - 1..i / 2 + 2, from, |j| binomial(2 * j - i))
         })
-    };
-    filter(image, &taps(half.0, width), &taps(half.1, height))
+    });
+    filter(image, &columns, &rows)
 }
 
 /// The taps of every sample of a line.

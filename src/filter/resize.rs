@@ -25,14 +25,17 @@ pub fn resize<P: Mix>(image: &Image<P>, width: usize, height: usize) -> Image<P>
 fn taps(from: usize, to: usize) -> Vec<Taps> {
     let scale = from as f64 / to as f64;
     let half_width = scale.max(1.0);
-    let tap = |i: usize| {
-        let center = (i as f64 + 0.5) * scale;
-        let window = (center - half_width).floor() as isize..(center + half_width).ceil() as isize;
-        Taps::new(window, from, |j| {
-            1.0 - ((j as f64 + 0.5 - center) / half_width).abs()
-        })
-    };
-    (0..to).map(tap).collect()
+    (0..to)
+        .map(|i| triangle((i as f64 + 0.5) * scale, half_width, from))
+        .collect()
+}
+
+/// A triangle around `center` of a line of `len` samples.
+fn triangle(center: f64, half_width: f64, len: usize) -> Taps {
+    let window = (center - half_width).floor() as isize..(center + half_width).ceil() as isize;
+    Taps::new(window, len, |j| {
+        1.0 - ((j as f64 + 0.5 - center) / half_width).abs()
+    })
 }
 
 #[cfg(test)]

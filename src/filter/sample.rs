@@ -3,22 +3,24 @@
 use crate::image::Image;
 use crate::pixel::Mix;
 
-/// The bilinear value at `(x, y)` in pixels, taking everything outside the picture for empty (black and transparent).
+/// The bilinear value at `(x, y)` in pixels; everything outside the picture is empty (black and transparent).
 ///
 /// Pixel `(i, j)` has its centre at `(i + 0.5, j + 0.5)`, where its own value is returned. Towards the outside the
 /// outermost half pixel fades, and half a pixel further out all is 0. A position that is not finite gives 0.
 #[inline]
 pub fn sample_bilinear<P: Mix>(image: &Image<P>, x: f64, y: f64) -> P {
-    let at = |i: isize, j: isize| {
-        let inside =
-            (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j);
-        if inside {
-            image[(i as usize, j as usize)]
-        } else {
-            P::default()
-        }
-    };
-    bilinear(at, x, y)
+    bilinear(|i, j| pixel_or_empty(image, i, j), x, y)
+}
+
+#[inline(always)]
+fn pixel_or_empty<P: Copy + Default>(image: &Image<P>, i: isize, j: isize) -> P {
+    let inside =
+        (0..image.width() as isize).contains(&i) && (0..image.height() as isize).contains(&j);
+    if inside {
+        image[(i as usize, j as usize)]
+    } else {
+        P::default()
+    }
 }
 
 /// The bilinear value at `(x, y)` in pixels, going on outside the picture as the nearest pixel inside; 0 in an empty
@@ -46,7 +48,7 @@ fn bilinear<P: Mix>(at: impl Fn(isize, isize) -> P, x: f64, y: f64) -> P {
     }
     let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
     let (u, v) = ((x - 0.5 - left) as f32, (y - 0.5 - top) as f32);
-    // Far beyond any picture, so that the next pixel still has a number.
+    // Far beyond any picture, so that the next pixel's index does not overflow.
     let [i, j] = [left, top].map(|edge| edge.clamp(-1e15, 1e15) as isize);
     P::default()
         .add_scaled((1.0 - u) * (1.0 - v), at(i, j))

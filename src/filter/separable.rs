@@ -48,7 +48,7 @@ impl Taps {
 }
 
 /// Output pixels that are worked on together, few enough for their sums to stay in the first cache.
-const BLOCK: usize = 512;
+const BLOCK_PIXELS: usize = 512;
 
 /// A picture as large as there are `columns` and `rows`, filtered from `image`.
 ///
@@ -58,24 +58,33 @@ const BLOCK: usize = 512;
 pub(super) fn filter<P: Mix>(image: &Image<P>, columns: &[Taps], rows: &[Taps]) -> Image<P> {
     let runs: Vec<&[Taps]> = columns
         .chunk_by(|a, b| b.follows(a))
-        .flat_map(|run| run.chunks(BLOCK))
+        .flat_map(|run| run.chunks(BLOCK_PIXELS))
         .collect();
     let mut out = Image::new(columns.len(), rows.len());
-    let mixed = || vec![P::default(); image.width()];
-    out.par_rows_mut()
-        .zip(rows)
-        .for_each_init(mixed, |mixed, (mut out, taps)| {
-            for (block, mixed) in mixed.chunks_mut(BLOCK).enumerate() {
-                let row = |k: usize| &image.row(taps.first + k)[block * BLOCK..];
-                mix(&taps.weights, row, mixed);
-            }
+    out.par_rows_mut().zip(rows).for_each_init(
+        || vec![P::default(); image.width()],
+        |mixed, (mut out, taps)| {
+            mix_rows(image, taps, mixed);
             for run in &runs {
                 let (here, rest) = out.split_at_mut(run.len());
                 mix_along(mixed, run, here);
                 out = rest;
             }
-        });
+        },
+    );
     out
+}
+
+/// The rows of a picture that the taps name, mixed to one.
+fn mix_rows<P: Mix>(image: &Image<P>, taps: &Taps, mixed: &mut [P]) {
+    for (block, mixed) in mixed.chunks_mut(BLOCK_PIXELS).enumerate() {
+        let start = block * BLOCK_PIXELS;
+        mix(
+            &taps.weights,
+            |k| &image.row(taps.first + k)[start..],
+            mixed,
+        );
+    }
 }
 
 /// A run of output pixels, each the weighted mean of samples of `line`.
@@ -87,6 +96,8 @@ fn mix_along<P: Mix>(line: &[P], run: &[Taps], out: &mut [P]) {
 }
 
 /// The weighted sum of lines: `line(k)`, at least as long as `out`, by the weight `k`.
+///
+/// Dense on purpose: four lines a turn are what the compiler vectorises.
 fn mix<'a, P: Mix + 'a>(weights: &[f32], line: impl Fn(usize) -> &'a [P], out: &mut [P]) {
     out.fill(P::default());
     // Four lines at once: a sum stays in its register for four additions, whose order is the same.
@@ -134,7 +145,7 @@ mod tests {
 
     #[test]
     fn runs_and_single_pixels_are_weighted_means() {
-        for (width, height) in [(1, 7), (4, 4), (2 * BLOCK + 7, 6)] {
+        for (width, height) in [(1, 7), (4, 4), (2 * BLOCK_PIXELS + 7, 6)] {
             let img = Image::from_fn(width, height, |x, y| {
                 ((x * 7919 + y * 104_729) % 101) as f32
             });

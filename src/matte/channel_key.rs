@@ -85,7 +85,7 @@ pub struct ChannelKeyed {
 pub fn channel_key<P: Photo>(photo: &Image<P>, opts: &ChannelKeyOptions) -> ChannelKeyed {
     let matte = photo.map(|p| {
         let p = p.premul();
-        Coverage(matte_of(to_space(p, opts), p.a, opts))
+        Coverage(alpha_of(to_space(p, opts), p.a, opts))
     });
     let cutout = photo.zip_map(&matte, |p, m| {
         let p = p.premul();
@@ -99,7 +99,7 @@ pub fn channel_key<P: Photo>(photo: &Image<P>, opts: &ChannelKeyOptions) -> Chan
     ChannelKeyed { matte, cutout }
 }
 
-fn matte_of(c: [f32; 3], alpha: f32, opts: &ChannelKeyOptions) -> f32 {
+fn alpha_of(c: [f32; 3], alpha: f32, opts: &ChannelKeyOptions) -> f32 {
     let key = usize::from(opts.matte_channel.min(2));
     let others = [(1, 2), (0, 2), (0, 1)][key];
     let limit = match opts.limit_method {
@@ -145,7 +145,7 @@ fn from_space([x, y, z]: [f32; 3], space: KeySpace) -> [f32; 3] {
 }
 
 /// Keeps divisions by zero away, as Blender does; too small to change any other result.
-const TINY: f32 = 1e-20;
+const MIN_DIVISOR: f32 = 1e-20;
 
 /// Hue 0 to 1, saturation and value, unclamped, in the rounding of Blender's own conversion.
 fn to_hsv(p: PremulRgba) -> [f32; 3] {
@@ -160,18 +160,17 @@ fn to_hsv(p: PremulRgba) -> [f32; 3] {
     }
     let chroma = r - least;
     [
-        (k + (g - b) / (6.0 * chroma + TINY)).abs(),
-        chroma / (r + TINY),
+        (k + (g - b) / (6.0 * chroma + MIN_DIVISOR)).abs(),
+        chroma / (r + MIN_DIVISOR),
         r,
     ]
 }
 
 fn from_hsv([h, s, v]: [f32; 3]) -> [f32; 3] {
-    let unit = |n: f32| n.clamp(0.0, 1.0);
-    let n = [
+    let full = [
         (h * 6.0 - 3.0).abs() - 1.0,
         2.0 - (h * 6.0 - 2.0).abs(),
         2.0 - (h * 6.0 - 4.0).abs(),
     ];
-    n.map(|n| ((unit(n) - 1.0) * s + 1.0) * v)
+    full.map(|n| ((n.clamp(0.0, 1.0) - 1.0) * s + 1.0) * v)
 }

@@ -2,7 +2,7 @@
 
 use super::key::{Photo, Profile, differences};
 use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::pixel::{Coverage, LinearRgb, PremulRgba};
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`chroma_key`], under the names that Blender 3.4 gives them.
@@ -45,27 +45,47 @@ pub fn chroma_key<P: Photo>(
     opts: &ChromaKeyOptions,
 ) -> Image<Coverage> {
     let exact = opts.profile == Profile::Blender45;
-    let centred = |p| differences(p, exact).map(|v| v * 2.0 - 1.0);
-    let (cos, sin) = direction(centred(screen.opaque()), exact);
-    let [widest, narrowest] = [opts.tolerance / 2.0, opts.threshold / 2.0];
-    let slope = libm::tan(f64::from(widest)) as f32;
+    let (cos, sin) = direction(centred(screen.opaque(), exact), exact);
+    let wedge = Wedge {
+        slope: libm::tan(f64::from(opts.tolerance / 2.0)) as f32,
+        core: opts.threshold / 2.0,
+        gain: opts.gain,
+    };
     photo.map(|p| {
         let p = p.premul();
-        let [c, r] = centred(p);
+        let [c, r] = centred(p, exact);
         let (x, z) = (c * cos + r * sin, r * cos - c * sin);
-        let inside = x - z.abs() / slope;
+        Coverage(wedge.alpha(x, z).filter(|&a| a < p.a).unwrap_or(p.a))
+    })
+}
+
+/// Colour differences around 0.
+fn centred(p: PremulRgba, exact: bool) -> [f32; 2] {
+    differences(p, exact).map(|v| v * 2.0 - 1.0)
+}
+
+/// What is keyed around the screen's direction.
+struct Wedge {
+    /// Tangent of half its opening.
+    slope: f32,
+    /// Half the angle that is keyed wholly, radians.
+    core: f32,
+    gain: f32,
+}
+
+impl Wedge {
+    /// The matte at `x` along the screen's direction and `z` across it; none outside the wedge.
+    #[inline(always)]
+    fn alpha(&self, x: f32, z: f32) -> Option<f32> {
+        let inside = x - z.abs() / self.slope;
         let angle = libm::atan2(f64::from(z), f64::from(x)) as f32;
-        let alpha = if angle.abs() < narrowest {
+        let alpha = if angle.abs() < self.core {
             0.0
         } else {
-            1.0 - inside / opts.gain
+            1.0 - inside / self.gain
         };
-        Coverage(if inside > 0.0 && alpha < p.a {
-            alpha
-        } else {
-            p.a
-        })
-    })
+        (inside > 0.0).then_some(alpha)
+    }
 }
 
 /// Cosine and sine of the key's direction.

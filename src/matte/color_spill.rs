@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// A colour channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Channel {
+pub enum SpillChannel {
     /// Red.
     R,
     /// Green.
@@ -33,11 +33,11 @@ pub struct ColorSpillOptions {
     /// Which Blender to be; `robust` and 4.2 are 3.4 here. Default: `blender-3.4`.
     pub profile: Profile,
     /// The screen's channel. Default: `G`.
-    pub channel: Channel,
+    pub channel: SpillChannel,
     /// What it is limited by. Default: `SIMPLE`.
     pub limit_method: SpillLimit,
     /// The channel that limits, where it is one. Default: `R`.
-    pub limit_channel: Channel,
+    pub limit_channel: SpillChannel,
     /// Multiple of the limit that is allowed. Default: 1.
     pub ratio: f32,
     /// Share of the excess that is taken; 4.5 scales the spill channel alone by it. Default: 1.
@@ -56,9 +56,9 @@ impl Default for ColorSpillOptions {
     fn default() -> Self {
         Self {
             profile: Profile::default(),
-            channel: Channel::G,
+            channel: SpillChannel::G,
             limit_method: SpillLimit::Simple,
-            limit_channel: Channel::R,
+            limit_channel: SpillChannel::R,
             ratio: 1.0,
             fac: 1.0,
             use_unspill: false,
@@ -78,21 +78,11 @@ impl Default for ColorSpillOptions {
 /// other channels as the strengths say.
 pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Image<PremulRgba> {
     let spill = opts.channel as usize;
-    let others = [(1, 2), (0, 2), (0, 1)][spill];
     let strengths = strengths(opts, spill);
-    let is_late = opts.profile == Profile::Blender45;
     photo.map(|p| {
         let p = p.premul();
         let c = [p.r, p.g, p.b];
-        let limit = match opts.limit_method {
-            SpillLimit::Simple => c[opts.limit_channel as usize],
-            SpillLimit::Average => (c[others.0] + c[others.1]) * 0.5,
-        };
-        let excess = if is_late {
-            opts.fac * c[spill] - opts.ratio * limit
-        } else {
-            opts.fac.min(1.0) * (c[spill] - opts.ratio * limit)
-        };
+        let excess = excess(c, opts);
         let [r, g, b] = [0, 1, 2].map(|k| c[k] + strengths[k] * excess);
         if excess > 0.0 {
             PremulRgba::new(r, g, b, p.a)
@@ -102,12 +92,28 @@ pub fn color_spill<P: Photo>(photo: &Image<P>, opts: &ColorSpillOptions) -> Imag
     })
 }
 
+/// By how much the spill channel exceeds its limit.
+#[inline(always)]
+fn excess(c: [f32; 3], opts: &ColorSpillOptions) -> f32 {
+    let spill = opts.channel as usize;
+    let others = [(1, 2), (0, 2), (0, 1)][spill];
+    let limit = match opts.limit_method {
+        SpillLimit::Simple => c[opts.limit_channel as usize],
+        SpillLimit::Average => (c[others.0] + c[others.1]) * 0.5,
+    };
+    if opts.profile == Profile::Blender45 {
+        opts.fac * c[spill] - opts.ratio * limit
+    } else {
+        opts.fac.min(1.0) * (c[spill] - opts.ratio * limit)
+    }
+}
+
 /// What every channel gets of the excess.
 fn strengths(opts: &ColorSpillOptions, spill: usize) -> [f32; 3] {
-    let mut given = match opts.use_unspill {
+    let mut strengths = match opts.use_unspill {
         true => [opts.unspill_red, opts.unspill_green, opts.unspill_blue],
         false => [0, 1, 2].map(|k| if k == spill { 1.0 } else { 0.0 }),
     };
-    given[spill] = -given[spill];
-    given
+    strengths[spill] = -strengths[spill];
+    strengths
 }

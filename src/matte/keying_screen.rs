@@ -14,8 +14,10 @@ pub struct ScreenPoint {
     pub color: LinearRgb,
 }
 
-/// Width of the Gaussian around a point at smoothness 0, and what smoothness 1 adds, in widths of the picture; Blender's.
-const SIGMA: [f64; 2] = [0.15, 0.85];
+/// Width of the Gaussian around a point at smoothness 0, in widths of the picture; Blender's.
+const SHARPEST_SIGMA: f64 = 0.15;
+/// What smoothness 1 adds to it; Blender's.
+const SMOOTHNESS_SIGMA: f64 = 0.85;
 
 /// Makes a plate out of points, as Blender 4.5 does: a mean of all points, weighted by a Gaussian of their distance.
 ///
@@ -37,40 +39,55 @@ pub fn keying_screen(
             format!("{smoothness}, expected 0 to 1"),
         ));
     }
-    let (w, h) = (width as f64, height as f64);
-    let inside =
-        |p: &&ScreenPoint| (0.0..=w).contains(&p.at_px.x) && (0.0..=h).contains(&p.at_px.y);
-    let points: Vec<ScreenPoint> = points.iter().filter(inside).copied().collect();
+    let size = [width as f64, height as f64];
+    let points: Vec<ScreenPoint> = points
+        .iter()
+        .filter(|p| p.is_inside(size))
+        .copied()
+        .collect();
     if points.is_empty() {
         return Err(Error::value(
             "points",
             format!("none inside the {width} x {height} pixels, expected at least 1"),
         ));
     }
-    let sigma = SIGMA[0] + SIGMA[1] * smoothness;
+    let sigma = SHARPEST_SIGMA + SMOOTHNESS_SIGMA * smoothness;
     Ok(Image::from_fn(width, height, |x, y| {
-        let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
-        let square =
-            |p: &ScreenPoint| ((p.at_px.x - x) / w).powi(2) + ((p.at_px.y - y) / h).powi(2);
-        // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios are the same.
-        let nearest = points.iter().map(square).fold(f64::INFINITY, f64::min);
-        let weight = |p: &ScreenPoint| libm::exp((nearest - square(p)) / (sigma * sigma));
-        weighted_mean(points.iter().map(|p| (weight(p), p.color)))
+        screen_color(&points, [x as f64 + 0.5, y as f64 + 0.5], size, sigma)
     }))
 }
 
+impl ScreenPoint {
+    fn is_inside(&self, [w, h]: [f64; 2]) -> bool {
+        (0.0..=w).contains(&self.at_px.x) && (0.0..=h).contains(&self.at_px.y)
+    }
+
+    /// Squared distance in widths and heights of the picture.
+    #[inline(always)]
+    fn square_distance(&self, [x, y]: [f64; 2], [w, h]: [f64; 2]) -> f64 {
+        ((self.at_px.x - x) / w).powi(2) + ((self.at_px.y - y) / h).powi(2)
+    }
+}
+
+/// The plate at one place.
+fn screen_color(points: &[ScreenPoint], at: [f64; 2], size: [f64; 2], sigma: f64) -> LinearRgb {
+    let squares = || points.iter().map(|p| p.square_distance(at, size));
+    // Measured from the nearest point, the weights of far pixels do not all vanish; their ratios are the same.
+    let nearest = squares().fold(f64::INFINITY, f64::min);
+    let weights = squares().map(|square| libm::exp((nearest - square) / (sigma * sigma)));
+    weighted_mean(weights.zip(points.iter().map(|p| p.color)))
+}
+
 fn weighted_mean(parts: impl Iterator<Item = (f64, LinearRgb)>) -> LinearRgb {
-    let ([r, g, b], total) = parts.fold(([0.0; 3], 0.0), |([r, g, b], total), (w, c)| {
-        (
-            [
-                r + w * f64::from(c.r),
-                g + w * f64::from(c.g),
-                b + w * f64::from(c.b),
-            ],
-            total + w,
-        )
-    });
-    LinearRgb::from([r, g, b].map(|v| (v / total) as f32))
+    let (mut sum, mut total) = ([0.0; 3], 0.0);
+    for (weight, color) in parts {
+        let color: [f32; 3] = color.into();
+        for (sum, channel) in sum.iter_mut().zip(color) {
+            *sum += weight * f64::from(channel);
+        }
+        total += weight;
+    }
+    LinearRgb::from(sum.map(|v| (v / total) as f32))
 }
 
 #[cfg(test)]

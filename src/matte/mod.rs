@@ -20,7 +20,7 @@ mod triangulate;
 
 pub use channel_key::{ChannelKeyOptions, ChannelKeyed, ChannelLimit, KeySpace, channel_key};
 pub use chroma_key::{ChromaKeyOptions, chroma_key};
-pub use color_spill::{Channel, ColorSpillOptions, SpillLimit, color_spill};
+pub use color_spill::{ColorSpillOptions, SpillChannel, SpillLimit, color_spill};
 pub use cut_out::{Boundary, CutOut, CutOutOptions, MatteMethod, cut_out, cut_out_on};
 pub use difference_key::{DifferenceKeyOptions, difference_key};
 pub use film::{ColorUncertainty, FilmMatte, FilmOptions, film, film_planes};

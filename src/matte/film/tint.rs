@@ -104,20 +104,13 @@ impl TintSamples {
             .collect();
         let sampled = object
             .iter()
-            .copied()
-            .step_by((object.len() / OBJECT_SAMPLES).max(1));
-        let mut sampled: Vec<(f32, usize)> = sampled.map(|i| (pair(i).reflected(key), i)).collect();
-        sampled.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        sampled.truncate((sampled.len() as f64 * share).ceil() as usize);
-        let step = (sampled.len() / TINT_SAMPLES).max(1);
-        Self {
-            key,
-            pixels: sampled
-                .iter()
-                .step_by(step)
-                .map(|(_, i)| pair(*i))
-                .collect(),
-        }
+            .step_by((object.len() / OBJECT_SAMPLES).max(1))
+            .map(|&i| (pair(i).reflected(key), i))
+            .collect();
+        let darkest = darkest(sampled, share);
+        let step = (darkest.len() / TINT_SAMPLES).max(1);
+        let pixels = darkest.into_iter().step_by(step).map(pair).collect();
+        Self { key, pixels }
     }
 
     /// The tint that explains the pixels best.
@@ -164,6 +157,13 @@ impl TintSamples {
             misfit: misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap,
         }
     }
+}
+
+/// The pixels, named by light and index, of a share that has the least light.
+fn darkest(mut pixels: Vec<(f32, usize)>, share: f64) -> Vec<usize> {
+    pixels.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    pixels.truncate((pixels.len() as f64 * share).ceil() as usize);
+    pixels.into_iter().map(|(_, i)| i).collect()
 }
 
 fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
