@@ -2,7 +2,7 @@
 
 use crate::dataset::journal::{JOURNAL, numbered_lines_of};
 use crate::dataset::listing::is_image;
-use crate::dataset::near::{NEAR_CODES, Thumbnail, nearest};
+use crate::dataset::near_duplicates::{NEAR_DUPLICATE_RMS, Thumbnail, nearest};
 use crate::dataset::yolo::LEAST_SIDE_PX;
 use crate::dataset::yolo_yaml::DataYaml;
 use crate::dataset::{Part, YoloSet};
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Something that a trainer would refuse, drop or take for something else.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Fault {
+pub struct Finding {
     /// The file, below the dataset's folder.
     pub path: PathBuf,
     /// Its line, from 1, where the fault is in one.
@@ -26,7 +26,7 @@ pub struct Fault {
     pub what: String,
 }
 
-impl fmt::Display for Fault {
+impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let line = self.line.map_or(String::new(), |n| format!("{n}:"));
         write!(f, "{}:{line} {}", self.path.display(), self.what)
@@ -37,7 +37,7 @@ impl fmt::Display for Fault {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Checked {
     /// Everything that is wrong, in order of file and line; empty for a good dataset.
-    pub faults: Vec<Fault>,
+    pub faults: Vec<Finding>,
     /// Images looked at.
     pub images: usize,
     /// Rows of label files for each class that has a name, in order.
@@ -155,7 +155,7 @@ impl Checked {
 ///
 /// * `data.yaml` has `train`, `val` and names, as many as `nc` says, and its folders exist and hold images;
 /// * every image decodes to its end and has sides of at least 10 pixels; no two that show something have the same bytes;
-/// * no image for validation looks like one for training ([`NEAR_CODES`]), unless it shows nothing;
+/// * no image for validation looks like one for training ([`NEAR_DUPLICATE_RMS`]), unless it shows nothing;
 /// * every image has a label file and every label file an image;
 /// * rows have 5 columns (or, in files of outlines, 7 or more, an odd number), a whole class number below `nc`, shares in
 ///   0..1, sides above 0, and no twin in the same file;
@@ -163,7 +163,7 @@ impl Checked {
 /// * where there is a journal, the files it names have the sizes and checksums that it says, and it names every image.
 ///
 /// # Errors
-/// When `folder` is not a folder that can be listed. Everything else is a [`Fault`].
+/// When `folder` is not a folder that can be listed. Everything else is a [`Finding`].
 pub fn check(folder: &Path) -> Result<Checked> {
     if !folder.is_dir() {
         return Err(Error::file(folder, "no such folder, expected a dataset"));
@@ -226,7 +226,7 @@ pub fn check(folder: &Path) -> Result<Checked> {
 /// Faults found so far.
 struct Findings<'a> {
     folder: &'a Path,
-    faults: Vec<Fault>,
+    faults: Vec<Finding>,
 }
 
 impl Findings<'_> {
@@ -295,7 +295,7 @@ impl Findings<'_> {
                 .unzip()
         };
         let ((train, train_small), (val, val_small)) = (of(Part::Train), of(Part::Val));
-        for (i, j, codes) in nearest(&train_small, &val_small, NEAR_CODES) {
+        for (i, j, codes) in nearest(&train_small, &val_small, NEAR_DUPLICATE_RMS) {
             let (image, twin) = (&images[val[i]], &images[train[j]]);
             // The same bytes are told already.
             if looked[val[i]].bytes != looked[train[j]].bytes {
@@ -348,8 +348,12 @@ impl Findings<'_> {
     }
 }
 
-pub(super) fn fault(path: impl AsRef<Path>, line: Option<usize>, what: impl Into<String>) -> Fault {
-    Fault {
+pub(super) fn fault(
+    path: impl AsRef<Path>,
+    line: Option<usize>,
+    what: impl Into<String>,
+) -> Finding {
+    Finding {
         path: path.as_ref().into(),
         line,
         what: what.into(),
@@ -381,7 +385,7 @@ pub(super) fn list(folder: &Path, below: &str) -> Vec<PathBuf> {
 /// What one image and its labels are like.
 #[derive(Default)]
 struct Look {
-    faults: Vec<Fault>,
+    faults: Vec<Finding>,
     /// Class of each good row, and the sides of its box.
     rows: Vec<(usize, Option<[f64; 2]>)>,
     /// There is nothing in it.

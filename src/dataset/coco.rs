@@ -1,7 +1,7 @@
 //! Labels as COCO writes them: one JSON document for each part of the dataset.
 
 use crate::dataset::formats::is_exact;
-use crate::dataset::{Entry, Extent, Labelled, Part, PictureFormat, Writer, Written};
+use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::label::{Mask, trace};
@@ -142,7 +142,7 @@ impl Coco {
     }
 
     /// None for an object without a box.
-    fn annotation(&self, k: u64, label: &Labelled<'_>) -> Result<Option<Annotation>> {
+    fn annotation(&self, k: u64, label: &LabelledObject<'_>) -> Result<Option<Annotation>> {
         let object = label.object;
         let (b, mask) = self.boxes.of(object);
         if b.is_empty() {

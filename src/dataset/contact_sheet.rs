@@ -3,7 +3,7 @@
 use crate::color::to_srgb8;
 use crate::dataset::folder::{self, IDENTITY};
 use crate::dataset::journal::{Line, lines_of};
-use crate::dataset::{Part, Record};
+use crate::dataset::{Part, SampleRecord};
 use crate::draw::{self, TextSize};
 use crate::error::{Error, Result};
 use crate::filter::resize;
@@ -30,7 +30,7 @@ const CAPTION_GAP: usize = 4;
 
 /// How a sheet is laid out.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SheetOptions {
+pub struct ContactSheetOptions {
     /// A line at the top. Default: none.
     pub title: String,
     /// Widest a picture may be, pixels; larger ones are made smaller. Default: 320.
@@ -39,7 +39,7 @@ pub struct SheetOptions {
     pub columns: usize,
 }
 
-impl Default for SheetOptions {
+impl Default for ContactSheetOptions {
     fn default() -> Self {
         Self {
             title: String::new(),
@@ -51,7 +51,7 @@ impl Default for SheetOptions {
 
 /// A picture of a sheet.
 #[derive(Clone, Debug)]
-pub struct Tile {
+pub struct ContactTile {
     /// The picture, of any size.
     pub picture: Image<LinearRgb>,
     /// What is where in it, in pixels of the size that the labels name.
@@ -62,7 +62,7 @@ pub struct Tile {
     pub caption: String,
 }
 
-impl Tile {
+impl ContactTile {
     /// A tile no wider than `width`, made smaller in linear light.
     pub fn new(
         picture: &Image<LinearRgb>,
@@ -97,7 +97,11 @@ impl Tile {
 }
 
 /// Lays out pictures in rows, each with its boxes and a caption, under a title and a legend of the classes.
-pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Image<Srgb8> {
+pub fn contact_sheet(
+    tiles: &[ContactTile],
+    classes: &[String],
+    options: &ContactSheetOptions,
+) -> Image<Srgb8> {
     let layout = Layout::of(tiles, classes, options);
     let mut sheet = Image::filled(layout.width, layout.height, PAPER);
     let mut y = MARGIN as isize;
@@ -135,7 +139,7 @@ pub fn contact_sheet(tiles: &[Tile], classes: &[String], options: &SheetOptions)
 pub fn contact_sheet_of(
     folder: &Path,
     most: usize,
-    options: &SheetOptions,
+    options: &ContactSheetOptions,
 ) -> Result<Image<Srgb8>> {
     let identity = folder::identity(folder)?;
     let identity = identity
@@ -154,9 +158,9 @@ pub fn contact_sheet_of(
     Ok(contact_sheet(&tiles?, &classes, options))
 }
 
-fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
+fn tile(folder: &Path, line: &Line, options: &ContactSheetOptions) -> Result<ContactTile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
-    let record: Record = io::read_json(line.file(folder, "scenes/")?)?;
+    let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
     let part = if line.part == Part::Val {
         "val  "
     } else {
@@ -164,7 +168,7 @@ fn tile(folder: &Path, line: &Line, options: &SheetOptions) -> Result<Tile> {
     };
     let (labelled, all) = (record.labelled.len(), record.labels.objects.len());
     let caption = format!("{:06} {part} {labelled}/{all} labelled", line.k);
-    Ok(Tile::new(
+    Ok(ContactTile::new(
         &picture,
         record.labels,
         record.labelled,
@@ -186,7 +190,7 @@ struct Layout {
 }
 
 impl Layout {
-    fn of(tiles: &[Tile], classes: &[String], options: &SheetOptions) -> Self {
+    fn of(tiles: &[ContactTile], classes: &[String], options: &ContactSheetOptions) -> Self {
         let text = TextSize::Small;
         let widest = tiles
             .iter()
@@ -262,7 +266,7 @@ impl LegendEntry {
 }
 
 /// The legend's entries, in as many lines as they need within a width.
-fn entries(classes: &[String], tiles: &[Tile], width: usize) -> Vec<LegendEntry> {
+fn entries(classes: &[String], tiles: &[ContactTile], width: usize) -> Vec<LegendEntry> {
     let count = |keep: &dyn Fn(&ObjectLabel, bool) -> bool| {
         let objects = tiles.iter().flat_map(|t| {
             t.labels
@@ -330,7 +334,7 @@ mod tests {
 
     #[test]
     fn a_sheet_without_pictures_still_has_its_legend() {
-        let sheet = contact_sheet(&[], &["cap".into()], &SheetOptions::default());
+        let sheet = contact_sheet(&[], &["cap".into()], &ContactSheetOptions::default());
         assert!(sheet.pixels().contains(&draw::class_color(0)));
     }
 
@@ -338,7 +342,7 @@ mod tests {
     fn a_small_picture_is_not_made_larger() {
         let picture = Image::filled(40, 30, LinearRgb::WHITE);
         let tile = |width| {
-            Tile::new(
+            ContactTile::new(
                 &picture,
                 Labels::default(),
                 Vec::new(),

@@ -2,7 +2,7 @@
 
 use crate::dataset::journal::JOURNAL;
 use crate::dataset::times::RUNS;
-use crate::dataset::{Numbers, Plan, Shard, SplitOrder};
+use crate::dataset::{Plan, SampleRange, Shard, SplitOrder};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -159,7 +159,7 @@ fn plan_identity(plan: &Plan) -> Result<Value> {
         "writers": plan.writers.iter().map(|writer| writer.settings()).collect::<Vec<_>>(),
         "recipe": plan.recipe,
     });
-    if let Numbers::Shard(Shard { index, of }) = plan.numbers {
+    if let SampleRange::Shard(Shard { index, of }) = plan.range {
         identity["shard"] = json!({ "index": index, "of": of, "count": plan.count });
     }
     if plan.split.order == SplitOrder::Consecutive {

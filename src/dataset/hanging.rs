@@ -1,6 +1,6 @@
 //! Objects of a finished dataset that nothing holds up, by the scenes in its sidecar files.
 
-use crate::dataset::check::{Fault, fault, list, short};
+use crate::dataset::check::{Finding, fault, list, short};
 use crate::dataset::folder;
 use crate::error::Result;
 use crate::io;
@@ -18,7 +18,7 @@ struct Fall {
 }
 
 /// A fault for each sidecar file with objects that hang in the air, and for each that cannot be read.
-pub(super) fn hanging(dataset: &Path) -> Vec<Fault> {
+pub(super) fn hanging(dataset: &Path) -> Vec<Finding> {
     let options = options(dataset);
     let files: Vec<PathBuf> = ["scenes/train", "scenes/val"]
         .iter()

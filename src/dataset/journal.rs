@@ -276,7 +276,7 @@ fn is_cut(mut file: &File) -> std::io::Result<bool> {
 ///
 /// # Errors
 /// A folder that holds no dataset, one that an older petcomp began, or one that a run is writing.
-pub fn mend(folder: &Path) -> Result<(usize, usize)> {
+pub fn repair(folder: &Path) -> Result<(usize, usize)> {
     let _lock = folder::reclaim(folder)?;
     Inputs::forget(folder);
     let path = folder.join(JOURNAL);
@@ -399,7 +399,7 @@ fn write<'a>(path: &Path, lines: impl Iterator<Item = &'a Line>) -> Result<()> {
 
 /// What a dataset holds.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Report {
+pub struct DatasetCounts {
     /// Images asked for.
     pub asked: u64,
     /// Images in the folder.
@@ -437,7 +437,7 @@ pub struct ClassCount {
     pub labelled: u64,
 }
 
-impl Report {
+impl DatasetCounts {
     /// Objects that got no label.
     pub fn dropped(&self) -> u64 {
         self.objects.saturating_sub(self.labelled)

@@ -1,7 +1,7 @@
 //! The images of a dataset, part by part, and a choice of them: lists that trainers read, without copies.
 
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Part, Record};
+use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::io;
 use std::path::{Path, PathBuf};
@@ -130,7 +130,7 @@ pub(crate) fn is_image(path: &Path) -> bool {
 ///
 /// # Errors
 /// When there is none beside it.
-pub(crate) fn record_of(image: &Path) -> Result<Record> {
+pub(crate) fn record_of(image: &Path) -> Result<SampleRecord> {
     let swapped: PathBuf = image
         .iter()
         .map(|step| {

@@ -4,7 +4,9 @@ use crate::dataset::folder::{self, IDENTITY};
 use crate::dataset::journal::{Finished, JOURNAL, Line, numbered_lines_of};
 use crate::dataset::run::{Progress, check_count, run};
 use crate::dataset::times::Times;
-use crate::dataset::{Inputs, LabelSetup, Numbers, Pictures, Plan, Report, Shard, Sidecar, Writer};
+use crate::dataset::{
+    DatasetCounts, Inputs, LabelConfig, Pictures, Plan, SampleRange, Shard, Sidecar, Writer,
+};
 use crate::error::{Error, Result};
 use crate::io;
 use serde_json::{Map, Value, json};
@@ -30,7 +32,7 @@ pub fn merge(
     folder: &Path,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
-) -> Result<Report> {
+) -> Result<DatasetCounts> {
     let identity = common(shards)?;
     let count = identity.count;
     let mut lines = BTreeMap::new();
@@ -179,7 +181,7 @@ fn plan(mut document: Map<String, Value>, count: u64, folder: &Path) -> Result<P
     Ok(Plan {
         folder: folder.into(),
         count,
-        numbers: Numbers::All,
+        range: SampleRange::All,
         seed: field(&mut document, "seed")?,
         recipe: field(&mut document, "recipe")?,
         classes: field(&mut document, "classes")?,
@@ -205,13 +207,13 @@ fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Wr
         "pictures" => Ok(Box::new(*pictures)),
         "sidecar" => Ok(Box::new(Sidecar)),
         format => {
-            let mut setup = json!({ "formats": [format] });
+            let mut config = json!({ "formats": [format] });
             if settings.as_object().is_some_and(|map| !map.is_empty()) {
-                setup[format] = settings;
+                config[format] = settings;
             }
-            let setup: LabelSetup = serde_json::from_value(setup).map_err(wrong)?;
+            let config: LabelConfig = serde_json::from_value(config).map_err(wrong)?;
             let unknown = || Error::value(format!("writers.{name}"), "no such layout");
-            setup
+            config
                 .writers(pictures)
                 .into_iter()
                 .next()

@@ -1,6 +1,6 @@
 //! Dataset: images and labels in the layouts that trainers read.
 //!
-//! A [`Studio`] opens what a recipe file ([`Setup`]) names and makes sample `k` of it: draws the scene, lets it settle,
+//! A [`Pipeline`] opens what a recipe file ([`DatasetConfig`]) names and makes sample `k` of it: draws the scene, lets it settle,
 //! lights, renders and labels it.
 //!
 //! [`generate`] makes samples, many at a time, and hands each to [`Writer`]s: [`Pictures`] writes the images, [`Sidecar`]
@@ -16,9 +16,12 @@
 //! index.jsonl                    one line for each finished sample
 //! ```
 
+mod background_photo;
 mod check;
 mod coco;
+mod config;
 mod contact_sheet;
+mod environment_maps;
 mod estimate;
 mod fingerprint;
 mod folder;
@@ -31,21 +34,18 @@ mod journal;
 mod layers;
 mod listing;
 mod merge;
-mod near;
+mod near_duplicates;
 mod obstructed;
 pub mod page;
+mod partition;
 mod pictures;
-mod place;
+mod pipeline;
 mod quality;
 mod run;
-mod setup;
 mod shard;
-mod sharing;
 mod sidecar;
 mod split;
-mod studio;
 mod summary;
-mod surroundings;
 mod times;
 mod voc;
 mod webdataset;
@@ -53,32 +53,32 @@ mod yolo;
 mod yolo_set;
 mod yolo_yaml;
 
-pub use check::{Checked, Fault, check};
+pub use check::{Checked, Finding, check};
 pub use coco::{Coco, CocoMask};
-pub use contact_sheet::{SheetOptions, Tile, contact_sheet, contact_sheet_of};
+pub use config::DatasetConfig;
+pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact_sheet_of};
 pub use estimate::LongRun;
-pub use formats::{Extent, Format, LabelSetup};
+pub use formats::{Extent, Format, LabelConfig};
 pub use generate::{Plan, generate};
 pub use inputs::Inputs;
 #[doc(hidden)]
 pub use journal::JOURNAL;
 pub(crate) use journal::read as journal_lines;
-pub use journal::{ClassCount, Report, mend};
+pub use journal::{ClassCount, DatasetCounts, repair};
 pub use layers::Layers;
 pub use listing::Listing;
 pub(crate) use listing::is_image;
 pub use merge::merge;
-pub use near::{NEAR_CODES, Near};
-pub use obstructed::{Labelled, OBSTRUCTED, Obstructed};
+pub use near_duplicates::{NEAR_DUPLICATE_RMS, NearDuplicate};
+pub use obstructed::{LabelledObject, OBSTRUCTED, Obstructed};
+pub use partition::{Group, Leakage, Partition};
 pub use pictures::{PictureFormat, Pictures};
+pub use pipeline::Pipeline;
 pub use run::Progress;
-pub use setup::Setup;
-pub use shard::{Numbers, Shard, ShardChoice};
-pub use sharing::{Group, Leaks, Sharing};
-pub use sidecar::{Record, Sidecar};
+pub use shard::{SampleRange, Shard, ShardChoice};
+pub use sidecar::{SampleRecord, Sidecar};
 pub use split::{Part, Split, SplitOrder};
-pub use studio::Studio;
-pub use summary::{Glance, NoLabel, Shown, Summary};
+pub use summary::{SampleSummary, ShownSample, Summary, UnlabelledReason};
 pub use times::Times;
 pub use voc::Voc;
 pub use webdataset::WebDataset;
@@ -133,7 +133,7 @@ pub struct Entry<'a> {
     /// The sample.
     pub sample: &'a Sample,
     /// The objects that get a label, in order of id.
-    pub labelled: &'a [Labelled<'a>],
+    pub labelled: &'a [LabelledObject<'a>],
 }
 
 impl Entry<'_> {

@@ -5,7 +5,7 @@
 //! gained: colour transfer, the keyer, labels (masks and boxes), and the camera, which is solved to its end in a fifth of a
 //! millisecond.
 
-use crate::dataset::{Pictures, Setup};
+use crate::dataset::{DatasetConfig, Pictures};
 use crate::error::{Error, Result};
 use crate::matte::{CutOutOptions, SegmentOptions};
 use crate::plot::Table;
@@ -56,12 +56,12 @@ impl Quality {
         }
     }
 
-    /// A dataset's setup with every approximate stage of a run at this quality.
-    pub fn setup(self, mut setup: Setup) -> Setup {
-        setup.render = self.render();
-        setup.scene.settle = self.settle(setup.scene.settle);
-        setup.pictures = self.pictures(setup.pictures);
-        setup
+    /// A dataset's config with every approximate stage of a run at this quality.
+    pub fn config(self, mut config: DatasetConfig) -> DatasetConfig {
+        config.render = self.render();
+        config.scene.settle = self.settle(config.scene.settle);
+        config.pictures = self.pictures(config.pictures);
+        config
     }
 
     /// The setting of each stage: a row a setting, a column a quality.
@@ -146,7 +146,10 @@ mod tests {
     #[test]
     fn normal_is_the_default_of_every_stage() {
         assert_eq!(Quality::default(), Quality::Normal);
-        assert_eq!(Quality::Normal.setup(Setup::default()), Setup::default());
+        assert_eq!(
+            Quality::Normal.config(DatasetConfig::default()),
+            DatasetConfig::default()
+        );
         assert_eq!(
             Quality::Normal.cut_out(CutOutOptions::default()),
             CutOutOptions::default()
@@ -165,13 +168,13 @@ mod tests {
             (settled.gravity, settled.attempts),
             (odd.gravity, odd.attempts)
         );
-        let mut setup = Setup::default();
-        setup.scene.objects = crate::scene::Range::fixed(3.0);
-        setup.pictures.exr = true;
-        let draft = Quality::Draft.setup(setup.clone());
+        let mut config = DatasetConfig::default();
+        config.scene.objects = crate::scene::Range::fixed(3.0);
+        config.pictures.exr = true;
+        let draft = Quality::Draft.config(config.clone());
         assert_eq!(
             (draft.scene.objects, draft.labels.clone(), draft.pictures),
-            (setup.scene.objects, setup.labels, setup.pictures)
+            (config.scene.objects, config.labels, config.pictures)
         );
         assert_eq!(draft.render, Quality::Draft.render());
     }
@@ -202,19 +205,19 @@ mod tests {
                 .map(|row| row[2 + quality].clone())
         };
         for (i, quality) in Quality::ALL.into_iter().enumerate() {
-            let setup = quality.setup(Setup::default());
-            let sides = setup.render.subsamples;
+            let config = quality.config(DatasetConfig::default());
+            let sides = config.render.subsamples;
             assert_eq!(
                 cell("samples of a pixel", i),
                 Some(format!("{sides} x {sides}"))
             );
             assert_eq!(
                 cell("iterations in a step", i),
-                Some(setup.scene.settle.iterations.to_string())
+                Some(config.scene.settle.iterations.to_string())
             );
             assert_eq!(
                 cell("files of a picture", i).map(|t| t.contains("EXR")),
-                Some(setup.pictures.exr)
+                Some(config.pictures.exr)
             );
         }
     }

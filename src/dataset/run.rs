@@ -3,7 +3,7 @@
 use crate::dataset::folder;
 use crate::dataset::journal::{Journal, Line};
 use crate::dataset::times::Times;
-use crate::dataset::{Numbers, Plan, Report};
+use crate::dataset::{DatasetCounts, Plan, SampleRange};
 use crate::error::{Error, Result};
 use crate::io;
 use crate::work;
@@ -46,12 +46,12 @@ pub(super) fn run(
     write: impl Fn(u64) -> Result<(Line, Times)> + Sync,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
-) -> Result<Report> {
+) -> Result<DatasetCounts> {
     check_count(plan.count)?;
     let _lock = folder::claim(plan)?;
     plan.inputs.keep(&plan.folder);
     let journal = Journal::open(&plan.folder)?;
-    let again = matches!(plan.numbers, Numbers::One(_));
+    let again = matches!(plan.range, SampleRange::One(_));
     // One sample is made again whatever the number of the others.
     let count = if again {
         plan.count.max(journal.end())
@@ -59,14 +59,14 @@ pub(super) fn run(
         plan.count
     };
     nothing_beyond(&journal, count, plan)?;
-    let done = journal.count(count, |k| plan.numbers.contains(k));
-    let asked = plan.numbers.count_below(count);
+    let done = journal.count(count, |k| plan.range.contains(k));
+    let asked = plan.range.count_below(count);
     let missing = if again {
         asked
     } else {
         asked.saturating_sub(done)
     };
-    let next = Mutex::new(plan.numbers.below(count));
+    let next = Mutex::new(plan.range.below(count));
     let progressed = Progress {
         done,
         count: asked,
@@ -182,7 +182,7 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
     }
 
     /// Closes the books, whatever happened, then says what did.
-    fn finish(self) -> Result<Report> {
+    fn finish(self) -> Result<DatasetCounts> {
         let (plan, count, wall) = (self.plan, self.count, self.began.elapsed());
         let Books {
             journal,
@@ -196,8 +196,8 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
         io::sync(&plan.folder);
         times.append(&plan.folder, made, wall);
         let (done, asked) = (
-            journal.count(count, |k| plan.numbers.contains(k)),
-            plan.numbers.count_below(count),
+            journal.count(count, |k| plan.range.contains(k)),
+            plan.range.count_below(count),
         );
         let state = format!(
             "{done} of {asked} samples are in {}; the same command goes on",
@@ -218,7 +218,7 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
                 .iter()
                 .try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
         }
-        Ok(Report::of(&lines, plan, count, made))
+        Ok(DatasetCounts::of(&lines, plan, count, made))
     }
 }
 

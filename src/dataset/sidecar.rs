@@ -10,14 +10,14 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Writes `scenes/{train,val}/NNNNNN.json`, a [`Record`] each: label formats forget most of what is known of a picture,
+/// Writes `scenes/{train,val}/NNNNNN.json`, a [`SampleRecord`] each: label formats forget most of what is known of a picture,
 /// this one nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sidecar;
 
 /// What a sidecar file says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct SampleRecord {
     /// Version of the program that made the sample.
     pub petcomp: String,
     /// Hash of the recipe and of the files it names.
@@ -62,12 +62,12 @@ impl Writer for Sidecar {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let path = entry.path("scenes", "json");
-        io::write_json(folder.join(&path), &Record::of(entry))?;
+        io::write_json(folder.join(&path), &SampleRecord::of(entry))?;
         Ok(vec![path])
     }
 }
 
-impl Record {
+impl SampleRecord {
     /// What there is to say of an entry.
     fn of(entry: &Entry<'_>) -> Self {
         let Sample {

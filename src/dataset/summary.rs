@@ -3,7 +3,7 @@
 use crate::dataset::folder::{self, IDENTITY};
 use crate::dataset::journal::{Line, lines_of};
 use crate::dataset::times::{RunTimes, runs_of};
-use crate::dataset::{Part, Record};
+use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
@@ -38,16 +38,16 @@ pub struct Summary {
     /// The runs that wrote it.
     pub(crate) runs: Vec<RunTimes>,
     /// How many objects have no label, by the reason.
-    pub unlabelled: BTreeMap<NoLabel, u64>,
+    pub unlabelled: BTreeMap<UnlabelledReason, u64>,
     /// Seen share of each object without a label, 0 to 1.
     pub unlabelled_visible: Vec<f64>,
     /// All samples, in order of number.
-    pub glances: Vec<Glance>,
+    pub glances: Vec<SampleSummary>,
 }
 
 /// What a sample is like in a few numbers.
 #[derive(Clone, Debug)]
-pub struct Glance {
+pub struct SampleSummary {
     /// Its number.
     pub index: u64,
     /// The part that it belongs to.
@@ -68,7 +68,7 @@ pub struct Glance {
 
 /// Why an object has no label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum NoLabel {
+pub enum UnlabelledReason {
     /// Another lies over it, by the topmost rule.
     Covered,
     /// Nothing of it lies in the picture.
@@ -77,9 +77,9 @@ pub enum NoLabel {
     LeftOut,
 }
 
-impl NoLabel {
+impl UnlabelledReason {
     /// None for an object with a label.
-    pub fn of(object: &ObjectLabel, record: &Record) -> Option<Self> {
+    pub fn of(object: &ObjectLabel, record: &SampleRecord) -> Option<Self> {
         let labelled = record.labelled.contains(&object.id);
         match (labelled, object.amodal_box.is_empty(), object.is_topmost()) {
             (_, true, _) => Some(Self::Outside),
@@ -92,18 +92,18 @@ impl NoLabel {
 
 /// A sample to look at.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct ShownSample {
     /// Its picture.
     pub picture: PathBuf,
     /// What is known of it.
-    pub record: Record,
+    pub record: SampleRecord,
 }
 
 /// What one sample adds.
 struct Told {
     k: u64,
     part: Part,
-    record: Record,
+    record: SampleRecord,
 }
 
 impl Summary {
@@ -142,7 +142,7 @@ impl Summary {
                     name(folder, line, "images/")?,
                     name(folder, line, "scenes/")?,
                 ];
-                summary.glances.push(Glance::of(&told, files));
+                summary.glances.push(SampleSummary::of(&told, files));
             }
         }
         Ok(summary)
@@ -152,12 +152,12 @@ impl Summary {
     ///
     /// # Errors
     /// A record that cannot be read.
-    pub fn shown(&self, folder: &Path, place: usize) -> Result<Shown> {
+    pub fn shown(&self, folder: &Path, place: usize) -> Result<ShownSample> {
         let [picture, record] = self.glances[place]
             .files
             .each_ref()
             .map(|file| folder.join(file));
-        Ok(Shown {
+        Ok(ShownSample {
             picture,
             record: io::read_json(record)?,
         })
@@ -200,7 +200,7 @@ impl Summary {
         }
         for object in &record.labels.objects {
             self.visible.push(object.visible_fraction);
-            if let Some(reason) = NoLabel::of(object, record) {
+            if let Some(reason) = UnlabelledReason::of(object, record) {
                 *self.unlabelled.entry(reason).or_default() += 1;
                 self.unlabelled_visible.push(object.visible_fraction);
             } else {
@@ -217,7 +217,7 @@ impl Summary {
     }
 }
 
-impl Glance {
+impl SampleSummary {
     fn of(told: &Told, files: [String; 2]) -> Self {
         let Told { k, part, record } = told;
         let labelled = || {
@@ -225,7 +225,7 @@ impl Glance {
                 .labels
                 .objects
                 .iter()
-                .filter(|object| NoLabel::of(object, record).is_none())
+                .filter(|object| UnlabelledReason::of(object, record).is_none())
         };
         Self {
             index: *k,

@@ -2,7 +2,7 @@
 
 use crate::dataset::formats::is_exact;
 use crate::dataset::yolo_yaml::DataYaml;
-use crate::dataset::{Entry, Extent, Labelled, Part, Writer};
+use crate::dataset::{Entry, Extent, LabelledObject, Part, Writer};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::geom::Point2;
@@ -101,7 +101,7 @@ impl Yolo {
 
     fn row_of(
         &self,
-        &Labelled { object, class, .. }: &Labelled<'_>,
+        &LabelledObject { object, class, .. }: &LabelledObject<'_>,
         image: [f64; 2],
     ) -> Option<String> {
         let (chosen, mask) = self.boxes.of(object);

@@ -1,6 +1,6 @@
 //! How much a score would move if other images had been taken.
 
-use super::{Definition, Matches, Sheet};
+use super::{Definition, EvalImage, Matches};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -24,7 +24,12 @@ pub struct Interval {
 /// [Efron 1979], percentile interval.
 ///
 /// [Efron 1979]: https://doi.org/10.1214/aos/1176344552
-pub fn bootstrap(sheets: &[Sheet], definition: Definition, rounds: usize, seed: u64) -> Interval {
+pub fn bootstrap(
+    sheets: &[EvalImage],
+    definition: Definition,
+    rounds: usize,
+    seed: u64,
+) -> Interval {
     Matches::new(sheets, definition).bootstrap(rounds, seed)
 }
 
@@ -86,7 +91,7 @@ mod tests {
     #[test]
     fn an_interval_holds_its_value_and_shrinks_with_more_images() {
         let b = bbox(0.0, 0.0, 10.0, 10.0);
-        let some = |n: usize| -> Vec<Sheet> {
+        let some = |n: usize| -> Vec<EvalImage> {
             let seen = |i: usize| {
                 if i.is_multiple_of(3) {
                     vec![]

@@ -1,6 +1,6 @@
 //! The boxes of every class, image by image: each box is looked at once, however many classes there are.
 
-use super::{FoundBox, Sheet, TrueBox};
+use super::{Detection, EvalImage, GroundTruth};
 use rayon::prelude::*;
 
 /// Where a box stands.
@@ -13,7 +13,7 @@ struct Place {
 
 /// All boxes in order of class, image and, of detections, confidence.
 pub(super) struct ByClass<'a> {
-    sheets: &'a [Sheet],
+    sheets: &'a [EvalImage],
     truth: Vec<Place>,
     found: Vec<Place>,
 }
@@ -21,7 +21,7 @@ pub(super) struct ByClass<'a> {
 /// The boxes of a class.
 pub(super) struct ClassBoxes<'a> {
     pub(super) class: u32,
-    sheets: &'a [Sheet],
+    sheets: &'a [EvalImage],
     truth: &'a [Place],
     found: &'a [Place],
 }
@@ -31,13 +31,13 @@ pub(super) struct ImageBoxes<'a> {
     /// Which sheet.
     pub(super) sheet: usize,
     /// In the sheet's order.
-    pub(super) truth: Vec<&'a TrueBox>,
+    pub(super) truth: Vec<&'a GroundTruth>,
     /// The surest first; equal ones in the sheet's order.
-    pub(super) found: Vec<&'a FoundBox>,
+    pub(super) found: Vec<&'a Detection>,
 }
 
 impl<'a> ByClass<'a> {
-    pub(super) fn new(sheets: &'a [Sheet]) -> Self {
+    pub(super) fn new(sheets: &'a [EvalImage]) -> Self {
         let at = |sheet| {
             move |(index, class)| Place {
                 class,
@@ -47,9 +47,9 @@ impl<'a> ByClass<'a> {
         };
         let each = || sheets.iter().enumerate();
         let truth =
-            |(i, s): (usize, &'a Sheet)| s.truth.iter().map(|t| t.class).enumerate().map(at(i));
+            |(i, s): (usize, &'a EvalImage)| s.truth.iter().map(|t| t.class).enumerate().map(at(i));
         let found =
-            |(i, s): (usize, &'a Sheet)| s.found.iter().map(|f| f.class).enumerate().map(at(i));
+            |(i, s): (usize, &'a EvalImage)| s.found.iter().map(|f| f.class).enumerate().map(at(i));
         let (mut truth, mut found): (Vec<_>, Vec<_>) = (
             each().flat_map(truth).collect(),
             each().flat_map(found).collect(),

@@ -5,7 +5,8 @@ use super::by_class::{ByClass, ClassBoxes, ImageBoxes};
 use super::overlap::{BoxIndex, area, intersection, share};
 use super::rank::{Hit, Marks, Ranking};
 use super::{
-    ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS, TrueBox, mean, thresholds,
+    ClassScores, Definition, Detection, EvalImage, GroundTruth, Scores, THRESHOLDS, mean,
+    thresholds,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -70,7 +71,7 @@ impl AreaRange {
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
-pub fn coco(sheets: &[Sheet], weights: &[u32]) -> CocoScores {
+pub fn coco(sheets: &[EvalImage], weights: &[u32]) -> CocoScores {
     assert!(
         weights.is_empty() || weights.len() == sheets.len(),
         "one weight per sheet"
@@ -194,7 +195,7 @@ impl<'a> Measured<'a> {
 
 /// A box of the truth as one range of sizes sees it.
 struct Target<'a> {
-    truth: &'a TrueBox,
+    truth: &'a GroundTruth,
     /// It counts for nobody.
     ignored: bool,
     taken: Marks,
@@ -231,7 +232,7 @@ fn held_against(image: &ImageBoxes<'_>, range: AreaRange) -> (Vec<Hit>, usize) {
 
 /// Thresholds at which a detection finds something, and at which it counts for nobody.
 fn marks(
-    found: &FoundBox,
+    found: &Detection,
     targets: &mut [Target<'_>],
     overlaps: &[(usize, f64)],
     range: AreaRange,
@@ -281,7 +282,7 @@ fn nearest(
 }
 
 /// Intersection over union; over the detection's own area where the truth is a crowd.
-fn overlap(found: &FoundBox, truth: &TrueBox) -> f64 {
+fn overlap(found: &Detection, truth: &GroundTruth) -> f64 {
     let shared = intersection(&found.bbox, &truth.bbox);
     let whole = if truth.crowd {
         area(&found.bbox)
@@ -305,7 +306,7 @@ mod tests {
         ];
         let truth = vec![
             there(0, b),
-            TrueBox {
+            GroundTruth {
                 crowd: true,
                 ..there(0, crowd)
             },

@@ -1,6 +1,6 @@
 //! Reads truth and detections from COCO JSON.
 
-use super::{FARTHEST_PX, FoundBox, Picture, Sheet, TrueBox};
+use super::{Detection, EvalImage, FARTHEST_PX, GroundTruth, Picture};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
@@ -46,7 +46,7 @@ struct Annotation {
 }
 
 #[derive(Deserialize)]
-struct Detection {
+struct CocoDetection {
     image_id: i64,
     category_id: i64,
     bbox: [f64; 4],
@@ -57,7 +57,7 @@ struct Detection {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CocoTruth {
     /// One per image, in order of their ids.
-    pub sheets: Vec<Sheet>,
+    pub sheets: Vec<EvalImage>,
     /// Names of the categories, in order of their ids; a class is a place in this list.
     pub classes: Vec<String>,
     /// File name of each image, and its width and height where they are told.
@@ -81,14 +81,14 @@ pub fn read_coco_truth(path: &Path) -> Result<CocoTruth> {
 /// As [`read_coco_truth`].
 pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
     truth
-        .add(&io::read_json_data::<Vec<Detection>>(path)?)
+        .add(&io::read_json_data::<Vec<CocoDetection>>(path)?)
         .map_err(|e| e.in_file(path))
 }
 
 /// What documents of truth and of detections give, for the fuzzers.
-pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<Sheet>> {
+pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
     let mut truth = CocoTruth::new(&io::parse_json(truth)?)?;
-    truth.add(&io::parse_json::<Vec<Detection>>(found)?)?;
+    truth.add(&io::parse_json::<Vec<CocoDetection>>(found)?)?;
     Ok(truth.sheets)
 }
 
@@ -100,7 +100,7 @@ impl CocoTruth {
         let mut truth = Self {
             sheets: images
                 .values()
-                .map(|&i| Sheet::new(document.images[i].name(), Vec::new()))
+                .map(|&i| EvalImage::new(document.images[i].name(), Vec::new()))
                 .collect(),
             classes: categories.values().map(name).collect(),
             files: images
@@ -117,7 +117,7 @@ impl CocoTruth {
                 .map_err(|e| e.within(&at()))?;
             let bbox = corners(a.bbox).map_err(|e| e.within(&at()))?;
             let area = a.area.unwrap_or(a.bbox[2] * a.bbox[3]);
-            truth.sheets[image].truth.push(TrueBox {
+            truth.sheets[image].truth.push(GroundTruth {
                 class,
                 bbox,
                 area,
@@ -127,14 +127,14 @@ impl CocoTruth {
         Ok(truth)
     }
 
-    fn add(&mut self, found: &[Detection]) -> Result<()> {
+    fn add(&mut self, found: &[CocoDetection]) -> Result<()> {
         for (i, d) in found.iter().enumerate() {
             let at = || format!("[{i}]");
             let (image, class) = self
                 .place(d.image_id, d.category_id)
                 .map_err(|e| e.within(&at()))?;
             let bbox = corners(d.bbox).map_err(|e| e.within(&at()))?;
-            self.sheets[image].found.push(FoundBox {
+            self.sheets[image].found.push(Detection {
                 class,
                 bbox,
                 confidence: d.score,

@@ -1,6 +1,6 @@
 //! Which class is taken for which.
 
-use super::Sheet;
+use super::EvalImage;
 use super::pairing::pairs;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,7 +34,7 @@ impl Default for ConfusionOptions {
 impl Confusion {
     /// Counts over all images, whatever the classes of two boxes that overlap. Pairs are made from the greatest overlap
     /// down; crowds, and detections in them, count for nobody.
-    pub fn new(sheets: &[Sheet], options: &ConfusionOptions) -> Self {
+    pub fn new(sheets: &[EvalImage], options: &ConfusionOptions) -> Self {
         let mut confusion = Self::default();
         for sheet in sheets {
             for pair in pairs(sheet, options) {

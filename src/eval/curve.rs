@@ -3,7 +3,7 @@
 use super::average::{self, POINTS};
 use super::rank::Ranking;
 use super::yolov5::{self, CONFIDENCES, Ranked, best_confidence, confidence};
-use super::{Definition, Matches, Sheet, mean};
+use super::{Definition, EvalImage, Matches, mean};
 
 /// Curves of every class that occurs in the truth.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Curves {
 
 /// Precision over recall, and F1 over confidence, at intersection over union 0.5, matched as by
 /// [`yolov5`](super::yolov5()).
-pub fn curves(sheets: &[Sheet]) -> Curves {
+pub fn curves(sheets: &[EvalImage]) -> Curves {
     Matches::new(sheets, Definition::Yolov5).curves()
 }
 

@@ -2,13 +2,13 @@
 
 use super::overlap::{BoxIndex, iou};
 use super::pairing::{Pair, pairs};
-use super::{ConfusionOptions, Sheet};
+use super::{ConfusionOptions, EvalImage};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
 /// How a detection or a box is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum MistakeKind {
     /// A detection where nothing is, or the second one of a box.
     FalseAlarm,
     /// A detection of a box of another class.
@@ -23,7 +23,7 @@ pub struct Mistake {
     /// Which sheet.
     pub sheet: usize,
     /// What is wrong.
-    pub kind: Kind,
+    pub kind: MistakeKind,
     /// The detection: of a miss the one that overlaps it most, however unsure, if any does.
     pub found: Option<usize>,
     /// The box of the truth: of a false alarm the one that it overlaps most, if any.
@@ -34,8 +34,8 @@ pub struct Mistake {
 
 /// All mistakes by the pairs that a [`Confusion`](super::Confusion) counts, the worst first: of detections the surest,
 /// of misses the box with the most area that no detection covers.
-pub fn mistakes(sheets: &[Sheet], options: &ConfusionOptions) -> Vec<Mistake> {
-    let of_sheet = |(i, sheet): (usize, &Sheet)| -> Vec<(f64, Mistake)> {
+pub fn mistakes(sheets: &[EvalImage], options: &ConfusionOptions) -> Vec<Mistake> {
+    let of_sheet = |(i, sheet): (usize, &EvalImage)| -> Vec<(f64, Mistake)> {
         let mistakes = in_sheet(i, sheet, options);
         mistakes
             .into_iter()
@@ -48,15 +48,15 @@ pub fn mistakes(sheets: &[Sheet], options: &ConfusionOptions) -> Vec<Mistake> {
         .flat_map_iter(of_sheet)
         .collect();
     let worse = |a: &(f64, Mistake), b: &(f64, Mistake)| -> Ordering {
-        (a.1.kind == Kind::Missed)
-            .cmp(&(b.1.kind == Kind::Missed))
+        (a.1.kind == MistakeKind::Missed)
+            .cmp(&(b.1.kind == MistakeKind::Missed))
             .then(b.0.total_cmp(&a.0))
     };
     all.sort_by(worse);
     all.into_iter().map(|(_, mistake)| mistake).collect()
 }
 
-fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mistake> {
+fn in_sheet(place: usize, sheet: &EvalImage, options: &ConfusionOptions) -> Vec<Mistake> {
     let truth = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
     let found = BoxIndex::new(sheet.found.iter().map(|f| f.bbox));
     let overlap = |f: usize, t: usize| iou(&sheet.found[f].bbox, &sheet.truth[t].bbox);
@@ -73,7 +73,7 @@ fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mist
             let wrong = sheet.found[f].class != sheet.truth[t].class;
             wrong.then(|| Mistake {
                 sheet: place,
-                kind: Kind::WrongClass,
+                kind: MistakeKind::WrongClass,
                 found: Some(f),
                 truth: Some(t),
                 iou: overlap(f, t),
@@ -87,7 +87,7 @@ fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mist
             let (truth, iou) = nearest.map_or((None, 0.0), |(t, iou)| (Some(t), iou));
             Some(Mistake {
                 sheet: place,
-                kind: Kind::FalseAlarm,
+                kind: MistakeKind::FalseAlarm,
                 found: Some(f),
                 truth,
                 iou,
@@ -101,7 +101,7 @@ fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mist
             let (found, iou) = nearest.map_or((None, 0.0), |(f, iou)| (Some(f), iou));
             Some(Mistake {
                 sheet: place,
-                kind: Kind::Missed,
+                kind: MistakeKind::Missed,
                 found,
                 truth: Some(t),
                 iou,
@@ -118,9 +118,9 @@ fn in_sheet(place: usize, sheet: &Sheet, options: &ConfusionOptions) -> Vec<Mist
         .collect()
 }
 
-fn badness(sheet: &Sheet, mistake: &Mistake) -> f64 {
+fn badness(sheet: &EvalImage, mistake: &Mistake) -> f64 {
     match (mistake.kind, mistake.truth, mistake.found) {
-        (Kind::Missed, Some(t), _) => sheet.truth[t].area * (1.0 - mistake.iou),
+        (MistakeKind::Missed, Some(t), _) => sheet.truth[t].area * (1.0 - mistake.iou),
         (_, _, Some(f)) => sheet.found[f].confidence,
         _ => 0.0,
     }
@@ -148,10 +148,10 @@ mod tests {
         assert_eq!(
             all.iter().map(told).collect::<Vec<_>>(),
             [
-                (Kind::WrongClass, Some(1), Some(0)),
-                (Kind::FalseAlarm, Some(0), None),
-                (Kind::FalseAlarm, Some(2), Some(1)),
-                (Kind::Missed, Some(2), Some(1)),
+                (MistakeKind::WrongClass, Some(1), Some(0)),
+                (MistakeKind::FalseAlarm, Some(0), None),
+                (MistakeKind::FalseAlarm, Some(2), Some(1)),
+                (MistakeKind::Missed, Some(2), Some(1)),
             ]
         );
         assert!((all[3].iou - 400.0 / 2800.0).abs() < 1e-12);

@@ -1,7 +1,7 @@
 //! Which detection names which box, whatever their classes.
 
 use super::overlap::{BoxIndex, area, intersection, iou, share};
-use super::{ConfusionOptions, Sheet};
+use super::{ConfusionOptions, EvalImage};
 use std::collections::BinaryHeap;
 
 /// A detection and the box that it names, by their places in the sheet: without a box it is a false alarm, without a
@@ -14,7 +14,7 @@ pub(super) struct Pair {
 
 /// Every detection and every box that counts, once. Pairs are made from the greatest overlap down; detections in a
 /// crowd count for nobody.
-pub(super) fn pairs(sheet: &Sheet, options: &ConfusionOptions) -> Vec<Pair> {
+pub(super) fn pairs(sheet: &EvalImage, options: &ConfusionOptions) -> Vec<Pair> {
     let mut search = Search::new(sheet, options);
     let sure = |&f: &usize| sheet.found[f].confidence > options.confidence;
     let found: Vec<usize> = (0..sheet.found.len()).filter(sure).collect();
@@ -70,14 +70,14 @@ impl PartialOrd for Candidate {
 }
 
 struct Search<'a> {
-    sheet: &'a Sheet,
+    sheet: &'a EvalImage,
     index: BoxIndex,
     taken: Vec<bool>,
     least: f64,
 }
 
 impl<'a> Search<'a> {
-    fn new(sheet: &'a Sheet, options: &ConfusionOptions) -> Self {
+    fn new(sheet: &'a EvalImage, options: &ConfusionOptions) -> Self {
         let index = BoxIndex::new(sheet.truth.iter().map(|t| t.bbox));
         Self {
             sheet,
@@ -123,12 +123,12 @@ impl<'a> Search<'a> {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{bbox, found, sheet, there};
-    use super::super::{FoundBox, TrueBox};
+    use super::super::{Detection, GroundTruth};
     use super::*;
     use proptest::prelude::*;
 
     /// All pairs in order of overlap: what the search above saves.
-    fn by_sorting(sheet: &Sheet, least: f64) -> Vec<(usize, usize)> {
+    fn by_sorting(sheet: &EvalImage, least: f64) -> Vec<(usize, usize)> {
         let each = (0..sheet.truth.len()).flat_map(|t| (0..sheet.found.len()).map(move |f| (t, f)));
         let mut all: Vec<_> = each
             .map(|(t, f)| (iou(&sheet.truth[t].bbox, &sheet.found[f].bbox), t, f))
@@ -156,8 +156,8 @@ mod tests {
             seen in prop::collection::vec([0_u8..30, 0..30, 1..20, 1..20], 0..40),
         ) {
             let made = |[x, y, w, h]: [u8; 4]| bbox(x.into(), y.into(), w.into(), h.into());
-            let truth: Vec<TrueBox> = truth.into_iter().map(|b| there(0, made(b))).collect();
-            let seen: Vec<FoundBox> = seen.into_iter().map(|b| found(0, made(b), 0.9)).collect();
+            let truth: Vec<GroundTruth> = truth.into_iter().map(|b| there(0, made(b))).collect();
+            let seen: Vec<Detection> = seen.into_iter().map(|b| found(0, made(b), 0.9)).collect();
             let sheet = sheet(truth, seen);
             let mut made: Vec<_> = pairs(&sheet, &Default::default())
                 .iter().filter_map(|p| p.truth.zip(p.found)).collect();
@@ -176,7 +176,7 @@ mod tests {
         let all = sheet(
             vec![
                 there(0, b),
-                TrueBox {
+                GroundTruth {
                     crowd: true,
                     ..there(0, crowd)
                 },

@@ -1,6 +1,6 @@
 //! Reads truth and detections from folders of YOLO text files.
 
-use super::{FoundBox, Picture, Sheet, TrueBox};
+use super::{Detection, EvalImage, GroundTruth, Picture};
 use crate::error::{Error, Result};
 use crate::geom::BBox;
 use crate::io;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct YoloTruth {
     /// In order of the images' names.
-    pub sheets: Vec<Sheet>,
+    pub sheets: Vec<EvalImage>,
     /// Width and height of each image, pixels.
     pub sizes: Vec<[u32; 2]>,
     /// The images, where they are found.
@@ -39,7 +39,7 @@ pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTrut
             path,
             size: size.map(f64::from),
         });
-        Ok((Sheet::new(name, boxes), size, picture))
+        Ok((EvalImage::new(name, boxes), size, picture))
     };
     let all: Vec<_> = texts(labels)?.par_iter().map(one).collect::<Result<_>>()?;
     if all.is_empty() {
@@ -60,7 +60,7 @@ pub fn read_yolo_truth(labels: &Path, size: Option<[u32; 2]>) -> Result<YoloTrut
 ///
 /// # Errors
 /// [`Error::File`] for a folder that cannot be read, a name that the truth does not have, or a bad line.
-pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
+pub fn read_yolo_detections(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
     let known: BTreeMap<String, usize> = truth
         .sheets
         .iter()
@@ -82,7 +82,7 @@ pub fn read_yolo_found(folder: &Path, truth: &mut YoloTruth) -> Result<()> {
                 .collect(),
         ))
     };
-    let found: Vec<(usize, Vec<FoundBox>)> =
+    let found: Vec<(usize, Vec<Detection>)> =
         texts(folder)?.par_iter().map(one).collect::<Result<_>>()?;
     found
         .into_iter()
@@ -95,7 +95,7 @@ pub(crate) fn sheet_of(
     truth: &str,
     found: &str,
     size: [u32; 2],
-) -> std::result::Result<Sheet, String> {
+) -> std::result::Result<EvalImage, String> {
     let truth = rows_of(truth, 0)?
         .into_iter()
         .map(|row| row.truth(size))
@@ -104,9 +104,9 @@ pub(crate) fn sheet_of(
         .into_iter()
         .map(|row| row.found(size))
         .collect();
-    Ok(Sheet {
+    Ok(EvalImage {
         found,
-        ..Sheet::new("", truth)
+        ..EvalImage::new("", truth)
     })
 }
 
@@ -253,9 +253,9 @@ impl Row {
         }
     }
 
-    fn truth(&self, size: [u32; 2]) -> TrueBox {
+    fn truth(&self, size: [u32; 2]) -> GroundTruth {
         let bbox = self.bbox(size);
-        TrueBox {
+        GroundTruth {
             class: self.class,
             bbox,
             area: bbox.width() * bbox.height(),
@@ -263,8 +263,8 @@ impl Row {
         }
     }
 
-    fn found(&self, size: [u32; 2]) -> FoundBox {
-        FoundBox {
+    fn found(&self, size: [u32; 2]) -> Detection {
+        Detection {
             class: self.class,
             bbox: self.bbox(size),
             confidence: self.confidence,
@@ -323,7 +323,7 @@ mod tests {
         ]);
         let mut truth = read_yolo_truth(labels.path(), Some([100, 200])).unwrap();
         let found = folder(&[("b.txt", "0 0.5 0.5 1 1 0.25\n")]);
-        read_yolo_found(found.path(), &mut truth).unwrap();
+        read_yolo_detections(found.path(), &mut truth).unwrap();
         assert_eq!(
             (
                 truth.sheets[0].found.len(),
@@ -362,7 +362,7 @@ mod tests {
     fn a_detection_for_an_unknown_image_is_refused() {
         let labels = folder(&[("a.txt", "")]);
         let mut truth = read_yolo_truth(labels.path(), Some([9, 9])).unwrap();
-        let said = read_yolo_found(folder(&[("c.txt", "")]).path(), &mut truth)
+        let said = read_yolo_detections(folder(&[("c.txt", "")]).path(), &mut truth)
             .unwrap_err()
             .to_string();
         assert!(said.contains("no image \"c\""), "{said}");

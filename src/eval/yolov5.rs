@@ -4,7 +4,7 @@ use super::average::{interpolated, recall_and_precision, trapezoid};
 use super::by_class::{ByClass, ImageBoxes};
 use super::overlap::BoxIndex;
 use super::rank::{Hit, Marks, Ranking, Running};
-use super::{ClassScores, Definition, FoundBox, Scores, Sheet, THRESHOLDS};
+use super::{ClassScores, Definition, Detection, EvalImage, Scores, THRESHOLDS};
 use crate::geom::BBox;
 use rayon::prelude::*;
 
@@ -29,7 +29,7 @@ const SMOOTHING: usize = 50;
 ///
 /// # Panics
 /// When there are weights and not one per sheet.
-pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
+pub fn yolov5(sheets: &[EvalImage], weights: &[u32]) -> Scores {
     assert!(
         weights.is_empty() || weights.len() == sheets.len(),
         "one weight per sheet"
@@ -38,7 +38,7 @@ pub fn yolov5(sheets: &[Sheet], weights: &[u32]) -> Scores {
 }
 
 /// The detections of every class with something to find.
-pub(super) fn rankings(sheets: &[Sheet]) -> Vec<Ranking> {
+pub(super) fn rankings(sheets: &[EvalImage]) -> Vec<Ranking> {
     ByClass::new(sheets)
         .classes()
         .par_iter()
@@ -175,7 +175,7 @@ pub(super) fn best_confidence(classes: &[Ranked<'_>]) -> usize {
 fn held_against(image: &ImageBoxes<'_>) -> (Vec<Hit>, usize) {
     let index = BoxIndex::new(image.truth.iter().map(|t| t.bbox));
     let mut taken: Vec<Marks> = vec![0; image.truth.len()];
-    let hit = |(place, f): (usize, &&FoundBox)| {
+    let hit = |(place, f): (usize, &&Detection)| {
         let overlaps = index
             .near(&f.bbox)
             .into_iter()

@@ -3,7 +3,7 @@
 use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use petcomp::dataset::{Setup, Studio};
+use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
 use petcomp::printable;
 use std::io::{IsTerminal, Write as _};
@@ -192,13 +192,13 @@ pub(crate) struct RecipeArgs {
 
 impl RecipeArgs {
     /// Reads the recipe.
-    pub(crate) fn setup(&self) -> anyhow::Result<Setup> {
-        Ok(Setup::read(&self.recipe, &self.overrides)?)
+    pub(crate) fn config(&self) -> anyhow::Result<DatasetConfig> {
+        Ok(DatasetConfig::read(&self.recipe, &self.overrides)?)
     }
 
     /// Opens the folders that the recipe names.
-    pub(crate) fn studio(&self) -> anyhow::Result<Studio> {
-        Ok(Studio::open(self.setup()?)?)
+    pub(crate) fn pipeline(&self) -> anyhow::Result<Pipeline> {
+        Ok(Pipeline::open(self.config()?)?)
     }
 }
 

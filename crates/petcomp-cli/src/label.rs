@@ -1,7 +1,7 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
 use crate::common::{Common, RecipeArgs};
-use petcomp::dataset::Studio;
+use petcomp::dataset::Pipeline;
 use petcomp::{Scene, io, label};
 use std::path::PathBuf;
 
@@ -24,14 +24,14 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
-    let studio = Studio::open_for(args.recipe.setup()?, &scene)?;
+    let pipeline = Pipeline::open_for(args.recipe.config()?, &scene)?;
     let labels = match &args.overlay {
-        None => studio.label(scene).map_err(|e| e.in_file(&args.scene))?,
+        None => pipeline.label(scene).map_err(|e| e.in_file(&args.scene))?,
         Some(path) => {
-            let sample = studio.take(scene).map_err(|e| e.in_file(&args.scene))?;
+            let sample = pipeline.take(scene).map_err(|e| e.in_file(&args.scene))?;
             io::write(
                 path,
-                &label::overlay(&sample.frame, &sample.labels, &studio.library().classes),
+                &label::overlay(&sample.frame, &sample.labels, &pipeline.library().classes),
             )?;
             sample.labels
         }
@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     if let Some(path) = &args.polygons {
         io::write_json(
             path,
-            &label::borders(&labels, studio.setup().labels.simplify),
+            &label::borders(&labels, pipeline.config().labels.simplify),
         )?;
     }
     let objects = &labels.objects;

@@ -32,13 +32,15 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     let scene: Scene = io::read_document(&args.scene)?;
-    let mut setup = args.recipe.setup()?;
+    let mut config = args.recipe.config()?;
     if let Some(quality) = args.quality {
-        setup = quality.setup(setup);
+        config = quality.config(config);
     }
-    let studio = petcomp::dataset::Studio::open_for(setup, &scene)?;
-    let (scene, shot) = studio.resolve(scene).map_err(|e| e.in_file(&args.scene))?;
-    let (deep, frame) = studio.shoot(&scene, &shot);
+    let pipeline = petcomp::dataset::Pipeline::open_for(config, &scene)?;
+    let (scene, shot) = pipeline
+        .resolve(scene)
+        .map_err(|e| e.in_file(&args.scene))?;
+    let (deep, frame) = pipeline.shoot(&scene, &shot);
     match args.aov.as_slice() {
         [] => write(&args.output, &frame)?,
         aovs => {

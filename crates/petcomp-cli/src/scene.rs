@@ -57,7 +57,7 @@ pub(crate) struct Draw {
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Draw(args) => {
-            let scene = args.recipe.studio()?.draw(args.seed, args.index)?;
+            let scene = args.recipe.pipeline()?.draw(args.seed, args.index)?;
             io::write_document(&args.output, &scene)?;
             common.say(format_args!(
                 "{}: {} objects over {}",
@@ -81,7 +81,7 @@ fn export(args: &Export, common: &Common) -> anyhow::Result<()> {
     let Renderer::Cycles = args.to;
     let (scene, shot) = args
         .recipe
-        .studio()?
+        .pipeline()?
         .resolve(scene)
         .map_err(|e| e.in_file(&args.scene))?;
     cycles::export(&shot, scene.surface.size, &args.folder)?;

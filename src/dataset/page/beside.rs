@@ -40,12 +40,12 @@ const THEIRS: &str = "#d55e00";
 pub(crate) struct Set {
     /// Names of the classes, in order; may be fewer than occur.
     pub(crate) classes: Vec<String>,
-    pub(crate) pictures: Vec<Labelled>,
+    pub(crate) pictures: Vec<LabelledPicture>,
 }
 
 /// A picture and its boxes.
 #[derive(Clone)]
-pub(crate) struct Labelled {
+pub(crate) struct LabelledPicture {
     pub(crate) path: PathBuf,
     /// Class, and centre, width and height as shares of the picture's; none for a picture without a label file.
     pub(crate) boxes: Option<Vec<(u32, [f64; 4])>>,
@@ -95,7 +95,7 @@ impl Set {
     }
 
     /// Some of the pictures, evenly spread.
-    fn spread(&self, most: usize) -> Vec<&Labelled> {
+    fn spread(&self, most: usize) -> Vec<&LabelledPicture> {
         let count = most.min(self.pictures.len());
         (0..count)
             .map(|i| &self.pictures[i * self.pictures.len() / count])
@@ -169,22 +169,22 @@ fn walk(folder: &Path, seen: &mut BTreeSet<PathBuf>, images: &mut Vec<PathBuf>) 
     Ok(())
 }
 
-fn labelled(path: PathBuf) -> Result<Labelled> {
+fn labelled(path: PathBuf) -> Result<LabelledPicture> {
     let candidates = [YoloSet::label_of(&path), path.with_extension("txt")];
     let Some(label) = candidates.iter().find(|label| label.is_file()) else {
-        return Ok(Labelled { path, boxes: None });
+        return Ok(LabelledPicture { path, boxes: None });
     };
     // In a picture of one pixel, pixels are shares.
     let sheet = eval::yolo_sheet(&io::read_text(label)?, "", [1, 1])
         .map_err(|what| Error::file(label, what))?;
-    let shares = |t: &eval::TrueBox| {
+    let shares = |t: &eval::GroundTruth| {
         let centre = t.bbox.center();
         (
             t.class,
             [centre.x, centre.y, t.bbox.width(), t.bbox.height()],
         )
     };
-    Ok(Labelled {
+    Ok(LabelledPicture {
         path,
         boxes: Some(sheet.truth.iter().map(shares).collect()),
     })
@@ -291,7 +291,7 @@ pub(crate) fn put_on(page: &mut Page, ours: &Set, theirs: &Set, most: usize) {
     page.html(&gallery("yours", &figures));
 }
 
-fn figure(set: &Set, picture: &Labelled) -> Option<Figure> {
+fn figure(set: &Set, picture: &LabelledPicture) -> Option<Figure> {
     // Boxes are shares of the picture, which is a square of 100 then; the frame gives it its shape back.
     let header = io::read_header(&picture.path).ok()?;
     let size = [header.width as f64, header.height as f64];

@@ -4,7 +4,7 @@
 mod beside;
 mod outlier;
 
-use crate::dataset::{Glance, NoLabel, Shown, Summary};
+use crate::dataset::{SampleSummary, ShownSample, Summary, UnlabelledReason};
 use crate::draw::class_color;
 use crate::error::Result;
 use crate::eval::class_name;
@@ -14,7 +14,7 @@ use crate::label::gallery::{self, Figure, gallery};
 use crate::label::{ObjectLabel, trace};
 use crate::plot::heat::heat_map;
 use crate::plot::{Histogram, Page, Table, escaped};
-use beside::{Labelled, Set};
+use beside::{LabelledPicture, Set};
 use outlier::{Feature, outliers};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -113,7 +113,7 @@ pub fn page(folder: &Path, options: &DatasetReportOptions) -> Result<Page> {
 
 /// The labels of the dataset as those of any other.
 fn as_set(folder: &Path, summary: &Summary) -> Set {
-    let labelled = |glance: &Glance| {
+    let labelled = |glance: &SampleSummary| {
         let [w, h] = glance.image.map(f64::from);
         let share = |(class, b): &(u32, BBox)| {
             (
@@ -126,7 +126,7 @@ fn as_set(folder: &Path, summary: &Summary) -> Set {
                 ],
             )
         };
-        Labelled {
+        LabelledPicture {
             path: folder.join(&glance.files[0]),
             boxes: Some(glance.labels.iter().map(share).collect()),
         }
@@ -224,8 +224,8 @@ fn legend(summary: &Summary) -> String {
 const UNLABELLED: &str = "#c8c8c8";
 
 /// Pictures to show: those unlike the others with what sets them apart, at most half, then others evenly spread.
-fn chosen(glances: &[Glance], most: usize) -> Vec<(usize, Option<String>)> {
-    let feature = |name, value: fn(&Glance) -> f64| Feature {
+fn chosen(glances: &[SampleSummary], most: usize) -> Vec<(usize, Option<String>)> {
+    let feature = |name, value: fn(&SampleSummary) -> f64| Feature {
         name,
         values: glances.iter().map(value).collect(),
     };
@@ -255,16 +255,16 @@ fn chosen(glances: &[Glance], most: usize) -> Vec<(usize, Option<String>)> {
 }
 
 /// The longer side of each labelled box.
-fn sides(glance: &Glance) -> impl Iterator<Item = f64> {
+fn sides(glance: &SampleSummary) -> impl Iterator<Item = f64> {
     glance.labels.iter().map(|(_, b)| b.width().max(b.height()))
 }
 
 /// A picture and its labels over it.
-fn figure(shown: &Shown, classes: &[String], why: Option<&str>) -> Result<Figure> {
+fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<Figure> {
     let record = &shown.record;
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
     let (letter, objects) = (figure.letter(), &record.labels.objects);
-    let reason = |object: &ObjectLabel| NoLabel::of(object, record);
+    let reason = |object: &ObjectLabel| UnlabelledReason::of(object, record);
     let (mut boxes, mut masks, mut others, mut labelled) =
         (String::new(), String::new(), String::new(), 0);
     for object in objects {
@@ -330,14 +330,19 @@ fn mask_of(object: &ObjectLabel) -> String {
 }
 
 /// An outline with the reason why it has no label.
-fn outline_of(object: &ObjectLabel, classes: &[String], reason: NoLabel, letter: f64) -> String {
+fn outline_of(
+    object: &ObjectLabel,
+    classes: &[String],
+    reason: UnlabelledReason,
+    letter: f64,
+) -> String {
     let over: Vec<String> = object
         .covered_by
         .iter()
         .map(|id| id.0.to_string())
         .collect();
     let why = match reason {
-        NoLabel::Covered => format!("under {}", over.join(", ")),
+        UnlabelledReason::Covered => format!("under {}", over.join(", ")),
         reason => in_words(reason).to_owned(),
     };
     let (id, name, seen) = (
@@ -397,7 +402,7 @@ fn all_pictures(page: &mut Page, folder: &Path, summary: &Summary, from: &Path) 
     }
 }
 
-fn listed(glance: &Glance, root: &Path) -> String {
+fn listed(glance: &SampleSummary, root: &Path) -> String {
     let (address, [w, h]) = (address(&root.join(&glance.files[0])), glance.image);
     let mut paths: BTreeMap<u32, String> = BTreeMap::new();
     for (class, b) in &glance.labels {
@@ -436,11 +441,11 @@ fn address(path: &Path) -> String {
     }
 }
 
-fn in_words(reason: NoLabel) -> &'static str {
+fn in_words(reason: UnlabelledReason) -> &'static str {
     match reason {
-        NoLabel::Covered => "another object lies over it",
-        NoLabel::Outside => "nothing of it lies in the picture",
-        NoLabel::LeftOut => "left out by the recipe",
+        UnlabelledReason::Covered => "another object lies over it",
+        UnlabelledReason::Outside => "nothing of it lies in the picture",
+        UnlabelledReason::LeftOut => "left out by the recipe",
     }
 }
 
@@ -571,7 +576,7 @@ fn seen(page: &mut Page, summary: &Summary) {
         .iter()
         .flatten()
         .fold(1.0, |a: f64, b| a.max(*b));
-    let count = |title, of: fn(&Glance) -> usize| {
+    let count = |title, of: fn(&SampleSummary) -> usize| {
         let counts: Vec<f64> = summary
             .glances
             .iter()

@@ -1,7 +1,7 @@
 //! What a detector got wrong, as a table and as pictures, the worst first.
 
 use super::{EvalReportOptions, Run};
-use crate::eval::{FoundBox, Kind, Mistake, Picture, Sheet, TrueBox, class_name};
+use crate::eval::{Detection, EvalImage, GroundTruth, Mistake, MistakeKind, Picture, class_name};
 use crate::geom::BBox;
 use crate::label::gallery::{self, Figure, gallery, marked_box};
 use crate::plot::{Page, Table};
@@ -74,7 +74,12 @@ pub(crate) fn put_on(
     options: &EvalReportOptions,
 ) {
     let count = |kind| mistakes.iter().filter(|m| m.kind == kind).count();
-    let [alarms, wrong, missed] = [Kind::FalseAlarm, Kind::WrongClass, Kind::Missed].map(count);
+    let [alarms, wrong, missed] = [
+        MistakeKind::FalseAlarm,
+        MistakeKind::WrongClass,
+        MistakeKind::Missed,
+    ]
+    .map(count);
     page.heading("Mistakes").text(&format!(
         "{alarms} false alarms, {wrong} of another class than the box that they name, {missed} boxes missed; detections \
          surer than {} that overlap a box by more than {}. All of them, the worst first, are in mistakes.csv.",
@@ -88,7 +93,7 @@ pub(crate) fn put_on(
     }
     page.html(gallery::STYLE).html(&legend());
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
-        mistakes.iter().partition(|m| m.kind == Kind::Missed);
+        mistakes.iter().partition(|m| m.kind == MistakeKind::Missed);
     put_those(
         page,
         "alarm",
@@ -152,9 +157,9 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
 /// A mistake with the boxes that it is about.
 struct Case<'a> {
     mistake: &'a Mistake,
-    sheet: &'a Sheet,
-    truth: Option<&'a TrueBox>,
-    found: Option<&'a FoundBox>,
+    sheet: &'a EvalImage,
+    truth: Option<&'a GroundTruth>,
+    found: Option<&'a Detection>,
 }
 
 impl<'a> Case<'a> {
@@ -173,7 +178,7 @@ impl<'a> Case<'a> {
     }
 
     fn is_miss(&self) -> bool {
-        self.mistake.kind == Kind::Missed
+        self.mistake.kind == MistakeKind::Missed
     }
 
     /// The box that is wrong.
@@ -248,8 +253,8 @@ impl<'a> Case<'a> {
     }
 
     /// Boxes of the truth in the view that the mistake is not about.
-    fn other_boxes(&self, view: &BBox) -> Vec<&'a TrueBox> {
-        let other = |t: &&TrueBox| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
+    fn other_boxes(&self, view: &BBox) -> Vec<&'a GroundTruth> {
+        let other = |t: &&GroundTruth| !self.truth.is_some_and(|own| std::ptr::eq(own, *t));
         self.sheet
             .truth
             .iter()
@@ -260,14 +265,14 @@ impl<'a> Case<'a> {
     }
 
     /// Detections in the view that the mistake is not about, the surest ones.
-    fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a FoundBox> {
-        let other = |f: &&FoundBox| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
+    fn other_detections(&self, view: &BBox, confidence: f64) -> Vec<&'a Detection> {
+        let other = |f: &&Detection| !self.found.is_some_and(|own| std::ptr::eq(own, *f));
         let sure = self
             .sheet
             .found
             .iter()
             .filter(|f| f.confidence > confidence);
-        let mut seen: Vec<&FoundBox> = sure
+        let mut seen: Vec<&Detection> = sure
             .filter(other)
             .filter(|f| f.bbox.overlaps(view))
             .collect();
@@ -285,11 +290,11 @@ impl<'a> Case<'a> {
         let truth = self.truth.map(|t| name(t.class)).unwrap_or_default();
         let iou = self.mistake.iou;
         let what = match (self.mistake.kind, self.truth, self.found) {
-            (Kind::Missed, _, Some(_)) => {
+            (MistakeKind::Missed, _, Some(_)) => {
                 format!("{truth} missed; nearest detection: {found}, IoU {iou:.2}")
             }
-            (Kind::Missed, ..) => format!("{truth} missed; no detection near"),
-            (Kind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
+            (MistakeKind::Missed, ..) => format!("{truth} missed; no detection near"),
+            (MistakeKind::WrongClass, ..) => format!("{found} for {truth}, IoU {iou:.2}"),
             (_, Some(_), _) => format!("false alarm: {found}; nearest box: {truth}, IoU {iou:.2}"),
             _ => format!("false alarm: {found}; no box near"),
         };
@@ -297,11 +302,11 @@ impl<'a> Case<'a> {
     }
 }
 
-fn word(kind: Kind) -> &'static str {
+fn word(kind: MistakeKind) -> &'static str {
     match kind {
-        Kind::FalseAlarm => "false alarm",
-        Kind::WrongClass => "wrong class",
-        Kind::Missed => "missed",
+        MistakeKind::FalseAlarm => "false alarm",
+        MistakeKind::WrongClass => "wrong class",
+        MistakeKind::Missed => "missed",
     }
 }
 
@@ -338,20 +343,20 @@ mod tests {
             x1: i as f64 + 2.0,
             y1: 2.0,
         };
-        let found = |i: usize| FoundBox {
+        let found = |i: usize| Detection {
             class: 0,
             bbox: at(i),
             confidence: 0.3 + (i % 7) as f64 / 10.0,
         };
         let truth = (0..300)
-            .map(|i| TrueBox {
+            .map(|i| GroundTruth {
                 class: 0,
                 bbox: at(i),
                 area: 4.0,
                 crowd: false,
             })
             .collect();
-        let sheet = Sheet {
+        let sheet = EvalImage {
             image: "a".into(),
             truth,
             found: (0..5_000).map(found).collect(),
@@ -362,7 +367,7 @@ mod tests {
         };
         let mistake = Mistake {
             sheet: 0,
-            kind: Kind::FalseAlarm,
+            kind: MistakeKind::FalseAlarm,
             found: Some(3),
             truth: None,
             iou: 0.0,

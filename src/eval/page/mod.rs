@@ -4,8 +4,8 @@ mod mistakes;
 
 use crate::error::Result;
 use crate::eval::{
-    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, Interval, Matches,
-    Picture, Scores, Sheet, THRESHOLDS, Tags, thresholds,
+    self, ClassScores, CocoScores, Confusion, ConfusionOptions, Definition, EvalImage, Interval,
+    Matches, Picture, Scores, THRESHOLDS, Tags, thresholds,
 };
 use crate::io;
 use crate::plot::{Page, Table};
@@ -19,7 +19,7 @@ pub struct Run {
     /// Its name: the folder or file of its predictions.
     pub name: String,
     /// Images with truth and detections.
-    pub sheets: Vec<Sheet>,
+    pub sheets: Vec<EvalImage>,
 }
 
 /// What is asked of the report.
@@ -397,7 +397,7 @@ pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
     for (i, factor) in options.tags.factors.iter().enumerate() {
         for level in options.tags.levels(i) {
             for (run, matches) in runs.iter().zip(&matches) {
-                let inside = |s: &Sheet| u32::from(options.tags.of(&s.image, i) == Some(level));
+                let inside = |s: &EvalImage| u32::from(options.tags.of(&s.image, i) == Some(level));
                 let weights: Vec<u32> = run.sheets.iter().map(inside).collect();
                 let images = weights.iter().filter(|weight| **weight > 0).count();
                 let [ours, theirs] = matches.each_ref().map(|m| share(m.map(&weights)));
@@ -463,7 +463,7 @@ const _: () = assert!(THRESHOLDS > 5, "mAP@0.75 is the sixth threshold");
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eval::{FoundBox, TrueBox};
+    use crate::eval::{Detection, GroundTruth};
     use crate::geom::BBox;
 
     fn run(name: &str, confidence: f64) -> Run {
@@ -473,18 +473,18 @@ mod tests {
             x1: 50.0,
             y1: 40.0,
         };
-        let truth = TrueBox {
+        let truth = GroundTruth {
             class: 0,
             bbox,
             area: 2000.0,
             crowd: false,
         };
-        let sheet = |image: &str, found: &[f64]| Sheet {
+        let sheet = |image: &str, found: &[f64]| EvalImage {
             image: image.into(),
             truth: vec![truth],
             found: found
                 .iter()
-                .map(|&confidence| FoundBox {
+                .map(|&confidence| Detection {
                     class: 0,
                     bbox,
                     confidence,

@@ -4,11 +4,11 @@ use crate::allowance::Allowance;
 use crate::asset::{Library, Panorama};
 use crate::bounds::LEAST_OBJECT_PX;
 use crate::composite;
+use crate::dataset::background_photo::{BackgroundOptions, BackgroundPhoto};
+use crate::dataset::environment_maps::EnvironmentMaps;
 use crate::dataset::fingerprint::fingerprint;
-use crate::dataset::place::{Place, PlaceOptions};
-use crate::dataset::surroundings::Surroundings;
 use crate::dataset::times::timed;
-use crate::dataset::{Inputs, Numbers, Plan, Sample, Setup, Sidecar, Times, Writer};
+use crate::dataset::{DatasetConfig, Inputs, Plan, Sample, SampleRange, Sidecar, Times, Writer};
 use crate::deep::DeepImage;
 use crate::error::{Error, Result};
 use crate::image::Image;
@@ -25,46 +25,46 @@ use std::sync::atomic::AtomicBool;
 
 /// Everything that pictures are made from, opened once: assets, labelled photos, options.
 #[derive(Debug)]
-pub struct Studio {
-    setup: Setup,
+pub struct Pipeline {
+    config: DatasetConfig,
     library: Library,
-    places: Vec<Place>,
+    places: Vec<BackgroundPhoto>,
     backgrounds: Vec<Background>,
     stock: Vec<Choice>,
-    surroundings: Surroundings,
+    surroundings: EnvironmentMaps,
     /// Turns true when no picture is to be finished any more.
     stop: &'static AtomicBool,
 }
 
-/// Nobody stops a studio by itself.
+/// Nobody stops a pipeline by itself.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// Scenes that will not settle are drawn again this often.
 const REDRAWS: usize = 8;
 
-impl Studio {
-    /// Opens the folders that a setup names.
+impl Pipeline {
+    /// Opens the folders that a config names.
     ///
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
-    pub fn open(setup: Setup) -> Result<Self> {
-        let studio = Self::with_assets(setup, |_| true)?;
-        studio
+    pub fn open(config: DatasetConfig) -> Result<Self> {
+        let pipeline = Self::with_assets(config, |_| true)?;
+        pipeline
             .places
             .iter()
-            .try_for_each(|place| studio.check_size_in(place))?;
-        Ok(studio)
+            .try_for_each(|place| pipeline.check_size_in(place))?;
+        Ok(pipeline)
     }
 
     /// Refuses a place in whose pictures the median object is too small to have an outline: a length is in another unit.
-    fn check_size_in(&self, place: &Place) -> Result<()> {
+    fn check_size_in(&self, place: &BackgroundPhoto) -> Result<()> {
         let photos = self.library.assets.iter().flat_map(|asset| &asset.photos);
         let mut lengths: Vec<f64> = photos.map(|photo| photo.record.object_m[0]).collect();
         lengths.sort_by(f64::total_cmp);
         let Some(&median) = lengths.get(lengths.len() / 2) else {
             return Ok(());
         };
-        let (median, factor) = (median, self.setup.scene.scale.middle().min);
+        let (median, factor) = (median, self.config.scene.scale.middle().min);
         let CameraSource::Known(camera) = &place.background.camera else {
             return Ok(());
         };
@@ -72,7 +72,7 @@ impl Studio {
         if px >= LEAST_OBJECT_PX {
             return Ok(());
         }
-        let [w, h] = self.setup.scene.image;
+        let [w, h] = self.config.scene.image;
         let what = format!(
             "the median object of {median:.3} m is {px:.1} px long in pictures of {w} x {h}, expected at least \
              {LEAST_OBJECT_PX}; are width_m and height_m in metres?"
@@ -84,19 +84,22 @@ impl Studio {
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn open_for(setup: Setup, scene: &Scene) -> Result<Self> {
-        Self::with_assets(setup, |name| {
+    pub fn open_for(config: DatasetConfig, scene: &Scene) -> Result<Self> {
+        Self::with_assets(config, |name| {
             scene.objects.iter().any(|object| object.asset == name)
         })
     }
 
-    fn with_assets(setup: Setup, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        let library = Library::open_some(&setup.assets, wanted)?;
-        let (image, surface_size, force) =
-            (setup.scene.image, setup.surface_size, setup.force_cameras);
-        let places = Place::all(
-            &setup.backgrounds,
-            PlaceOptions {
+    fn with_assets(config: DatasetConfig, wanted: impl Fn(&str) -> bool) -> Result<Self> {
+        let library = Library::open_some(&config.assets, wanted)?;
+        let (image, surface_size, force) = (
+            config.scene.image,
+            config.surface_size,
+            config.force_cameras,
+        );
+        let places = BackgroundPhoto::all(
+            &config.backgrounds,
+            BackgroundOptions {
                 image,
                 surface_size,
                 force,
@@ -107,9 +110,9 @@ impl Studio {
             .map(|place| place.background.clone())
             .collect();
         let stock = stock(&library);
-        let surroundings = Surroundings::of(&setup);
+        let surroundings = EnvironmentMaps::of(&config);
         Ok(Self {
-            setup,
+            config,
             library,
             places,
             backgrounds,
@@ -125,8 +128,8 @@ impl Studio {
     }
 
     /// What it was opened from.
-    pub fn setup(&self) -> &Setup {
-        &self.setup
+    pub fn config(&self) -> &DatasetConfig {
+        &self.config
     }
 
     /// The assets.
@@ -134,35 +137,35 @@ impl Studio {
         &self.library
     }
 
-    /// A dataset of `count` pictures to be made in `folder` with the setup's formats.
+    /// A dataset of `count` pictures to be made in `folder` with the config's formats.
     ///
     /// # Errors
-    /// Classes that the setup's policy for obstructed objects cannot add to; an asset that fits between the walls of some
+    /// Classes that the config's policy for obstructed objects cannot add to; an asset that fits between the walls of some
     /// background in no direction; a photo or an environment map that cannot be read.
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
-        self.setup
+        self.config
             .scene
             .check_room(&self.backgrounds, &self.stock)
             .map_err(|e| e.within("scene"))?;
-        let (folder, labels) = (folder.into(), &self.setup.labels);
+        let (folder, labels) = (folder.into(), &self.config.labels);
         let mut inputs = Inputs::kept(&folder);
         let mut writers: Vec<Box<dyn Writer>> =
-            vec![Box::new(self.setup.pictures), Box::new(Sidecar)];
-        writers.extend(labels.writers(&self.setup.pictures));
+            vec![Box::new(self.config.pictures), Box::new(Sidecar)];
+        writers.extend(labels.writers(&self.config.pictures));
         Ok(Plan {
             folder,
             count,
-            numbers: Numbers::All,
+            range: SampleRange::All,
             seed,
             recipe: fingerprint(
-                &self.setup,
+                &self.config,
                 &self.library,
                 &self.places,
                 &self.surroundings,
                 &mut inputs,
             )?,
             classes: labels.obstructed.classes(&self.library.classes)?,
-            split: self.setup.split,
+            split: self.config.split,
             obstructed: labels.obstructed,
             writers,
             inputs,
@@ -182,7 +185,7 @@ impl Studio {
     /// # Errors
     /// As [`draw`](Self::draw).
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
-        self.setup
+        self.config
             .scene
             .explained(seed, k, &self.backgrounds, &self.stock)
     }
@@ -230,7 +233,7 @@ impl Studio {
         let (resolved, settle) = timed(|| self.resolve_within(scene, allowance));
         let (scene, shot) = resolved?;
         let ((deep, frame), render) = timed(|| self.shoot(&scene, &shot));
-        let (labels, label) = timed(|| label::label(&deep, &shot, &self.setup.labels.options()));
+        let (labels, label) = timed(|| label::label(&deep, &shot, &self.config.labels.options()));
         let times = Times {
             settle,
             render,
@@ -259,15 +262,15 @@ impl Studio {
     pub fn label(&self, scene: Scene) -> Result<Labels> {
         let (_, shot) = self.resolve(scene.unlit())?;
         Ok(label::label(
-            &render::cover(&shot, &self.setup.render),
+            &render::cover(&shot, &self.config.render),
             &shot,
-            &self.setup.labels.options(),
+            &self.config.labels.options(),
         ))
     }
 
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
-        let deep = render::cast(shot, &self.setup.render);
+        let deep = render::cast(shot, &self.config.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
         let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
         (deep, frame)
@@ -283,7 +286,7 @@ impl Studio {
 
     /// What one picture may take.
     fn allowance(&self) -> Allowance<'static> {
-        Allowance::new(self.setup.scene.settle.most_work).stopped_by(self.stop)
+        Allowance::new(self.config.scene.settle.most_work).stopped_by(self.stop)
     }
 
     fn resolve_within(&self, scene: Scene, allowance: &Allowance) -> Result<(Scene, Shot)> {
@@ -302,7 +305,7 @@ impl Studio {
 
     #[cfg(feature = "settle")]
     fn rest(&self, scene: Scene, allowance: &Allowance) -> Result<Scene> {
-        crate::settle::settle_within(scene, &self.setup.scene.settle, 0, allowance)?
+        crate::settle::settle_within(scene, &self.config.scene.settle, 0, allowance)?
             .0
             .into_scene()
     }

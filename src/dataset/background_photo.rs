@@ -18,7 +18,7 @@ const CUT_OFF: f64 = 0.02;
 
 /// A labelled photo: its camera is found once, its pixels are read when a picture first needs them.
 #[derive(Debug)]
-pub(crate) struct Place {
+pub(crate) struct BackgroundPhoto {
     /// What a recipe sees of it.
     pub(crate) background: Background,
     /// The file that labels it.
@@ -36,7 +36,7 @@ pub(crate) struct Place {
 
 /// How labelled photos are opened.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct PlaceOptions {
+pub(crate) struct BackgroundOptions {
     /// Width and height of the pictures to be made, pixels.
     pub(crate) image: [u32; 2],
     /// Width and height of the rectangle, metres, for labels that do not say them.
@@ -45,9 +45,9 @@ pub(crate) struct PlaceOptions {
     pub(crate) force: bool,
 }
 
-impl Place {
+impl BackgroundPhoto {
     /// The labelled photos of a folder in order of name.
-    pub(crate) fn all(folder: &Path, options: PlaceOptions) -> Result<Vec<Self>> {
+    pub(crate) fn all(folder: &Path, options: BackgroundOptions) -> Result<Vec<Self>> {
         let labels = camera::labels_in(folder, options.surface_size)?;
         if labels.is_empty() {
             let what = "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
@@ -185,8 +185,8 @@ fn said(labels: &[Labelled], sightings: &[Sighting]) {
 }
 
 /// Says, once for all, that photos are of another shape than the pictures, where that costs much of them.
-fn said_of_shapes(places: &[Place]) {
-    let odd: Vec<&Place> = places
+fn said_of_shapes(places: &[BackgroundPhoto]) {
+    let odd: Vec<&BackgroundPhoto> = places
         .iter()
         .filter(|place| place.part() < SMALL_PART || place.cuts_off())
         .collect();

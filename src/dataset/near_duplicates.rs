@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 /// Two images that are nearly the same.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Near {
+pub struct NearDuplicate {
     /// The one for validation.
     pub val: PathBuf,
     /// The one for training that it is nearest to.
@@ -23,7 +23,7 @@ pub struct Near {
 /// Images that differ by less than this, in 8-bit grey values, are nearly the same: photos of a scene that nobody
 /// touched differ by noise, which the small copies average to below one code; an object of 1 % of the picture and a tenth
 /// of the full scale of contrast, moved, changes it by 3.
-pub const NEAR_CODES: f64 = 2.0;
+pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
 
 /// Sides of the small copies, pixels.
 const SMALL: [usize; 2] = [32, 24];
@@ -72,14 +72,18 @@ pub(crate) fn nearest(
 }
 
 /// The images of `val` that are nearly the same as one of `train`.
-pub(crate) fn near_pairs(train: &[PathBuf], val: &[PathBuf], codes: f64) -> Result<Vec<Near>> {
+pub(crate) fn near_pairs(
+    train: &[PathBuf],
+    val: &[PathBuf],
+    codes: f64,
+) -> Result<Vec<NearDuplicate>> {
     let small = |images: &[PathBuf]| -> Result<Vec<Thumbnail>> {
         images
             .par_iter()
             .map(|path| Ok(Thumbnail::of(&io::read::<LinearRgb>(path)?)))
             .collect()
     };
-    let pair = |(i, j, codes): (usize, usize, f64)| Near {
+    let pair = |(i, j, codes): (usize, usize, f64)| NearDuplicate {
         val: val[i].clone(),
         train: train[j].clone(),
         codes,
@@ -106,8 +110,11 @@ mod tests {
     #[test]
     fn noise_is_near_and_a_moved_object_is_not() {
         let scenes = [scene(0, 0.0), scene(0, 0.05), scene(60, 0.0)];
-        assert!(scenes[0].codes_from(&scenes[1]) < NEAR_CODES);
-        assert!(scenes[0].codes_from(&scenes[2]) > 3.0 * NEAR_CODES);
-        assert_eq!(nearest(&scenes[..1], &scenes[1..], NEAR_CODES).len(), 1);
+        assert!(scenes[0].codes_from(&scenes[1]) < NEAR_DUPLICATE_RMS);
+        assert!(scenes[0].codes_from(&scenes[2]) > 3.0 * NEAR_DUPLICATE_RMS);
+        assert_eq!(
+            nearest(&scenes[..1], &scenes[1..], NEAR_DUPLICATE_RMS).len(),
+            1
+        );
     }
 }
