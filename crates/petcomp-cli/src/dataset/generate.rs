@@ -96,8 +96,8 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         .or(args.preview)
         .unwrap_or_else(|| args.only.map_or(0, |k| k.saturating_add(1)));
     let count = args.preview.map_or(count, |first| first.min(count));
-    let numbers = range(args)?;
-    let folder = match numbers {
+    let range = sample_range(args)?;
+    let folder = match range {
         SampleRange::Shard(shard) => args.output.join(shard.folder()),
         _ => args.output.clone(),
     };
@@ -129,7 +129,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn range(args: &Args) -> petcomp::Result<SampleRange> {
+fn sample_range(args: &Args) -> petcomp::Result<SampleRange> {
     match (args.only, args.shard) {
         (Some(k), _) => Ok(SampleRange::One(k)),
         (None, Some(choice)) => choice

@@ -82,7 +82,7 @@ impl World {
         let pipeline = Pipeline::open(setup).unwrap();
         let make = |folder: &str, range: SampleRange| {
             let mut plan = pipeline.plan(3, 0, self.path(folder)).unwrap();
-            plan.range = numbers;
+            plan.range = range;
             generate(
                 &plan,
                 |k| pipeline.sample(0, k),
