@@ -174,7 +174,7 @@ fn text(folder: &Path, name: &str) -> String {
 fn faults(folder: &Path) -> Vec<String> {
     check(folder)
         .unwrap()
-        .faults
+        .findings
         .iter()
         .map(ToString::to_string)
         .collect()
@@ -579,12 +579,12 @@ fn a_check_finds_every_fault_and_its_place() {
     for expected in [
         "labels/train/000001.txt:2: 4 columns, expected 5",
         "labels/train/000001.txt:3: class 3, but data.yaml has 3 classes, from 0",
-        "labels/train/000001.txt:4: the same row stands above",
+        "labels/train/000001.txt:4: the same row stands above [dataset.duplicate_label_row]",
         "labels/train/000002.txt:1: 1.1, expected a share of the image, 0 to 1",
         "labels/train/000002.txt:2: a box of 0 x 0.1, expected sides above 0",
-        "labels/train/000002.txt:3: class 0.5, expected a whole number from 0",
+        "labels/train/000002.txt:3: class 0.5, expected an integer from 0 [dataset.bad_label_row]",
         "labels/train/000002.txt:4: \"a\", expected a number",
-        "labels/train/000002.txt:5: class -1, expected a whole number from 0",
+        "labels/train/000002.txt:5: class -1, expected an integer from 0",
         "labels/train/000003.txt:1: 5 columns, expected a class and at least 3 pairs",
         "labels/train/000004.txt: missing",
         "labels/train/000099.txt: no image of this name",
@@ -646,7 +646,8 @@ fn an_object_that_nothing_holds_up_is_a_fault_of_its_picture() {
             .filter(|fault| fault.contains("nothing holds"));
         found.collect::<Vec<_>>()
     };
-    let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again";
+    let expected = "scenes/train/000001.json: nothing holds object 3 (\"bottle\"), 0.27 m up: make this picture again \
+                    [dataset.unsupported_object]";
     assert_eq!(found("{}"), [expected]);
     // Nothing falls in a recipe that lays its objects.
     assert!(found(r#"{ "scene": { "settle": { "mode": "flat" } } }"#).is_empty());
@@ -1171,11 +1172,11 @@ fn the_classes_balance_and_box_sizes_are_counted() {
     assert_eq!(table.rows[0][4], "18.8 / 18.8 / 18.8 %");
     assert!(
         checked
-            .remarks()
+            .notes()
             .iter()
-            .all(|remark| remark.starts_with("class ")),
+            .all(|note| note.message.starts_with("class ")),
         "{:?}",
-        checked.remarks()
+        checked.notes()
     );
 }
 

@@ -1,7 +1,7 @@
 //! The file that a dataset is made from.
 
 use crate::dataset::environment_maps::seen_from;
-use crate::dataset::yolo::LEAST_SIDE_PX;
+use crate::dataset::yolo::MIN_SIDE_PX;
 use crate::dataset::{LabelConfig, Pictures, Split};
 use crate::error::{Error, Result};
 use crate::io;
@@ -111,7 +111,7 @@ impl DatasetConfig {
 
     /// The same in pictures of half the width and height, for a first look: the same scenes.
     pub fn preview(mut self) -> Self {
-        self.scene.image = self.scene.image.map(|side| (side / 2).max(LEAST_SIDE_PX));
+        self.scene.image = self.scene.image.map(|side| (side / 2).max(MIN_SIDE_PX));
         self
     }
 

@@ -2,7 +2,8 @@
 
 use crate::color::to_srgb8;
 use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Line, lines_of};
+use crate::dataset::journal::lines_of;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::{Part, SampleRecord};
 use crate::draw::{self, TextSize};
 use crate::error::{Error, Result};
@@ -148,7 +149,7 @@ pub fn contact_sheet_of(
         serde_json::from_value(identity["classes"].clone()).unwrap_or_default();
     let lines = lines_of(folder)?;
     let shown = most.min(lines.len());
-    let chosen: Vec<&Line> = (0..shown)
+    let chosen: Vec<&JournalLine> = (0..shown)
         .map(|i| &lines[i * lines.len() / shown])
         .collect();
     let tiles: Result<Vec<_>> = chosen
@@ -158,7 +159,7 @@ pub fn contact_sheet_of(
     Ok(contact_sheet(&tiles?, &classes, options))
 }
 
-fn tile(folder: &Path, line: &Line, options: &ContactSheetOptions) -> Result<ContactTile> {
+fn tile(folder: &Path, line: &JournalLine, options: &ContactSheetOptions) -> Result<ContactTile> {
     let picture = io::read::<LinearRgb>(line.file(folder, "images/")?)?;
     let record: SampleRecord = io::read_json(line.file(folder, "scenes/")?)?;
     let part = if line.part == Part::Val {

@@ -1,6 +1,5 @@
 //! A dataset's folder: claimed by one run at a time, and only for the plan that it was begun with.
 
-use crate::dataset::journal::JOURNAL;
 use crate::dataset::times::RUNS;
 use crate::dataset::{Plan, SampleRange, Shard, SplitOrder};
 use crate::error::{Error, Result};
@@ -11,6 +10,9 @@ use std::path::Path;
 
 /// Name of the file that says what a dataset was made from.
 pub(crate) const IDENTITY: &str = "dataset.json";
+
+/// Name of the journal in a dataset's folder.
+pub const JOURNAL: &str = "index.jsonl";
 
 /// Locked while a run writes; empty.
 const LOCK: &str = ".lock";

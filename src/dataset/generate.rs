@@ -1,6 +1,6 @@
 //! Makes a dataset, many samples at a time, in a folder that survives any interruption.
 
-use crate::dataset::journal::Line;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::run::{Progress, run};
 use crate::dataset::times::{Times, timed};
 use crate::dataset::{
@@ -81,7 +81,7 @@ pub fn generate(
 }
 
 /// Writes the files of a sample.
-fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<Line> {
+fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<JournalLine> {
     let Plan {
         folder,
         seed,
@@ -104,7 +104,7 @@ fn write(plan: &Plan, recipe_hash: &str, k: u64, sample: &Sample) -> Result<Line
     for writer in &plan.writers {
         files.extend(writer.write(folder, &entry)?);
     }
-    Line::of(&entry, folder, &files)
+    JournalLine::new(&entry, folder, &files)
 }
 
 /// Meets what the writers take for granted.

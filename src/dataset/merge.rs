@@ -1,7 +1,8 @@
 //! Joins the shards of a dataset: the folder that a single run would have made.
 
-use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Finished, JOURNAL, Line, numbered_lines_of};
+use crate::dataset::folder::{self, IDENTITY, JOURNAL};
+use crate::dataset::journal::numbered_lines;
+use crate::dataset::journal_line::{JournalLine, WrittenFile};
 use crate::dataset::run::{Progress, check_count, run};
 use crate::dataset::times::Times;
 use crate::dataset::{
@@ -56,7 +57,7 @@ pub fn merge(
     }
     let plan = plan(identity.document, count, folder)?;
     let copy = |k| {
-        let (shard, line): &(&PathBuf, Line) = &lines[&k];
+        let (shard, line): &(&PathBuf, JournalLine) = &lines[&k];
         line.files
             .iter()
             .try_for_each(|file| copy(shard, folder, file))?;
@@ -66,10 +67,10 @@ pub fn merge(
 }
 
 /// The lines of a shard's journal, all of them as they were written.
-fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<Line>> {
+fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<JournalLine>> {
     let wrong = |i, what: String| Error::file(folder.join(JOURNAL), format!("line {i}: {what}"));
     let mend = "run this shard again with --resume";
-    let checked = |(i, line): (usize, std::result::Result<Line, String>)| match line {
+    let checked = |(i, line): (usize, std::result::Result<JournalLine, String>)| match line {
         Err(what) => Err(wrong(i, format!("{what}; {mend}"))),
         Ok(line) if line.k >= count || !shard.contains(line.k) => Err(wrong(
             i,
@@ -80,10 +81,7 @@ fn lines_in(folder: &Path, shard: Shard, count: u64) -> Result<Vec<Line>> {
         )),
         Ok(line) => Ok(line),
     };
-    numbered_lines_of(folder)?
-        .into_iter()
-        .map(checked)
-        .collect()
+    numbered_lines(folder)?.into_iter().map(checked).collect()
 }
 
 /// What all shards say of themselves.
@@ -223,7 +221,7 @@ fn writer(name: &str, settings: Value, pictures: &Pictures) -> Result<Box<dyn Wr
 }
 
 /// Copies a file, if it is as it was written.
-fn copy(shard: &Path, folder: &Path, file: &Finished) -> Result<()> {
+fn copy(shard: &Path, folder: &Path, file: &WrittenFile) -> Result<()> {
     let (from, to) = (
         io::inside(shard, &file.path)?,
         io::below(folder, &file.path)?,

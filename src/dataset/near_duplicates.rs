@@ -33,7 +33,7 @@ const SMALL: [usize; 2] = [32, 24];
 pub(crate) struct Thumbnail(Vec<u8>);
 
 impl Thumbnail {
-    pub(crate) fn of(picture: &Image<LinearRgb>) -> Self {
+    pub(crate) fn new(picture: &Image<LinearRgb>) -> Self {
         let grey =
             |[r, g, b]: [u8; 3]| ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
         Self(
@@ -80,7 +80,7 @@ pub(crate) fn near_pairs(
     let small = |images: &[PathBuf]| -> Result<Vec<Thumbnail>> {
         images
             .par_iter()
-            .map(|path| Ok(Thumbnail::of(&io::read::<LinearRgb>(path)?)))
+            .map(|path| Ok(Thumbnail::new(&io::read::<LinearRgb>(path)?)))
             .collect()
     };
     let pair = |(i, j, codes): (usize, usize, f64)| NearDuplicate {
@@ -104,7 +104,7 @@ mod tests {
             let grain = ((x * 7919 + y * 104_729) % 97) as f32 / 97.0 - 0.5;
             LinearRgb::grey(if object { 0.5 } else { 0.2 } + noise * grain)
         };
-        Thumbnail::of(&Image::from_fn(320, 240, of))
+        Thumbnail::new(&Image::from_fn(320, 240, of))
     }
 
     #[test]

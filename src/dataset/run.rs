@@ -1,7 +1,8 @@
 //! One run over a dataset's folder: many samples at a time, each entered in the journal when its files are there.
 
 use crate::dataset::folder;
-use crate::dataset::journal::{Journal, Line};
+use crate::dataset::journal::Journal;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::times::Times;
 use crate::dataset::{DatasetCounts, Plan, SampleRange};
 use crate::error::{Error, Result};
@@ -43,7 +44,7 @@ pub(super) fn check_count(count: u64) -> Result<()> {
 /// files of a sample in their places.
 pub(super) fn run(
     plan: &Plan,
-    write: impl Fn(u64) -> Result<(Line, Times)> + Sync,
+    write: impl Fn(u64) -> Result<(JournalLine, Times)> + Sync,
     progress: &(dyn Fn(Progress) + Sync),
     stop: &AtomicBool,
 ) -> Result<DatasetCounts> {
@@ -129,7 +130,7 @@ struct Books {
     failure: Option<(u64, Error)>,
 }
 
-impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
+impl<F: Fn(u64) -> Result<(JournalLine, Times)> + Sync> Run<'_, F> {
     /// Makes samples until `next` has none, of the `missing` ones, or there is a reason to stop.
     fn work(&self, missing: u64, next: impl Fn() -> Option<u64> + Sync) -> Result<()> {
         let threads = rayon::current_num_threads();
@@ -213,17 +214,17 @@ impl<F: Fn(u64) -> Result<(Line, Times)> + Sync> Run<'_, F> {
             return Err(Error::Interrupted { what: state });
         }
         if lines.len() as u64 == count {
-            let samples: Vec<_> = lines.iter().map(Line::written).collect();
+            let samples: Vec<_> = lines.iter().map(JournalLine::written).collect();
             plan.writers
                 .iter()
                 .try_for_each(|writer| writer.finish(&plan.folder, &plan.classes, &samples))?;
         }
-        Ok(DatasetCounts::of(&lines, plan, count, made))
+        Ok(DatasetCounts::new(&lines, plan, count, made))
     }
 }
 
 impl Books {
-    fn enter(&mut self, line: Line, times: Times) -> Result<()> {
+    fn enter(&mut self, line: JournalLine, times: Times) -> Result<()> {
         let Progress { done, count, made } = self.progressed;
         let new = u64::from(!self.journal.has(line.k));
         self.journal.add(line)?;

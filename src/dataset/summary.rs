@@ -1,7 +1,8 @@
 //! Everything a dataset on disk tells of itself, gathered for a report.
 
 use crate::dataset::folder::{self, IDENTITY};
-use crate::dataset::journal::{Line, lines_of};
+use crate::dataset::journal::lines_of;
+use crate::dataset::journal_line::JournalLine;
 use crate::dataset::times::{RunTimes, runs_of};
 use crate::dataset::{Part, SampleRecord};
 use crate::error::{Error, Result};
@@ -178,7 +179,7 @@ impl Summary {
         Some((range, key == "objects"))
     }
 
-    fn add(&mut self, told: &Told, line: &Line) {
+    fn add(&mut self, told: &Told, line: &JournalLine) {
         let Told { k, part, record } = told;
         for (path, &value) in &record.draws {
             if let Some(key) = key(path) {
@@ -247,7 +248,7 @@ impl SampleSummary {
 /// Records that are read at a time.
 const STEP: usize = 256;
 
-fn told(folder: &Path, line: &Line) -> Result<Told> {
+fn told(folder: &Path, line: &JournalLine) -> Result<Told> {
     Ok(Told {
         k: line.k,
         part: line.part,
@@ -256,7 +257,7 @@ fn told(folder: &Path, line: &Line) -> Result<Told> {
 }
 
 /// The file of a sample in one of the dataset's folders, as the journal has it.
-fn name(folder: &Path, line: &Line, kind: &str) -> Result<String> {
+fn name(folder: &Path, line: &JournalLine, kind: &str) -> Result<String> {
     line.file(folder, kind)?;
     let file = line.files.iter().find(|file| file.path.starts_with(kind));
     file.map(|file| file.path.clone())

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 const DATA_YAML: &str = "data.yaml";
 
 /// Least side of an image, pixels: trainers refuse smaller ones.
-pub(crate) const LEAST_SIDE_PX: u32 = 10;
+pub(crate) const MIN_SIDE_PX: u32 = 10;
 
 /// Writes `labels/{train,val}/NNNNNN.txt` and `data.yaml`.
 ///
@@ -69,10 +69,10 @@ impl Writer for Yolo {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let [w, h] = entry.sample.labels.image;
-        if w.min(h) < LEAST_SIDE_PX {
+        if w.min(h) < MIN_SIDE_PX {
             return Err(Error::value(
                 "image",
-                format!("{w} x {h} pixels, expected at least {LEAST_SIDE_PX} a side for YOLO"),
+                format!("{w} x {h} pixels, expected at least {MIN_SIDE_PX} a side for YOLO"),
             ));
         }
         let path = entry.path("labels", "txt");

@@ -463,7 +463,7 @@ fn dataset_folder(world: &World) {
         )
         .map(|page| page.document()),
     );
-    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.remarks())));
+    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
     ends(
         Listing::read(&folder)
             .and_then(|all| all.partitioned(Partition::Grouped(dataset::Group::Selection), 0.5, 1)),
@@ -510,7 +510,7 @@ fn yolo_set(world: &World) {
         Listing::read(&folder)
             .and_then(|all| all.partitioned(Partition::Consecutive { guard: 1 }, 0.5, 1)),
     );
-    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.remarks())));
+    ends(dataset::check(&folder).map(|checked| (checked.balance(), checked.notes())));
 }
 
 fn evaluated(world: &World, sheets: Vec<eval::EvalImage>) {

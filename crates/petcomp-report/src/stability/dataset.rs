@@ -131,8 +131,8 @@ impl Made {
 
     /// Everything wrong with it, without the faults that small sets of like pictures have.
     fn faults(&self) -> Result<Vec<String>> {
-        let faults = check(self.path())?.faults;
-        let told = faults.iter().map(|fault| fault.what.clone());
+        let faults = check(self.path())?.findings;
+        let told = faults.iter().map(|fault| fault.diagnostic.message.clone());
         Ok(told
             .filter(|what| !what.contains("looks like") && !what.contains("same bytes"))
             .collect())
