@@ -44,12 +44,6 @@ impl Matches {
 
 /// The percentile interval of resampled values; the value itself where there are none.
 pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
-    values.sort_by(f64::total_cmp);
-    let quantile = |q: f64| {
-        let place = q * values.len().saturating_sub(1) as f64;
-        let (low, high) = (place as usize, (place as usize + 1).min(values.len() - 1));
-        values[low] + (values[high] - values[low]) * (place - low as f64)
-    };
     if values.is_empty() {
         return Interval {
             value,
@@ -57,11 +51,19 @@ pub(crate) fn interval(value: f64, mut values: Vec<f64>) -> Interval {
             high: value,
         };
     }
+    values.sort_by(f64::total_cmp);
     Interval {
         value,
-        low: quantile(0.025),
-        high: quantile(0.975),
+        low: quantile(&values, 0.025),
+        high: quantile(&values, 0.975),
     }
+}
+
+/// A quantile of sorted values, between two of them where need be.
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let place = q * values.len().saturating_sub(1) as f64;
+    let (low, high) = (place as usize, (place as usize + 1).min(values.len() - 1));
+    values[low] + (values[high] - values[low]) * (place - low as f64)
 }
 
 /// How often each of `count` things is drawn in `count` draws.

@@ -6,7 +6,7 @@ use super::rank::Ranking;
 use super::{Curves, Definition, EvalImage, Scores, curve, mean, yolov5};
 use rayon::prelude::*;
 
-/// Detections held against the truth once, which is what takes long: they can be scored for any weights of the images.
+/// Detections matched with the truth once, which is what takes long: they can be scored for any weights of the images.
 #[derive(Clone, Debug)]
 pub struct Matches {
     definition: Definition,
@@ -15,7 +15,7 @@ pub struct Matches {
 }
 
 impl Matches {
-    /// Holds all detections against the truth.
+    /// Matches all detections with the truth.
     pub fn new(sheets: &[EvalImage], definition: Definition) -> Self {
         let rankings = match definition {
             Definition::Yolov5 => yolov5::rankings(sheets),
@@ -66,7 +66,7 @@ impl Matches {
 
     /// As [`curves`](super::curves()), matched by this definition.
     pub fn curves(&self) -> Curves {
-        curve::of(&self.rankings)
+        curve::from_rankings(&self.rankings)
     }
 
     fn check(&self, weights: &[u32]) {

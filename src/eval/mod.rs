@@ -2,7 +2,7 @@
 //!
 //! Average precision has two definitions in use, and they differ by more than rounding: [`Definition::Yolov5`]
 //! integrates a precision curve over 101 points, [`Definition::Coco`] averages 101 readings of it, looks at no more
-//! than 100 detections an image and knows boxes that count for nobody. Both are computed here from the same
+//! than 100 detections an image and knows boxes that are ignored. Both are computed here from the same
 //! [`EvalImage`]s, one per image.
 
 mod average;
