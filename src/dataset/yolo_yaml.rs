@@ -410,8 +410,11 @@ mod tests {
 
     #[test]
     fn hostile_documents_end_soon() {
-        let deep = format!("x: {}", "[".repeat(1 << 20));
-        assert!(DataYaml::read(&deep).1[0].1.contains("levels"));
+        let deep_flow = format!("x: {}", "[".repeat(1 << 20));
+        assert!(!DataYaml::read(&deep_flow).1.is_empty());
+        let deep_block = format!("x:\n{}a", "- ".repeat(1 << 20));
+        let problems = DataYaml::read(&deep_block).1;
+        assert!(problems[0].1.contains("levels"), "{:?}", problems[0]);
         let laughs = format!(
             "a: &a {}\nnames: [{}]\n",
             "x".repeat(1 << 16),

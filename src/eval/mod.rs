@@ -34,7 +34,7 @@ pub use matches::Matches;
 pub use mistake::{Mistake, MistakeKind, mistakes};
 pub use overlap::iou;
 pub(crate) use picture::class_name;
-pub use picture::{CURVES_SHOWN, confusion_picture, f1_picture, precision_recall_picture};
+pub use picture::{MAX_CURVES, confusion_picture, f1_picture, precision_recall_picture};
 pub use tag::{Tags, read_tags};
 pub(crate) use yolo::sheet_of as yolo_sheet;
 pub use yolo::{YoloTruth, read_yolo_detections, read_yolo_truth};

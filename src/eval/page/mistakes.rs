@@ -19,10 +19,10 @@ const DASHED: &str = "stroke-width=\"1.5\" stroke-dasharray=\"5 3\"";
 const THICK_DASHED: &str = "stroke-width=\"3\" stroke-dasharray=\"7 4\"";
 
 /// What is seen around a box: so many times its longer side, but at least this share of the picture's.
-const AROUND: f64 = 3.0;
-const LEAST_SHARE: f64 = 0.15;
+const VIEW_SCALE: f64 = 3.0;
+const MIN_VIEW_SHARE: f64 = 0.15;
 /// Boxes that a picture shows beside those that it is about: more would hide it, and make the page grow without end.
-const MOST_OTHERS: usize = 100;
+const MAX_OTHER_BOXES: usize = 100;
 
 /// All mistakes of a run, one a row.
 pub(crate) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions) -> Table {
@@ -40,34 +40,13 @@ pub(crate) fn table(run: &Run, mistakes: &[Mistake], options: &EvalReportOptions
     ];
     let mut table = Table::new(columns);
     for mistake in mistakes {
-        let case = Case::of(run, mistake);
-        let name = |class: Option<u32>| {
-            class
-                .map(|class| class_name(class, &options.classes))
-                .unwrap_or_default()
-        };
-        let number = |value: f64, digits: usize| format!("{value:.digits$}");
-        let b = case.wrong();
-        table.push([
-            case.sheet.image.clone(),
-            word(mistake.kind).to_owned(),
-            name(case.truth.map(|t| t.class)),
-            name(case.found.map(|f| f.class)),
-            case.found
-                .map(|f| number(f.confidence, 4))
-                .unwrap_or_default(),
-            number(mistake.iou, 3),
-            number(b.x0, 1),
-            number(b.y0, 1),
-            number(b.x1, 1),
-            number(b.y1, 1),
-        ]);
+        table.push(ShownMistake::new(run, mistake).row(options));
     }
     table
 }
 
 /// The worst mistakes as pictures.
-pub(crate) fn put_on(
+pub(crate) fn add_to(
     page: &mut Page,
     run: &Run,
     mistakes: &[Mistake],
@@ -94,7 +73,7 @@ pub(crate) fn put_on(
     page.html(gallery::STYLE).html(&legend());
     let (misses, detections): (Vec<&Mistake>, Vec<&Mistake>) =
         mistakes.iter().partition(|m| m.kind == MistakeKind::Missed);
-    put_those(
+    add_figures(
         page,
         "alarm",
         "False alarms and wrong classes, the surest first",
@@ -102,7 +81,7 @@ pub(crate) fn put_on(
         &detections,
         options,
     );
-    put_those(
+    add_figures(
         page,
         "miss",
         "Boxes that were missed, the largest first",
@@ -112,7 +91,7 @@ pub(crate) fn put_on(
     );
 }
 
-fn put_those(
+fn add_figures(
     page: &mut Page,
     name: &str,
     title: &str,
@@ -143,27 +122,51 @@ fn put_those(
 
 /// None for a picture that cannot be read, which is only warned of: the scores do not depend on it.
 fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<Figure> {
-    let case = Case::of(run, mistake);
+    let shown = ShownMistake::new(run, mistake);
     let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
-    let view = case.view(*size);
+    let view = shown.view(*size);
     let mut figure = Figure::of(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    figure.drawing = case.drawing(&view, figure.letter(), figure.top(), options);
-    figure.caption = case.caption(options);
+    let canvas = Canvas {
+        letter: figure.letter(),
+        top: figure.top(),
+        options,
+    };
+    figure.drawing = shown.drawing(&view, &canvas);
+    figure.caption = shown.caption(options);
     Some(figure)
 }
 
+/// What all marks of a figure have in common.
+struct Canvas<'a> {
+    /// Height of its letters, in pixels of the picture.
+    letter: f64,
+    /// Upper edge of what is seen.
+    top: f64,
+    options: &'a EvalReportOptions,
+}
+
+impl Canvas<'_> {
+    fn marked(&self, bbox: &BBox, words: &str, color: &str, style: &str) -> String {
+        marked_box(bbox, words, self.letter, self.top, color, style)
+    }
+
+    fn class_name(&self, class: u32) -> String {
+        gallery::clipped(&class_name(class, &self.options.classes), 24)
+    }
+}
+
 /// A mistake with the boxes that it is about.
-struct Case<'a> {
+struct ShownMistake<'a> {
     mistake: &'a Mistake,
     sheet: &'a EvalImage,
     truth: Option<&'a GroundTruth>,
     found: Option<&'a Detection>,
 }
 
-impl<'a> Case<'a> {
-    fn of(run: &'a Run, mistake: &'a Mistake) -> Self {
+impl<'a> ShownMistake<'a> {
+    fn new(run: &'a Run, mistake: &'a Mistake) -> Self {
         let sheet = &run.sheets[mistake.sheet];
         let (truth, found) = (
             mistake.truth.map(|t| &sheet.truth[t]),
@@ -195,12 +198,11 @@ impl<'a> Case<'a> {
             .flatten()
             .reduce(BBox::hull)
             .unwrap_or_default();
-        let side = (AROUND * both.width().max(both.height())).max(LEAST_SHARE * width.max(height));
+        let side =
+            (VIEW_SCALE * both.width().max(both.height())).max(MIN_VIEW_SHARE * width.max(height));
         let (w, h, middle) = (side.min(width), side.min(height), both.center());
-        let (x0, y0) = (
-            (middle.x - w / 2.0).clamp(0.0, width - w),
-            (middle.y - h / 2.0).clamp(0.0, height - h),
-        );
+        let x0 = (middle.x - w / 2.0).clamp(0.0, width - w);
+        let y0 = (middle.y - h / 2.0).clamp(0.0, height - h);
         BBox {
             x0,
             y0,
@@ -209,47 +211,66 @@ impl<'a> Case<'a> {
         }
     }
 
-    fn drawing(&self, view: &BBox, letter: f64, top: f64, options: &EvalReportOptions) -> String {
+    fn drawing(&self, view: &BBox, canvas: &Canvas<'_>) -> String {
         let mut svg = String::new();
         for truth in self.other_boxes(view) {
             let color = if truth.crowd { CROWD } else { TRUTH };
-            svg += &marked_box(&truth.bbox, "", letter, top, color, THIN);
+            svg += &canvas.marked(&truth.bbox, "", color, THIN);
         }
-        for found in self.other_detections(view, options.confusion.confidence) {
-            svg += &marked_box(&found.bbox, "", letter, top, FOUND, DASHED);
+        for found in self.other_detections(view, canvas.options.confusion.confidence) {
+            svg += &canvas.marked(&found.bbox, "", FOUND, DASHED);
         }
-        let name = |class: u32| gallery::clipped(&class_name(class, &options.classes), 24);
         if let Some(truth) = self.truth {
-            let (color, style) = if self.is_miss() {
-                (WRONG, THICK)
-            } else {
-                (TRUTH, THICK)
-            };
-            svg += &marked_box(
-                &truth.bbox,
-                &format!("true: {}", name(truth.class)),
-                letter,
-                top,
-                color,
-                style,
-            );
+            svg += &self.truth_mark(truth, canvas);
         }
         if let Some(found) = self.found {
-            let (color, style) = if self.is_miss() {
-                (FOUND, DASHED)
-            } else {
-                (WRONG, THICK_DASHED)
-            };
-            let words = format!("{} {:.2}", name(found.class), found.confidence);
-            // Beside the words of the truth, which stand at the upper corner.
-            let below = BBox {
-                y0: found.bbox.y1 + 1.2 * letter,
-                ..found.bbox
-            };
-            svg += &marked_box(&found.bbox, "", letter, top, color, style);
-            svg += &gallery::words([below.x0, below.y0], &words, letter, color);
+            svg += &self.found_mark(found, canvas);
         }
         svg
+    }
+
+    fn truth_mark(&self, truth: &GroundTruth, canvas: &Canvas<'_>) -> String {
+        let color = if self.is_miss() { WRONG } else { TRUTH };
+        let words = format!("true: {}", canvas.class_name(truth.class));
+        canvas.marked(&truth.bbox, &words, color, THICK)
+    }
+
+    fn found_mark(&self, found: &Detection, canvas: &Canvas<'_>) -> String {
+        let (color, style) = if self.is_miss() {
+            (FOUND, DASHED)
+        } else {
+            (WRONG, THICK_DASHED)
+        };
+        let words = format!("{} {:.2}", canvas.class_name(found.class), found.confidence);
+        // Apart from the words of the truth, which stand at the upper corner.
+        let at = [found.bbox.x0, found.bbox.y1 + 1.2 * canvas.letter];
+        canvas.marked(&found.bbox, "", color, style)
+            + &gallery::words(at, &words, canvas.letter, color)
+    }
+
+    /// Its row in the table of mistakes.
+    fn row(&self, options: &EvalReportOptions) -> [String; 10] {
+        let name = |class: Option<u32>| {
+            class
+                .map(|class| class_name(class, &options.classes))
+                .unwrap_or_default()
+        };
+        let wrong = self.wrong();
+        let [x0, y0, x1, y1] = [wrong.x0, wrong.y0, wrong.x1, wrong.y1].map(|v| format!("{v:.1}"));
+        [
+            self.sheet.image.clone(),
+            word(self.mistake.kind).to_owned(),
+            name(self.truth.map(|t| t.class)),
+            name(self.found.map(|f| f.class)),
+            self.found
+                .map(|f| format!("{:.4}", f.confidence))
+                .unwrap_or_default(),
+            format!("{:.3}", self.mistake.iou),
+            x0,
+            y0,
+            x1,
+            y1,
+        ]
     }
 
     /// Boxes of the truth in the view that the mistake is not about.
@@ -260,7 +281,7 @@ impl<'a> Case<'a> {
             .iter()
             .filter(other)
             .filter(|t| t.bbox.overlaps(view))
-            .take(MOST_OTHERS)
+            .take(MAX_OTHER_BOXES)
             .collect()
     }
 
@@ -277,7 +298,7 @@ impl<'a> Case<'a> {
             .filter(|f| f.bbox.overlaps(view))
             .collect();
         seen.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        seen.truncate(MOST_OTHERS);
+        seen.truncate(MAX_OTHER_BOXES);
         seen
     }
 
@@ -372,15 +393,21 @@ mod tests {
             truth: None,
             iou: 0.0,
         };
-        let case = Case::of(&run, &mistake);
+        let shown = ShownMistake::new(&run, &mistake);
         let view = BBox {
             x0: 100.0,
             y0: 0.0,
             x1: 1_400.0,
             y1: 2.0,
         };
-        let (boxes, detections) = (case.other_boxes(&view), case.other_detections(&view, 0.25));
-        assert_eq!((boxes.len(), detections.len()), (MOST_OTHERS, MOST_OTHERS));
+        let (boxes, detections) = (
+            shown.other_boxes(&view),
+            shown.other_detections(&view, 0.25),
+        );
+        assert_eq!(
+            (boxes.len(), detections.len()),
+            (MAX_OTHER_BOXES, MAX_OTHER_BOXES)
+        );
         assert!(boxes.iter().all(|t| t.bbox.overlaps(&view)));
         assert!(
             detections
