@@ -115,7 +115,7 @@ fn mean_of(boxes: &[[f64; 2]], nearest: &[usize], k: usize) -> Option<[f64; 2]> 
     (count > 0.0).then(|| sum.map(|s| s / count))
 }
 
-pub(super) fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
+fn in_reach(b: &[f64; 2], anchor: &[f64; 2]) -> bool {
     (0..2).all(|i| (b[i] / anchor[i]).max(anchor[i] / b[i]) < MAX_SIDE_RATIO)
 }
 

@@ -239,7 +239,7 @@ pub(crate) fn tell(report: &DatasetCounts) {
         ..
     } = report;
     print::line(format_args!(
-        "images       {images} ({val} for validation), {made} made now, {retries} scenes drawn again"
+        "images       {images} ({val} for validation), {made} made now, {retries} scenes resampled"
     ));
     print::line(format_args!(
         "objects      {objects}, {labelled} labelled, {obstructed} obstructed ({})",

@@ -39,7 +39,7 @@ pub(crate) fn init(args: &Init, common: &Common) -> anyhow::Result<()> {
 pub(crate) fn explain(args: &Explain) -> anyhow::Result<()> {
     let sample = args.recipe.pipeline()?.sample(args.seed, args.index)?;
     for reason in &sample.rejected {
-        print::line(format_args!("# a scene was thrown away: {reason}"));
+        print::line(format_args!("# rejected a scene: {reason}"));
     }
     if !sample.rejected.is_empty() {
         print::line(format_args!(
