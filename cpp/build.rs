@@ -3,30 +3,34 @@
 fn main() {
     println!("cargo:rerun-if-changed=cpp/build.rs");
     #[cfg(feature = "oiio")]
-    shim();
+    build_shim();
 }
 
 /// Oldest OpenImageIO that the shim was tried with (Debian 12).
 #[cfg(feature = "oiio")]
-const OLDEST: &str = "2.4";
+const MIN_OIIO_VERSION: &str = "2.4";
 
 #[cfg(feature = "oiio")]
-fn shim() {
-    for file in ["cpp/oiio_shim.h", "cpp/oiio_shim.cpp", "src/io/ffi.rs"] {
+fn build_shim() {
+    for file in [
+        "cpp/oiio_shim.h",
+        "cpp/oiio_shim.cpp",
+        "src/io/worker/ffi.rs",
+    ] {
         println!("cargo:rerun-if-changed={file}");
     }
     let oiio = pkg_config::Config::new()
-        .atleast_version(OLDEST)
+        .atleast_version(MIN_OIIO_VERSION)
         .cargo_metadata(false)
         .probe("OpenImageIO");
     let oiio = oiio.unwrap_or_else(|_| {
         println!(
-            "cargo:error=the feature `oiio` needs OpenImageIO {OLDEST} or newer, a C++ compiler and pkg-config: \
+            "cargo:error=the feature `oiio` needs OpenImageIO {MIN_OIIO_VERSION} or newer, a C++ compiler and pkg-config: \
              `apt-get install g++ pkg-config libopenimageio-dev`, or build with `--no-default-features`"
         );
         std::process::exit(1)
     });
-    cxx_build::bridge("src/io/ffi.rs")
+    cxx_build::bridge("src/io/worker/ffi.rs")
         .file("cpp/oiio_shim.cpp")
         .std("c++17")
         .includes(&oiio.include_paths)

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "petcomp/src/io/ffi.rs.h"
+#include "petcomp/src/io/worker/ffi.rs.h"
 
 namespace petcomp {
 namespace {

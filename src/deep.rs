@@ -23,8 +23,8 @@ pub struct DeepSample {
 
 /// A picture of deep samples, and what the shadows leave of the surface's light.
 ///
-/// Films hide a share of their own in each channel: pictures with film know [`tints`](Self::tints) beside the samples,
-/// whose `alpha` and `visible` are then the mean over channels. Pictures without film have none and pay for none.
+/// Film hides another share in each channel: pictures with film have [`tints`](Self::tints) beside the samples, whose
+/// `alpha` and `visible` are then the mean over channels. Pictures without film have none and pay for none.
 #[derive(Clone, Debug, Default)]
 pub struct DeepImage {
     width: usize,
@@ -97,25 +97,18 @@ impl DeepImage {
         tints: impl Iterator<Item = LinearRgb>,
     ) -> Self {
         let (width, height) = shadow.size();
-        let pixel = |x: u32, y: u32| y as usize * width + x as usize;
-        // Counts become starts, then move to ends as each pixel's samples take their places.
-        let mut ends = vec![0u32; width * height + 1];
-        samples
-            .clone()
-            .for_each(|(x, y, _)| ends[pixel(x, y) + 1] += 1);
-        (0..width * height).for_each(|i| ends[i + 1] += ends[i]);
+        // Starts become ends as each pixel's samples take their places.
+        let mut ends = pixel_starts(width, height, samples.clone());
         let mut placed = vec![DeepSample::default(); ends.last().map_or(0, |&n| n as usize)];
         let mut tints = tints.peekable();
-        let mut placed_tints = vec![
-            LinearRgb::BLACK;
-            if tints.peek().is_some() {
-                placed.len()
-            } else {
-                0
-            }
-        ];
+        let tint_count = if tints.peek().is_some() {
+            placed.len()
+        } else {
+            0
+        };
+        let mut placed_tints = vec![LinearRgb::BLACK; tint_count];
         for (x, y, sample) in samples {
-            let next = &mut ends[pixel(x, y)];
+            let next = &mut ends[y as usize * width + x as usize];
             placed[*next as usize] = sample;
             if let Some(tint) = tints.next() {
                 placed_tints[*next as usize] = tint;
@@ -147,7 +140,7 @@ impl DeepImage {
     /// The samples of one pixel, front to back.
     #[inline(always)]
     pub fn at(&self, x: usize, y: usize) -> &[DeepSample] {
-        &self.samples[self.range(x, y)]
+        &self.samples[self.sample_range(x, y)]
     }
 
     /// What each sample of a pixel hides of what is behind, per channel, as far as it is itself seen; empty where no
@@ -157,7 +150,7 @@ impl DeepImage {
         if self.tints.is_empty() {
             &[]
         } else {
-            &self.tints[self.range(x, y)]
+            &self.tints[self.sample_range(x, y)]
         }
     }
 
@@ -179,7 +172,7 @@ impl DeepImage {
         }
     }
 
-    fn range(&self, x: usize, y: usize) -> std::ops::Range<usize> {
+    fn sample_range(&self, x: usize, y: usize) -> std::ops::Range<usize> {
         let i = y * self.width + x;
         self.starts[i] as usize..self.starts[i + 1] as usize
     }
@@ -197,4 +190,20 @@ impl DeepImage {
     pub fn shadow(&self) -> &Image<LinearRgb> {
         &self.shadow
     }
+}
+
+/// Where each pixel's samples start, pixel by pixel, and after the last one where they end.
+fn pixel_starts(
+    width: usize,
+    height: usize,
+    samples: impl Iterator<Item = (u32, u32, DeepSample)>,
+) -> Vec<u32> {
+    let mut starts = vec![0_u32; width * height + 1];
+    for (x, y, _) in samples {
+        starts[y as usize * width + x as usize + 1] += 1;
+    }
+    for i in 0..width * height {
+        starts[i + 1] += starts[i];
+    }
+    starts
 }

@@ -143,6 +143,18 @@ pub fn printable(text: &str) -> String {
     shown
 }
 
+/// Letters of a foreign message that are shown; a damaged file may make a decoder list thousands of numbers.
+const SHOWN_LETTERS: usize = 300;
+
+/// The beginning of a text of any form on one line.
+pub(crate) fn one_line(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(SHOWN_LETTERS) {
+        Some((end, _)) => format!("{}..", &line[..end]),
+        None => line,
+    }
+}
+
 /// Control characters, separators of lines and paragraphs, and marks of direction (Unicode Bidirectional Algorithm,
 /// "explicit directional embeddings, overrides and isolates").
 fn is_control(c: char) -> bool {
@@ -174,6 +186,15 @@ mod tests {
         );
         assert_eq!(printable("exe\u{202e}gpj"), "exe\\x202egpj");
         assert_eq!(printable("größe 3 \\ µm"), "größe 3 \\ µm");
+    }
+
+    #[test]
+    fn long_messages_are_cut() {
+        assert_eq!(one_line(" a\n b "), "a b");
+        assert_eq!(
+            one_line(&"ö ".repeat(9999)).chars().count(),
+            SHOWN_LETTERS + 2
+        );
     }
 
     #[test]

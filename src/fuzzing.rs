@@ -1,4 +1,4 @@
-//! Doors for the fuzzers in `fuzz/`: each takes any bytes and must come back. Not part of the library's interface.
+//! Entry points of the fuzzers in `fuzz/`: each takes any bytes and must return. Not part of the library's interface.
 
 use crate::{camera, dataset, eval, io};
 
@@ -27,10 +27,10 @@ pub fn journal(bytes: &[u8]) {
     let _ = dataset::journal_lines(bytes, false);
 }
 
-/// What an OpenImageIO worker says.
+/// The response of an OpenImageIO worker.
 #[cfg(feature = "oiio")]
 pub fn worker(bytes: &[u8]) {
-    let _ = io::worker_answer(bytes);
+    let _ = io::is_worker_response(bytes);
 }
 
 /// The first bytes of a picture.
@@ -47,7 +47,7 @@ pub fn data_yaml(bytes: &[u8]) {
     let _ = (yaml.class_count(), yaml.root(std::path::Path::new("a")));
 }
 
-/// What stands between the truth and the detections that the doors below take.
+/// What stands between the truth and the detections that the functions below take.
 pub const BETWEEN: &str = "\n===\n";
 
 /// A file of YOLO labels and one of detections, scored where they can be read.

@@ -3,6 +3,7 @@
 //! Row 0 is the top row, pixel `(x, y)` covers `[x, x+1) x [y, y+1)` and has its centre at `+0.5`. Pixels lie row by
 //! row in one allocation without padding; work goes over whole rows so that the compiler can vectorise it.
 
+use crate::pixel::Coverage;
 use rayon::prelude::*;
 
 /// A rectangle of pixels `P`, row by row from the top.
@@ -12,6 +13,9 @@ pub struct Image<P> {
     height: usize,
     pixels: Vec<P>,
 }
+
+/// Yes or no for every pixel; [`RleMask`](crate::label::RleMask) is what label files hold of one.
+pub type Mask = Image<bool>;
 
 /// A region of interest: a half-open rectangle of whole pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -276,6 +280,23 @@ impl<P: Copy> Image<P> {
     }
 }
 
+impl Mask {
+    /// Number of pixels that are set.
+    pub fn count(&self) -> usize {
+        self.pixels.iter().filter(|set| **set).count()
+    }
+
+    /// Set where this mask is not.
+    pub fn complement(&self) -> Self {
+        self.map(|set| !set)
+    }
+
+    /// A matte without soft edges: 1 where set, 0 elsewhere.
+    pub fn to_coverage(&self) -> Image<Coverage> {
+        self.map(|set| Coverage(f32::from(u8::from(set))))
+    }
+}
+
 impl<P> std::ops::Index<(usize, usize)> for Image<P> {
     type Output = P;
     #[inline(always)]
@@ -331,6 +352,14 @@ mod tests {
             .pixels(),
             [21, 22, 31, 32]
         );
+    }
+
+    #[test]
+    fn a_mask_and_its_complement_are_all_pixels() {
+        let mask: Mask = Image::from_fn(4, 3, |x, y| x > y);
+        assert_eq!((mask.count(), mask.complement().count()), (6, 6));
+        let sum: f32 = mask.to_coverage().pixels().iter().map(|c| c.0).sum();
+        assert_eq!(sum, 6.0);
     }
 
     #[test]

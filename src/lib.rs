@@ -1,4 +1,35 @@
-#![doc = include_str!("../README.md")]
+//! Photographs become labelled training images.
+//!
+//! A photo on a coloured screen becomes a cut-out ([`matte`]), kept with its size and class ([`asset`]). Four corners of a
+//! rectangle become a [`camera`]. A recipe and a number become a [`Scene`], whose unknowns the stages replace one by one;
+//! what is left is a [`Shot`], rendered to deep samples, from which picture and labels are both read.
+//!
+//! | unknown in a scene | replaced by | what it takes |
+//! | --- | --- | --- |
+//! | [`CameraSource::Rectangle`](scene::CameraSource) | [`scene::locate`] | four corners and the size of their rectangle |
+//! | [`Placement::Drop`](scene::Placement) | `settle::settle` (feature `settle`) | a known camera; outlines, thickness, mass |
+//! | [`Exposure::MatchPlate`](scene::Exposure) and its like | [`light`] | the photo of the place |
+//! | names of textures and of the plate | [`Scene::resolve`] | a [`Library`](asset::Library) and the photo |
+//!
+//! A generator of its own may begin anywhere: with a scene, or with a shot built in code and one call to
+//! [`composite::picture`]. `examples/` has five programs. Conventions of axes and pixels are in [`geom`], the kinds of
+//! pixels and what may be done with them at [`Image`].
+//!
+//! ```
+//! use petcomp::geom::{Pose, Quad};
+//! use petcomp::scene::Card;
+//! use petcomp::{Camera, Image, LinearRgb, ObjectId, PremulRgba, Shot, composite};
+//! use std::sync::Arc;
+//!
+//! let quad = Quad { world_from_card: Pose::translation(0.0, 0.0, 0.05), size: [0.2, 0.1] };
+//! let red_film = Image::filled(8, 8, PremulRgba::new(0.3, 0.1, 0.1, 0.5));
+//! let shot = Shot::new(Camera::looking_down(1.0, 80.0, [64, 48]))
+//!     .with_plate(Arc::new(Image::filled(64, 48, LinearRgb::grey(0.5))))
+//!     .with_card(Card::new(ObjectId(1), quad, red_film))
+//!     .with_ambient(LinearRgb::WHITE);
+//! let frame = composite::picture(&shot, &Default::default());
+//! assert!(frame[(32, 24)].r > frame[(32, 24)].g);
+//! ```
 #![warn(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 mod allowance;
@@ -15,6 +46,7 @@ mod draw;
 mod error;
 pub mod eval;
 pub mod filter;
+#[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
 pub mod geom;
@@ -32,14 +64,17 @@ pub mod scene;
 pub mod settle;
 mod stopwatch;
 pub mod train;
+#[cfg(feature = "counters")]
 pub mod work;
+#[cfg(not(feature = "counters"))]
+mod work;
 
 pub use allowance::Allowance;
 pub use camera::Camera;
 pub use deep::{DeepImage, DeepSample};
 pub use diagnostic::{Code, Diagnostic, Severity};
 pub use error::{Error, Result, printable};
-pub use image::{Image, Roi};
+pub use image::{Image, Mask, Roi};
 pub use pixel::{
     Coverage, Depth, Film, LinearRgb, Mix, ObjectId, PremulRgba, Srgb8, Srgba8, StraightRgba,
 };

@@ -184,6 +184,14 @@ impl Mix for Coverage {
     }
 }
 
+/// A plane of numbers of any meaning and sign: brightness, a band of a pyramid, an error.
+impl Mix for f32 {
+    #[inline(always)]
+    fn add_scaled(self, w: f32, o: Self) -> Self {
+        self + w * o
+    }
+}
+
 impl LinearRgb {
     /// No light.
     pub const BLACK: Self = Self::new(0.0, 0.0, 0.0);

@@ -9,7 +9,7 @@ use petcomp::dataset::{
 };
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2};
-use petcomp::label::{Labels, Mask, ObjectLabel};
+use petcomp::label::{Labels, ObjectLabel, RleMask};
 use petcomp::scene::{CameraSource, Exposure, Grade, Object, Placement, Surface};
 use petcomp::{Error, Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, io};
 use std::collections::BTreeMap;
@@ -63,9 +63,9 @@ fn object(id: u32, class: u32, [x, y]: [f64; 2], covered_by: &[u32]) -> ObjectLa
     }
 }
 
-fn mask(b: &BBox) -> Mask {
+fn mask(b: &BBox) -> RleMask {
     let inside = |v: u32, from: f64, to: f64| (from..to).contains(&f64::from(v));
-    Mask::from_fn(IMAGE, |x, y| inside(x, b.x0, b.x1) && inside(y, b.y0, b.y1))
+    RleMask::from_fn(IMAGE, |x, y| inside(x, b.x0, b.x1) && inside(y, b.y0, b.y1))
 }
 
 /// Sample k: noise that depends on k, with k mod 4 objects, of which the second lies under the first.

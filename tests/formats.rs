@@ -12,7 +12,7 @@ use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{CameraSource, Card, Cast, Exposure, Finish, Grade, Surface};
+use petcomp::scene::{CameraSource, Card, Exposure, Finish, Grade, LightTint, Surface};
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -89,7 +89,7 @@ fn shot(k: u64) -> Shot {
 
 fn sample(k: u64) -> Result<Sample> {
     let shot = shot(k);
-    let deep = render::cast(&shot, &Default::default());
+    let deep = render::render(&shot, &Default::default());
     let frame = composite::frame(&deep, shot.plate.as_deref());
     let labels = label(&deep, &shot, &LabelOptions::default());
     let scene = Scene {
@@ -102,7 +102,7 @@ fn sample(k: u64) -> Result<Sample> {
         ambient: LinearRgb::grey(1.0),
         environment: None,
         exposure: Exposure::default(),
-        cast: Cast::default(),
+        cast: LightTint::default(),
         finish: Finish::default(),
     };
     Ok(Sample {
@@ -323,7 +323,7 @@ fn a_mask_is_what_the_layer_of_its_object_shows() {
             let alpha = |x: u32, y: u32| plane(layer).samples[(y * IMAGE[0] + x) as usize];
             assert_eq!(
                 *mask,
-                petcomp::label::Mask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1)
+                petcomp::label::RleMask::from_fn(IMAGE, |x, y| alpha(x, y) > 0.1)
             );
         }
         assert!(object.visible_mask.pixels().count() <= object.amodal_mask.pixels().count());
@@ -342,7 +342,7 @@ fn a_box_is_that_of_the_object_rendered_alone() {
                 ..shot.clone()
             };
             let alone = label(
-                &render::cast(&alone, &Default::default()),
+                &render::render(&alone, &Default::default()),
                 &alone,
                 &LabelOptions::default(),
             );

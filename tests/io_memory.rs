@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use petcomp::diff::{Likeness, RowsBy, Thresholds, Verdict, compare};
+use petcomp::diff::{Likeness, RowsFromFn, Thresholds, Verdict, compare};
 use petcomp::io::{self, Picture};
 use petcomp::{LinearRgb, PremulRgba};
 use std::fs;
@@ -87,7 +87,7 @@ fn two_pictures_are_compared_in_the_memory_of_one_channel() {
     let taken = bytes_a_pixel(|| {
         let [a, b] = [(); 2].map(|()| Picture::read(&path).unwrap());
         let light = |p: &Picture, rows| p.rows::<PremulRgba>(rows).map(PremulRgba::color);
-        let [a, b] = [&a, &b].map(|p| RowsBy {
+        let [a, b] = [&a, &b].map(|p| RowsFromFn {
             size: p.size(),
             make: move |rows| light(p, rows),
         });
@@ -107,11 +107,11 @@ fn likeness_takes_memory_for_bands_alone() {
         let make = |rows: std::ops::Range<usize>| {
             petcomp::Image::filled(1 << 11, rows.len(), LinearRgb::grey(0.5))
         };
-        let picture = RowsBy {
+        let picture = RowsFromFn {
             size: (1 << 11, height),
             make,
         };
-        bytes_a_pixel(move || Likeness::of(&picture, &picture).unwrap())
+        bytes_a_pixel(move || Likeness::measure(&picture, &picture).unwrap())
     };
     // Once before: threads and tables are there then.
     wide(128);

@@ -63,9 +63,13 @@ fn hulls_of_sample_bottles_agree_with_the_renderer() {
 fn the_sample_list_becomes_a_library_of_all_four_classes() {
     let folder = tempfile::tempdir().unwrap();
     let built = asset::build(samples().join("photos.toml"), folder.path(), &|_, _| ()).unwrap();
-    assert_eq!((built.photos, built.assets), (12, 6));
-    let library = asset::Library::open(folder.path()).unwrap();
-    let mut classes: Vec<u32> = library.assets.iter().map(|asset| asset.class).collect();
+    let library = built.library;
+    assert_eq!((built.photos, library.assets.len()), (12, 6));
+    let mut classes: Vec<u32> = library
+        .assets
+        .iter()
+        .map(|asset| library.class_number(asset))
+        .collect();
     classes.sort_unstable();
     classes.dedup();
     assert_eq!(classes, [0, 1, 2, 3]);

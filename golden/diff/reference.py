@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints SSIM (scikit-image) and FLIP (its authors' flip-evaluator) of the two pictures in src/diff/likeness.rs.
+"""Prints SSIM (scikit-image) and FLIP (its authors' flip-evaluator) of the two pictures in src/diff/test_pictures.rs.
 
     python3 golden/diff/reference.py      # needs scikit-image==0.26.0 flip-evaluator==1.7
 """

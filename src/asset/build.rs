@@ -1,21 +1,22 @@
 //! Many photos into an asset folder, from a list.
 
-use super::List;
-use super::folder::{asset_of, read_or_new, write_photo};
+use super::folder::{CutOutWriter, read_or_new};
+use super::library::{Library, Photo};
+use super::list::{List, find_list};
+use super::manifest::Manifest;
+use super::screen_source::EmptyScreens;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What [`build`] did.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Built {
+    /// All that the folder holds now, as [`Library::open`] would read it.
+    pub library: Library,
     /// Photos that were cut out.
     pub photos: usize,
-    /// Assets in the folder.
-    pub assets: usize,
-    /// Names of the folder's classes, in order.
-    pub classes: Vec<String>,
     /// Lengths of the objects that were cut out, with their standard errors, metres, in the order of the list.
     pub lengths: Vec<[f64; 2]>,
     /// Photos that gave no cut-out, and why.
@@ -24,13 +25,10 @@ pub struct Built {
     pub needs_review: Vec<String>,
 }
 
-/// Names of the lists that a folder may hold.
-const LISTS: [&str; 2] = ["photos.toml", "photos.csv"];
-
 /// Cuts all photos of a list out, several at a time, into an asset folder, which is made if it is not there.
 ///
 /// `list` is a TOML or CSV file, or a folder with `photos.toml` or `photos.csv` in it. A photo without a usable object is
-/// left out and told in [`Built::refused`].
+/// left out and reported in [`Built::refused`].
 ///
 /// `progress` is called with the photos done and their number, at the start and after each photo, from several threads.
 /// What the folder already had stays; a photo that is there already is replaced. The manifest is written last and does not
@@ -38,120 +36,98 @@ const LISTS: [&str; 2] = ["photos.toml", "photos.csv"];
 ///
 /// # Errors
 /// A list that cannot be read or be right (before any work, naming the entry); the first
-/// photo that cannot be read, or [`Error::Photo`] where no photo gives a cut-out.
+/// photo that cannot be read, or [`Error::Photo`] where no photo gives a cut-out; those of [`Library::open`] for cut-outs
+/// that were there before.
 pub fn build(
     list: impl AsRef<Path>,
     folder: impl AsRef<Path>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Built> {
-    let (path, folder) = (list_in(list.as_ref())?, folder.as_ref());
+    let (path, folder) = (find_list(list.as_ref())?, folder.as_ref());
     let path = path.as_path();
     let list = List::read(path)?;
     let mut manifest = read_or_new(folder)?;
-    let at = path.parent().unwrap_or(Path::new(""));
-    let adds = list.adds(&mut manifest, at).map_err(|e| e.in_file(path))?;
-    let count = adds.len();
-    let done = AtomicUsize::new(0);
-    progress(0, count);
-    let work = list.photos.par_iter().zip(&adds).map(|(photo, add)| {
-        let record =
-            write_photo(folder, &as_written(at.join(&photo.file)), add).map(|photo| photo.record);
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
-        record
-    });
-    let records: Vec<Result<_>> = work.collect();
-    let mut built = Built::default();
-    for (i, (record, add)) in records.into_iter().zip(&adds).enumerate() {
-        let record = match record {
-            Err(refusal @ Error::Photo { .. }) => {
-                built.refused.push(refusal.to_string());
-                continue;
-            }
-            other => other.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?,
-        };
-        if record.needs_review() {
-            let reasons = record.review_reasons();
-            built
-                .needs_review
-                .push(format!("{}: {reasons}", record.file));
-        }
-        built.lengths.push([record.object_m[0], record.error_m]);
-        let inserted = manifest.insert(asset_of(add, record));
-        inserted.map_err(|e| e.within(&format!("photos[{i}]")).in_file(path))?;
-        built.photos += 1;
-    }
-    if built.photos == 0 {
-        return Err(Error::file(
-            path,
-            format!("no photo gave a cut-out: {}", built.refused.join("; ")),
-        ));
+    list.check(&mut manifest).map_err(|e| e.in_file(path))?;
+    let list = list.located_in(path.parent().unwrap_or(Path::new("")));
+    let outcomes = cut_out_all(&list, folder, progress);
+    let (photos, refused) =
+        insert_all(&list, outcomes, &mut manifest).map_err(|e| e.in_file(path))?;
+    if photos.is_empty() {
+        let what = format!("no photo gave a cut-out: {}", refused.join("; "));
+        return Err(Error::file(path, what));
     }
     manifest.write(folder)?;
-    built.assets = manifest.assets.len();
-    built.classes = manifest.classes;
-    Ok(built)
-}
-
-/// The file of that name, or where there is none the only one beside it that is called so but for capitals and the
-/// spelling of `.jpg`.
-fn as_written(path: PathBuf) -> PathBuf {
-    if path.exists() {
-        return path;
-    }
-    let entries = path
-        .parent()
-        .and_then(|folder| std::fs::read_dir(folder).ok())
-        .into_iter()
-        .flatten()
-        .flatten();
-    let mut alike = entries
-        .map(|entry| entry.path())
-        .filter(|other| plain_name(other) == plain_name(&path));
-    match (alike.next(), alike.next()) {
-        (Some(only), None) => only,
-        _ => path,
-    }
-}
-
-/// A file's name in small letters, with the short endings of pictures.
-fn plain_name(path: &Path) -> String {
-    let name = path
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    let ending = [(".jpeg", ".jpg"), (".tiff", ".tif")];
-    let long = ending
-        .iter()
-        .find_map(|(long, short)| Some(format!("{}{short}", name.strip_suffix(long)?)));
-    long.unwrap_or(name)
-}
-
-/// The list itself, or the one in a folder.
-fn list_in(path: &Path) -> Result<PathBuf> {
-    if !path.is_dir() {
-        return Ok(path.into());
-    }
-    let inside = LISTS
-        .iter()
-        .map(|name| path.join(name))
-        .find(|list| list.exists());
-    inside.ok_or_else(|| {
-        Error::file(
-            path,
-            format!(
-                "expected {} in it, a list of the photos",
-                LISTS.join(" or ")
-            ),
-        )
+    Ok(Built {
+        photos: photos.len(),
+        lengths: photos
+            .iter()
+            .map(|photo| [photo.record.object_m[0], photo.record.error_m])
+            .collect(),
+        needs_review: photos.iter().filter_map(review_line).collect(),
+        refused,
+        library: Library::of_manifest(folder, manifest, photos)?,
     })
+}
+
+/// Cuts out and writes the photos of a list.
+fn cut_out_all(
+    list: &List,
+    folder: &Path,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Vec<Result<Photo>> {
+    let (done, count) = (AtomicUsize::new(0), list.photos.len());
+    progress(0, count);
+    let writer = CutOutWriter {
+        folder,
+        options: &list.cut_out,
+        empty_screens: EmptyScreens::shared_by(list.photos.iter().map(|photo| &photo.screen)),
+    };
+    list.photos
+        .par_iter()
+        .map(|entry| {
+            let photo = writer.write(entry);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, count);
+            photo
+        })
+        .collect()
+}
+
+/// Puts the cut-outs of a list into a manifest; returns them, and why the other photos gave none.
+fn insert_all(
+    list: &List,
+    outcomes: Vec<Result<Photo>>,
+    manifest: &mut Manifest,
+) -> Result<(Vec<Photo>, Vec<String>)> {
+    let (mut photos, mut refused) = (Vec::new(), Vec::new());
+    for (i, (outcome, entry)) in outcomes.into_iter().zip(&list.photos).enumerate() {
+        match outcome {
+            Ok(photo) => {
+                manifest
+                    .insert(entry.asset_with(photo.record.clone()))
+                    .map_err(|e| e.within(&format!("photos[{i}]")))?;
+                photos.push(photo);
+            }
+            Err(refusal @ Error::Photo { .. }) => refused.push(refusal.to_string()),
+            Err(error) => return Err(error.within(&format!("photos[{i}]"))),
+        }
+    }
+    Ok((photos, refused))
+}
+
+/// Why a person should review a cut-out, after the name of its file.
+fn review_line(photo: &Photo) -> Option<String> {
+    let record = &photo.record;
+    record
+        .needs_review()
+        .then(|| format!("{}: {}", record.file, record.review_reasons()))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Library, MANIFEST, PhotoRecord, contact_sheet};
+    use super::super::{MANIFEST, PhotoRecord, contact_sheet};
     use super::*;
     use crate::diagnostic::Code;
+    use crate::geom::Point2;
     use crate::image::Image;
     use crate::io;
     use crate::pixel::LinearRgb;
@@ -179,12 +155,29 @@ mod tests {
 
     fn built(list: &str) -> Result<Library> {
         let folder = folder_with(list);
-        build(
-            folder.path().join("photos.toml"),
-            folder.path().join("out"),
-            &|_, _| (),
-        )?;
-        Library::open(folder.path().join("out"))
+        let out = folder.path().join("out");
+        let built = build(folder.path().join("photos.toml"), &out, &|_, _| ())?.library;
+        let read = Library::open(out)?;
+        assert_eq!(in_brief(&built), in_brief(&read));
+        Ok(read)
+    }
+
+    /// All that tells two libraries apart.
+    fn in_brief(library: &Library) -> Vec<(String, PhotoRecord, u32, Vec<Point2<f64>>)> {
+        let photos = library
+            .assets
+            .iter()
+            .flat_map(|asset| asset.photos.iter().map(move |photo| (asset, photo)));
+        photos
+            .map(|(asset, photo)| {
+                (
+                    format!("{} {} {}", asset.name, asset.class, asset.mass),
+                    photo.record.clone(),
+                    photo.texture.checksum(),
+                    photo.outline_uv.to_vec(),
+                )
+            })
+            .collect()
     }
 
     const TWO: &str = "[[photos]]\nfile = \"one.png\"\nasset = \"a\"\nclass = \"cap\"\nlength = 0.3\n\
@@ -208,7 +201,7 @@ mod tests {
         let [asset] = &library.assets[..] else {
             panic!("one asset")
         };
-        assert_eq!((asset.class, asset.photos.len()), (0, 2));
+        assert_eq!((asset.class.as_str(), asset.photos.len()), ("cap", 2));
         // An edge is told to a pixel, so a length to two: 60 px are 0.3 m to within 1 in 30.
         assert!((asset.photos[0].record.px_per_metre / 200.0 - 1.0).abs() < 1.0 / 30.0);
         assert!((asset.photos[1].record.object_m[0] - 0.6).abs() <= 0.02);
@@ -295,7 +288,7 @@ mod tests {
         let folder = folder_with(&three);
         let list = folder.path().join("photos.toml");
         let classes = |out: &str| {
-            build(&list, folder.path().join(out), &|_, _| ()).map(|built| built.classes)
+            build(&list, folder.path().join(out), &|_, _| ()).map(|built| built.library.classes)
         };
         assert_eq!(classes("met").unwrap(), ["see-through bag", "cap"]);
         let declared = format!("classes = [\"cap\", \"jar\", \"see-through bag\"]\n{three}");
@@ -357,19 +350,6 @@ mod tests {
                 .unwrap()
                 .photos,
             2
-        );
-        for (there, asked) in [("a.jpeg", "a.jpg"), ("B.JPG", "b.jpeg"), ("c.jpg", "c.jpg")] {
-            std::fs::write(folder.path().join(there), "").unwrap();
-            assert_eq!(
-                as_written(folder.path().join(asked)),
-                folder.path().join(there)
-            );
-        }
-        // Two that might be meant are none.
-        std::fs::write(folder.path().join("A.jpeg"), "").unwrap();
-        assert_eq!(
-            as_written(folder.path().join("a.jpg")),
-            folder.path().join("a.jpg")
         );
     }
 

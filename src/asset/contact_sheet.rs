@@ -1,6 +1,8 @@
 //! A sheet of all cut-outs of a folder over four backgrounds, so that a person sees faults at once.
 
-use super::{Library, Photo, Texture};
+use super::library::{Library, Photo};
+use super::manifest::PhotoRecord;
+use super::texture::Texture;
 use crate::color::to_srgb8;
 use crate::draw::{self, TextSize};
 use crate::filter;
@@ -9,17 +11,17 @@ use crate::pixel::{Film, LinearRgb, Mix, Srgb8};
 use rayon::prelude::*;
 
 /// Longer side of a cut-out on the sheet, pixels.
-const SIDE: usize = 240;
+const CUT_OUT_SIDE_PX: usize = 240;
 /// Pixels between things.
-const GAP: usize = 8;
+const GAP_PX: usize = 8;
 /// Photos beside each other.
 const COLUMNS: usize = 2;
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
 const WARNING: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
 /// Side of a square of the checkerboard, pixels, and its two greys, scene-linear.
-const SQUARE: usize = 8;
-const GREYS: [f32; 2] = [0.2, 0.45];
+const SQUARE_PX: usize = 8;
+const CHECKER_GREYS: [f32; 2] = [0.2, 0.45];
 /// A screen's green, so that what is left of a green screen cannot be seen here and is seen on the others.
 const GREEN: LinearRgb = LinearRgb::new(0.05, 0.45, 0.08);
 
@@ -27,13 +29,17 @@ const GREEN: LinearRgb = LinearRgb::new(0.05, 0.45, 0.08);
 type Background = fn(usize, usize) -> LinearRgb;
 
 const BACKGROUNDS: [Background; 4] = [
-    |x, y| LinearRgb::grey(GREYS[(x / SQUARE + y / SQUARE) % GREYS.len()]),
+    |x, y| LinearRgb::grey(CHECKER_GREYS[(x / SQUARE_PX + y / SQUARE_PX) % CHECKER_GREYS.len()]),
     |_, _| LinearRgb::BLACK,
     |_, _| LinearRgb::WHITE,
     |_, _| GREEN,
 ];
 
-/// Every cut-out over a checkerboard, black, white and green, with its size, how sure outline and colour are and why it is in doubt.
+/// Width of a cut-out over all backgrounds, pixels.
+const STRIP_WIDTH_PX: usize = BACKGROUNDS.len() * (CUT_OUT_SIDE_PX + GAP_PX);
+
+/// Every cut-out over a checkerboard, black, white and green, with its size, the confidence in outline and colour, and why it
+/// needs a review.
 pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
     let photos: Vec<&Photo> = library
         .assets
@@ -41,75 +47,83 @@ pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
         .flat_map(|asset| &asset.photos)
         .collect();
     let strips: Vec<Image<Srgb8>> = photos.par_iter().map(|photo| strip(photo)).collect();
-    let rows = strips.chunks(COLUMNS);
-    let cell = [BACKGROUNDS.len() * (SIDE + GAP) + 2 * GAP, 0];
-    let heights: Vec<usize> = rows
-        .clone()
-        .map(|row| row.iter().map(Image::height).max().unwrap_or(0) + GAP)
+    in_columns(&strips)
+}
+
+/// Strips in rows from the top left, each row as high as its highest.
+fn in_columns(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
+    let rows: Vec<(&[Image<Srgb8>], usize)> = strips
+        .chunks(COLUMNS)
+        .map(|row| {
+            (
+                row,
+                row.iter().map(Image::height).max().unwrap_or(0) + GAP_PX,
+            )
+        })
         .collect();
     let columns = COLUMNS.min(strips.len().max(1));
+    let column_width = STRIP_WIDTH_PX + 2 * GAP_PX;
     let mut sheet = Image::filled(
-        columns * cell[0] + GAP,
-        heights.iter().sum::<usize>() + GAP,
+        columns * column_width + GAP_PX,
+        rows.iter().map(|(_, height)| height).sum::<usize>() + GAP_PX,
         PAPER,
     );
-    let mut top = GAP;
-    for (row, height) in rows.zip(heights) {
+    let mut top = GAP_PX;
+    for (row, height) in rows {
         for (i, strip) in row.iter().enumerate() {
-            draw::paste(&mut sheet, [GAP + i * cell[0], top], strip);
+            draw::paste(&mut sheet, [GAP_PX + i * column_width, top], strip);
         }
         top += height;
     }
     sheet
 }
 
-/// One cut-out over all backgrounds under a line of text.
+/// One cut-out over all backgrounds under lines of text.
 fn strip(photo: &Photo) -> Image<Srgb8> {
     let cutout = small(&photo.texture);
     let (w, h) = cutout.size();
-    let record = &photo.record;
+    let lines = lines_of(&photo.record);
     let line_height = TextSize::Small.height();
-    let width = BACKGROUNDS.len() * (SIDE + GAP);
-    let [length, across] = record.object_m.map(|m| 1e3 * m);
-    let title = format!(
-        "{}  {length:.1} x {across:.1} mm (+- {:.1})  outline confidence {:.2}{}",
-        record.file,
-        1e3 * record.error_m,
-        record.outline_confidence,
-        record
-            .color_confidence
-            .map(|sure| format!(", colour {sure:.2}"))
-            .unwrap_or_default()
-    );
-    let reasons = record.diagnostics.iter().map(|d| (&d.message, WARNING));
-    let lines: Vec<(String, Srgb8)> = std::iter::once((&title, INK))
-        .chain(reasons)
-        .flat_map(|(text, ink)| {
-            draw::wrapped(text, width, TextSize::Small)
-                .into_iter()
-                .map(move |line| (line, ink))
-        })
-        .collect();
-    let text_height = lines.len() * line_height + GAP / 2;
-    let mut canvas = Image::filled(width, text_height + h, PAPER);
+    let text_height = lines.len() * line_height + GAP_PX / 2;
+    let mut canvas = Image::filled(STRIP_WIDTH_PX, text_height + h, PAPER);
     for (i, (line, ink)) in lines.iter().enumerate() {
-        draw::text(
-            &mut canvas,
-            [0, (i * line_height) as isize],
-            line,
-            *ink,
-            TextSize::Small,
-        );
+        let at = [0, (i * line_height) as isize];
+        draw::text(&mut canvas, at, line, *ink, TextSize::Small);
     }
     for (i, background) in BACKGROUNDS.iter().enumerate() {
         let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over_color(background(x, y)));
-        draw::paste(
-            &mut canvas,
-            [i * (SIDE + GAP), text_height],
-            &to_srgb8(&over),
-        );
+        let at = [i * (CUT_OUT_SIDE_PX + GAP_PX), text_height];
+        draw::paste(&mut canvas, at, &to_srgb8(&over));
     }
     canvas
+}
+
+/// What is written over a cut-out: its size, and why it needs a review.
+fn lines_of(record: &PhotoRecord) -> Vec<(String, Srgb8)> {
+    let title = title(record);
+    let reasons = record.diagnostics.iter().map(|d| (&d.message, WARNING));
+    std::iter::once((&title, INK))
+        .chain(reasons)
+        .flat_map(|(text, ink)| {
+            draw::wrapped(text, STRIP_WIDTH_PX, TextSize::Small)
+                .into_iter()
+                .map(move |line| (line, ink))
+        })
+        .collect()
+}
+
+fn title(record: &PhotoRecord) -> String {
+    let [length, width] = record.object_m.map(|m| 1e3 * m);
+    let color = record
+        .color_confidence
+        .map(|confidence| format!(", colour {confidence:.2}"))
+        .unwrap_or_default();
+    format!(
+        "{}  {length:.1} x {width:.1} mm (+- {:.1})  outline confidence {:.2}{color}",
+        record.file,
+        1e3 * record.error_m,
+        record.outline_confidence,
+    )
 }
 
 fn small(cutout: &Texture) -> Image<Film> {
@@ -121,19 +135,18 @@ fn small(cutout: &Texture) -> Image<Film> {
 
 fn fitted<P: Mix>(cutout: &Image<P>) -> Image<P> {
     let (w, h) = cutout.size();
-    let longest = w.max(h).max(SIDE);
-    let side = |len: usize| (len * SIDE).div_ceil(longest).max(1);
+    let longest = w.max(h).max(CUT_OUT_SIDE_PX);
+    let side = |len: usize| (len * CUT_OUT_SIDE_PX).div_ceil(longest).max(1);
     filter::resize(cutout, side(w), side(h))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::manifest::Asset;
     use super::super::manifest::tests::photo;
     use super::*;
-    use crate::asset::Asset;
     use crate::diagnostic::{Code, Diagnostic};
     use crate::pixel::PremulRgba;
-    use std::sync::Arc;
 
     fn library(warnings: &[&str], count: usize) -> Library {
         let mut record = photo("a.exr");
@@ -141,16 +154,10 @@ mod tests {
             .iter()
             .map(|text| Diagnostic::warning(Code::Uncoded, text))
             .collect();
-        let texture = Image::filled(480, 240, PremulRgba::TRANSPARENT).into();
-        let one = Photo {
-            size: [0.4, 0.2],
-            texture,
-            outline_uv: Arc::new([]),
-            record,
-        };
+        let one = Photo::new(Image::filled(480, 240, PremulRgba::TRANSPARENT), record);
         let asset = Asset {
             name: "a".into(),
-            class: 0,
+            class: "cap".into(),
             thickness: 0.01,
             mass: 0.02,
             photos: vec![one; count],
@@ -164,8 +171,8 @@ mod tests {
     #[test]
     fn an_empty_cut_out_shows_the_four_backgrounds() {
         let sheet = contact_sheet(&library(&[], 1));
-        let y = sheet.height() - 3 * GAP;
-        let at = |i: usize| sheet[(GAP + i * (SIDE + GAP) + 2, y)];
+        let y = sheet.height() - 3 * GAP_PX;
+        let at = |i: usize| sheet[(GAP_PX + i * (CUT_OUT_SIDE_PX + GAP_PX) + 2, y)];
         assert_eq!(
             [at(1), at(2)],
             [draw::rgb(0, 0, 0), draw::rgb(255, 255, 255)]

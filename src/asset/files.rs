@@ -1,80 +1,107 @@
-//! The files of one cut-out: film, thumbnail, outline.
+//! The files of one cut-out: film and thumbnail.
 
 use super::thumbnail::thumbnail;
 use crate::error::Result;
 use crate::geom::Point2;
+use crate::image::Image;
 use crate::io;
 use crate::matte::CutOut;
+use crate::pixel::{Film, LinearRgb};
 use crate::stopwatch::Stopwatch;
-use serde::{Deserialize, Serialize};
+use half::f16;
 use std::path::Path;
 
-/// Outline of a cut-out as its own file: `NAME.outline.json`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OutlineFile {
-    /// Convex hull in pixels of the cut-out, clockwise as seen.
-    pub hull_px: Vec<[f64; 2]>,
-    /// Tight outline: rings around the object clockwise, rings around holes the other way.
-    pub rings_px: Vec<Vec<[f64; 2]>>,
-}
-
-/// Names of the channels of a cut-out's file; see [`write`].
-const CHANNELS: [&str; 10] = ["R", "G", "B", "A", "TR", "TG", "TB", "VR", "VG", "VB"];
-
-/// Writes film (`.exr`), thumbnail (`.png`) and outline (`.outline.json`) under one name.
+/// Writes film (`.exr`) and thumbnail (`.png`) under one name, and returns the film as it will be read back.
 ///
 /// The EXR holds half floats, zip-compressed: `R G B` is the object's own light F, `A` the mean opacity along the line of
 /// sight (together: premultiplied RGBA for programs that know no film), `TR TG TB` the transmittance as measured, the
 /// object's own shadow included, and `VR VG VB` that of the line of sight alone.
-pub(super) fn write(path: &Path, cut: &CutOut) -> Result<()> {
+pub(super) fn write(path: &Path, cut: &CutOut) -> Result<Image<Film>> {
     let mut watch = Stopwatch::start();
-    let plane =
-        |value: fn(&crate::Film) -> f32| cut.film.pixels().iter().map(value).collect::<Vec<f32>>();
-    let through = |value: fn(&crate::LinearRgb) -> f32| {
-        cut.transmittance
-            .pixels()
-            .iter()
-            .map(value)
-            .collect::<Vec<f32>>()
-    };
-    let planes = [
-        plane(|f| f.color.r),
-        plane(|f| f.color.g),
-        plane(|f| f.color.b),
-        plane(|f| f.to_rgba().a),
-        through(|t| t.r),
-        through(|t| t.g),
-        through(|t| t.b),
-        plane(|f| f.transmittance().r),
-        plane(|f| f.transmittance().g),
-        plane(|f| f.transmittance().b),
-    ];
-    watch.lap("planes");
-    let channels: Vec<(&str, &[f32])> = CHANNELS
-        .into_iter()
-        .zip(planes.iter().map(Vec::as_slice))
+    let channels = channels(cut);
+    let channels: Vec<(&str, &[f32])> = channels
+        .iter()
+        .map(|(name, samples)| (*name, samples.as_slice()))
         .collect();
+    watch.lap("planes");
     io::exr::write_half_channels(path, cut.film.size(), &channels, &[])?;
     watch.lap("film");
     io::write(path.with_extension("png"), &thumbnail(&cut.to_rgba()))?;
     watch.lap("thumbnail");
-    let rings = cut
-        .outline
-        .rings
-        .iter()
-        .map(|ring| ring.iter().map(rounded).collect());
-    let outline = OutlineFile {
-        hull_px: cut.hull.iter().map(rounded).collect(),
-        rings_px: rings.collect(),
-    };
-    io::write_json(path.with_extension("outline.json"), &outline)?;
-    watch.lap("outline");
+    let stored = cut.film.map(as_stored);
+    watch.lap("stored film");
     watch.log("write");
-    Ok(())
+    Ok(stored)
+}
+
+/// The channels of a cut-out's file; see [`write`].
+fn channels(cut: &CutOut) -> [(&'static str, Vec<f32>); 10] {
+    let (film, measured) = (&cut.film, &cut.transmittance);
+    [
+        ("R", plane(film, |f| f.color.r)),
+        ("G", plane(film, |f| f.color.g)),
+        ("B", plane(film, |f| f.color.b)),
+        ("A", plane(film, |f| f.to_rgba().a)),
+        ("TR", plane(measured, |t| t.r)),
+        ("TG", plane(measured, |t| t.g)),
+        ("TB", plane(measured, |t| t.b)),
+        ("VR", plane(film, |f| f.transmittance().r)),
+        ("VG", plane(film, |f| f.transmittance().g)),
+        ("VB", plane(film, |f| f.transmittance().b)),
+    ]
+}
+
+fn plane<P: Copy>(image: &Image<P>, value: fn(&P) -> f32) -> Vec<f32> {
+    image.pixels().iter().map(value).collect()
+}
+
+/// A pixel as it is read back from half floats.
+fn as_stored(film: Film) -> Film {
+    let half = |color: LinearRgb| color.map(through_half);
+    Film::new(half(film.color), half(film.transmittance()))
+}
+
+/// A number as an EXR of half floats keeps it: what is too large becomes the largest.
+fn through_half(value: f32) -> f32 {
+    let most = f32::from(f16::MAX);
+    let kept = if value.is_finite() {
+        value.clamp(-most, most)
+    } else {
+        value
+    };
+    f16::from_f32(kept).to_f32()
 }
 
 /// As exact as a pixel coordinate needs to be in a file that people read.
 pub(super) fn rounded(p: &Point2<f64>) -> [f64; 2] {
     [p.x, p.y].map(|px| (px * 1000.0).round() / 1000.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn film_in_memory_is_what_is_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let film = Image::from_fn(7, 5, |x, y| {
+            let v = (x as f32 + 7.3 * y as f32) / 37.1;
+            Film::new(
+                LinearRgb::new(v, 1e5 * v, 1e-7 * v),
+                LinearRgb::new(1.0 - 0.9 * v, 0.3, v / 3.0),
+            )
+        });
+        let planes = [
+            ("R", plane(&film, |f| f.color.r)),
+            ("G", plane(&film, |f| f.color.g)),
+            ("B", plane(&film, |f| f.color.b)),
+            ("VR", plane(&film, |f| f.transmittance().r)),
+            ("VG", plane(&film, |f| f.transmittance().g)),
+            ("VB", plane(&film, |f| f.transmittance().b)),
+        ];
+        let channels: Vec<_> = planes.iter().map(|(n, v)| (*n, v.as_slice())).collect();
+        io::exr::write_half_channels(&path, film.size(), &channels, &[]).unwrap();
+        assert_eq!(io::read::<Film>(&path).unwrap(), film.map(as_stored));
+    }
 }

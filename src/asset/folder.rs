@@ -1,139 +1,25 @@
 //! Putting photos into an asset folder.
 
+use super::MANIFEST;
+use super::entry::PhotoEntry;
 use super::files;
-use super::ground::OnScreen;
-use super::library::Photo;
-use super::manifest::{AssetRecord, Manifest, PhotoRecord, check_class, check_name};
+use super::library::{Photo, check_pixels};
+use super::manifest::{Manifest, PhotoRecord};
 use super::measure::Measured;
-use super::screen_source::ScreenSource;
-use super::{DEFAULT_MASS, DEFAULT_THICKNESS, MANIFEST};
-use crate::bounds::{MASS, OBJECT, PX_PER_METRE, SURFACE, THICKNESS, WIDTH, number};
+use super::rectified::RectifiedPhoto;
+use super::scale::Scale;
+use super::screen_source::EmptyScreens;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::matte::{ColorDoubts, CutOut, CutOutOptions, cut_out_on};
+use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
 use crate::stopwatch::Stopwatch;
 use std::path::Path;
 
-/// What is known of a photo that is not in the photo.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AddPhoto {
-    /// Name of the object: letters and digits of any language, `_`, `-` and `.`.
-    pub asset: String,
-    /// Name of its class.
-    pub class: String,
-    /// Scale of the photo.
-    pub scale: Scale,
-    /// Thickness of the body that falls, metres.
-    pub thickness: f64,
-    /// Mass, kilograms.
-    pub mass: f64,
-    /// What it was photographed on.
-    pub screen: ScreenSource,
-    /// How it is cut out.
-    pub options: CutOutOptions,
-    /// Names of the folder's classes in order, where they are declared. Default: a class that the folder does not have
-    /// comes behind those that it has.
-    pub classes: Vec<String>,
-}
-
-/// How large the things in a photo are.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scale {
-    /// Pixels of the photo for a metre.
-    PxPerMetre(f64),
-    /// Length of the object along its longest side, metres.
-    Length(f64),
-    /// Length and width of the object, longest first, metres.
-    Size([f64; 2]),
-    /// Width and height of the whole screen, metres, with its corners where they are known (from the top left, clockwise,
-    /// pixels); else they are found. The object's scale is that at half its thickness above the screen.
-    Screen([f64; 2], Option<[[f64; 2]; 4]>),
-    /// Side of the black square of a printed marker that lies on the screen (AprilTag tag36h11 or ArUco DICT_4X4_50),
-    /// metres.
-    Marker(f64),
-}
-
-impl AddPhoto {
-    /// A photo with default thickness, mass and options.
-    pub fn new(asset: impl Into<String>, class: impl Into<String>, scale: Scale) -> Self {
-        Self {
-            asset: asset.into(),
-            class: class.into(),
-            scale,
-            thickness: DEFAULT_THICKNESS,
-            mass: DEFAULT_MASS,
-            screen: ScreenSource::Auto,
-            options: CutOutOptions::default(),
-            classes: Vec::new(),
-        }
-    }
-
-    /// # Errors
-    /// [`Error::Value`] for the first value that cannot be right.
-    pub(super) fn check(&self, manifest: &Manifest) -> Result<()> {
-        check_name(&self.asset).map_err(|e| match e {
-            Error::Value { what, .. } => Error::value("asset", what),
-            other => other,
-        })?;
-        check_class(&self.class)?;
-        manifest.class(&self.class)?;
-        match self.scale {
-            Scale::PxPerMetre(scale) => PX_PER_METRE.check("px_per_metre", scale)?,
-            Scale::Length(length) => OBJECT.check("length", length)?,
-            Scale::Size([length, width]) => {
-                OBJECT.check("length", length)?;
-                WIDTH.check("width", width)?;
-                if width > length {
-                    return Err(Error::value(
-                        "width",
-                        format!("{width}, expected at most the length of {length}"),
-                    ));
-                }
-            }
-            Scale::Screen(size, _) => size
-                .into_iter()
-                .try_for_each(|side| SURFACE.check("screen_size", side))?,
-            Scale::Marker(side) => OBJECT.check("marker_size", side)?,
-        }
-        THICKNESS.check("thickness", self.thickness)?;
-        MASS.check("mass", self.mass)
-    }
-
-    /// The scale makes a thing of the object that can be photographed on a screen.
-    fn check_length(&self, record: &PhotoRecord) -> Result<()> {
-        let length = record.object_m[0];
-        if OBJECT.contains(length) {
-            return Ok(());
-        }
-        let pixels_for = || {
-            OBJECT
-                .unit_meant(length)
-                .map(|unit| format!("; is it pixels for a {unit}?"))
-        };
-        let (at, told, question) = match self.scale {
-            Scale::Length(_) | Scale::Size(_) => return Ok(()),
-            Scale::PxPerMetre(scale) => (
-                "px_per_metre",
-                number(scale),
-                pixels_for().unwrap_or_default(),
-            ),
-            Scale::Screen([w, h], _) => (
-                "screen_size",
-                format!("{} x {}", number(w), number(h)),
-                OBJECT.question(length),
-            ),
-            Scale::Marker(side) => ("marker_size", number(side), OBJECT.question(length)),
-        };
-        let (source, length) = (&record.source, number((1e4 * length).round() / 1e4));
-        let what = format!(
-            "{told}, makes what is in {source} {length} m long, expected {OBJECT}{question}"
-        );
-        Err(Error::value(at, what))
-    }
-}
-
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
+///
+/// `classes` are the names of the folder's classes in order, where they are declared; where there are none, a class that
+/// the folder does not have comes behind those that it has.
 ///
 /// Adding the same photo to the same asset again replaces it. The manifest is written last, whole or not at all. Not for
 /// two processes at once: the later manifest wins.
@@ -143,15 +29,21 @@ impl AddPhoto {
 /// those of writing.
 pub fn add_photo(
     folder: impl AsRef<Path>,
-    photo: impl AsRef<Path>,
-    add: &AddPhoto,
+    entry: &PhotoEntry,
+    classes: &[String],
+    options: &CutOutOptions,
 ) -> Result<Photo> {
     let folder = folder.as_ref();
     let mut manifest = read_or_new(folder)?;
-    manifest.learn(&add.classes, std::iter::once(add.class.as_str()))?;
-    add.check(&manifest)?;
-    let photo = write_photo(folder, photo.as_ref(), add)?;
-    manifest.insert(asset_of(add, photo.record.clone()))?;
+    manifest.add_classes(classes, std::iter::once(entry.class.as_str()))?;
+    entry.check(&manifest)?;
+    let writer = CutOutWriter {
+        folder,
+        options,
+        empty_screens: EmptyScreens::default(),
+    };
+    let photo = writer.write(entry)?;
+    manifest.insert(entry.asset_with(photo.record.clone()))?;
     manifest.write(folder)?;
     Ok(photo)
 }
@@ -164,64 +56,62 @@ pub(super) fn read_or_new(folder: &Path) -> Result<Manifest> {
     }
 }
 
-pub(super) fn asset_of(add: &AddPhoto, photo: PhotoRecord) -> AssetRecord {
-    AssetRecord {
-        name: add.asset.clone(),
-        class: add.class.clone(),
-        thickness: add.thickness,
-        mass: add.mass,
-        photos: vec![photo],
-    }
+/// Cuts objects out of photos and writes the files of a folder, all but its manifest.
+pub(super) struct CutOutWriter<'a> {
+    pub(super) folder: &'a Path,
+    pub(super) options: &'a CutOutOptions,
+    pub(super) empty_screens: EmptyScreens,
 }
 
-/// Cuts the object out of a photo and writes cut-out, outline and thumbnail.
-pub(super) fn write_photo(folder: &Path, photo: &Path, add: &AddPhoto) -> Result<Photo> {
-    let mut watch = Stopwatch::start();
-    let on_screen = on_screen(photo, add).map_err(|e| named(e, photo))?;
-    let empty = add
-        .screen
-        .empty()?
-        .map(|empty| on_screen.same_view(empty))
-        .transpose()?;
-    watch.lap("read");
-    let options = CutOutOptions {
-        screen: add.screen.color().or(add.options.screen),
-        ..add.options.clone()
-    };
-    let cut =
-        cut_out_on(&on_screen.photo, empty.as_ref(), &options).map_err(|e| named(e, photo))?;
-    watch.lap("cut out");
-    for diagnostic in &cut.diagnostics {
-        let level = if diagnostic.code == Code::ScreenHue {
-            log::Level::Warn
-        } else {
-            log::Level::Info
+impl CutOutWriter<'_> {
+    /// Writes the cut-out and the thumbnail of one photo, and returns the photo as it would be read back.
+    pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
+        let mut watch = Stopwatch::start();
+        let photo = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;
+        let empty = self
+            .empty_screens
+            .get(&entry.screen)?
+            .map(|empty| photo.same_view(empty))
+            .transpose()?;
+        watch.lap("read");
+        let options = CutOutOptions {
+            screen: entry.screen.color().or(self.options.screen),
+            ..self.options.clone()
         };
-        log::log!(level, "{}: {diagnostic}", photo.display());
+        let cut = cut_out_on(&photo.photo, empty.as_deref(), &options)
+            .map_err(|e| with_name(e, &entry.file))?;
+        watch.lap("cut out");
+        log_diagnostics(&cut, &entry.file);
+        let record = record(&cut, entry, &photo)?;
+        watch.lap("measure");
+        io::create_folder(self.folder.join(&entry.asset))?;
+        let path = self.folder.join(&record.file);
+        let film = files::write(&path, &cut)?;
+        check_pixels(&film).map_err(|what| Error::file(path, what))?;
+        watch.lap("write");
+        watch.log(entry.file.display());
+        Ok(Photo::new(film, record))
     }
-    let record = record(&cut, add, &on_screen, photo);
-    add.check_length(&record)?;
-    watch.lap("measure");
-    io::create_folder(folder.join(&add.asset))?;
-    files::write(&folder.join(&record.file), &cut)?;
-    watch.lap("write");
-    watch.log(photo.display());
-    Ok(Photo::new(cut.film, record))
 }
 
-/// The photo, seen from straight above where something in it tells of the screen's plane.
-fn on_screen(photo: &Path, add: &AddPhoto) -> Result<OnScreen> {
-    let (picture, height) = (io::read(photo)?, add.thickness / 2.0);
-    match add.scale {
-        Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => Ok(OnScreen::whole(picture)),
-        Scale::Screen(size, corners) => {
-            OnScreen::by_corners(picture, size, corners, height, &io::read_header(photo)?)
+/// The photo, seen from straight above where something in it shows the screen's plane.
+fn read_rectified(entry: &PhotoEntry) -> Result<RectifiedPhoto> {
+    let (scale, file) = (entry.scale()?, &entry.file);
+    let (photo, height) = (io::read(file)?, entry.thickness / 2.0);
+    match scale {
+        Scale::PxPerMetre(_) | Scale::Length(_) | Scale::Size(_) => {
+            Ok(RectifiedPhoto::unchanged(photo))
         }
-        Scale::Marker(side) => OnScreen::by_marker(picture, side, height, &io::read_header(photo)?),
+        Scale::Screen(size, corners) => {
+            RectifiedPhoto::by_corners(photo, size, corners, height, &io::read_header(file)?)
+        }
+        Scale::Marker(side) => {
+            RectifiedPhoto::by_marker(photo, side, height, &io::read_header(file)?)
+        }
     }
 }
 
-fn named(error: Error, photo: &Path) -> Error {
+fn with_name(error: Error, photo: &Path) -> Error {
     match error {
         Error::Photo { what } => Error::Photo {
             what: format!("{}: {what}", photo.display()),
@@ -230,55 +120,48 @@ fn named(error: Error, photo: &Path) -> Error {
     }
 }
 
-/// Where the cut-out of a photo goes.
-pub(super) fn cut_out_file(photo: &Path, add: &AddPhoto) -> String {
-    format!("{}/{}.exr", add.asset, stem(photo))
-}
-
-/// The photo's name without ending, safe as a name anywhere.
-fn stem(photo: &Path) -> String {
-    let stem = photo.file_stem().unwrap_or_default().to_string_lossy();
-    let plain = |c: char| {
-        if c.is_alphanumeric() || c == '-' {
-            c
+fn log_diagnostics(cut: &CutOut, photo: &Path) {
+    for diagnostic in &cut.diagnostics {
+        let level = if diagnostic.code == Code::ScreenHue {
+            log::Level::Warn
         } else {
-            '_'
-        }
-    };
-    stem.chars().map(plain).collect()
+            log::Level::Info
+        };
+        log::log!(level, "{}: {diagnostic}", photo.display());
+    }
 }
 
-fn record(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen, photo: &Path) -> PhotoRecord {
-    let measured = Measured::of(cut, add, on_screen);
-    let file = cut_out_file(photo, add);
+/// What the manifest says of a cut-out.
+///
+/// # Errors
+/// [`Error::Value`] for a scale that makes the object too short or too long.
+fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<PhotoRecord> {
+    let scale = entry.scale()?;
+    let measured = Measured::new(cut, scale, photo);
+    scale.check_length(measured.object_m[0], &entry.source())?;
     let (w, h) = cut.film.size();
+    let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);
+    let outline_px = cut.hull.iter().map(files::rounded).collect();
+    let file = entry.cut_out_file();
     let diagnostics = cut
         .diagnostics
         .iter()
         .filter(|d| Diagnostic::needs_review(d))
         .cloned()
         .chain(measured.size_mismatch)
-        .chain(on_screen.diagnostic());
-    PhotoRecord {
-        file,
-        source: photo
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        px_per_metre: measured.px_per_metre,
-        size_m: [w as f64, h as f64].map(|px| px / measured.px_per_metre),
+        .chain(photo.diagnostic());
+    Ok(PhotoRecord {
+        source: entry.source(),
         object_m: measured.object_m,
         error_m: measured.error_m,
-        hull_m: measured.hull_m,
         screen: cut.screen,
         matte: cut.method,
-        residue: f64::from(cut.residue),
+        residue: f64::from(cut.residual_matte),
         unevenness: f64::from(cut.unevenness),
         outline_confidence: cut.segmentation.confidence.value(),
-        color_confidence: cut.doubts.map(ColorDoubts::confidence),
+        color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
-        outline_px: cut.hull.iter().map(files::rounded).collect(),
         diagnostics: diagnostics.collect(),
-    }
+        ..PhotoRecord::new(file, measured.px_per_metre, size_m, outline_px)
+    })
 }

@@ -1,7 +1,7 @@
 //! An asset folder in memory, ready to be put into scenes.
 
 use super::MANIFEST;
-use super::manifest::{AssetRecord, Manifest, PhotoRecord};
+use super::manifest::{Asset, Manifest, PhotoRecord, class_number};
 use super::texture::Texture;
 use crate::error::{Error, Result};
 use crate::geom::Point2;
@@ -15,32 +15,15 @@ use std::sync::Arc;
 /// Objects to put into scenes.
 #[derive(Clone, Debug)]
 pub struct Library {
-    /// Names of the classes; [`Asset::class`] is a place in this list.
+    /// Names of the classes; a label's number is the place in this list.
     pub classes: Vec<String>,
     /// The assets, by name.
-    pub assets: Vec<Asset>,
-}
-
-/// One object.
-#[derive(Clone, Debug)]
-pub struct Asset {
-    /// Its name.
-    pub name: String,
-    /// Index into the class list.
-    pub class: u32,
-    /// Thickness of the body that falls, metres.
-    pub thickness: f64,
-    /// Mass, kilograms.
-    pub mass: f64,
-    /// Its photos; at least one.
-    pub photos: Vec<Photo>,
+    pub assets: Vec<Asset<Photo>>,
 }
 
 /// One cut-out of an object.
 #[derive(Clone, Debug)]
 pub struct Photo {
-    /// Width and height of the card that carries the whole cut-out, metres.
-    pub size: [f64; 2],
     /// The cut-out, premultiplied, scene-linear.
     pub texture: Texture,
     /// The object's convex hull in texture coordinates (0 to 1, right and down), in order.
@@ -65,48 +48,48 @@ impl Library {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_some(folder: impl AsRef<Path>, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        Self::load(folder.as_ref(), wanted, &[])
+        let mut manifest = Manifest::read(&folder)?;
+        manifest.assets.retain(|asset| wanted(&asset.name));
+        Self::of_manifest(folder.as_ref(), manifest, Vec::new())
     }
 
     /// The same with photos that were just [added](super::add_photo), which need not be read.
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn open_with(folder: impl AsRef<Path>, added: &[Photo]) -> Result<Self> {
-        Self::load(folder.as_ref(), |_| true, added)
+    pub fn open_with(folder: impl AsRef<Path>, added: Vec<Photo>) -> Result<Self> {
+        let manifest = Manifest::read(&folder)?;
+        Self::of_manifest(folder.as_ref(), manifest, added)
     }
 
-    fn load(folder: &Path, wanted: impl Fn(&str) -> bool, added: &[Photo]) -> Result<Self> {
-        let mut manifest = Manifest::read(folder)?;
-        manifest.assets.retain(|asset| wanted(&asset.name));
-        let photos: Vec<(usize, usize)> = manifest
-            .assets
-            .iter()
-            .enumerate()
-            .flat_map(places)
-            .collect();
-        let load = |&(i, j): &(usize, usize)| {
-            let record = &manifest.assets[i].photos[j];
-            let known = added.iter().find(|photo| photo.record == *record).cloned();
-            known.map_or_else(
-                || load(folder, record, &format!("assets[{i}].photos[{j}]")),
-                Ok,
-            )
-        };
-        let loaded: Vec<Result<Photo>> = photos.par_iter().map(load).collect();
-        let mut loaded = loaded.into_iter();
+    /// The library of a manifest that was read or written just now, with photos that need not be read.
+    pub(super) fn of_manifest(
+        folder: &Path,
+        manifest: Manifest,
+        added: Vec<Photo>,
+    ) -> Result<Self> {
+        let records: Vec<(String, &PhotoRecord)> = places_and_records(&manifest).collect();
+        let photos = records.par_iter().map(|(at, record)| {
+            let added = added.iter().find(|photo| photo.record == **record);
+            added.map_or_else(|| load(folder, record, at), |photo| Ok(photo.clone()))
+        });
+        let photos: Vec<Result<Photo>> = photos.collect();
+        let mut photos = photos.into_iter();
         let mut assets = Vec::with_capacity(manifest.assets.len());
-        for record in &manifest.assets {
-            let photos = loaded
-                .by_ref()
-                .take(record.photos.len())
-                .collect::<Result<_>>()?;
+        for Asset {
+            name,
+            class,
+            thickness,
+            mass,
+            photos: records,
+        } in manifest.assets
+        {
             assets.push(Asset {
-                name: record.name.clone(),
-                class: manifest.class(&record.class)?,
-                thickness: record.thickness,
-                mass: record.mass,
-                photos,
+                name,
+                class,
+                thickness,
+                mass,
+                photos: photos.by_ref().take(records.len()).collect::<Result<_>>()?,
             });
         }
         Ok(Self {
@@ -116,51 +99,74 @@ impl Library {
     }
 
     /// The asset of a name.
-    pub fn find(&self, name: &str) -> Option<&Asset> {
+    pub fn find(&self, name: &str) -> Option<&Asset<Photo>> {
         self.assets.iter().find(|asset| asset.name == name)
+    }
+
+    /// Place of an asset's class in the list.
+    ///
+    /// # Panics
+    /// When the asset is none of this library and has a class of its own.
+    pub fn class_number(&self, asset: &Asset<Photo>) -> u32 {
+        class_number(&self.classes, &asset.class).expect("a class of the library")
     }
 }
 
-fn places((i, asset): (usize, &AssetRecord)) -> impl Iterator<Item = (usize, usize)> + use<> {
-    (0..asset.photos.len()).map(move |j| (i, j))
+/// All photos of a manifest, with where they stand in it.
+fn places_and_records(manifest: &Manifest) -> impl Iterator<Item = (String, &PhotoRecord)> {
+    manifest.assets.iter().enumerate().flat_map(|(i, asset)| {
+        let photos = asset.photos.iter().enumerate();
+        photos.map(move |(j, photo)| (format!("assets[{i}].photos[{j}]"), photo))
+    })
 }
 
 /// By how many pixels a picture may differ from the size that its manifest gives in metres: rounding.
-const SLACK_PX: f64 = 0.5;
+const ROUNDING_PX: f64 = 0.5;
 
+/// Reads the cut-out of a record that stands at a place of the manifest.
 fn load(folder: &Path, record: &PhotoRecord, at: &str) -> Result<Photo> {
-    let path = io::inside(folder, &record.file)
-        .map_err(|e| e.within(at).in_file(folder.join(MANIFEST)))?;
+    let in_manifest = |e: Error| e.within(at).in_file(folder.join(MANIFEST));
+    let path = io::inside(folder, &record.file).map_err(in_manifest)?;
     let image: Image<Film> = io::read(&path)?;
-    let (w, h) = (image.width() as f64, image.height() as f64);
-    let told = record.size_m.map(|side| side * record.px_per_metre);
-    if (told[0] - w).abs() > SLACK_PX || (told[1] - h).abs() > SLACK_PX {
-        let what = format!(
-            "{:.1} x {:.1} pixels, but {} has {w} x {h}",
-            told[0], told[1], record.file
-        );
-        return Err(Error::value("size_m", what)
-            .within(at)
-            .in_file(folder.join(MANIFEST)));
-    }
-    if let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) {
-        let (x, y) = (i % image.width(), i / image.width());
-        let Film { color, opacity } = image.pixels()[i];
-        let [color, opacity] = [color, opacity].map(<[f32; 3]>::from);
-        let told = format!("colour {color:?} and opacity {opacity:?} at ({x}, {y})");
-        let what = format!("{told}, expected finite colour and opacity from 0 to 1");
-        return Err(Error::file(path, what));
-    }
+    check_size(&image, record).map_err(in_manifest)?;
+    check_pixels(&image).map_err(|what| Error::file(path, what))?;
     Ok(Photo::new(image, record.clone()))
+}
+
+fn check_size(image: &Image<Film>, record: &PhotoRecord) -> Result<()> {
+    let [w, h] = [image.width() as f64, image.height() as f64];
+    let expected = record.size_px();
+    if (expected[0] - w).abs() <= ROUNDING_PX && (expected[1] - h).abs() <= ROUNDING_PX {
+        return Ok(());
+    }
+    let what = format!(
+        "{:.1} x {:.1} pixels, but {} has {w} x {h}",
+        expected[0], expected[1], record.file
+    );
+    Err(Error::value("size_m", what))
+}
+
+/// What is wrong with the first pixel that no picture has.
+pub(super) fn check_pixels(image: &Image<Film>) -> std::result::Result<(), String> {
+    let Some(i) = image.pixels().iter().position(|p| !p.is_sound()) else {
+        return Ok(());
+    };
+    let (x, y) = (i % image.width(), i / image.width());
+    let Film { color, opacity } = image.pixels()[i];
+    let [color, opacity] = [color, opacity].map(<[f32; 3]>::from);
+    Err(format!(
+        "colour {color:?} and opacity {opacity:?} at ({x}, {y}), expected finite colour and opacity from 0 to 1"
+    ))
 }
 
 impl Photo {
     /// A cut-out and what the manifest says of it.
-    pub(super) fn new(image: Image<Film>, record: PhotoRecord) -> Self {
-        let (w, h) = (image.width() as f64, image.height() as f64);
+    pub fn new(cut_out: impl Into<Texture>, record: PhotoRecord) -> Self {
+        let texture = cut_out.into();
+        let (w, h) = texture.size();
+        let [w, h] = [w as f64, h as f64];
         Self {
-            size: record.size_m,
-            texture: image.into(),
+            texture,
             outline_uv: record
                 .outline_px
                 .iter()
@@ -168,6 +174,11 @@ impl Photo {
                 .collect(),
             record,
         }
+    }
+
+    /// Width and height of the card that carries the whole cut-out, metres.
+    pub fn size(&self) -> [f64; 2] {
+        self.record.size_m
     }
 }
 
@@ -180,7 +191,7 @@ mod tests {
     fn folder_with(picture: Option<(usize, usize)>) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let photos = vec![photo("a.exr")];
-        let record = AssetRecord {
+        let record = Asset {
             name: "a".into(),
             class: "label".into(),
             thickness: 0.01,
@@ -206,7 +217,7 @@ mod tests {
         let folder = folder_with(Some((40, 20)));
         let library = Library::open(folder.path()).unwrap();
         let asset = library.find("a").unwrap();
-        assert_eq!((asset.class, asset.photos.len()), (2, 1));
+        assert_eq!((library.class_number(asset), asset.photos.len()), (2, 1));
         assert_eq!(
             asset.photos[0].texture.texel(3, 3),
             PremulRgba::new(0.25, 0.5, 0.125, 0.75).into()
@@ -228,14 +239,14 @@ mod tests {
             .remove(0);
         let film = Image::filled(40, 20, Film::from(PremulRgba::new(0.25, 0.5, 0.125, 0.75)));
         let library =
-            Library::open_with(folder.path(), &[Photo::new(film, record.clone())]).unwrap();
+            Library::open_with(folder.path(), vec![Photo::new(film, record.clone())]).unwrap();
         assert_eq!(library.assets[0].photos[0].texture.size(), (40, 20));
         let other = PhotoRecord {
             file: "b.exr".into(),
             ..record
         };
         let stranger = Photo::new(Image::filled(40, 20, Film::default()), other);
-        assert!(Library::open_with(folder.path(), &[stranger]).is_err());
+        assert!(Library::open_with(folder.path(), vec![stranger]).is_err());
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::io;
 use crate::matte::MatteMethod;
 use crate::pixel::LinearRgb;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::path::Path;
 
@@ -19,13 +20,14 @@ pub struct Manifest {
     pub classes: Vec<String>,
     /// The assets, by name.
     #[serde(default)]
-    pub assets: Vec<AssetRecord>,
+    pub assets: Vec<Asset<PhotoRecord>>,
 }
 
-/// One object, which may have been photographed several times.
+/// One object, which may have been photographed several times: of [`PhotoRecord`]s in a manifest, of
+/// [`Photo`](super::Photo)s in a library.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct AssetRecord {
+pub struct Asset<P> {
     /// Its name: letters and digits of any language, `_`, `-` and `.`.
     pub name: String,
     /// Name of its class.
@@ -34,8 +36,8 @@ pub struct AssetRecord {
     pub thickness: f64,
     /// Mass, kilograms.
     pub mass: f64,
-    /// Its photos, by file name.
-    pub photos: Vec<PhotoRecord>,
+    /// Its photos, by file name; at least one.
+    pub photos: Vec<P>,
 }
 
 /// One cut-out.
@@ -52,12 +54,12 @@ pub struct PhotoRecord {
     pub size_m: [f64; 2],
     /// Length and width of the object's tight outline, however it is turned, metres.
     pub object_m: [f64; 2],
-    /// Standard error of these, metres: of the outline, and of the scale where a screen or marker tells it.
+    /// Standard error of these, metres: of the outline, and of the scale where a screen or marker gives it.
     #[serde(default)]
     pub error_m: f64,
-    /// Length and width of its convex hull, metres; 0 where nobody has measured them.
-    #[serde(default)]
-    pub hull_m: [f64; 2],
+    /// Length and width of the convex hull, which older manifests hold and nobody reads.
+    #[serde(default, rename = "hull_m", skip_serializing)]
+    pub(super) _hull_m: IgnoredKey,
     /// Colour of the screen, scene-linear.
     pub screen: LinearRgb,
     /// Where the matte came from.
@@ -67,10 +69,10 @@ pub struct PhotoRecord {
     /// How uneven the screen was: 1 minus darkest over brightest.
     #[serde(default)]
     pub unevenness: f64,
-    /// How far the outline can be believed, 0 to 1; 1 where a person has looked.
-    #[serde(default = "certain", alias = "confidence")]
+    /// Confidence in the outline, 0 to 1; 1 where a person has reviewed it.
+    #[serde(default = "full_confidence", alias = "confidence")]
     pub outline_confidence: f64,
-    /// How far colour and transmittance can be believed, 0 to 1; missing where nobody has asked.
+    /// Confidence in colour and transmittance, 0 to 1; missing where it was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color_confidence: Option<f64>,
     /// The object reached a border of the photo: part of it is missing.
@@ -86,19 +88,6 @@ pub struct PhotoRecord {
         skip_serializing_if = "Vec::is_empty"
     )]
     pub diagnostics: Vec<Diagnostic>,
-}
-
-impl PhotoRecord {
-    /// A person should review this cut-out.
-    pub fn needs_review(&self) -> bool {
-        self.diagnostics.iter().any(Diagnostic::needs_review)
-    }
-
-    /// The messages of the diagnostics, in one line.
-    pub fn review_reasons(&self) -> String {
-        let messages: Vec<&str> = self.diagnostics.iter().map(|d| &*d.message).collect();
-        messages.join("; ")
-    }
 }
 
 /// Reads diagnostics, and the plain texts (`doubts`) that earlier versions wrote in their place.
@@ -122,8 +111,18 @@ fn coded_or_plain<'de, D: Deserializer<'de>>(
     Ok(diagnostics.collect())
 }
 
-fn certain() -> f64 {
+fn full_confidence() -> f64 {
     1.0
+}
+
+/// A key that may be there and means nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct IgnoredKey;
+
+impl<'de> Deserialize<'de> for IgnoredKey {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        IgnoredAny::deserialize(deserializer).map(|_| Self)
+    }
 }
 
 impl Manifest {
@@ -135,12 +134,8 @@ impl Manifest {
         let path = folder.as_ref().join(MANIFEST);
         let mut manifest: Self = io::read_toml(&path)?;
         if manifest.classes.is_empty() {
-            let met: Vec<String> = manifest
-                .assets
-                .iter()
-                .map(|asset| asset.class.clone())
-                .collect();
-            manifest.learn(&[], met.iter().map(String::as_str))?;
+            let Self { classes, assets } = &mut manifest;
+            append_new(classes, assets.iter().map(|asset| asset.class.as_str()));
         }
         manifest.check().map_err(|e| e.in_file(&path))?;
         Ok(manifest)
@@ -164,7 +159,7 @@ impl Manifest {
     ///
     /// # Errors
     /// [`Error::Value`] (`class`) when the asset is known as something else.
-    pub fn insert(&mut self, asset: AssetRecord) -> Result<()> {
+    pub fn insert(&mut self, asset: Asset<PhotoRecord>) -> Result<()> {
         let Some(known) = self
             .assets
             .iter_mut()
@@ -188,46 +183,39 @@ impl Manifest {
         Ok(())
     }
 
-    /// Takes classes into the list: those that are declared, in that order, or else those met, behind the ones that are
+    /// Takes classes into the list: those that are declared, in that order, or else those in use, behind the ones that are
     /// there, in the order in which they appear. No class that is there changes its number.
     ///
     /// # Errors
     /// [`Error::Value`] (`classes`) for declared ones that do not begin with those that are there.
-    pub(super) fn learn<'a>(
+    pub(super) fn add_classes<'a>(
         &mut self,
         declared: &[String],
-        met: impl Iterator<Item = &'a str>,
+        in_use: impl Iterator<Item = &'a str>,
     ) -> Result<()> {
-        if !declared.is_empty() {
-            unique("classes", declared.iter().map(String::as_str))?;
-            if !declared.starts_with(&self.classes) {
-                let (told, known) = (declared.join(", "), self.classes.join(", "));
-                let what =
-                    format!("{told}; expected to begin with those that the folder has: {known}");
-                return Err(Error::value("classes", what));
-            }
-            self.classes = declared.to_vec();
+        if declared.is_empty() {
+            append_new(&mut self.classes, in_use);
             return Ok(());
         }
-        for class in met {
-            if !self.classes.iter().any(|known| known == class) {
-                self.classes.push(class.to_owned());
-            }
+        check_unique("classes", declared.iter().map(String::as_str))?;
+        if !declared.starts_with(&self.classes) {
+            let (declared, known) = (declared.join(", "), self.classes.join(", "));
+            let what =
+                format!("{declared}; expected to begin with those that the folder has: {known}");
+            return Err(Error::value("classes", what));
         }
+        self.classes = declared.to_vec();
         Ok(())
     }
 
     /// Place of a class in the list.
     ///
     /// # Errors
-    /// [`Error::Value`] (`class`) with the name that was probably meant.
+    /// [`Error::Value`] (`class`) with the names that are known.
     pub fn class(&self, name: &str) -> Result<u32> {
-        let place = self.classes.iter().position(|class| class == name);
-        place.and_then(|i| u32::try_from(i).ok()).ok_or_else(|| {
-            Error::value(
-                "class",
-                format!("\"{name}\", expected one of {}", self.classes.join(", ")),
-            )
+        class_number(&self.classes, name).ok_or_else(|| {
+            let known = self.classes.join(", ");
+            Error::value("class", format!("\"{name}\", expected one of {known}"))
         })
     }
 
@@ -235,11 +223,11 @@ impl Manifest {
         if self.classes.is_empty() {
             return Err(Error::value("classes", "empty, expected at least one"));
         }
-        unique("classes", self.classes.iter().map(String::as_str))?;
+        check_unique("classes", self.classes.iter().map(String::as_str))?;
         for (i, class) in self.classes.iter().enumerate() {
             check_class(class).map_err(|e| e.within(&format!("classes[{i}]")))?;
         }
-        unique(
+        check_unique(
             "assets",
             self.assets.iter().map(|asset| asset.name.as_str()),
         )?;
@@ -252,7 +240,7 @@ impl Manifest {
     }
 }
 
-impl AssetRecord {
+impl Asset<PhotoRecord> {
     fn check(&self) -> Result<()> {
         check_name(&self.name)?;
         THICKNESS.check("thickness", self.thickness)?;
@@ -260,7 +248,7 @@ impl AssetRecord {
         if self.photos.is_empty() {
             return Err(Error::value("photos", "empty, expected at least one"));
         }
-        unique(
+        check_unique(
             "photos",
             self.photos.iter().map(|photo| photo.file.as_str()),
         )?;
@@ -273,45 +261,105 @@ impl AssetRecord {
     }
 }
 
+/// Place of a class in a list of names.
+pub(super) fn class_number(classes: &[String], name: &str) -> Option<u32> {
+    let place = classes.iter().position(|class| class == name)?;
+    u32::try_from(place).ok()
+}
+
+fn append_new<'a>(classes: &mut Vec<String>, in_use: impl Iterator<Item = &'a str>) {
+    for class in in_use {
+        if !classes.iter().any(|known| known == class) {
+            classes.push(class.to_owned());
+        }
+    }
+}
+
 impl PhotoRecord {
+    /// A cut-out of full confidence of which nothing else is known: all of it is the object.
+    pub fn new(
+        file: impl Into<String>,
+        px_per_metre: f64,
+        size_m: [f64; 2],
+        outline_px: Vec<[f64; 2]>,
+    ) -> Self {
+        Self {
+            file: file.into(),
+            source: String::new(),
+            px_per_metre,
+            size_m,
+            object_m: size_m,
+            error_m: 0.0,
+            _hull_m: IgnoredKey,
+            screen: LinearRgb::BLACK,
+            matte: MatteMethod::Physical,
+            residue: 0.0,
+            unevenness: 0.0,
+            outline_confidence: full_confidence(),
+            color_confidence: None,
+            truncated: false,
+            outline_px,
+            diagnostics: Vec::new(),
+        }
+    }
+
+    /// A person should review this cut-out.
+    pub fn needs_review(&self) -> bool {
+        self.diagnostics.iter().any(Diagnostic::needs_review)
+    }
+
+    /// The messages of the diagnostics, in one line.
+    pub fn review_reasons(&self) -> String {
+        let messages: Vec<&str> = self.diagnostics.iter().map(|d| &*d.message).collect();
+        messages.join("; ")
+    }
+
+    /// Width and height of the cut-out, pixels.
+    pub(super) fn size_px(&self) -> [f64; 2] {
+        self.size_m.map(|side| side * self.px_per_metre)
+    }
+
     fn check(&self) -> Result<()> {
         io::below("", &self.file)?;
         PX_PER_METRE.check("px_per_metre", self.px_per_metre)?;
         self.size_m
             .into_iter()
-            .try_for_each(|side| CARD.check("size_m", side))?;
+            .try_for_each(|side| CUT_OUT_SIDE.check("size_m", side))?;
         OBJECT.check("object_m[0]", self.object_m[0])?;
         WIDTH.check("object_m[1]", self.object_m[1])?;
-        let share = Bounds::new(0.0, 1.0, "a share");
-        share.check("outline_confidence", self.outline_confidence)?;
-        self.color_confidence
-            .map_or(Ok(()), |told| share.check("color_confidence", told))?;
+        CONFIDENCE.check("outline_confidence", self.outline_confidence)?;
+        if let Some(confidence) = self.color_confidence {
+            CONFIDENCE.check("color_confidence", confidence)?;
+        }
+        self.check_outline()
+    }
+
+    fn check_outline(&self) -> Result<()> {
         if self.outline_px.len() < 3 {
             let what = format!("{} points, expected at least 3", self.outline_px.len());
             return Err(Error::value("outline_px", what));
         }
-        let [w, h] = self.size_m.map(|side| side * self.px_per_metre);
-        let outside =
-            |&[x, y]: &[f64; 2]| !((-1.0..=w + 1.0).contains(&x) && (-1.0..=h + 1.0).contains(&y));
-        match self.outline_px.iter().position(outside) {
-            Some(i) => {
-                let [x, y] = self.outline_px[i];
+        let [w, h] = self.size_px();
+        for (i, [x, y]) in self.outline_px.iter().enumerate() {
+            if !((-1.0..=w + 1.0).contains(x) && (-1.0..=h + 1.0).contains(y)) {
                 let what = format!("({x}, {y}), expected a point inside {w:.0} x {h:.0} pixels");
-                Err(Error::value(format!("outline_px[{i}]"), what))
+                return Err(Error::value(format!("outline_px[{i}]"), what));
             }
-            None => Ok(()),
         }
+        Ok(())
     }
 }
 
+const CONFIDENCE: Bounds = Bounds::new(0.0, 1.0, "a share");
+
 /// Side of a whole cut-out, metres: the object's, and the margin around it.
-const CARD: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m long");
+const CUT_OUT_SIDE: Bounds = Bounds::metres(1e-4, 20.0, "objects are 5 mm to 5 m long");
 
 /// A name that is safe as the name of a file: letters and digits of any language.
 pub(super) fn check_name(name: &str) -> Result<()> {
     let plain = |c: char| c.is_alphanumeric() || "_-.".contains(c);
     if !name.is_empty()
-        && name.len() <= LONGEST_NAME
+        && name.len() <= MAX_NAME_BYTES
         && name.chars().all(plain)
         && !name.starts_with('.')
     {
@@ -319,34 +367,39 @@ pub(super) fn check_name(name: &str) -> Result<()> {
     }
     Err(Error::value(
         "name",
-        format!("\"{}\", expected letters, digits, _ and -", shown(name)),
+        format!(
+            "\"{}\", expected letters, digits, _ and -",
+            printable_start(name)
+        ),
     ))
 }
 
 /// File systems allow 255 bytes with what is put behind.
-const LONGEST_NAME: usize = 120;
+const MAX_NAME_BYTES: usize = 120;
 
 /// A name that stands on a line of its own in every format of labels.
 pub(super) fn check_class(name: &str) -> Result<()> {
-    if !name.trim().is_empty() && name.len() <= LONGEST_NAME && !name.chars().any(char::is_control)
+    if !name.trim().is_empty()
+        && name.len() <= MAX_NAME_BYTES
+        && !name.chars().any(char::is_control)
     {
         return Ok(());
     }
     Err(Error::value(
         "class",
-        format!("\"{}\", expected a name on one line", shown(name)),
+        format!("\"{}\", expected a name on one line", printable_start(name)),
     ))
 }
 
 /// The beginning of a name, on one line.
-fn shown(name: &str) -> String {
+fn printable_start(name: &str) -> String {
     name.chars()
-        .take(LONGEST_NAME)
+        .take(MAX_NAME_BYTES)
         .flat_map(char::escape_debug)
         .collect()
 }
 
-fn unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
+fn check_unique<'a>(at: &str, names: impl Iterator<Item = &'a str>) -> Result<()> {
     let mut seen = std::collections::BTreeSet::new();
     for (i, name) in names.enumerate() {
         if !seen.insert(name) {
@@ -364,29 +417,23 @@ pub(super) mod tests {
     use super::*;
 
     pub(in super::super) fn photo(file: &str) -> PhotoRecord {
+        let outline_px = vec![[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]];
         PhotoRecord {
-            file: file.into(),
             source: "IMG_1.jpg".into(),
-            px_per_metre: 100.0,
-            size_m: [0.4, 0.2],
             object_m: [0.35, 0.15],
             error_m: 0.001,
-            hull_m: [0.35, 0.15],
             screen: LinearRgb::new(0.1, 0.5, 0.1),
-            matte: MatteMethod::Physical,
             residue: 0.01,
             unevenness: 0.1,
             outline_confidence: 0.9,
             color_confidence: Some(0.8),
-            truncated: false,
-            outline_px: vec![[1.0, 1.0], [39.0, 1.0], [39.0, 19.0]],
-            diagnostics: Vec::new(),
+            ..PhotoRecord::new(file, 100.0, [0.4, 0.2], outline_px)
         }
     }
 
-    fn asset(name: &str, class: &str) -> AssetRecord {
+    fn asset(name: &str, class: &str) -> Asset<PhotoRecord> {
         let photos = vec![photo(&format!("{name}/1.exr"))];
-        AssetRecord {
+        Asset {
             name: name.into(),
             class: class.into(),
             thickness: 0.005,
@@ -455,6 +502,23 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn the_hull_of_older_manifests_is_read_and_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut manifest = two();
+        manifest.write(folder.path()).unwrap();
+        let path = folder.path().join(MANIFEST);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(!text.contains("hull_m"), "{text}");
+        let older = text.replace(
+            "error_m = ",
+            "hull_m = [\n    0.35,\n    0.15,\n]\nerror_m = ",
+        );
+        assert_ne!(older, text);
+        std::fs::write(&path, older).unwrap();
+        assert_eq!(Manifest::read(folder.path()).unwrap(), manifest);
+    }
+
+    #[test]
     fn classes_are_those_declared_or_those_met_and_keep_their_numbers() {
         let learned = |known: &[&str], declared: &[&str], met: &[&str]| {
             let own = |names: &[&str]| {
@@ -468,7 +532,7 @@ pub(super) mod tests {
                 ..Manifest::default()
             };
             manifest
-                .learn(&own(declared), met.iter().copied())
+                .add_classes(&own(declared), met.iter().copied())
                 .map(|()| manifest.classes)
                 .map_err(|e| e.to_string())
         };

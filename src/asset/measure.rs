@@ -1,7 +1,7 @@
 //! How large an object is, with the error of that.
 
-use super::folder::{AddPhoto, Scale};
-use super::ground::OnScreen;
+use super::rectified::{RectifiedPhoto, ScreenScale};
+use super::scale::Scale;
 use super::size::oriented_size;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Vector2};
@@ -13,8 +13,6 @@ pub(super) struct Measured {
     pub(super) px_per_metre: f64,
     /// Length and width of the tight outline.
     pub(super) object_m: [f64; 2],
-    /// Length and width of the hull.
-    pub(super) hull_m: [f64; 2],
     /// Standard error of the length.
     pub(super) error_m: f64,
     /// The given size does not fit the outline.
@@ -25,37 +23,44 @@ pub(super) struct Measured {
 /// of the boxes of 48 rendered bottles, each against the renderer's exact box, was 0.39 for the tight outline (0.41 on 36
 /// photos, 0.29 on 12 of other seeds) and 0.48 for the hull; of the two the larger.
 const SIDE_ERROR_PX: f64 = 0.5;
-/// Told and measured proportions may differ by this share.
+/// Given and measured proportions may differ by this share.
 const PROPORTION_SLACK: f64 = 0.05;
 
 impl Measured {
-    pub(super) fn of(cut: &CutOut, add: &AddPhoto, on_screen: &OnScreen) -> Self {
+    pub(super) fn new(cut: &CutOut, scale: Scale, photo: &RectifiedPhoto) -> Self {
         let tight = oriented_size(&cut.outline.hull());
-        let hull = oriented_size(&cut.hull);
-        let [of_ground, sigma] = on_screen.scale(middle(cut)).unwrap_or([1.0, 0.0]);
-        let px_per_metre = match add.scale {
+        let screen = photo.scale(middle_px(cut)).unwrap_or(ScreenScale {
+            px_per_metre: 1.0,
+            sigma: 0.0,
+        });
+        let px_per_metre = match scale {
             Scale::PxPerMetre(scale) => scale * cut.scale,
-            Scale::Screen(..) | Scale::Marker(_) => of_ground * cut.scale,
+            Scale::Screen(..) | Scale::Marker(_) => screen.px_per_metre * cut.scale,
             Scale::Length(length) => tight[0] / length,
             // Least squares over both sides.
             Scale::Size([l, w]) => (tight[0] * l + tight[1] * w) / (l * l + w * w),
         };
-        let side_px = SIDE_ERROR_PX * cut.segmentation.reduction * cut.scale;
-        let tips_px = 0.5 * (hull[0] - tight[0]).abs().max((hull[1] - tight[1]).abs());
-        let error_px = libm::hypot(std::f64::consts::SQRT_2 * side_px, tips_px);
+        let error_px = outline_error_px(cut, tight);
         let metres = |px: f64| px / px_per_metre;
         Self {
             px_per_metre,
             object_m: tight.map(metres),
-            hull_m: hull.map(metres),
-            error_m: libm::hypot(metres(error_px), sigma * metres(tight[0])),
-            size_mismatch: size_mismatch(tight, error_px, add.scale),
+            error_m: libm::hypot(metres(error_px), screen.sigma * metres(tight[0])),
+            size_mismatch: size_mismatch(tight, error_px, scale),
         }
     }
 }
 
+/// Standard error of the length of an outline, and how far its tips may lie beyond it, pixels of the cut-out.
+fn outline_error_px(cut: &CutOut, tight: [f64; 2]) -> f64 {
+    let hull = oriented_size(&cut.hull);
+    let side_px = SIDE_ERROR_PX * cut.segmentation.reduction * cut.scale;
+    let tips_px = 0.5 * (hull[0] - tight[0]).abs().max((hull[1] - tight[1]).abs());
+    libm::hypot(std::f64::consts::SQRT_2 * side_px, tips_px)
+}
+
 /// The middle of the object's hull in pixels of the photo.
-fn middle(cut: &CutOut) -> Point2<f64> {
+fn middle_px(cut: &CutOut) -> Point2<f64> {
     let count = cut.hull.len().max(1) as f64;
     let middle = cut
         .hull

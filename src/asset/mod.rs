@@ -2,39 +2,45 @@
 //!
 //! An asset folder holds `assets.toml` ([`Manifest`]) and, in a folder for each asset, its cut-outs (half-float EXR,
 //! scene-linear: `R G B A` premultiplied, `TR TG TB` transmittance as measured, `VR VG VB` that of the line of sight) with
-//! a thumbnail PNG and its outline (`NAME.outline.json`, [`OutlineFile`]) beside each. The manifest is written last and whole, so that a
-//! folder never names a picture that is not there.
+//! a thumbnail PNG beside each. The manifest is written last and whole, so that a folder never names a picture that is not
+//! there.
 //!
 //! ```text
-//! photos.toml -build-> folder -Library::open-> Library        photo -add_photo-> the same folder
+//! photos.toml -build-> folder and Library        folder -Library::open-> Library        photo -add_photo-> the same folder
 //! ```
 
 mod build;
 mod contact_sheet;
+mod entry;
 mod files;
 mod folder;
-mod ground;
+mod inpaint;
 mod library;
 mod list;
 mod manifest;
 mod measure;
 mod moments;
 mod panorama;
+mod rectified;
+mod scale;
+mod screen_pose;
 mod screen_source;
 mod size;
 mod spreadsheet;
 mod texture;
 mod thumbnail;
+mod top_view;
 
 pub use build::{Built, build};
 pub use contact_sheet::contact_sheet;
-pub use files::OutlineFile;
-pub use folder::{AddPhoto, Scale, add_photo};
-pub use library::{Asset, Library, Photo};
-pub use list::{List, ListedPhoto};
-pub use manifest::{AssetRecord, Manifest, PhotoRecord};
+pub use entry::PhotoEntry;
+pub use folder::add_photo;
+pub use library::{Library, Photo};
+pub use list::List;
+pub use manifest::{Asset, Manifest, PhotoRecord};
 pub use moments::{Moments, Piece};
 pub use panorama::{Panorama, direction_to_uv, uv_to_direction};
+pub use scale::Scale;
 pub use screen_source::ScreenSource;
 pub use size::oriented_size;
 pub use texture::Texture;

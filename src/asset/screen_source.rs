@@ -4,11 +4,17 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::LinearRgb;
-use std::path::PathBuf;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 /// What is known of the screen: `auto`, a colour `R,G,B` (scene-linear) or a photo of the empty screen.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub enum ScreenSource {
     /// Nothing: it is fitted to each photo.
     #[default]
@@ -20,7 +26,7 @@ pub enum ScreenSource {
 }
 
 impl ScreenSource {
-    /// The colour, where it is told.
+    /// The colour, where it is given.
     pub(super) fn color(&self) -> Option<LinearRgb> {
         if let Self::Color(color) = self {
             Some(*color)
@@ -29,13 +35,34 @@ impl ScreenSource {
         }
     }
 
-    /// The photo of the empty screen, where there is one.
-    pub(super) fn empty(&self) -> Result<Option<Image<LinearRgb>>> {
+    fn photo(&self) -> Option<&Path> {
         if let Self::Photo(path) = self {
-            io::read(path).map(Some)
+            Some(path)
         } else {
-            Ok(None)
+            None
         }
+    }
+}
+
+impl TryFrom<String> for ScreenSource {
+    type Error = String;
+
+    fn try_from(text: String) -> std::result::Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        if text.is_empty() {
+            return Err("empty, expected auto, R,G,B or a photo".into());
+        }
+        let numbers: std::result::Result<Vec<f32>, _> =
+            text.split(',').map(|n| n.trim().parse()).collect();
+        let Ok(numbers) = numbers else {
+            return Ok(Self::Photo(text.into()));
+        };
+        let channels: std::result::Result<[f32; 3], _> = numbers.try_into();
+        channels
+            .map(|c| Self::Color(c.into()))
+            .map_err(|n| format!("{} numbers, expected auto, R,G,B or a photo", n.len()))
     }
 }
 
@@ -43,26 +70,59 @@ impl FromStr for ScreenSource {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        if text == "auto" {
-            return Ok(Self::Auto);
+        Self::try_from(text.to_owned()).map_err(|what| Error::value("screen", what))
+    }
+}
+
+impl fmt::Display for ScreenSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Color(LinearRgb { r, g, b }) => write!(f, "{r},{g},{b}"),
+            Self::Photo(path) => write!(f, "{}", path.display()),
         }
-        let numbers: std::result::Result<Vec<f32>, _> =
-            text.split(',').map(|n| n.trim().parse()).collect();
-        match numbers {
-            Err(_) if text.is_empty() => Err(Error::value(
-                "screen",
-                "empty, expected auto, R,G,B or a photo",
-            )),
-            Err(_) => Ok(Self::Photo(text.into())),
-            Ok(numbers) => {
-                let channels: std::result::Result<[f32; 3], _> = numbers.try_into();
-                channels.map(|c| Self::Color(c.into())).map_err(|n| {
-                    Error::value(
-                        "screen",
-                        format!("{} numbers, expected auto, R,G,B or a photo", n.len()),
-                    )
-                })
-            }
+    }
+}
+
+impl From<ScreenSource> for String {
+    fn from(screen: ScreenSource) -> Self {
+        screen.to_string()
+    }
+}
+
+/// Photos of empty screens that several photos share, each decoded once.
+#[derive(Debug, Default)]
+pub(super) struct EmptyScreens {
+    shared: BTreeMap<PathBuf, Image<LinearRgb>>,
+}
+
+impl EmptyScreens {
+    /// Reads those that are named more than once. One that cannot be read is left to the first photo that needs it, whose
+    /// error names it.
+    pub(super) fn shared_by<'a>(screens: impl Iterator<Item = &'a ScreenSource>) -> Self {
+        let mut uses: BTreeMap<&Path, usize> = BTreeMap::new();
+        for path in screens.filter_map(ScreenSource::photo) {
+            *uses.entry(path).or_default() += 1;
+        }
+        let shared = uses
+            .into_par_iter()
+            .filter(|(_, count)| *count > 1)
+            .filter_map(|(path, _)| Some((path.to_owned(), io::read(path).ok()?)))
+            .collect();
+        Self { shared }
+    }
+
+    /// The photo of the empty screen, where there is one.
+    ///
+    /// # Errors
+    /// Those of [`io::read`].
+    pub(super) fn get(&self, screen: &ScreenSource) -> Result<Option<Cow<'_, Image<LinearRgb>>>> {
+        let Some(path) = screen.photo() else {
+            return Ok(None);
+        };
+        match self.shared.get(path) {
+            Some(image) => Ok(Some(Cow::Borrowed(image))),
+            None => io::read(path).map(|image| Some(Cow::Owned(image))),
         }
     }
 }
@@ -88,5 +148,43 @@ mod tests {
             "screen: 2 numbers, expected auto, R,G,B or a photo"
         );
         assert!(of("").is_err());
+    }
+
+    #[test]
+    fn a_screen_in_a_document_is_the_text_that_gives_it() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Document {
+            screen: ScreenSource,
+        }
+        for text in ["auto", "0.1,0.5,0.25", "empty.png"] {
+            let document: Document = toml::from_str(&format!("screen = \"{text}\"")).unwrap();
+            assert_eq!(document.screen.to_string(), text);
+            let written = toml::to_string(&document).unwrap();
+            assert_eq!(toml::from_str::<Document>(&written).unwrap(), document);
+        }
+    }
+
+    #[test]
+    fn an_empty_screen_that_two_photos_share_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("empty.png");
+        let green = Image::filled(4, 3, LinearRgb::new(0.0, 1.0, 0.0));
+        io::write(&path, &green).unwrap();
+        let shared = ScreenSource::Photo(path.clone());
+        let lost = ScreenSource::Photo(folder.path().join("lost.png"));
+        let all = [&shared, &shared, &lost, &lost, &ScreenSource::Auto];
+        let screens = EmptyScreens::shared_by(all.into_iter());
+        std::fs::remove_file(path).unwrap();
+        assert_eq!(screens.get(&shared).unwrap().unwrap().into_owned(), green);
+        assert!(
+            screens
+                .get(&lost)
+                .unwrap_err()
+                .to_string()
+                .contains("lost.png")
+        );
+        assert!(screens.get(&ScreenSource::Auto).unwrap().is_none());
+        let one = EmptyScreens::shared_by([&shared].into_iter());
+        assert!(one.get(&shared).is_err(), "read when it is needed");
     }
 }

@@ -1,5 +1,8 @@
 //! How surprising a sum of squares is.
 
+/// Another explanation counts where its chi squared is no worse, or better, by this: 1 % of two degrees of freedom.
+pub(crate) const CHI2_99: f64 = 9.2;
+
 /// Probability that a chi squared of `dof` degrees of freedom exceeds `x`; none without degrees of freedom.
 ///
 /// # Method

@@ -2,7 +2,7 @@
 
 use super::error::SolveError;
 use super::options::CornerOrder;
-use super::warning::Warning;
+use crate::diagnostic::{Code, Diagnostic};
 use crate::geom::{Point2, Vector2};
 
 /// Corners closer than this many pixels are one corner; also closer than [`COINCIDENT_SIGMAS`] times their noise.
@@ -13,11 +13,11 @@ const COLLINEAR_SIGMAS: f64 = 3.0;
 /// Below this length of the longest side corner noise is a large part of the picture.
 const SMALL_QUAD_PX: f64 = 50.0;
 
-/// Checked corners: convex, clockwise in the picture (y down), starting at the labelled first.
+/// OrderedCorners corners: convex, clockwise in the picture (y down), starting at the labelled first.
 #[derive(Clone, Debug)]
-pub(crate) struct Checked {
+pub(crate) struct OrderedCorners {
     pub(crate) corners: [Point2<f64>; 4],
-    pub(crate) warnings: Vec<Warning>,
+    pub(crate) warnings: Vec<Diagnostic>,
 }
 
 /// Checks four corners (pixels) labelled with noise `sigma` in a picture of size `image`, and repairs their order.
@@ -29,21 +29,20 @@ pub(crate) fn check(
     sigma: f64,
     image: [u32; 2],
     policy: CornerOrder,
-) -> Result<Checked, SolveError> {
+) -> Result<OrderedCorners, SolveError> {
     refuse_coincident(&labelled, sigma)?;
     let (order, repair) = clockwise(&labelled);
     let corners = order.map(|i| labelled[i]);
     refuse_folded(&corners, sigma)?;
-    if let (CornerOrder::Strict, Some(found)) = (policy, repair) {
+    if let (CornerOrder::Strict, Some(found)) = (policy, repair.clone()) {
         return Err(SolveError::Order(found));
     }
-    let mut warnings: Vec<_> = repair.into_iter().collect();
-    let longest_px = sides(&corners).into_iter().fold(0.0, f64::max);
-    if longest_px < SMALL_QUAD_PX {
-        warnings.push(Warning::SmallQuad { longest_px });
-    }
-    warnings.extend(far_outside(&corners, image));
-    Ok(Checked { corners, warnings })
+    let warnings = repair
+        .into_iter()
+        .chain(small_quad(&corners))
+        .chain(far_outside(&corners, image))
+        .collect();
+    Ok(OrderedCorners { corners, warnings })
 }
 
 /// Twice the signed areas of the triangles that leave out one corner each; in a picture of a rectangle the one without
@@ -77,14 +76,18 @@ fn refuse_coincident(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError>
 }
 
 /// The order in which the corners run clockwise, and what had to be repaired for that.
-fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Warning>) {
+fn clockwise(c: &[Point2<f64>; 4]) -> ([usize; 4], Option<Diagnostic>) {
     let areas = triangle_areas(&c.map(|p| p.coords));
     if areas.iter().all(|&a| a > 0.0) {
         ([0, 1, 2, 3], None)
     } else if areas.iter().all(|&a| a < 0.0) {
-        ([0, 3, 2, 1], Some(Warning::Reversed))
+        let what = "the corners run anticlockwise; the second and fourth were exchanged";
+        let reversed = Diagnostic::warning(Code::CornersReversed, what);
+        ([0, 3, 2, 1], Some(reversed))
     } else {
-        (by_angle(c), Some(Warning::Reordered))
+        let what = "the corners cross each other; sorted clockwise, starting at the first";
+        let reordered = Diagnostic::warning(Code::CornersReordered, what);
+        (by_angle(c), Some(reordered))
     }
 }
 
@@ -121,21 +124,32 @@ fn refuse_folded(c: &[Point2<f64>; 4], sigma: f64) -> Result<(), SolveError> {
     Ok(())
 }
 
-fn sides(c: &[Point2<f64>; 4]) -> [f64; 4] {
-    [0, 1, 2, 3].map(|i| (c[(i + 1) % 4] - c[i]).norm())
+fn small_quad(c: &[Point2<f64>; 4]) -> Option<Diagnostic> {
+    let longest_px = [0, 1, 2, 3]
+        .map(|i| (c[(i + 1) % 4] - c[i]).norm())
+        .into_iter()
+        .fold(0.0, f64::max);
+    let what = || {
+        format!("the longest side is only {longest_px:.1} px; expected at least {SMALL_QUAD_PX}")
+    };
+    (longest_px < SMALL_QUAD_PX).then(|| Diagnostic::warning(Code::SmallQuad, what()))
 }
 
-fn far_outside(c: &[Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Warning> {
-    let size = Vector2::from(image.map(f64::from));
-    let diagonal = size.norm();
+fn far_outside(c: &[Point2<f64>; 4], image: [u32; 2]) -> impl Iterator<Item = Diagnostic> {
     let c = *c;
-    (0..4).filter_map(move |corner| {
-        let inside = Vector2::new(
-            c[corner].x.clamp(0.0, size.x),
-            c[corner].y.clamp(0.0, size.y),
-        );
-        ((c[corner].coords - inside).norm() > diagonal).then_some(Warning::Outside { corner })
-    })
+    (0..4)
+        .filter(move |&corner| is_far_outside(c[corner], image))
+        .map(|corner| {
+            let what = format!("corner {corner} lies more than a diagonal outside the picture");
+            Diagnostic::warning(Code::CornerOutside, what)
+        })
+}
+
+/// More than a diagonal of the picture.
+fn is_far_outside(corner: Point2<f64>, image: [u32; 2]) -> bool {
+    let size = Vector2::from(image.map(f64::from));
+    let inside = Vector2::new(corner.x.clamp(0.0, size.x), corner.y.clamp(0.0, size.y));
+    (corner.coords - inside).norm() > size.norm()
 }
 
 #[cfg(test)]
@@ -144,8 +158,12 @@ mod tests {
 
     const QUAD: [[f64; 2]; 4] = [[100.0, 110.0], [600.0, 90.0], [620.0, 410.0], [90.0, 400.0]];
 
-    fn run(c: [[f64; 2]; 4]) -> Result<Checked, SolveError> {
+    fn run(c: [[f64; 2]; 4]) -> Result<OrderedCorners, SolveError> {
         check(c.map(Point2::from), 1.0, [640, 480], CornerOrder::Repair)
+    }
+
+    fn codes(warnings: &[Diagnostic]) -> Vec<Code> {
+        warnings.iter().map(|warning| warning.code).collect()
     }
 
     fn permutations() -> Vec<[usize; 4]> {
@@ -159,10 +177,10 @@ mod tests {
             let checked = run(p.map(|i| QUAD[i])).unwrap();
             let cycle = [0, 1, 2, 3].map(|n| Point2::from(QUAD[(p[0] + n) % 4]));
             assert_eq!(checked.corners, cycle, "{p:?}");
-            counts[match checked.warnings.as_slice() {
+            counts[match codes(&checked.warnings)[..] {
                 [] => 0,
-                [Warning::Reversed] => 1,
-                other => 2 * usize::from(other == [Warning::Reordered]),
+                [Code::CornersReversed] => 1,
+                ref other => 2 * usize::from(other == [Code::CornersReordered]),
             }] += 1;
             counts
         });
@@ -173,7 +191,10 @@ mod tests {
     fn strict_order_refuses_what_repair_repairs() {
         let crossed = [QUAD[0], QUAD[2], QUAD[1], QUAD[3]].map(Point2::from);
         let strict = check(crossed, 1.0, [640, 480], CornerOrder::Strict);
-        assert_eq!(strict.unwrap_err(), SolveError::Order(Warning::Reordered));
+        let Err(SolveError::Order(found)) = strict else {
+            panic!("{strict:?}");
+        };
+        assert_eq!(found.code, Code::CornersReordered);
     }
 
     #[test]
@@ -216,14 +237,16 @@ mod tests {
             [100.0, 130.0],
         ])
         .unwrap();
-        assert_eq!(small.warnings, [Warning::SmallQuad { longest_px: 40.0 }]);
+        assert_eq!(codes(&small.warnings), [Code::SmallQuad]);
+        let what = small.warnings[0].to_string();
+        assert!(what.contains("40.0 px; expected at least 50"), "{what}");
         let far = run([QUAD[0], [1600.0, 90.0], [1620.0, 410.0], QUAD[3]]).unwrap();
         assert_eq!(
-            far.warnings,
-            [
-                Warning::Outside { corner: 1 },
-                Warning::Outside { corner: 2 }
-            ]
+            codes(&far.warnings),
+            [Code::CornerOutside, Code::CornerOutside]
         );
+        for (warning, corner) in far.warnings.iter().zip(["corner 1", "corner 2"]) {
+            assert!(warning.message.starts_with(corner), "{warning}");
+        }
     }
 }

@@ -3,8 +3,11 @@
 //! # Method
 //! The direct linear transformation with Hartley's normalisation: both point sets to zero mean and RMS distance sqrt 2.
 
-use crate::geom::{Homography, Point2, Vector2};
+use crate::geom::{Homography, Point2, Vector2, Vector3};
 use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// Singular systems have a second eigenvalue below this, a point.
+const SINGULAR_EIGENVALUE: f64 = 1e-9;
 
 /// The map that takes each `from` nearest to its `to`; none for fewer than four points or all on a line.
 pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homography> {
@@ -15,51 +18,50 @@ pub(crate) fn homography(pairs: &[(Point2<f64>, Point2<f64>)]) -> Option<Homogra
     let to = normalisation(pairs.iter().map(|p| p.1))?;
     let mut square = SMatrix::<f64, 9, 9>::zeros();
     for (p, q) in pairs {
-        let (p, q) = (from * p.to_homogeneous(), to * q.to_homogeneous());
-        for axis in 0..2 {
-            let mut row = SVector::<f64, 9>::zeros();
-            for k in 0..3 {
-                row[3 * axis + k] = p[k];
-                row[6 + k] = -q[axis] * p[k];
-            }
+        for row in equations(&(from * p.to_homogeneous()), &(to * q.to_homogeneous())) {
             square += row * row.transpose();
         }
     }
+    let h = null_vector(square, SINGULAR_EIGENVALUE * pairs.len() as f64)?;
+    let map = to.try_inverse()? * Matrix3::from_fn(|i, j| h[3 * i + j]) * from;
+    map.iter().all(|v| v.is_finite()).then_some(Homography(map))
+}
+
+/// The two linear equations of a pair of points, one for each coordinate.
+fn equations(p: &Vector3<f64>, q: &Vector3<f64>) -> [SVector<f64, 9>; 2] {
+    [0, 1].map(|axis| {
+        let mut row = SVector::<f64, 9>::zeros();
+        for k in 0..3 {
+            row[3 * axis + k] = p[k];
+            row[6 + k] = -q[axis] * p[k];
+        }
+        row
+    })
+}
+
+/// The eigenvector of the smallest eigenvalue, where the second smallest is larger than a threshold.
+fn null_vector(square: SMatrix<f64, 9, 9>, threshold: f64) -> Option<SVector<f64, 9>> {
     let eigen = square.symmetric_eigen();
     let smallest = eigen.eigenvalues.imin();
     let second = (0..9)
         .filter(|&i| i != smallest)
         .map(|i| eigen.eigenvalues[i])
         .fold(f64::MAX, f64::min);
-    let h = eigen.eigenvectors.column(smallest);
-    let map = to.try_inverse()? * Matrix3::from_fn(|i, j| h[3 * i + j]) * from;
-    (second > 1e-9 * pairs.len() as f64 && map.iter().all(|v| v.is_finite()))
-        .then_some(Homography(map))
+    (second > threshold).then(|| eigen.eigenvectors.column(smallest).into())
 }
 
+/// The map to zero mean and a root mean square distance of sqrt 2.
 fn normalisation(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<Matrix3<f64>> {
     let count = points.clone().count() as f64;
     let mean = points
         .clone()
         .fold(Vector2::zeros(), |sum, p| sum + p.coords)
         / count;
-    let spread = (points
-        .map(|p| (p.coords - mean).norm_squared())
-        .sum::<f64>()
-        / count)
-        .sqrt();
+    let squares: f64 = points.map(|p| (p.coords - mean).norm_squared()).sum();
+    let spread = (squares / count).sqrt();
     let scale = std::f64::consts::SQRT_2 / spread;
-    let matrix = Matrix3::new(
-        scale,
-        0.0,
-        -scale * mean.x,
-        0.0,
-        scale,
-        -scale * mean.y,
-        0.0,
-        0.0,
-        1.0,
-    );
+    let (x, y) = (-scale * mean.x, -scale * mean.y);
+    let matrix = Matrix3::new(scale, 0.0, x, 0.0, scale, y, 0.0, 0.0, 1.0);
     scale.is_finite().then_some(matrix)
 }
 

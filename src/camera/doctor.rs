@@ -5,49 +5,40 @@ use super::label::{Framing, Label};
 use super::options::SolveOptions;
 use super::solution::Solution;
 use super::solve::solve;
-use super::warning::Warning;
-use std::fmt::Write;
+use crate::diagnostic::Code;
 
-/// A tape measure's error of the camera height that the advice speaks of.
-const HEIGHT_ADVICE: f64 = 0.03;
-/// An improvement is worth a sentence from this factor on.
-const WORTH_IT: f64 = 0.8;
+/// A tape measure's relative error of the camera height that the advice speaks of.
+const TAPE_HEIGHT_SIGMA: f64 = 0.03;
+/// An improvement by this factor or more is worth a sentence.
+const WORTHWHILE_FACTOR: f64 = 0.8;
 
 /// What a person should know of a solution, a few lines of plain words.
 pub fn doctor(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
-    let mut text = String::new();
     let misfit = solution
         .misfit()
-        .map(|error| format!("This camera is worth nothing: {error}."));
+        .map(|error| format!("This camera cannot be used: {error}."));
     let lines = [
-        view(solution),
-        focal(solution),
-        framing(label, solution, options),
-        surface(solution),
-        above(solution),
+        pose_line(solution),
+        focal_line(solution),
+        framing_line(label, solution, options),
+        surface_line(solution),
+        height_line(solution),
     ];
-    for line in misfit.into_iter().chain(lines) {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{line}");
-    }
-    for warning in solution
+    let warnings = solution
         .warnings
         .iter()
-        .filter(|w| !matches!(w, Warning::FramingUnknown { .. }))
-    {
-        let _ = writeln!(text, "Beware: {warning}.");
-    }
-    if let Some(advice) = advice(label, solution, options) {
-        let _ = writeln!(text, "{advice}");
-    }
-    text
+        .filter(|w| w.code != Code::FramingUnknown)
+        .map(|warning| format!("Warning: {warning}."));
+    let lines = misfit.into_iter().chain(lines).chain(warnings);
+    let advice = height_advice(label, solution, options);
+    lines.chain(advice).map(|line| line + "\n").collect()
 }
 
-fn view(solution: &Solution) -> String {
+fn pose_line(solution: &Solution) -> String {
     let (camera, sigma) = (&solution.camera, &solution.sigma);
     let height_sigma = sigma.center[(2, 2)].max(0.0).sqrt();
     format!(
-        "The camera stands {:.3} m (+- {:.3}) above the surface and looks {:.1} degrees (+- {:.1}) away from straight down.",
+        "The camera is {:.3} m (+- {:.3}) above the surface, tilted by {:.1} degrees (+- {:.1}) from straight down.",
         camera.center().z,
         height_sigma,
         camera.tilt().to_degrees(),
@@ -55,26 +46,26 @@ fn view(solution: &Solution) -> String {
     )
 }
 
-fn focal(solution: &Solution) -> String {
+fn focal_line(solution: &Solution) -> String {
     let focal_px = solution.camera.focal_px.x;
     let percent = 100.0 * solution.sigma.ln_focal;
     let known = match solution.focal_source {
-        FocalSource::Measured => "the corners themselves tell it",
+        FocalSource::Measured => "measured by the corners",
         FocalSource::Mixed => "partly from the corners, partly from what was known before",
         FocalSource::Prior => {
-            "only from what was known before: seen from so nearly above, the corners do not tell it"
+            "only from what was known before: from so nearly straight above, the corners do not show it"
         }
         FocalSource::Fixed => "as given",
-        FocalSource::Unbounded => "a bound, not a value: nothing tells it",
+        FocalSource::Unbounded => "a bound, not a value: nothing constrains it",
     };
     match percent.is_finite() {
         true => format!("Its focal length is {focal_px:.0} px (+- {percent:.1} %): {known}."),
-        false => format!("Its focal length is not known; {focal_px:.0} px was taken."),
+        false => format!("Its focal length is not known; {focal_px:.0} px was assumed."),
     }
 }
 
-/// Where the middle of the lens is in the picture, and why that is known.
-fn framing(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
+/// Where the principal point is in the picture, and why that is known.
+fn framing_line(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
     let (camera, sigma_px) = (&solution.camera, solution.sigma.principal_px);
     let [x, y] = [camera.principal_px.x, camera.principal_px.y];
     let known = format!("Its principal point is at ({x:.0}, {y:.0}) px (+- {sigma_px:.0})");
@@ -86,29 +77,30 @@ fn framing(label: &Label, solution: &Solution, options: &SolveOptions) -> String
             format!("{known}, found with the rest: the picture is a part of a larger one.")
         }
         Framing::Unknown => {
-            let (now, whole) = (100.0 * solution.sigma.ln_focal, if_whole(label, options));
-            let gain = whole.map_or(String::new(), |percent| {
-                format!(" and the focal length known to {percent:.1} % instead of {now:.1} %")
-            });
+            let gain = whole_picture_gain(label, solution, options);
             format!(
-                "{known}: nothing says that the picture is whole, its EXIF size is missing or another one. If it is, write \
-                 \"cropped\": false under \"image\": the principal point is then its middle{gain}."
+                "{known}: it is not known whether the picture is whole, since its EXIF size is missing or differs. If it \
+                 is, write \"cropped\": false under \"image\": the principal point is then its middle{gain}."
             )
         }
     }
 }
 
-/// How well the focal length would be known if the picture were whole, percent; none where the corners deny that it is.
-fn if_whole(label: &Label, options: &SolveOptions) -> Option<f64> {
+/// How much better the focal length would be known if the picture were whole; empty where the corners do not allow that.
+fn whole_picture_gain(label: &Label, solution: &Solution, options: &SolveOptions) -> String {
     let mut whole = label.clone();
     whole.image.cropped = Some(false);
-    let solution = solve(&whole, options)
-        .ok()
-        .filter(|s| s.misfit().is_none())?;
-    Some(100.0 * solution.sigma.ln_focal)
+    let fitting = solve(&whole, options).and_then(Solution::fitting);
+    fitting.map_or(String::new(), |whole| {
+        format!(
+            " and the focal length known to {:.1} % instead of {:.1} %",
+            100.0 * whole.sigma.ln_focal,
+            100.0 * solution.sigma.ln_focal
+        )
+    })
 }
 
-fn surface(solution: &Solution) -> String {
+fn surface_line(solution: &Solution) -> String {
     let [w, h] = solution.size;
     let scale = solution.fit.px_per_metre;
     format!(
@@ -118,31 +110,31 @@ fn surface(solution: &Solution) -> String {
     )
 }
 
-fn above(solution: &Solution) -> String {
+fn height_line(solution: &Solution) -> String {
     let sigma = &solution.sigma;
     let millimetres = 1000.0 * sigma.reference_height;
     format!(
-        "A point {millimetres:.0} mm above the surface is drawn within {:.1} px of its true place.",
+        "A point {millimetres:.0} mm above the surface is drawn within {:.1} px of its true position.",
         sigma.height_px
     )
 }
 
 /// What measuring the height of the lens would bring.
-fn advice(label: &Label, solution: &Solution, options: &SolveOptions) -> Option<String> {
+fn height_advice(label: &Label, solution: &Solution, options: &SolveOptions) -> Option<String> {
     if label.camera.height_m.is_some() {
         return None;
     }
     let height = solution.camera.center().z;
     let mut measured = label.clone();
     measured.camera.height_m = Some(height);
-    measured.camera.height_sigma_m = Some(HEIGHT_ADVICE * height);
+    measured.camera.height_sigma_m = Some(TAPE_HEIGHT_SIGMA * height);
     let better = solve(&measured, options).ok()?.sigma.height_px;
-    (better < WORTH_IT * solution.sigma.height_px).then(|| {
+    (better < WORTHWHILE_FACTOR * solution.sigma.height_px).then(|| {
         format!(
             "Measure the height of the lens above the surface (about {height:.2} m) to {:.0} mm and write it as \
              camera.height_m: that would bring {:.1} px down to {better:.1}. So would another photo or two of the rectangle at \
              25 to 40 degrees with the same zoom (camera joint).",
-            1000.0 * HEIGHT_ADVICE * height,
+            1000.0 * TAPE_HEIGHT_SIGMA * height,
             solution.sigma.height_px
         )
     })
@@ -163,13 +155,13 @@ mod tests {
     fn from_above_the_advice_is_to_measure_the_height() {
         let text = say(0.5);
         assert!(
-            text.contains("the corners do not tell it") && text.contains("Measure the height"),
+            text.contains("the corners do not show it") && text.contains("Measure the height"),
             "{text}"
         );
     }
 
     #[test]
-    fn what_is_known_of_the_framing_is_said() {
+    fn what_is_known_of_the_framing_is_reported() {
         let mut label = Scenario::realistic().tilted(30.0).view(1, 0).label;
         let options = SolveOptions::default();
         let mut say = |cropped: Option<bool>| {
@@ -187,14 +179,14 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_does_not_fit_is_said_to_be_worth_nothing() {
+    fn a_camera_that_does_not_fit_cannot_be_used() {
         let mut label = Scenario::realistic().tilted(30.0).view(1, 0).label;
         let surface = &mut label.surface;
         (surface.width_m, surface.height_m) = (surface.height_m, surface.width_m);
         let options = SolveOptions::default();
         let text = doctor(&label, &solve(&label, &options).unwrap(), &options);
         assert!(
-            text.starts_with("This camera is worth nothing: ") && text.contains("exchange width_m"),
+            text.starts_with("This camera cannot be used: ") && text.contains("exchange width_m"),
             "{text}"
         );
     }
@@ -203,7 +195,7 @@ mod tests {
     fn from_the_side_there_is_no_advice() {
         let text = say(45.0);
         assert!(
-            text.contains("the corners themselves tell it") && !text.contains("Measure"),
+            text.contains("measured by the corners") && !text.contains("Measure"),
             "{text}"
         );
     }

@@ -1,6 +1,6 @@
 //! Why no camera could be found.
 
-use super::warning::Warning;
+use crate::diagnostic::Diagnostic;
 use crate::error::Error;
 
 /// Why no camera could be found.
@@ -10,7 +10,7 @@ pub enum SolveError {
     /// A number is NaN or infinite.
     #[error("{0} is not finite")]
     NonFinite(&'static str),
-    /// A number is of no label that a person would write.
+    /// A number is too large, or too near to zero, to mean something.
     #[error(
         "{at}: {value:e}, expected no more than {most:e}, and no less than its inverse where it is positive"
     )]
@@ -47,7 +47,7 @@ pub enum SolveError {
         /// What it was.
         value: f64,
     },
-    /// Two corners are one.
+    /// Two corners coincide.
     #[error(
         "surface.corners_px: corners {first} and {second} are {distance_px:.1} px apart, expected at least {limit_px:.1}"
     )]
@@ -58,7 +58,7 @@ pub enum SolveError {
         second: usize,
         /// How far apart they are.
         distance_px: f64,
-        /// How far apart they have to be.
+        /// The least distance.
         limit_px: f64,
     },
     /// One corner lies inside the triangle of the others.
@@ -73,26 +73,26 @@ pub enum SolveError {
         corner: usize,
         /// Its distance from the line.
         distance_px: f64,
-        /// The distance it has to have.
+        /// The least distance.
         limit_px: f64,
     },
     /// The corners are in another order than asked for ([`CornerOrder::Strict`](super::CornerOrder::Strict)).
-    #[error("surface.corners_px: {0}, and the order was asked to be strict")]
-    Order(Warning),
+    #[error("surface.corners_px: {0}, and the order has to be right")]
+    Order(Diagnostic),
     /// Photos that should be of one camera differ in the shape of the picture.
     #[error("photo {photo} differs in shape from the first: not one camera")]
     DifferentPictures {
         /// Which photo, from 0.
         photo: usize,
     },
-    /// The best camera is not within the noise of its label.
-    #[error("surface: no camera fits (corners {rms_px:.1} px off, p = {p_value:.1e}): {}", cure(*.exchanged))]
+    /// The best camera does not fit its label within the noise.
+    #[error("surface: no camera fits (corners {rms_px:.1} px off, p = {p_value:.1e}): {}", remedy(*.exchanged))]
     NoFit {
         /// Root mean square distance of the corners from where the camera sees them, pixels.
         rms_px: f64,
         /// Probability of a worse fit by chance.
         p_value: f64,
-        /// Chi squared with width and height exchanged, where that mends it: as labelled, and exchanged.
+        /// Chi squared as labelled and with width and height exchanged, where that repairs it.
         exchanged: Option<[f64; 2]>,
     },
     /// No pose has the camera above the surface with the whole rectangle in front of it.
@@ -101,7 +101,7 @@ pub enum SolveError {
 }
 
 /// What to do about a label that no camera fits.
-fn cure(exchanged: Option<[f64; 2]>) -> String {
+fn remedy(exchanged: Option<[f64; 2]>) -> String {
     match exchanged {
         Some([before, after]) => {
             format!("exchange width_m and height_m (chi squared {before:.1} as labelled, {after:.1} exchanged)")

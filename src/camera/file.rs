@@ -3,14 +3,17 @@
 use super::exchange::{BlenderCamera, OpencvCamera};
 use super::focal::FocalSource;
 use super::label::{Framing, Label, LabelImage};
+use super::label_check::MAX_MAGNITUDE;
+use super::pinhole::Camera;
 use super::solution::Solution;
 use super::uncertainty::UNKNOWN_NAMES;
-use super::warning::Warning;
-use crate::camera::Camera;
+use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
 use crate::geom::{Point2, Vector2};
 use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// A solved camera as a document; numbers read back to the same bits. What is infinite is `null`.
@@ -25,13 +28,13 @@ pub struct CameraFile {
     pub image: LabelImage,
     /// The label's surface.
     pub surface_id: String,
-    /// What the camera was solved from, so that it is not taken for that of another label.
+    /// What the camera was solved from: shows whether the label has changed since.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solved_from: Option<SolvedFrom>,
-    /// The camera does not fit its label, and somebody wants it nevertheless. Default: false.
+    /// The camera does not fit its label and was written because of `--force`. Default: false.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub forced: bool,
-    /// The camera and the doubts.
+    /// The camera, its uncertainty and its warnings.
     #[serde(flatten)]
     pub found: FoundCamera,
 }
@@ -79,19 +82,20 @@ pub struct FoundCamera {
     pub sigma: SigmaRecord,
     /// How well the label fits.
     pub fit: FitRecord,
-    /// Which part of what the camera took the picture was taken for.
+    /// Which part of what the camera took the picture was assumed to be.
     #[serde(default)]
     pub framing: Framing,
     /// Where the focal length comes from.
     pub focal_source: FocalSource,
     /// Part of the information on the focal length that comes from the picture.
     pub data_share: f64,
-    /// What the picture alone says of the focal length, pixels.
+    /// What the picture alone gives for the focal length, pixels.
     pub focal_from_data: Option<f64>,
-    /// What was believed of it.
+    /// The prior of the focal length.
     pub focal_prior: FocalPrior,
     /// What a person should look at.
-    pub warnings: Vec<Warning>,
+    #[serde(deserialize_with = "warnings_with_codes")]
+    pub warnings: Vec<Diagnostic>,
     /// Another camera that a person should know of.
     pub alternative: Option<Box<FoundCamera>>,
 }
@@ -121,7 +125,7 @@ pub struct FittedSurface {
     pub height_m: f64,
 }
 
-/// What was believed of the focal length: pixels, and relative standard deviation.
+/// The prior of the focal length: pixels, and relative standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(
@@ -206,69 +210,84 @@ impl CameraFile {
     /// # Errors
     /// [`Error::Value`] naming the first value that cannot be right.
     pub fn check(&self, image: [u32; 2]) -> Result<()> {
-        let FoundCamera { model, opencv, .. } = &self.found;
-        let own = [self.image.width, self.image.height];
-        if own != image || image.contains(&0) {
-            let ([w, h], [a, b]) = (own, image);
-            return Err(Error::value(
-                "image",
-                format!("{w} x {h} pixels, expected {a} x {b}"),
-            ));
+        self.check_image(image)?;
+        self.found.model.check()?;
+        for side in self.size() {
+            check_positive("surface", side)?;
         }
-        positive("model.f_px", model.f_px)?;
-        model
-            .principal_point_px
-            .iter()
-            .try_for_each(|v| bounded("model.principal_point_px", *v))?;
-        self.size()
-            .iter()
-            .try_for_each(|v| positive("surface", *v))?;
-        opencv.t.iter().try_for_each(|v| bounded("opencv.t", *v))?;
-        let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
-        let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
-        if !(off < ROTATION && rotation.determinant() > 0.0) {
-            return Err(Error::value("opencv.R", "no rotation"));
-        }
-        let height = self.camera().center().z;
-        if height > 0.0 {
+        check_pose(&self.found.opencv)?;
+        if self.camera().center().z > 0.0 {
             Ok(())
         } else {
             Err(Error::value("opencv.t", "the camera is below the surface"))
         }
     }
+
+    fn check_image(&self, image: [u32; 2]) -> Result<()> {
+        let own = [self.image.width, self.image.height];
+        if own == image && !image.contains(&0) {
+            return Ok(());
+        }
+        let ([w, h], [a, b]) = (own, image);
+        let what = format!("{w} x {h} pixels, expected {a} x {b}");
+        Err(Error::value("image", what))
+    }
+}
+
+impl Model {
+    fn check(&self) -> Result<()> {
+        check_positive("model.f_px", self.f_px)?;
+        self.principal_point_px
+            .iter()
+            .try_for_each(|v| check_magnitude("model.principal_point_px", *v))
+    }
+}
+
+fn check_pose(opencv: &OpencvCamera) -> Result<()> {
+    for value in opencv.t {
+        check_magnitude("opencv.t", value)?;
+    }
+    let rotation = Matrix3::from_fn(|i, j| opencv.r[i][j]);
+    let off = (rotation * rotation.transpose() - Matrix3::identity()).norm();
+    if off < ROTATION_TOLERANCE && rotation.determinant() > 0.0 {
+        Ok(())
+    } else {
+        Err(Error::value("opencv.R", "not a rotation"))
+    }
 }
 
 /// A matrix as far from a rotation as this is none.
-const ROTATION: f64 = 1e-6;
-/// Larger numbers, and smaller ones than one over it, are of no camera.
-const LARGEST: f64 = 1e9;
+const ROTATION_TOLERANCE: f64 = 1e-6;
 
-fn bounded(at: &str, value: f64) -> Result<()> {
-    let fits = value.abs() <= LARGEST;
-    if fits {
-        Ok(())
-    } else {
-        Err(Error::value(
-            at,
-            format!("{value:e}, expected at most {LARGEST:e}"),
-        ))
+fn check_magnitude(at: &str, value: f64) -> Result<()> {
+    if value.abs() <= MAX_MAGNITUDE {
+        return Ok(());
     }
+    let what = format!("{value:e}, expected at most {MAX_MAGNITUDE:e}");
+    Err(Error::value(at, what))
 }
 
-fn positive(at: &str, value: f64) -> Result<()> {
-    let fits = (1.0 / LARGEST..=LARGEST).contains(&value);
-    if fits {
-        Ok(())
-    } else {
-        Err(Error::value(
-            at,
-            format!("{value:e}, expected a positive number"),
-        ))
+fn check_positive(at: &str, value: f64) -> Result<()> {
+    if (1.0 / MAX_MAGNITUDE..=MAX_MAGNITUDE).contains(&value) {
+        return Ok(());
     }
+    let what = format!("{value:e}, expected a positive number");
+    Err(Error::value(at, what))
+}
+
+/// Reads warnings, without those of older files, which had a `kind` and its numbers instead of a code and a message.
+fn warnings_with_codes<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> std::result::Result<Vec<Diagnostic>, D::Error> {
+    Vec::<Value>::deserialize(deserializer)?
+        .into_iter()
+        .filter(|warning| warning.get("kind").is_none())
+        .map(|warning| serde_json::from_value(warning).map_err(D::Error::custom))
+        .collect()
 }
 
 impl SolvedFrom {
-    /// Of a label alone.
+    /// For a label that is solved alone.
     pub fn new(label: &Label) -> Self {
         let size_m = [label.surface.width_m, label.surface.height_m];
         Self {
@@ -281,7 +300,7 @@ impl SolvedFrom {
 
 /// CRC-32 of a label as we would write it.
 pub(crate) fn checksum(label: &Label) -> u32 {
-    // A label is made of texts and numbers: JSON says them all.
+    // A label is made of texts and numbers: all of them have a form in JSON.
     crc32fast::hash(&serde_json::to_vec(label).unwrap_or_default())
 }
 
@@ -349,7 +368,7 @@ impl FitRecord {
             p_value: fit.p_value,
             rms_px: solution.rms_px,
             per_corner_px: fit.per_corner_px,
-            iterations: fit.steps,
+            iterations: fit.iterations,
             condition: fit.condition,
             depth_ratio: fit.depth_ratio,
             px_per_m: fit.px_per_metre,
@@ -393,5 +412,48 @@ mod tests {
                 assert!((a - b).norm() < 1e-9);
             }
         }
+    }
+    fn warned() -> (Label, Solution) {
+        let label = Scenario::realistic().tilted(85.0).view(21, 1).label;
+        let solution = solve(&label, &SolveOptions::default()).unwrap();
+        assert!(!solution.warnings.is_empty());
+        (label, solution)
+    }
+
+    #[test]
+    fn warnings_have_a_code_a_severity_and_a_message() {
+        let (label, solution) = warned();
+        let file = serde_json::to_value(CameraFile::new(&label, &solution)).unwrap();
+        let written = file["warnings"].as_array().unwrap();
+        assert_eq!(written.len(), solution.warnings.len());
+        let (first, expected) = (&written[0], &solution.warnings[0]);
+        assert_eq!(first["code"], expected.code.name());
+        assert_eq!(first["severity"], "warning");
+        assert_eq!(first["message"], expected.message);
+    }
+
+    #[test]
+    fn a_file_with_warnings_of_the_older_form_is_read_without_them() {
+        let (label, solution) = warned();
+        let file = CameraFile::new(&label, &solution);
+        let mut value = serde_json::to_value(&file).unwrap();
+        let older = serde_json::json!({ "kind": "grazing", "tilt_deg": 85.0 });
+        let warnings = value["warnings"].as_array_mut().unwrap();
+        warnings.push(older.clone());
+        let mixed: CameraFile = serde_json::from_value(value.clone()).unwrap();
+        assert_eq!(mixed, file);
+        value["warnings"] = serde_json::json!([older]);
+        let read: CameraFile = serde_json::from_value(value).unwrap();
+        assert!(read.found.warnings.is_empty());
+        assert_eq!(read.found.model, file.found.model);
+    }
+
+    #[test]
+    fn an_unknown_code_is_an_error() {
+        let (label, solution) = warned();
+        let mut value = serde_json::to_value(CameraFile::new(&label, &solution)).unwrap();
+        value["warnings"][0]["code"] = "camera.unheard_of".into();
+        let error = serde_json::from_value::<CameraFile>(value).unwrap_err();
+        assert!(error.to_string().contains("camera.unheard_of"), "{error}");
     }
 }

@@ -1,23 +1,23 @@
-//! What is known of the focal length before the picture is looked at, and where it came from afterwards.
+//! The prior of the focal length, and where a solution's focal length comes from.
 
-use super::belief::Belief;
-use super::label::{Framing, Label};
+use super::label::{Framing, Label, LabelCamera};
 use super::options::Priors;
+use super::prior::Prior;
 use serde::{Deserialize, Serialize};
 
 /// Diagonal of the 36 mm x 24 mm frame that 35 mm equivalents refer to, millimetres.
 const FULL_FRAME_DIAGONAL_MM: f64 = 43.266_615_305_567_87;
-/// Nothing known: one longer picture side, 36 mm equivalent, the median of pocket cameras.
-const USUAL_FOCAL: f64 = 1.0;
-/// Relative noise of a focal length that a person states without saying how sure they are.
+/// Focal length where nothing is known, in longer picture sides: 36 mm equivalent, the median of pocket cameras.
+const NOMINAL_FOCAL_SIDES: f64 = 1.0;
+/// Relative noise of a focal length that is stated without a standard deviation.
 const STATED_SIGMA: f64 = 0.01;
 /// The same of a 35 mm equivalent; the ways to convert it differ by 4 %.
 const EQUIVALENT_SIGMA: f64 = 0.05;
-/// What is added to that where the picture may have been cropped, since the equivalent is then of a longer diagonal: people
+/// Added to that where the picture may have been cropped, since the equivalent then refers to a longer diagonal: people
 /// keep between half and all of a picture.
 const CROP_SIGMA: f64 = 0.15;
-/// Equivalents that imply a focal length outside this many longer sides are wrong.
-const POSSIBLE_FOCAL: std::ops::RangeInclusive<f64> = 0.2..=20.0;
+/// Equivalents that imply a focal length outside this range, in longer sides, are wrong.
+const PLAUSIBLE_FOCAL_SIDES: std::ops::RangeInclusive<f64> = 0.2..=20.0;
 
 /// Where a solution's focal length comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,13 +25,13 @@ const POSSIBLE_FOCAL: std::ops::RangeInclusive<f64> = 0.2..=20.0;
 pub enum FocalSource {
     /// The four corners, at least nine tenths of the information.
     Measured,
-    /// The corners and what was known before, both.
+    /// The corners and the prior, both.
     Mixed,
-    /// What was known before (EXIF or a usual lens); the corners say next to nothing of it.
+    /// The prior (EXIF or a common lens); the corners hardly constrain it.
     Prior,
     /// The label gave it as exact.
     Fixed,
-    /// Nobody: nothing was known, and the corners look like seen from infinitely far. It was put at the largest sensible.
+    /// Nothing: the prior was flat, and the corners look as if seen from infinitely far. It is the largest sensible value.
     Unbounded,
 }
 
@@ -47,15 +47,15 @@ impl std::fmt::Display for FocalSource {
     }
 }
 
-/// Who says what is believed of the focal length.
+/// Where the prior of the focal length comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Witness {
+pub(crate) enum PriorSource {
     /// The label, in pixels.
-    Person,
+    Label,
     /// The 35 mm equivalent that the camera wrote.
     Exif,
-    /// Nobody: lenses as they usually are.
-    Usual,
+    /// Nowhere: the distribution of common lenses.
+    Nominal,
 }
 
 /// The focal length in pixels that a 35 mm equivalent stands for, by the diagonal.
@@ -63,48 +63,58 @@ pub fn focal_from_equivalent(focal_35mm: f64, image: [u32; 2]) -> f64 {
     focal_35mm * libm::hypot(f64::from(image[0]), f64::from(image[1])) / FULL_FRAME_DIAGONAL_MM
 }
 
-/// The focal length in pixels of a usual lens.
-pub(crate) fn usual_px(image: [u32; 2]) -> f64 {
-    USUAL_FOCAL * longer_side(image)
+/// The focal length in pixels of a common lens.
+pub(crate) fn nominal_px(image: [u32; 2]) -> f64 {
+    NOMINAL_FOCAL_SIDES * longer_side(image)
 }
 
-/// What to believe of the logarithm of the focal length in pixels of a picture of some framing, and who says so.
-pub(crate) fn belief(label: &Label, framing: Framing, priors: &Priors) -> (Belief, Witness) {
-    let (camera, image) = (&label.camera, label.taken_size());
-    let equivalent = camera.focal_35mm.map(|mm| focal_from_equivalent(mm, image));
-    let believable = equivalent.filter(|f| {
-        framing != Framing::Cropped && POSSIBLE_FOCAL.contains(&(f / longer_side(image)))
-    });
-    let (focal_px, usual_sigma, witness) = match (camera.focal_px, believable) {
-        (Some(px), _) => (px, STATED_SIGMA, Witness::Person),
-        (None, Some(px)) => (px, EQUIVALENT_SIGMA, Witness::Exif),
-        (None, None) => return (usual(image, priors), Witness::Usual),
-    };
-    let sigma = if camera.focal_fixed {
-        0.0
-    } else {
-        camera.focal_sigma.unwrap_or(usual_sigma)
-    };
-    let cropped_perhaps =
-        framing == Framing::Unknown && witness == Witness::Exif && !camera.focal_fixed;
-    let sigma = if cropped_perhaps {
-        libm::hypot(sigma, CROP_SIGMA)
-    } else {
-        sigma
-    };
-    (
-        Belief {
-            mean: libm::log(focal_px),
-            sigma,
-        },
-        witness,
-    )
+/// The prior of the logarithm of the focal length in pixels, for a picture of some framing, and where it comes from.
+pub(crate) fn length_prior(
+    label: &Label,
+    framing: Framing,
+    priors: &Priors,
+) -> (Prior, PriorSource) {
+    let camera = &label.camera;
+    match (camera.focal_px, plausible_equivalent(label, framing)) {
+        (Some(px), _) => (stated_prior(camera, px, STATED_SIGMA), PriorSource::Label),
+        (None, Some(px)) => {
+            let mut prior = stated_prior(camera, px, EQUIVALENT_SIGMA);
+            if framing == Framing::Unknown && !camera.focal_fixed {
+                prior.sigma = libm::hypot(prior.sigma, CROP_SIGMA);
+            }
+            (prior, PriorSource::Exif)
+        }
+        (None, None) => (
+            nominal_prior(label.taken_size(), priors),
+            PriorSource::Nominal,
+        ),
+    }
 }
 
-/// What to believe where nobody says anything.
-fn usual(image: [u32; 2], priors: &Priors) -> Belief {
-    Belief {
-        mean: libm::log(usual_px(image)),
+/// The focal length in pixels by the 35 mm equivalent, where that can be right.
+fn plausible_equivalent(label: &Label, framing: Framing) -> Option<f64> {
+    let image = label.taken_size();
+    let px = focal_from_equivalent(label.camera.focal_35mm?, image);
+    let plausible = PLAUSIBLE_FOCAL_SIDES.contains(&(px / longer_side(image)));
+    (framing != Framing::Cropped && plausible).then_some(px)
+}
+
+/// A focal length that a label or a file states, with its own standard deviation or else this one.
+fn stated_prior(camera: &LabelCamera, focal_px: f64, default_sigma: f64) -> Prior {
+    let sigma = match camera.focal_fixed {
+        true => 0.0,
+        false => camera.focal_sigma.unwrap_or(default_sigma),
+    };
+    Prior {
+        mean: libm::log(focal_px),
+        sigma,
+    }
+}
+
+/// Where nothing states the focal length.
+fn nominal_prior(image: [u32; 2], priors: &Priors) -> Prior {
+    Prior {
+        mean: libm::log(nominal_px(image)),
         sigma: priors.focal_sigma,
     }
 }
@@ -123,16 +133,16 @@ mod tests {
         label
     }
 
-    fn believed(label: &Label, framing: Framing) -> (Belief, Witness) {
-        belief(label, framing, &Priors::default())
+    fn default_prior(label: &Label, framing: Framing) -> (Prior, PriorSource) {
+        length_prior(label, framing, &Priors::default())
     }
 
     #[test]
     fn an_equivalent_counts_by_the_diagonal() {
-        let (belief, witness) = believed(&label(26.0), Framing::Whole);
-        assert_eq!((witness, belief.sigma), (Witness::Exif, 0.05));
-        assert!((libm::exp(belief.mean) - 26.0 * 5000.0 / 43.2666).abs() < 0.01);
-        assert!(believed(&label(26.0), Framing::Unknown).0.sigma > 0.15);
+        let (prior, source) = default_prior(&label(26.0), Framing::Whole);
+        assert_eq!((source, prior.sigma), (PriorSource::Exif, 0.05));
+        assert!((libm::exp(prior.mean) - 26.0 * 5000.0 / 43.2666).abs() < 0.01);
+        assert!(default_prior(&label(26.0), Framing::Unknown).0.sigma > 0.15);
     }
 
     #[test]
@@ -142,8 +152,8 @@ mod tests {
             (label(1e4), Framing::Whole),
             (label(26.0), Framing::Cropped),
         ] {
-            let (belief, witness) = believed(&label, framing);
-            assert_eq!((witness, belief.sigma), (Witness::Usual, 0.35));
+            let (prior, source) = default_prior(&label, framing);
+            assert_eq!((source, prior.sigma), (PriorSource::Nominal, 0.35));
         }
     }
 
@@ -151,10 +161,10 @@ mod tests {
     fn a_person_s_pixels_come_first() {
         let mut both = label(26.0);
         both.camera.focal_px = Some(3000.0);
-        let (belief, witness) = believed(&both, Framing::Whole);
+        let (prior, source) = default_prior(&both, Framing::Whole);
         assert_eq!(
-            (witness, belief.sigma, libm::exp(belief.mean).round()),
-            (Witness::Person, 0.01, 3000.0)
+            (source, prior.sigma, libm::exp(prior.mean).round()),
+            (PriorSource::Label, 0.01, 3000.0)
         );
     }
 }

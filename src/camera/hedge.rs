@@ -1,4 +1,4 @@
-//! What is not known of a picture that may have been cropped.
+//! The uncertainty of a picture that may have been cropped.
 //!
 //! # Method
 //! Two cameras are solved: of a whole picture, whose principal point is in its middle, and of one that may be a part of a
@@ -6,55 +6,64 @@
 //! what the second one leaves open, and the distance to it: the mean square error of the answer where the picture is
 //! cropped after all.
 
-use super::Solution;
+use super::chi::CHI2_99;
 use super::label::Framing;
 use super::model::Unknowns;
 use super::options::SolveOptions;
 use super::pinhole::distorted;
-use super::problem::corner_points;
-use super::search::TELLING;
-use super::solution::Sigma;
-use super::uncertainty::{heights, variance};
-use super::warning::Warning;
-use crate::geom::{Point2, Vector2};
+use super::rectangle::corner_points;
+use super::solution::{Sigma, Solution};
+use super::uncertainty::{grid_at_height, repaired_variance};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::geom::{Point2, Point3, Vector2};
 
 /// Corners that cost so much in a whole picture, and so little in one that may be cropped, are of a cropped one.
 pub(crate) fn is_off_center(whole: f64, loose: f64) -> bool {
-    whole > loose + TELLING
+    whole > loose + CHI2_99
 }
 
 impl Solution {
-    /// The camera of a picture taken for whole, `apart` from that of the same picture if it may be cropped, with the
+    /// The camera of a picture assumed to be whole, `apart` from that of the same picture if it may be cropped, with the
     /// uncertainty of both.
     pub(crate) fn hedged(mut self, loose: &Self, apart: &Unknowns, options: &SolveOptions) -> Self {
-        let sure_px = self.sigma.height_px;
+        let whole_px = self.sigma.height_px;
         self.sigma = self.sigma_with(loose, apart);
         (self.focal.share, self.focal.from_data_px) = (loose.focal.share, loose.focal.from_data_px);
         (self.focal_source, self.framing) = (loose.focal_source, Framing::Unknown);
-        self.warnings
-            .retain(|w| !matches!(w, Warning::HeightUncertain { .. }));
+        self.warnings.retain(|w| w.code != Code::HeightUncertain);
         let limit_px = self.height_limit_px(options);
-        if sure_px > limit_px {
+        if whole_px > limit_px {
             self.warnings.extend(self.height_warning(options));
         } else if self.sigma.height_px > limit_px {
-            let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
-            self.warnings.push(Warning::FramingUnknown {
-                height,
-                sigma_px,
-                whole_px: sure_px,
-            });
+            self.warnings.push(self.framing_warning(whole_px));
         }
         self
     }
 
-    /// The camera of a picture that is not whole, although nobody said so, and beside it that of a whole one.
+    /// That points above the surface would be known better, to this, if the picture were known to be whole.
+    fn framing_warning(&self, whole_px: f64) -> Diagnostic {
+        let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
+        Diagnostic::warning(
+            Code::FramingUnknown,
+            format!(
+                "it is not known whether the picture was cropped, so a point {height:.3} m above the surface is known only \
+                 to {sigma_px:.1} px; write \"cropped\": false under \"image\" if it is whole: to {whole_px:.1} px then"
+            ),
+        )
+    }
+
+    /// The camera of a picture that turns out not to be whole, and beside it that of a whole one.
     pub(crate) fn off_center(mut self, whole: Option<Self>) -> Self {
         let [w, h] = self.camera.image.map(f64::from);
-        let off = self.camera.principal_px - Point2::new(w / 2.0, h / 2.0);
-        self.warnings.push(Warning::OffCenter {
-            off_px: off.norm(),
-            sigma_px: self.sigma.principal_px,
-        });
+        let off_px = (self.camera.principal_px - Point2::new(w / 2.0, h / 2.0)).norm();
+        self.warnings.push(Diagnostic::warning(
+            Code::OffCenter,
+            format!(
+                "the principal point lies {off_px:.0} px (+- {:.0}) off the middle of the picture: it was cropped, the lens \
+                 was shifted, or the EXIF focal length is wrong",
+                self.sigma.principal_px
+            ),
+        ));
         self.alternative = self.alternative.or(whole.map(Box::new));
         self
     }
@@ -86,14 +95,14 @@ impl Solution {
     /// Root mean square distance of points at the reference height as two cameras see them.
     fn height_apart_px(&self, other: &Self) -> f64 {
         let height = self.sigma.reference_height;
-        let pairs = heights(self.size, height).zip(heights(other.size, height));
+        let pairs = grid_at_height(self.size, height).zip(grid_at_height(other.size, height));
         let squares: Vec<f64> = pairs
-            .map(|(a, b)| variance((other.sees(b) - self.sees(a)).norm_squared()))
+            .map(|(a, b)| repaired_variance((other.sees(b) - self.sees(a)).norm_squared()))
             .collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 
-    fn sees(&self, point: crate::geom::Point3<f64>) -> Vector2<f64> {
+    fn sees(&self, point: Point3<f64>) -> Vector2<f64> {
         distorted(&self.camera, self.kappa, point).coords
     }
 }
@@ -108,15 +117,12 @@ mod tests {
         solve(label, &SolveOptions::default()).unwrap()
     }
 
-    fn said(solution: &Solution, kind: &str) -> bool {
-        solution
-            .warnings
-            .iter()
-            .any(|w| serde_json::to_value(w).unwrap()["kind"] == kind)
+    fn warns(solution: &Solution, code: Code) -> bool {
+        solution.warnings.iter().any(|w| w.code == code)
     }
 
     #[test]
-    fn a_picture_of_unknown_framing_is_taken_for_whole_with_a_larger_error() {
+    fn a_picture_of_unknown_framing_is_treated_as_whole_with_a_larger_error() {
         let whole = Scenario::realistic().tilted(25.0).view(1, 3).label;
         let mut unknown = whole.clone();
         unknown.image.cropped = None;
@@ -132,7 +138,7 @@ mod tests {
             hedged.sigma.ln_focal
         );
         assert!(hedged.sigma.principal_px > 10.0 * sure.sigma.principal_px);
-        assert!(said(&hedged, "framing_unknown") && !said(&sure, "framing_unknown"));
+        assert!(warns(&hedged, Code::FramingUnknown) && !warns(&sure, Code::FramingUnknown));
     }
 
     #[test]
@@ -145,7 +151,7 @@ mod tests {
         .tilted(40.0);
         let view = scenario.view(1, 3);
         let solution = solved(&view.label);
-        assert!(said(&solution, "off_center"), "{:?}", solution.warnings);
+        assert!(warns(&solution, Code::OffCenter), "{:?}", solution.warnings);
         let error = libm::log(solution.camera.focal_px.x / view.camera.focal_px.x).abs();
         assert!(error < 3.0 * solution.sigma.ln_focal, "{error}");
         assert!(

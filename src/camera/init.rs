@@ -1,13 +1,11 @@
-//! A label from nothing: what a photo knows of itself, and what is left to be filled in.
+//! A label for a new photo: its EXIF data, and what is left to be filled in.
 
-use super::label::{Framing, Label, LabelSurface};
+use super::label::{Framing, Label, LabelCamera, LabelSurface};
+use super::read::apply_exif;
 use crate::error::{Error, Result};
 use crate::io;
 use serde::Serialize;
-use std::path::Path;
-
-/// Relative noise of a focal length that was noted together with a digital zoom.
-pub(super) const ZOOMED_SIGMA: f64 = 0.25;
+use std::path::{Path, PathBuf};
 
 /// The label, to be written to `path`, of a photo: its size, what its EXIF data say of the lens and of its framing, and the
 /// surface, markers and camera of another label of the same rectangle. Its corners are missing.
@@ -22,57 +20,56 @@ pub fn init_label(photo: &Path, path: &Path, like: Option<&Label>) -> Result<Lab
         [1.0; 2],
     );
     label.image.file = file_below(photo, path)?;
-    label.image.cropped = (header.cropped || header.whole).then_some(header.cropped);
     label.surface = LabelSurface {
         id: "surface".into(),
         ..LabelSurface::default()
     };
     if let Some(like) = like {
-        label.surface = LabelSurface {
-            corners_px: None,
-            source: None,
-            ..like.surface.clone()
-        };
-        (label.camera.id, label.markers) = (like.camera.id.clone(), like.markers.clone());
-        if like.image_size() == label.image_size() {
-            label.camera = super::LabelCamera {
-                height_m: None,
-                height_sigma_m: None,
-                ..like.camera.clone()
-            };
-        }
+        copy_shared(&mut label, like);
     }
-    if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
-        label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
-        label.camera.focal_sigma = label
-            .camera
-            .focal_35mm
-            .filter(|_| header.digital_zoom)
-            .map(|_| ZOOMED_SIGMA);
-    }
+    apply_exif(&mut label, &header);
     Ok(label)
+}
+
+/// Takes over from another label of the same rectangle what the photos share.
+fn copy_shared(label: &mut Label, like: &Label) {
+    label.surface = LabelSurface {
+        corners_px: None,
+        source: None,
+        ..like.surface.clone()
+    };
+    label.markers = like.markers.clone();
+    if like.image_size() == label.image_size() {
+        label.camera = LabelCamera {
+            height_m: None,
+            height_sigma_m: None,
+            ..like.camera.clone()
+        };
+    }
+    label.camera.id = like.camera.id.clone();
 }
 
 /// The photo as a label at `path` names it.
 fn file_below(photo: &Path, path: &Path) -> Result<String> {
-    let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
     let folder = absolute(path)?
         .parent()
         .map(Path::to_path_buf)
         .unwrap_or_default();
     let relative = io::relative(&absolute(photo)?, &folder);
     if io::below("", &relative).is_err() {
-        return Err(Error::file(
-            path,
-            format!("does not lie beside {} nor above it", photo.display()),
-        ));
+        let what = format!("does not lie beside {} nor above it", photo.display());
+        return Err(Error::file(path, what));
     }
     Ok(relative.to_string_lossy().replace('\\', "/"))
 }
 
-/// A label as text, with remarks on what is left to be filled in.
+fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|e| Error::file(path, e))
+}
+
+/// A label as text, with comments on what is left to be filled in.
 #[derive(Serialize)]
-struct Commented<'a> {
+struct CommentedLabel<'a> {
     #[serde(rename = "_todo", skip_serializing_if = "Vec::is_empty")]
     todo: Vec<&'static str>,
     #[serde(flatten)]
@@ -82,12 +79,12 @@ struct Commented<'a> {
 /// The text of a label file, in which what is missing is there to be filled in: corners of `null`, and what they mean.
 ///
 /// # Errors
-/// [`Error::Value`] where JSON cannot say a value.
+/// [`Error::Value`] for a value that JSON cannot express.
 pub fn commented(label: &Label) -> Result<String> {
     let mut shown = label.clone();
     let mut todo = Vec::new();
     if label.surface.corners_px.is_none() && label.points.is_empty() {
-        // What is not a number is null.
+        // NaN is written as null.
         shown.surface.corners_px = Some([[f64::NAN; 2]; 4]);
         todo.push(
             "surface.corners_px: x and y of the rectangle's corners in pixels from the top left of the picture, clockwise \
@@ -97,16 +94,16 @@ pub fn commented(label: &Label) -> Result<String> {
     if label.framing() == Framing::Unknown {
         todo.push("image: add \"cropped\": false if nothing was cut off the picture, true if something was");
     }
-    let text = serde_json::to_string_pretty(&Commented {
+    let text = serde_json::to_string_pretty(&CommentedLabel {
         todo,
         label: &shown,
     })
     .map_err(|e| Error::value("label", e))?;
-    Ok(folded(&text) + "\n")
+    Ok(with_folded_lists(&text) + "\n")
 }
 
 /// Pretty JSON, its lists of numbers in one line each.
-fn folded(text: &str) -> String {
+fn with_folded_lists(text: &str) -> String {
     let mut lines: Vec<String> = Vec::new();
     let mut list: Option<String> = None;
     for line in text.lines() {
@@ -120,10 +117,7 @@ fn folded(text: &str) -> String {
                 lines.push(format!("{}{part}", open.trim_end()));
                 list = None;
             }
-            Some(open)
-                if part.trim_end_matches(',').parse::<f64>().is_ok()
-                    || part.starts_with("null") =>
-            {
+            Some(open) if is_number(part) => {
                 *open += part;
                 *open += if part.ends_with(',') { " " } else { "" };
             }
@@ -136,10 +130,16 @@ fn folded(text: &str) -> String {
     lines.join("\n")
 }
 
+/// An element of a list of numbers, `null` among them.
+fn is_number(part: &str) -> bool {
+    part.trim_end_matches(',').parse::<f64>().is_ok() || part.starts_with("null")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Image, Srgb8};
+    use crate::image::Image;
+    use crate::pixel::Srgb8;
 
     #[test]
     fn a_label_from_nothing_reads_back_without_its_corners() {

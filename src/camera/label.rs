@@ -1,4 +1,4 @@
-//! Label files: what a person says of a photo of a surface (`NAME.label.json`).
+//! Label files: the corners of a surface in a photo, as a person labelled them (`NAME.label.json`).
 
 use crate::geom::{Point2, Vector2};
 use serde::de::Error as _;
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 /// The corners of a flat rectangle of known size in a photo, and what is known of the camera that took it.
 ///
-/// In files an unknown key is an error, except where it starts with `_`: those are remarks. Values are as a person
+/// In files an unknown key is an error, except where it starts with `_`: those are comments. Values are as a person
 /// wrote them; [`solve`](super::solve) checks them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self", deny_unknown_fields)]
@@ -54,7 +54,7 @@ pub struct LabelImage {
     pub width: u32,
     /// Height of the upright picture, pixels.
     pub height: u32,
-    /// A part was cut away, so that the lens need not look at the picture's centre; `false` says that the picture is
+    /// A part was cut away, so that the principal point need not be the picture's centre; `false` says that the picture is
     /// whole. Default: what the photo's EXIF data say. See [`Label::framing`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cropped: Option<bool>,
@@ -67,12 +67,12 @@ pub struct LabelImage {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Framing {
-    /// All of it, or a part of known place, or one of known principal point: the label or its photo's EXIF data say so.
+    /// All of it, or a known part, or one of known principal point: the label or its photo's EXIF data say so.
     Whole,
-    /// Nobody says: EXIF data were taken away, or tell of another size.
+    /// Not known: EXIF data were removed, or state another size.
     #[default]
     Unknown,
-    /// A part of unknown place.
+    /// An unknown part.
     Cropped,
 }
 
@@ -135,7 +135,7 @@ pub struct LabelCamera {
     /// Focal length, pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_px: Option<f64>,
-    /// Focal length as a 35 mm camera's, millimetres, as EXIF tells it.
+    /// Focal length as a 35 mm camera's, millimetres, as in EXIF data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_35mm: Option<f64>,
     /// Relative standard deviation of the focal length.
@@ -160,7 +160,7 @@ pub struct LabelCamera {
     pub height_sigma_m: Option<f64>,
 }
 
-/// A point of known place on or above the surface.
+/// A point of known position on or above the surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LabelPoint {
@@ -271,7 +271,7 @@ impl Label {
 
 impl<'de> Deserialize<'de> for Label {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let value = without_empty_corners(without_remarks(Value::deserialize(deserializer)?));
+        let value = without_empty_corners(without_comments(Value::deserialize(deserializer)?));
         if let Some(missing) = missing_keys(&value) {
             return Err(D::Error::custom(missing));
         }
@@ -279,7 +279,7 @@ impl<'de> Deserialize<'de> for Label {
         let tracked = serde_path_to_error::Deserializer::new(value, &mut track);
         Self::deserialize(tracked).map_err(|e| {
             let (what, at) = (e.to_string(), track.path().to_string());
-            // A message on a key names it; the reader of the file adds what was probably meant.
+            // A message about a key names it; the reader of the file adds what was probably meant.
             D::Error::custom(if what.contains(" field `") {
                 what
             } else {
@@ -298,22 +298,28 @@ impl Serialize for Label {
 /// Without corners that were left to be filled in and were not.
 fn without_empty_corners(mut value: Value) -> Value {
     let surface = value.get_mut("surface").and_then(Value::as_object_mut);
-    if let Some(surface) = surface {
-        let corners = surface.get("corners_px").and_then(Value::as_array);
-        let numbers = corners
-            .into_iter()
-            .flatten()
-            .flat_map(|corner| corner.as_array().map_or(&[][..], Vec::as_slice));
-        let mut numbers = numbers.peekable();
-        if numbers.peek().is_some() && numbers.all(Value::is_null) {
-            surface.remove("corners_px");
-        }
+    if let Some(surface) = surface
+        && surface.get("corners_px").is_some_and(are_empty_corners)
+    {
+        surface.remove("corners_px");
     }
     value
 }
 
+/// Pairs of `null`.
+fn are_empty_corners(corners: &Value) -> bool {
+    let mut numbers = corners
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_array)
+        .flatten()
+        .peekable();
+    numbers.peek().is_some() && numbers.all(Value::is_null)
+}
+
 /// Keys that every label has, as pointers.
-const NEEDED: [&str; 6] = [
+const NEEDED_KEYS: [&str; 6] = [
     "/format",
     "/version",
     "/image/file",
@@ -324,26 +330,37 @@ const NEEDED: [&str; 6] = [
 
 /// All keys that a label lacks, where it lacks any that every one has.
 fn missing_keys(value: &Value) -> Option<String> {
-    let is_missing = |key: &str| value.pointer(key).is_none_or(Value::is_null);
-    let mut missing: Vec<String> = NEEDED
+    let mut missing: Vec<String> = NEEDED_KEYS
         .into_iter()
-        .filter(|key| is_missing(key))
+        .filter(|key| is_missing(value, key))
         .map(|key| key[1..].replace('/', "."))
         .collect();
     if missing.is_empty() || !value.is_object() {
         return None;
     }
-    if is_missing("/surface/corners_px") && is_missing("/markers") && is_missing("/points") {
-        missing.push("surface.corners_px (or markers)".into());
-    }
-    if is_missing("/surface/width_m") && is_missing("/surface/height_m") {
-        missing.push("surface.width_m (or surface.height_m)".into());
-    }
+    missing.extend(missing_alternatives(value));
     let key = if missing.len() == 1 { "key" } else { "keys" };
     Some(format!(
         "missing {key} {}; `petcomp camera init PHOTO --size WxH` writes them",
         missing.join(", ")
     ))
+}
+
+/// Keys of which a label needs one or another, where it has none.
+fn missing_alternatives(value: &Value) -> impl Iterator<Item = String> {
+    let corners = lacks_all(value, &["/surface/corners_px", "/markers", "/points"])
+        .then_some("surface.corners_px (or markers)");
+    let sides = lacks_all(value, &["/surface/width_m", "/surface/height_m"])
+        .then_some("surface.width_m (or surface.height_m)");
+    corners.into_iter().chain(sides).map(String::from)
+}
+
+fn lacks_all(value: &Value, keys: &[&str]) -> bool {
+    keys.iter().all(|key| is_missing(value, key))
+}
+
+fn is_missing(value: &Value, key: &str) -> bool {
+    value.pointer(key).is_none_or(Value::is_null)
 }
 
 fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
@@ -354,13 +371,13 @@ fn version_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Err
 }
 
 /// Without the keys that start with `_`.
-fn without_remarks(value: Value) -> Value {
+fn without_comments(value: Value) -> Value {
     match value {
         Value::Object(map) => {
             let kept = map.into_iter().filter(|(key, _)| !key.starts_with('_'));
-            Value::Object(kept.map(|(key, v)| (key, without_remarks(v))).collect())
+            Value::Object(kept.map(|(key, v)| (key, without_comments(v))).collect())
         }
-        Value::Array(items) => Value::Array(items.into_iter().map(without_remarks).collect()),
+        Value::Array(items) => Value::Array(items.into_iter().map(without_comments).collect()),
         other => other,
     }
 }
@@ -402,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_is_an_error_that_names_it_and_a_remark_is_not() {
+    fn an_unknown_key_is_an_error_that_names_it_and_a_comment_is_not() {
         let typo = TRAY.replace("\"focal_sigma\"", "\"focal_sgima\"");
         assert!(message(&typo).contains("focal_sgima"), "{}", message(&typo));
     }

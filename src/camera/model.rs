@@ -1,11 +1,11 @@
-//! What a camera sees of a point, and how that changes with everything the solver may turn.
+//! Where a camera sees a point, and how that changes with the unknowns.
 //!
 //! # Method
 //! The eleven unknowns are chosen so that the one weak direction stands alone: from straight above the focal length (and
 //! the principal point) has no influence on any residual while all else stays well conditioned. Focal length and distance
 //! would be almost perfectly correlated; the logarithm of the scale, focal length over distance, is not.
 
-use super::rectangle::Stance;
+use super::rectangle::ScaledPose;
 use crate::geom::Vector2;
 use nalgebra::{Matrix2, Rotation3, SMatrix, SVector, Vector3};
 
@@ -18,8 +18,8 @@ pub(crate) const LN_FOCAL: usize = 6;
 pub(crate) const STRETCH: usize = 7;
 pub(crate) const PRINCIPAL: usize = 8;
 pub(crate) const KAPPA: usize = 10;
-/// Points nearer to the camera's plane than this part of the rectangle's distance are not seen.
-const NEAREST: f64 = 1e-6;
+/// Points nearer to the camera's plane than this part of the rectangle's depth are not seen.
+const NEAREST_DEPTH: f64 = 1e-6;
 
 /// A value per unknown.
 pub(crate) type Unknowns = SVector<f64, UNKNOWNS>;
@@ -31,13 +31,13 @@ pub(crate) type Slope = SMatrix<f64, UNKNOWNS, 2>;
 /// A camera over a rectangle; units as in [`camera`](super).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State {
-    pub(crate) stance: Stance,
+    pub(crate) pose: ScaledPose,
     pub(crate) ln_focal: f64,
     pub(crate) focal: f64,
     /// Logarithm of what the ratio of the sides has to be multiplied by.
     pub(crate) stretch: f64,
-    /// How the rectangle gives to that.
-    pub(crate) elastic: Elastic,
+    /// How that is shared between the sides.
+    pub(crate) stretch_shares: StretchShares,
     /// What its sides become.
     pub(crate) sides: [f64; 2],
     /// Principal point, relative to where it is expected.
@@ -46,11 +46,11 @@ pub(crate) struct State {
     pub(crate) kappa: f64,
 }
 
-/// Which part of the stretch goes into x and which into y; tells what stays exact.
+/// Which parts of the stretch go into x and into y: a measured side stays as it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Elastic([f64; 2]);
+pub(crate) struct StretchShares([f64; 2]);
 
-impl Elastic {
+impl StretchShares {
     /// The area stays: both sides are measured.
     pub(crate) const BOTH: Self = Self([0.5, -0.5]);
     /// The width stays: only it is measured.
@@ -59,27 +59,44 @@ impl Elastic {
     pub(crate) const WIDTH: Self = Self([1.0, 0.0]);
 }
 
-/// A point of known place, and where it was seen.
+/// A point of known position, and where it was seen.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sight {
+pub(crate) struct Observation {
     pub(crate) point: Vector3<f64>,
-    /// It was measured on its own and does not give with the rectangle.
+    /// It was measured on its own and does not stretch with the rectangle.
     pub(crate) rigid: bool,
     pub(crate) seen: Vector2<f64>,
     /// One over the noise.
     pub(crate) weight: f64,
 }
 
+/// A point as a pinhole camera sees it.
+struct PinholeView {
+    /// Its offset from the rectangle's centre, in the camera's axes.
+    turned: Vector3<f64>,
+    /// Focal lengths per length: scale over focal length.
+    nearness: f64,
+    /// Its depth over that of the rectangle's centre.
+    depth: f64,
+    /// Where it is seen, relative to the principal point.
+    position: Vector2<f64>,
+}
+
 impl State {
     /// A camera over a rectangle that is as measured.
-    pub(crate) fn new(stance: Stance, focal: f64, kappa: f64, elastic: Elastic) -> Self {
+    pub(crate) fn new(
+        pose: ScaledPose,
+        focal: f64,
+        kappa: f64,
+        stretch_shares: StretchShares,
+    ) -> Self {
         let (ln_focal, principal) = (libm::log(focal), Vector2::zeros());
         Self {
-            stance,
+            pose,
             ln_focal,
             focal,
             stretch: 0.0,
-            elastic,
+            stretch_shares,
             sides: [1.0; 2],
             principal,
             kappa,
@@ -105,7 +122,7 @@ impl State {
     }
 
     fn with_stretch(self, stretch: f64) -> Self {
-        let Elastic(shares) = self.elastic;
+        let StretchShares(shares) = self.stretch_shares;
         Self {
             stretch,
             sides: shares.map(|share| libm::exp(share * stretch)),
@@ -115,22 +132,22 @@ impl State {
 
     /// Position of the rectangle's centre in the camera's frame.
     pub(crate) fn translation(&self) -> Vector3<f64> {
-        (self.stance.center - self.principal).push(self.focal) / self.stance.scale
+        (self.pose.center - self.principal).push(self.focal) / self.pose.scale
     }
 
     /// The camera's place over the rectangle.
     pub(crate) fn camera_center(&self) -> Vector3<f64> {
-        -(self.stance.rotation.transpose() * self.translation())
+        -(self.pose.rotation.transpose() * self.translation())
     }
 
     /// After a small step in every unknown.
     pub(crate) fn stepped(&self, step: &Unknowns) -> Self {
         let turn = Rotation3::new(step.fixed_rows::<3>(0));
         let moved = Self {
-            stance: Stance {
-                rotation: turn.matrix() * self.stance.rotation,
-                center: self.stance.center + step.fixed_rows::<2>(CENTER),
-                scale: self.stance.scale * libm::exp(step[LN_SCALE]),
+            pose: ScaledPose {
+                rotation: turn.matrix() * self.pose.rotation,
+                center: self.pose.center + step.fixed_rows::<2>(CENTER),
+                scale: self.pose.scale * libm::exp(step[LN_SCALE]),
             },
             principal: self.principal + step.fixed_rows::<2>(PRINCIPAL),
             kappa: self.kappa + step[KAPPA],
@@ -143,14 +160,13 @@ impl State {
 
     /// The step that leads from here to another state.
     pub(crate) fn step_to(&self, other: &Self) -> Unknowns {
-        let turn = Rotation3::from_matrix_unchecked(
-            other.stance.rotation * self.stance.rotation.transpose(),
-        );
+        let turn =
+            Rotation3::from_matrix_unchecked(other.pose.rotation * self.pose.rotation.transpose());
         let mut step = Unknowns::zeros();
         step.fixed_rows_mut::<3>(0).copy_from(&turn.scaled_axis());
         step.fixed_rows_mut::<2>(CENTER)
-            .copy_from(&(other.stance.center - self.stance.center));
-        step[LN_SCALE] = libm::log(other.stance.scale / self.stance.scale);
+            .copy_from(&(other.pose.center - self.pose.center));
+        step[LN_SCALE] = libm::log(other.pose.scale / self.pose.scale);
         for unknown in LN_FOCAL..UNKNOWNS {
             step[unknown] = other.value(unknown) - self.value(unknown);
         }
@@ -165,73 +181,110 @@ impl State {
 
     /// Where a point is seen; none at or behind the camera.
     pub(crate) fn project(&self, point: &Vector3<f64>, rigid: bool) -> Option<Vector2<f64>> {
-        let turned = self.stance.rotation * self.stretched(point, rigid);
-        let w = 1.0 + self.stance.scale / self.focal * turned.z;
-        let n = turned.xy() * self.stance.scale + self.stance.center - self.principal;
-        let straight = n / w;
-        (w > NEAREST)
-            .then(|| self.principal + straight * (1.0 + self.kappa * straight.norm_squared()))
+        let seen = self.pinhole(&self.stretched(point, rigid))?;
+        Some(self.distorted(&seen.position))
     }
 
     /// Where a point is seen and how that changes with the unknowns; none at or behind the camera.
     pub(crate) fn slope(&self, point: &Vector3<f64>, rigid: bool) -> Option<(Vector2<f64>, Slope)> {
-        let Stance {
+        let stretched = self.stretched(point, rigid);
+        let seen = self.pinhole(&stretched)?;
+        let per_stretch = self.stretch_derivative(&stretched, rigid);
+        let mut slope = self.pinhole_slope(&seen, &per_stretch);
+        self.distort_slope(&seen.position, &mut slope);
+        Some((self.distorted(&seen.position), slope))
+    }
+
+    /// Projection without distortion; none at or behind the camera.
+    #[inline]
+    fn pinhole(&self, stretched: &Vector3<f64>) -> Option<PinholeView> {
+        let ScaledPose {
             rotation,
             center,
             scale,
-        } = self.stance;
+        } = self.pose;
         let nearness = scale / self.focal;
-        let stretched = self.stretched(point, rigid);
-        let q = rotation * stretched;
-        let w = 1.0 + nearness * q.z;
-        if w <= NEAREST {
-            return None;
-        }
-        let straight = (q.xy() * scale + center - self.principal) / w;
-        let Elastic([ex, ey]) = if rigid {
-            Elastic([0.0; 2])
-        } else {
-            self.elastic
-        };
-        let pull = rotation * Vector3::new(ex * stretched.x, ey * stretched.y, 0.0);
-        let (near, far) = (scale / w, nearness / w);
+        let turned = rotation * stretched;
+        let depth = 1.0 + nearness * turned.z;
+        let position = (turned.xy() * scale + center - self.principal) / depth;
+        (depth > NEAREST_DEPTH).then_some(PinholeView {
+            turned,
+            nearness,
+            depth,
+            position,
+        })
+    }
 
+    /// Change of a stretched point per stretch, in the camera's axes.
+    #[inline]
+    fn stretch_derivative(&self, stretched: &Vector3<f64>, rigid: bool) -> Vector3<f64> {
+        let StretchShares([x, y]) = if rigid {
+            StretchShares([0.0; 2])
+        } else {
+            self.stretch_shares
+        };
+        self.pose.rotation * Vector3::new(x * stretched.x, y * stretched.y, 0.0)
+    }
+
+    /// Change of a position without distortion, relative to the principal point.
+    #[inline]
+    fn pinhole_slope(&self, seen: &PinholeView, per_stretch: &Vector3<f64>) -> Slope {
+        let PinholeView {
+            turned,
+            nearness,
+            depth,
+            position,
+        } = seen;
+        let (near, far) = (self.pose.scale / depth, nearness / depth);
         let mut slope = Slope::zeros();
         for axis in 0..2 {
-            // The change of the position along this axis per change of q.
-            let mut per_q = Vector3::new(0.0, 0.0, -straight[axis] * far);
-            per_q[axis] = near;
+            // The change of the position along this axis per change of the turned point.
+            let mut per_point = Vector3::new(0.0, 0.0, -position[axis] * far);
+            per_point[axis] = near;
             let mut column = slope.column_mut(axis);
-            column.fixed_rows_mut::<3>(0).copy_from(&q.cross(&per_q));
-            column[CENTER + axis] = 1.0 / w;
-            column[LN_SCALE] = per_q.dot(&q);
-            column[LN_FOCAL] = straight[axis] * far * q.z;
-            column[STRETCH] = per_q.dot(&pull);
-            column[PRINCIPAL + axis] = -1.0 / w;
+            column
+                .fixed_rows_mut::<3>(0)
+                .copy_from(&turned.cross(&per_point));
+            column[CENTER + axis] = 1.0 / depth;
+            column[LN_SCALE] = per_point.dot(turned);
+            column[LN_FOCAL] = position[axis] * far * turned.z;
+            column[STRETCH] = per_point.dot(per_stretch);
+            column[PRINCIPAL + axis] = -1.0 / depth;
         }
-        let r2 = straight.norm_squared();
+        slope
+    }
+
+    /// What distortion makes of the change of a position.
+    #[inline]
+    fn distort_slope(&self, position: &Vector2<f64>, slope: &mut Slope) {
+        let r2 = position.norm_squared();
         if self.kappa != 0.0 {
             let bent = Matrix2::identity() * (1.0 + self.kappa * r2)
-                + straight * straight.transpose() * (2.0 * self.kappa);
-            slope *= bent;
+                + position * position.transpose() * (2.0 * self.kappa);
+            *slope *= bent;
         }
         for axis in 0..2 {
             slope[(PRINCIPAL + axis, axis)] += 1.0;
-            slope[(KAPPA, axis)] = straight[axis] * r2;
+            slope[(KAPPA, axis)] = position[axis] * r2;
         }
-        Some((self.principal + straight * (1.0 + self.kappa * r2), slope))
+    }
+
+    /// Where the lens shows what is at a position without distortion.
+    #[inline]
+    fn distorted(&self, position: &Vector2<f64>) -> Vector2<f64> {
+        self.principal + position * (1.0 + self.kappa * position.norm_squared())
     }
 
     /// Logarithm of the camera's height over the surface and how it changes with the unknowns; none below it.
     pub(crate) fn ln_height(&self) -> Option<(f64, Unknowns)> {
         let t = self.translation();
-        let normal: Vector3<f64> = self.stance.rotation.column(2).into();
+        let normal: Vector3<f64> = self.pose.rotation.column(2).into();
         let height = -normal.dot(&t);
         let mut slope = Unknowns::zeros();
         slope.fixed_rows_mut::<3>(0).copy_from(&-normal.cross(&t));
         for axis in 0..2 {
-            slope[CENTER + axis] = -normal[axis] / self.stance.scale;
-            slope[PRINCIPAL + axis] = normal[axis] / self.stance.scale;
+            slope[CENTER + axis] = -normal[axis] / self.pose.scale;
+            slope[PRINCIPAL + axis] = normal[axis] / self.pose.scale;
         }
         slope[LN_SCALE] = -height;
         slope[LN_FOCAL] = -normal.z * t.z;
@@ -244,15 +297,15 @@ mod tests {
     use super::*;
     use nalgebra::Matrix3;
 
-    fn state(elastic: Elastic) -> State {
+    fn state(stretch_shares: StretchShares) -> State {
         let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
         let rotation = Rotation3::from_euler_angles(0.4, -0.3, 0.8).into_inner() * flip;
-        let stance = Stance {
+        let pose = ScaledPose {
             rotation,
             center: Vector2::new(0.2, -0.1),
             scale: 0.6,
         };
-        let state = State::new(stance, 1.3, 0.02, elastic).with_stretch(0.03);
+        let state = State::new(pose, 1.3, 0.02, stretch_shares).with_stretch(0.03);
         State {
             principal: Vector2::new(0.01, -0.02),
             ..state
@@ -277,13 +330,13 @@ mod tests {
 
     #[test]
     fn slopes_agree_with_differences() {
-        for (elastic, rigid) in [
-            (Elastic::BOTH, false),
-            (Elastic::HEIGHT, false),
-            (Elastic::WIDTH, false),
-            (Elastic::WIDTH, true),
+        for (stretch_shares, rigid) in [
+            (StretchShares::BOTH, false),
+            (StretchShares::HEIGHT, false),
+            (StretchShares::WIDTH, false),
+            (StretchShares::WIDTH, true),
         ] {
-            let (state, point) = (state(elastic), Vector3::new(0.5, -0.4, 0.2));
+            let (state, point) = (state(stretch_shares), Vector3::new(0.5, -0.4, 0.2));
             let (seen, slope) = state.slope(&point, rigid).unwrap();
             assert!((seen - state.project(&point, rigid).unwrap()).norm() < 1e-15);
             let expected = differences(state, |s| s.project(&point, rigid).unwrap());
@@ -298,7 +351,7 @@ mod tests {
     #[test]
     fn a_step_to_a_state_leads_there() {
         let (from, step) = (
-            state(Elastic::BOTH),
+            state(StretchShares::BOTH),
             Unknowns::from_fn(|i, _| 0.01 * (i as f64 - 4.0)),
         );
         assert!((from.step_to(&from.stepped(&step)) - step).norm() < 1e-12);
@@ -306,7 +359,7 @@ mod tests {
 
     #[test]
     fn the_slope_of_the_height_agrees_with_differences() {
-        let state = state(Elastic::BOTH);
+        let state = state(StretchShares::BOTH);
         let expected = differences(state, |s| SVector::<f64, 1>::new(s.ln_height().unwrap().0));
         let (_, slope) = state.ln_height().unwrap();
         assert!((slope - expected).abs().max() < 1e-9);
@@ -314,7 +367,7 @@ mod tests {
 
     #[test]
     fn a_point_behind_the_camera_is_not_seen() {
-        let (state, behind) = (state(Elastic::BOTH), Vector3::new(0.0, 0.0, 1e3));
+        let (state, behind) = (state(StretchShares::BOTH), Vector3::new(0.0, 0.0, 1e3));
         assert!(state.project(&behind, true).is_none() && state.slope(&behind, true).is_none());
     }
 }

@@ -1,11 +1,11 @@
-//! How to solve, and what to believe where a label says nothing.
+//! How to solve, and the priors of what a label leaves open.
 
 /// How to solve.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolveOptions {
     /// What to do with corners out of order. Default: repair them.
     pub order: CornerOrder,
-    /// What to believe where the label says nothing. Default: of a real camera and a tape measure.
+    /// Priors of what the label leaves open. Default: those of a real camera and a tape measure.
     pub priors: Priors,
     /// Take the width as 1 where neither side is known. Default: false, an error.
     pub unit_scale: bool,
@@ -13,21 +13,12 @@ pub struct SolveOptions {
     pub reference_height: Option<f64>,
     /// Warn where a point at that height is known no better than to this, pixels. Default: 0.0015 picture diagonals.
     pub max_height_sigma_px: Option<f64>,
-    /// How long to look. Default: to the end.
-    pub effort: Effort,
-}
-
-/// How long to look for the most probable camera.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Effort {
-    /// From every start, until nothing changes any more.
-    #[default]
-    Whole,
-    /// From the closed form only, at most so many steps; 0 is the closed form itself.
+    /// At most so many iterations of the refinement, from the closed form alone; 0 is the closed form itself. Default: none,
+    /// from every start until nothing changes any more.
     ///
-    /// Looks for no other pose, believes EXIF and the order of the sides, and gives the standard deviations of where it
-    /// stopped.
-    Steps(usize),
+    /// With a limit, other poses are not searched for, EXIF data and the order of the sides are trusted, and the standard
+    /// deviations are those at the last iteration.
+    pub max_iterations: Option<usize>,
 }
 
 /// What to do with corners in another order than clockwise from the top left.
@@ -42,7 +33,7 @@ pub enum CornerOrder {
     Auto,
 }
 
-/// Standard deviations of what a label leaves open; 0 makes a fact of the usual value, infinity forgets it.
+/// Standard deviations of what a label leaves open; 0 fixes the default value, infinity makes the prior flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Priors {
     /// Relative, of a focal length of which nothing is known; its median is the picture's longer side.
@@ -50,8 +41,8 @@ pub struct Priors {
     pub focal_sigma: f64,
     /// Of the principal point of a whole picture, in picture diagonals. Default: 0.005.
     pub principal_sigma: f64,
-    /// Of the principal point of a picture that is cropped, or may be, in picture diagonals. Default: 0.12 (somebody who
-    /// cuts a third away on one side moves it by 0.2 diagonals; see `petcomp-report camera`).
+    /// Of the principal point of a picture that is cropped, or may be, in picture diagonals. Default: 0.12 (cutting a third
+    /// away on one side moves it by 0.2 diagonals; see `petcomp-report camera`).
     pub cropped_sigma: f64,
     /// Relative, of the ratio of the sides. Default: 0.005.
     pub ratio_sigma: f64,
@@ -72,7 +63,7 @@ impl Default for Priors {
 }
 
 impl Priors {
-    /// Of a perfect camera over a perfect rectangle, for rendered pictures.
+    /// For rendered pictures: a perfect camera over a perfect rectangle.
     ///
     /// Not for photos: from near above it turns half a percent of tape error into focal errors of hundreds of percent.
     pub fn ideal() -> Self {
@@ -85,12 +76,12 @@ impl Priors {
         }
     }
 
-    /// A cropped picture is another thing than a whole one.
+    /// A cropped picture has another prior than a whole one.
     pub(crate) fn cropping_matters(&self) -> bool {
         self.cropped_sigma > self.principal_sigma
     }
 
-    /// The same, knowing nothing of the focal length.
+    /// The same, with a flat prior of the focal length.
     pub fn with_free_focal(self) -> Self {
         Self {
             focal_sigma: f64::INFINITY,

@@ -1,5 +1,6 @@
 //! A picture to judge a camera by: rectangle, metric grid and a box of the reference height, drawn over the photo.
 
+use super::pinhole::Camera;
 use super::solution::Solution;
 use crate::color::{decode_srgb8, encode_srgb8};
 use crate::draw::{self, TextSize};
@@ -8,169 +9,188 @@ use crate::image::Image;
 use crate::pixel::{LinearRgb, Srgb8};
 use nalgebra::{Matrix2, SymmetricEigen};
 
-/// Colours, scene-linear.
-const GRID: LinearRgb = LinearRgb {
-    r: 0.9,
-    g: 0.9,
-    b: 0.9,
-};
-const RECTANGLE: LinearRgb = LinearRgb {
-    r: 0.05,
-    g: 0.8,
-    b: 0.1,
-};
-const BOX: LinearRgb = LinearRgb {
-    r: 1.0,
-    g: 0.3,
-    b: 0.0,
-};
-const LABELLED: LinearRgb = LinearRgb {
-    r: 0.9,
-    g: 0.0,
-    b: 0.35,
-};
+const GRID_COLOR: LinearRgb = linear_rgb(0.9, 0.9, 0.9);
+const RECTANGLE_COLOR: LinearRgb = linear_rgb(0.05, 0.8, 0.1);
+const BOX_COLOR: LinearRgb = linear_rgb(1.0, 0.3, 0.0);
+const LABEL_COLOR: LinearRgb = linear_rgb(0.9, 0.0, 0.35);
+/// Widths of lines, in those of a cross.
+const GRID_WEIGHT: f64 = 0.6;
+const BOX_WEIGHT: f64 = 1.0;
+const RECTANGLE_WEIGHT: f64 = 1.5;
+/// A line is one pixel wide for so many pixels of the picture's longer side.
+const SIDE_PER_LINE_WIDTH: f64 = 800.0;
 /// Error ellipses are drawn this many standard deviations large, to be seen at all.
 const ELLIPSE_SIGMAS: f64 = 10.0;
 const ELLIPSE_POINTS: usize = 48;
 /// Grid lines per side, at most.
-const MOST_LINES: f64 = 12.0;
+const MAX_GRID_LINES: f64 = 12.0;
 /// Half an arm of the cross at a labelled corner, in line widths.
-const CROSS: f64 = 5.0;
-/// The legend is drawn for a picture of at least half so many columns and no more than so many, and made as large as this
-/// one.
+const CROSS_ARM: f64 = 5.0;
+/// The legend is drawn for a picture of at least half so many columns and no more than so many, and enlarged to this one.
 const LEGEND_COLUMNS: usize = 1600;
 /// Room around the legend and between a mark and its text, and the side of a mark, pixels.
-const MARGIN: usize = 8;
-const MARK: usize = 12;
+const MARGIN_PX: usize = 8;
+const MARK_PX: usize = 12;
+const LEGEND_SIZE: TextSize = TextSize::Small;
 const PAPER: Srgb8 = draw::rgb(0x1C, 0x1E, 0x22);
 const INK: Srgb8 = draw::rgb(0xF2, 0xF2, 0xF2);
-const WARNING: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
+const WARNING_INK: Srgb8 = draw::rgb(0xFF, 0xB0, 0x40);
 
-/// Draws what a solution says over its photo, with a legend below it.
+const fn linear_rgb(r: f32, g: f32, b: f32) -> LinearRgb {
+    LinearRgb { r, g, b }
+}
+
+/// Draws a solution over its photo, with a legend below it.
 ///
 /// Green is the rectangle as fitted, white a grid of 1, 2 or 5 times a power of ten metres, orange a box over the rectangle
 /// as high as [`Sigma::reference_height`](super::Sigma), crosses are the labelled corners, the ellipses around them ten
 /// standard deviations of where the camera sees the corners.
 pub fn overlay(photo: &Image<LinearRgb>, solution: &Solution) -> Image<LinearRgb> {
-    let image = [photo.width() as u32, photo.height() as u32];
-    let zoom = f64::from(image[0]) / f64::from(solution.camera.image[0].max(1));
-    let mut sheet = Sheet {
-        picture: photo.clone(),
-        camera: solution.camera.resized(image),
-        width: (f64::from(image[0].max(image[1])) / 800.0).max(1.0),
-    };
-    let [x, y] = solution.size.map(|s| s / 2.0);
-    for line in grid(solution.size) {
-        sheet.line(line, GRID, 0.6);
-    }
-    let base = [[-x, y], [x, y], [x, -y], [-x, -y]];
-    let height = solution.sigma.reference_height;
-    for i in 0..4 {
-        let [a, b] = [base[i], base[(i + 1) % 4]];
-        sheet.line([[a[0], a[1], height], [b[0], b[1], height]], BOX, 1.0);
-        sheet.line([[a[0], a[1], 0.0], [a[0], a[1], height]], BOX, 1.0);
-        sheet.line([[a[0], a[1], 0.0], [b[0], b[1], 0.0]], RECTANGLE, 1.5);
-    }
-    for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
-        sheet.mark(corner * zoom, &(covariance * zoom * zoom));
-    }
+    let drawing = OverlayDrawing::new(photo, solution).picture;
     let legend = legend(photo.width(), solution);
     let (width, height) = photo.size();
     Image::from_fn(width, height + legend.height(), |x, y| {
         match y.checked_sub(height) {
-            None => sheet.picture[(x, y)],
+            None => drawing[(x, y)],
             Some(below) => legend[(x, below)],
         }
     })
 }
 
+/// An entry of the legend.
+#[derive(Clone)]
+struct LegendEntry {
+    mark: Option<Srgb8>,
+    text: String,
+    ink: Srgb8,
+}
+
+impl LegendEntry {
+    /// What a colour means.
+    fn for_color(color: LinearRgb, text: String) -> Self {
+        Self {
+            mark: Some(encode_srgb8(color)),
+            ..Self::plain(text, INK)
+        }
+    }
+
+    fn plain(text: String, ink: Srgb8) -> Self {
+        Self {
+            mark: None,
+            text,
+            ink,
+        }
+    }
+
+    /// Lines of so many columns at most, the mark beside the first.
+    fn wrapped(&self, columns: usize) -> impl Iterator<Item = Self> {
+        let lines = draw::wrapped(&self.text, columns, LEGEND_SIZE);
+        lines.into_iter().enumerate().map(|(i, text)| Self {
+            mark: self.mark.filter(|_| i == 0),
+            text,
+            ink: self.ink,
+        })
+    }
+
+    /// Draws a line of the legend.
+    fn draw(&self, canvas: &mut Image<Srgb8>, top: usize) {
+        if let Some(color) = self.mark {
+            let at = [MARGIN_PX as isize, top as isize + 2];
+            draw::fill(canvas, at, [MARK_PX; 2], color);
+        }
+        let at = [TEXT_LEFT_PX as isize, top as isize];
+        draw::text(canvas, at, &self.text, self.ink, LEGEND_SIZE);
+    }
+}
+
+/// Where the legend's texts begin, pixels.
+const TEXT_LEFT_PX: usize = 2 * MARGIN_PX + MARK_PX;
+
 /// What the colours mean, what was found, and what to look at, as wide as the picture.
 fn legend(width: usize, solution: &Solution) -> Image<LinearRgb> {
     let grown = (width * 2).div_ceil(LEGEND_COLUMNS).max(1);
     let columns = width.div_ceil(grown).max(1);
-    let left = 2 * MARGIN + MARK;
-    let size = TextSize::Small;
-    let lines: Vec<(Option<Srgb8>, String, Srgb8)> = entries(solution)
-        .into_iter()
-        .flat_map(|(mark, text, ink)| {
-            let lines = draw::wrapped(&text, columns.saturating_sub(left + MARGIN), size);
-            lines
-                .into_iter()
-                .enumerate()
-                .map(move |(i, line)| (mark.filter(|_| i == 0), line, ink))
-        })
+    let text_columns = columns.saturating_sub(TEXT_LEFT_PX + MARGIN_PX);
+    let entries = entries(solution);
+    let lines: Vec<LegendEntry> = entries
+        .iter()
+        .flat_map(|entry| entry.wrapped(text_columns))
         .collect();
-    let mut canvas = Image::filled(columns, 2 * MARGIN + lines.len() * size.height(), PAPER);
-    for (i, (mark, line, ink)) in lines.into_iter().enumerate() {
-        let top = (MARGIN + i * size.height()) as isize;
-        if let Some(color) = mark {
-            draw::fill(&mut canvas, [MARGIN as isize, top + 2], [MARK, MARK], color);
-        }
-        draw::text(&mut canvas, [left as isize, top], &line, ink, size);
+    let rows = 2 * MARGIN_PX + lines.len() * LEGEND_SIZE.height();
+    let mut canvas = Image::filled(columns, rows, PAPER);
+    for (i, line) in lines.iter().enumerate() {
+        line.draw(&mut canvas, MARGIN_PX + i * LEGEND_SIZE.height());
     }
     Image::from_fn(width, canvas.height() * grown, |x, y| {
         decode_srgb8(canvas[(x / grown, y / grown)])
     })
 }
 
-/// Lines of the legend: a mark's colour, a text and its colour.
-fn entries(solution: &Solution) -> Vec<(Option<Srgb8>, String, Srgb8)> {
-    let ([w, h], camera, sigma) = (solution.size, &solution.camera, &solution.sigma);
-    let percent = 100.0 * sigma.ln_focal;
-    let marks = [
-        (RECTANGLE, format!("rectangle as fitted, {w:.3} x {h:.3} m")),
+fn entries(solution: &Solution) -> Vec<LegendEntry> {
+    let warnings = solution
+        .warnings
+        .iter()
+        .map(|warning| LegendEntry::plain(warning.to_string(), WARNING_INK));
+    color_entries(solution)
+        .into_iter()
+        .chain([LegendEntry::plain(camera_text(solution), INK)])
+        .chain(warnings)
+        .collect()
+}
+
+fn color_entries(solution: &Solution) -> [LegendEntry; 4] {
+    let [w, h] = solution.size;
+    let step = grid_step(solution.size);
+    let height = solution.sigma.reference_height;
+    [
         (
-            GRID,
-            format!("grid of {:.3} m on the surface", grid_step(solution.size)),
+            RECTANGLE_COLOR,
+            format!("rectangle as fitted, {w:.3} x {h:.3} m"),
+        ),
+        (GRID_COLOR, format!("grid of {step:.3} m on the surface")),
+        (
+            BOX_COLOR,
+            format!("box {height:.3} m high over the rectangle"),
         ),
         (
-            BOX,
-            format!(
-                "box {:.3} m high over the rectangle",
-                sigma.reference_height
-            ),
-        ),
-        (
-            LABELLED,
+            LABEL_COLOR,
             format!(
                 "labelled corner, and {ELLIPSE_SIGMAS:.0} standard deviations of where the camera sees it"
             ),
         ),
-    ];
-    let found = format!(
-        "focal length {:.0} px (+- {percent:.1} %), {:.3} m high, tilt {:.1} degrees, corners to {:.2} px",
+    ]
+    .map(|(color, text)| LegendEntry::for_color(color, text))
+}
+
+fn camera_text(solution: &Solution) -> String {
+    let camera = &solution.camera;
+    format!(
+        "focal length {:.0} px (+- {:.1} %), {:.3} m high, tilt {:.1} degrees, corners to {:.2} px",
         camera.focal_px.x,
+        100.0 * solution.sigma.ln_focal,
         camera.center().z,
         camera.tilt().to_degrees(),
         solution.rms_px
-    );
-    let marks = marks.map(|(color, text)| (Some(encode_srgb8(color)), text, INK));
-    let warnings = solution
-        .warnings
-        .iter()
-        .map(|warning| (None, warning.to_string(), WARNING));
-    marks
-        .into_iter()
-        .chain([(None, found, INK)])
-        .chain(warnings)
-        .collect()
+    )
 }
 
 /// Lines of a grid over a rectangle: both ends, metres.
 fn grid(size: [f64; 2]) -> Vec<[[f64; 3]; 2]> {
     let step = grid_step(size);
     let [x, y] = size.map(|s| s / 2.0);
-    let lines = |half: f64| {
-        let count = (half / step).floor() as i32;
-        (-count..=count).map(move |i| f64::from(i) * step)
-    };
-    let upright = lines(x).map(|at| [[at, -y, 0.0], [at, y, 0.0]]);
-    let level = lines(y).map(|at| [[-x, at, 0.0], [x, at, 0.0]]);
+    let upright = multiples(step, x).map(|at| [[at, -y, 0.0], [at, y, 0.0]]);
+    let level = multiples(step, y).map(|at| [[-x, at, 0.0], [x, at, 0.0]]);
     upright.chain(level).collect()
 }
 
+/// Multiples of a step up to a distance from zero.
+fn multiples(step: f64, most: f64) -> impl Iterator<Item = f64> {
+    let count = (most / step).floor() as i32;
+    (-count..=count).map(move |i| f64::from(i) * step)
+}
+
 fn grid_step(size: [f64; 2]) -> f64 {
-    round_step(size[0].max(size[1]) / MOST_LINES)
+    round_step(size[0].max(size[1]) / MAX_GRID_LINES)
 }
 
 /// The next 1, 2 or 5 times a power of ten.
@@ -184,28 +204,67 @@ fn round_step(least: f64) -> f64 {
 }
 
 /// A picture that is drawn on.
-struct Sheet {
+struct OverlayDrawing {
     picture: Image<LinearRgb>,
-    camera: crate::Camera,
+    camera: Camera,
     /// Width of a line, pixels.
-    width: f64,
+    line_px: f64,
 }
 
-impl Sheet {
+impl OverlayDrawing {
+    /// A solution drawn over a photo, of the label's size or another.
+    fn new(photo: &Image<LinearRgb>, solution: &Solution) -> Self {
+        let image = [photo.width() as u32, photo.height() as u32];
+        let zoom = f64::from(image[0]) / f64::from(solution.camera.image[0].max(1));
+        let longer_side = f64::from(image[0].max(image[1]));
+        let mut drawing = Self {
+            picture: photo.clone(),
+            camera: solution.camera.resized(image),
+            line_px: (longer_side / SIDE_PER_LINE_WIDTH).max(1.0),
+        };
+        for line in grid(solution.size) {
+            drawing.line(line, GRID_COLOR, GRID_WEIGHT);
+        }
+        drawing.draw_box(solution.size, solution.sigma.reference_height);
+        for (corner, covariance) in solution.corners_px.iter().zip(&solution.sigma.corners_px) {
+            drawing.cross(corner * zoom);
+            drawing.ellipse(corner * zoom, &(covariance * zoom * zoom));
+        }
+        drawing
+    }
+
+    /// The rectangle, and a box of some height over it.
+    fn draw_box(&mut self, size: [f64; 2], height: f64) {
+        let [x, y] = size.map(|s| s / 2.0);
+        let base = [[-x, y], [x, y], [x, -y], [-x, -y]];
+        for i in 0..4 {
+            let [a, b] = [base[i], base[(i + 1) % 4]];
+            let [foot, next_foot] = [a, b].map(|[x, y]| [x, y, 0.0]);
+            let [top, next_top] = [a, b].map(|[x, y]| [x, y, height]);
+            self.line([top, next_top], BOX_COLOR, BOX_WEIGHT);
+            self.line([foot, top], BOX_COLOR, BOX_WEIGHT);
+            self.line([foot, next_foot], RECTANGLE_COLOR, RECTANGLE_WEIGHT);
+        }
+    }
+
     /// A straight line in space; nothing where an end is behind the camera.
     fn line(&mut self, ends: [[f64; 3]; 2], color: LinearRgb, weight: f64) {
         let [a, b] = ends.map(|p| self.camera.project(Point3::from(p)).map(|(px, _)| px));
         if let (Some(a), Some(b)) = (a, b) {
-            self.stroke(a, b, color, weight * self.width);
+            self.stroke([a, b], color, weight * self.line_px);
         }
     }
 
-    /// A cross at a labelled corner and the ellipse of where the camera sees it.
-    fn mark(&mut self, at: Point2<f64>, covariance: &Matrix2<f64>) {
-        let arm = CROSS * self.width;
+    /// A cross at a labelled corner.
+    fn cross(&mut self, at: Point2<f64>) {
+        let arm = CROSS_ARM * self.line_px;
         for direction in [Vector2::new(arm, arm), Vector2::new(arm, -arm)] {
-            self.stroke(at - direction, at + direction, LABELLED, self.width);
+            self.stroke([at - direction, at + direction], LABEL_COLOR, self.line_px);
         }
+    }
+
+    /// The error ellipse of a position; nothing where the error is not finite.
+    fn ellipse(&mut self, center: Point2<f64>, covariance: &Matrix2<f64>) {
         if covariance.iter().any(|v| !v.is_finite()) {
             return;
         }
@@ -213,48 +272,62 @@ impl Sheet {
         let radii = eigen
             .eigenvalues
             .map(|v| ELLIPSE_SIGMAS * v.max(0.0).sqrt());
-        let point = |i: usize| {
-            let angle = std::f64::consts::TAU * i as f64 / ELLIPSE_POINTS as f64;
-            at + eigen.eigenvectors
-                * Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle))
-        };
-        for i in 0..ELLIPSE_POINTS {
-            self.stroke(point(i), point(i + 1), LABELLED, self.width);
+        let points: Vec<_> = (0..=ELLIPSE_POINTS)
+            .map(|i| {
+                let angle = std::f64::consts::TAU * i as f64 / ELLIPSE_POINTS as f64;
+                let along = Vector2::new(radii.x * libm::cos(angle), radii.y * libm::sin(angle));
+                center + eigen.eigenvectors * along
+            })
+            .collect();
+        for ends in points.windows(2) {
+            self.stroke([ends[0], ends[1]], LABEL_COLOR, self.line_px);
         }
     }
 
     /// A line with soft edges, pixel centres nearer than half its width fully covered.
-    fn stroke(&mut self, a: Point2<f64>, b: Point2<f64>, color: LinearRgb, width: f64) {
-        let reach = width / 2.0 + 1.0;
-        let bounds = |p: f64, q: f64, end: usize| {
-            let from = (p.min(q) - reach).clamp(0.0, end as f64);
-            let to = (p.max(q) + reach).clamp(0.0, end as f64);
-            from.floor() as usize..to.ceil() as usize
-        };
-        let (columns, rows) = (
-            bounds(a.x, b.x, self.picture.width()),
-            bounds(a.y, b.y, self.picture.height()),
-        );
+    fn stroke(&mut self, ends: [Point2<f64>; 2], color: LinearRgb, width: f64) {
+        let (columns, rows) = self.pixels_near(ends, width / 2.0 + 1.0);
         for y in rows {
             for x in columns.clone() {
                 let center = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-                let cover = (width / 2.0 + 0.5 - distance(center, a, b)).clamp(0.0, 1.0) as f32;
+                let cover = (width / 2.0 + 0.5 - distance(center, ends)).clamp(0.0, 1.0) as f32;
                 if cover > 0.0 {
-                    let under = self.picture[(x, y)];
-                    let mix = |u: f32, c: f32| u + (c - u) * cover;
-                    self.picture[(x, y)] = LinearRgb {
-                        r: mix(under.r, color.r),
-                        g: mix(under.g, color.g),
-                        b: mix(under.b, color.b),
-                    };
+                    self.picture[(x, y)] = mixed(self.picture[(x, y)], color, cover);
                 }
             }
         }
     }
+
+    /// Columns and rows of the picture within a distance of a line's box.
+    fn pixels_near(
+        &self,
+        [a, b]: [Point2<f64>; 2],
+        reach: f64,
+    ) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
+        (
+            range_near([a.x, b.x], reach, self.picture.width()),
+            range_near([a.y, b.y], reach, self.picture.height()),
+        )
+    }
+}
+
+/// The pixels of a row or column of so many that are within a distance of an interval.
+fn range_near([p, q]: [f64; 2], reach: f64, count: usize) -> std::ops::Range<usize> {
+    let from = (p.min(q) - reach).clamp(0.0, count as f64);
+    let to = (p.max(q) + reach).clamp(0.0, count as f64);
+    from.floor() as usize..to.ceil() as usize
+}
+
+fn mixed(under: LinearRgb, color: LinearRgb, cover: f32) -> LinearRgb {
+    LinearRgb {
+        r: under.r + (color.r - under.r) * cover,
+        g: under.g + (color.g - under.g) * cover,
+        b: under.b + (color.b - under.b) * cover,
+    }
 }
 
 /// Distance of a point from a segment.
-fn distance(p: Point2<f64>, a: Point2<f64>, b: Point2<f64>) -> f64 {
+fn distance(p: Point2<f64>, [a, b]: [Point2<f64>; 2]) -> f64 {
     let (along, to) = (b - a, p - a);
     let part = (to.dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
     (to - along * part).norm()
@@ -308,7 +381,7 @@ mod tests {
         .unwrap();
         let texts: Vec<String> = entries(&solution)
             .into_iter()
-            .map(|(_, text, _)| text)
+            .map(|entry| entry.text)
             .collect();
         for word in [
             "rectangle as fitted",
@@ -331,14 +404,14 @@ mod tests {
             );
         }
         let drawn = overlay(&Image::filled(400, 300, LinearRgb::BLACK), &solution);
-        let green = encode_srgb8(RECTANGLE);
+        let green = encode_srgb8(RECTANGLE_COLOR);
         let below = drawn
             .rows()
             .skip(300)
             .flatten()
             .filter(|p| encode_srgb8(**p) == green)
             .count();
-        assert_eq!(below, MARK * MARK);
+        assert_eq!(below, MARK_PX * MARK_PX);
     }
 
     #[test]

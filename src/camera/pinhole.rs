@@ -1,6 +1,6 @@
 //! The pinhole camera.
 
-use crate::geom::{Homography, Point2, Point3, Pose, Ray, Vector2, Vector3};
+use crate::geom::{Homography, Point2, Point3, Pose, Ray, UnitQuaternion, Vector2, Vector3};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +22,48 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// A camera straight above the centre of the surface, the picture's top towards `+y`.
+    ///
+    /// `height` is in metres; the principal point is the middle of the picture, `image` its width and height in pixels.
+    ///
+    /// ```
+    /// use petcomp::Camera;
+    /// use petcomp::geom::Point3;
+    /// let camera = Camera::looking_down(1.0, 800.0, [640, 480]);
+    /// let (px, depth) = camera.project(Point3::new(0.1, 0.0, 0.0)).unwrap();
+    /// assert!((px.x - 400.0).abs() < 1e-9 && (px.y - 240.0).abs() < 1e-9 && depth == 1.0);
+    /// ```
+    pub fn looking_down(height: f64, focal_px: f64, image: [u32; 2]) -> Self {
+        Self::look_at(
+            Point3::new(0.0, 0.0, height),
+            Point3::origin(),
+            focal_px,
+            image,
+        )
+    }
+
+    /// A camera at `eye` that looks at `target`, upright: `+z` of the world is up in the picture, or `+y` where the camera
+    /// looks straight down or up.
+    ///
+    /// ```
+    /// use petcomp::Camera;
+    /// use petcomp::geom::Point3;
+    /// let camera = Camera::look_at(Point3::new(0.0, -1.0, 1.0), Point3::origin(), 800.0, [640, 480]);
+    /// assert!((camera.tilt().to_degrees() - 45.0).abs() < 1e-9);
+    /// ```
+    pub fn look_at(eye: Point3<f64>, target: Point3<f64>, focal_px: f64, image: [u32; 2]) -> Self {
+        let forward = target - eye;
+        let vertical = forward.cross(&Vector3::z()).norm() < 1e-9 * forward.norm();
+        let up = if vertical { Vector3::y() } else { Vector3::z() };
+        let rotation = UnitQuaternion::look_at_lh(&forward, &-up);
+        Self {
+            image,
+            focal_px: [focal_px; 2].into(),
+            principal_px: Point2::new(f64::from(image[0]) / 2.0, f64::from(image[1]) / 2.0),
+            camera_from_world: Pose::from_parts((-(rotation * eye.coords)).into(), rotation),
+        }
+    }
+
     /// The camera's centre in the world.
     pub fn center(&self) -> Point3<f64> {
         self.camera_from_world

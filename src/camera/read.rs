@@ -1,7 +1,6 @@
-//! Labels from files, ours and other programs', with what their photos know.
+//! Labels from files, ours and other programs', completed with their photos' EXIF data.
 
-use super::import::{self, Drawing};
-use super::init::ZOOMED_SIGMA;
+use super::import::{self, Annotation};
 use super::label::Label;
 use super::pinhole::Camera;
 use crate::bounds::{CAMERA, SURFACE, number};
@@ -13,11 +12,13 @@ use std::path::{Path, PathBuf};
 pub(crate) const LABEL_SUFFIX: &str = ".label.json";
 /// How camera files are named.
 const CAMERA_SUFFIX: &str = ".camera.json";
+/// Relative noise of a focal length that was recorded together with a digital zoom.
+const ZOOMED_FOCAL_SIGMA: f64 = 0.25;
 
 /// A label, and where it and its camera lie.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Labelled {
-    /// The label, with what its photo knows.
+pub struct LabelledPhoto {
+    /// The label, completed with its photo's EXIF data.
     pub label: Label,
     /// The file that it was read from; one of another program may hold many labels.
     pub source: PathBuf,
@@ -25,7 +26,7 @@ pub struct Labelled {
     pub name: String,
 }
 
-impl Labelled {
+impl LabelledPhoto {
     /// A file of its own: `bg0001.camera.json` for the ending `camera.json`.
     pub fn beside(&self, ending: &str) -> PathBuf {
         self.source
@@ -36,10 +37,15 @@ impl Labelled {
     pub fn photo(&self) -> Option<PathBuf> {
         photo_of(&self.label, &self.source)
     }
+
+    /// Read from a label file, not from another program's.
+    fn is_ours(&self) -> bool {
+        ends_with(&self.source, LABEL_SUFFIX)
+    }
 }
 
-impl std::fmt::Display for Labelled {
-    /// The file, and the picture where the file alone does not say which.
+impl std::fmt::Display for LabelledPhoto {
+    /// The file, and the picture where the file alone does not identify it.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.source.display())?;
         let file = self
@@ -55,7 +61,7 @@ impl std::fmt::Display for Labelled {
     }
 }
 
-/// Reads a label (`NAME.label.json`), with what its photo knows of the focal length where it says nothing itself.
+/// Reads a label (`NAME.label.json`), with its photo's EXIF focal length where it gives none itself.
 ///
 /// # Errors
 /// As [`read_labels`]; a file with several labels.
@@ -69,21 +75,20 @@ pub fn read_label(path: impl AsRef<Path>) -> Result<Label> {
 }
 
 /// Reads the labels of a file: one of ours, or an array of them, or what LabelMe, CVAT ("for images") or Label Studio
-/// (JSON or JSON-MIN) wrote. `size` is the rectangle's width and height, metres, for labels that do not say them.
+/// (JSON or JSON-MIN) wrote. `size` is the rectangle's width and height, metres, for labels without them.
 ///
 /// # Errors
 /// A file that cannot be read or understood, a photo instead of a label among them; a photo that has another size than its
 /// label says, or a path that leads out of the label's folder.
-pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<Labelled>> {
+pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
     let path = path.as_ref();
-    let text = text_of(path)?;
-    let drawings = import::drawings(&text).map_err(|e| e.in_file(path))?;
-    let labels = match drawings {
-        Some(drawings) => drawings
+    let text = label_text(path)?;
+    let labels = match import::annotations(&text).map_err(|e| e.in_file(path))? {
+        Some(annotations) => annotations
             .iter()
-            .map(|drawing| drawn(drawing, path))
+            .map(|annotation| imported_label(annotation, path))
             .collect::<Result<Vec<_>>>()?,
-        None => ours(&text, path)?,
+        None => own_labels(&text, path)?,
     };
     if labels.is_empty() {
         return Err(Error::file(path, "no label, expected at least one"));
@@ -99,38 +104,46 @@ pub fn read_labels(path: impl AsRef<Path>, size: Option<[f64; 2]>) -> Result<Vec
 ///
 /// # Errors
 /// As [`read_labels`]; a folder that cannot be read; a photo that is labelled twice.
-pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<Labelled>> {
-    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    // Ours first: what is read later does not come before it.
-    paths.sort_by_key(|path| (!ends_with(path, LABEL_SUFFIX), path.clone()));
-    let mut found: Vec<Labelled> = Vec::new();
-    for path in paths.iter().filter(|path| may_be_label(path)) {
-        let is_ours = ends_with(path, LABEL_SUFFIX);
-        if !is_ours && !is_drawn(path) {
-            log::info!("{}: no label", path.display());
-            continue;
-        }
-        for labelled in read_labels(path, size)? {
+pub(crate) fn labels_in(folder: &Path, size: Option<[f64; 2]>) -> Result<Vec<LabelledPhoto>> {
+    let mut found: Vec<LabelledPhoto> = Vec::new();
+    for path in label_paths(folder)? {
+        for labelled in read_labels(&path, size)? {
             match found.iter().find(|other| other.name == labelled.name) {
                 None => found.push(labelled),
-                Some(ours) if ends_with(&ours.source, LABEL_SUFFIX) => {
+                Some(ours) if ours.is_ours() => {
                     log::info!(
                         "{labelled}: left out, since {} is there",
                         ours.source.display()
                     );
                 }
                 Some(other) => {
-                    return Err(Error::file(
-                        path,
-                        format!("labels {} once more, after {other}", labelled.name),
-                    ));
+                    let what = format!("labels {} once more, after {other}", labelled.name);
+                    return Err(Error::file(path, what));
                 }
             }
         }
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(found)
+}
+
+/// The files of a folder that hold labels, ours first: what is read later does not replace it.
+fn label_paths(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| may_be_label(path))
+        .collect();
+    paths.sort_by_key(|path| (!ends_with(path, LABEL_SUFFIX), path.clone()));
+    paths.retain(|path| {
+        let is_label = ends_with(path, LABEL_SUFFIX) || is_annotated(path);
+        if !is_label {
+            log::info!("{}: no label", path.display());
+        }
+        is_label
+    });
+    Ok(paths)
 }
 
 fn ends_with(path: &Path, suffix: &str) -> bool {
@@ -142,61 +155,63 @@ fn may_be_label(path: &Path) -> bool {
     (ends_with(path, ".json") && !ends_with(path, CAMERA_SUFFIX)) || ends_with(path, ".xml")
 }
 
-/// Another program's labels are in a file, well or badly written.
-fn is_drawn(path: &Path) -> bool {
-    io::read_text(path).is_ok_and(|text| !matches!(import::drawings(&text), Ok(None)))
+/// Another program's labels are in a file, well or badly formed.
+fn is_annotated(path: &Path) -> bool {
+    io::read_text(path).is_ok_and(|text| !matches!(import::annotations(&text), Ok(None)))
 }
 
-/// The text of a label; a photo instead of one is met with what to do.
-fn text_of(path: &Path) -> Result<String> {
-    io::read_text(path).map_err(|error| {
-        if io::read_header(path).is_err() {
-            return error;
-        }
-        let name = path
-            .file_stem()
-            .map(|stem| stem.to_string_lossy().into_owned())
-            .unwrap_or_default();
-        let label = path.with_file_name(format!("{name}{LABEL_SUFFIX}"));
-        let next = match label.is_file() {
-            true => format!("{} lies beside it", label.display()),
-            false => format!(
-                "`petcomp camera init {} --size WIDTHxHEIGHT` writes one",
-                path.display()
-            ),
-        };
-        Error::file(path, format!("a picture, expected a label of it; {next}"))
+/// The text of a label; for a photo instead of one, the error says what to do.
+fn label_text(path: &Path) -> Result<String> {
+    io::read_text(path).map_err(|error| match io::read_header(path) {
+        Err(_) => error,
+        Ok(_) => photo_instead(path),
     })
 }
 
+/// The error of a photo that was given instead of its label.
+fn photo_instead(photo: &Path) -> Error {
+    let label = photo.with_file_name(format!("{}{LABEL_SUFFIX}", stem(photo)));
+    let next = match label.is_file() {
+        true => format!("{} lies beside it", label.display()),
+        false => format!(
+            "`petcomp camera init {} --size WIDTHxHEIGHT` writes one",
+            photo.display()
+        ),
+    };
+    Error::file(photo, format!("a picture, expected a label of it; {next}"))
+}
+
 /// A label of ours, or an array of them.
-fn ours(text: &str, path: &Path) -> Result<Vec<Labelled>> {
+fn own_labels(text: &str, path: &Path) -> Result<Vec<LabelledPhoto>> {
     let is_array = text.trim_start().starts_with('[');
-    let labels: Result<Vec<Label>> = if is_array {
-        io::parse_json(text)
-    } else {
-        io::parse_json(text).map(|label| vec![label])
-    };
-    let labels = labels.map_err(|e| e.in_file(path))?;
-    let name = |label: &Label| match is_array {
-        true => stem(Path::new(&label.image.file)),
-        false => {
-            let file = stem(path);
-            file.strip_suffix(".label")
-                .map_or(file.clone(), str::to_owned)
-        }
-    };
-    let labelled = |label: Label| {
-        if !label.image.file.is_empty() {
-            io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
-        }
-        Ok(Labelled {
-            name: name(&label),
-            label,
-            source: path.into(),
+    let labels: Vec<Label> = match is_array {
+        true => io::parse_json(text),
+        false => io::parse_json(text).map(|label| vec![label]),
+    }
+    .map_err(|e| e.in_file(path))?;
+    labels
+        .into_iter()
+        .map(|label| {
+            if !label.image.file.is_empty() {
+                io::below("", &label.image.file).map_err(|e| e.within("image").in_file(path))?;
+            }
+            Ok(LabelledPhoto {
+                name: match is_array {
+                    true => stem(Path::new(&label.image.file)),
+                    false => label_name(path),
+                },
+                label,
+                source: path.into(),
+            })
         })
-    };
-    labels.into_iter().map(labelled).collect()
+        .collect()
+}
+
+/// `bg0001` of `bg0001.label.json`, or of `bg0001.json`.
+fn label_name(path: &Path) -> String {
+    let file = stem(path);
+    file.strip_suffix(".label")
+        .map_or(file.clone(), str::to_owned)
 }
 
 fn stem(path: &Path) -> String {
@@ -205,60 +220,63 @@ fn stem(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// The label that another program's drawing means, its photo looked for beside the file.
-fn drawn(drawing: &Drawing, path: &Path) -> Result<Labelled> {
-    let inside = |file: &&String| io::below("", file.as_str()).is_ok();
-    let base = |file: &String| file.rsplit('/').next().unwrap_or_default().to_owned();
-    let names: Vec<String> = drawing
-        .files
-        .iter()
-        .filter(inside)
-        .cloned()
-        .chain(drawing.files.iter().map(base))
-        .collect();
-    let there = names
-        .iter()
-        .find(|name| path.with_file_name(name).is_file());
-    let file = there.or(names.last()).cloned().unwrap_or_default();
+/// The label that another program's annotation means, its photo looked for beside the file.
+fn imported_label(annotation: &Annotation, path: &Path) -> Result<LabelledPhoto> {
+    let file = annotated_file(annotation, path);
     if file.is_empty() {
         return Err(Error::file(path, "no name of a picture"));
     }
-    let place = |e: Error| e.within(&file).in_file(path);
-    io::below("", &file).map_err(place)?;
-    let mut label = drawing.label().map_err(place)?;
+    let mut label = io::below("", &file)
+        .and_then(|_| annotation.label())
+        .map_err(|e| e.within(&file).in_file(path))?;
     label.image.file.clone_from(&file);
-    if drawing.size.is_none() {
+    if annotation.size.is_none() {
         let header = io::read_header(path.with_file_name(&file))?;
         (label.image.width, label.image.height) = (header.width as u32, header.height as u32);
     }
-    Ok(Labelled {
+    Ok(LabelledPhoto {
         name: stem(Path::new(&file)),
         label,
         source: path.into(),
     })
 }
 
-/// With the sides that were given where the label has none, and with what its photo knows.
-fn completed(labelled: Labelled, size: Option<[f64; 2]>) -> Result<Labelled> {
-    let Labelled {
-        mut label,
-        source,
-        name,
-    } = labelled;
-    if let (Some([w, h]), None, None) = (size, label.surface.width_m, label.surface.height_m) {
-        (label.surface.width_m, label.surface.height_m) = (Some(w), Some(h));
+/// The name of an annotation's photo: the first that is there, in or below the folder or directly in it, or else the last.
+fn annotated_file(annotation: &Annotation, path: &Path) -> String {
+    let inside = annotation
+        .files
+        .iter()
+        .filter(|file| io::below("", file.as_str()).is_ok())
+        .cloned();
+    let bare = annotation
+        .files
+        .iter()
+        .map(|file| file.rsplit('/').next().unwrap_or_default().to_owned());
+    let names: Vec<String> = inside.chain(bare).collect();
+    names
+        .iter()
+        .find(|name| path.with_file_name(name).is_file())
+        .or(names.last())
+        .cloned()
+        .unwrap_or_default()
+}
+
+/// With the sides that were given where the label has none, and with its photo's EXIF data.
+fn completed(mut labelled: LabelledPhoto, size: Option<[f64; 2]>) -> Result<LabelledPhoto> {
+    let surface = &mut labelled.label.surface;
+    if let (Some([w, h]), None, None) = (size, surface.width_m, surface.height_m) {
+        (surface.width_m, surface.height_m) = (Some(w), Some(h));
     }
-    check_size(&label).map_err(|e| e.in_file(&source))?;
-    Ok(Labelled {
-        label: with_photo(label, &source)?,
-        source,
-        name,
+    check_size(&labelled.label).map_err(|e| e.in_file(&labelled.source))?;
+    Ok(LabelledPhoto {
+        label: with_photo(labelled.label, &labelled.source)?,
+        ..labelled
     })
 }
 
-/// A label that was read from `path`, with the focal length of its photo's EXIF data where it says nothing itself; as it
-/// is where the photo is not there. Unless the label says whether the photo is cropped, its EXIF data do: it is where they
-/// tell of another shape, and whole where they tell of its size or a whole multiple of it.
+/// A label that was read from `path`, with the focal length of its photo's EXIF data where it gives none itself; as it is
+/// where the photo is not there. Unless the label says whether the photo is cropped, its EXIF data do: it is where they
+/// state another shape, and whole where they state its size or an integer multiple of it.
 ///
 /// # Errors
 /// A photo that cannot be read, or has another size than the label says.
@@ -270,28 +288,25 @@ pub fn with_photo(mut label: Label, path: impl AsRef<Path>) -> Result<Label> {
     let folder = path.parent().unwrap_or(Path::new(""));
     io::inside(folder, &label.image.file).map_err(|e| e.within("image").in_file(path))?;
     let header = io::read_header(&photo)?;
-    let (seen, told) = (
-        [header.width, header.height],
-        label.image_size().map(|side| side as usize),
-    );
-    if seen != told {
-        let [[w, h], [tw, th]] = [seen, told];
-        let what = format!("{tw} x {th} pixels, but {} has {w} x {h}", photo.display());
+    let ([w, h], [expected_w, expected_h]) = ([header.width, header.height], label.image_size());
+    if [w, h] != [expected_w as usize, expected_h as usize] {
+        let photo = photo.display();
+        let what = format!("{expected_w} x {expected_h} pixels, but {photo} has {w} x {h}");
         return Err(Error::value("image", what).in_file(path));
     }
-    learn(&mut label, &header);
+    apply_exif(&mut label, &header);
     Ok(label)
 }
 
 /// Takes over what the photo's file says of its camera and the label does not.
-pub(crate) fn learn(label: &mut Label, header: &io::Header) {
+pub(crate) fn apply_exif(label: &mut Label, header: &io::Header) {
     if header.cropped || header.whole {
         label.image.cropped.get_or_insert(header.cropped);
     }
     if label.camera.focal_px.is_none() && label.camera.focal_35mm.is_none() {
         label.camera.focal_35mm = header.focal_35mm.filter(|mm| *mm > 0.0);
         if header.digital_zoom && label.camera.focal_35mm.is_some() {
-            label.camera.focal_sigma.get_or_insert(ZOOMED_SIGMA);
+            label.camera.focal_sigma.get_or_insert(ZOOMED_FOCAL_SIGMA);
         }
     }
 }
@@ -338,13 +353,14 @@ pub fn photo_of(label: &Label, path: impl AsRef<Path>) -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Image, Srgb8};
+    use crate::image::Image;
+    use crate::pixel::Srgb8;
     use exif::experimental::Writer;
     use exif::{Field, In, Rational, Tag, Value};
 
     /// A label of a photo of 90 x 60 pixels with EXIF data: a 35 mm equivalent of 28 mm, a digital zoom, and the size it was
     /// taken in.
-    fn photo_told(zoom: [u32; 2], taken: [u32; 2]) -> Label {
+    fn label_of_photo(zoom: [u32; 2], taken: [u32; 2]) -> Label {
         let folder = tempfile::tempdir().unwrap();
         let photo = folder.path().join("a.jpg");
         io::write(&photo, &Image::<Srgb8>::new(90, 60)).unwrap();
@@ -383,8 +399,8 @@ mod tests {
     }
 
     #[test]
-    fn a_photo_tells_its_focal_length() {
-        let label = photo_told([0, 1], [4500, 3000]);
+    fn a_photo_gives_its_focal_length() {
+        let label = label_of_photo([0, 1], [4500, 3000]);
         assert_eq!(
             (
                 label.camera.focal_35mm,
@@ -396,8 +412,8 @@ mod tests {
     }
 
     #[test]
-    fn a_zoomed_photo_tells_it_less_surely() {
-        let label = photo_told([3, 2], [4500, 3000]);
+    fn a_zoomed_photo_gives_it_less_precisely() {
+        let label = label_of_photo([3, 2], [4500, 3000]);
         assert_eq!(
             (label.camera.focal_35mm, label.camera.focal_sigma),
             (Some(28.0), Some(0.25))
@@ -406,14 +422,17 @@ mod tests {
 
     #[test]
     fn a_photo_of_another_shape_than_it_was_taken_in_is_cropped() {
-        assert_eq!(photo_told([0, 1], [4000, 3000]).image.cropped, Some(true));
         assert_eq!(
-            photo_told([0, 1], [3000, 4500]).image.cropped,
+            label_of_photo([0, 1], [4000, 3000]).image.cropped,
+            Some(true)
+        );
+        assert_eq!(
+            label_of_photo([0, 1], [3000, 4500]).image.cropped,
             Some(false),
             "turned"
         );
         assert_eq!(
-            photo_told([0, 1], [2205, 1470]).image.cropped,
+            label_of_photo([0, 1], [2205, 1470]).image.cropped,
             None,
             "reduced, or cut out in its own shape"
         );

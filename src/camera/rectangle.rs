@@ -7,12 +7,12 @@
 //! known. They are the imaginary and the real part of one complex equation, which gives them their weights.
 
 use super::corners::triangle_areas;
-use crate::geom::{Homography, Point2, Vector2};
+use crate::geom::{Homography, Point2, Point3, Vector2};
 use nalgebra::{Matrix3, Vector3};
 
 /// The picture of a rectangle in homogeneous coordinates; units as in [`camera`](super).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
+pub(crate) struct ProjectedRectangle {
     /// Direction of +x: its picture, and its change of depth.
     along: (Vector2<f64>, f64),
     /// Direction of -y, likewise.
@@ -23,7 +23,7 @@ pub(crate) struct View {
 
 /// A pose in the parameters that stay well conditioned from every side.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stance {
+pub(crate) struct ScaledPose {
     /// Camera axes from world axes.
     pub(crate) rotation: Matrix3<f64>,
     /// Picture of the rectangle's centre, relative to the principal point.
@@ -32,16 +32,16 @@ pub(crate) struct Stance {
     pub(crate) scale: f64,
 }
 
-impl View {
+impl ProjectedRectangle {
     /// From corners in the order top left, top right, bottom right, bottom left, relative to the principal point.
     pub(crate) fn new(corners: &[Vector2<f64>; 4]) -> Self {
         let areas = triangle_areas(corners);
         let mean = areas.iter().sum::<f64>() / 4.0;
         let [c0, c1, c2, c3] = [0, 1, 2, 3].map(|i| corners[i].push(1.0) * (areas[i] / mean));
-        let split = |e: Vector3<f64>| (e.xy(), e.z);
+        let [along, down] = [c1 - c0, c3 - c0];
         Self {
-            along: split(c1 - c0),
-            down: split(c3 - c0),
+            along: (along.xy(), along.z),
+            down: (down.xy(), down.z),
             center: (c0 + c2) / 2.0,
         }
     }
@@ -73,7 +73,7 @@ impl View {
     }
 
     /// The pose for a known focal length and size; the sides are made orthogonal symmetrically.
-    pub(crate) fn stance(&self, focal: f64, size: [f64; 2]) -> Stance {
+    pub(crate) fn pose_at(&self, focal: f64, size: [f64; 2]) -> ScaledPose {
         let ((a, dw), (b, dh)) = (self.along, self.down);
         let along = a.push(focal * dw);
         let up = -b.push(focal * dh);
@@ -81,7 +81,7 @@ impl View {
         let (sum, difference) = ((x + y).normalize(), (x - y).normalize());
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let (x, y) = ((sum + difference) * half, (sum - difference) * half);
-        Stance {
+        ScaledPose {
             rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]),
             center: self.center.xy() / self.center.z,
             scale: (along.norm() / size[0] + up.norm() / size[1]) / (2.0 * self.center.z),
@@ -89,24 +89,24 @@ impl View {
     }
 }
 
-impl View {
+impl ProjectedRectangle {
     /// The two poses from which the rectangle looks like this from so far that perspective is lost in the noise.
     ///
-    /// Its picture is then a parallelogram, and [`stance`](Self::stance) sees no tilt in it: a saddle of the cost. The
-    /// foreshortening tells the tilt, up to its sign.
-    pub(crate) fn distant_stances(&self, size: [f64; 2]) -> [Stance; 2] {
+    /// Its picture is then a parallelogram, and [`pose_at`](Self::pose_at) sees no tilt in it: a saddle of the cost. The
+    /// foreshortening gives the tilt, up to its sign.
+    pub(crate) fn distant_poses(&self, size: [f64; 2]) -> [ScaledPose; 2] {
         let along = self.along.0 / (size[0] * self.center.z);
         let up = -self.down.0 / (size[1] * self.center.z);
         let (n1, n2, dot) = (along.norm_squared(), up.norm_squared(), along.dot(&up));
         let squared = (n1 + n2 + libm::hypot(n1 - n2, 2.0 * dot)) / 2.0;
-        let lean = |n: f64| (1.0 - n / squared).max(0.0).sqrt();
-        let (z1, z2) = (lean(n1), if dot > 0.0 { -lean(n2) } else { lean(n2) });
+        let (lean, other) = (leaning(n1, squared), leaning(n2, squared));
+        let leans = (lean, if dot > 0.0 { -other } else { other });
         let (scale, center) = (squared.sqrt(), self.center.xy() / self.center.z);
         [1.0, -1.0].map(|sign| {
-            let x = (along / scale).push(sign * z1).normalize();
-            let y = (up / scale).push(sign * z2);
+            let x = (along / scale).push(sign * leans.0).normalize();
+            let y = (up / scale).push(sign * leans.1);
             let y = (y - x * x.dot(&y)).normalize();
-            Stance {
+            ScaledPose {
                 rotation: Matrix3::from_columns(&[x, y, x.cross(&y)]),
                 center,
                 scale,
@@ -115,7 +115,18 @@ impl View {
     }
 }
 
-impl Stance {
+/// The depth component of a unit axis, from its squared length in the picture and that of an axis seen from the front.
+fn leaning(squared: f64, frontal_squared: f64) -> f64 {
+    (1.0 - squared / frontal_squared).max(0.0).sqrt()
+}
+
+/// The corners of a centred rectangle of this size, in label order.
+pub(crate) fn corner_points(size: [f64; 2]) -> [Point3<f64>; 4] {
+    let [x, y] = size.map(|s| s / 2.0);
+    [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| Point3::new(x, y, 0.0))
+}
+
+impl ScaledPose {
     /// The other pose from which a small or distant rectangle looks almost the same: mirrored at the line of sight.
     pub(crate) fn mirrored(&self, focal: f64) -> Self {
         let sight = self.center.push(focal).normalize();
@@ -144,7 +155,7 @@ mod tests {
     use super::*;
     use crate::geom::UnitQuaternion;
 
-    impl Stance {
+    impl ScaledPose {
         /// Position of the rectangle's centre in the camera's frame.
         fn translation(&self, focal: f64) -> Vector3<f64> {
             self.center.push(focal) / self.scale
@@ -154,23 +165,23 @@ mod tests {
     const SIZE: [f64; 2] = [1.2, 1.0 / 1.2];
     const FOCAL: f64 = 1.4;
 
-    fn seen(tilt: f64) -> (Stance, View) {
+    fn seen(tilt: f64) -> (ScaledPose, ProjectedRectangle) {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), tilt)
             * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.4);
         let flip = Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
         let rotation = turn.to_rotation_matrix().into_inner() * flip;
-        let stance = Stance {
+        let pose = ScaledPose {
             rotation,
             center: Vector2::new(0.1, -0.2),
             scale: 0.5,
         };
-        (stance, View::new(&project(&stance)))
+        (pose, ProjectedRectangle::new(&project(&pose)))
     }
 
-    fn project(stance: &Stance) -> [Vector2<f64>; 4] {
+    fn project(pose: &ScaledPose) -> [Vector2<f64>; 4] {
         let [x, y] = SIZE.map(|s| s / 2.0);
         [[-x, y], [x, y], [x, -y], [-x, -y]].map(|[x, y]| {
-            let c = stance.rotation * Vector3::new(x, y, 0.0) + stance.translation(FOCAL);
+            let c = pose.rotation * Vector3::new(x, y, 0.0) + pose.translation(FOCAL);
             c.xy() * FOCAL / c.z
         })
     }
@@ -181,7 +192,7 @@ mod tests {
             let (truth, view) = seen(tilt);
             let focal = view.focal_squared(SIZE[0] / SIZE[1]).sqrt();
             assert!((focal - FOCAL).abs() < 1e-10, "{tilt}: {focal}");
-            let found = view.stance(focal, SIZE);
+            let found = view.pose_at(focal, SIZE);
             assert!((found.rotation - truth.rotation).norm() < 1e-10);
             assert!((found.translation(focal) - truth.translation(FOCAL)).norm() < 1e-9);
         }
@@ -199,13 +210,13 @@ mod tests {
     #[test]
     fn from_straight_above_there_is_no_focal_length_but_a_pose() {
         let [x, y] = SIZE.map(|s| s / 4.0);
-        let view = View::new(&[[-x, -y], [x, -y], [x, y], [-x, y]].map(Vector2::from));
+        let view =
+            ProjectedRectangle::new(&[[-x, -y], [x, -y], [x, y], [-x, y]].map(Vector2::from));
         assert!(!view.focal_squared(SIZE[0] / SIZE[1]).is_finite());
-        let stance = view.stance(2.0, SIZE);
-        assert!((stance.translation(2.0) - Vector3::new(0.0, 0.0, 4.0)).norm() < 1e-12);
+        let pose = view.pose_at(2.0, SIZE);
+        assert!((pose.translation(2.0) - Vector3::new(0.0, 0.0, 4.0)).norm() < 1e-12);
         assert!(
-            (stance.rotation - Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))).norm()
-                < 1e-12
+            (pose.rotation - Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))).norm() < 1e-12
         );
     }
 
@@ -222,7 +233,7 @@ mod tests {
     fn the_mirrored_pose_looks_alike_from_far_away() {
         let (mut truth, _) = seen(0.3);
         truth.scale = 1e-3;
-        let difference = |a: &Stance, b: &Stance| {
+        let difference = |a: &ScaledPose, b: &ScaledPose| {
             project(a)
                 .iter()
                 .zip(&project(b))

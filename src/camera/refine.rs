@@ -1,32 +1,32 @@
 //! The most probable camera near a first guess.
 //!
 //! # Method
-//! Levenberg and Marquardt's damped least squares on the normal equations, scaled to a unit diagonal; beliefs are further
+//! Levenberg and Marquardt's damped least squares on the normal equations, scaled to a unit diagonal; priors are further
 //! residuals.
 
-use super::belief::Beliefs;
-use super::model::{LN_FOCAL, LN_SCALE, STRETCH, Sight, Square, State, UNKNOWNS, Unknowns};
+use super::model::{LN_FOCAL, LN_SCALE, Observation, STRETCH, Square, State, UNKNOWNS, Unknowns};
+use super::prior::ParameterPriors;
 
-/// Damping at the start, its factor on success and on failure, and where it is hopeless.
-const DAMPING: f64 = 1e-3;
-const RELAX: f64 = 0.1;
-const STIFFEN: f64 = 10.0;
-const HOPELESS: f64 = 1e10;
+/// Damping at the start, its factor on success and on failure, and where the search is given up.
+const INITIAL_DAMPING: f64 = 1e-3;
+const DAMPING_DECREASE: f64 = 0.1;
+const DAMPING_INCREASE: f64 = 10.0;
+const MAX_DAMPING: f64 = 1e10;
 /// More steps than this are never needed (10 to 30 are).
-const MOST_STEPS: usize = 100;
+const MAX_ITERATIONS: usize = 100;
 /// A relative fall of the cost, or a scaled step, below which the minimum is reached.
-const SMALLEST_FALL: f64 = 1e-12;
-const SMALLEST_STEP: f64 = 1e-10;
+const COST_TOLERANCE: f64 = 1e-12;
+const STEP_TOLERANCE: f64 = 1e-10;
 /// Part of the height above the bar that a step has to fall by.
-const CREEPING: f64 = 0.01;
+const LEAST_PROGRESS: f64 = 0.01;
 /// No step turns the camera, or changes a logarithm, by more than this.
-const LONGEST_STEP: f64 = 1.0;
+const MAX_STEP: f64 = 1.0;
 
 /// Everything the cost is made of.
 #[derive(Clone, Debug)]
-pub(crate) struct Evidence {
-    pub(crate) sights: Vec<Sight>,
-    pub(crate) beliefs: Beliefs,
+pub(crate) struct Residuals {
+    pub(crate) observations: Vec<Observation>,
+    pub(crate) priors: ParameterPriors,
     /// Smallest and largest logarithm of the focal length to be followed.
     pub(crate) ln_focal_range: [f64; 2],
 }
@@ -35,58 +35,58 @@ pub(crate) struct Evidence {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Minimum {
     pub(crate) state: State,
-    /// Squared distances from everything seen and believed, in sigmas: chi squared.
+    /// Squared distances from all observations and priors, in sigmas: chi squared.
     pub(crate) cost: f64,
     /// Information on the unknowns there.
     pub(crate) information: Square,
-    pub(crate) steps: usize,
+    pub(crate) iterations: usize,
 }
 
 /// The cost around a state to second order.
-pub(crate) struct Normal {
+pub(crate) struct NormalEquations {
     pub(crate) information: Square,
     /// Half the slope of the cost.
     pub(crate) slope: Unknowns,
     pub(crate) cost: f64,
 }
 
-impl Evidence {
+impl Residuals {
     /// The cost of a state; none where a point would be behind the camera.
     fn cost(&self, state: &State) -> Option<f64> {
-        let mut cost = self.beliefs.cost(state);
-        for sight in &self.sights {
-            let off = (state.project(&sight.point, sight.rigid)? - sight.seen) * sight.weight;
-            cost += off.norm_squared();
+        let mut cost = self.priors.cost(state);
+        for observation in &self.observations {
+            let seen = state.project(&observation.point, observation.rigid)?;
+            cost += ((seen - observation.seen) * observation.weight).norm_squared();
         }
-        if let Some(height) = self.beliefs.ln_height {
-            let off = state.ln_height()?.0 - height.mean;
-            cost += off * off * height.information();
+        if let Some(height) = self.priors.ln_height {
+            cost += height.cost(state.ln_height()?.0);
         }
         Some(cost)
     }
 
     /// The normal equations at a state; none where a point would be behind the camera.
-    pub(crate) fn normal(&self, state: &State) -> Option<Normal> {
-        let mut normal = Normal {
+    pub(crate) fn normal_equations(&self, state: &State) -> Option<NormalEquations> {
+        let mut normal = NormalEquations {
             information: Square::zeros(),
             slope: Unknowns::zeros(),
             cost: 0.0,
         };
-        for sight in &self.sights {
-            let (seen, slope) = state.slope(&sight.point, sight.rigid)?;
-            let (off, weight) = (seen - sight.seen, sight.weight * sight.weight);
+        for observation in &self.observations {
+            let (seen, slope) = state.slope(&observation.point, observation.rigid)?;
+            let off = seen - observation.seen;
+            let weight = observation.weight * observation.weight;
             for axis in 0..2 {
                 normal.add(off[axis], &slope.column(axis).into(), weight);
             }
         }
-        if let Some(height) = self.beliefs.ln_height {
+        if let Some(height) = self.priors.ln_height {
             let (value, slope) = state.ln_height()?;
             normal.add(value - height.mean, &slope, height.information());
         }
-        self.beliefs
-            .forget_facts(&mut normal.information, &mut normal.slope);
+        self.priors
+            .remove_fixed(&mut normal.information, &mut normal.slope);
         normal.cost += self
-            .beliefs
+            .priors
             .add_to(state, &mut normal.information, &mut normal.slope);
         Some(normal)
     }
@@ -104,49 +104,94 @@ impl Evidence {
     /// Down to the nearest minimum; none where the start is impossible.
     ///
     /// Only minima below `bar` are of interest: a start that is far above it and hardly falls any more is left where it is.
-    /// (The mirrored start of a large rectangle creeps along a valley floor for as long as it is let.)
+    /// (The mirrored start of a large rectangle creeps along a valley floor for as long as it may.)
     pub(crate) fn refine(&self, start: State, bar: f64) -> Option<Minimum> {
-        self.refine_for(start, bar, MOST_STEPS)
+        self.refine_for(start, bar, MAX_ITERATIONS)
     }
 
-    /// The same, leaving off after so many steps.
-    pub(crate) fn refine_for(&self, start: State, bar: f64, most_steps: usize) -> Option<Minimum> {
-        let (mut state, mut normal) = (start, self.normal(&start)?);
-        let mut damping = DAMPING;
-        let mut steps = 0;
-        while steps < most_steps && damping < HOPELESS {
-            steps += 1;
-            let Some((step, scaled)) = normal.damped_step(damping) else {
-                damping *= STIFFEN;
-                continue;
-            };
-            let next = self.stepped(&state, &step);
-            match self.cost(&next) {
-                Some(cost) if cost < normal.cost => {
-                    let fall = normal.cost - cost;
-                    let before = normal.cost;
-                    (state, normal) = (next, self.normal(&next)?);
-                    damping *= RELAX;
-                    if fall < SMALLEST_FALL * before || fall < CREEPING * (cost - bar) {
-                        break;
-                    }
-                }
-                _ => damping *= STIFFEN,
-            }
-            if scaled < SMALLEST_STEP {
+    /// The same, stopping after so many iterations.
+    pub(crate) fn refine_for(
+        &self,
+        start: State,
+        bar: f64,
+        max_iterations: usize,
+    ) -> Option<Minimum> {
+        let mut descent = Descent::new(self, start, bar)?;
+        while descent.iterations < max_iterations && descent.damping < MAX_DAMPING {
+            descent.iterations += 1;
+            if descent.iterate()? == Progress::Finished {
                 break;
             }
         }
         Some(Minimum {
-            state,
-            cost: normal.cost,
-            information: normal.information,
-            steps,
+            state: descent.state,
+            cost: descent.normal.cost,
+            information: descent.normal.information,
+            iterations: descent.iterations,
         })
     }
 }
 
-impl Normal {
+/// A descent into a valley of the cost, after some iterations.
+struct Descent<'a> {
+    residuals: &'a Residuals,
+    bar: f64,
+    state: State,
+    normal: NormalEquations,
+    damping: f64,
+    iterations: usize,
+}
+
+/// Whether a descent goes on.
+#[derive(PartialEq)]
+enum Progress {
+    Continues,
+    Finished,
+}
+
+impl<'a> Descent<'a> {
+    fn new(residuals: &'a Residuals, start: State, bar: f64) -> Option<Self> {
+        Some(Self {
+            residuals,
+            bar,
+            state: start,
+            normal: residuals.normal_equations(&start)?,
+            damping: INITIAL_DAMPING,
+            iterations: 0,
+        })
+    }
+
+    /// Tries a damped step; none where it is taken and has no normal equations.
+    fn iterate(&mut self) -> Option<Progress> {
+        let Some((step, length)) = self.normal.damped_step(self.damping) else {
+            self.damping *= DAMPING_INCREASE;
+            return Some(Progress::Continues);
+        };
+        let next = self.residuals.stepped(&self.state, &step);
+        let mut has_converged = length < STEP_TOLERANCE;
+        match self.residuals.cost(&next) {
+            Some(cost) if cost < self.normal.cost => {
+                has_converged |= self.hardly_falls_to(cost);
+                self.state = next;
+                self.normal = self.residuals.normal_equations(&next)?;
+                self.damping *= DAMPING_DECREASE;
+            }
+            _ => self.damping *= DAMPING_INCREASE,
+        }
+        Some(match has_converged {
+            true => Progress::Finished,
+            false => Progress::Continues,
+        })
+    }
+
+    /// A step to a lower cost that is not worth another.
+    fn hardly_falls_to(&self, cost: f64) -> bool {
+        let fall = self.normal.cost - cost;
+        fall < COST_TOLERANCE * self.normal.cost || fall < LEAST_PROGRESS * (cost - self.bar)
+    }
+}
+
+impl NormalEquations {
     /// Adds a residual with its slope and its weight, one over its variance.
     fn add(&mut self, off: f64, slope: &Unknowns, weight: f64) {
         self.information.ger(weight, slope, slope, 1.0);
@@ -174,8 +219,8 @@ impl Normal {
             .dot(&self.information.diagonal())
             .sqrt();
         let bounded = [0, 1, 2, LN_SCALE, LN_FOCAL, STRETCH].map(|i| step[i].abs());
-        let leap = bounded.into_iter().fold(LONGEST_STEP, f64::max);
-        Some((step * (LONGEST_STEP / leap), length))
+        let leap = bounded.into_iter().fold(MAX_STEP, f64::max);
+        Some((step * (MAX_STEP / leap), length))
     }
 }
 

@@ -1,93 +1,91 @@
 //! All the cameras that could have taken a picture, the most probable first.
 
+use super::chi::CHI2_99;
 use super::model::State;
 use super::problem::Problem;
-use super::rectangle::Stance;
+use super::rectangle::ScaledPose;
 use super::refine::Minimum;
 
 /// Normals closer than this belong to one pose.
 const ONE_POSE_DEG: f64 = 1.0;
 
-/// Another explanation counts where its chi squared is no worse, or better, by this: 1 % of two degrees of freedom.
-pub(crate) const TELLING: f64 = 9.2;
-
-/// The best camera, and the best one that stands elsewhere.
+/// The best camera, and the best one in another pose.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Found {
+pub(crate) struct SearchResult {
     pub(crate) best: Minimum,
     pub(crate) other: Option<Minimum>,
 }
 
 impl Problem {
     /// Refines from every start and keeps what stands above the surface; none where nothing does.
-    pub(crate) fn search(&self) -> Option<Found> {
+    pub(crate) fn search(&self) -> Option<SearchResult> {
         let mut minima: Vec<Minimum> = Vec::with_capacity(10);
         let mut lowest = f64::INFINITY;
-        let mut try_from = |start: State| {
-            let minimum = self
-                .evidence
-                .refine(start, lowest + TELLING)
-                .filter(is_above);
+        for start in self.starts() {
+            let minimum = self.residuals.refine(start, lowest + CHI2_99);
+            let minimum = minimum.filter(is_above_surface);
             lowest = minimum.map_or(lowest, |m| lowest.min(m.cost));
             minima.extend(minimum);
-        };
-        for focal in self.focal_starts().into_iter().flatten() {
-            let direct = self.start(focal);
-            try_from(direct);
-            try_from(State {
-                stance: direct.stance.mirrored(focal),
-                ..direct
-            });
-        }
-        let believed = self.start(libm::exp(self.evidence.beliefs.ln_focal.mean));
-        for stance in self.view.distant_stances(self.unit_size()) {
-            try_from(State { stance, ..believed });
         }
         let best = *minima.iter().min_by(|a, b| a.cost.total_cmp(&b.cost))?;
         let elsewhere = minima
             .iter()
-            .filter(|m| degrees_apart(&m.state.stance, &best.state.stance) > ONE_POSE_DEG);
-        Some(Found {
+            .filter(|m| degrees_apart(&m.state.pose, &best.state.pose) > ONE_POSE_DEG);
+        Some(SearchResult {
             best,
             other: elsewhere.min_by(|a, b| a.cost.total_cmp(&b.cost)).copied(),
         })
     }
 
-    /// The closed form, where it stands above the surface, after at most so many steps.
-    pub(crate) fn first_guess(&self, most_steps: usize) -> Option<Found> {
-        let fact = self.evidence.beliefs.ln_focal.is_fact();
-        let said = self.closed_form_focal().filter(|_| !fact);
-        let start =
-            self.start(said.unwrap_or_else(|| libm::exp(self.evidence.beliefs.ln_focal.mean)));
+    /// The closed form, where it stands above the surface, after at most so many iterations.
+    pub(crate) fn closed_form(&self, max_iterations: usize) -> Option<SearchResult> {
+        let is_fixed = self.residuals.priors.ln_focal.is_fixed();
+        let focal = self.closed_form_focal().filter(|_| !is_fixed);
+        let start = self.start(focal.unwrap_or_else(|| self.prior_focal()));
         let best = self
-            .evidence
-            .refine_for(start, f64::INFINITY, most_steps)
-            .filter(is_above)?;
-        Some(Found { best, other: None })
+            .residuals
+            .refine_for(start, f64::INFINITY, max_iterations)
+            .filter(is_above_surface)?;
+        Some(SearchResult { best, other: None })
     }
 
-    /// What is believed, what the corners say, and a short and a long lens; only the fact where there is one.
+    /// For each focal length the closed form and its mirror image; then the two poses without perspective.
+    fn starts(&self) -> impl Iterator<Item = State> {
+        let near = self.focal_starts().into_iter().flatten().flat_map(|focal| {
+            let direct = self.start(focal);
+            let pose = direct.pose.mirrored(focal);
+            [direct, State { pose, ..direct }]
+        });
+        let nominal = self.start(self.prior_focal());
+        let distant = self.projected.distant_poses(self.unit_size());
+        near.chain(distant.map(|pose| State { pose, ..nominal }))
+    }
+
+    /// The mean of the prior, what the corners give, and a short and a long lens; only the mean where it is fixed.
     fn focal_starts(&self) -> [Option<f64>; 4] {
-        let belief = self.evidence.beliefs.ln_focal;
-        let believed = libm::exp(belief.mean);
-        if belief.is_fact() {
-            return [Some(believed), None, None, None];
+        let prior = self.prior_focal();
+        if self.residuals.priors.ln_focal.is_fixed() {
+            return [Some(prior), None, None, None];
         }
         [
-            Some(believed),
+            Some(prior),
             self.closed_form_focal(),
-            Some(believed / 2.0),
-            Some(believed * 3.0),
+            Some(prior / 2.0),
+            Some(prior * 3.0),
         ]
+    }
+
+    fn prior_focal(&self) -> f64 {
+        libm::exp(self.residuals.priors.ln_focal.mean)
     }
 }
 
-fn is_above(minimum: &Minimum) -> bool {
+fn is_above_surface(minimum: &Minimum) -> bool {
     minimum.cost.is_finite() && minimum.state.camera_center().z > 0.0
 }
 
 /// Angle between the surface normals of two poses, degrees.
-pub(crate) fn degrees_apart(a: &Stance, b: &Stance) -> f64 {
+pub(crate) fn degrees_apart(a: &ScaledPose, b: &ScaledPose) -> f64 {
     let (a, b) = (a.rotation.column(2), b.rotation.column(2));
     libm::atan2(a.cross(&b).norm(), a.dot(&b)).to_degrees()
 }

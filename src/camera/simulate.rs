@@ -2,7 +2,7 @@
 
 use super::label::Label;
 use super::pinhole::distorted;
-use super::problem::corner_points;
+use super::rectangle::corner_points;
 use crate::camera::Camera;
 use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use nalgebra::{Matrix3, Rotation3};

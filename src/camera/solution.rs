@@ -6,27 +6,28 @@ use super::focal::FocalSource;
 use super::label::Framing;
 use super::model::Square;
 use super::options::SolveOptions;
-use super::problem::{Problem, corner_points};
-use super::refine::Minimum;
+use super::pinhole::Camera;
+use super::problem::Problem;
+use super::rectangle::corner_points;
+use super::refine::{Minimum, Residuals};
 use super::uncertainty::{FocalShare, Uncertainty};
-use super::warning::Warning;
-use crate::camera::Camera;
+use crate::diagnostic::{Code, Diagnostic, Severity};
 use crate::geom::{Point2, Point3, Pose, UnitQuaternion, Vector2};
 use nalgebra::{Matrix2, Matrix3, Rotation3};
 
-/// From this share of the information on, the focal length counts as measured; below the other, as believed.
-const MEASURED: f64 = 0.9;
-const BELIEVED: f64 = 0.1;
+/// From this share of the information on, the focal length counts as measured; below the other, as the prior's.
+const MEASURED_SHARE: f64 = 0.9;
+const PRIOR_SHARE: f64 = 0.1;
 /// Above this tilt the surface is seen almost edge-on.
 const GRAZING_DEG: f64 = 80.0;
 /// Height of the objects where none is given, in shorter sides.
-const REFERENCE_HEIGHT: f64 = 0.1;
-/// Error of objects worth a warning where none is given, in picture diagonals: more than a usual EXIF value leaves, less
-/// than knowing nothing from above does.
-const HEIGHT_SIGMA: f64 = 0.0015;
-/// Fits less probable than these are warned of, and severe.
-const IMPROBABLE: f64 = 0.01;
-const IMPOSSIBLE: f64 = 1e-4;
+const REFERENCE_HEIGHT_SHARE: f64 = 0.1;
+/// Error of objects worth a warning where none is given, in picture diagonals: more than an EXIF value leaves, less than
+/// knowing nothing from above does.
+const HEIGHT_SIGMA_DIAGONALS: f64 = 0.0015;
+/// Fits less probable than the first are worth a warning; those less probable than the second are refused.
+const POOR_FIT_P: f64 = 0.01;
+const REFUSED_FIT_P: f64 = 1e-4;
 
 /// A camera, and how far to trust it.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,11 +41,11 @@ pub struct Solution {
     pub size: [f64; 2],
     /// The corners as used: clockwise from the labelled first, pixels from the picture's corner.
     pub corners_px: [Point2<f64>; 4],
-    /// Which part of what the camera took the picture is taken for.
+    /// Which part of what the camera took the picture is assumed to be.
     pub framing: Framing,
     /// Where the focal length comes from.
     pub focal_source: FocalSource,
-    /// What was known of the focal length before and what the picture says.
+    /// What the prior and the picture say of the focal length.
     pub focal: FocalFinding,
     /// Root mean square distance of the rectangle's projected corners from the labelled ones, pixels.
     pub rms_px: f64,
@@ -53,38 +54,40 @@ pub struct Solution {
     /// Standard deviations.
     pub sigma: Sigma,
     /// What a person should look at.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<Diagnostic>,
     /// Another camera that a person should know of; the warnings say why.
     pub alternative: Option<Box<Solution>>,
 }
 
-/// What was known of the focal length before and what the picture says.
+/// What the prior and the picture say of the focal length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FocalFinding {
     /// Part of the information that comes from the picture, 0 to 1.
     pub share: f64,
-    /// What was believed, pixels, and its relative standard deviation (infinite where nothing was).
+    /// The prior, pixels, and its relative standard deviation (infinite where it is flat).
     pub prior_px: f64,
     /// See [`prior_px`](Self::prior_px).
     pub prior_sigma: f64,
-    /// What the picture alone says, pixels; none where it says nothing.
+    /// What the picture alone gives, pixels; none where it gives nothing.
     pub from_data_px: Option<f64>,
 }
 
 /// How well a label fits its camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Sum of squared distances from everything labelled and believed, in standard deviations.
+    /// Sum of squared distances from everything labelled and from the priors, in standard deviations.
     pub chi2: f64,
     /// Degrees of freedom of that sum.
     pub dof: usize,
     /// Probability of a larger sum by chance; none without degrees of freedom.
     pub p_value: Option<f64>,
+    /// Chi squared with width and height exchanged, where that fits clearly better.
+    pub exchanged_chi2: Option<f64>,
     /// Distance of each corner from where it was labelled, pixels.
     pub per_corner_px: [f64; 4],
-    /// Steps of the refinement.
-    pub steps: usize,
-    /// Condition number of what the picture alone says.
+    /// Iterations of the refinement.
+    pub iterations: usize,
+    /// Condition number of the information from the picture alone.
     pub condition: f64,
     /// Depth of the farthest corner over that of the nearest.
     pub depth_ratio: f64,
@@ -116,7 +119,7 @@ pub struct Sigma {
 impl Problem {
     /// What a minimum means, in metres and pixels.
     pub(crate) fn solution(&self, minimum: &Minimum, options: &SolveOptions) -> Solution {
-        let uncertainty = Uncertainty::new(minimum, self.evidence.beliefs.ln_focal);
+        let uncertainty = Uncertainty::new(minimum, self.residuals.priors.ln_focal);
         self.solution_with(minimum, &uncertainty, options)
     }
 
@@ -128,71 +131,68 @@ impl Problem {
         options: &SolveOptions,
     ) -> Solution {
         let state = &minimum.state;
-        let believed = self.evidence.beliefs.ln_focal;
         let camera = self.camera(minimum);
         let size = self.fitted_size(state);
-        let seen = self.seen_corners(minimum);
-        let per_corner_px = [0, 1, 2, 3].map(|i| (seen[i] - self.corners_px[i]).norm());
-        let rms_px = (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt();
+        let per_corner_px = self.corner_distances_px(minimum);
         let height = options
             .reference_height
-            .unwrap_or(REFERENCE_HEIGHT * size[0].min(size[1]));
-        let fit = self.fit(minimum, &camera, per_corner_px, uncertainty.condition);
-        let sigma = self.sigma(minimum, uncertainty, height);
-        let to_px = |ln_focal: f64| libm::exp(ln_focal) * self.frame.unit_px;
-        let focal = FocalFinding {
-            share: uncertainty.focal.share,
-            prior_px: to_px(believed.mean),
-            prior_sigma: believed.sigma,
-            from_data_px: uncertainty
-                .focal
-                .from_data
-                .map(|b| to_px(b.mean))
-                .filter(|f| f.is_finite()),
-        };
-        let focal_source = self.focal_source(minimum, &uncertainty.focal);
+            .unwrap_or(REFERENCE_HEIGHT_SHARE * size[0].min(size[1]));
         let mut solution = Solution {
             camera,
             kappa: state.kappa,
             size,
             corners_px: self.corners_px,
             framing: self.framing,
-            focal_source,
-            focal,
-            rms_px,
-            fit,
-            sigma,
+            focal_source: self.focal_source(minimum, &uncertainty.focal),
+            focal: self.focal_finding(&uncertainty.focal),
+            rms_px: (per_corner_px.iter().map(|d| d * d).sum::<f64>() / 4.0).sqrt(),
+            fit: self.fit(minimum, &camera, per_corner_px, uncertainty.condition),
+            sigma: self.sigma(minimum, uncertainty, height),
             warnings: self.warnings.clone(),
             alternative: None,
         };
-        solution.warn(options);
+        solution.add_warnings(options);
         solution
     }
 
+    fn focal_finding(&self, focal: &FocalShare) -> FocalFinding {
+        let prior = self.residuals.priors.ln_focal;
+        FocalFinding {
+            share: focal.share,
+            prior_px: self.units.focal_px(prior.mean),
+            prior_sigma: prior.sigma,
+            from_data_px: focal
+                .from_data
+                .map(|measured| self.units.focal_px(measured.mean))
+                .filter(|px| px.is_finite()),
+        }
+    }
+
     fn camera(&self, minimum: &Minimum) -> Camera {
-        let (state, frame) = (&minimum.state, &self.frame);
-        let rotation = Rotation3::from_matrix_unchecked(state.stance.rotation);
+        let (state, units) = (&minimum.state, &self.units);
+        let rotation = Rotation3::from_matrix_unchecked(state.pose.rotation);
         let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
         Camera {
             image: self.image,
-            focal_px: Vector2::repeat(state.focal * frame.unit_px),
-            principal_px: frame.principal_px + state.principal * frame.unit_px,
+            focal_px: Vector2::repeat(state.focal * units.unit_px),
+            principal_px: units.principal_px + state.principal * units.unit_px,
             camera_from_world: Pose::from_parts(
-                (state.translation() * frame.unit).into(),
+                (state.translation() * units.unit).into(),
                 rotation,
             ),
         }
     }
 
-    /// Where the rectangle's corners are seen, pixels, distortion included.
-    fn seen_corners(&self, minimum: &Minimum) -> [Point2<f64>; 4] {
-        corner_points(self.size).map(|corner| {
-            let seen = minimum
-                .state
-                .project(&(corner.coords / self.frame.unit), false);
-            seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| {
-                self.frame.principal_px + u * self.frame.unit_px
-            })
+    /// Distance of each corner from where the camera sees it, distortion included, pixels.
+    fn corner_distances_px(&self, minimum: &Minimum) -> [f64; 4] {
+        let points = corner_points(self.size);
+        [0, 1, 2, 3].map(|i| {
+            let point = points[i].coords / self.units.unit;
+            let seen = minimum.state.project(&point, false);
+            let seen_px = seen.map_or(Point2::new(f64::NAN, f64::NAN), |u| {
+                self.units.principal_px + u * self.units.unit_px
+            });
+            (seen_px - self.corners_px[i]).norm()
         })
     }
 
@@ -203,54 +203,57 @@ impl Problem {
         per_corner_px: [f64; 4],
         condition: f64,
     ) -> Fit {
-        let evidence = &self.evidence;
-        let seen = 2 * evidence.sights.len() + usize::from(evidence.beliefs.ln_height.is_some());
-        let dof = seen.saturating_sub(6 + evidence.beliefs.unknown());
+        let dof = self.degrees_of_freedom();
         let depths = corner_points(self.fitted_size(&minimum.state)).map(|c| depth(camera, c));
-        let (near, far) = (
-            depths.into_iter().fold(f64::MAX, f64::min),
-            depths.into_iter().fold(0.0, f64::max),
-        );
+        let nearest = depths.into_iter().fold(f64::MAX, f64::min);
+        let farthest = depths.into_iter().fold(0.0, f64::max);
         Fit {
             chi2: minimum.cost,
             dof,
             p_value: chi::exceeds(minimum.cost, dof),
+            exchanged_chi2: None,
             per_corner_px,
-            steps: minimum.steps,
+            iterations: minimum.iterations,
             condition,
-            depth_ratio: far / near,
-            px_per_metre: minimum.state.stance.scale * self.frame.unit_px / self.frame.unit,
+            depth_ratio: farthest / nearest,
+            px_per_metre: minimum.state.pose.scale * self.units.unit_px / self.units.unit,
         }
+    }
+
+    fn degrees_of_freedom(&self) -> usize {
+        let Residuals {
+            observations,
+            priors,
+            ..
+        } = &self.residuals;
+        let measured = 2 * observations.len() + usize::from(priors.ln_height.is_some());
+        measured.saturating_sub(6 + priors.flat_count())
     }
 
     fn sigma(&self, minimum: &Minimum, uncertainty: &Uncertainty, reference_height: f64) -> Sigma {
         let state = &minimum.state;
         Sigma {
             ln_focal: uncertainty.focal.sigma,
-            tilt: uncertainty.tilt(state),
-            center: uncertainty.camera_center(state) * (self.frame.unit * self.frame.unit),
-            corners_px: uncertainty.corners_px(self, state),
+            tilt: uncertainty.tilt_sigma(state),
+            center: uncertainty.center_covariance(state) * (self.units.unit * self.units.unit),
+            corners_px: uncertainty.corner_covariances_px(self, state),
             reference_height,
-            height_px: uncertainty.height_px(self, state, reference_height),
-            principal_px: uncertainty.principal_px(self),
+            height_px: uncertainty.height_sigma_px(self, state, reference_height),
+            principal_px: uncertainty.principal_sigma_px(self),
             covariance: uncertainty.covariance,
         }
     }
 
     fn focal_source(&self, minimum: &Minimum, focal: &FocalShare) -> FocalSource {
-        let believed = self.evidence.beliefs.ln_focal;
-        if believed.is_fact() {
+        let prior = self.residuals.priors.ln_focal;
+        let range = self.residuals.ln_focal_range;
+        if prior.is_fixed() {
             FocalSource::Fixed
-        } else if believed.says_nothing()
-            && self
-                .evidence
-                .ln_focal_range
-                .contains(&minimum.state.ln_focal)
-        {
+        } else if prior.is_flat() && range.contains(&minimum.state.ln_focal) {
             FocalSource::Unbounded
-        } else if focal.share >= MEASURED {
+        } else if focal.share >= MEASURED_SHARE {
             FocalSource::Measured
-        } else if focal.share >= BELIEVED {
+        } else if focal.share >= PRIOR_SHARE {
             FocalSource::Mixed
         } else {
             FocalSource::Prior
@@ -259,53 +262,44 @@ impl Problem {
 }
 
 impl Solution {
-    /// The solution, unless it is one that does not fit its label.
+    /// The solution, unless it does not fit its label.
     ///
     /// # Errors
-    /// [`SolveError::NoFit`], which says what would mend it.
+    /// [`SolveError::NoFit`], which says what would repair it.
     pub fn fitting(self) -> Result<Self, SolveError> {
         self.misfit().map_or(Ok(self), Err)
     }
 
     /// Why the solution does not fit its label, where it does not: so improbable by chance, or so much better with the
-    /// sides exchanged, that it is worth nothing.
+    /// sides exchanged, that it cannot be used.
     pub fn misfit(&self) -> Option<SolveError> {
-        let severe = self
+        let is_improbable = self
             .warnings
             .iter()
-            .any(|w| matches!(w, Warning::Inconsistent { severe: true, .. }));
-        let exchanged = self.warnings.iter().find_map(|w| match *w {
-            Warning::SidesSwapped {
-                labelled,
-                exchanged,
-            } if self.fit.chi2 > exchanged => Some([labelled, exchanged]),
-            _ => None,
-        });
-        let mended = self
-            .alternative
-            .as_ref()
-            .is_some_and(|other| other.misfit().is_none());
-        let exchanged = exchanged.filter(|_| mended);
-        let p_value = self.fit.p_value.unwrap_or(0.0);
-        (severe || exchanged.is_some()).then_some(SolveError::NoFit {
+            .any(|w| w.code == Code::PoorFit && w.severity == Severity::Error);
+        let exchanged = self
+            .fit
+            .exchanged_chi2
+            .filter(|_| self.has_fitting_alternative());
+        (is_improbable || exchanged.is_some()).then(|| SolveError::NoFit {
             rms_px: self.rms_px,
-            p_value,
-            exchanged,
+            p_value: self.fit.p_value.unwrap_or(0.0),
+            exchanged: exchanged.map(|exchanged| [self.fit.chi2, exchanged]),
         })
+    }
+
+    fn has_fitting_alternative(&self) -> bool {
+        self.alternative
+            .as_ref()
+            .is_some_and(|other| other.misfit().is_none())
     }
 
     /// Everything that a camera file holds is finite, but for standard deviations of what nothing is known of.
     pub(crate) fn is_finite(&self) -> bool {
         let (camera, fit, focal) = (&self.camera, &self.fit, &self.focal);
         let center = camera.center();
-        let places = [
-            camera.focal_px.x,
-            camera.principal_px.x,
-            camera.principal_px.y,
-            center.x,
-            center.y,
-            center.z,
-        ];
+        let principal = camera.principal_px;
+        let pose = [camera.focal_px.x, principal.x, principal.y];
         let fits = [
             fit.chi2,
             fit.depth_ratio,
@@ -315,48 +309,80 @@ impl Solution {
             focal.prior_px,
             focal.share,
         ];
-        places
-            .iter()
+        pose.iter()
+            .chain(center.iter())
             .chain(&fits)
             .chain(&self.size)
             .all(|value| value.is_finite())
     }
 
-    /// From which error on objects at the reference height are warned of, pixels.
+    /// From which error on objects at the reference height are worth a warning, pixels.
     pub(crate) fn height_limit_px(&self, options: &SolveOptions) -> f64 {
         let [w, h] = self.camera.image.map(f64::from);
         options
             .max_height_sigma_px
-            .unwrap_or(HEIGHT_SIGMA * libm::hypot(w, h))
+            .unwrap_or(HEIGHT_SIGMA_DIAGONALS * libm::hypot(w, h))
     }
 
     /// That objects on the surface may be seen at the wrong place, where they may.
-    pub(crate) fn height_warning(&self, options: &SolveOptions) -> Option<Warning> {
+    pub(crate) fn height_warning(&self, options: &SolveOptions) -> Option<Diagnostic> {
         let (height, sigma_px) = (self.sigma.reference_height, self.sigma.height_px);
-        (sigma_px > self.height_limit_px(options))
-            .then_some(Warning::HeightUncertain { height, sigma_px })
+        (sigma_px > self.height_limit_px(options)).then(|| {
+            Diagnostic::warning(
+                Code::HeightUncertain,
+                format!(
+                    "a point {height:.3} m above the surface is known only to {sigma_px:.1} px: give the focal length or the \
+                     camera height, add photos taken at an angle, or label points above the surface"
+                ),
+            )
+        })
     }
 
     /// Adds what is odd about the solution by itself.
-    fn warn(&mut self, options: &SolveOptions) {
+    fn add_warnings(&mut self, options: &SolveOptions) {
+        let found = [
+            self.grazing_warning(),
+            self.unbounded_warning(),
+            self.fit_warning(),
+            self.height_warning(options),
+        ];
+        self.warnings.extend(found.into_iter().flatten());
+    }
+
+    fn grazing_warning(&self) -> Option<Diagnostic> {
         let tilt_deg = self.camera.tilt().to_degrees();
-        if tilt_deg > GRAZING_DEG {
-            self.warnings.push(Warning::Grazing { tilt_deg });
-        }
-        if self.focal_source == FocalSource::Unbounded {
-            self.warnings.push(Warning::FocalUnbounded {
-                focal_px: self.camera.focal_px.x,
-            });
-        }
-        if let Some(p_value) = self.fit.p_value.filter(|&p| p < IMPROBABLE) {
-            let severe = p_value < IMPOSSIBLE;
-            self.warnings.push(Warning::Inconsistent {
-                p_value,
-                rms_px: self.rms_px,
-                severe,
-            });
-        }
-        self.warnings.extend(self.height_warning(options));
+        (tilt_deg > GRAZING_DEG).then(|| {
+            let what = format!(
+                "grazing view: the camera looks along the surface ({tilt_deg:.1} degrees from straight down)"
+            );
+            Diagnostic::warning(Code::GrazingView, what)
+        })
+    }
+
+    fn unbounded_warning(&self) -> Option<Diagnostic> {
+        (self.focal_source == FocalSource::Unbounded).then(|| {
+            let what = format!(
+                "the corners show no perspective and the focal length is not known: {:.0} px is a bound, not a value",
+                self.camera.focal_px.x
+            );
+            Diagnostic::warning(Code::FocalUnbounded, what)
+        })
+    }
+
+    /// An error where the fit is so improbable that the camera is refused.
+    fn fit_warning(&self) -> Option<Diagnostic> {
+        let p_value = self.fit.p_value.filter(|&p| p < POOR_FIT_P)?;
+        let severity = if p_value < REFUSED_FIT_P {
+            Severity::Error
+        } else {
+            Severity::Warning
+        };
+        let what = format!(
+            "no camera fits ({:.1} px off, p = {p_value:.1e}): wrong dimensions, corners of different rectangles, strong \
+             distortion, a cropped picture, or corner_sigma_px is too small",
+            self.rms_px
+        );
+        Some(Diagnostic::new(Code::PoorFit, severity, what))
     }
 }
 

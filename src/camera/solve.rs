@@ -1,33 +1,34 @@
-//! From a label to a camera, with every doubt that the label gives reason for.
+//! From a label to a camera, with a warning for everything that is odd about it.
 
+use super::chi::CHI2_99;
 use super::error::SolveError;
-use super::focal::Witness;
+use super::focal::PriorSource;
 use super::hedge::is_off_center;
 use super::label::{Framing, Label};
-use super::options::{CornerOrder, Effort, SolveOptions};
+use super::options::{CornerOrder, SolveOptions};
 use super::problem::Problem;
 use super::refine::Minimum;
-use super::search::{Found, TELLING, degrees_apart};
+use super::search::{SearchResult, degrees_apart};
 use super::solution::Solution;
 use super::uncertainty::Uncertainty;
-use super::warning::Warning;
+use crate::diagnostic::{Code, Diagnostic};
 
-/// Picture and belief contradict each other beyond this many standard deviations.
+/// Picture and prior contradict each other beyond this many standard deviations.
 const CONFLICT_SIGMAS: f64 = 3.0;
-/// How often a stated distortion is understood anew, and the relative change of the focal length that ends it.
-const MOST_REPEATS: usize = 20;
-const SETTLED: f64 = 1e-9;
+/// How often a stated distortion is applied anew, and the relative change of the focal length that ends it.
+const MAX_REPEATS: usize = 20;
+const FOCAL_TOLERANCE: f64 = 1e-9;
 
 /// Solves the camera that sees a rectangle of known size at four labelled corners.
 ///
 /// The rectangle becomes the world plane `z = 0`, centred, `+x` along its width.
 ///
 /// # Method
-/// The most probable camera given the corners and what is known of focal length, tape measure and lens, from several
-/// closed-form starts; the covariance at the optimum tells how well each quantity is known. Where the picture cannot tell
-/// the focal length, the answer rests on what was believed, and [`Solution::focal_source`] says so. A picture of which
-/// nobody says that it is whole is taken for whole as long as its corners allow that, with the error that it has if it is
-/// not ([`Label::framing`]).
+/// The most probable camera given the corners and the priors of focal length, tape measure and lens, from several
+/// closed-form starts; the covariance at the optimum gives how well each quantity is known. Where the picture does not
+/// constrain the focal length, the answer rests on its prior, and [`Solution::focal_source`] says so. A picture that may
+/// have been cropped is treated as whole as long as its corners allow that, with the error that it has if it is not
+/// ([`Label::framing`]).
 ///
 /// A camera that does not fit its label is returned, too: [`Solution::fitting`] refuses it.
 /// # Errors
@@ -43,174 +44,203 @@ const SETTLED: f64 = 1e-9;
 /// # Ok::<(), camera::SolveError>(())
 /// ```
 pub fn solve(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
-    if options.effort != Effort::Whole {
-        return as_labelled(label, options).map(|solved| solved.solution);
+    if options.max_iterations.is_some() {
+        return solve_as_labelled(label, options).map(|solved| solved.solution);
     }
-    let solution = without_wrong_exif(label, options)?;
-    Ok(with_sides_exchanged(label, options, solution))
+    let solution = solve_without_wrong_exif(label, options)?;
+    Ok(compare_exchanged_sides(label, options, solution))
 }
 
 /// A solution and what it comes from.
-struct Solved {
+struct SolvedProblem {
     solution: Solution,
     problem: Problem,
     minimum: Minimum,
 }
 
 /// The solution of a label as it stands.
-fn as_labelled(label: &Label, options: &SolveOptions) -> Result<Solved, SolveError> {
+fn solve_as_labelled(label: &Label, options: &SolveOptions) -> Result<SolvedProblem, SolveError> {
     match label.framing() {
         Framing::Unknown
-            if options.effort == Effort::Whole && options.priors.cropping_matters() =>
+            if options.max_iterations.is_none() && options.priors.cropping_matters() =>
         {
-            perhaps_cropped(label, options)
+            solve_perhaps_cropped(label, options)
         }
-        Framing::Unknown => framed(label, Framing::Whole, options),
-        known => framed(label, known, options),
+        Framing::Unknown => solve_framed(label, Framing::Whole, options),
+        known => solve_framed(label, known, options),
     }
 }
 
-/// The solution of a picture of which nobody says that it is whole.
-fn perhaps_cropped(label: &Label, options: &SolveOptions) -> Result<Solved, SolveError> {
-    let whole = framed(label, Framing::Whole, options);
-    let loose = framed(label, Framing::Unknown, options);
-    let (whole, loose) = match (whole, loose) {
-        (Ok(whole), Ok(loose)) => (whole, loose),
-        (Ok(whole), Err(_)) => return Ok(whole),
-        (Err(_), loose) => {
-            return loose.map(|l| Solved {
-                solution: l.solution.off_center(None),
-                ..l
-            });
-        }
-    };
+/// The solution of a picture that may have been cropped.
+fn solve_perhaps_cropped(
+    label: &Label,
+    options: &SolveOptions,
+) -> Result<SolvedProblem, SolveError> {
+    let whole = solve_framed(label, Framing::Whole, options);
+    let loose = solve_framed(label, Framing::Unknown, options);
+    match (whole, loose) {
+        (Ok(whole), Ok(loose)) => Ok(whole_or_cropped(whole, loose, options)),
+        (Ok(whole), Err(_)) => Ok(whole),
+        (Err(_), loose) => loose.map(|l| SolvedProblem {
+            solution: l.solution.off_center(None),
+            ..l
+        }),
+    }
+}
+
+/// The camera of a whole picture with the uncertainty of both, or the other one where the corners demand it.
+fn whole_or_cropped(
+    whole: SolvedProblem,
+    loose: SolvedProblem,
+    options: &SolveOptions,
+) -> SolvedProblem {
     if is_off_center(whole.minimum.cost, loose.minimum.cost) {
         let solution = loose.solution.off_center(Some(whole.solution));
-        return Ok(Solved { solution, ..loose });
+        return SolvedProblem { solution, ..loose };
     }
     let apart = whole.minimum.state.step_to(&loose.minimum.state);
-    Ok(Solved {
+    SolvedProblem {
         solution: whole.solution.hedged(&loose.solution, &apart, options),
         ..whole
-    })
+    }
 }
 
 /// The solution of a picture of some framing; another pose that fits as well is its alternative.
-fn framed(label: &Label, framing: Framing, options: &SolveOptions) -> Result<Solved, SolveError> {
-    let (problem, found) = with_stated_distortion(label, framing, options)?;
-    let mut solution = problem.solution(&found.best, options);
-    if !solution.is_finite() {
-        return Err(SolveError::NoPose);
-    }
-    if let Some(other) = found
-        .other
-        .filter(|other| other.cost < found.best.cost + TELLING)
-    {
-        let apart_deg = degrees_apart(&found.best.state.stance, &other.state.stance);
-        solution.warnings.push(Warning::PoseAmbiguous { apart_deg });
-        solution.alternative = Some(Box::new(problem.solution(&other, options)));
-    }
-    Ok(Solved {
-        solution,
-        problem,
-        minimum: found.best,
-    })
-}
-
-/// The search, repeated for a label that states k1 until that is understood at the focal length found.
-fn with_stated_distortion(
+fn solve_framed(
     label: &Label,
     framing: Framing,
     options: &SolveOptions,
-) -> Result<(Problem, Found), SolveError> {
+) -> Result<SolvedProblem, SolveError> {
+    let (problem, SearchResult { best, other }) =
+        search_with_stated_distortion(label, framing, options)?;
+    let mut solution = problem.solution(&best, options);
+    if !solution.is_finite() {
+        return Err(SolveError::NoPose);
+    }
+    if let Some(other) = other.filter(|other| other.cost < best.cost + CHI2_99) {
+        let apart_deg = degrees_apart(&best.state.pose, &other.state.pose);
+        solution.warnings.push(Diagnostic::warning(
+            Code::PoseAmbiguous,
+            format!(
+                "the pose is ambiguous: another one, turned by {apart_deg:.1} degrees, fits almost as well"
+            ),
+        ));
+        solution.alternative = Some(Box::new(problem.solution(&other, options)));
+    }
+    Ok(SolvedProblem {
+        solution,
+        problem,
+        minimum: best,
+    })
+}
+
+/// The search; for a label that states k1 repeated until that is applied at the focal length found.
+fn search_with_stated_distortion(
+    label: &Label,
+    framing: Framing,
+    options: &SolveOptions,
+) -> Result<(Problem, SearchResult), SolveError> {
     let mut problem = Problem::new(label, framing, options)?;
     let mut found = search(&problem, options)?;
-    let known =
-        label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.evidence.beliefs.ln_focal.is_fact();
-    let mut understood = problem.evidence.beliefs.ln_focal.mean;
-    for _ in 0..if known { 0 } else { MOST_REPEATS } {
+    let is_settled =
+        label.camera.k1.is_none_or(|k1| k1 == 0.0) || problem.residuals.priors.ln_focal.is_fixed();
+    let mut applied = problem.residuals.priors.ln_focal.mean;
+    for _ in 0..if is_settled { 0 } else { MAX_REPEATS } {
         let ln_focal = found.best.state.ln_focal;
-        if (ln_focal - understood).abs() < SETTLED {
+        if (ln_focal - applied).abs() < FOCAL_TOLERANCE {
             break;
         }
-        understood = ln_focal;
+        applied = ln_focal;
         problem = Problem::with_focal(label, framing, Some(libm::exp(ln_focal)), options)?;
         found = search(&problem, options)?;
     }
     Ok((problem, found))
 }
 
-fn search(problem: &Problem, options: &SolveOptions) -> Result<Found, SolveError> {
-    let found = match options.effort {
-        Effort::Whole => problem.search(),
-        Effort::Steps(most) => problem.first_guess(most),
+fn search(problem: &Problem, options: &SolveOptions) -> Result<SearchResult, SolveError> {
+    let found = match options.max_iterations {
+        None => problem.search(),
+        Some(limit) => problem.closed_form(limit),
     };
     found.ok_or(SolveError::NoPose)
 }
 
 /// Solves; where the picture contradicts its own EXIF value, solves again without that and keeps the first answer beside.
-fn without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
-    let Solved {
+fn solve_without_wrong_exif(label: &Label, options: &SolveOptions) -> Result<Solution, SolveError> {
+    let SolvedProblem {
         mut solution,
         problem,
         minimum,
-    } = as_labelled(label, options)?;
+    } = solve_as_labelled(label, options)?;
     let Some(conflict) = focal_conflict(&problem, &minimum) else {
         return Ok(solution);
     };
-    if problem.witness != Witness::Exif {
+    if problem.prior_source != PriorSource::Exif {
         solution.warnings.push(conflict);
         return Ok(solution);
     }
-    let mut doubted = label.clone();
-    (doubted.camera.focal_35mm, doubted.camera.focal_sigma) = (None, None);
-    let mut second = as_labelled(&doubted, options)?.solution;
+    let mut without = label.clone();
+    (without.camera.focal_35mm, without.camera.focal_sigma) = (None, None);
+    let mut second = solve_as_labelled(&without, options)?.solution;
     second.warnings.push(conflict);
     second.alternative = Some(Box::new(solution));
     Ok(second)
 }
 
-fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Warning> {
-    let believed = problem.evidence.beliefs.ln_focal;
-    let focal = Uncertainty::new(minimum, believed).focal;
-    let sigmas = focal.conflict(believed)?.abs();
-    let to_px = |ln_focal: f64| libm::exp(ln_focal) * problem.frame.unit_px;
-    let (believed_px, measured_px) = (to_px(believed.mean), to_px(focal.from_data?.mean));
-    (sigmas > CONFLICT_SIGMAS).then_some(Warning::FocalPriorConflict {
-        believed_px,
-        measured_px,
-        sigmas,
+fn focal_conflict(problem: &Problem, minimum: &Minimum) -> Option<Diagnostic> {
+    let prior = problem.residuals.priors.ln_focal;
+    let focal = Uncertainty::new(minimum, prior).focal;
+    let sigmas = focal.prior_conflict(prior)?.abs();
+    let prior_px = problem.units.focal_px(prior.mean);
+    let measured_px = problem.units.focal_px(focal.from_data?.mean);
+    (sigmas > CONFLICT_SIGMAS).then(|| {
+        Diagnostic::warning(
+            Code::FocalPriorConflict,
+            format!(
+                "focal length: {prior_px:.0} px was expected and the corners give {measured_px:.0} px ({sigmas:.1} sigmas \
+                 apart): wrong EXIF, a cropped or a zoomed picture"
+            ),
+        )
     })
 }
 
-/// Where width and height exchanged fit clearly better, says so, and has the better one beside, or before when asked.
-fn with_sides_exchanged(label: &Label, options: &SolveOptions, solution: Solution) -> Solution {
+/// Where width and height exchanged fit clearly better, adds a warning and the better solution, as the alternative or, with
+/// [`CornerOrder::Auto`], as the first.
+fn compare_exchanged_sides(
+    label: &Label,
+    options: &SolveOptions,
+    mut labelled: Solution,
+) -> Solution {
+    let Some(mut exchanged) = with_exchanged_sides(label, options, labelled.fit.chi2) else {
+        return labelled;
+    };
+    let warning = Diagnostic::warning(
+        Code::SidesSwapped,
+        format!(
+            "width and height look exchanged (chi squared {:.1} as labelled, {:.1} exchanged)",
+            labelled.fit.chi2, exchanged.fit.chi2
+        ),
+    );
+    if options.order == CornerOrder::Auto {
+        exchanged.warnings.push(warning);
+        exchanged.alternative = Some(Box::new(labelled));
+        return exchanged;
+    }
+    labelled.warnings.push(warning);
+    labelled.fit.exchanged_chi2 = Some(exchanged.fit.chi2);
+    labelled.alternative = Some(Box::new(exchanged));
+    labelled
+}
+
+/// The solution with width and height exchanged, where it fits clearly better than this chi squared.
+fn with_exchanged_sides(label: &Label, options: &SolveOptions, chi2: f64) -> Option<Solution> {
     let surface = &label.surface;
-    let differ = surface.width_m.is_some()
-        && surface.height_m.is_some()
-        && surface.width_m != surface.height_m;
-    let labelled = solution.fit.chi2;
-    if !differ || labelled <= TELLING {
-        return solution;
+    let (width_m, height_m) = (surface.width_m?, surface.height_m?);
+    if width_m == height_m || chi2 <= CHI2_99 {
+        return None;
     }
     let mut exchanged = label.clone();
-    (exchanged.surface.width_m, exchanged.surface.height_m) = (surface.height_m, surface.width_m);
-    let Ok(other) = without_wrong_exif(&exchanged, options) else {
-        return solution;
-    };
-    if other.fit.chi2 + TELLING >= labelled {
-        return solution;
-    }
-    let swapped = Warning::SidesSwapped {
-        labelled,
-        exchanged: other.fit.chi2,
-    };
-    let (mut first, second) = if options.order == CornerOrder::Auto {
-        (other, solution)
-    } else {
-        (solution, other)
-    };
-    first.warnings.push(swapped);
-    first.alternative = Some(Box::new(second));
-    first
+    (exchanged.surface.width_m, exchanged.surface.height_m) = (Some(height_m), Some(width_m));
+    let other = solve_without_wrong_exif(&exchanged, options).ok()?;
+    (other.fit.chi2 + CHI2_99 < chi2).then_some(other)
 }

@@ -1,11 +1,12 @@
 //! Cameras that were solved before and lie beside their labels, and whether they still are those of their labels.
 
+use super::error::SolveError;
 use super::file::{CameraFile, checksum};
 use super::options::SolveOptions;
-use super::read::Labelled;
+use super::pinhole::Camera;
+use super::read::LabelledPhoto;
 use super::solve::solve;
-use super::warning::Warning;
-use super::{Camera, SolveError};
+use crate::diagnostic::Diagnostic;
 use crate::error::{Error, Result};
 use crate::io;
 use std::collections::BTreeMap;
@@ -13,13 +14,13 @@ use std::path::{Path, PathBuf};
 
 /// A labelled photo's camera.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sighting {
+pub struct PhotoCamera {
     /// The camera.
     pub camera: Camera,
     /// Width and height of the rectangle as fitted, metres.
     pub size: [f64; 2],
     /// What a person should look at.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<Diagnostic>,
     /// The camera was read from `NAME.camera.json`, not solved anew.
     pub stored: bool,
     /// Why a stored camera was not used, in words.
@@ -32,99 +33,108 @@ pub struct Sighting {
 ///
 /// # Errors
 /// A camera file that cannot be right; a label that no camera can have seen, or that none fits.
-pub fn sightings(labels: &[Labelled], force: bool) -> Result<Vec<Sighting>> {
-    let files = labels.iter().map(stored).collect::<Result<Vec<_>>>()?;
-    let labels: Vec<Labelled> = labels
+pub fn photo_cameras(labels: &[LabelledPhoto], force: bool) -> Result<Vec<PhotoCamera>> {
+    let files = labels
+        .iter()
+        .map(read_camera_file)
+        .collect::<Result<Vec<_>>>()?;
+    let labels: Vec<LabelledPhoto> = labels
         .iter()
         .zip(&files)
-        .map(|(l, file)| with_size(l, file.as_ref()))
+        .map(|(labelled, file)| with_stored_size(labelled, file.as_ref()))
         .collect();
-    let known = together(&labels);
-    let one = |(labelled, file): (&Labelled, &Option<CameraFile>)| {
-        let stale = match file
-            .as_ref()
-            .map(|file| (file, staleness(file, labelled, &known)))
-        {
-            Some((file, None)) => return Ok(Sighting::stored(file)),
-            Some((_, Some(why))) => Some(format!(
-                "{}: {why}; solved again",
-                path_of(labelled).display()
-            )),
-            None => None,
-        };
-        Ok(Sighting {
-            stale,
-            ..Sighting::solved(labelled, force)?
-        })
-    };
-    labels.iter().zip(&files).map(one).collect()
+    let known = label_checksums(&labels);
+    labels
+        .iter()
+        .zip(&files)
+        .map(|(labelled, file)| PhotoCamera::new(labelled, file.as_ref(), &known, force))
+        .collect()
 }
 
-impl Sighting {
+impl PhotoCamera {
+    /// The stored camera, unless it is not that of its label any more.
+    fn new(
+        labelled: &LabelledPhoto,
+        file: Option<&CameraFile>,
+        known: &BTreeMap<String, u32>,
+        force: bool,
+    ) -> Result<Self> {
+        let Some(file) = file else {
+            return Self::solved(labelled, force);
+        };
+        let Some(why) = staleness(file, labelled, known) else {
+            return Ok(Self::stored(file));
+        };
+        let path = camera_path(labelled);
+        Ok(Self {
+            stale: Some(format!("{}: {why}; solved again", path.display())),
+            ..Self::solved(labelled, force)?
+        })
+    }
+
     fn stored(file: &CameraFile) -> Self {
-        let warnings = file.found.warnings.clone();
         Self {
             camera: file.camera(),
             size: file.size(),
-            warnings,
+            warnings: file.found.warnings.clone(),
             stored: true,
             stale: None,
         }
     }
 
-    fn solved(labelled: &Labelled, force: bool) -> Result<Self> {
-        let error =
-            |e: SolveError| advised_on_size(Error::from(e).in_file(&labelled.source), labelled);
-        let solution = solve(&labelled.label, &SolveOptions::default()).map_err(error)?;
-        let solution = if force {
-            solution
-        } else {
-            solution.fitting().map_err(error)?
-        };
-        let (camera, size, warnings) = (solution.camera, solution.size, solution.warnings);
+    fn solved(labelled: &LabelledPhoto, force: bool) -> Result<Self> {
+        let solution = solve(&labelled.label, &SolveOptions::default())
+            .and_then(|solution| match force {
+                true => Ok(solution),
+                false => solution.fitting(),
+            })
+            .map_err(|error| located_error(error, labelled))?;
         Ok(Self {
-            camera,
-            size,
-            warnings,
+            camera: solution.camera,
+            size: solution.size,
+            warnings: solution.warnings,
             stored: false,
             stale: None,
         })
     }
 }
 
-fn path_of(labelled: &Labelled) -> PathBuf {
+fn camera_path(labelled: &LabelledPhoto) -> PathBuf {
     labelled.beside("camera.json")
 }
 
 /// The camera file of a label, where there is one.
-fn stored(labelled: &Labelled) -> Result<Option<CameraFile>> {
-    let path = path_of(labelled);
+fn read_camera_file(labelled: &LabelledPhoto) -> Result<Option<CameraFile>> {
+    let path = camera_path(labelled);
     if !path.exists() {
         return Ok(None);
     }
-    let read = || {
-        let file: CameraFile = io::read_json(&path)?;
-        file.check(labelled.label.image_size())
-            .map_err(|e| e.in_file(&path))?;
-        Ok(Some(file))
-    };
-    read().map_err(|error: Error| {
-        let what = error.to_string();
-        let what = what
-            .strip_prefix(&format!("{}: ", path.display()))
-            .unwrap_or(&what);
-        Error::file(
-            &path,
-            format!("{what}; delete it, or run `petcomp camera solve` again"),
-        )
-    })
+    checked_camera_file(&path, labelled)
+        .map(Some)
+        .map_err(|error| {
+            let what = error.to_string();
+            let what = what
+                .strip_prefix(&format!("{}: ", path.display()))
+                .unwrap_or(&what);
+            Error::file(
+                &path,
+                format!("{what}; delete it, or run `petcomp camera solve` again"),
+            )
+        })
 }
 
-/// An error for want of a size tells where it may be given.
-fn advised_on_size(error: Error, labelled: &Labelled) -> Error {
+fn checked_camera_file(path: &Path, labelled: &LabelledPhoto) -> Result<CameraFile> {
+    let file: CameraFile = io::read_json(path)?;
+    file.check(labelled.label.image_size())
+        .map_err(|e| e.in_file(path))?;
+    Ok(file)
+}
+
+/// The error of a label, or where its sides are missing, where to give them.
+fn located_error(error: SolveError, labelled: &LabelledPhoto) -> Error {
     let surface = &labelled.label.surface;
     if surface.width_m.is_some() || surface.height_m.is_some() {
-        return error;
+        return Error::from(error).in_file(&labelled.source);
     }
     Error::file(
         &labelled.source,
@@ -134,14 +144,11 @@ fn advised_on_size(error: Error, labelled: &Labelled) -> Error {
 }
 
 /// A label without sides, with those that its camera was solved with.
-fn with_size(labelled: &Labelled, file: Option<&CameraFile>) -> Labelled {
+fn with_stored_size(labelled: &LabelledPhoto, file: Option<&CameraFile>) -> LabelledPhoto {
     let mut labelled = labelled.clone();
     let surface = &mut labelled.label.surface;
-    if let (None, None, Some(from)) = (
-        surface.width_m,
-        surface.height_m,
-        file.and_then(|f| f.solved_from.as_ref()),
-    ) {
+    let from = file.and_then(|f| f.solved_from.as_ref());
+    if let (None, None, Some(from)) = (surface.width_m, surface.height_m, from) {
         [surface.width_m, surface.height_m] = from.size_m;
     }
     labelled
@@ -150,19 +157,21 @@ fn with_size(labelled: &Labelled, file: Option<&CameraFile>) -> Labelled {
 /// Why a camera is not that of its label any more; `known` are the labels that are there.
 fn staleness(
     file: &CameraFile,
-    labelled: &Labelled,
+    labelled: &LabelledPhoto,
     known: &BTreeMap<String, u32>,
 ) -> Option<String> {
     let Some(from) = &file.solved_from else {
-        let older = modified(&path_of(labelled)) < modified(&labelled.source);
+        let older = modified(&camera_path(labelled)) < modified(&labelled.source);
         return older.then(|| "older than its label".to_owned());
     };
     if from.label_crc32 != checksum(&labelled.label) {
         return Some("solved from another version of its label, or with another size".into());
     }
-    let changed = |(name, crc): &(&String, &u32)| known.get(*name).is_some_and(|now| now != *crc);
-    let changed = from.together.iter().find(changed);
-    changed.map(|(name, _)| format!("solved together with another version of {name}"))
+    let (name, _) = from
+        .together
+        .iter()
+        .find(|&(name, crc)| known.get(name).is_some_and(|now| now != crc))?;
+    Some(format!("solved together with another version of {name}"))
 }
 
 fn modified(path: &Path) -> Option<std::time::SystemTime> {
@@ -170,7 +179,9 @@ fn modified(path: &Path) -> Option<std::time::SystemTime> {
 }
 
 /// The checksums of labels by name: what each of those that are solved together keeps of the others.
-pub fn together<'a>(labels: impl IntoIterator<Item = &'a Labelled>) -> BTreeMap<String, u32> {
+pub fn label_checksums<'a>(
+    labels: impl IntoIterator<Item = &'a LabelledPhoto>,
+) -> BTreeMap<String, u32> {
     labels
         .into_iter()
         .map(|labelled| (labelled.name.clone(), checksum(&labelled.label)))
@@ -183,8 +194,8 @@ mod tests {
     use crate::camera::simulate::Scenario;
     use crate::camera::{Label, read_labels};
 
-    fn sighting(labelled: &Labelled, force: bool) -> Result<Sighting> {
-        sightings(std::slice::from_ref(labelled), force).map(|mut all| all.remove(0))
+    fn camera_of(labelled: &LabelledPhoto, force: bool) -> Result<PhotoCamera> {
+        photo_cameras(std::slice::from_ref(labelled), force).map(|mut all| all.remove(0))
     }
 
     struct Desk(tempfile::TempDir);
@@ -204,7 +215,7 @@ mod tests {
             label
         }
 
-        fn write(&self, label: &Label) -> Labelled {
+        fn write(&self, label: &Label) -> LabelledPhoto {
             io::write_json(self.path("a.label.json"), label).unwrap();
             read_labels(self.path("a.label.json"), None)
                 .unwrap()
@@ -212,7 +223,7 @@ mod tests {
         }
 
         /// A camera file whose focal length tells it from a camera solved anew.
-        fn store(&self, labelled: &Labelled, edit: impl Fn(&mut CameraFile)) {
+        fn store(&self, labelled: &LabelledPhoto, edit: impl Fn(&mut CameraFile)) {
             let solution = solve(&labelled.label, &SolveOptions::default()).unwrap();
             let mut file = CameraFile::new(&labelled.label, &solution);
             file.found.model.f_px = 3333.0;
@@ -226,15 +237,15 @@ mod tests {
         let desk = Desk::new();
         let mut label = desk.label(0);
         let labelled = desk.write(&label);
-        assert!(!sighting(&labelled, false).unwrap().stored);
+        assert!(!camera_of(&labelled, false).unwrap().stored);
         desk.store(&labelled, |_| {});
-        let found = sighting(&labelled, false).unwrap();
+        let found = camera_of(&labelled, false).unwrap();
         assert!(found.stored && found.camera.focal_px.x == 3333.0 && found.stale.is_none());
         // Written anew with other spaces and a younger time: still the same label.
         let text = serde_json::to_string(&label).unwrap();
         io::write_text(desk.path("a.label.json"), &text).unwrap();
         assert!(
-            sighting(
+            camera_of(
                 &read_labels(desk.path("a.label.json"), None).unwrap()[0],
                 false
             )
@@ -242,7 +253,7 @@ mod tests {
             .stored
         );
         label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
-        let found = sighting(&desk.write(&label), false).unwrap();
+        let found = camera_of(&desk.write(&label), false).unwrap();
         assert!(!found.stored && found.camera.focal_px.x != 3333.0);
         assert!(
             found
@@ -257,7 +268,7 @@ mod tests {
         let desk = Desk::new();
         let labelled = desk.write(&desk.label(0));
         desk.store(&labelled, |file| file.solved_from = None);
-        assert!(sighting(&labelled, false).unwrap().stored);
+        assert!(camera_of(&labelled, false).unwrap().stored);
         let file = std::fs::File::options()
             .write(true)
             .open(desk.path("a.camera.json"))
@@ -265,7 +276,7 @@ mod tests {
         file.set_modified(std::time::SystemTime::UNIX_EPOCH)
             .unwrap();
         assert!(
-            sighting(&labelled, false)
+            camera_of(&labelled, false)
                 .unwrap()
                 .stale
                 .unwrap()
@@ -285,17 +296,21 @@ mod tests {
             read_labels(&path, None).unwrap().remove(0),
         ];
         desk.store(&labelled, |file| {
-            file.solved_from.as_mut().unwrap().together = together(&labels)
+            file.solved_from.as_mut().unwrap().together = label_checksums(&labels)
         });
-        assert!(sightings(&labels, false).unwrap()[0].stored);
+        assert!(photo_cameras(&labels, false).unwrap()[0].stored);
         labels[1].label.surface.corners_px.as_mut().unwrap()[0][0] += 1.0;
-        let stale = sightings(&labels, false).unwrap().remove(0).stale.unwrap();
+        let stale = photo_cameras(&labels, false)
+            .unwrap()
+            .remove(0)
+            .stale
+            .unwrap();
         assert!(
             stale.contains("together with another version of b"),
             "{stale}"
         );
         assert!(
-            sighting(&labelled, false).unwrap().stored,
+            camera_of(&labelled, false).unwrap().stored,
             "a copy of a part of the photos"
         );
     }
@@ -321,7 +336,7 @@ mod tests {
         ];
         for (edit, expected) in edits {
             desk.store(&labelled, edit);
-            let error = sighting(&labelled, true).unwrap_err().to_string();
+            let error = camera_of(&labelled, true).unwrap_err().to_string();
             assert!(
                 error.contains(expected) && error.contains("a.camera.json: "),
                 "{error}"
@@ -333,7 +348,7 @@ mod tests {
         }
         io::write_text(desk.path("a.camera.json"), "{").unwrap();
         assert!(
-            sighting(&labelled, false)
+            camera_of(&labelled, false)
                 .unwrap_err()
                 .to_string()
                 .contains("a.camera.json: line 1")
@@ -347,12 +362,12 @@ mod tests {
         let surface = &mut label.surface;
         (surface.width_m, surface.height_m) = (surface.height_m, surface.width_m);
         let labelled = desk.write(&label);
-        let error = sighting(&labelled, false).unwrap_err().to_string();
+        let error = camera_of(&labelled, false).unwrap_err().to_string();
         assert!(
             error.contains("a.label.json") && error.contains("exchange width_m and height_m"),
             "{error}"
         );
-        assert!(!sighting(&labelled, true).unwrap().stored);
+        assert!(!camera_of(&labelled, true).unwrap().stored);
         let solution = solve(&label, &SolveOptions::default()).unwrap();
         assert!(CameraFile::new(&label, &solution).forced);
         io::write_json(
@@ -361,7 +376,7 @@ mod tests {
         )
         .unwrap();
         assert!(
-            sighting(&labelled, false).unwrap().stored,
+            camera_of(&labelled, false).unwrap().stored,
             "forced when it was solved"
         );
     }

@@ -1,18 +1,21 @@
-//! How well a camera is known.
+//! How well a camera is known: the covariance of its unknowns and what follows from it.
 
-use super::belief::Belief;
 use super::model::{
     CENTER, KAPPA, LN_FOCAL, LN_SCALE, PRINCIPAL, Square, State, UNKNOWNS, Unknowns,
 };
+use super::prior::Prior;
 use super::problem::Problem;
+use super::rectangle::corner_points;
 use super::refine::{Minimum, unit_diagonal};
 use crate::geom::Point3;
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 /// Information on the logarithm of the focal length below this part of its diagonal is rounding.
-const ROUNDING: f64 = 1e-13;
+const ROUNDING_SHARE: f64 = 1e-13;
 /// Points of the grid, per side, at which the height error is taken.
-const GRID: usize = 4;
+const GRID_SIDE: usize = 4;
+/// Below this sine of the tilt its direction is undefined.
+const LEAST_TILT_SINE: f64 = 1e-9;
 
 /// Covariance of the unknowns, and what it says of the focal length.
 #[derive(Clone, Copy, Debug)]
@@ -23,31 +26,31 @@ pub(crate) struct Uncertainty {
     pub(crate) condition: f64,
 }
 
-/// How much of what is known of the focal length was known before.
+/// How much of what is known of the focal length comes from the picture, and how much from its prior.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FocalShare {
     /// Standard deviation of its logarithm; infinite where nothing is known.
     pub(crate) sigma: f64,
     /// Part of the information that comes from the picture, 0 to 1.
     pub(crate) share: f64,
-    /// What the picture alone says of its logarithm: the value and its standard deviation.
-    pub(crate) from_data: Option<Belief>,
+    /// What the picture alone gives for its logarithm: the value and its standard deviation.
+    pub(crate) from_data: Option<Prior>,
 }
 
 impl FocalShare {
-    /// Difference between the picture and what was believed, in standard deviations of the difference.
-    pub(crate) fn conflict(&self, believed: Belief) -> Option<f64> {
+    /// Difference between the picture and the prior, in standard deviations of the difference.
+    pub(crate) fn prior_conflict(&self, prior: Prior) -> Option<f64> {
         let data = self.from_data?;
-        (!believed.is_fact() && !believed.says_nothing())
-            .then(|| (data.mean - believed.mean) / libm::hypot(data.sigma, believed.sigma))
+        (!prior.is_fixed() && !prior.is_flat())
+            .then(|| (data.mean - prior.mean) / libm::hypot(data.sigma, prior.sigma))
     }
 }
 
 impl Uncertainty {
-    pub(crate) fn new(minimum: &Minimum, believed: Belief) -> Self {
+    pub(crate) fn new(minimum: &Minimum, prior: Prior) -> Self {
         let (covariance, information) = covariance(&minimum.information);
-        let condition = condition(&minimum.information, believed);
-        let focal = focal_share(minimum.state.ln_focal, information, believed);
+        let condition = condition(&minimum.information, prior);
+        let focal = focal_share(minimum.state.ln_focal, information, prior);
         Self {
             covariance,
             focal,
@@ -56,11 +59,11 @@ impl Uncertainty {
     }
 
     /// Standard deviation of the tilt, radians.
-    pub(crate) fn tilt(&self, state: &State) -> f64 {
-        let normal = state.stance.rotation.column(2);
+    pub(crate) fn tilt_sigma(&self, state: &State) -> f64 {
+        let normal = state.pose.rotation.column(2);
         let sin = libm::hypot(normal.x, normal.y);
         let c = &self.covariance;
-        if sin < 1e-9 {
+        if sin < LEAST_TILT_SINE {
             return ((c[(0, 0)] + c[(1, 1)]) / 2.0).sqrt();
         }
         let (x, y) = (normal.y / sin, -normal.x / sin);
@@ -70,16 +73,16 @@ impl Uncertainty {
     }
 
     /// Covariance of the camera's place over the rectangle.
-    pub(crate) fn camera_center(&self, state: &State) -> Matrix3<f64> {
+    pub(crate) fn center_covariance(&self, state: &State) -> Matrix3<f64> {
         let t = state.translation();
-        let back = state.stance.rotation.transpose();
+        let back = state.pose.rotation.transpose();
         let mut slope = SMatrix::<f64, 3, UNKNOWNS>::zeros();
         slope
             .fixed_columns_mut::<3>(0)
             .copy_from(&-t.cross_matrix());
         for axis in 0..2 {
-            slope[(axis, CENTER + axis)] = -1.0 / state.stance.scale;
-            slope[(axis, PRINCIPAL + axis)] = 1.0 / state.stance.scale;
+            slope[(axis, CENTER + axis)] = -1.0 / state.pose.scale;
+            slope[(axis, PRINCIPAL + axis)] = 1.0 / state.pose.scale;
         }
         slope.set_column(LN_SCALE, &t);
         slope[(2, LN_FOCAL)] = -t.z;
@@ -87,45 +90,54 @@ impl Uncertainty {
         slope * self.covariance * slope.transpose()
     }
 
-    /// Covariance of where a point of the rectangle's frame is seen; none behind the camera.
-    fn seen(&self, problem: &Problem, state: &State, point: Vector3<f64>) -> Option<Matrix2<f64>> {
-        let (_, slope) = state.slope(&(point / problem.frame.unit), false)?;
+    /// Covariance of where a point of the rectangle's units is seen; none behind the camera.
+    fn point_covariance_px(
+        &self,
+        problem: &Problem,
+        state: &State,
+        point: Vector3<f64>,
+    ) -> Option<Matrix2<f64>> {
+        let (_, slope) = state.slope(&(point / problem.units.unit), false)?;
         Some(
             slope.transpose()
                 * self.covariance
                 * slope
-                * (problem.frame.unit_px * problem.frame.unit_px),
+                * (problem.units.unit_px * problem.units.unit_px),
         )
     }
 
     /// The same at the rectangle's corners, squared pixels.
-    pub(crate) fn corners_px(&self, problem: &Problem, state: &State) -> [Matrix2<f64>; 4] {
-        let corners = super::problem::corner_points(problem.size);
+    pub(crate) fn corner_covariances_px(
+        &self,
+        problem: &Problem,
+        state: &State,
+    ) -> [Matrix2<f64>; 4] {
+        let corners = corner_points(problem.size);
         corners.map(|c| {
-            self.seen(problem, state, c.coords)
+            self.point_covariance_px(problem, state, c.coords)
                 .unwrap_or(Matrix2::repeat(f64::INFINITY))
         })
     }
 
     /// Root mean square error, pixels, of points over the rectangle at a height of `height` metres.
-    pub(crate) fn height_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
-        let traces = heights(problem.size, height).map(|point| {
-            self.seen(problem, state, point.coords)
-                .map_or(f64::INFINITY, |c| variance(c.trace()))
+    pub(crate) fn height_sigma_px(&self, problem: &Problem, state: &State, height: f64) -> f64 {
+        let traces = grid_at_height(problem.size, height).map(|point| {
+            self.point_covariance_px(problem, state, point.coords)
+                .map_or(f64::INFINITY, |c| repaired_variance(c.trace()))
         });
-        (traces.sum::<f64>() / (GRID * GRID) as f64).sqrt()
+        (traces.sum::<f64>() / (GRID_SIDE * GRID_SIDE) as f64).sqrt()
     }
 
     /// Standard deviation of a coordinate of the principal point, pixels.
-    pub(crate) fn principal_px(&self, problem: &Problem) -> f64 {
+    pub(crate) fn principal_sigma_px(&self, problem: &Problem) -> f64 {
         let variance = self.covariance[(PRINCIPAL, PRINCIPAL)]
             + self.covariance[(PRINCIPAL + 1, PRINCIPAL + 1)];
-        problem.frame.unit_px * (variance / 2.0).sqrt()
+        problem.units.unit_px * (variance / 2.0).sqrt()
     }
 }
 
-/// A variance as rounding has left it: nothing is surer than sure, and what is no number is not known at all.
-pub(crate) fn variance(value: f64) -> f64 {
+/// A variance after rounding: not negative, and infinite where it is NaN.
+pub(crate) fn repaired_variance(value: f64) -> f64 {
     if value.is_nan() {
         f64::INFINITY
     } else {
@@ -134,27 +146,22 @@ pub(crate) fn variance(value: f64) -> f64 {
 }
 
 /// Points of a grid over a rectangle, metres, at a height.
-pub(crate) fn heights([w, h]: [f64; 2], height: f64) -> impl Iterator<Item = Point3<f64>> {
-    let part = |i: usize| i as f64 / (GRID - 1) as f64 - 0.5;
-    (0..GRID * GRID).map(move |i| Point3::new(part(i % GRID) * w, part(i / GRID) * h, height))
+pub(crate) fn grid_at_height([w, h]: [f64; 2], height: f64) -> impl Iterator<Item = Point3<f64>> {
+    (0..GRID_SIDE * GRID_SIDE).map(move |i| {
+        let [x, y] =
+            [i % GRID_SIDE, i / GRID_SIDE].map(|k| k as f64 / (GRID_SIDE - 1) as f64 - 0.5);
+        Point3::new(x * w, y * h, height)
+    })
 }
 
 /// Inverse of the information, and the information left on the focal length when all else is free.
 ///
 /// The focal length is split off first (its Schur complement): it is the one unknown that may have no information at
-/// all, and then its variance is huge while the rest stays as it is. Facts have no information and get no variance.
+/// all, and then its variance is huge while the rest stays as it is. Fixed unknowns have no information and get no variance.
 fn covariance(information: &Square) -> (Square, f64) {
     let scale = unit_diagonal(information);
-    let mut rest = scaled(information, &scale);
-    let mut coupling: Unknowns = rest.column(LN_FOCAL).into();
-    coupling[LN_FOCAL] = 0.0;
-    rest.row_mut(LN_FOCAL).fill(0.0);
-    rest.column_mut(LN_FOCAL).fill(0.0);
-    rest[(LN_FOCAL, LN_FOCAL)] = 1.0;
-    let inverse = rest
-        .cholesky()
-        .or_else(|| (rest + Square::identity() * ROUNDING).cholesky());
-    let Some(mut inverse) = inverse.map(|c| c.inverse()) else {
+    let (rest, coupling) = without_focal(scaled(information, &scale));
+    let Some(mut inverse) = inverse_or_rounded(&rest) else {
         return (Square::repeat(f64::INFINITY), 0.0);
     };
     inverse[(LN_FOCAL, LN_FOCAL)] = 0.0;
@@ -167,18 +174,41 @@ fn covariance(information: &Square) -> (Square, f64) {
     let left = (own + coupling.dot(&response)).max(0.0);
     response[LN_FOCAL] = 1.0;
     if own > 0.0 {
-        inverse += response * response.transpose() / left.max(ROUNDING);
+        inverse += response * response.transpose() / left.max(ROUNDING_SHARE);
     }
-    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
-        inverse.row_mut(i).fill(0.0);
-        inverse.column_mut(i).fill(0.0);
-    }
-    let left = if left > ROUNDING {
+    clear_uninformed(&mut inverse, information);
+    let left = if left > ROUNDING_SHARE {
         left / (scale[LN_FOCAL] * scale[LN_FOCAL])
     } else {
         0.0
     };
     (inverse.component_mul(&(scale * scale.transpose())), left)
+}
+
+/// The information with the focal length decoupled from the rest, and the coupling that was there.
+fn without_focal(mut rest: Square) -> (Square, Unknowns) {
+    let mut coupling: Unknowns = rest.column(LN_FOCAL).into();
+    coupling[LN_FOCAL] = 0.0;
+    rest.row_mut(LN_FOCAL).fill(0.0);
+    rest.column_mut(LN_FOCAL).fill(0.0);
+    rest[(LN_FOCAL, LN_FOCAL)] = 1.0;
+    (rest, coupling)
+}
+
+/// The inverse of a positive matrix, or of one that only rounding keeps from being positive.
+fn inverse_or_rounded(matrix: &Square) -> Option<Square> {
+    matrix
+        .cholesky()
+        .or_else(|| (matrix + Square::identity() * ROUNDING_SHARE).cholesky())
+        .map(|c| c.inverse())
+}
+
+/// No variance for unknowns without information.
+fn clear_uninformed(covariance: &mut Square, information: &Square) {
+    for i in (0..UNKNOWNS).filter(|&i| information[(i, i)] == 0.0) {
+        covariance.row_mut(i).fill(0.0);
+        covariance.column_mut(i).fill(0.0);
+    }
 }
 
 /// With a unit diagonal, also where there is no information.
@@ -189,26 +219,26 @@ fn scaled(information: &Square, scale: &Unknowns) -> Square {
 }
 
 /// What is known of the focal length, from the information left on its logarithm.
-pub(crate) fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> FocalShare {
-    if believed.is_fact() {
+pub(crate) fn focal_share(ln_focal: f64, information: f64, prior: Prior) -> FocalShare {
+    if prior.is_fixed() {
         return FocalShare {
             sigma: 0.0,
             share: 0.0,
             from_data: None,
         };
     }
-    let from_data = (information - believed.information()).max(0.0);
+    let from_data = (information - prior.information()).max(0.0);
     let share = if information > 0.0 {
         from_data / information
     } else {
         0.0
     };
-    let start = if believed.says_nothing() {
+    let start = if prior.is_flat() {
         ln_focal
     } else {
-        believed.mean
+        prior.mean
     };
-    let alone = Belief {
+    let alone = Prior {
         mean: start + (ln_focal - start) / share,
         sigma: 1.0 / from_data.sqrt(),
     };
@@ -219,10 +249,10 @@ pub(crate) fn focal_share(ln_focal: f64, information: f64, believed: Belief) -> 
     }
 }
 
-/// Condition number of the information with a unit diagonal, without what was believed of the focal length.
-fn condition(information: &Square, believed: Belief) -> f64 {
+/// Condition number of the information with a unit diagonal, without the prior of the focal length.
+fn condition(information: &Square, prior: Prior) -> f64 {
     let mut data = *information;
-    data[(LN_FOCAL, LN_FOCAL)] -= believed.information();
+    data[(LN_FOCAL, LN_FOCAL)] -= prior.information();
     if data.iter().any(|value| !value.is_finite()) {
         return 1.0 / f64::EPSILON;
     }

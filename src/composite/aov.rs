@@ -1,15 +1,16 @@
-//! Arbitrary output variables: everything that deep samples know besides the finished frame, as parts of an EXR file.
+//! Arbitrary output variables: everything that deep samples hold besides the finished frame, as parts of an EXR file.
 //!
 //! Each is a fold of its own over the samples, done only when asked for.
 
-use super::cryptomatte::cryptomatte;
+use crate::composite::cryptomatte::cryptomatte;
+use crate::composite::part::{float_part, pixels_of};
 use crate::deep::{DeepImage, DeepSample};
-use crate::error::Error;
+use crate::error::{Error, Result};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
-use crate::io::exr_parts::{Part, Plane};
+use crate::io::exr::{ChannelSamples, Part};
 use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
-use crate::scene::{Card, Shot};
+use crate::scene::Shot;
 use std::str::FromStr;
 
 /// A part of the picture that can be asked for by its name.
@@ -21,7 +22,7 @@ pub enum Aov {
     Coverage,
     /// `shadow`: factor on the plate, `R G B`.
     Shadow,
-    /// `id`: the [`front`] object, whole numbers, `id`; 0 where there is none.
+    /// `id`: the [`front`] object, integers, `id`; 0 where there is none.
     Id,
     /// `depth`: its distance along the optical axis, metres, `Z`; infinite where there is none.
     Depth,
@@ -54,7 +55,7 @@ impl Aov {
 impl FromStr for Aov {
     type Err = Error;
 
-    fn from_str(name: &str) -> Result<Self, Error> {
+    fn from_str(name: &str) -> Result<Self> {
         let known = Self::ALL.iter().find(|(n, _)| *n == name);
         known.map(|&(_, aov)| aov).ok_or_else(|| {
             let names = Self::ALL.map(|(n, _)| n).join(", ");
@@ -76,124 +77,110 @@ pub fn front(samples: &[DeepSample]) -> Option<&DeepSample> {
 /// `frame` is the finished frame of the same samples, `shot` what they were rendered from: position and texture
 /// coordinates are those at the pixel's centre, as depth is.
 pub fn parts(aovs: &[Aov], deep: &DeepImage, shot: &Shot, frame: &Image<PremulRgba>) -> Vec<Part> {
-    let fronts = Fronts { deep, shot };
-    let one = |aov: &Aov| match aov {
-        Aov::Beauty => vec![floats(
-            "beauty",
-            ["R", "G", "B", "A"],
-            frame.pixels().iter().map(|&p| channels(p)),
-        )],
-        Aov::Coverage => vec![floats(
-            "coverage",
-            ["Y"],
-            pixels(deep).map(|(x, y)| [deep.flat(x, y).to_rgba().a]),
-        )],
-        Aov::Shadow => vec![floats(
-            "shadow",
-            ["R", "G", "B"],
-            deep.shadow().pixels().iter().map(|&c| c.into()),
-        )],
-        Aov::Id => {
-            vec![Part {
-                name: "id".into(),
-                channels: vec![("id".into(), fronts.ids())],
-                metadata: Vec::new(),
-            }]
-        }
-        Aov::Depth => vec![floats("depth", ["Z"], fronts.depths())],
-        Aov::Position => vec![floats("position", ["X", "Y", "Z"], fronts.positions())],
-        Aov::Uv => vec![floats("uv", ["U", "V"], fronts.texture_coordinates())],
-        Aov::Cryptomatte => vec![cryptomatte(deep, |id| format!("object.{}", id.0))],
-        Aov::Layers => shot.cards.iter().map(|card| layer(deep, card.id)).collect(),
-    };
-    aovs.iter().flat_map(one).collect()
+    let picture = AovSource { deep, shot, frame };
+    aovs.iter().flat_map(|aov| picture.parts_of(*aov)).collect()
 }
 
-/// Every pixel's column and row, in reading order.
-pub(super) fn pixels(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let (width, height) = (deep.width(), deep.height());
-    (0..width * height).map(move |i| (i % width, i / width))
-}
-
-fn channels(p: PremulRgba) -> [f32; 4] {
-    [p.r, p.g, p.b, p.a]
-}
-
-/// A part of float channels from the pixels in reading order.
-pub(super) fn floats<const N: usize>(
-    name: impl Into<String>,
-    names: [&str; N],
-    values: impl Iterator<Item = [f32; N]>,
-) -> Part {
-    let mut planes = [const { Vec::new() }; N];
-    for value in values {
-        planes
-            .iter_mut()
-            .zip(value)
-            .for_each(|(plane, v)| plane.push(v));
-    }
-    let channels = names
-        .iter()
-        .zip(planes)
-        .map(|(name, plane)| (name.to_string(), Plane::Float(plane)))
-        .collect();
-    Part {
-        name: name.into(),
-        channels,
-        metadata: Vec::new(),
-    }
-}
-
-/// The foremost object of every pixel.
-struct Fronts<'a> {
+/// Everything that parts are made from.
+struct AovSource<'a> {
     deep: &'a DeepImage,
     shot: &'a Shot,
+    frame: &'a Image<PremulRgba>,
 }
 
-impl Fronts<'_> {
-    fn samples(&self) -> impl Iterator<Item = ((usize, usize), Option<&DeepSample>)> {
-        pixels(self.deep).map(|(x, y)| ((x, y), front(self.deep.at(x, y))))
+impl AovSource<'_> {
+    fn parts_of(&self, aov: Aov) -> Vec<Part> {
+        match aov {
+            Aov::Beauty => vec![self.beauty()],
+            Aov::Coverage => vec![self.coverage()],
+            Aov::Shadow => vec![self.shadow()],
+            Aov::Id => vec![self.object_ids()],
+            Aov::Depth => vec![float_part("depth", ["Z"], self.depths())],
+            Aov::Position => vec![float_part("position", ["X", "Y", "Z"], self.positions())],
+            Aov::Uv => vec![float_part("uv", ["U", "V"], self.texture_coordinates())],
+            Aov::Cryptomatte => vec![cryptomatte(self.deep, |id| format!("object.{}", id.0))],
+            Aov::Layers => self.layers(),
+        }
     }
 
-    fn ids(&self) -> Plane {
-        Plane::Whole(
-            self.samples()
-                .map(|(_, s)| s.map_or(0, |s| s.object.0))
-                .collect(),
+    fn beauty(&self) -> Part {
+        let pixels = self.frame.pixels().iter();
+        float_part(
+            "beauty",
+            ["R", "G", "B", "A"],
+            pixels.map(|p| [p.r, p.g, p.b, p.a]),
         )
     }
 
+    fn coverage(&self) -> Part {
+        let values = pixels_of(self.deep).map(|(x, y)| [self.deep.flat(x, y).to_rgba().a]);
+        float_part("coverage", ["Y"], values)
+    }
+
+    fn shadow(&self) -> Part {
+        let factors = self.deep.shadow().pixels().iter();
+        float_part("shadow", ["R", "G", "B"], factors.map(|&c| c.into()))
+    }
+
+    fn object_ids(&self) -> Part {
+        let ids = self.fronts().map(|(_, s)| s.map_or(0, |s| s.object.0));
+        Part {
+            name: "id".into(),
+            channels: vec![("id".into(), ChannelSamples::Integer(ids.collect()))],
+            metadata: Vec::new(),
+        }
+    }
+
+    fn layers(&self) -> Vec<Part> {
+        let tinted = pixels_of(self.deep).any(|(x, y)| !self.deep.tints(x, y).is_empty());
+        let cards = self.shot.cards.iter();
+        cards
+            .map(|card| layer_part(self.deep, card.id, tinted))
+            .collect()
+    }
+
+    /// Every pixel with its foremost object.
+    fn fronts(&self) -> impl Iterator<Item = ((usize, usize), Option<&DeepSample>)> {
+        pixels_of(self.deep).map(|(x, y)| ((x, y), front(self.deep.at(x, y))))
+    }
+
     fn depths(&self) -> impl Iterator<Item = [f32; 1]> {
-        self.samples()
+        self.fronts()
             .map(|(_, s)| [s.map_or(f32::INFINITY, |s| s.depth.0)])
     }
 
     fn positions(&self) -> impl Iterator<Item = [f32; 3]> {
-        self.samples().map(|(at, s)| {
+        self.fronts().map(|(at, s)| {
             s.map_or([f32::NAN; 3], |s| {
-                self.point(at, s).coords.map(|v| v as f32).into()
+                self.world_point(at, s).coords.map(|v| v as f32).into()
             })
         })
     }
 
     fn texture_coordinates(&self) -> impl Iterator<Item = [f32; 2]> {
-        let uv = |at, s: &DeepSample| {
-            let card: &Card = self.shot.cards.iter().find(|card| card.id == s.object)?;
-            let p = card
-                .quad
-                .world_from_card
-                .inverse_transform_point(&self.point(at, s));
-            Some([
-                (p.x / card.quad.size[0] + 0.5) as f32,
-                (0.5 - p.y / card.quad.size[1]) as f32,
-            ])
-        };
-        self.samples()
-            .map(move |(at, s)| s.and_then(|s| uv(at, s)).unwrap_or([f32::NAN; 2]))
+        self.fronts()
+            .map(|(at, s)| s.and_then(|s| self.uv_at(at, s)).unwrap_or([f32::NAN; 2]))
+    }
+
+    /// Texture coordinates that a sample shows at its pixel's centre.
+    fn uv_at(&self, at: (usize, usize), sample: &DeepSample) -> Option<[f32; 2]> {
+        let card = self
+            .shot
+            .cards
+            .iter()
+            .find(|card| card.id == sample.object)?;
+        let p = card
+            .quad
+            .world_from_card
+            .inverse_transform_point(&self.world_point(at, sample));
+        Some([
+            (p.x / card.quad.size[0] + 0.5) as f32,
+            (0.5 - p.y / card.quad.size[1]) as f32,
+        ])
     }
 
     /// The point of the world that a sample shows at its pixel's centre.
-    fn point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
+    fn world_point(&self, (x, y): (usize, usize), sample: &DeepSample) -> Point3<f64> {
         self.shot
             .camera
             .ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5))
@@ -201,33 +188,33 @@ impl Fronts<'_> {
     }
 }
 
-/// What one object adds to the picture.
-fn layer(deep: &DeepImage, id: ObjectId) -> Part {
+/// What one object adds to the picture; with what it lets pass per channel where there is film.
+fn layer_part(deep: &DeepImage, id: ObjectId, tinted: bool) -> Part {
     let name = format!("layer.{}", id.0);
-    let own = |(x, y): (usize, usize)| {
-        let (samples, tints) = (deep.at(x, y), deep.tints(x, y));
-        let mine = |(_, s): &(usize, &DeepSample)| s.object == id;
-        samples.iter().enumerate().filter(mine).fold(
-            (PremulRgba::TRANSPARENT, LinearRgb::BLACK),
-            |(sum, hidden), (i, s)| {
-                let tint = tints.get(i).copied().unwrap_or(LinearRgb::grey(s.visible));
-                (
-                    sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible)),
-                    hidden + tint,
-                )
-            },
-        )
-    };
-    let films = pixels(deep).any(|(x, y)| !deep.tints(x, y).is_empty());
-    let values = pixels(deep).map(own);
-    if !films {
-        return floats(name, ["R", "G", "B", "A"], values.map(|(p, _)| channels(p)));
+    let values = pixels_of(deep).map(|at| own_light(deep, at, id));
+    if !tinted {
+        let values = values.map(|(p, _)| [p.r, p.g, p.b, p.a]);
+        return float_part(name, ["R", "G", "B", "A"], values);
     }
-    floats(
+    float_part(
         name,
         ["R", "G", "B", "A", "TR", "TG", "TB"],
         values.map(|(p, h)| [p.r, p.g, p.b, p.a, 1.0 - h.r, 1.0 - h.g, 1.0 - h.b]),
     )
+}
+
+/// Light and coverage of an object in one pixel, and what it hides per channel.
+fn own_light(deep: &DeepImage, (x, y): (usize, usize), id: ObjectId) -> (PremulRgba, LinearRgb) {
+    let tints = deep.tints(x, y);
+    let (mut sum, mut hidden) = (PremulRgba::TRANSPARENT, LinearRgb::BLACK);
+    for (i, s) in deep.at(x, y).iter().enumerate() {
+        if s.object == id {
+            let tint = tints.get(i).copied();
+            sum = sum.plus(PremulRgba::new(s.light.r, s.light.g, s.light.b, s.visible));
+            hidden = hidden + tint.unwrap_or(LinearRgb::grey(s.visible));
+        }
+    }
+    (sum, hidden)
 }
 
 #[cfg(test)]
@@ -236,8 +223,8 @@ mod tests {
     use crate::camera::Camera;
     use crate::composite;
     use crate::geom::{Pose, Quad, UnitQuaternion, Vector2, Vector3};
-    use crate::render::{RenderOptions, cast};
-    use crate::scene::Grade;
+    use crate::render::{RenderOptions, render};
+    use crate::scene::{Card, Grade};
 
     fn shot() -> Shot {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
@@ -272,14 +259,14 @@ mod tests {
 
     fn plane<'a>(part: &'a Part, name: &str) -> &'a [f32] {
         match &part.channels.iter().find(|(n, _)| n == name).unwrap().1 {
-            Plane::Float(samples) => samples,
-            Plane::Whole(_) => panic!("whole numbers"),
+            ChannelSamples::Float(samples) => samples,
+            ChannelSamples::Integer(_) => panic!("integers"),
         }
     }
 
     fn made(names: &[&str]) -> (Image<PremulRgba>, Vec<Part>) {
         let shot = shot();
-        let deep = cast(&shot, &RenderOptions::default());
+        let deep = render(&shot, &RenderOptions::default());
         let frame = composite::frame(&deep, None);
         let aovs: Vec<Aov> = names.iter().map(|n| n.parse().unwrap()).collect();
         let parts = parts(&aovs, &deep, &shot, &frame);
@@ -306,7 +293,7 @@ mod tests {
         let (_, parts) = made(&["id", "depth", "position", "uv", "coverage"]);
         let middle = 12 * 32 + 16;
         assert!(
-            matches!(&parts[0].channels[0].1, Plane::Whole(ids) if ids[middle] == 7 && ids[0] == 0)
+            matches!(&parts[0].channels[0].1, ChannelSamples::Integer(ids) if ids[middle] == 7 && ids[0] == 0)
         );
         assert!(
             (plane(&parts[1], "Z")[middle] - 0.8).abs() < 1e-5
@@ -329,11 +316,11 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_name_is_told_with_the_known_ones() {
-        let told = "normals".parse::<Aov>().unwrap_err().to_string();
+    fn an_unknown_name_is_reported_with_the_known_ones() {
+        let message = "normals".parse::<Aov>().unwrap_err().to_string();
         assert!(
-            told.contains("\"normals\"") && told.contains("cryptomatte"),
-            "{told}"
+            message.contains("\"normals\"") && message.contains("cryptomatte"),
+            "{message}"
         );
     }
 }

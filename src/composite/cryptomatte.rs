@@ -1,44 +1,19 @@
 //! Cryptomatte: soft mattes of all objects in a few channels.
 
-use super::aov::{floats, pixels};
-use crate::deep::DeepImage;
-use crate::io::exr_parts::Part;
+use crate::composite::part::{float_part, pixels_of};
+use crate::deep::{DeepImage, DeepSample};
+use crate::io::exr::Part;
 use crate::pixel::ObjectId;
-use crate::render::{id_of, murmur3};
+use crate::render::{attribute_name, hex_id, id_of_name};
 use std::collections::BTreeMap;
 
 /// Objects kept per pixel, those that are seen most; two in each group of four channels.
-const RANKS: usize = 6;
+const RANKS_PER_PIXEL: usize = 6;
 
 /// What the part and its channels are called.
 const NAME: &str = "CryptoObject";
 
-/// Identifier and visible coverage of up to six objects of each pixel, the most visible first, with the manifest that
-/// tells their names: a part that programs that know Cryptomatte read as it is.
-///
-/// An object's coverage is the share of the pixel that it hides of what is behind it, seen through what lies in front.
-///
-/// # Method
-/// [Cryptomatte specification] 1.2: channels `CryptoObject00.R` (identifier), `.G` (coverage), `.B`, `.A` and so on;
-/// identifiers are MurmurHash3 (32 bits, seed 0) of the name, their exponent kept away from those of infinity, NaN and
-/// denormal numbers.
-///
-/// [Cryptomatte specification]: https://github.com/Psyop/Cryptomatte
-pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
-    let mut part = floats(
-        NAME,
-        CHANNELS,
-        pixels(deep).map(|(x, y)| ranks(deep, x, y, &name)),
-    );
-    let objects: BTreeMap<ObjectId, String> = pixels(deep)
-        .flat_map(|(x, y)| deep.at(x, y))
-        .map(|s| (s.object, name(s.object)))
-        .collect();
-    part.metadata = metadata(objects.values());
-    part
-}
-
-const CHANNELS: [&str; 2 * RANKS] = [
+const CHANNELS: [&str; 2 * RANKS_PER_PIXEL] = [
     "CryptoObject00.R",
     "CryptoObject00.G",
     "CryptoObject00.B",
@@ -53,45 +28,59 @@ const CHANNELS: [&str; 2 * RANKS] = [
     "CryptoObject02.A",
 ];
 
+/// Identifier and visible coverage of up to six objects of each pixel, the most visible first, with the manifest of
+/// their names: a part that programs that know Cryptomatte read as it is.
+///
+/// An object's coverage is the share of the pixel that it hides of what is behind it, seen through what lies in front.
+///
+/// # Method
+/// [Cryptomatte specification] 1.2: channels `CryptoObject00.R` (identifier), `.G` (coverage), `.B`, `.A` and so on;
+/// identifiers are MurmurHash3 (32 bits, seed 0) of the name, their exponent kept away from those of infinity, NaN and
+/// denormal numbers.
+///
+/// [Cryptomatte specification]: https://github.com/Psyop/Cryptomatte
+pub fn cryptomatte(deep: &DeepImage, name: impl Fn(ObjectId) -> String) -> Part {
+    let ranks = pixels_of(deep).map(|(x, y)| ranked_objects(deep.at(x, y), &name));
+    let mut part = float_part(NAME, CHANNELS, ranks);
+    let objects: BTreeMap<ObjectId, String> = pixels_of(deep)
+        .flat_map(|(x, y)| deep.at(x, y))
+        .map(|s| (s.object, name(s.object)))
+        .collect();
+    part.metadata = part_metadata(objects.values());
+    part
+}
+
 /// Identifier and coverage, in turn; zeros where there are fewer objects.
-fn ranks(
-    deep: &DeepImage,
-    x: usize,
-    y: usize,
+fn ranked_objects(
+    samples: &[DeepSample],
     name: impl Fn(ObjectId) -> String,
-) -> [f32; 2 * RANKS] {
+) -> [f32; 2 * RANKS_PER_PIXEL] {
     let mut seen: BTreeMap<ObjectId, f32> = BTreeMap::new();
-    for s in deep.at(x, y).iter().filter(|s| s.visible > 0.0) {
+    for s in samples.iter().filter(|s| s.visible > 0.0) {
         *seen.entry(s.object).or_default() += s.visible;
     }
     let mut seen: Vec<_> = seen.into_iter().collect();
     // A stable sort: equally visible objects stay in the order of their ids.
     seen.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut out = [0.0; 2 * RANKS];
+    let mut out = [0.0; 2 * RANKS_PER_PIXEL];
     for (pair, (id, coverage)) in out.chunks_exact_mut(2).zip(seen) {
-        pair.copy_from_slice(&[f32::from_bits(identifier(&name(id))), coverage]);
+        pair.copy_from_slice(&[id_of_name(&name(id)), coverage]);
     }
     out
 }
 
-/// What the specification asks to be told: under the first seven digits of the part's own hash.
-fn metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, String)> {
-    let manifest: BTreeMap<&str, String> = names
-        .map(|n| (n.as_str(), format!("{:08x}", identifier(n))))
-        .collect();
-    let key = &format!("{:08x}", murmur3(NAME.as_bytes()))[..7];
-    let entry = |field: &str, value: String| (format!("cryptomatte/{key}/{field}"), value);
-    vec![
-        entry("conversion", "uint32_to_float32".into()),
-        entry("hash", "MurmurHash3_32".into()),
-        entry("manifest", serde_json::json!(manifest).to_string()),
-        entry("name", NAME.into()),
-    ]
-}
-
-/// The id of a name as bits.
-fn identifier(name: &str) -> u32 {
-    id_of(name).to_bits()
+/// The attributes that the specification requires, under the first seven digits of the part's own hash.
+fn part_metadata<'a>(names: impl Iterator<Item = &'a String>) -> Vec<(String, String)> {
+    let manifest: BTreeMap<&str, String> = names.map(|n| (n.as_str(), hex_id(n))).collect();
+    let texts = [
+        ("conversion", "uint32_to_float32".into()),
+        ("hash", "MurmurHash3_32".into()),
+        ("manifest", serde_json::json!(manifest).to_string()),
+        ("name", NAME.into()),
+    ];
+    texts
+        .map(|(field, text)| (attribute_name(NAME, field), text))
+        .into()
 }
 
 #[cfg(test)]
@@ -99,28 +88,12 @@ mod tests {
     use super::*;
     use crate::deep::DeepSample;
     use crate::image::Image;
-    use crate::io::exr_parts::Plane;
+    use crate::io::exr::ChannelSamples;
     use crate::pixel::{Depth, LinearRgb};
-
-    /// Published test vectors of MurmurHash3_x86_32 with seed 0.
-    #[test]
-    fn the_hash_is_murmur3() {
-        let vectors = [
-            ("", 0),
-            ("a", 0x3c25_69b2),
-            ("test", 0xba6b_d213),
-            ("Hello, world!", 0xc036_3e43),
-        ];
-        for (text, hash) in vectors {
-            assert_eq!(murmur3(text.as_bytes()), hash, "{text}");
-        }
-    }
 
     #[test]
     fn identifiers_are_ordinary_numbers() {
-        assert!(
-            (0..20_000).all(|i| f32::from_bits(identifier(&format!("object.{i}"))).is_normal())
-        );
+        assert!((0..20_000).all(|i| id_of_name(&format!("object.{i}")).is_normal()));
     }
 
     #[test]
@@ -139,10 +112,10 @@ mod tests {
         let deep = DeepImage::from_pixels(Image::filled(2, 1, LinearRgb::WHITE), lists);
         let part = cryptomatte(&deep, |id| format!("bottle {}", id.0));
         let at = |c: usize| match &part.channels[c].1 {
-            Plane::Float(v) => (v[0], v[1]),
-            Plane::Whole(_) => panic!("whole numbers"),
+            ChannelSamples::Float(v) => (v[0], v[1]),
+            ChannelSamples::Integer(_) => panic!("integers"),
         };
-        assert_eq!(at(0), (f32::from_bits(identifier("bottle 2")), 0.0));
+        assert_eq!(at(0), (id_of_name("bottle 2"), 0.0));
         assert_eq!(
             (at(1), at(3), at(5)),
             ((0.5, 0.0), (0.375, 0.0), (0.0, 0.0))
@@ -154,7 +127,7 @@ mod tests {
             .unwrap()
             .1;
         assert!(
-            manifest.contains(&format!("\"bottle 1\":\"{:08x}\"", identifier("bottle 1"))),
+            manifest.contains(&format!("\"bottle 1\":\"{}\"", hex_id("bottle 1"))),
             "{manifest}"
         );
     }

@@ -8,8 +8,8 @@ use crate::scene::{Finish, Noise};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
-/// Radius of what sharpening takes for blur, pixels.
-const SHARPENING_SIGMA: f32 = 1.0;
+/// Standard deviation of the blur that sharpening removes.
+const SHARPENING_SIGMA_PX: f32 = 1.0;
 
 /// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`Finish::default`] gives the same bits.
 ///
@@ -26,53 +26,65 @@ pub fn finish(
     plate: Option<&Image<LinearRgb>>,
     finish: &Finish,
 ) -> Image<PremulRgba> {
-    let frame = match finish.noise {
-        Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => Sensor {
+    let noisy = match finish.noise {
+        Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => SensorNoise {
             shot,
             read,
             seed: finish.noise_seed,
         }
-        .expose(&frame, deep, plate),
+        .add_to(&frame, deep, plate),
         Noise::Known { .. } | Noise::None | Noise::MatchPlate => frame,
     };
+    let exposed = apply_gain(noisy, finish);
+    if finish.sharpening == 0.0 {
+        return exposed;
+    }
+    sharpen(&exposed, finish.sharpening as f32)
+}
+
+/// Exposure and white balance.
+fn apply_gain(frame: Image<PremulRgba>, finish: &Finish) -> Image<PremulRgba> {
     // An infinite gain would make NaN of black.
     let gain = finish
         .white_balance
         .scale(libm::exp2(finish.exposure_ev) as f32)
         .map(|g| g.min(f32::MAX));
-    let frame = if gain == LinearRgb::WHITE {
-        frame
-    } else {
-        balanced(&frame, gain)
-    };
-    if finish.sharpening == 0.0 {
+    if gain == LinearRgb::WHITE {
         return frame;
     }
-    let soft = gaussian_blur(&frame, SHARPENING_SIGMA);
-    let amount = finish.sharpening as f32;
+    work::add(Kind::Filters, 1);
+    frame.map(|p| with_color(p, p.color() * gain))
+}
+
+/// An unsharp mask.
+fn sharpen(frame: &Image<PremulRgba>, amount: f32) -> Image<PremulRgba> {
+    let soft = gaussian_blur(frame, SHARPENING_SIGMA_PX);
     frame.zip_map(&soft, |p, s| {
         let sharp = p.color().scale(1.0 + amount).add_scaled(-amount, s.color());
         with_color(p, sharp.map(|v| v.max(0.0)))
     })
 }
 
-fn balanced(frame: &Image<PremulRgba>, gain: LinearRgb) -> Image<PremulRgba> {
-    work::add(Kind::Filters, 1);
-    frame.map(|p| with_color(p, p.color() * gain))
-}
-
 fn with_color(p: PremulRgba, LinearRgb { r, g, b }: LinearRgb) -> PremulRgba {
     PremulRgba { r, g, b, ..p }
 }
 
-struct Sensor {
+struct SensorNoise {
     shot: f64,
     read: f64,
     seed: u64,
 }
 
-impl Sensor {
-    fn expose(
+/// A channel of a pixel: its value, and what it shows of a plate that has noise of its own.
+struct ExposedValue {
+    value: f32,
+    /// Factor on the plate.
+    passes: f32,
+    plate: f32,
+}
+
+impl SensorNoise {
+    fn add_to(
         &self,
         frame: &Image<PremulRgba>,
         deep: &DeepImage,
@@ -81,41 +93,55 @@ impl Sensor {
         work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
-            let (value, kept, behind): ([f32; 3], [f32; 3], [f32; 3]) = match plate {
+            let (passes, behind): ([f32; 3], [f32; 3]) = match plate {
                 Some(plate) => {
                     let passes = deep.flat(x, y).transmittance() * deep.shadow()[(x, y)];
-                    (p.color().into(), passes.into(), plate[(x, y)].into())
+                    (passes.into(), plate[(x, y)].into())
                 }
-                None => (p.color().into(), [1.0 - p.a; 3], [0.0; 3]),
+                None => ([1.0 - p.a; 3], [0.0; 3]),
             };
+            let value: [f32; 3] = p.color().into();
             let index = 3 * (y * frame.width() + x) as u64;
-            let noisy = |c: usize| {
-                let (share, all) = (f64::from(kept[c]), self.variance(value[c]));
-                let missing = all - share * share * self.variance(behind[c]);
-                if missing <= 0.0 {
-                    return value[c];
-                }
-                (f64::from(value[c]) + missing.sqrt() * normal(self.seed, index + c as u64)) as f32
-            };
-            with_color(p, LinearRgb::new(noisy(0), noisy(1), noisy(2)))
+            let noisy: [f32; 3] = std::array::from_fn(|c| {
+                let exposed = ExposedValue {
+                    value: value[c],
+                    passes: passes[c],
+                    plate: behind[c],
+                };
+                self.noisy_value(&exposed, index + c as u64)
+            });
+            with_color(p, noisy.into())
         })
     }
 
+    #[inline(always)]
+    fn noisy_value(&self, exposed: &ExposedValue, index: u64) -> f32 {
+        let ExposedValue { value, .. } = *exposed;
+        let (share, all) = (f64::from(exposed.passes), self.variance(value));
+        let missing = all - share * share * self.variance(exposed.plate);
+        if missing <= 0.0 {
+            return value;
+        }
+        (f64::from(value) + missing.sqrt() * normal_deviate(self.seed, index)) as f32
+    }
+
+    #[inline(always)]
     fn variance(&self, value: f32) -> f64 {
         self.shot * f64::from(value).max(0.0) + self.read * self.read
     }
 }
 
 /// A number from the normal distribution, by Box and Muller from two uniform ones.
-fn normal(seed: u64, index: u64) -> f64 {
-    let uniform = |k: u64| {
-        (mixed(mixed(seed).wrapping_add(2 * index + k)) >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    (-2.0 * libm::log(1.0 - uniform(0))).sqrt() * libm::cos(TAU * uniform(1))
+fn normal_deviate(seed: u64, index: u64) -> f64 {
+    let [first, second] = [0, 1].map(|k| {
+        let bits = split_mix(split_mix(seed).wrapping_add(2 * index + k)) >> 11;
+        bits as f64 / (1_u64 << 53) as f64
+    });
+    (-2.0 * libm::log(1.0 - first)).sqrt() * libm::cos(TAU * second)
 }
 
 /// SplitMix64 (Steele, Lea and Flood, 2014): neighbouring numbers become unrelated ones.
-fn mixed(n: u64) -> u64 {
+fn split_mix(n: u64) -> u64 {
     let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -167,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_falls_on_cards_alone_with_the_variance_told() {
+    fn noise_falls_on_cards_alone_with_the_variance_given() {
         let noise = Noise::Known {
             shot: 0.002,
             read: 0.01,

@@ -1,6 +1,6 @@
 //! Labelled photos of the place that scenes are set in.
 
-use crate::camera::{self, Camera, Labelled, Sighting};
+use crate::camera::{self, Camera, LabelledPhoto, PhotoCamera};
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::{Point2, Point3};
@@ -53,7 +53,7 @@ impl BackgroundPhoto {
             let what = "no label found, expected at least one NAME.label.json, or a file of LabelMe, CVAT or Label Studio";
             return Err(Error::file(folder, what));
         }
-        let sightings = camera::sightings(&labels, options.force)?;
+        let sightings = camera::photo_cameras(&labels, options.force)?;
         warn_of_cameras(&labels, &sightings);
         let opened = labels
             .iter()
@@ -64,7 +64,7 @@ impl BackgroundPhoto {
         Ok(places)
     }
 
-    fn open(labelled: &Labelled, seen: &Sighting, image: [u32; 2]) -> Result<Self> {
+    fn open(labelled: &LabelledPhoto, seen: &PhotoCamera, image: [u32; 2]) -> Result<Self> {
         let taken = labelled.label.image_size();
         let kept = middle_part(taken, image);
         let camera = cropped(seen.camera, kept).resized(image);
@@ -158,9 +158,9 @@ impl BackgroundPhoto {
     }
 }
 
-/// Says what is odd about cameras: that some are not used, each; what was warn_of_cameras where it was solved not again; and of those
-/// solved now, only where to read it.
-fn warn_of_cameras(labels: &[Labelled], sightings: &[Sighting]) {
+/// Warns of cameras: of each that is stale and not used; of those solved now that have warnings, once for all. What was
+/// reported where a camera was solved is not repeated.
+fn warn_of_cameras(labels: &[LabelledPhoto], sightings: &[PhotoCamera]) {
     for stale in sightings.iter().filter_map(|seen| seen.stale.as_ref()) {
         log::warn!("{stale}");
     }

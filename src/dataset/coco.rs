@@ -4,7 +4,7 @@ use crate::dataset::formats::is_exact;
 use crate::dataset::{Entry, Extent, LabelledObject, Part, PictureFormat, Writer, Written};
 use crate::error::{Error, Result};
 use crate::io;
-use crate::label::{Mask, trace};
+use crate::label::{RleMask, trace};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,7 @@ struct Annotation {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Segmentation {
-    Runs(Mask),
+    Runs(RleMask),
     Polygons(Vec<Vec<f64>>),
 }
 
@@ -161,7 +161,7 @@ impl Coco {
         }))
     }
 
-    fn segmentation(&self, mask: &Mask, ignored: bool) -> Segmentation {
+    fn segmentation(&self, mask: &RleMask, ignored: bool) -> Segmentation {
         let polygons = match self.masks {
             CocoMask::Polygon if !ignored => trace::polygons(mask, self.simplify),
             _ => Vec::new(),

@@ -30,11 +30,7 @@ pub(super) fn fingerprint(
         labels,
         ..
     } = config;
-    let assets: Vec<Value> = library
-        .assets
-        .iter()
-        .map(|asset| of_asset(asset, &library.classes))
-        .collect();
+    let assets: Vec<Value> = library.assets.iter().map(of_asset).collect();
     Ok(json!({
         "scene": scene,
         "render": render,
@@ -46,10 +42,10 @@ pub(super) fn fingerprint(
     }))
 }
 
-fn of_asset(asset: &Asset, classes: &[String]) -> Value {
+fn of_asset(asset: &Asset<Photo>) -> Value {
     json!({
         "name": asset.name,
-        "class": classes.get(asset.class as usize),
+        "class": asset.class,
         "thickness": asset.thickness,
         "mass": asset.mass,
         "photos": asset.photos.iter().map(of_photo).collect::<Vec<_>>(),
@@ -60,7 +56,7 @@ fn of_photo(photo: &Photo) -> Value {
     json!({
         "file": photo.record.file,
         "px_per_metre": photo.record.px_per_metre,
-        "size_m": photo.size,
+        "size_m": photo.size(),
         "outline_px": digest(&photo.record.outline_px),
         "pixels": shown(photo.texture.checksum()),
     })

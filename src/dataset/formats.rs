@@ -4,7 +4,7 @@ use crate::bounds::Bounds;
 use crate::dataset::{Coco, Layers, Obstructed, Pictures, Voc, WebDataset, Writer, Yolo};
 use crate::error::Result;
 use crate::geom::BBox;
-use crate::label::{AmodalBox, LabelOptions, Mask, ObjectLabel};
+use crate::label::{AmodalBox, LabelOptions, ObjectLabel, RleMask};
 use serde::{Deserialize, Serialize};
 
 /// How labels are made and written: the table `[labels]` of a recipe.
@@ -67,7 +67,7 @@ pub enum Extent {
 
 impl Extent {
     /// Box and mask of an object.
-    pub fn of(self, object: &ObjectLabel) -> (BBox, &Mask) {
+    pub fn of(self, object: &ObjectLabel) -> (BBox, &RleMask) {
         match self {
             Self::Amodal => (object.amodal_box, &object.amodal_mask),
             Self::Visible => (object.visible_box, &object.visible_mask),

@@ -79,7 +79,7 @@ impl Inputs {
             Some(input) => Ok(input.clone()),
             None => Ok(Input {
                 stamp,
-                crc32: Checksum::of(path)?.crc32,
+                crc32: Checksum::from_file(path)?.crc32,
                 is_settled: is_settled(&meta, now),
             }),
         }

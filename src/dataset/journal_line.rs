@@ -153,7 +153,7 @@ fn count_by_class(entry: &Entry<'_>) -> Vec<[u32; 2]> {
 impl WrittenFile {
     /// Reads the file back: what counts is what is on the disk.
     pub(crate) fn read_back(folder: &Path, path: &Path) -> Result<Self> {
-        let Checksum { bytes, crc32 } = Checksum::of(io::inside(folder, path)?)?;
+        let Checksum { bytes, crc32 } = Checksum::from_file(io::inside(folder, path)?)?;
         let names: Vec<_> = path.iter().map(|name| name.to_string_lossy()).collect();
         Ok(Self {
             path: names.join("/"),

@@ -61,11 +61,12 @@ pub use contact_sheet::{ContactSheetOptions, ContactTile, contact_sheet, contact
 pub use counts::{ClassCount, DatasetCounts};
 pub use estimate::LongRun;
 pub use finding::Finding;
+#[doc(hidden)]
 pub use folder::JOURNAL;
 pub use formats::{Extent, Format, LabelConfig};
 pub use generate::{Plan, generate};
 pub use inputs::Inputs;
-#[doc(hidden)]
+#[cfg(feature = "fuzzing")]
 pub(crate) use journal::read_lines as journal_lines;
 pub use journal::repair;
 pub use layers::Layers;
@@ -87,6 +88,7 @@ pub use voc::Voc;
 pub use webdataset::WebDataset;
 pub use yolo::{Yolo, YoloTask};
 pub use yolo_set::YoloSet;
+#[cfg(feature = "fuzzing")]
 pub(crate) use yolo_yaml::DataYaml;
 
 use crate::deep::DeepImage;

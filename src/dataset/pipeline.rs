@@ -48,7 +48,16 @@ impl Pipeline {
     /// # Errors
     /// A folder, manifest, label or cut-out that cannot be used; each names the file, the field and what was expected.
     pub fn open(config: DatasetConfig) -> Result<Self> {
-        let pipeline = Self::with_assets(config, |_| true)?;
+        let library = Library::open(&config.assets)?;
+        Self::with_library(config, library)
+    }
+
+    /// The same with the assets in memory, which [`build`](crate::asset::build) returns.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
+        let pipeline = Self::new(config, library)?;
         pipeline
             .places
             .iter()
@@ -85,13 +94,12 @@ impl Pipeline {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_for(config: DatasetConfig, scene: &Scene) -> Result<Self> {
-        Self::with_assets(config, |name| {
-            scene.objects.iter().any(|object| object.asset == name)
-        })
+        let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
+        let library = Library::open_some(&config.assets, is_named)?;
+        Self::new(config, library)
     }
 
-    fn with_assets(config: DatasetConfig, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        let library = Library::open_some(&config.assets, wanted)?;
+    fn new(config: DatasetConfig, library: Library) -> Result<Self> {
         let (image, surface_size, force) = (
             config.scene.image,
             config.surface_size,
@@ -262,7 +270,7 @@ impl Pipeline {
     pub fn label(&self, scene: Scene) -> Result<Labels> {
         let (_, shot) = self.resolve(scene.unlit())?;
         Ok(label::label(
-            &render::cover(&shot, &self.config.render),
+            &render::render_coverage(&shot, &self.config.render),
             &shot,
             &self.config.labels.options(),
         ))
@@ -270,7 +278,7 @@ impl Pipeline {
 
     /// Renders a shot and finishes its frame as the scene asks.
     pub fn shoot(&self, scene: &Scene, shot: &Shot) -> (DeepImage, Image<PremulRgba>) {
-        let deep = render::cast(shot, &self.config.render);
+        let deep = render::render(shot, &self.config.render);
         let frame = composite::frame(&deep, shot.plate.as_deref());
         let frame = composite::finish(frame, &deep, shot.plate.as_deref(), &scene.finish);
         (deep, frame)

@@ -10,14 +10,13 @@ use crate::error::{Error, Result};
 use crate::matte::{CutOutOptions, SegmentOptions};
 use crate::plot::Table;
 use crate::quality::Quality;
-use crate::render::{Preset, RenderOptions};
+use crate::render::RenderOptions;
 use crate::scene::SettleOptions;
 
 impl Quality {
     /// How finely pictures, their light and their shadows are sampled.
     pub fn render(self) -> RenderOptions {
-        self.of([Preset::Draft, Preset::default(), Preset::Reference])
-            .options()
+        self.into()
     }
 
     /// Settle options with the solver's steps changed; what a fall is, and when it ends, stay.

@@ -3,51 +3,51 @@
 use crate::image::{Image, Roi};
 use std::ops::Range;
 
-/// Pixels of a band; more rows than this makes of it are only read beside it.
-const BAND: usize = 1 << 18;
+/// Pixels of a band; wider pictures have bands of [`MIN_BAND_ROWS`].
+const BAND_PIXELS: usize = 1 << 18;
 /// Rows of a band at least: what is read beside it should not be more than it.
-const LEAST_ROWS: usize = 64;
+const MIN_BAND_ROWS: usize = 64;
 
 /// A picture that makes the pixels of some rows when they are asked for.
-pub trait Rows<P>: Sync {
+pub trait RowSource<P>: Sync {
     /// Width and height.
     fn size(&self) -> (usize, usize);
 
     /// The pixels of these rows.
-    fn rows(&self, rows: Range<usize>) -> Image<P>;
+    fn read_rows(&self, rows: Range<usize>) -> Image<P>;
 }
 
-impl<P: Copy + Sync> Rows<P> for Image<P> {
+impl<P: Copy + Sync> RowSource<P> for Image<P> {
     fn size(&self) -> (usize, usize) {
         Image::size(self)
     }
 
-    fn rows(&self, rows: Range<usize>) -> Image<P> {
+    fn read_rows(&self, rows: Range<usize>) -> Image<P> {
         self.crop(Roi::spanning(0..self.width(), rows))
     }
 }
 
 /// A picture of given size by a function that makes rows.
-pub struct RowsBy<F> {
+pub struct RowsFromFn<F> {
     /// Width and height.
     pub size: (usize, usize),
     /// Makes rows.
     pub make: F,
 }
 
-impl<P, F: Fn(Range<usize>) -> Image<P> + Sync> Rows<P> for RowsBy<F> {
+impl<P, F: Fn(Range<usize>) -> Image<P> + Sync> RowSource<P> for RowsFromFn<F> {
     fn size(&self) -> (usize, usize) {
         self.size
     }
 
-    fn rows(&self, rows: Range<usize>) -> Image<P> {
+    fn read_rows(&self, rows: Range<usize>) -> Image<P> {
         (self.make)(rows)
     }
 }
 
 /// The rows of a picture in bands.
 pub(super) fn bands((width, height): (usize, usize)) -> impl Iterator<Item = Range<usize>> {
-    let rows = (BAND / width.max(1)).max(LEAST_ROWS);
+    let rows = (BAND_PIXELS / width.max(1)).max(MIN_BAND_ROWS);
     (0..height)
         .step_by(rows)
         .map(move |start| start..(start + rows).min(height))

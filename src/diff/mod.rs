@@ -10,24 +10,25 @@
 //! ```
 
 mod bands;
-mod correlate;
 mod flip;
 mod likeness;
 mod report;
 mod ssim;
+#[cfg(test)]
+mod test_pictures;
 mod view;
 
-pub use bands::{Rows, RowsBy};
+pub use bands::{RowSource, RowsFromFn};
 pub use flip::flip;
 pub use likeness::Likeness;
-pub use report::{Largest, Report, Verdict};
+pub use report::{Comparison, Largest, Verdict};
 pub use ssim::ssim;
 pub use view::{absolute_difference, difference, triple};
 
 use crate::pixel::{Coverage, Depth, LinearRgb, PremulRgba, StraightRgba};
 use bands::bands;
 use rayon::prelude::*;
-use report::Tally;
+use report::DifferenceTally;
 
 /// How much two pictures may differ: the options of `idiff`, by the same names.
 ///
@@ -72,34 +73,37 @@ impl Default for Thresholds {
 }
 
 /// Pixels that are a few floats, each with a name.
-pub trait Channels: bytemuck::Pod + Send + Sync {
+pub trait NamedChannels: bytemuck::Pod + Send + Sync {
     /// The names, in order of memory.
     const NAMES: &'static [&'static str];
 }
 
-impl Channels for LinearRgb {
+impl NamedChannels for LinearRgb {
     const NAMES: &'static [&'static str] = &["R", "G", "B"];
 }
-impl Channels for PremulRgba {
+impl NamedChannels for PremulRgba {
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A"];
 }
-impl Channels for StraightRgba {
+impl NamedChannels for StraightRgba {
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A"];
 }
-impl Channels for Coverage {
+impl NamedChannels for Coverage {
     const NAMES: &'static [&'static str] = &["A"];
 }
-impl Channels for Depth {
+impl NamedChannels for f32 {
+    const NAMES: &'static [&'static str] = &["Y"];
+}
+impl NamedChannels for Depth {
     const NAMES: &'static [&'static str] = &["Z"];
 }
 /// Values of no stated meaning: encoded ones, say.
-impl Channels for [f32; 4] {
+impl NamedChannels for [f32; 4] {
     const NAMES: &'static [&'static str] = &["R", "G", "B", "A"];
 }
 
 /// Compares two pictures channel by channel.
 ///
-/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`](crate::Image)s, or anything else that has [`Rows`].
+/// Pictures of different size are [`Verdict::Incomparable`]. Takes [`Image`](crate::Image)s, or anything else that has [`RowSource`].
 ///
 /// # Method
 /// The counts and the verdict of `idiff` 2.4.7: up to `allow_failures` failing pixels the pictures match, whatever
@@ -107,28 +111,37 @@ impl Channels for [f32; 4] {
 /// `hard_warn`. Departs from it where it would let a broken picture pass: a NaN or an infinity that the other picture
 /// does not have in the same place and sign differs by infinity and counts (`idiff` passes over the first one), and
 /// pictures of different size are not compared (`idiff` continues the smaller one with zeros).
-pub fn compare<P: Channels>(a: &impl Rows<P>, b: &impl Rows<P>, thresholds: &Thresholds) -> Report {
+pub fn compare<P: NamedChannels>(
+    a: &impl RowSource<P>,
+    b: &impl RowSource<P>,
+    thresholds: &Thresholds,
+) -> Comparison {
     let (width, height) = a.size();
     if (width, height) != b.size() {
-        return Report::incomparable();
+        return Comparison::incomparable();
     }
     let tallies = bands((width, height)).flat_map(|band| {
-        let (a, b) = (a.rows(band.clone()), b.rows(band.clone()));
+        let (a, b) = (a.read_rows(band.clone()), b.read_rows(band.clone()));
         let rows = band.clone().into_par_iter().map(|y| (y, y - band.start));
         rows.map(|(y, i)| compare_rows(a.row(i), b.row(i), y, thresholds))
-            .collect::<Vec<Tally>>()
+            .collect::<Vec<DifferenceTally>>()
     });
-    Report::new::<P>(
-        tallies.fold(Tally::default(), Tally::then),
+    Comparison::new::<P>(
+        tallies.fold(DifferenceTally::default(), DifferenceTally::then),
         width * height,
         thresholds,
     )
 }
 
-fn compare_rows<P: Channels>(a: &[P], b: &[P], y: usize, thresholds: &Thresholds) -> Tally {
+fn compare_rows<P: NamedChannels>(
+    a: &[P],
+    b: &[P],
+    y: usize,
+    thresholds: &Thresholds,
+) -> DifferenceTally {
     let count = P::NAMES.len();
     let [a, b] = [a, b].map(bytemuck::cast_slice::<P, f32>);
-    let mut tally = Tally::default();
+    let mut tally = DifferenceTally::default();
     for (x, (a, b)) in a.chunks_exact(count).zip(b.chunks_exact(count)).enumerate() {
         tally.add_pixel(a, b, [x, y], thresholds);
     }
@@ -331,7 +344,7 @@ mod tests {
     #[test]
     fn large_pictures_are_compared_in_bands() {
         let (width, height) = (1 << 14, 3 * 64 + 1);
-        let rows = |last: f32| RowsBy {
+        let rows = |last: f32| RowsFromFn {
             size: (width, height),
             make: move |rows: std::ops::Range<usize>| {
                 let value = |y: usize| Coverage(if y == height - 1 { last } else { y as f32 });

@@ -1,6 +1,6 @@
-//! What a comparison found, and what follows from it.
+//! What a comparison found, and its verdict.
 
-use super::{Channels, Thresholds};
+use super::{NamedChannels, Thresholds};
 use std::fmt;
 
 /// The outcome of a comparison.
@@ -37,10 +37,10 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The statistics of a comparison and its verdict; [`Display`](fmt::Display) gives the lines that `idiff` prints.
+/// The statistics of two pictures' differences and a verdict; [`Display`](fmt::Display) gives the lines that `idiff` prints.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
-    /// What follows.
+pub struct Comparison {
+    /// What they amount to.
     pub verdict: Verdict,
     /// Mean absolute difference of all channels of all pixels; non-finite differences are left out.
     pub mean_error: f64,
@@ -58,7 +58,7 @@ pub struct Report {
     pub failed: usize,
     /// Number of pixels.
     pub pixels: usize,
-    /// What it was held against.
+    /// What they were compared with.
     pub thresholds: Thresholds,
 }
 
@@ -75,22 +75,26 @@ pub struct Largest {
     pub values: [Vec<f32>; 2],
 }
 
-impl Report {
+impl Comparison {
     /// Of pictures that differ in size.
     pub(super) fn incomparable() -> Self {
-        let nothing = Self::from_tally(Tally::default(), &[], 0, &Thresholds::default());
+        let nothing = Self::from_tally(DifferenceTally::default(), &[], 0, &Thresholds::default());
         Self {
             verdict: Verdict::Incomparable,
             ..nothing
         }
     }
 
-    pub(super) fn new<P: Channels>(tally: Tally, pixels: usize, thresholds: &Thresholds) -> Self {
+    pub(super) fn new<P: NamedChannels>(
+        tally: DifferenceTally,
+        pixels: usize,
+        thresholds: &Thresholds,
+    ) -> Self {
         Self::from_tally(tally, P::NAMES, pixels, thresholds)
     }
 
     fn from_tally(
-        tally: Tally,
+        tally: DifferenceTally,
         names: &[&'static str],
         pixels: usize,
         thresholds: &Thresholds,
@@ -119,7 +123,7 @@ impl Report {
 
 /// Sums over a part of the pictures.
 #[derive(Debug)]
-pub(super) struct Tally {
+pub(super) struct DifferenceTally {
     errors: f64,
     squares: f64,
     peak: f32,
@@ -131,7 +135,7 @@ pub(super) struct Tally {
     failed: usize,
 }
 
-impl Default for Tally {
+impl Default for DifferenceTally {
     fn default() -> Self {
         Self {
             errors: 0.0,
@@ -146,7 +150,7 @@ impl Default for Tally {
     }
 }
 
-impl Tally {
+impl DifferenceTally {
     /// Adds the channels of one pixel of both pictures.
     #[inline]
     pub(super) fn add_pixel(
@@ -164,12 +168,7 @@ impl Tally {
                 self.largest = Some([x, y, channel]);
                 self.values = [a.to_vec(), b.to_vec()];
             }
-            // An infinite error has no magnitude to be a part of.
-            let relative = if error < f64::INFINITY {
-                error / mean_magnitude(u, v)
-            } else {
-                error
-            };
+            let relative = relative_error(error, u, v);
             warned |= error > thresholds.warn.into() && relative > thresholds.warn_relative.into();
             failed |= error > thresholds.fail.into() && relative > thresholds.fail_relative.into();
         }
@@ -216,13 +215,15 @@ impl Tally {
     }
 
     fn verdict(&self, pixels: usize, t: &Thresholds) -> Verdict {
-        let over =
-            |count: usize, percent: f32| count as f64 > f64::from(percent) / 100.0 * pixels as f64;
         if self.failed <= t.allow_failures {
             Verdict::Match
-        } else if over(self.failed, t.fail_percent) || self.max_error > t.hard_fail.into() {
+        } else if exceeds(self.failed, t.fail_percent, pixels)
+            || self.max_error > t.hard_fail.into()
+        {
             Verdict::Failure
-        } else if over(self.warned, t.warn_percent) || self.max_error > t.hard_warn.into() {
+        } else if exceeds(self.warned, t.warn_percent, pixels)
+            || self.max_error > t.hard_warn.into()
+        {
             Verdict::Warning
         } else {
             Verdict::Match
@@ -230,46 +231,65 @@ impl Tally {
     }
 }
 
-fn mean_magnitude(u: f32, v: f32) -> f64 {
-    0.5 * (f64::from(u.abs()) + f64::from(v.abs()))
+/// A count is more than so many percent of the pixels.
+fn exceeds(count: usize, percent: f32, pixels: usize) -> bool {
+    count as f64 > f64::from(percent) / 100.0 * pixels as f64
 }
 
-impl fmt::Display for Report {
+/// An error as a part of the mean magnitude of two values; an infinite one has no magnitude to be a part of.
+#[inline(always)]
+fn relative_error(error: f64, u: f32, v: f32) -> f64 {
+    if error < f64::INFINITY {
+        error / (0.5 * (f64::from(u.abs()) + f64::from(v.abs())))
+    } else {
+        error
+    }
+}
+
+impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.verdict == Verdict::Incomparable {
             return write!(f, "{}", self.verdict);
         }
-        let short = |x| general(x, 6);
         writeln!(f, "  Mean error = {}", short(self.mean_error))?;
         writeln!(f, "  RMS error = {}", short(self.rms_error))?;
         writeln!(f, "  Peak SNR = {}", short(self.psnr))?;
         write!(f, "  Max error  = {}", short(self.max_error))?;
-        if let Some(at) = &self.largest {
-            let [a, b] = at
-                .values
-                .each_ref()
-                .map(|v| v.iter().map(f32::to_string).collect::<Vec<_>>().join(", "));
-            write!(
-                f,
-                " @ ({}, {}, {})  values are {a} vs {b}",
-                at.x, at.y, at.channel
-            )?;
+        if let Some(largest) = &self.largest {
+            write!(f, " @ {largest}")?;
         }
         writeln!(f)?;
-        for (count, threshold) in [
-            (self.warned, self.thresholds.warn),
-            (self.failed, self.thresholds.fail),
-        ] {
-            let percent = 100.0 * count as f64 / self.pixels.max(1) as f64;
-            writeln!(
-                f,
-                "  {count} pixels ({}%) over {}",
-                general(percent, 3),
-                short(threshold.into())
-            )?;
-        }
+        self.write_share(f, self.warned, self.thresholds.warn)?;
+        self.write_share(f, self.failed, self.thresholds.fail)?;
         write!(f, "{}", self.verdict)
     }
+}
+
+impl Comparison {
+    /// The line on the pixels over a threshold.
+    fn write_share(&self, f: &mut fmt::Formatter<'_>, count: usize, threshold: f32) -> fmt::Result {
+        let percent = 100.0 * count as f64 / self.pixels.max(1) as f64;
+        let (percent, threshold) = (general(percent, 3), short(threshold.into()));
+        writeln!(f, "  {count} pixels ({percent}%) over {threshold}")
+    }
+}
+
+impl fmt::Display for Largest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { x, y, channel, .. } = self;
+        let [a, b] = self.values.each_ref().map(|values| listed(values));
+        write!(f, "({x}, {y}, {channel})  values are {a} vs {b}")
+    }
+}
+
+fn listed(values: &[f32]) -> String {
+    let values: Vec<String> = values.iter().map(f32::to_string).collect();
+    values.join(", ")
+}
+
+/// A number to as many digits as `idiff` prints.
+fn short(x: f64) -> String {
+    general(x, 6)
 }
 
 /// A number to some significant digits, in the way of C's `%g`: no zeros at the end, an exponent where it is short.
@@ -279,18 +299,21 @@ fn general(x: f64, digits: usize) -> String {
         return scientific.to_lowercase();
     };
     let exponent: i32 = exponent.parse().unwrap_or_default();
-    let trimmed = |s: &str| {
-        if s.contains('.') {
-            s.trim_end_matches('0').trim_end_matches('.').into()
-        } else {
-            s.to_string()
-        }
-    };
     if (-4..digits as i32).contains(&exponent) {
-        return trimmed(&format!("{x:.*}", (digits as i32 - 1 - exponent) as usize));
+        let decimals = (digits as i32 - 1 - exponent) as usize;
+        return without_trailing_zeros(&format!("{x:.decimals$}")).into();
     }
     let sign = if exponent < 0 { '-' } else { '+' };
-    format!("{}e{sign}{:02}", trimmed(mantissa), exponent.abs())
+    let mantissa = without_trailing_zeros(mantissa);
+    format!("{mantissa}e{sign}{:02}", exponent.abs())
+}
+
+fn without_trailing_zeros(number: &str) -> &str {
+    if number.contains('.') {
+        number.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        number
+    }
 }
 
 #[cfg(test)]

@@ -1,16 +1,17 @@
 //! Structural similarity.
 
-use super::correlate::{Kernel, channel, correlate};
 use crate::image::Image;
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Radius of the window: 11 x 11 pixels.
-pub(super) const RADIUS: usize = 5;
+pub(super) const WINDOW_RADIUS_PX: usize = 5;
 /// Standard deviation of the window's weights, pixels.
-const SIGMA: f64 = 1.5;
-/// Stabilise the division where means, or variances, are near 0: `(0.01 L)^2` and `(0.03 L)^2` for the range L = 1.
-const C: [f32; 2] = [0.01 * 0.01, 0.03 * 0.03];
+const WINDOW_SIGMA_PX: f64 = 1.5;
+/// Stabilises the division where means are near 0: `(K1 L)^2` with K1 = 0.01 and the range L = 1.
+const MEAN_STABILIZER: f32 = 0.01 * 0.01;
+/// Stabilises the division where variances are near 0: `(K2 L)^2` with K2 = 0.03 and the range L = 1.
+const VARIANCE_STABILIZER: f32 = 0.03 * 0.03;
 
 /// Mean structural similarity of two pictures of values from 0 to 1, averaged over the channels; 1 for equal ones.
 ///
@@ -24,19 +25,22 @@ pub fn ssim(a: &Image<[f32; 3]>, b: &Image<[f32; 3]>) -> Option<f64> {
     if a.size() != b.size() {
         return None;
     }
-    mean(&row_sums(a, b, inside(a.height())), a.size())
+    mean(&row_sums(a, b, window_centers(a.height())), a.size())
 }
 
 /// Where a window along a side lies wholly inside.
-pub(super) fn inside(length: usize) -> Range<usize> {
-    RADIUS..length.saturating_sub(RADIUS).max(RADIUS)
+pub(super) fn window_centers(length: usize) -> Range<usize> {
+    WINDOW_RADIUS_PX
+        ..length
+            .saturating_sub(WINDOW_RADIUS_PX)
+            .max(WINDOW_RADIUS_PX)
 }
 
 /// The measure of a picture from the sums of its rows that have windows; none where there are none.
 pub(super) fn mean(rows: &[[f64; 3]], (width, height): (usize, usize)) -> Option<f64> {
-    let windows = inside(width).len() * inside(height).len();
-    let channel = |c: usize| rows.iter().map(|row| row[c]).sum::<f64>() / windows as f64;
-    (windows > 0).then(|| (0..3).map(channel).sum::<f64>() / 3.0)
+    let windows = window_centers(width).len() * window_centers(height).len();
+    let means = [0, 1, 2].map(|c| rows.iter().map(|row| row[c]).sum::<f64>() / windows as f64);
+    (windows > 0).then(|| means.iter().sum::<f64>() / 3.0)
 }
 
 /// Sums over the windows of some rows, which lie wholly inside, for each channel.
@@ -45,34 +49,102 @@ pub(super) fn row_sums(
     b: &Image<[f32; 3]>,
     rows: Range<usize>,
 ) -> Vec<[f64; 3]> {
-    let channels = [0, 1, 2].map(|c| of_channel(&channel(a, c), &channel(b, c), rows.clone()));
+    let channels =
+        [0, 1, 2].map(|c| Moments::new(&a.map(|p| p[c]), &b.map(|p| p[c])).row_sums(rows.clone()));
     (0..rows.len())
         .map(|y| [0, 1, 2].map(|c| channels[c][y]))
         .collect()
 }
 
-fn of_channel(a: &Image<f32>, b: &Image<f32>, rows: Range<usize>) -> Vec<f64> {
-    let window = Kernel::gaussian(RADIUS as i32, SIGMA);
-    let mean = |plane: &Image<f32>| correlate(plane, &window, &window);
-    let product = |p: &Image<f32>, q: &Image<f32>| mean(&p.zip_map(q, |u, v| u * v));
-    let (ma, mb) = (mean(a), mean(b));
-    let (aa, bb, ab) = (product(a, a), product(b, b), product(a, b));
-    let width = a.width();
-    let at = |x: usize, y: usize| {
-        let i = (x, y);
-        let (u, v) = (ma[i], mb[i]);
-        let (spread, shared) = (aa[i] - u * u + bb[i] - v * v, ab[i] - u * v);
-        f64::from((2.0 * u * v + C[0]) * (2.0 * shared + C[1]))
-            / f64::from((u * u + v * v + C[0]) * (spread + C[1]))
-    };
-    rows.into_par_iter()
-        .map(|y| inside(width).map(|x| at(x, y)).sum())
-        .collect()
+/// Means over windows of one channel of two pictures, of its squares and of their product.
+struct Moments {
+    a: Image<f32>,
+    b: Image<f32>,
+    aa: Image<f32>,
+    bb: Image<f32>,
+    ab: Image<f32>,
+}
+
+impl Moments {
+    fn new(a: &Image<f32>, b: &Image<f32>) -> Self {
+        let window = Window::gaussian();
+        Self {
+            a: window.means(a),
+            b: window.means(b),
+            aa: window.means(&a.map(|u| u * u)),
+            bb: window.means(&b.map(|v| v * v)),
+            ab: window.means(&a.zip_map(b, |u, v| u * v)),
+        }
+    }
+
+    fn row_sums(&self, rows: Range<usize>) -> Vec<f64> {
+        let width = self.a.width();
+        rows.into_par_iter()
+            .map(|y| window_centers(width).map(|x| self.similarity((x, y))).sum())
+            .collect()
+    }
+
+    /// Structural similarity of the windows around a pixel.
+    #[inline(always)]
+    fn similarity(&self, at: (usize, usize)) -> f64 {
+        let (u, v) = (self.a[at], self.b[at]);
+        let variances = self.aa[at] - u * u + self.bb[at] - v * v;
+        let covariance = self.ab[at] - u * v;
+        f64::from((2.0 * u * v + MEAN_STABILIZER) * (2.0 * covariance + VARIANCE_STABILIZER))
+            / f64::from((u * u + v * v + MEAN_STABILIZER) * (variances + VARIANCE_STABILIZER))
+    }
+}
+
+/// The weights along one side of a window, which sum to 1.
+struct Window {
+    weights: Vec<f32>,
+}
+
+impl Window {
+    fn gaussian() -> Self {
+        let radius = WINDOW_RADIUS_PX as i32;
+        let weights: Vec<f32> = (-radius..=radius)
+            .map(|i| {
+                let x = f64::from(i);
+                libm::exp(-x * x / (2.0 * WINDOW_SIGMA_PX * WINDOW_SIGMA_PX)) as f32
+            })
+            .collect();
+        let sum: f32 = weights.iter().sum();
+        Self {
+            weights: weights.iter().map(|w| w / sum).collect(),
+        }
+    }
+
+    /// Weighted means around every pixel, the border's values going on outside.
+    fn means(&self, plane: &Image<f32>) -> Image<f32> {
+        let (width, height) = plane.size();
+        let along_x = Image::from_fn(width, height, |x, y| {
+            let row = plane.row(y);
+            self.mean(x, width, |i| row[i])
+        });
+        Image::from_fn(width, height, |x, y| {
+            self.mean(y, height, |j| along_x[(x, j)])
+        })
+    }
+
+    /// Weighted mean around `center` of a line of `len` values, each end going on.
+    #[inline(always)]
+    fn mean(&self, center: usize, len: usize, value: impl Fn(usize) -> f32) -> f32 {
+        let (first, last) = (
+            center as isize - WINDOW_RADIUS_PX as isize,
+            len as isize - 1,
+        );
+        self.weights
+            .iter()
+            .enumerate()
+            .map(|(i, w)| w * value((first + i as isize).clamp(0, last) as usize))
+            .sum()
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::likeness::tests::{changed, pattern};
+    use super::super::test_pictures::{changed, pattern};
     use super::*;
 
     #[test]
@@ -96,5 +168,11 @@ mod tests {
         assert_eq!(ssim(&of(10, 30), &of(10, 30)), None);
         assert_eq!(ssim(&of(30, 30), &of(30, 31)), None);
         assert_eq!(ssim(&of(11, 11), &of(11, 11)), Some(1.0));
+    }
+
+    #[test]
+    fn the_mean_of_a_plane_of_one_value_is_that_value() {
+        let means = Window::gaussian().means(&Image::filled(7, 5, 0.3));
+        assert!(means.pixels().iter().all(|v| (v - 0.3).abs() < 1e-6));
     }
 }

@@ -1,20 +1,20 @@
 //! Differences to look at.
 
-use super::Channels;
-use super::bands::{Rows, bands};
+use super::NamedChannels;
+use super::bands::{RowSource, bands};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 
 /// How much [`triple`] makes of a difference.
-const MAGNIFICATION: f32 = 16.0;
+const DIFFERENCE_GAIN: f32 = 16.0;
 /// Light behind a transparent pixel in [`triple`]: photographic middle grey, so that neither black nor white hides.
-const BACKDROP: f32 = 0.18;
+const MIDDLE_GREY: f32 = 0.18;
 
 /// `(a - b) * scale` of every channel.
 ///
 /// # Panics
 /// When the sizes differ.
-pub fn difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<P> {
+pub fn difference<P: NamedChannels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<P> {
     combined(a, b, |u, v| (u - v) * scale)
 }
 
@@ -22,22 +22,22 @@ pub fn difference<P: Channels>(a: &Image<P>, b: &Image<P>, scale: f32) -> Image<
 ///
 /// # Panics
 /// When the sizes differ.
-pub fn absolute_difference<P: Channels>(
-    a: &impl Rows<P>,
-    b: &impl Rows<P>,
+pub fn absolute_difference<P: NamedChannels>(
+    a: &impl RowSource<P>,
+    b: &impl RowSource<P>,
     scale: f32,
 ) -> Image<P> {
     let (width, height) = a.size();
     assert_eq!((width, height), b.size(), "images of different size");
     let mut pixels = Vec::with_capacity(width * height);
     for band in bands((width, height)) {
-        let (a, b) = (a.rows(band.clone()), b.rows(band));
+        let (a, b) = (a.read_rows(band.clone()), b.read_rows(band));
         pixels.extend_from_slice(combined(&a, &b, |u, v| (u - v).abs() * scale).pixels());
     }
     Image::from_vec(width, height, pixels)
 }
 
-fn combined<P: Channels>(
+fn combined<P: NamedChannels>(
     a: &Image<P>,
     b: &Image<P>,
     f: impl Fn(f32, f32) -> f32 + Sync,
@@ -55,22 +55,18 @@ fn combined<P: Channels>(
 ///
 /// Transparent pixels show middle grey. Differences of alpha are grey; where one picture is not a number and the other
 /// is, the difference is white. The sizes may differ: what one picture does not have is black.
-pub fn triple<P: Channels>(expected: &Image<P>, actual: &Image<P>) -> Image<LinearRgb> {
+pub fn triple<P: NamedChannels>(expected: &Image<P>, actual: &Image<P>) -> Image<LinearRgb> {
     let width = expected.width().max(actual.width());
     let height = expected.height().max(actual.height());
     Image::from_fn(3 * width, height, |x, y| {
         let [left, right] = [expected, actual].map(|image| pixel(image, x % width, y));
         match x / width {
-            0 => left
-                .as_ref()
-                .map_or(LinearRgb::BLACK, |p| shown(channels(p))),
+            0 => shown(left.as_ref()),
             1 => shown_difference(
                 left.as_ref().map_or(&[], channels),
                 right.as_ref().map_or(&[], channels),
             ),
-            _ => right
-                .as_ref()
-                .map_or(LinearRgb::BLACK, |p| shown(channels(p))),
+            _ => shown(right.as_ref()),
         }
     })
 }
@@ -79,42 +75,42 @@ fn pixel<P: Copy>(image: &Image<P>, x: usize, y: usize) -> Option<P> {
     (x < image.width() && y < image.height()).then(|| image[(x, y)])
 }
 
-fn channels<P: Channels>(pixel: &P) -> &[f32] {
+fn channels<P: NamedChannels>(pixel: &P) -> &[f32] {
     bytemuck::cast_slice(std::slice::from_ref(pixel))
 }
 
-/// A pixel over the backdrop.
-fn shown(values: &[f32]) -> LinearRgb {
-    match *values {
-        [r, g, b, a] => LinearRgb::new(r, g, b) + LinearRgb::grey(BACKDROP * (1.0 - a)),
+/// A pixel over the backdrop; black where there is none.
+fn shown<P: NamedChannels>(pixel: Option<&P>) -> LinearRgb {
+    match *pixel.map_or(&[][..], channels) {
+        [r, g, b, a] => LinearRgb::new(r, g, b) + LinearRgb::grey(MIDDLE_GREY * (1.0 - a)),
         [r, g, b] => LinearRgb::new(r, g, b),
         [v] => LinearRgb::grey(v),
         _ => LinearRgb::BLACK,
     }
 }
 
-/// Colour by colour what differs; a missing pixel counts as zeros.
+/// Colour by colour what differs; a missing pixel is zeros.
 fn shown_difference(a: &[f32], b: &[f32]) -> LinearRgb {
-    let value = |values: &[f32], c: usize| values.get(c).copied().unwrap_or(0.0);
-    let count = a.len().max(b.len());
-    let error = |c: usize| {
-        let (u, v) = (value(a, c), value(b, c));
-        let same = u == v || (u.is_nan() && v.is_nan());
-        if same {
-            0.0
-        } else if (u - v).is_nan() {
-            1.0
-        } else {
-            MAGNIFICATION * (u - v).abs()
-        }
-    };
-    match count {
+    let error = |c: usize| magnified_error(channel_or_zero(a, c), channel_or_zero(b, c));
+    match a.len().max(b.len()) {
         0 => LinearRgb::BLACK,
         1 => LinearRgb::grey(error(0)),
-        _ => {
-            LinearRgb::new(error(0), error(1), error(2))
-                + LinearRgb::grey(if count > 3 { error(3) } else { 0.0 })
-        }
+        _ => LinearRgb::new(error(0), error(1), error(2)) + LinearRgb::grey(error(3)),
+    }
+}
+
+fn channel_or_zero(values: &[f32], c: usize) -> f32 {
+    values.get(c).copied().unwrap_or(0.0)
+}
+
+/// The distance of two values, magnified; 1 where one of them is not a number.
+fn magnified_error(u: f32, v: f32) -> f32 {
+    if u == v || (u.is_nan() && v.is_nan()) {
+        0.0
+    } else if (u - v).is_nan() {
+        1.0
+    } else {
+        DIFFERENCE_GAIN * (u - v).abs()
     }
 }
 

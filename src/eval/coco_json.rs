@@ -86,6 +86,8 @@ pub fn read_coco_results(path: &Path, truth: &mut CocoTruth) -> Result<()> {
 }
 
 /// What documents of truth and of detections give, for the fuzzers.
+#[cfg(feature = "fuzzing")]
+#[cfg(feature = "fuzzing")]
 pub(crate) fn sheets_of(truth: &str, found: &str) -> Result<Vec<EvalImage>> {
     let mut truth = CocoTruth::new(&io::parse_json(truth)?)?;
     truth.add(&io::parse_json::<Vec<CocoDetection>>(found)?)?;

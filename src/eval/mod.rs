@@ -26,6 +26,7 @@ mod yolov5;
 pub use bootstrap::{Interval, bootstrap};
 pub(crate) use bootstrap::{drawn, interval};
 pub use coco::{AreaRange, CocoScores, MAX_DETECTIONS, coco};
+#[cfg(feature = "fuzzing")]
 pub(crate) use coco_json::sheets_of as coco_sheets;
 pub use coco_json::{CocoTruth, read_coco_results, read_coco_truth};
 pub use confusion::{Confusion, ConfusionOptions};

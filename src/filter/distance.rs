@@ -1,7 +1,7 @@
 //! How far every pixel of a mask is from its outside.
 
 use super::morphology::vertical_distances;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use rayon::prelude::*;
 
 /// Distance of every set pixel's centre to the centre of the nearest one that is not set, pixels; 0 where not set.
@@ -13,9 +13,9 @@ use rayon::prelude::*;
 /// that these are the feet of along each row. Exact, and linear in the number of pixels.
 ///
 /// [Felzenszwalb and Huttenlocher 2012]: https://doi.org/10.4086/toc.2012.v008a019
-pub fn depth(mask: &Image<bool>) -> Image<f32> {
+pub fn depth(mask: &Mask) -> Image<f32> {
     let (width, height) = mask.size();
-    let columns = vertical_distances(&mask.map(|set| !set));
+    let columns = vertical_distances(&mask.complement());
     let mut out = Image::new(width, height);
     out.par_rows_mut()
         .zip(columns.par_chunks_exact(width.max(1)))

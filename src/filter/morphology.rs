@@ -1,6 +1,6 @@
 //! Masks grown and shrunk by a disc.
 
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::work::{self, Kind};
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// [Felzenszwalb and Huttenlocher 2012], cut at one height).
 ///
 /// [Felzenszwalb and Huttenlocher 2012]: https://doi.org/10.4086/toc.2012.v008a019
-pub fn dilate(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
+pub fn dilate(mask: &Mask, radius_px: f64) -> Mask {
     if radius_px.is_nan() || radius_px < 1.0 {
         return mask.clone();
     }
@@ -33,12 +33,12 @@ pub fn dilate(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
 /// The mask shrunk by `radius_px`: every pixel of it that is farther than that from every pixel outside it.
 ///
 /// Beyond the picture's border the mask is taken to go on. Unchanged where `radius_px` is below 1 or not a number.
-pub fn erode(mask: &Image<bool>, radius_px: f64) -> Image<bool> {
-    dilate(&mask.map(|set| !set), radius_px).map(|set| !set)
+pub fn erode(mask: &Mask, radius_px: f64) -> Mask {
+    dilate(&mask.complement(), radius_px).complement()
 }
 
 /// How far a set pixel reaches sideways at each vertical distance; farther than the list goes it does not reach.
-fn reach_by_distance(mask: &Image<bool>, radius: f64) -> Vec<usize> {
+fn reach_by_distance(mask: &Mask, radius: f64) -> Vec<usize> {
     let last = radius.min(mask.height() as f64) as usize;
     let sideways = |d: usize| ((radius - d as f64) * (radius + d as f64)).sqrt();
     (0..=last)
@@ -47,7 +47,7 @@ fn reach_by_distance(mask: &Image<bool>, radius: f64) -> Vec<usize> {
 }
 
 /// For every pixel the distance to the nearest set pixel of its column; very large where there is none.
-pub(super) fn vertical_distances(mask: &Image<bool>) -> Vec<u32> {
+pub(super) fn vertical_distances(mask: &Mask) -> Vec<u32> {
     let (width, height) = mask.size();
     let mut distances = vec![u32::MAX; width * height];
     for (distance, &set) in distances.iter_mut().zip(mask.pixels()) {
@@ -90,12 +90,12 @@ fn mark(row: &mut [bool], distances: &[u32], reach: &[usize]) {
 mod tests {
     use super::*;
 
-    fn speckles(width: usize, height: usize) -> Image<bool> {
+    fn speckles(width: usize, height: usize) -> Mask {
         Image::from_fn(width, height, |x, y| (x * 7919 + y * 104_729) % 37 == 0)
     }
 
     /// The definition.
-    fn dilated_slowly(mask: &Image<bool>, radius: f64) -> Image<bool> {
+    fn dilated_slowly(mask: &Mask, radius: f64) -> Mask {
         let (w, h) = mask.size();
         let near = |(x, y): (usize, usize), (i, j): (usize, usize)| {
             let (dx, dy) = (x.abs_diff(i) as f64, y.abs_diff(j) as f64);

@@ -129,54 +129,53 @@ fn binomial(offset: isize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pixel::Coverage;
 
-    fn noise(width: usize, height: usize) -> Image<Coverage> {
+    fn noise(width: usize, height: usize) -> Image<f32> {
         Image::from_fn(width, height, |x, y| {
-            Coverage(((x * 7919 + y * 104_729) % 101) as f32 / 100.0)
+            ((x * 7919 + y * 104_729) % 101) as f32 / 100.0
         })
     }
 
     #[test]
     fn halving_keeps_a_constant() {
-        let half = halve(&Image::filled(7, 5, Coverage(0.25)));
-        assert_eq!(half, Image::filled(4, 3, Coverage(0.25)));
+        let half = halve(&Image::filled(7, 5, 0.25));
+        assert_eq!(half, Image::filled(4, 3, 0.25));
     }
 
     #[test]
     fn halving_averages_what_is_there() {
-        let img = Image::from_vec(3, 1, [1.0, 3.0, 8.0].map(Coverage).to_vec());
-        assert_eq!(halve(&img).pixels(), [Coverage(2.0), Coverage(8.0)]);
+        let img = Image::from_vec(3, 1, vec![1.0, 3.0, 8.0]);
+        assert_eq!(halve(&img).pixels(), [2.0, 8.0]);
     }
 
     #[test]
     fn a_pyramid_ends_in_one_pixel() {
-        let pyramid = Pyramid::new(Image::filled(9, 4, Coverage(1.0)));
+        let pyramid = Pyramid::new(Image::filled(9, 4, 1.0));
         assert_eq!(pyramid.level(pyramid.levels() - 1).size(), (1, 1));
         assert_eq!(pyramid.level(99).size(), (1, 1));
     }
 
     #[test]
     fn an_empty_pyramid_has_one_empty_level() {
-        let pyramid = Pyramid::new(Image::<Coverage>::new(0, 0));
+        let pyramid = Pyramid::new(Image::<f32>::new(0, 0));
         assert!(pyramid.levels() == 1 && pyramid.level(5).is_empty());
     }
 
     #[test]
     fn reducing_weighs_by_the_binomial_kernel() {
-        let dot = Image::from_fn(9, 1, |x, _| Coverage(if x == 4 { 16.0 } else { 0.0 }));
+        let dot = Image::from_fn(9, 1, |x, _| if x == 4 { 16.0 } else { 0.0 });
         let near = |a: f32, b: f32| (a - b).abs() < 1e-6;
         let out = reduce(&dot);
-        assert!(near(out[(1, 0)].0, 1.0) && near(out[(2, 0)].0, 6.0) && near(out[(3, 0)].0, 1.0));
+        assert!(near(out[(1, 0)], 1.0) && near(out[(2, 0)], 6.0) && near(out[(3, 0)], 1.0));
     }
 
     #[test]
     fn reducing_and_expanding_keep_a_constant() {
         for (w, h) in [(1, 1), (2, 3), (9, 6), (16, 16)] {
-            let img = Image::filled(w, h, Coverage(0.7));
+            let img = Image::filled(w, h, 0.7);
             let back = expand(&reduce(&img), w, h);
             assert!(
-                back.pixels().iter().all(|c| (c.0 - 0.7).abs() < 1e-6),
+                back.pixels().iter().all(|v| (v - 0.7).abs() < 1e-6),
                 "{w} x {h}"
             );
         }
@@ -184,21 +183,21 @@ mod tests {
 
     #[test]
     fn expanding_keeps_a_ramp_away_from_the_border() {
-        let ramp = Image::from_fn(20, 1, |x, _| Coverage(x as f32));
+        let ramp = Image::from_fn(20, 1, |x, _| x as f32);
         let out = expand(&ramp, 40, 1);
-        assert!((2..38).all(|x| (out[(x, 0)].0 - 0.5 * x as f32).abs() < 1e-5));
+        assert!((2..38).all(|x| (out[(x, 0)] - 0.5 * x as f32).abs() < 1e-5));
     }
 
     #[test]
     fn a_laplacian_level_holds_the_detail_and_only_that() {
-        let detail = |img: &Image<Coverage>| {
+        let detail = |img: &Image<f32>| {
             let smooth = expand(&reduce(img), img.width(), img.height());
-            img.zip_map(&smooth, |a, b| a.0 - b.0)
+            img.zip_map(&smooth, |a, b| a - b)
         };
         let mean =
             |values: &[f32]| values.iter().map(|v| v.abs()).sum::<f32>() / values.len() as f32;
         let wave = Image::from_fn(64, 48, |x, y| {
-            Coverage(libm::sinf(0.05 * x as f32) * libm::cosf(0.07 * y as f32))
+            libm::sinf(0.05 * x as f32) * libm::cosf(0.07 * y as f32)
         });
         assert!(
             mean(detail(&wave).pixels()) < 0.01,
@@ -212,7 +211,7 @@ mod tests {
 
     #[test]
     fn empty_pictures_survive() {
-        let empty = Image::<Coverage>::new(0, 5);
+        let empty = Image::<f32>::new(0, 5);
         assert_eq!(
             (halve(&empty).size(), reduce(&empty).size()),
             ((0, 3), (0, 3))

@@ -58,10 +58,10 @@ fn bilinear<P: Mix>(at: impl Fn(isize, isize) -> P, x: f64, y: f64) -> P {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pixel::{Coverage, ObjectId};
+    use crate::pixel::ObjectId;
 
-    fn plane() -> Image<Coverage> {
-        Image::from_fn(6, 4, |x, y| Coverage(x as f32 + 10.0 * y as f32))
+    fn plane() -> Image<f32> {
+        Image::from_fn(6, 4, |x, y| x as f32 + 10.0 * y as f32)
     }
 
     #[test]
@@ -73,17 +73,17 @@ mod tests {
 
     #[test]
     fn a_plane_is_sampled_exactly() {
-        let value = sample_bilinear(&plane(), 2.75, 2.0).0;
+        let value = sample_bilinear(&plane(), 2.75, 2.0);
         assert!((value - (2.25 + 15.0)).abs() < 1e-5, "{value}");
     }
 
     #[test]
     fn the_outside_is_empty_and_the_border_fades() {
-        let img = Image::filled(3, 3, Coverage(1.0));
-        assert_eq!(sample_bilinear(&img, 0.0, 1.5), Coverage(0.5));
-        assert_eq!(sample_bilinear(&img, 0.0, 0.0), Coverage(0.25));
-        assert_eq!(sample_bilinear(&img, -0.5, 1.5), Coverage(0.0));
-        assert_eq!(sample_bilinear(&img, 3.5, 1.5), Coverage(0.0));
+        let img = Image::filled(3, 3, 1.0);
+        assert_eq!(sample_bilinear(&img, 0.0, 1.5), 0.5);
+        assert_eq!(sample_bilinear(&img, 0.0, 0.0), 0.25);
+        assert_eq!(sample_bilinear(&img, -0.5, 1.5), 0.0);
+        assert_eq!(sample_bilinear(&img, 3.5, 1.5), 0.0);
     }
 
     #[test]
@@ -97,13 +97,13 @@ mod tests {
     fn strange_positions_and_empty_pictures_give_nothing() {
         let img = plane();
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert_eq!(sample_bilinear(&img, x, 1.0), Coverage(0.0));
-            assert_eq!(sample_bilinear_clamped(&img, 1.0, x), Coverage(0.0));
+            assert_eq!(sample_bilinear(&img, x, 1.0), 0.0);
+            assert_eq!(sample_bilinear_clamped(&img, 1.0, x), 0.0);
         }
-        assert_eq!(sample_bilinear(&img, -1e300, 0.0), Coverage(0.0));
+        assert_eq!(sample_bilinear(&img, -1e300, 0.0), 0.0);
         assert_eq!(
-            sample_bilinear_clamped(&Image::<Coverage>::new(0, 0), 1.0, 1.0),
-            Coverage(0.0)
+            sample_bilinear_clamped(&Image::<f32>::new(0, 0), 1.0, 1.0),
+            0.0
         );
     }
 

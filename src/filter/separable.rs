@@ -111,7 +111,6 @@ fn mix<'a, P: Mix + 'a>(weights: &[f32], line: impl Fn(usize) -> &'a [P], out: &
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pixel::Coverage;
 
     fn triangle(len: usize) -> Vec<Taps> {
         (0..len as isize)
@@ -120,13 +119,13 @@ mod tests {
     }
 
     /// The definition, in `f64`.
-    fn slowly(image: &Image<Coverage>, x: isize, y: isize) -> f64 {
+    fn slowly(image: &Image<f32>, x: isize, y: isize) -> f64 {
         let near = |a: isize, len: usize| (a - 2).max(0)..(a + 3).min(len as isize);
         let weight = |dx: isize, dy: isize| (3 - dx.abs()) as f64 * (3 - dy.abs()) as f64;
         let (mut sum, mut total) = (0.0, 0.0);
         for j in near(y, image.height()) {
             for i in near(x, image.width()) {
-                sum += weight(i - x, j - y) * f64::from(image[(i as usize, j as usize)].0);
+                sum += weight(i - x, j - y) * f64::from(image[(i as usize, j as usize)]);
                 total += weight(i - x, j - y);
             }
         }
@@ -137,13 +136,13 @@ mod tests {
     fn runs_and_single_pixels_are_weighted_means() {
         for (width, height) in [(1, 7), (4, 4), (2 * BLOCK + 7, 6)] {
             let img = Image::from_fn(width, height, |x, y| {
-                Coverage(((x * 7919 + y * 104_729) % 101) as f32)
+                ((x * 7919 + y * 104_729) % 101) as f32
             });
             let out = filter(&img, &triangle(width), &triangle(height));
             for (k, value) in out.pixels().iter().enumerate() {
                 let exact = slowly(&img, (k % width) as isize, (k / width) as isize);
                 assert!(
-                    (f64::from(value.0) - exact).abs() < 1e-4,
+                    (f64::from(*value) - exact).abs() < 1e-4,
                     "{k} of {width} x {height}"
                 );
             }

@@ -1,6 +1,17 @@
 //! What a file says about its picture before the pixels.
 
-use super::Format;
+use super::format::Format;
+
+/// Which part of an EXR is the picture. Other formats have only one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Window {
+    /// What is meant to be shown: stored pixels outside are cut, missing ones are transparent black.
+    #[default]
+    Display,
+    /// What is stored, wherever it lies: [`Header::data_at`].
+    Data,
+}
 
 /// What a picture file says about itself; reading it decodes no pixel.
 #[non_exhaustive]

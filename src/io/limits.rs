@@ -3,7 +3,8 @@
 //! A damaged or hostile header of 60 bytes can ask for 245 GB, and an allocation that fails aborts the process: so sizes
 //! are checked first, in arithmetic that cannot wrap.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
+use std::path::Path;
 use std::str::FromStr;
 use std::sync::OnceLock;
 
@@ -19,7 +20,7 @@ pub struct Limits {
     pub channels: u64,
     /// Bytes of the decoded samples. Default: 1 GiB.
     pub decoded_bytes: u64,
-    /// Decoded bytes for each byte of the file, looked at above 64 MiB of decoded bytes. Default: 10,000.
+    /// Decoded bytes for each byte of the file, checked above 64 MiB of decoded bytes. Default: 10,000.
     pub ratio: u64,
     /// Bytes of the file itself. Default: 1 GiB.
     pub file_bytes: u64,
@@ -31,7 +32,7 @@ pub struct Limits {
     /// Default: 10.
     pub seconds: u64,
     /// Bytes of a document (TOML, JSON, YAML, CSV): recipes, labels, manifests. Truth and detections in COCO's JSON are
-    /// data, for which `file_bytes` counts. Default: 16 MiB.
+    /// data, for which `file_bytes` holds. Default: 16 MiB.
     pub document_bytes: u64,
     /// Levels that a document is nested, at most 80. Default: 64.
     pub document_depth: u64,
@@ -39,17 +40,17 @@ pub struct Limits {
     pub memory_percent: u64,
 }
 
-/// A day: who waits longer does not wait for a picture.
-const MOST_SECONDS: u64 = 86_400;
-/// What the readers of TOML and JSON follow by themselves.
-const DEEPEST: u64 = 80;
-/// Other limits: sums of a few such numbers cannot wrap.
-const HIGHEST: u64 = 1 << 53;
-/// Percent of the memory: who says so means all there is, and more.
-const MOST_PERCENT: u64 = 10_000;
+/// A day: nobody waits longer for a picture.
+const MAX_SECONDS: u64 = 86_400;
+/// Levels that the readers of TOML and JSON follow by themselves.
+const MAX_DOCUMENT_DEPTH: u64 = 80;
+/// Largest value of the other limits: sums of a few such numbers cannot wrap.
+const MAX_LIMIT: u64 = 1 << 53;
+/// Percent of the memory: all there is, and more.
+const MAX_MEMORY_PERCENT: u64 = 10_000;
 
 /// What a pixel takes in each channel that is used, at the worst: three floats.
-const BYTES_IN_HAND: u64 = 12;
+const BYTES_PER_SAMPLE: u64 = 12;
 
 /// Below this many decoded bytes no ratio is suspicious: a plain white picture compresses very well.
 const RATIO_FREE_BYTES: u64 = 64 << 20;
@@ -78,38 +79,41 @@ const SUFFIXES: [(char, u64); 3] = [('K', 1 << 10), ('M', 1 << 20), ('G', 1 << 3
 
 /// A new value for one limit: `side=65536`, `decoded_bytes=4G`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Raise {
+pub struct LimitOverride {
     name: String,
     value: u64,
 }
 
-impl FromStr for Raise {
+impl FromStr for LimitOverride {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
         let (name, number) = text
             .split_once('=')
             .ok_or_else(|| Error::value(text, "no value, expected NAME=NUMBER"))?;
-        let unit = SUFFIXES
-            .iter()
-            .find(|(suffix, _)| number.ends_with(*suffix));
-        let (digits, factor) = unit.map_or((number, 1), |&(suffix, factor)| {
-            (number.trim_end_matches(suffix), factor)
-        });
-        let value = digits.parse().ok().and_then(|v: u64| v.checked_mul(factor));
-        let value = value.ok_or_else(|| {
+        let value = parse_with_suffix(number).ok_or_else(|| {
             Error::value(
                 name,
                 format!("{number:?}, expected a number such as 65536 or 4G"),
             )
         })?;
-        let raise = Self {
-            name: name.into(),
-            value,
-        };
-        Limits::default().with(&raise)?;
-        Ok(raise)
+        let name = name.into();
+        let limit = Self { name, value };
+        Limits::default().with(&limit)?;
+        Ok(limit)
     }
+}
+
+/// `3K` is 3072.
+fn parse_with_suffix(number: &str) -> Option<u64> {
+    let unit = SUFFIXES
+        .iter()
+        .find(|(suffix, _)| number.ends_with(*suffix));
+    let (digits, factor) = unit.map_or((number, 1), |&(suffix, factor)| {
+        (number.trim_end_matches(suffix), factor)
+    });
+    let value: u64 = digits.parse().ok()?;
+    value.checked_mul(factor)
 }
 
 impl Limits {
@@ -117,39 +121,46 @@ impl Limits {
     ///
     /// # Errors
     /// [`Error::Value`] for a name that no limit has, and for a value that none can have.
-    pub fn with(mut self, raise: &Raise) -> Result<Self> {
-        let mut named: [(&str, &mut u64, u64); 12] = [
-            ("side", &mut self.side, HIGHEST),
-            ("pixels", &mut self.pixels, HIGHEST),
-            ("channels", &mut self.channels, HIGHEST),
-            ("decoded_bytes", &mut self.decoded_bytes, HIGHEST),
-            ("ratio", &mut self.ratio, HIGHEST),
-            ("file_bytes", &mut self.file_bytes, HIGHEST),
-            ("metadata_bytes", &mut self.metadata_bytes, HIGHEST),
-            ("parts", &mut self.parts, HIGHEST),
-            ("seconds", &mut self.seconds, MOST_SECONDS),
-            ("document_bytes", &mut self.document_bytes, HIGHEST),
-            ("document_depth", &mut self.document_depth, DEEPEST),
-            ("memory_percent", &mut self.memory_percent, MOST_PERCENT),
-        ];
-        let Raise { name, value } = raise;
-        match named.iter_mut().find(|(known, ..)| known == name) {
-            Some((_, _, most)) if *value > *most => {
-                return Err(Error::value(
-                    name,
-                    format!("{value}, expected at most {most}"),
-                ));
-            }
-            Some((_, limit, _)) => **limit = *value,
-            None => {
-                let known = named.map(|(name, ..)| name).join(", ");
-                return Err(Error::value(
-                    name,
-                    format!("no such limit, expected one of {known}"),
-                ));
-            }
+    pub fn with(mut self, limit: &LimitOverride) -> Result<Self> {
+        let LimitOverride { name, value } = limit;
+        let mut named = self.named();
+        let Some((_, place, most)) = named.iter_mut().find(|(known, ..)| known == name) else {
+            let known = named.map(|(name, ..)| name).join(", ");
+            let what = format!("no such limit, expected one of {known}");
+            return Err(Error::value(name, what));
+        };
+        if *value > *most {
+            let what = format!("{value}, expected at most {most}");
+            return Err(Error::value(name, what));
         }
+        **place = *value;
         Ok(self)
+    }
+
+    /// Every limit with its name and its largest value.
+    fn named(&mut self) -> [(&'static str, &mut u64, u64); 12] {
+        [
+            ("side", &mut self.side, MAX_LIMIT),
+            ("pixels", &mut self.pixels, MAX_LIMIT),
+            ("channels", &mut self.channels, MAX_LIMIT),
+            ("decoded_bytes", &mut self.decoded_bytes, MAX_LIMIT),
+            ("ratio", &mut self.ratio, MAX_LIMIT),
+            ("file_bytes", &mut self.file_bytes, MAX_LIMIT),
+            ("metadata_bytes", &mut self.metadata_bytes, MAX_LIMIT),
+            ("parts", &mut self.parts, MAX_LIMIT),
+            ("seconds", &mut self.seconds, MAX_SECONDS),
+            ("document_bytes", &mut self.document_bytes, MAX_LIMIT),
+            (
+                "document_depth",
+                &mut self.document_depth,
+                MAX_DOCUMENT_DEPTH,
+            ),
+            (
+                "memory_percent",
+                &mut self.memory_percent,
+                MAX_MEMORY_PERCENT,
+            ),
+        ]
     }
 }
 
@@ -163,54 +174,56 @@ pub(super) struct Demand {
     pub(super) file_bytes: u64,
 }
 
+impl Demand {
+    fn is_empty(&self) -> bool {
+        self.width == 0 || self.height == 0 || self.channels == 0
+    }
+}
+
 impl Limits {
     /// Refuses what cannot be right or is too much; the text names the limit.
-    pub(super) fn check(&self, d: Demand) -> std::result::Result<(), String> {
-        let Demand { width, height, .. } = d;
-        if width == 0 || height == 0 || d.channels == 0 {
+    pub(super) fn check(&self, demand: Demand) -> std::result::Result<(), String> {
+        let (width, height, channels) = (demand.width, demand.height, demand.channels);
+        if demand.is_empty() {
             return Err(format!(
-                "{width} x {height} pixels with {} channels, expected at least 1 of each",
-                d.channels
+                "{width} x {height} pixels with {channels} channels, expected at least 1 of each"
             ));
         }
         at_most(width.max(height), self.side, "pixels along a side", "side")?;
         let pixels = width.checked_mul(height).ok_or("size overflows")?;
         at_most(pixels, self.pixels, "pixels", "pixels")?;
-        at_most(d.channels, self.channels, "channels", "channels")?;
+        at_most(channels, self.channels, "channels", "channels")?;
         let bytes = pixels
-            .checked_mul(d.bytes_per_pixel)
+            .checked_mul(demand.bytes_per_pixel)
             .ok_or("size overflows")?;
         at_most(bytes, self.decoded_bytes, "decoded bytes", "decoded_bytes")?;
         if bytes > RATIO_FREE_BYTES {
-            at_most(
-                bytes / d.file_bytes.max(1),
-                self.ratio,
-                "decoded bytes for each byte of the file",
-                "ratio",
-            )?;
+            let ratio = bytes / demand.file_bytes.max(1);
+            let what = "decoded bytes for each byte of the file";
+            at_most(ratio, self.ratio, what, "ratio")?;
         }
         affordable(bytes)
     }
 
     /// Refuses a picture that needs too much of the machine's memory; the text shows the sum. Where the system does not
-    /// say how much it has, nothing is refused.
-    pub(super) fn room(
+    /// report how much it has, nothing is refused.
+    pub(super) fn check_memory(
         &self,
         width: usize,
         height: usize,
         channels: usize,
     ) -> std::result::Result<(), String> {
         machine_bytes().map_or(Ok(()), |machine| {
-            self.room_in(machine, [width, height, channels].map(|n| n as u64))
+            self.check_memory_of(machine, [width, height, channels].map(|n| n as u64))
         })
     }
 
-    fn room_in(
+    fn check_memory_of(
         &self,
         machine: u64,
         [width, height, channels]: [u64; 3],
     ) -> std::result::Result<(), String> {
-        let need = [height, channels, BYTES_IN_HAND]
+        let need = [height, channels, BYTES_PER_SAMPLE]
             .into_iter()
             .fold(width, u64::saturating_mul);
         let percent = self.memory_percent;
@@ -219,45 +232,43 @@ impl Limits {
         }
         let [need, machine] = [need, machine].map(|bytes| bytes >> 20);
         Err(format!(
-            "{width} x {height} pixels x {channels} channels x {BYTES_IN_HAND} bytes = {need} MiB of memory, over \
+            "{width} x {height} pixels x {channels} channels x {BYTES_PER_SAMPLE} bytes = {need} MiB of memory, over \
              {percent} % of this machine's {machine} MiB (Limits::memory_percent; --limit memory_percent=N)"
         ))
     }
 }
 
 /// The memory of this machine, or of the control group that this process is confined to; none where the system does not
-/// tell. Asked once.
+/// report it. Asked once.
 pub(super) fn machine_bytes() -> Option<u64> {
     static BYTES: OnceLock<Option<u64>> = OnceLock::new();
     *BYTES.get_or_init(|| {
-        let told = std::fs::read_to_string("/proc/meminfo").ok()?;
-        let kib: u64 = told.lines().find_map(|l| {
-            l.strip_prefix("MemTotal:")?
-                .trim()
-                .strip_suffix(" kB")?
-                .parse()
-                .ok()
-        })?;
-        Some(control_group_bytes().unwrap_or(u64::MAX).min(kib << 10))
+        let installed = installed_bytes()?;
+        Some(control_group_bytes().unwrap_or(u64::MAX).min(installed))
     })
+}
+
+fn installed_bytes() -> Option<u64> {
+    let report = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let total = report.lines().find_map(|l| l.strip_prefix("MemTotal:"))?;
+    let kib: u64 = total.trim().strip_suffix(" kB")?.parse().ok()?;
+    Some(kib << 10)
 }
 
 /// The least that this process's control group (cgroup v2) or one above it allows.
 fn control_group_bytes() -> Option<u64> {
     let groups = std::fs::read_to_string("/proc/self/cgroup").ok()?;
     let own = groups.lines().find_map(|l| l.strip_prefix("0::/"))?;
-    let most = |group: &std::path::Path| -> Option<u64> {
-        std::fs::read_to_string(group.join("memory.max"))
-            .ok()?
-            .trim()
-            .parse()
-            .ok()
-    };
-    std::path::Path::new("/sys/fs/cgroup")
+    Path::new("/sys/fs/cgroup")
         .join(own)
         .ancestors()
-        .filter_map(most)
+        .filter_map(group_bytes)
         .min()
+}
+
+fn group_bytes(group: &Path) -> Option<u64> {
+    let most = std::fs::read_to_string(group.join("memory.max")).ok()?;
+    most.trim().parse().ok()
 }
 
 /// One limit: `what` is counted, `name` is the field to raise.
@@ -275,17 +286,16 @@ pub(super) fn at_most(
     ))
 }
 
-/// Refuses what the system has no memory for, as far as it says so: an allocation that fails ends the process.
+/// Refuses what the system has no memory for, as far as it reports that: an allocation that fails ends the process.
 pub(super) fn affordable(bytes: u64) -> std::result::Result<(), String> {
     let fits = usize::try_from(bytes).is_ok_and(|n| Vec::<u8>::new().try_reserve_exact(n).is_ok());
     if fits {
-        Ok(())
-    } else {
-        Err(format!(
-            "needs {} MiB of memory, more than the system gives",
-            bytes >> 20
-        ))
+        return Ok(());
     }
+    let mebibytes = bytes >> 20;
+    Err(format!(
+        "needs {mebibytes} MiB of memory, more than the system gives"
+    ))
 }
 
 #[cfg(test)]
@@ -337,12 +347,12 @@ mod tests {
     fn every_limit_has_a_name() {
         let json = serde_json::to_value(Limits::default()).unwrap();
         for name in json.as_object().unwrap().keys() {
-            let raised = Limits::default()
+            let changed = Limits::default()
                 .with(&format!("{name}=80").parse().unwrap())
                 .unwrap();
-            assert_eq!(serde_json::to_value(raised).unwrap()[name], 80);
+            assert_eq!(serde_json::to_value(changed).unwrap()[name], 80);
             let most = format!("{name}={}", u64::MAX)
-                .parse::<Raise>()
+                .parse::<LimitOverride>()
                 .unwrap_err()
                 .to_string();
             assert!(
@@ -365,7 +375,7 @@ mod tests {
             "side=-1",
             "side=G",
         ] {
-            assert!(bad.parse::<Raise>().is_err(), "{bad}");
+            assert!(bad.parse::<LimitOverride>().is_err(), "{bad}");
         }
     }
 
@@ -373,9 +383,11 @@ mod tests {
     fn a_need_beyond_a_share_of_the_memory_is_refused_with_the_sum() {
         let gib = 1 << 30;
         let square = [11_585, 11_585, 3];
-        assert!(Limits::default().room_in(16 * gib, square).is_ok());
+        assert!(Limits::default().check_memory_of(16 * gib, square).is_ok());
         assert_eq!(
-            Limits::default().room_in(8 * gib, square).unwrap_err(),
+            Limits::default()
+                .check_memory_of(8 * gib, square)
+                .unwrap_err(),
             "11585 x 11585 pixels x 3 channels x 12 bytes = 4607 MiB of memory, over 50 % of this machine's 8192 MiB \
              (Limits::memory_percent; --limit memory_percent=N)"
         );
@@ -384,12 +396,12 @@ mod tests {
                 memory_percent: 60,
                 ..Default::default()
             }
-            .room_in(8 * gib, square)
+            .check_memory_of(8 * gib, square)
             .is_ok()
         );
         assert!(
             Limits::default()
-                .room_in(8 * gib, [u64::MAX, 2, 2])
+                .check_memory_of(8 * gib, [u64::MAX, 2, 2])
                 .is_err()
         );
     }

@@ -1,11 +1,17 @@
 //! A decoded picture whose pixels are made when they are asked for.
 
-use super::format::{Format, Source};
+use super::codec::channels::{ChannelMatch, Wanted};
+use super::codec::profile::{ColorDescription, Profile};
+use super::codec::raster::Raster;
+use super::codec::refusal::Refusal;
+use super::codec::{FromFile, jpeg, png, tiff};
+use super::decode::{camera_notes, catch_panic, decode_raster};
+use super::format::Format;
 use super::limits::{Limits, affordable};
-use super::profile::Profile;
-use super::raster::{Fit, FromFile, Raster, Refusal, Wanted};
-use super::{ReadOptions, camera_notes, caught, raster_of};
-use crate::{Error, Image, Result};
+use super::options::ReadOptions;
+use super::source::Source;
+use crate::error::{Error, Result};
+use crate::image::Image;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -35,16 +41,12 @@ impl Picture {
 
     pub(super) fn decode(path: &Path, options: &ReadOptions, wanted: Wanted) -> Result<Self> {
         let source = Source::open(path, &options.limits)?;
-        Self::of(
-            raster_of(&source, options, wanted),
-            &source,
-            &options.limits,
-            wanted,
-        )
+        let raster = decode_raster(&source, options, wanted);
+        Self::from_raster(raster, &source, &options.limits, wanted)
     }
 
-    /// Says what samples mean, and turns the picture the way the camera was held.
-    pub(super) fn of(
+    /// Finds the meaning of samples, and turns the picture the way the camera was held.
+    pub(super) fn from_raster(
         raster: std::result::Result<Raster, Refusal>,
         source: &Source,
         limits: &Limits,
@@ -52,10 +54,11 @@ impl Picture {
     ) -> Result<Self> {
         let raster = raster.map_err(|e| Error::file(&source.path, e))?;
         let profile = match wanted {
-            Wanted::Color | Wanted::Film => profile_of(&raster, source, limits),
+            Wanted::Color | Wanted::Film => usable_profile(&raster, source, limits),
             Wanted::Coverage | Wanted::Depth => None,
         };
-        warn_of_samples(&raster, source, wanted);
+        warn_not_finite(&raster, source, wanted);
+        warn_unusual_channels(&raster, source, wanted);
         let raster = raster.upright(camera_notes(source).orientation);
         Ok(Self {
             path: source.path.clone(),
@@ -93,6 +96,20 @@ impl Picture {
             .expect("colours were found when the picture was read")
     }
 
+    /// All colours, as [`read`](super::read) makes them.
+    ///
+    /// # Errors
+    /// [`Error::File`] for a picture with alpha below 1 where `LinearRgb` is asked for.
+    ///
+    /// # Panics
+    /// When the pixels asked for are no colours.
+    pub fn pixels<P: FromFile>(&self) -> Result<Image<P>> {
+        let rows = 0..self.raster.height;
+        P::check(&self.raster.rows(self.profile.as_ref(), rows.clone()))
+            .map_err(|e| Error::file(&self.path, e))?;
+        Ok(self.rows(rows))
+    }
+
     pub(super) fn into_image<P: FromFile>(self) -> Result<Image<P>> {
         let Self {
             path,
@@ -110,41 +127,58 @@ impl Picture {
 }
 
 /// The colour profile of display codes, where there is one other than sRGB.
-fn profile_of(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profile> {
+fn usable_profile(raster: &Raster, source: &Source, limits: &Limits) -> Option<Profile> {
     let path = source.path.display();
-    match caught(|| Ok(Profile::of_file(source, limits)?)) {
+    match catch_panic(|| Ok(embedded_profile(source, limits)?)) {
         Ok(Some(_)) if !raster.display_encoded => {
             log::warn!(
-                "{path}: has a colour profile, but float samples; taken for linear Rec. 709"
+                "{path}: has a colour profile, but float samples; treated as linear Rec. 709"
             );
             None
         }
         Ok(profile) => profile,
         Err(e) => {
-            log::warn!("{path}: has {e}; taken for sRGB");
+            log::warn!("{path}: has {e}; treated as sRGB");
             None
         }
     }
 }
 
-/// What a person should know of the samples that were taken.
-fn warn_of_samples(raster: &Raster, source: &Source, wanted: Wanted) {
-    let path = source.path.display();
-    // Endless depth is where nothing is.
-    let wild = if wanted == Wanted::Depth {
-        0
-    } else {
-        raster.not_finite()
+/// The profile in a file, if it is not sRGB anyway; formats of linear light have none.
+fn embedded_profile(
+    source: &Source,
+    limits: &Limits,
+) -> std::result::Result<Option<Profile>, String> {
+    let description = match source.format {
+        Format::Png => png::color_description(&source.bytes, limits),
+        Format::Jpeg => jpeg::profile(&source.bytes).map(ColorDescription::Icc),
+        Format::Tiff => tiff::profile(&source.bytes, limits).map(ColorDescription::Icc),
+        _ => None,
     };
-    if wild > 0 {
-        log::warn!("{path}: {wild} samples are infinite or no number");
+    description.map_or(Ok(None), Profile::from_description)
+}
+
+/// Infinite depth is where nothing is; elsewhere it is worth a warning.
+fn warn_not_finite(raster: &Raster, source: &Source, wanted: Wanted) {
+    if wanted == Wanted::Depth {
+        return;
     }
+    let count = raster.count_not_finite();
+    if count > 0 {
+        let path = source.path.display();
+        log::warn!("{path}: {count} samples are infinite or NaN");
+    }
+}
+
+/// Names the channels of a picture that has none of the default names.
+fn warn_unusual_channels(raster: &Raster, source: &Source, wanted: Wanted) {
+    let path = source.path.display();
     match wanted.choose(&raster.names) {
-        Ok((Fit::Layer, _)) => {
-            log::warn!("{path}: the channels {} are taken", raster.names.join(" "))
+        Ok((ChannelMatch::Layer, _)) => {
+            log::warn!("{path}: uses the channels {}", raster.names.join(" "))
         }
-        Ok((Fit::Alone, _)) => {
-            log::warn!("{path}: the channel {} is taken for grey", raster.names[0])
+        Ok((ChannelMatch::Alone, _)) => {
+            log::warn!("{path}: uses the channel {} as grey", raster.names[0])
         }
         _ => {}
     }

@@ -32,11 +32,11 @@ pub fn borders(labels: &Labels, tolerance_px: f64) -> Vec<Border> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::label::{Mask, ObjectLabel};
+    use crate::label::{ObjectLabel, RleMask};
 
     #[test]
     fn an_object_of_which_nothing_is_seen_has_a_whole_border_and_none_that_is_seen() {
-        let amodal_mask = Mask::from_fn([9, 9], |x, y| x + y < 8);
+        let amodal_mask = RleMask::from_fn([9, 9], |x, y| x + y < 8);
         let object = ObjectLabel {
             id: ObjectId(3),
             class: 2,

@@ -1,18 +1,23 @@
 //! Pictures in a grid on a page, each enlarged by a click or by the keyboard, without another file.
 
 use crate::color::to_srgb8;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::filter::resize;
 use crate::geom::BBox;
 use crate::image::{Image, Roi};
 use crate::io;
 use crate::pixel::LinearRgb;
-use crate::plot::{base64, escaped};
+use crate::plot::base64;
+use crate::plot::markup::text;
+use maud::{Markup, PreEscaped, html};
+use std::ops::Range;
 use std::path::Path;
 
 /// Longest side of a picture on a page, pixels, and its quality as JPEG: about 30 kB.
-const SIDE_PX: f64 = 480.0;
-const QUALITY: u8 = 82;
+const MAX_SIDE_PX: f64 = 480.0;
+const JPEG_QUALITY: u8 = 82;
+/// Height of letters, as a share of the longer side of what is shown.
+const LETTER_SHARE: f64 = 0.045;
 
 /// What a page with galleries needs once. An enlarged picture is the target of the address, so no script is needed for
 /// it; the script adds the keys Escape and the arrows.
@@ -44,37 +49,24 @@ impl Figure {
     ///
     /// # Errors
     /// A picture that cannot be read.
-    pub(crate) fn of(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
+    pub(crate) fn cropped(path: &Path, size: [f64; 2], view: BBox) -> Result<Self> {
         let picture = io::read::<LinearRgb>(path)?;
-        let scale = [
-            picture.width() as f64 / size[0],
-            picture.height() as f64 / size[1],
-        ];
-        let whole = |v: f64, most: usize| (v.max(0.0) as usize).min(most);
-        let [x0, x1] =
-            [view.x0, view.x1 + 1.0 / scale[0]].map(|x| whole(x * scale[0], picture.width()));
-        let [y0, y1] =
-            [view.y0, view.y1 + 1.0 / scale[1]].map(|y| whole(y * scale[1], picture.height()));
-        if x0 >= x1 || y0 >= y1 {
-            return Err(crate::Error::file(
-                path,
-                "nothing of it lies in the part to be shown",
-            ));
+        let scale_x = picture.width() as f64 / size[0];
+        let scale_y = picture.height() as f64 / size[1];
+        let columns = pixel_span([view.x0, view.x1], scale_x, picture.width());
+        let rows = pixel_span([view.y0, view.y1], scale_y, picture.height());
+        if columns.is_empty() || rows.is_empty() {
+            let what = "nothing of it lies in the part to be shown";
+            return Err(Error::file(path, what));
         }
-        let part = small(&picture.crop(Roi {
-            x: x0,
-            y: y0,
-            width: x1 - x0,
-            height: y1 - y0,
-        }));
-        let edge = |i: usize, k: usize| i as f64 / scale[k];
         let view = BBox {
-            x0: edge(x0, 0),
-            y0: edge(y0, 1),
-            x1: edge(x1, 0),
-            y1: edge(y1, 1),
+            x0: columns.start as f64 / scale_x,
+            y0: rows.start as f64 / scale_y,
+            x1: columns.end as f64 / scale_x,
+            y1: rows.end as f64 / scale_y,
         };
-        let jpeg = io::jpeg_bytes(&to_srgb8(&part), QUALITY)?;
+        let part = shrunk(&picture.crop(Roi::spanning(columns, rows)));
+        let jpeg = io::jpeg_bytes(&to_srgb8(&part), JPEG_QUALITY)?;
         Ok(Self {
             jpeg,
             view,
@@ -86,23 +78,20 @@ impl Figure {
     /// The whole of a picture.
     ///
     /// # Errors
-    /// As [`Figure::of`].
+    /// As [`Figure::cropped`].
     pub(crate) fn whole(path: &Path, size: [f64; 2]) -> Result<Self> {
-        Self::of(
-            path,
-            size,
-            BBox {
-                x0: 0.0,
-                y0: 0.0,
-                x1: size[0],
-                y1: size[1],
-            },
-        )
+        let view = BBox {
+            x0: 0.0,
+            y0: 0.0,
+            x1: size[0],
+            y1: size[1],
+        };
+        Self::cropped(path, size, view)
     }
 
     /// Height of letters, in the units of the drawing.
-    pub(crate) fn letter(&self) -> f64 {
-        0.045 * self.view.width().max(self.view.height())
+    pub(crate) fn letter_height(&self) -> f64 {
+        LETTER_SHARE * self.view.width().max(self.view.height())
     }
 
     /// Where it begins, in the units of the drawing.
@@ -110,93 +99,104 @@ impl Figure {
         self.view.y0
     }
 
-    fn html(&self, name: &str, i: usize, count: usize) -> String {
-        let Self {
-            jpeg,
-            view,
-            drawing,
-            caption,
-        } = self;
-        let (x, y, w, h) = (view.x0, view.y0, view.width(), view.height());
-        let aspect = w / h;
-        let (data, caption) = (base64(jpeg), escaped(caption));
-        let to = |class: &str, to: usize, word: &str| {
-            format!("<a class=\"{class}\" href=\"#{name}-{to}\">{word}</a>")
-        };
-        let back = if i > 0 {
-            to("back", i - 1, "&larr; previous")
-        } else {
-            String::new()
-        };
-        let on = if i + 1 < count {
-            to("on", i + 1, "next &rarr;")
-        } else {
-            String::new()
-        };
-        format!(
-            "<div id=\"{name}-{i}-at\"><figure id=\"{name}-{i}\">\
-             <a class=\"frame\" href=\"#{name}-{i}\" title=\"enlarge\" style=\"--aspect:{aspect:.4}\">\
-             <img alt=\"{caption}\" src=\"data:image/jpeg;base64,{data}\">\
-             <svg viewBox=\"{x:.2} {y:.2} {w:.2} {h:.2}\">{drawing}</svg></a><figcaption>{caption}</figcaption>\
-             <nav>{back}<a class=\"close\" href=\"#{name}-{i}-at\">close</a>{on}</nav></figure></div>\n"
-        )
+    /// Figure `i` of `count` of the gallery of a name.
+    fn html(&self, name: &str, i: usize, count: usize) -> Markup {
+        html! {
+            div id=(format_args!("{name}-{i}-at")) {
+                figure id=(format_args!("{name}-{i}")) {
+                    (self.frame(&format!("#{name}-{i}")))
+                    figcaption { (text(&self.caption)) }
+                    nav {
+                        @if i > 0 {
+                            a class="back" href=(format_args!("#{name}-{}", i - 1)) { "\u{2190} previous" }
+                        }
+                        a class="close" href=(format_args!("#{name}-{i}-at")) { "close" }
+                        @if i + 1 < count {
+                            a class="on" href=(format_args!("#{name}-{}", i + 1)) { "next \u{2192}" }
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// The picture under its drawing, which a click enlarges.
+    fn frame(&self, address: &str) -> Markup {
+        let (w, h) = (self.view.width(), self.view.height());
+        let view_box = format!("{:.2} {:.2} {w:.2} {h:.2}", self.view.x0, self.view.y0);
+        let data = format!("data:image/jpeg;base64,{}", base64(&self.jpeg));
+        html! {
+            a class="frame" href=(address) title="enlarge" style=(format_args!("--aspect:{:.4}", w / h)) {
+                img alt=(text(&self.caption)) src=(data);
+                svg viewBox=(view_box) { (PreEscaped(&self.drawing)) }
+            }
+        }
     }
 }
 
+/// The whole pixels between two places of a drawing, of a picture `scale` times as large.
+fn pixel_span([start, end]: [f64; 2], scale: f64, length: usize) -> Range<usize> {
+    let whole = |v: f64| ((v * scale).max(0.0) as usize).min(length);
+    whole(start)..whole(end + 1.0 / scale)
+}
+
 /// A picture no larger than is shown.
-fn small(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
+fn shrunk(picture: &Image<LinearRgb>) -> Image<LinearRgb> {
     let (w, h) = picture.size();
-    let factor = SIDE_PX / w.max(h) as f64;
-    let side = |n: usize| ((n as f64 * factor).round() as usize).max(1);
-    if factor < 1.0 {
-        resize(picture, side(w), side(h))
-    } else {
-        picture.clone()
+    let factor = MAX_SIDE_PX / w.max(h) as f64;
+    if factor >= 1.0 {
+        return picture.clone();
     }
+    let [w, h] = [w, h].map(|side| ((side as f64 * factor).round() as usize).max(1));
+    resize(picture, w, h)
 }
 
 /// A grid of figures; `name` begins their addresses on the page.
 pub(crate) fn gallery(name: &str, figures: &[Figure]) -> String {
-    let all: String = figures
-        .iter()
-        .enumerate()
-        .map(|(i, figure)| figure.html(name, i, figures.len()))
-        .collect();
-    format!("<div class=\"gallery\">\n{all}</div>\n")
+    html! {
+        div class="gallery" {
+            @for (i, figure) in figures.iter().enumerate() { (figure.html(name, i, figures.len())) }
+        }
+    }
+    .into_string()
+        + "\n"
 }
 
 /// A box with words at its upper left corner, inside it where there is no room above; `style` are attributes.
 pub(crate) fn marked_box(
     b: &BBox,
-    text: &str,
+    content: &str,
     letter: f64,
     top: f64,
     color: &str,
     style: &str,
 ) -> String {
-    let (w, h) = (b.width(), b.height());
     let rect = format!(
-        "<rect x=\"{:.2}\" y=\"{:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"none\" stroke=\"{color}\" {style}/>",
-        b.x0, b.y0
+        "<rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{:.2}\" fill=\"none\" stroke=\"{color}\" {style}/>",
+        b.x0,
+        b.y0,
+        b.width(),
+        b.height()
     );
-    let y = if b.y0 - 1.2 * letter < top {
-        b.y0 + letter
-    } else {
-        b.y0 - 0.25 * letter
-    };
-    if text.is_empty() {
-        rect
-    } else {
-        rect + &words([b.x0, y], text, letter, color)
+    if content.is_empty() {
+        return rect;
     }
+    let has_room_above = b.y0 - 1.2 * letter >= top;
+    let y = if has_room_above {
+        b.y0 - 0.25 * letter
+    } else {
+        b.y0 + letter
+    };
+    rect + &words([b.x0, y], content, letter, color)
 }
 
 /// Words that begin at a place.
-pub(crate) fn words([x, y]: [f64; 2], text: &str, letter: f64, color: &str) -> String {
-    let text = escaped(text);
-    format!(
-        "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{letter:.2}\" fill=\"{color}\">{text}</text>"
-    )
+pub(crate) fn words([x, y]: [f64; 2], content: &str, letter: f64, color: &str) -> String {
+    html! {
+        text x=(format_args!("{x:.2}")) y=(format_args!("{y:.2}")) font-size=(format_args!("{letter:.2}"))
+            fill=(color) { (text(content)) }
+    }
+    .into_string()
 }
 
 /// No more letters of a text than there is room for.
@@ -227,7 +227,7 @@ mod tests {
             x1: 10.0,
             y1: 30.0,
         };
-        let figure = Figure::of(&path, [20.0, 10.0], part).unwrap();
+        let figure = Figure::cropped(&path, [20.0, 10.0], part).unwrap();
         assert_eq!(
             figure.view,
             BBox {
@@ -238,7 +238,7 @@ mod tests {
             }
         );
         assert!(
-            Figure::of(
+            Figure::cropped(
                 &path,
                 [20.0, 10.0],
                 BBox {

@@ -11,12 +11,12 @@ use serde::{Deserialize, Serialize};
 /// mask of a picture without pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "rle::Text", into = "rle::Text")]
-pub struct Mask {
+pub struct RleMask {
     size: [u32; 2],
     runs: Vec<u32>,
 }
 
-impl Mask {
+impl RleMask {
     /// From what `inside` says of column and row; `size` is width and height.
     pub fn from_fn(size: [u32; 2], mut inside: impl FnMut(u32, u32) -> bool) -> Self {
         let pixels = (0..size[0]).flat_map(|x| (0..size[1]).map(move |y| (x, y)));
@@ -134,7 +134,7 @@ impl Bits {
     }
 
     /// The runs: looks for the next pixel that differs, a word at a time.
-    pub(crate) fn mask(&self) -> Mask {
+    pub(crate) fn mask(&self) -> RleMask {
         let end = self.size[0] as usize * self.size[1] as usize;
         let mut runs = Vec::new();
         let (mut at, mut value) = (0, false);
@@ -143,7 +143,7 @@ impl Bits {
             runs.push((next - at) as u32);
             (at, value) = (next, !value);
         }
-        Mask {
+        RleMask {
             size: self.size,
             runs,
         }
@@ -178,7 +178,7 @@ mod tests {
         ) {
             let mut bits = Bits::new([w, h]);
             dots.iter().for_each(|&(x, y)| bits.insert(x as usize, y as usize));
-            let mask = Mask::from_fn([w, h], |x, y| dots.contains(&(x, y)));
+            let mask = RleMask::from_fn([w, h], |x, y| dots.contains(&(x, y)));
             prop_assert_eq!(bits.mask(), mask.clone());
             let mut sorted = dots.clone();
             sorted.sort();
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_full_mask_starts_with_an_empty_run() {
-        let full = Mask::from_fn([3, 2], |_, _| true);
+        let full = RleMask::from_fn([3, 2], |_, _| true);
         assert_eq!((full.runs(), full.area()), (&[0, 6][..], 6));
         assert_eq!(
             full.bounds(),

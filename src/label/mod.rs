@@ -16,7 +16,7 @@ mod visibility;
 
 pub use border::{Border, borders};
 pub(crate) use gallery::clipped;
-pub use mask::Mask;
+pub use mask::RleMask;
 pub use overlay::overlay;
 pub use topmost::knotted;
 pub use visibility::DepthRange;
@@ -56,9 +56,9 @@ pub struct ObjectLabel {
     /// Box around what is seen of it; empty when nothing is.
     pub visible_box: BBox,
     /// Pixels that it covers, seen or not.
-    pub amodal_mask: Mask,
+    pub amodal_mask: RleMask,
     /// Pixels in which it is seen. See-through objects over each other are seen in the same pixels.
-    pub visible_mask: Mask,
+    pub visible_mask: RleMask,
     /// Seen share of its coverage, 0 to 1: what half covers a pixel counts half.
     pub visible_fraction: f64,
     /// Pixels of the visible mask over pixels of the amodal one, 0 to 1.

@@ -7,7 +7,7 @@
 //! character that many places after `0`.
 
 use crate::bounds::{LONGEST_SIDE_PX, MOST_PIXELS};
-use crate::label::Mask;
+use crate::label::RleMask;
 use serde::{Deserialize, Serialize};
 
 /// Code of the character for the group 0.
@@ -31,8 +31,8 @@ pub(crate) struct Text {
     counts: String,
 }
 
-impl From<Mask> for Text {
-    fn from(mask: Mask) -> Self {
+impl From<RleMask> for Text {
+    fn from(mask: RleMask) -> Self {
         let [w, h] = mask.size();
         Self {
             size: [h, w],
@@ -41,7 +41,7 @@ impl From<Mask> for Text {
     }
 }
 
-impl TryFrom<Text> for Mask {
+impl TryFrom<Text> for RleMask {
     type Error = String;
 
     fn try_from(text: Text) -> Result<Self, String> {
@@ -53,7 +53,7 @@ impl TryFrom<Text> for Mask {
         }
         let runs = decode(&text.counts).ok_or("counts: not COCO's compressed run lengths")?;
         let sum: u64 = runs.iter().map(|&n| u64::from(n)).sum();
-        Mask::from_runs([w, h], runs)
+        RleMask::from_runs([w, h], runs)
             .ok_or_else(|| format!("counts: runs of {sum} pixels in all, expected {w} x {h}"))
     }
 }
@@ -136,21 +136,21 @@ mod tests {
     /// Texts made by `encode` of pycocotools 2.0.11.
     #[test]
     fn texts_are_those_of_pycocotools() {
-        let square = Mask::from_fn([4, 5], |x, y| (1..3).contains(&x) && (1..4).contains(&y));
-        let bars = Mask::from_fn([640, 480], |x, y| match x {
+        let square = RleMask::from_fn([4, 5], |x, y| (1..3).contains(&x) && (1..4).contains(&y));
+        let bars = RleMask::from_fn([640, 480], |x, y| match x {
             200..203 => (100..300).contains(&y),
             203 => (50..60).contains(&y),
             300..302 => (5..470).contains(&y),
             _ => false,
         });
-        let none = Mask::from_fn([640, 480], |_, _| false);
+        let none = RleMask::from_fn([640, 480], |_, _| false);
         let texts = [square, bars, none].map(|mask| encode(mask.runs()));
         assert_eq!(texts, ["63204", "Tkm2X6h8000^NRJSV]1W>VcbN0k]n4", "PP\\9"]);
     }
 
     #[test]
     fn a_mask_of_another_size_is_refused() {
-        let read = |json: &str| serde_json::from_str::<Mask>(json).map_err(|e| e.to_string());
+        let read = |json: &str| serde_json::from_str::<RleMask>(json).map_err(|e| e.to_string());
         assert!(read(r#"{"size":[2,3],"counts":"06"}"#).is_ok());
         assert!(
             read(r#"{"size":[2,2],"counts":"06"}"#)

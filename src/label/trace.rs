@@ -10,7 +10,7 @@
 
 use super::simplify::{Ring, simplified};
 use crate::geom::Point2;
-use crate::label::Mask;
+use crate::label::RleMask;
 
 /// Steps to the right, down, left and up: each a right turn from the one before.
 const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
@@ -20,13 +20,13 @@ const STEPS: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
 ///
 /// Corners that the border goes without are dropped: no point of it is then farther than `tolerance_px` from the polygons,
 /// and no side crosses another. 0 keeps all corners; parts and holes are kept at any tolerance.
-pub fn polygons(mask: &Mask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
+pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
     parts(mask, tolerance_px).into_iter().map(points).collect()
 }
 
 /// The whole mask as one closed polygon, parts and holes joined by slits, simplified as [`polygons`] are; without points
 /// for an empty mask.
-pub fn polygon(mask: &Mask, tolerance_px: f64) -> Vec<Point2<f64>> {
+pub fn polygon(mask: &RleMask, tolerance_px: f64) -> Vec<Point2<f64>> {
     let mut parts = parts(mask, tolerance_px).into_iter();
     let first = parts.next().unwrap_or_default();
     points(parts.fold(first, join))
@@ -36,7 +36,7 @@ fn points(ring: Ring) -> Vec<Point2<f64>> {
     ring.into_iter().map(Point2::from).collect()
 }
 
-fn parts(mask: &Mask, tolerance_px: f64) -> Vec<Ring> {
+fn parts(mask: &RleMask, tolerance_px: f64) -> Vec<Ring> {
     let rings = simplified(Grid::new(mask).rings(), tolerance_px);
     let (mut parts, mut holes): (Vec<_>, Vec<_>) = rings.into_iter().partition(|r| area2(r) > 0.0);
     // What lies left of a hole is then joined before it.
@@ -56,7 +56,7 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(mask: &Mask) -> Self {
+    fn new(mask: &RleMask) -> Self {
         let b = mask.bounds();
         let [left, top, right, bottom] = [b.x0, b.y0, b.x1, b.y1].map(|v| v as i64);
         let (columns, rows) = (right - left + 1, bottom - top + 1);
@@ -237,7 +237,7 @@ mod tests {
         fn polygons_wind_once_around_the_pixels_inside_and_never_around_the_others(
             bits in prop::collection::vec(prop::bool::weighted(0.6), 12 * 9)
         ) {
-            let mask = Mask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
+            let mask = RleMask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
             let (parts, whole) = (polygons(&mask, 0.0), polygon(&mask, 0.0));
             prop_assert_eq!(parts.iter().map(|ring| area(ring)).sum::<f64>(), mask.area() as f64);
             prop_assert_eq!(area(&whole), mask.area() as f64);
@@ -275,7 +275,7 @@ mod tests {
         fn fewer_corners_keep_parts_and_holes_and_cross_nothing(
             bits in prop::collection::vec(prop::bool::weighted(0.6), 12 * 9), tolerance in 0.0..3.0_f64
         ) {
-            let mask = Mask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
+            let mask = RleMask::from_fn([12, 9], |x, y| bits[(x * 9 + y) as usize]);
             let rings = Grid::new(&mask).rings();
             let fewer = simplified(rings.clone(), tolerance);
             prop_assert_eq!(rings.len(), fewer.len());
@@ -299,15 +299,15 @@ mod tests {
 
     #[test]
     fn a_rectangle_has_four_corners() {
-        let mask = Mask::from_fn([8, 8], |x, y| (2..5).contains(&x) && (3..7).contains(&y));
+        let mask = RleMask::from_fn([8, 8], |x, y| (2..5).contains(&x) && (3..7).contains(&y));
         let corners = [[2.0, 3.0], [5.0, 3.0], [5.0, 7.0], [2.0, 7.0]].map(Point2::from);
         assert_eq!(polygons(&mask, 0.0), [corners.to_vec()]);
     }
 
     #[test]
     fn an_empty_mask_has_no_polygon() {
-        let none = Mask::from_fn([5, 5], |_, _| false);
+        let none = RleMask::from_fn([5, 5], |_, _| false);
         assert!(polygons(&none, 1.0).is_empty() && polygon(&none, 1.0).is_empty());
-        assert!(polygons(&Mask::default(), 0.0).is_empty());
+        assert!(polygons(&RleMask::default(), 0.0).is_empty());
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::deep::{DeepImage, DeepSample};
 use crate::label::mask::Bits;
-use crate::label::{LabelOptions, Mask};
+use crate::label::{LabelOptions, RleMask};
 use crate::pixel::ObjectId;
 use crate::work::{self, Kind};
 use serde::{Deserialize, Serialize};
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Seen {
     /// The pixels that the object covers, as if alone.
-    pub(crate) amodal: Mask,
+    pub(crate) amodal: RleMask,
     /// The pixels in which it is seen.
-    pub(crate) visible: Mask,
+    pub(crate) visible: RleMask,
     /// Seen share of its coverage.
     pub(crate) fraction: f64,
     /// How far away it is.

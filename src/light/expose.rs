@@ -2,32 +2,33 @@
 
 use crate::geom::{Point3, Vector3};
 use crate::image::Image;
-use crate::light::{irradiance, match_cast, match_noise, surface_color};
+use crate::light::{irradiance, match_light_tint, match_noise, surface_color};
 use crate::pixel::LinearRgb;
 use crate::scene::{Exposure, Scene};
 use std::f64::consts::PI;
 
-/// Share of the plate's pixels that are darker than what counts as its white.
+/// Share of the plate's pixels that are darker than its white.
 ///
 /// High, since white is the bright end; not the maximum, since a highlight or a dead pixel is not paper.
 const WHITE_PERCENTILE: f64 = 0.99;
 
-/// Finds out what a scene leaves to its plate: the colour of the light, the exposure, the noise.
+/// Estimates what a scene leaves to its plate: the colour of the light, the exposure, the noise.
 ///
 /// A scene that leaves nothing comes back as it is.
 pub fn match_plate(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    match_noise(expose(match_cast(scene, plate), plate), plate)
+    match_noise(expose(match_light_tint(scene, plate), plate), plate)
 }
 
-/// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene whose exposure is known comes back as it is.
+/// Turns [`Exposure::MatchPlate`] and [`Exposure::MatchSurface`] into [`Exposure::Ev`]; a scene whose exposure is known
+/// comes back as it is.
 ///
 /// A matte white card (albedo 1) in the middle of the surface, under the scene's lights with nothing in their way, gets
 /// the luminance of [`plate_white`], times `2^gain_ev`.
 ///
-/// This is an assumption, not a measurement: one photograph does not tell which of its pixels are white paper. It holds
-/// where the photo was exposed for the place and shows something bright; the surface itself is not asked, since a tray
-/// may be of any grey. Where that grey is known, `MatchSurface` is the better choice. `gain_ev` is there to say otherwise. Without any light in the scene, or on a black plate, the
-/// exposure is `gain_ev` alone.
+/// This is an assumption, not a measurement: one photograph does not show which of its pixels are white paper. It holds
+/// where the photo was exposed for the place and shows something bright; the surface itself is not used, since a tray
+/// may be of any grey. Where that grey is known, `MatchSurface` is the better choice. `gain_ev` overrides. Without any
+/// light in the scene, or on a black plate, the exposure is `gain_ev` alone.
 pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     let (wanted, gain_ev) = match scene.exposure {
         Exposure::Ev(_) => return scene,
@@ -37,21 +38,25 @@ pub fn expose(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
             (f64::from(surface.luminance()) / albedo, gain_ev)
         }
     };
-    let ratio = wanted / f64::from(white_card(&scene));
-    let match_ev = if ratio > 0.0 && ratio.is_finite() {
-        libm::log2(ratio)
-    } else {
-        0.0
-    };
+    let match_ev = stops_of(wanted / f64::from(white_card(&scene)));
     Scene {
         exposure: Exposure::Ev(match_ev + gain_ev),
         ..scene
     }
 }
 
+/// A ratio of luminances in stops; 0 for one that cannot be.
+fn stops_of(ratio: f64) -> f64 {
+    if ratio > 0.0 && ratio.is_finite() {
+        libm::log2(ratio)
+    } else {
+        0.0
+    }
+}
+
 /// Luminance of the plate's white: the 99th percentile over all pixels.
 ///
-/// Pixels that are not finite do not count; 0 for a plate without any other.
+/// Pixels that are not finite are left out; 0 for a plate without any other.
 pub fn plate_white(plate: &Image<LinearRgb>) -> f32 {
     let finite = plate.pixels().iter().filter(|c| c.is_finite());
     let mut values: Vec<_> = finite.map(|c| c.luminance()).collect();
@@ -64,8 +69,12 @@ pub fn plate_white(plate: &Image<LinearRgb>) -> f32 {
 
 /// Luminance of a white card in the middle of the surface.
 fn white_card(scene: &Scene) -> f32 {
-    let at_center = |light| irradiance(light, Point3::origin(), Vector3::z()).luminance();
-    scene.lights.iter().map(at_center).sum::<f32>() / PI as f32 + scene.ambient.luminance()
+    let lit: f32 = scene
+        .lights
+        .iter()
+        .map(|light| irradiance(light, Point3::origin(), Vector3::z()).luminance())
+        .sum();
+    lit / PI as f32 + scene.ambient.luminance()
 }
 
 #[cfg(test)]

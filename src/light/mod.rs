@@ -7,19 +7,23 @@
 mod ambient;
 mod area;
 mod expose;
+mod irradiance;
 mod nodes;
 mod noise;
 mod polygon;
+mod quadrature;
 mod sky;
 mod surface;
 
 pub use ambient::ambient_directions;
-pub use area::{LightFrame, frame, irradiance, radiance};
+pub use area::{LightFrame, frame, radiance};
 pub use expose::{expose, match_plate, plate_white};
+pub use irradiance::irradiance;
 pub(crate) use nodes::nodes_above;
-pub use nodes::{Node, gauss_legendre, nodes};
+pub use nodes::{Node, nodes};
 pub use noise::{match_noise, plate_noise};
 pub use polygon::polygon_irradiance;
+pub use quadrature::gauss_legendre;
 pub(crate) use sky::sky_cells;
 pub use sky::{SkyPiece, sky_pieces};
-pub use surface::{match_cast, surface_color};
+pub use surface::{match_light_tint, surface_color};

@@ -1,9 +1,10 @@
 //! Where an area light is sampled: few points, placed so that smooth integrals come out right.
 
 use crate::geom::{Point3, Vector3};
-use crate::light::area::{LightFrame, area, frame, sides};
+use crate::light::area::{LightFrame, face_area, frame, side_lengths};
+use crate::light::quadrature::gauss_legendre;
 use crate::scene::{AreaLight, LightShape};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// A point of a light's face and the area it stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,33 +43,36 @@ pub fn nodes(light: &AreaLight, per_side: usize) -> Vec<Node> {
 }
 
 fn rectangle_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
-    let (frame, area) = (frame(light), area(light));
-    let [half_x, half_y] = sides(light).map(|s| 0.5 * s);
-    let row = |&(y, wy): &(f64, f64)| {
-        rule.iter().map(move |&(x, wx)| Node {
+    let (frame, area) = (frame(light), face_area(light));
+    let [half_x, half_y] = side_lengths(light).map(|s| 0.5 * s);
+    let mut nodes = Vec::with_capacity(rule.len() * rule.len());
+    for &(y, wy) in rule {
+        nodes.extend(rule.iter().map(|&(x, wx)| Node {
             point: frame.point(x * half_x, y * half_y),
             area: area * wx * wy / 4.0,
-        })
-    };
-    rule.iter().flat_map(row).collect()
+        }));
+    }
+    nodes
 }
 
 fn ellipse_nodes(light: &AreaLight, rule: &[(f64, f64)]) -> Vec<Node> {
-    let (frame, area) = (frame(light), area(light));
-    let [half_x, half_y] = sides(light).map(|s| 0.5 * s);
+    let (frame, area) = (frame(light), face_area(light));
+    let [half_x, half_y] = side_lengths(light).map(|s| 0.5 * s);
     let steps = 2 * rule.len();
-    let ring = |(k, &(x, w)): (usize, &(f64, f64))| {
+    let mut nodes = Vec::with_capacity(steps * rule.len());
+    for (k, &(x, w)) in rule.iter().enumerate() {
         let radius = (0.5 + 0.5 * x).sqrt();
-        (0..steps).map(move |i| {
-            let (sin, cos) = libm::sincos(TAU * (i as f64 + 0.5 * (k % 2) as f64) / steps as f64);
-            let point = frame.point(radius * half_x * cos, radius * half_y * sin);
-            Node {
-                point,
-                area: area * 0.5 * w / steps as f64,
-            }
-        })
-    };
-    rule.iter().enumerate().flat_map(ring).collect()
+        nodes.extend(ring_directions(steps, k).map(|(sin, cos)| Node {
+            point: frame.point(radius * half_x * cos, radius * half_y * sin),
+            area: area * 0.5 * w / steps as f64,
+        }));
+    }
+    nodes
+}
+
+/// Sines and cosines of equal steps around ring `k`; odd rings are turned by half a step.
+fn ring_directions(steps: usize, k: usize) -> impl Iterator<Item = (f64, f64)> {
+    (0..steps).map(move |i| libm::sincos(TAU * (i as f64 + 0.5 * (k % 2) as f64) / steps as f64))
 }
 
 /// Sample points of the part of a light that is above the plane through `point` with unit `normal`: those of [`nodes`]
@@ -85,63 +89,82 @@ pub(crate) fn nodes_above(
     normal: &Vector3<f64>,
 ) -> Vec<Node> {
     let frame = frame(light);
-    let half = sides(light).map(|s| 0.5 * s);
-    let middle = normal.dot(&(frame.center - point));
-    let rise = [
-        half[0] * normal.dot(&frame.x),
-        half[1] * normal.dot(&frame.y),
-    ];
-    let [a, b] = rise.map(f64::abs);
-    let cut = match light.shape {
-        LightShape::Rectangle if middle.abs() < a + b => strips(middle, rise, per_side.max(1)),
-        LightShape::Ellipse if middle.abs() < a.hypot(b) => chords(middle, rise, per_side.max(1)),
+    let half = side_lengths(light).map(|s| 0.5 * s);
+    let horizon = LightHorizon {
+        middle: normal.dot(&(frame.center - point)),
+        rise: [
+            half[0] * normal.dot(&frame.x),
+            half[1] * normal.dot(&frame.y),
+        ],
+    };
+    let left = match light.shape {
+        LightShape::Rectangle if horizon.cuts_square() => horizon.strips(per_side.max(1)),
+        LightShape::Ellipse if horizon.cuts_disk() => horizon.chords(per_side.max(1)),
         _ => return nodes(light, per_side),
     };
-    let node = |([x, y], area): ([f64; 2], f64)| Node {
-        point: frame.point(x * half[0], y * half[1]),
-        area: area * half[0] * half[1],
-    };
-    cut.into_iter().map(node).collect()
+    left.into_iter()
+        .map(|([x, y], area)| Node {
+            point: frame.point(x * half[0], y * half[1]),
+            area: area * half[0] * half[1],
+        })
+        .collect()
 }
 
-/// Points and areas in the square -1..1 where `middle + rise . point` is above 0.
-fn strips(middle: f64, rise: [f64; 2], n: usize) -> Vec<([f64; 2], f64)> {
-    let [outer, inner] = if rise[1].abs() >= rise[0].abs() {
-        [0, 1]
-    } else {
-        [1, 0]
-    };
-    let rule = gauss_legendre(n);
-    let mut points = Vec::with_capacity(n * n);
-    for (a, width) in on(above(middle + rise[inner].abs(), rise[outer]), &rule) {
-        for (b, length) in on(above(middle + rise[outer] * a, rise[inner]), &rule) {
-            let mut point = [0.0; 2];
-            (point[outer], point[inner]) = (a, b);
-            points.push((point, width * length));
-        }
+/// A receiver's plane as a light sees it: its height over the plane is `middle + rise . point`, with the light's sides
+/// running from -1 to 1.
+struct LightHorizon {
+    middle: f64,
+    rise: [f64; 2],
+}
+
+impl LightHorizon {
+    fn cuts_square(&self) -> bool {
+        let [a, b] = self.rise.map(f64::abs);
+        self.middle.abs() < a + b
     }
-    points
-}
 
-/// Points and areas in the unit disk where `middle + rise . point` is above 0.
-fn chords(middle: f64, rise: [f64; 2], n: usize) -> Vec<([f64; 2], f64)> {
-    let steepest = rise[0].hypot(rise[1]);
-    let [x, y] = rise.map(|r| r / steepest);
-    let widest = libm::acos((-middle / steepest).clamp(-1.0, 1.0));
-    // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.
-    let (across, along) = (gauss_legendre(2 * n), gauss_legendre(n));
-    let mut points = Vec::with_capacity(2 * n * n);
-    for (angle, width) in on([0.0, widest], &across) {
-        let (half, at) = libm::sincos(angle);
-        let chord = |&(t, w): &(f64, f64)| {
-            (
-                [at * x - half * t * y, at * y + half * t * x],
-                width * half * half * w,
-            )
+    fn cuts_disk(&self) -> bool {
+        let [a, b] = self.rise.map(f64::abs);
+        self.middle.abs() < a.hypot(b)
+    }
+
+    /// Points and areas in the square -1..1 above the plane.
+    fn strips(&self, n: usize) -> Vec<([f64; 2], f64)> {
+        let (middle, rise) = (self.middle, self.rise);
+        let [outer, inner] = if rise[1].abs() >= rise[0].abs() {
+            [0, 1]
+        } else {
+            [1, 0]
         };
-        points.extend(along.iter().map(chord));
+        let rule = gauss_legendre(n);
+        let mut points = Vec::with_capacity(n * n);
+        for (a, width) in rule_on(above(middle + rise[inner].abs(), rise[outer]), &rule) {
+            for (b, length) in rule_on(above(middle + rise[outer] * a, rise[inner]), &rule) {
+                let mut point = [0.0; 2];
+                (point[outer], point[inner]) = (a, b);
+                points.push((point, width * length));
+            }
+        }
+        points
     }
-    points
+
+    /// Points and areas in the unit disk above the plane.
+    fn chords(&self, n: usize) -> Vec<([f64; 2], f64)> {
+        let steepest = self.rise[0].hypot(self.rise[1]);
+        let [x, y] = self.rise.map(|r| r / steepest);
+        let widest = libm::acos((-self.middle / steepest).clamp(-1.0, 1.0));
+        // Chords of a nearly whole disk grow and shrink again: n of them miss its area by 2 %.
+        let (across, along) = (gauss_legendre(2 * n), gauss_legendre(n));
+        let mut points = Vec::with_capacity(2 * n * n);
+        for (angle, width) in rule_on([0.0, widest], &across) {
+            let (half, at) = libm::sincos(angle);
+            points.extend(along.iter().map(|&(t, w)| {
+                let point = [at * x - half * t * y, at * y + half * t * x];
+                (point, width * half * half * w)
+            }));
+        }
+        points
+    }
 }
 
 /// The part of -1..1 where `start + slope x` is above 0.
@@ -155,76 +178,18 @@ fn above(start: f64, slope: f64) -> [f64; 2] {
 }
 
 /// A rule on an interval: points and weights.
-fn on([from, to]: [f64; 2], rule: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+fn rule_on([from, to]: [f64; 2], rule: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
     let half = 0.5 * (to - from);
     rule.iter()
         .map(move |(x, w)| (from + half * (1.0 + x), half * w))
 }
 
-/// Abscissae in -1..1 and weights (sum 2) of the Gauss-Legendre rule of `n` points.
-///
-/// # Method
-/// Newton's iteration on the Legendre polynomial from Tricomi's estimate of its roots.
-pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
-    (0..n)
-        .map(|i| {
-            gauss_point(
-                n,
-                libm::cos(PI * (n as f64 - i as f64 - 0.25) / (n as f64 + 0.5)),
-            )
-        })
-        .collect()
-}
-
-fn gauss_point(n: usize, estimate: f64) -> (f64, f64) {
-    // Quadratic convergence: 8 steps are plenty from an estimate good to three digits.
-    let root = (0..8).fold(estimate, |x, _| {
-        let (p, slope) = legendre(n, x);
-        x - p / slope
-    });
-    let (_, slope) = legendre(n, root);
-    (root, 2.0 / ((1.0 - root * root) * slope * slope))
-}
-
-/// Value and slope of the Legendre polynomial of degree `n`, by its recurrence.
-fn legendre(n: usize, x: f64) -> (f64, f64) {
-    let (mut last, mut p) = (1.0, x);
-    for k in 2..=n {
-        let k = k as f64;
-        (last, p) = (p, ((2.0 * k - 1.0) * x * p - (k - 1.0) * last) / k);
-    }
-    (p, n as f64 * (x * p - last) / (x * x - 1.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::light::area::radiance;
     use crate::light::area::tests::{lit_points, square};
-    use crate::light::radiance;
-
-    #[test]
-    fn three_points_are_the_textbook_rule() {
-        let rule = gauss_legendre(3);
-        let expected = [
-            (-0.6f64.sqrt(), 5.0 / 9.0),
-            (0.0, 8.0 / 9.0),
-            (0.6f64.sqrt(), 5.0 / 9.0),
-        ];
-        for ((x, w), (ex, ew)) in rule.into_iter().zip(expected) {
-            assert!((x - ex).abs() < 1e-14 && (w - ew).abs() < 1e-14);
-        }
-    }
-
-    #[test]
-    fn n_points_integrate_degree_2n_minus_1() {
-        for n in 1..9 {
-            let sum: f64 = gauss_legendre(n)
-                .iter()
-                .map(|&(x, w)| w * x.powi(2 * n as i32 - 2))
-                .sum();
-            assert!((sum - 2.0 / (2 * n - 1) as f64).abs() < 1e-13, "{n} points");
-        }
-    }
+    use std::f64::consts::PI;
 
     #[test]
     fn nine_nodes_match_the_closed_form() {
@@ -319,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_light_that_the_horizon_does_not_cut_has_its_usual_nodes() {
+    fn a_light_that_the_horizon_does_not_cut_keeps_its_nodes() {
         let light = square();
         assert_eq!(
             nodes_above(&light, 3, Point3::origin(), &Vector3::z()),

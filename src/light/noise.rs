@@ -1,16 +1,16 @@
-//! How noisy a photograph is.
+//! The noise of a photograph.
 
 use crate::image::Image;
 use crate::pixel::LinearRgb;
 use crate::scene::{Noise, Scene};
 
 /// Groups of pixels of like brightness.
-const GROUPS: usize = 12;
-/// Fewer pixels tell nothing of a group.
-const FEWEST: usize = 200;
-/// Texture only makes residuals larger, so the small ones tell the noise: a quarter of a normal distribution's magnitudes
+const BRIGHTNESS_GROUPS: usize = 12;
+/// A group of fewer pixels has no noise that could be estimated.
+const MIN_GROUP_PIXELS: usize = 200;
+/// Texture only makes residuals larger, so the small ones show the noise: a quarter of a normal distribution's magnitudes
 /// lies below 0.3186 standard deviations.
-const QUARTILE: f64 = 0.318_639;
+const QUARTILE_SIGMAS: f64 = 0.318_639;
 /// Standard deviation of the residual of noise of standard deviation 1: the root of the mask's summed squares.
 const MASK_GAIN: f64 = 6.0;
 /// Values from here on may be clipped.
@@ -24,70 +24,68 @@ pub fn match_noise(mut scene: Scene, plate: &Image<LinearRgb>) -> Scene {
     scene
 }
 
-/// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small to tell.
+/// The noise of a photograph, from its green channel: [`Noise::None`] for one that is too small.
 ///
 /// # Method
 /// The residual of the difference of two Laplacians, which passes over slopes and straight edges (J. Immerkær, "Fast Noise
 /// Variance Estimation", 1996); its lower quartile in groups of like brightness; a line through their variances.
 pub fn plate_noise(plate: &Image<LinearRgb>) -> Noise {
+    let mut residuals = residuals_of(plate);
+    residuals.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = residuals.len() / BRIGHTNESS_GROUPS;
+    if size < MIN_GROUP_PIXELS {
+        return Noise::None;
+    }
+    let groups: Vec<_> = residuals.chunks_exact(size).map(group_noise).collect();
+    fit_noise(&groups)
+}
+
+/// The residuals around all pixels but the outermost.
+fn residuals_of(plate: &Image<LinearRgb>) -> Vec<(f32, f32)> {
     let (width, height) = plate.size();
-    if width < 3 || height < 3 {
-        return Noise::None;
-    }
-    let mut seen: Vec<(f32, f32)> = (1..height - 1)
-        .flat_map(|y| (1..width - 1).map(move |x| (x, y)))
-        .filter_map(|(x, y)| residual(plate, x, y))
-        .collect();
-    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let size = seen.len() / GROUPS;
-    if size < FEWEST {
-        return Noise::None;
-    }
-    fit(&seen.chunks_exact(size).map(of_group).collect::<Vec<_>>())
+    (1..height.saturating_sub(1))
+        .flat_map(|y| (1..width.saturating_sub(1)).map(move |x| (x, y)))
+        .filter_map(|(x, y)| residual_at(plate, x, y))
+        .collect()
 }
 
 /// Mean and magnitude of the residual around a pixel; none near white or where something is not finite.
-fn residual(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32)> {
+fn residual_at(plate: &Image<LinearRgb>, x: usize, y: usize) -> Option<(f32, f32)> {
     const MASK: [f32; 9] = [1.0, -2.0, 1.0, -2.0, 4.0, -2.0, 1.0, -2.0, 1.0];
-    let at = |i: usize| plate[(x + i % 3 - 1, y + i / 3 - 1)].g;
     let (mut mean, mut sum) = (0.0, 0.0);
     for (i, weight) in MASK.iter().enumerate() {
-        mean += at(i) / 9.0;
-        sum += weight * at(i);
+        let value = plate[(x + i % 3 - 1, y + i / 3 - 1)].g;
+        mean += value / 9.0;
+        sum += weight * value;
     }
     (mean.is_finite() && sum.is_finite() && mean < NEARLY_WHITE).then_some((mean, sum.abs()))
 }
 
 /// Mean brightness and variance of a group.
-fn of_group(group: &[(f32, f32)]) -> [f64; 2] {
+fn group_noise(group: &[(f32, f32)]) -> [f64; 2] {
     let mean = group.iter().map(|p| f64::from(p.0)).sum::<f64>() / group.len() as f64;
     let mut residuals: Vec<f32> = group.iter().map(|p| p.1).collect();
-    let quarter = *residuals
-        .select_nth_unstable_by(group.len() / 4, f32::total_cmp)
-        .1;
-    let sigma = f64::from(quarter) / (QUARTILE * MASK_GAIN);
+    let (_, quarter, _) = residuals.select_nth_unstable_by(group.len() / 4, f32::total_cmp);
+    let sigma = f64::from(*quarter) / (QUARTILE_SIGMAS * MASK_GAIN);
     [mean, sigma * sigma]
 }
 
 /// The line of least squares through variances over means, neither part of it negative.
-fn fit(groups: &[[f64; 2]]) -> Noise {
+fn fit_noise(groups: &[[f64; 2]]) -> Noise {
     let n = groups.len() as f64;
-    let sum = |f: &dyn Fn(&[f64; 2]) -> f64| groups.iter().map(f).sum::<f64>();
-    let (x, y, xx, xy) = (
-        sum(&|g| g[0]),
-        sum(&|g| g[1]),
-        sum(&|g| g[0] * g[0]),
-        sum(&|g| g[0] * g[1]),
-    );
+    let x: f64 = groups.iter().map(|g| g[0]).sum();
+    let y: f64 = groups.iter().map(|g| g[1]).sum();
+    let xx: f64 = groups.iter().map(|g| g[0] * g[0]).sum();
+    let xy: f64 = groups.iter().map(|g| g[0] * g[1]).sum();
     let spread = n * xx - x * x;
     let slope = if spread > 0.0 {
         (n * xy - x * y) / spread
     } else {
         0.0
     };
-    let rest = (y - slope * x) / n;
-    let (shot, dark) = match (slope > 0.0, rest > 0.0) {
-        (true, true) => (slope, rest),
+    let offset = (y - slope * x) / n;
+    let (shot, dark) = match (slope > 0.0, offset > 0.0) {
+        (true, true) => (slope, offset),
         (true, false) => (xy / xx.max(f64::MIN_POSITIVE), 0.0),
         (false, _) => (0.0, y / n),
     };

@@ -17,10 +17,13 @@ pub fn polygon_irradiance(
 ) -> f64 {
     let rays = above_horizon(corners.iter().map(|c| c - point).collect(), normal);
     let edges = rays.iter().zip(rays.iter().cycle().skip(1));
-    0.5 * edges.map(|(a, b)| edge(a, b, normal)).sum::<f64>().abs()
+    0.5 * edges
+        .map(|(a, b)| edge_irradiance(a, b, normal))
+        .sum::<f64>()
+        .abs()
 }
 
-fn edge(a: &Vector3<f64>, b: &Vector3<f64>, normal: Vector3<f64>) -> f64 {
+fn edge_irradiance(a: &Vector3<f64>, b: &Vector3<f64>, normal: Vector3<f64>) -> f64 {
     let cross = a.cross(b);
     let length = cross.norm();
     // An edge seen end on subtends nothing.

@@ -22,65 +22,83 @@ pub struct SkyPiece {
 /// Pieces add up to the irradiance of the whole map on the receiver, nothing in the way.
 ///
 /// # Method
-/// The map is cut into rectangles in the way that makes the errors of shadows smallest ([`Panorama::pieces`](crate::asset::Panorama::pieces)), so a sun is
-/// a piece of its own. A piece that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; what the
+/// The map is cut into rectangles in the way that makes the errors of shadows smallest ([`Panorama::pieces`](crate::asset::Panorama::pieces)),
+/// so a sun is a piece of its own. A piece that the receiver's horizon does not cut gives exactly `n . integral of L w dw`; what the
 /// horizon cuts off others is made up for by scaling all to the irradiance that a sum over the whole map gives.
 pub fn sky_pieces(map: &EnvironmentMap, count: usize, normal: &Vector3<f64>) -> Vec<SkyPiece> {
-    scaled(map, &map.panorama.pieces(count), normal)
+    scaled_pieces(map, &map.panorama.pieces(count), normal)
 }
 
-/// The same in even rectangles, about `count` of them: slower to come right, with nothing to go wrong.
+/// The same in even rectangles, about `count` of them: slower to converge, and simpler.
 pub(crate) fn sky_cells(
     map: &EnvironmentMap,
     count: usize,
     normal: &Vector3<f64>,
 ) -> Vec<SkyPiece> {
     let rows = (count as f64 / 2.0).sqrt().ceil() as usize;
-    scaled(map, &map.panorama.even(rows), normal)
+    scaled_pieces(map, &map.panorama.even(rows), normal)
 }
 
 /// Side of a square as large as half the sky, radians: `sqrt(2 pi)`.
-const HALF_OF_THE_SKY: f64 = 2.506_628_274_631;
+const HALF_SKY_WIDTH: f64 = 2.506_628_274_631;
 
-fn scaled(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<SkyPiece> {
+/// The pieces over a receiver's horizon, scaled to the irradiance of the whole map.
+fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) -> Vec<SkyPiece> {
     work::add(Kind::MapPieces, pieces.len() as u64);
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
     let mut seen: Vec<_> = pieces
         .iter()
-        .filter_map(|piece| over(piece, &local))
+        .filter_map(|piece| VisiblePiece::over_horizon(piece, &local))
         .collect();
     let whole = map.panorama.irradiance(&local);
     if seen.is_empty() && whole.iter().any(|&e| e > 0.0) {
         // A sun has taken all the cuts, on the other side: what little there is here is one piece.
-        seen.push((local, whole, HALF_OF_THE_SKY));
+        seen.push(VisiblePiece {
+            direction: local,
+            irradiance: whole,
+            width: HALF_SKY_WIDTH,
+        });
     }
-    let sum = seen.iter().fold([0.0; 3], |sum, (_, e, _)| {
-        std::array::from_fn(|c| sum[c] + e[c])
-    });
-    let strength = f64::from(map.strength);
-    let scale: [f64; 3] = std::array::from_fn(|c| {
-        if sum[c] > 0.0 {
-            strength * whole[c] / sum[c]
+    let scale = irradiance_scale(&seen, whole, f64::from(map.strength));
+    seen.into_iter()
+        .map(|piece| SkyPiece {
+            direction: turned(&piece.direction, -map.rotation),
+            irradiance: std::array::from_fn(|c| (piece.irradiance[c] * scale[c]) as f32).into(),
+            width: piece.width,
+        })
+        .collect()
+}
+
+/// Factors that make pieces add up to the irradiance of the whole map times its strength.
+fn irradiance_scale(pieces: &[VisiblePiece], whole: [f64; 3], strength: f64) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let sum = pieces.iter().fold(0.0, |sum, p| sum + p.irradiance[c]);
+        if sum > 0.0 {
+            strength * whole[c] / sum
         } else {
             0.0
         }
-    });
-    let piece = |(direction, e, width): (Vector3<f64>, [f64; 3], f64)| SkyPiece {
-        direction: turned(&direction, -map.rotation),
-        irradiance: std::array::from_fn(|c| (e[c] * scale[c]) as f32).into(),
-        width,
-    };
-    seen.into_iter().map(piece).collect()
+    })
 }
 
-/// Direction, irradiance and width of a piece over a horizon; none for one below it.
-fn over(piece: &Piece, normal: &Vector3<f64>) -> Option<(Vector3<f64>, [f64; 3], f64)> {
-    let direction = piece.moments.direction()?;
-    let e = piece.moments.irradiance(normal);
-    (direction.dot(normal) > 0.0 && e.iter().any(|&v| v > 0.0)).then_some((
-        direction,
-        e,
-        piece.moments.width(),
-    ))
+/// A piece in the frame of the picture.
+struct VisiblePiece {
+    direction: Vector3<f64>,
+    irradiance: [f64; 3],
+    width: f64,
+}
+
+impl VisiblePiece {
+    /// None for a piece below a receiver's horizon.
+    fn over_horizon(piece: &Piece, normal: &Vector3<f64>) -> Option<Self> {
+        let direction = piece.moments.direction()?;
+        let irradiance = piece.moments.irradiance(normal);
+        let lights = direction.dot(normal) > 0.0 && irradiance.iter().any(|&v| v > 0.0);
+        lights.then_some(Self {
+            direction,
+            irradiance,
+            width: piece.moments.width(),
+        })
+    }
 }

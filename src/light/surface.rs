@@ -1,9 +1,10 @@
-//! What the plate tells of the light on the labelled surface.
+//! The colour of the light on the labelled surface, from the plate.
 
-use crate::geom::{Plane, Point2};
+use crate::camera::Camera;
+use crate::geom::{Plane, Point2, Point3};
 use crate::image::Image;
 use crate::pixel::LinearRgb;
-use crate::scene::{CameraSource, Cast, Scene};
+use crate::scene::{CameraSource, LightTint, Scene};
 
 /// The median colour, channel by channel, of the plate where the scene's labelled rectangle is seen; none where the
 /// camera is not known yet, or does not see it.
@@ -12,66 +13,71 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
         return None;
     };
     let [w, h] = scene.surface.size.map(|side| 0.5 * side);
-    let on_surface = |x: usize, y: usize| {
-        let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
-        let hit = Plane::surface().intersect(&ray).map(|t| ray.at(t));
-        hit.is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
-    };
     let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
     let seen: Vec<LinearRgb> = places
-        .filter(|&(x, y)| on_surface(x, y))
+        .filter(|&(x, y)| {
+            surface_point(&camera, x, y).is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
+        })
         .map(|at| plate[at])
         .filter(|c| c.is_finite())
         .collect();
     if seen.is_empty() {
         return None;
     }
-    let median = |channel: fn(&LinearRgb) -> f32| {
-        let mut values: Vec<f32> = seen.iter().map(channel).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
     Some(LinearRgb::new(
-        median(|c| c.r),
-        median(|c| c.g),
-        median(|c| c.b),
+        median_of(&seen, |c| c.r),
+        median_of(&seen, |c| c.g),
+        median_of(&seen, |c| c.b),
     ))
 }
 
-/// Turns [`Cast::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
+/// The point of the plane `z = 0` that a pixel shows.
+fn surface_point(camera: &Camera, x: usize, y: usize) -> Option<Point3<f64>> {
+    let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5));
+    Plane::surface().intersect(&ray).map(|t| ray.at(t))
+}
+
+/// The median of a channel; the upper one of two.
+fn median_of(colors: &[LinearRgb], channel: fn(&LinearRgb) -> f32) -> f32 {
+    let mut values: Vec<f32> = colors.iter().map(channel).collect();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+/// Turns [`LightTint::MatchSurface`] into the colour of the surface's light; any other scene comes back as it is.
 ///
-/// The surface is taken to be grey: its colour is then that of the light on it. A share below 1 believes half, say, of
+/// The surface is assumed to be grey: its colour is then that of the light on it. A share below 1 takes only a part of
 /// that, since trays and tables may have a colour of their own. Luminance stays.
-pub fn match_cast(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
-    let Cast::MatchSurface { share } = scene.cast else {
+pub fn match_light_tint(scene: Scene, plate: &Image<LinearRgb>) -> Scene {
+    let LightTint::MatchSurface { share } = scene.cast else {
         return scene;
     };
     let color = surface_color(&scene, plate).unwrap_or(LinearRgb::WHITE);
-    let luminance = color.luminance();
-    let lit = color.r > 0.0 && color.g > 0.0 && color.b > 0.0;
-    let channel = |v: f32| {
-        if lit {
-            libm::pow(f64::from(v / luminance), share) as f32
-        } else {
-            1.0
-        }
-    };
-    let tint = color.map(channel);
+    let tint = tint_of(color, share);
     Scene {
-        cast: Cast::Known(tint.scale(1.0 / tint.luminance())),
+        cast: LightTint::Known(tint.scale(1.0 / tint.luminance())),
         ..scene
+    }
+}
+
+/// A share, as an exponent, of a colour's ratio to grey; white for a colour without some channel.
+fn tint_of(color: LinearRgb, share: f64) -> LinearRgb {
+    let luminance = color.luminance();
+    if color.r > 0.0 && color.g > 0.0 && color.b > 0.0 {
+        color.map(|v| libm::pow(f64::from(v / luminance), share) as f32)
+    } else {
+        LinearRgb::WHITE
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::camera::Camera;
     use crate::geom::{Pose, UnitQuaternion, Vector2, Vector3};
     use crate::scene::{Exposure, Surface};
 
     /// A camera one metre above a surface that fills the middle half of its picture.
-    pub(in crate::light) fn scene(cast: Cast) -> Scene {
+    pub(in crate::light) fn scene(cast: LightTint) -> Scene {
         let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
         let camera = Camera {
             image: [40, 30],
@@ -104,32 +110,33 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_surface_is_told_from_the_table_and_from_highlights() {
+    fn the_surface_is_separated_from_the_table_and_from_highlights() {
         assert_eq!(
-            surface_color(&scene(Cast::default()), &plate()),
+            surface_color(&scene(LightTint::default()), &plate()),
             Some(LinearRgb::new(0.4, 0.2, 0.1))
         );
     }
 
     #[test]
-    fn the_cast_is_the_surface_s_colour_at_luminance_one() {
-        let Cast::Known(tint) = match_cast(scene(Cast::MatchSurface { share: 1.0 }), &plate()).cast
+    fn the_tint_is_the_surface_s_colour_at_luminance_one() {
+        let LightTint::Known(tint) =
+            match_light_tint(scene(LightTint::MatchSurface { share: 1.0 }), &plate()).cast
         else {
             panic!("still unknown")
         };
         assert!((tint.luminance() - 1.0).abs() < 1e-6 && (tint.r / tint.g - 2.0).abs() < 1e-5);
-        let none = match_cast(scene(Cast::MatchSurface { share: 0.0 }), &plate()).cast;
-        assert_eq!(none, Cast::Known(LinearRgb::WHITE));
-        let known = scene(Cast::Known(LinearRgb::new(2.0, 1.0, 0.5)));
-        assert_eq!(match_cast(known.clone(), &plate()), known);
+        let none = match_light_tint(scene(LightTint::MatchSurface { share: 0.0 }), &plate()).cast;
+        assert_eq!(none, LightTint::Known(LinearRgb::WHITE));
+        let known = scene(LightTint::Known(LinearRgb::new(2.0, 1.0, 0.5)));
+        assert_eq!(match_light_tint(known.clone(), &plate()), known);
     }
 
     #[test]
-    fn a_black_plate_has_no_cast() {
-        let black = match_cast(
-            scene(Cast::MatchSurface { share: 1.0 }),
+    fn a_black_plate_has_no_tint() {
+        let black = match_light_tint(
+            scene(LightTint::MatchSurface { share: 1.0 }),
             &Image::filled(40, 30, LinearRgb::BLACK),
         );
-        assert_eq!(black.cast, Cast::Known(LinearRgb::WHITE));
+        assert_eq!(black.cast, LightTint::Known(LinearRgb::WHITE));
     }
 }

@@ -1,17 +1,20 @@
 //! Film: reflected light and transmittance of see-through plastic from one photo on a coloured screen.
 
 mod bright;
-mod doubts;
+mod object;
 mod planes;
 mod solve;
 pub(super) mod tint;
+mod uncertainty;
 mod view;
 
-pub use doubts::ColorDoubts;
+pub(super) use object::OPAQUE;
 pub use planes::film_planes;
+pub use uncertainty::ColorUncertainty;
 pub(super) use view::view;
 
 use super::plate::ScreenPlate;
+use super::prepared::{check_finite, longer_side, refused};
 use super::screen::{is_keyable, strongest_channel};
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
@@ -22,21 +25,22 @@ use crate::stopwatch::Stopwatch;
 use serde::{Deserialize, Serialize};
 use solve::{Factor, Solver};
 use std::borrow::Cow;
+use tint::{DARKEST_SHARE, Tint, TintSamples};
 
 /// How film is solved for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FilmOptions {
-    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath it; nothing = from the
-    /// photo. Default: nothing.
+    /// Transmittance per channel of the plastic where it lies flat, as seen on a screen beneath it; none = from the
+    /// photo. Default: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<LinearRgb>,
-    /// Scene-linear value from which on a channel counts as clipped. Default: 0.98.
+    /// Scene-linear value from which on a channel is clipped. Default: 0.98.
     pub clipped: f32,
-    /// How far the thickness of plastic scatters around that of two walls, as a share: what counts where the photo does
-    /// not tell. Default: 0.35.
+    /// How far the thickness of plastic scatters around that of two walls, as a share: the prior where the photo
+    /// shows too little. Default: 0.35.
     pub thickness_spread: f32,
-    /// How well the reflected light of the screen's channel is told from the others, as a share. Default: 0.15.
+    /// How well the reflected light of the screen's channel is inferred from the others, as a share. Default: 0.15.
     pub reflection_error: f32,
 }
 
@@ -51,7 +55,7 @@ impl Default for FilmOptions {
     }
 }
 
-/// What one photo tells of a film. `F + V * background` composites it over a background with light of its own,
+/// The film that one photo shows. `F + V * background` composites it over a background with light of its own,
 /// `F + T * background` over one that the object itself shades.
 #[derive(Clone, Debug)]
 pub struct FilmMatte {
@@ -61,11 +65,11 @@ pub struct FilmMatte {
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
     /// Expected error of T in each pixel, 0 to 1: large where the photo does not fix it.
-    pub uncertainty: Image<Coverage>,
+    pub uncertainty: Image<f32>,
     /// T of the plastic where it lies flat: its tint, and what relates V to T.
     pub flat: LinearRgb,
-    /// What makes its colours wrong.
-    pub doubts: ColorDoubts,
+    /// What may make its colours wrong.
+    pub color_uncertainty: ColorUncertainty,
     /// What a person should know.
     pub diagnostics: Vec<Diagnostic>,
 }
@@ -81,7 +85,7 @@ impl FilmMatte {
 /// Solves `photo = F + T * plate` for the reflected light F and the transmittance T of one object.
 ///
 /// `photo` is scene-linear; `inside` is the object's coverage, soft at its outline, and cuts off everything else (the
-/// garbage matte). A screen with little colour tells little of T: then what may be plastic by its light is guessed to be
+/// garbage matte). A screen with little colour shows little of T: then what may be plastic by its light is guessed to be
 /// that, and a [`Diagnostic`] says so.
 ///
 /// # Method
@@ -109,106 +113,198 @@ pub fn film(
     inside: &Image<Coverage>,
     opts: &FilmOptions,
 ) -> Result<FilmMatte> {
-    let longer_side = photo.width().max(photo.height());
-    film_of_part(
+    opts.check()?;
+    check_finite(photo)?;
+    let object = FilmInput {
         photo,
         plate,
         inside,
-        PartOf {
-            screen: plate.color(),
-            longer_side,
-        },
-        opts,
-    )
+        screen: plate.color(),
+        longer_side: longer_side(photo),
+    };
+    solve_film(object, opts)
 }
 
-/// What a part of a photo does not tell of all of it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct PartOf {
-    /// Mean colour of the screen.
+/// A photo on its screen, or the part of it around the object: there is nothing to solve elsewhere. All pictures are of
+/// one size.
+#[derive(Clone, Copy)]
+pub(super) struct FilmInput<'a> {
+    /// Finite.
+    pub(super) photo: &'a Image<LinearRgb>,
+    pub(super) plate: &'a ScreenPlate,
+    /// Coverage of the object.
+    pub(super) inside: &'a Image<Coverage>,
+    /// Mean colour of the whole screen.
     pub(super) screen: LinearRgb,
-    /// Longer side of the photo, pixels.
+    /// Longer side of the whole photo, pixels.
     pub(super) longer_side: usize,
 }
 
-/// As [`film`], of the part of a photo around the object: there is nothing to solve elsewhere. All pictures are of the
-/// part's size.
-pub(super) fn film_of_part(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    PartOf {
-        screen,
-        longer_side,
-    }: PartOf,
-    opts: &FilmOptions,
-) -> Result<FilmMatte> {
-    opts.check()?;
+/// As [`film`], with options that are checked.
+pub(super) fn solve_film(object: FilmInput<'_>, opts: &FilmOptions) -> Result<FilmMatte> {
+    object.check()?;
     let mut watch = Stopwatch::start();
-    assert_eq!(
-        photo.size(),
-        plate.image.size(),
-        "photo and plate differ in size"
-    );
-    assert_eq!(photo.size(), inside.size(), "photo and mask differ in size");
-    if !inside.pixels().iter().any(|c| c.0 > 0.0) {
-        return Err(Error::Photo {
-            what: "the mask of the object is empty".into(),
-        });
-    }
-    if let Some(i) = photo.pixels().iter().position(|p| !p.is_finite()) {
-        let (x, y) = (i % photo.width(), i / photo.width());
-        return Err(Error::Photo {
-            what: format!("pixel ({x}, {y}) is not a finite number"),
-        });
-    }
-    let key = strongest_channel(screen);
-    let calm = calmed(photo, plate.residual);
-    let grey = (!is_keyable(screen)).then(|| grey_screen(screen));
-    let (flat, tint) = match (opts.flat, &grey) {
-        (Some(flat), _) => (flat.into(), 0.0),
-        // That the tint may be another is part of the guess.
-        (None, Some(_)) => (tint::fit(&calm, plate, inside, key, 1.0).0, 0.0),
-        (None, None) => tint::fit(&calm, plate, inside, key, tint::DARKEST),
+    let solution = FilmSolution {
+        object,
+        calm: calmed(object.photo, object.plate.residual),
+        key: strongest_channel(object.screen),
+        is_keyable: is_keyable(object.screen),
+        opts,
     };
+    let tint = solution.tint();
     watch.lap("tint");
-    let solver = Solver::new(key, flat, plate.residual, opts);
-    let factor = if grey.is_some() {
-        Solver::guess
-    } else {
-        Solver::solve
-    };
-    let mut factors = calm.zip3_map(&plate.image, inside, |pixel, screen, inside| {
-        if inside.0 > 0.0 {
-            factor(&solver, pixel.into(), screen.into())
-        } else {
-            Factor::default()
-        }
-    });
+    let mut factors = solution.factors(tint.flat);
     watch.lap("factors");
-    let most = flat.into_iter().fold(0.0, f32::max);
-    let guessed = doubts::guessed(&factors, inside, opts.thickness_spread, most);
-    let screen_hue = bright::make_opaque(&mut factors, &calm, &plate.image, inside, longer_side);
-    let keyed_away = doubts::keyed_away(&factors, inside, flat[key], longer_side);
-    watch.lap("paint");
-    let clipped = bright::fill_glints(&mut factors, photo, inside, opts.clipped);
-    watch.lap("glints");
-    let doubts = ColorDoubts {
-        keyed_away,
-        screen_hue,
-        clipped,
-        guessed,
-        tint,
-    };
-    let diagnostics = grey.into_iter().chain(doubts.diagnostics()).collect();
+    let color_uncertainty = solution.refine(&mut factors, tint, &mut watch);
+    let grey = (!solution.is_keyable).then(|| grey_screen(object.screen));
+    let diagnostics = grey.into_iter().chain(color_uncertainty.diagnostics());
     let matte = FilmMatte {
-        doubts,
-        diagnostics,
-        ..composed(photo, plate, inside, &factors, flat.into())
+        color_uncertainty,
+        diagnostics: diagnostics.collect(),
+        ..solution.composed(&factors, tint.flat.into())
     };
     watch.lap("compose");
     watch.log("film");
     Ok(matte)
+}
+
+impl FilmInput<'_> {
+    /// # Errors
+    /// [`Error::Photo`] where the mask is empty.
+    /// # Panics
+    /// When the sizes differ.
+    fn check(&self) -> Result<()> {
+        let size = self.photo.size();
+        assert_eq!(
+            size,
+            self.plate.image.size(),
+            "photo and plate differ in size"
+        );
+        assert_eq!(size, self.inside.size(), "photo and mask differ in size");
+        if self.inside.pixels().iter().any(|c| c.0 > 0.0) {
+            Ok(())
+        } else {
+            Err(refused("the mask of the object is empty"))
+        }
+    }
+}
+
+/// A film while it is solved.
+struct FilmSolution<'a> {
+    object: FilmInput<'a>,
+    /// The photo that the transmittance is measured in.
+    calm: Cow<'a, Image<LinearRgb>>,
+    /// The screen's strongest channel.
+    key: usize,
+    is_keyable: bool,
+    opts: &'a FilmOptions,
+}
+
+impl FilmSolution<'_> {
+    /// The tint that is given, or else that of the photo. On a grey screen all of the object is looked at, and that the
+    /// tint may be another is part of the guess.
+    fn tint(&self) -> Tint {
+        if let Some(flat) = self.opts.flat {
+            return Tint {
+                flat: flat.into(),
+                uncertainty: 0.0,
+            };
+        }
+        let share = if self.is_keyable { DARKEST_SHARE } else { 1.0 };
+        let samples = TintSamples::new(
+            &self.calm,
+            self.object.plate,
+            self.object.inside,
+            self.key,
+            share,
+        );
+        let tint = samples.fit();
+        match self.is_keyable {
+            true => tint,
+            false => Tint {
+                uncertainty: 0.0,
+                ..tint
+            },
+        }
+    }
+
+    /// By which factor each pixel is flat plastic.
+    fn factors(&self, flat: [f32; 3]) -> Image<Factor> {
+        let solver = Solver::new(self.key, flat, self.object.plate.residual, self.opts);
+        let factor = if self.is_keyable {
+            Solver::solve
+        } else {
+            Solver::guess
+        };
+        self.calm.zip3_map(
+            &self.object.plate.image,
+            self.object.inside,
+            |pixel, screen, inside| {
+                if inside.0 > 0.0 {
+                    factor(&solver, pixel.into(), screen.into())
+                } else {
+                    Factor::default()
+                }
+            },
+        )
+    }
+
+    /// Makes paint opaque, fills what glints hide, and says how certain the colours are.
+    fn refine(
+        &self,
+        factors: &mut Image<Factor>,
+        Tint { flat, uncertainty }: Tint,
+        watch: &mut Stopwatch,
+    ) -> ColorUncertainty {
+        let (inside, longer_side) = (self.object.inside, self.object.longer_side);
+        let most = flat.into_iter().fold(0.0, f32::max);
+        let guessed = uncertainty::guessed(factors, inside, self.opts.thickness_spread, most);
+        let screen_hue = bright::make_opaque(
+            factors,
+            &self.calm,
+            &self.object.plate.image,
+            inside,
+            longer_side,
+        );
+        let keyed_away = uncertainty::keyed_away(factors, inside, flat[self.key], longer_side);
+        watch.lap("paint");
+        let clipped = bright::fill_glints(factors, self.object.photo, inside, self.opts.clipped);
+        watch.lap("glints");
+        ColorUncertainty {
+            keyed_away,
+            screen_hue,
+            clipped,
+            guessed,
+            tint: uncertainty,
+        }
+    }
+
+    /// F, T and V from the factors by which the pixels are flat plastic.
+    fn composed(&self, factors: &Image<Factor>, flat: LinearRgb) -> FilmMatte {
+        let inside = self.object.inside;
+        let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
+        let transmittance = plastic.zip_map(inside, covered);
+        let reflected =
+            self.object
+                .photo
+                .zip3_map(&self.object.plate.image, &transmittance, |p, k, t| {
+                    without(p, t * k)
+                });
+        let seen = view(&plastic, flat, inside);
+        let film = reflected.zip3_map(&seen, inside, |f, v, c| {
+            Film::new(f.scale(c.0), covered(v, c))
+        });
+        let most = flat.r.max(flat.g).max(flat.b);
+        let uncertainty = factors.zip_map(inside, |f, c| (c.0 * f.sigma * most).min(1.0));
+        FilmMatte {
+            film,
+            transmittance,
+            uncertainty,
+            flat,
+            color_uncertainty: ColorUncertainty::default(),
+            diagnostics: Vec::new(),
+        }
+    }
 }
 
 impl FilmOptions {
@@ -235,45 +331,18 @@ impl FilmOptions {
     }
 }
 
-/// Noise from which on the transmittance is told from a blurred photo: a twentieth of what a screen at 0.4 shows through
+/// Noise from which on the transmittance is measured in a blurred photo: a twentieth of what a screen at 0.4 shows through
 /// two clear walls.
-const NOISY: f32 = 0.01;
+const MAX_SHARP_NOISE: f32 = 0.01;
 /// Blur of a noisy photo, standard deviation in pixels: leaves a quarter of the noise, and folds.
-const CALM_PX: f32 = 1.0;
+const NOISE_BLUR_PX: f32 = 1.0;
 
-/// The photo that the transmittance is told from.
+/// The photo that the transmittance is measured in.
 fn calmed(photo: &Image<LinearRgb>, noise: LinearRgb) -> Cow<'_, Image<LinearRgb>> {
-    if noise.r.max(noise.g).max(noise.b) < NOISY {
+    if noise.r.max(noise.g).max(noise.b) < MAX_SHARP_NOISE {
         return Cow::Borrowed(photo);
     }
-    Cow::Owned(filter::gaussian_blur(photo, CALM_PX))
-}
-
-/// F, T and V from the factors by which the pixels are flat plastic.
-fn composed(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    factors: &Image<Factor>,
-    flat: LinearRgb,
-) -> FilmMatte {
-    let plastic = factors.map(|f| flat.map(|t| (f.value * t).clamp(0.0, 1.0)));
-    let transmittance = plastic.zip_map(inside, covered);
-    let reflected = photo.zip3_map(&plate.image, &transmittance, |p, k, t| without(p, t * k));
-    let seen = view(&plastic, flat, inside);
-    let film = reflected.zip3_map(&seen, inside, |f, v, c| {
-        Film::new(f.scale(c.0), covered(v, c))
-    });
-    let most = flat.r.max(flat.g).max(flat.b);
-    let uncertainty = factors.zip_map(inside, |f, c| Coverage((c.0 * f.sigma * most).min(1.0)));
-    FilmMatte {
-        film,
-        transmittance,
-        uncertainty,
-        flat,
-        doubts: ColorDoubts::default(),
-        diagnostics: Vec::new(),
-    }
+    Cow::Owned(filter::gaussian_blur(photo, NOISE_BLUR_PX))
 }
 
 /// A transmittance that holds for the covered share of a pixel only.

@@ -1,11 +1,11 @@
 //! Key colour: one colour for the screen, and whether the object has it, too.
 
-use super::film::ColorDoubts;
+use super::film::ColorUncertainty;
 use super::screen::{screen_color, screen_pixels, strongest_channel};
 use crate::diagnostic::Diagnostic;
 use crate::error::Result;
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +27,7 @@ pub struct KeyColor {
     pub color: LinearRgb,
     /// Standard deviation of the pixels around it, per channel, by their median distance: noise and uneven light.
     pub spread: LinearRgb,
-    /// What a person should know: the object has the screen's hue.
+    /// A warning where the object has the screen's hue.
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -50,64 +50,74 @@ pub fn key_color(
     average: KeyAverage,
 ) -> Result<KeyColor> {
     let mean = screen_color(photo, mask)?;
-    let far = screen_pixels(mask);
-    let far = if far.pixels().iter().any(|p| *p) {
-        far
-    } else {
-        mask.map(|c| c.0 <= 0.0)
-    };
-    let [r, g, b] = [0, 1, 2].map(|c| robust(photo, &far, c));
+    let background = background(mask);
+    let [r, g, b] = [0, 1, 2].map(|c| robust_mean(&channel_values(photo, &background, c)));
     let color = match average {
         KeyAverage::Mean => mean,
-        KeyAverage::Robust => LinearRgb::new(r.0, g.0, b.0),
+        KeyAverage::Robust => LinearRgb::new(r.center, g.center, b.center),
     };
     let diagnostics = screen_hue(photo, mask, color).into_iter().collect();
     Ok(KeyColor {
         color,
-        spread: LinearRgb::new(r.1, g.1, b.1),
+        spread: LinearRgb::new(r.sigma, g.sigma, b.sigma),
         diagnostics,
     })
 }
 
-/// Pixels that are asked: the median of a noise of 0.01 is known to 1e-4.
-const ASKED: usize = 20_000;
+/// The pixels outside a mask and a margin around it; those outside the mask where the margin leaves nothing.
+fn background(mask: &Image<Coverage>) -> Mask {
+    let far = screen_pixels(mask);
+    if far.pixels().contains(&true) {
+        far
+    } else {
+        mask.map(|c| c.0 <= 0.0)
+    }
+}
+
+/// Pixels that are sampled: the median of a noise of 0.01 is known to 1e-4.
+const MAX_SAMPLES: usize = 20_000;
 /// Distance from the median beyond which nothing counts, in standard deviations (95 % efficient for a Gaussian).
-const TUKEY: f32 = 4.685;
+const TUKEY_SIGMAS: f32 = 4.685;
 /// Standard deviation of a Gaussian over the median of its absolute values.
 const SIGMA_OF_MEDIAN: f32 = 1.4826;
 /// Values nearer than a code of an 8-bit picture are the same.
-const FINEST: f32 = 1e-3;
+const MIN_SIGMA: f32 = 1e-3;
 
-/// Centre and standard deviation of a channel.
-fn robust(photo: &Image<LinearRgb>, set: &Image<bool>, channel: usize) -> (f32, f32) {
+/// Values of a channel where a mask is set, thinned out; without those that are not finite.
+fn channel_values(photo: &Image<LinearRgb>, set: &Mask, channel: usize) -> Vec<f32> {
     let all: Vec<usize> = (0..photo.pixels().len())
         .filter(|&i| set.pixels()[i])
         .collect();
-    let step = (all.len() / ASKED).max(1);
-    let value = |i: usize| <[f32; 3]>::from(photo.pixels()[i])[channel];
-    let values: Vec<f32> = all
-        .into_iter()
+    let step = (all.len() / MAX_SAMPLES).max(1);
+    all.into_iter()
         .step_by(step)
-        .map(value)
+        .map(|i| <[f32; 3]>::from(photo.pixels()[i])[channel])
         .filter(|v| v.is_finite())
-        .collect();
-    let center = median(values.clone());
+        .collect()
+}
+
+/// Location and scale of values, outliers excluded.
+struct RobustMean {
+    center: f32,
+    sigma: f32,
+}
+
+fn robust_mean(values: &[f32]) -> RobustMean {
+    let center = median(values.to_vec());
     let sigma = SIGMA_OF_MEDIAN * median(values.iter().map(|v| (v - center).abs()).collect());
-    let reach = TUKEY * sigma.max(FINEST);
+    let reach = TUKEY_SIGMAS * sigma.max(MIN_SIGMA);
     let (mut sum, mut weights) = (0.0_f64, 0.0_f64);
-    for v in values {
+    for &v in values {
         let weight = f64::from((1.0 - ((v - center) / reach).powi(2)).max(0.0).powi(2));
         sum += weight * f64::from(v);
         weights += weight;
     }
-    (
-        if weights > 0.0 {
-            (sum / weights) as f32
-        } else {
-            center
-        },
-        sigma,
-    )
+    let center = if weights > 0.0 {
+        (sum / weights) as f32
+    } else {
+        center
+    };
+    RobustMean { center, sigma }
 }
 
 fn median(mut values: Vec<f32>) -> f32 {
@@ -121,11 +131,11 @@ fn median(mut values: Vec<f32>) -> f32 {
 
 /// The screen's own excess of its strongest channel, uneven light included, is below so many times its mean; see-through
 /// plastic shows less than that.
-const BEYOND_SCREEN: f32 = 1.25;
-/// Rim of the mask that is not asked, as a share of the longer side: bare screen.
-const RIM: f64 = 0.01;
-/// Share of the object below which nothing is said.
-const WORTH_SAYING: f32 = 0.002;
+const SCREEN_EXCESS_FACTOR: f32 = 1.25;
+/// Rim of the mask that is left out, as a share of the longer side: bare screen.
+const RIM_SHARE: f64 = 0.01;
+/// Share of the object below which there is no diagnostic.
+const MIN_HUED_SHARE: f32 = 0.002;
 
 /// The diagnostic of an object that has the screen's hue, brighter than the screen.
 fn screen_hue(
@@ -133,21 +143,25 @@ fn screen_hue(
     mask: &Image<Coverage>,
     screen: LinearRgb,
 ) -> Option<Diagnostic> {
-    let key = strongest_channel(screen);
-    let excess = |p: LinearRgb| {
-        let c: [f32; 3] = p.into();
-        c[key] - c[(key + 1) % 3].max(c[(key + 2) % 3])
-    };
-    let rim_px = RIM * photo.width().max(photo.height()) as f64;
+    let channel = strongest_channel(screen);
+    let rim_px = RIM_SHARE * photo.width().max(photo.height()) as f64;
     let interior = filter::erode(&mask.map(|c| c.0 > 0.5), rim_px);
-    let object = interior.pixels().iter().filter(|p| **p).count();
-    let limit = BEYOND_SCREEN * excess(screen);
-    let pairs = photo.pixels().iter().zip(interior.pixels());
-    let hued = pairs
-        .filter(|(p, inside)| **inside && excess(**p) > limit)
+    let screen_excess = excess(screen, channel);
+    let limit = SCREEN_EXCESS_FACTOR * screen_excess;
+    let hued = photo
+        .pixels()
+        .iter()
+        .zip(interior.pixels())
+        .filter(|(p, inside)| **inside && excess(**p, channel) > limit)
         .count();
-    let share = hued as f32 / object.max(1) as f32;
-    (excess(screen) > 0.0 && share > WORTH_SAYING).then(|| ColorDoubts::screen_hue(share))
+    let share = hued as f32 / interior.count().max(1) as f32;
+    (screen_excess > 0.0 && share > MIN_HUED_SHARE).then(|| ColorUncertainty::screen_hue(share))
+}
+
+/// By how much a channel exceeds the larger of the two others.
+fn excess(p: LinearRgb, channel: usize) -> f32 {
+    let c: [f32; 3] = p.into();
+    c[channel] - c[(channel + 1) % 3].max(c[(channel + 2) % 3])
 }
 
 #[cfg(test)]
@@ -172,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn an_object_of_the_screens_hue_is_said() {
+    fn an_object_of_the_screens_hue_is_reported() {
         let said = |paint| {
             let (photo, mask) = slab(paint);
             key_color(&photo, &mask, KeyAverage::Robust)

@@ -5,7 +5,7 @@ use crate::image::Image;
 use crate::pixel::Coverage;
 use contour::ContourBuilder;
 use geo::orient::Direction;
-use geo::{Area, ConvexHull, MultiPoint, Orient, Point};
+use geo::{Area, ConvexHull, MultiPoint, Orient, Point, Polygon};
 use rayon::prelude::*;
 
 /// The border of what an object covers, in pixel-corner coordinates.
@@ -19,9 +19,9 @@ pub struct Outline {
 }
 
 /// Value at which a coverage becomes inside.
-const HALF: f64 = 0.5;
+const HALF_COVERED: f64 = 0.5;
 /// Rings around less than this are rounding, square pixels.
-const LEAST_AREA_PX: f64 = 1.0;
+const MIN_RING_AREA_PX: f64 = 1.0;
 
 impl Outline {
     /// The lines along which a coverage is one half.
@@ -31,24 +31,23 @@ impl Outline {
     pub fn around(coverage: &Image<Coverage>) -> Self {
         let values: Vec<f64> = coverage.pixels().iter().map(|c| f64::from(c.0)).collect();
         let (w, h) = coverage.size();
-        // Fails only for values that are not as many as the sides say.
+        // Fails only where the number of values is not that of the pixels.
         let contours = ContourBuilder::new(w, h, true)
-            .contours(&values, &[HALF])
+            .contours(&values, &[HALF_COVERED])
             .unwrap_or_default();
-        let polygons = contours.iter().flat_map(|contour| &contour.geometry().0);
-        let worth = polygons
-            .filter(|p| p.unsigned_area() >= LEAST_AREA_PX)
-            .map(|p| p.orient(Direction::Default));
-        let rings = worth.flat_map(|polygon| {
-            let (outer, holes) = polygon.into_inner();
-            std::iter::once(outer).chain(holes).map(|ring| {
-                let open = &ring.0[..ring.0.len().saturating_sub(1)];
-                open.iter().map(|c| Point2::new(c.x, c.y)).collect()
-            })
-        });
+        let rings = contours
+            .iter()
+            .flat_map(|contour| &contour.geometry().0)
+            .filter(|polygon| polygon.unsigned_area() >= MIN_RING_AREA_PX)
+            .flat_map(|polygon| open_rings(polygon.orient(Direction::Default)));
         Self {
             rings: rings.collect(),
         }
+    }
+
+    /// A single ring, clockwise as seen.
+    pub(super) fn from_ring(ring: Vec<Point2<f64>>) -> Self {
+        Self { rings: vec![ring] }
     }
 
     /// The convex hull, clockwise as seen.
@@ -62,21 +61,14 @@ impl Outline {
             .collect()
     }
 
-    /// Area inside, square pixels; holes do not count.
+    /// Area inside, square pixels, without the holes.
     pub fn area(&self) -> f64 {
         self.rings.iter().map(|ring| signed_area(ring)).sum()
     }
 
     /// How wide it is, if it were a long strip: twice the area over the length of its rings, pixels; 0 for nothing.
     pub fn width(&self) -> f64 {
-        let length = |ring: &Vec<Point2<f64>>| {
-            let next = ring.iter().cycle().skip(1);
-            ring.iter()
-                .zip(next)
-                .map(|(a, b)| (b - a).norm())
-                .sum::<f64>()
-        };
-        let around: f64 = self.rings.iter().map(length).sum();
+        let around: f64 = self.rings.iter().map(|ring| ring_length(ring)).sum();
         if around > 0.0 {
             2.0 * self.area() / around
         } else {
@@ -97,36 +89,25 @@ impl Outline {
 
     /// The share of every pixel that lies inside.
     pub fn coverage(&self, width: usize, height: usize) -> Image<Coverage> {
-        let rows = self.sides_by_row(height);
+        let sides = self.sides_by_row(height);
         let mut image = Image::new(width, height);
         image
             .par_rows_mut()
-            .zip(&rows)
+            .zip(&sides)
             .enumerate()
-            .for_each(|(y, (row, sides))| {
-                for line in 0..LINES {
-                    let at = y as f64 + (line as f64 + HALF) / LINES as f64;
-                    let mut xs: Vec<f64> =
-                        sides.iter().filter_map(|side| crossing(side, at)).collect();
-                    xs.sort_by(f64::total_cmp);
-                    xs.chunks_exact(2)
-                        .for_each(|span| add_span(row, span[0], span[1]));
-                }
-            });
+            .for_each(|(y, (row, sides))| cover_row(row, y, sides));
         image
     }
 
     /// The sides of the rings that pass through each row of pixels.
-    fn sides_by_row(&self, height: usize) -> Vec<Vec<Side>> {
+    fn sides_by_row(&self, height: usize) -> Vec<Vec<RingSide>> {
         let mut rows = vec![Vec::new(); height];
         for ring in &self.rings {
-            for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-                let (top, bottom) = (
-                    a.y.min(b.y).max(0.0) as usize,
-                    a.y.max(b.y).max(0.0) as usize,
-                );
+            for [a, b] in sides(ring) {
+                let top = a.y.min(b.y).max(0.0) as usize;
+                let bottom = a.y.max(b.y).max(0.0) as usize;
                 for row in rows.iter_mut().take(bottom.saturating_add(1)).skip(top) {
-                    row.push([*a, *b]);
+                    row.push([a, b]);
                 }
             }
         }
@@ -134,42 +115,74 @@ impl Outline {
     }
 }
 
-type Side = [Point2<f64>; 2];
+/// Two neighbouring points of a ring.
+type RingSide = [Point2<f64>; 2];
+
+fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = RingSide> {
+    let next = ring.iter().cycle().skip(1);
+    ring.iter().zip(next).map(|(a, b)| [*a, *b])
+}
+
+/// The rings of a polygon without their repeated first points.
+fn open_rings(polygon: Polygon) -> impl Iterator<Item = Vec<Point2<f64>>> {
+    let (outer, holes) = polygon.into_inner();
+    std::iter::once(outer).chain(holes).map(|ring| {
+        let open = &ring.0[..ring.0.len().saturating_sub(1)];
+        open.iter().map(|c| Point2::new(c.x, c.y)).collect()
+    })
+}
+
+fn ring_length(ring: &[Point2<f64>]) -> f64 {
+    sides(ring).map(|[a, b]| (b - a).norm()).sum()
+}
 
 /// Scan lines per row of pixels; each contributes exact spans, so only slanted sides are approximated.
-const LINES: usize = 8;
-/// What one of them counts.
-const LINE: f32 = 1.0 / LINES as f32;
+const SCAN_LINES: usize = 8;
+/// The coverage of one of them.
+const LINE_COVERAGE: f32 = 1.0 / SCAN_LINES as f32;
 
 /// Where a side crosses the horizontal line at `y`.
-fn crossing([a, b]: &Side, y: f64) -> Option<f64> {
+fn crossing([a, b]: &RingSide, y: f64) -> Option<f64> {
     ((a.y <= y) != (b.y <= y)).then(|| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x))
+}
+
+/// Adds what the insides of rings with these sides cover of row `y`.
+fn cover_row(row: &mut [Coverage], y: usize, sides: &[RingSide]) {
+    for line in 0..SCAN_LINES {
+        let at = y as f64 + (line as f64 + 0.5) / SCAN_LINES as f64;
+        let mut xs: Vec<f64> = sides.iter().filter_map(|side| crossing(side, at)).collect();
+        xs.sort_by(f64::total_cmp);
+        for span in xs.chunks_exact(2) {
+            add_span(row, span[0], span[1]);
+        }
+    }
+}
+
+/// The column of a row of `len` pixels that holds a coordinate, or the nearest to it.
+#[inline]
+fn column(x: f64, len: usize) -> usize {
+    (x.max(0.0) as usize).min(len)
 }
 
 /// Adds what one scan line covers from `x0` to `x1`.
 fn add_span(row: &mut [Coverage], x0: f64, x1: f64) {
-    let within = |x: f64| (x.max(0.0) as usize).min(row.len());
-    let (first, end) = (within(x0), within(x1.ceil()));
+    let len = row.len();
+    let (first, end) = (column(x0, len), column(x1.ceil(), len));
     // Between its ends a span covers whole pixels.
-    let whole = within(x0.ceil())..within(x1);
+    let whole = column(x0.ceil(), len)..column(x1, len);
     let whole = if whole.is_empty() { end..end } else { whole };
-    row[whole.clone()]
-        .iter_mut()
-        .for_each(|pixel| pixel.0 += LINE);
+    for pixel in &mut row[whole.clone()] {
+        pixel.0 += LINE_COVERAGE;
+    }
     for x in (first..whole.start).chain(whole.end..end) {
         let overlap = x1.min((x + 1) as f64) - x0.max(x as f64);
-        row[x].0 += overlap.clamp(0.0, 1.0) as f32 * LINE;
+        row[x].0 += overlap.clamp(0.0, 1.0) as f32 * LINE_COVERAGE;
     }
 }
 
 /// Area of a ring, positive where it goes clockwise as seen (shoelace formula).
 fn signed_area(ring: &[Point2<f64>]) -> f64 {
-    let next = ring.iter().cycle().skip(1);
-    HALF * ring
-        .iter()
-        .zip(next)
-        .map(|(a, b)| a.x * b.y - b.x * a.y)
-        .sum::<f64>()
+    0.5 * sides(ring).map(|[a, b]| a.x * b.y - b.x * a.y).sum::<f64>()
 }
 
 #[cfg(test)]

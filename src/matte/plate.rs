@@ -3,11 +3,12 @@
 mod cells;
 mod polynomial;
 
+use super::prepared::refused;
 use super::register::{self, Registered};
 use super::screen::{screen_pixels, strongest_channel};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::{Image, Roi};
+use crate::image::{Image, Mask, Roi};
 use crate::pixel::{Coverage, LinearRgb};
 use polynomial::Polynomial;
 use serde::{Deserialize, Serialize};
@@ -57,7 +58,7 @@ pub struct ScreenPlate {
 impl ScreenPlate {
     /// Fits a smooth screen to the pixels of a photo that show it.
     ///
-    /// `photo` is scene-linear; `background` says which pixels are surely screen. They may lie around the object only: the
+    /// `photo` is scene-linear; `background` marks the pixels that surely show the screen. They may lie around the object only: the
     /// polynomial goes on under it.
     ///
     /// # Method
@@ -73,16 +74,12 @@ impl ScreenPlate {
     /// When the sizes differ.
     ///
     /// [Tukey]: https://doi.org/10.1080/03610927708827533
-    pub fn fit(
-        photo: &Image<LinearRgb>,
-        background: &Image<bool>,
-        opts: &PlateOptions,
-    ) -> Result<Self> {
+    pub fn fit(photo: &Image<LinearRgb>, background: &Mask, opts: &PlateOptions) -> Result<Self> {
         opts.check()?;
         let cells = cells::means(photo, background);
         let fitted = Polynomial::fit(&cells, photo.size(), opts)?;
         let image = fitted.image(photo.size());
-        Ok(Self::of(
+        Ok(Self::measured(
             image,
             photo,
             background,
@@ -93,7 +90,7 @@ impl ScreenPlate {
 
     /// Takes a photo of the empty screen for the plate.
     ///
-    /// It is moved onto the photo (the screen's texture and dirt tell how far, if it has any), its exposure and white balance
+    /// It is moved onto the photo (by the screen's texture and dirt, if it has any), its exposure and white balance
     /// are matched channel by channel, and its noise is blurred.
     ///
     /// # Errors
@@ -104,35 +101,28 @@ impl ScreenPlate {
     pub fn from_photo(
         empty: &Image<LinearRgb>,
         photo: &Image<LinearRgb>,
-        background: &Image<bool>,
+        background: &Mask,
         opts: &PlateOptions,
     ) -> Result<Self> {
         opts.check()?;
-        if empty.size() != photo.size() {
-            let ((w, h), (pw, ph)) = (empty.size(), photo.size());
-            return Err(refused(format!(
-                "the empty screen is {w} x {h} pixels, the photo {pw} x {ph}"
-            )));
-        }
-        let no_background =
-            || refused("the object leaves no background to check the empty screen on");
-        let on_free = |picture: &Image<LinearRgb>| cells::means(picture, background);
-        let gain = cells::gain(&on_free(photo), &on_free(empty)).ok_or_else(no_background)?;
+        check_same_size(empty, photo)?;
+        let gain = gain_on_background(photo, empty, background)?;
         // The object's edges must not be seen: the filters of the search reach over them into the free screen.
-        let without_object = photo.zip_map(background, |p, free| free.then_some(p));
-        let without_object = without_object.zip_map(empty, |p, e| p.unwrap_or(e * gain));
+        let without_object = photo.zip3_map(
+            empty,
+            background,
+            |p, e, free| {
+                if free { p } else { e * gain }
+            },
+        );
         let Registered { shift_px, .. } =
             register::shift(&without_object, empty, background, [1.0; 3]);
-        if shift_px.iter().any(|s| s.abs() > opts.max_shift_px) {
-            return Err(refused(format!(
-                "the empty screen lies ({:.1}, {:.1}) pixels off the photo, expected at most {}; did the camera move?",
-                shift_px[0], shift_px[1], opts.max_shift_px
-            )));
-        }
+        opts.check_shift(shift_px)?;
         let moved = register::moved(empty, shift_px);
         let smooth = filter::gaussian_blur(&moved, PHOTO_BLUR_PX);
-        let gain = cells::gain(&on_free(photo), &on_free(&smooth)).ok_or_else(no_background)?;
-        let plate = Self::of(smooth.map(|p| p * gain), photo, background, None, shift_px);
+        let gain = gain_on_background(photo, &smooth, background)?;
+        let image = smooth.map(|p| p * gain);
+        let plate = Self::measured(image, photo, background, None, shift_px);
         plate.check_mismatch(photo, background, opts)?;
         Ok(plate)
     }
@@ -166,7 +156,7 @@ impl ScreenPlate {
         Self::from_photo(empty, photo, &screen_pixels(mask), opts)
     }
 
-    /// One colour everywhere: what the paper takes for the screen.
+    /// One colour everywhere: the paper's model of the screen.
     pub fn even(color: LinearRgb, size: (usize, usize)) -> Self {
         let image = Image::filled(size.0, size.1, color);
         Self {
@@ -180,18 +170,10 @@ impl ScreenPlate {
 
     /// Mean colour of the plate, scene-linear.
     pub fn color(&self) -> LinearRgb {
-        let mut sum = [0.0_f64; 3];
-        for p in self.image.pixels() {
-            let channels: [f32; 3] = (*p).into();
-            sum.iter_mut()
-                .zip(channels)
-                .for_each(|(s, c)| *s += f64::from(c));
-        }
-        let n = self.image.pixels().len().max(1) as f64;
-        sum.map(|s| (s / n) as f32).into()
+        mean_color(&self.image)
     }
 
-    /// The part of the plate behind a part of the photo; what is known of all of it stays.
+    /// The part of the plate behind a part of the photo; what describes all of it stays.
     ///
     /// # Panics
     /// When `roi` reaches outside the plate.
@@ -212,29 +194,28 @@ impl ScreenPlate {
         }
     }
 
-    fn of(
+    /// A plate with its unevenness and its deviation from a photo.
+    fn measured(
         image: Image<LinearRgb>,
         photo: &Image<LinearRgb>,
-        background: &Image<bool>,
+        background: &Mask,
         degree: Option<usize>,
         shift_px: [f64; 2],
     ) -> Self {
         let residual = cells::deviation(photo, &image, background);
-        let mut plate = Self {
+        Self {
+            unevenness: unevenness(&image),
             image,
-            unevenness: 0.0,
             residual,
             degree,
             shift_px,
-        };
-        plate.unevenness = unevenness(&plate);
-        plate
+        }
     }
 
     fn check_mismatch(
         &self,
         photo: &Image<LinearRgb>,
-        background: &Image<bool>,
+        background: &Mask,
         opts: &PlateOptions,
     ) -> Result<()> {
         let mismatch = cells::mismatch(
@@ -255,44 +236,79 @@ impl ScreenPlate {
 /// Blur of a photographed plate against its noise, standard deviation in pixels: a tenth of the noise is left, and screens
 /// have no finer structure that matters.
 const PHOTO_BLUR_PX: f32 = 3.0;
-/// The highest degree that is offered: 28 coefficients a channel.
-const HIGHEST_DEGREE: usize = 6;
+/// The highest degree: 28 coefficients a channel.
+const MAX_DEGREE: usize = 6;
 
 impl PlateOptions {
     pub(super) fn check(&self) -> Result<()> {
-        if self.max_degree > HIGHEST_DEGREE {
-            return Err(Error::value(
+        let (degree, shift) = (self.max_degree, self.max_shift_px);
+        let (gain, mismatch) = (self.least_gain, self.max_mismatch);
+        let share = 0.0..=1.0;
+        let wrong = if degree > MAX_DEGREE {
+            (
                 "max_degree",
-                format!("{}, expected 0 to {HIGHEST_DEGREE}", self.max_degree),
-            ));
+                format!("{degree}, expected 0 to {MAX_DEGREE}"),
+            )
+        } else if !share.contains(&gain) {
+            ("least_gain", format!("{gain}, expected 0 to 1"))
+        } else if shift.is_nan() || shift < 0.0 {
+            ("max_shift_px", format!("{shift}, expected at least 0"))
+        } else if !share.contains(&f64::from(mismatch)) {
+            ("max_mismatch", format!("{mismatch}, expected 0 to 1"))
+        } else {
+            return Ok(());
+        };
+        Err(Error::value(wrong.0, wrong.1))
+    }
+
+    fn check_shift(&self, [x, y]: [f64; 2]) -> Result<()> {
+        let most = self.max_shift_px;
+        if x.abs() <= most && y.abs() <= most {
+            return Ok(());
         }
-        if !(0.0..=1.0).contains(&self.least_gain) {
-            return Err(Error::value(
-                "least_gain",
-                format!("{}, expected 0 to 1", self.least_gain),
-            ));
-        }
-        if self.max_shift_px.is_nan() || self.max_shift_px < 0.0 {
-            return Err(Error::value(
-                "max_shift_px",
-                format!("{}, expected at least 0", self.max_shift_px),
-            ));
-        }
-        if !(0.0..=1.0).contains(&self.max_mismatch) {
-            return Err(Error::value(
-                "max_mismatch",
-                format!("{}, expected 0 to 1", self.max_mismatch),
-            ));
-        }
-        Ok(())
+        Err(refused(format!(
+            "the empty screen is offset by ({x:.1}, {y:.1}) px from the photo, expected at most {most}; did the camera move?"
+        )))
     }
 }
 
+fn check_same_size(empty: &Image<LinearRgb>, photo: &Image<LinearRgb>) -> Result<()> {
+    let ((w, h), (width, height)) = (empty.size(), photo.size());
+    if (w, h) == (width, height) {
+        return Ok(());
+    }
+    Err(refused(format!(
+        "the empty screen is {w} x {h} pixels, expected {width} x {height} as the photo"
+    )))
+}
+
+/// The factor per channel from a photo of the empty screen to the photo.
+fn gain_on_background(
+    photo: &Image<LinearRgb>,
+    empty: &Image<LinearRgb>,
+    background: &Mask,
+) -> Result<LinearRgb> {
+    let cells = [photo, empty].map(|picture| cells::means(picture, background));
+    cells::gain(&cells[0], &cells[1])
+        .ok_or_else(|| refused("the object leaves no background to check the empty screen on"))
+}
+
+fn mean_color(image: &Image<LinearRgb>) -> LinearRgb {
+    let mut sum = [0.0_f64; 3];
+    for p in image.pixels() {
+        let channels: [f32; 3] = (*p).into();
+        for (sum, channel) in sum.iter_mut().zip(channels) {
+            *sum += f64::from(channel);
+        }
+    }
+    let n = image.pixels().len().max(1) as f64;
+    sum.map(|s| (s / n) as f32).into()
+}
+
 /// 1 minus darkest over brightest of the strongest channel.
-fn unevenness(plate: &ScreenPlate) -> f32 {
-    let strongest = strongest_channel(plate.color());
+fn unevenness(plate: &Image<LinearRgb>) -> f32 {
+    let strongest = strongest_channel(mean_color(plate));
     let values = plate
-        .image
         .pixels()
         .iter()
         .map(|p| <[f32; 3]>::from(*p)[strongest]);
@@ -304,10 +320,6 @@ fn unevenness(plate: &ScreenPlate) -> f32 {
     } else {
         0.0
     }
-}
-
-fn refused(what: impl Into<String>) -> Error {
-    Error::Photo { what: what.into() }
 }
 
 #[cfg(test)]

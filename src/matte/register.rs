@@ -1,7 +1,7 @@
 //! How far one picture lies from another, to a fraction of a pixel.
 
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb, Mix};
 use nalgebra::{Matrix2, Vector2};
 
@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Registered {
     /// Pixels right and down by which the second picture must be moved to lie on the first; 0 where there is too little
-    /// structure to tell.
+    /// structure.
     pub(super) shift_px: [f64; 2],
     /// Standard deviation of the shift; infinite where there is no structure at all.
     pub(super) sigma_px: f64,
@@ -18,21 +18,23 @@ pub(super) struct Registered {
 }
 
 /// Levels of the pyramid that the search climbs down: shifts of up to 2 pixels of the coarsest are found.
-const LEVELS: usize = 4;
+const PYRAMID_LEVELS: usize = 4;
 /// Shortest side of a picture that is still halved.
-const SMALLEST: usize = 32;
+const MIN_HALVED_SIDE_PX: usize = 32;
 /// Steps of Gauss and Newton a level.
-const STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 /// A step shorter than this is the last.
-const SHORT_PX: f64 = 1e-3;
+const CONVERGED_PX: f64 = 1e-3;
 /// Wavelengths above some ten of these are taken out: light that differs, not edges.
 const HIGH_PASS_PX: f32 = 4.0;
 /// Pictures that correlate less show nothing in common that could have moved.
-const LEAST_AGREEMENT: f64 = 0.3;
-/// The longest step, pixels of its level: farther off the gradient says nothing.
-const LONGEST_PX: f64 = 2.0;
+const MIN_AGREEMENT: f64 = 0.3;
+/// The longest step, pixels of its level: farther off the gradient is no guide.
+const MAX_STEP_PX: f64 = 2.0;
 /// A shift below so many standard deviations is none.
-const SIGNIFICANT: f64 = 3.0;
+const SIGNIFICANT_SIGMAS: f64 = 3.0;
+/// A search that moved by more than this share of the shorter side has diverged: there was nothing to hold on to.
+const MAX_SHIFT_SHARE: f64 = 0.25;
 
 /// The shift of `b` onto `a` where `mask` is set, by the light weighed by `weights`.
 ///
@@ -44,46 +46,23 @@ const SIGNIFICANT: f64 = 3.0;
 pub(super) fn shift(
     a: &Image<LinearRgb>,
     b: &Image<LinearRgb>,
-    mask: &Image<bool>,
+    mask: &Mask,
     weights: [f32; 3],
 ) -> Registered {
-    let tone = |image: &Image<LinearRgb>| {
-        image.map(|p| Coverage(weights[0] * p.r + weights[1] * p.g + weights[2] * p.b))
+    let whole = PicturePair {
+        a: weighted(a, weights),
+        b: weighted(b, weights),
+        mask: mask.to_coverage(),
     };
-    let mask = mask.map(|set| Coverage(f32::from(u8::from(set))));
-    let mut levels = vec![(tone(a), tone(b), mask)];
-    while let Some((a, b, mask)) = levels
-        .last()
-        .filter(|(a, ..)| a.width().min(a.height()) >= 2 * SMALLEST)
-    {
-        if levels.len() == LEVELS {
-            break;
-        }
-        let next = (filter::halve(a), filter::halve(b), filter::halve(mask));
-        levels.push(next);
-    }
-    let mut found = Registered {
-        shift_px: [0.0; 2],
-        sigma_px: f64::INFINITY,
-        agreement: 0.0,
-    };
-    for (level, (a, b, mask)) in levels.iter().enumerate().rev() {
-        let at_full = f64::from(1 << level);
-        let start = found.shift_px.map(|s| s / at_full);
-        let Some((at, last)) = refined(&high_passed(a), &high_passed(b), mask, start.into()) else {
-            continue;
+    let found = whole.coarse_to_fine();
+    let length = Vector2::from(found.shift_px).norm();
+    let is_unlike = found.agreement < MIN_AGREEMENT;
+    let is_lost = length > MAX_SHIFT_SHARE * a.width().min(a.height()) as f64;
+    if is_lost || is_unlike || length < SIGNIFICANT_SIGMAS * found.sigma_px {
+        return Registered {
+            shift_px: [0.0; 2],
+            ..found
         };
-        found = Registered {
-            shift_px: (at * at_full).into(),
-            sigma_px: last.sigma * at_full,
-            agreement: last.agreement,
-        };
-    }
-    let unlike = found.agreement < LEAST_AGREEMENT;
-    // A search over more than a quarter of the picture has lost its way: there was nothing to hold on to.
-    let lost = Vector2::from(found.shift_px).norm() > 0.25 * a.width().min(a.height()) as f64;
-    if lost || unlike || Vector2::from(found.shift_px).norm() < SIGNIFICANT * found.sigma_px {
-        found.shift_px = [0.0; 2];
     }
     found
 }
@@ -93,85 +72,175 @@ pub(super) fn moved<P: Mix>(image: &Image<P>, [dx, dy]: [f64; 2]) -> Image<P> {
     if dx == 0.0 && dy == 0.0 {
         return image.clone();
     }
-    let at = |x: usize, y: usize| (x as f64 + 0.5 - dx, y as f64 + 0.5 - dy);
     Image::from_fn(image.width(), image.height(), |x, y| {
-        let (x, y) = at(x, y);
-        filter::sample_bilinear_clamped(image, x, y)
+        filter::sample_bilinear_clamped(image, x as f64 + 0.5 - dx, y as f64 + 0.5 - dy)
     })
 }
 
-fn high_passed(image: &Image<Coverage>) -> Image<Coverage> {
+fn weighted(image: &Image<LinearRgb>, [r, g, b]: [f32; 3]) -> Image<f32> {
+    image.map(|p| r * p.r + g * p.g + b * p.b)
+}
+
+fn high_passed(image: &Image<f32>) -> Image<f32> {
     let smooth = filter::gaussian_blur(image, HIGH_PASS_PX);
-    filter::gaussian_blur(
-        &image.zip_map(&smooth, |v, mean| Coverage(v.0 - mean.0)),
-        1.0,
+    filter::gaussian_blur(&image.zip_map(&smooth, |v, mean| v - mean), 1.0)
+}
+
+/// Two pictures at one level of a pyramid, and where they are compared.
+struct PicturePair {
+    a: Image<f32>,
+    b: Image<f32>,
+    mask: Image<Coverage>,
+}
+
+impl PicturePair {
+    fn halved(&self) -> Self {
+        Self {
+            a: filter::halve(&self.a),
+            b: filter::halve(&self.b),
+            mask: filter::halve(&self.mask),
+        }
+    }
+
+    /// The pair itself and its halves, as long as they are large enough.
+    fn into_pyramid(self) -> Vec<Self> {
+        let mut levels = vec![self];
+        while levels.len() < PYRAMID_LEVELS {
+            let last = &levels[levels.len() - 1];
+            if last.a.width().min(last.a.height()) < 2 * MIN_HALVED_SIDE_PX {
+                break;
+            }
+            let next = last.halved();
+            levels.push(next);
+        }
+        levels
+    }
+
+    /// The shift from the coarsest level down to the finest, each starting from the one before.
+    fn coarse_to_fine(self) -> Registered {
+        let mut found = Registered {
+            shift_px: [0.0; 2],
+            sigma_px: f64::INFINITY,
+            agreement: 0.0,
+        };
+        for (level, pair) in self.into_pyramid().iter().enumerate().rev() {
+            let at_full = f64::from(1 << level);
+            let start = found.shift_px.map(|s| s / at_full);
+            let Some((at, last)) = pair.high_passed().refined(start.into()) else {
+                continue;
+            };
+            found = Registered {
+                shift_px: (at * at_full).into(),
+                sigma_px: last.sigma * at_full,
+                agreement: last.agreement,
+            };
+        }
+        found
+    }
+
+    fn high_passed(&self) -> Self {
+        Self {
+            a: high_passed(&self.a),
+            b: high_passed(&self.b),
+            mask: self.mask.clone(),
+        }
+    }
+
+    /// Gauss and Newton from a start; the shift and the last step, nothing where there is no structure.
+    fn refined(&self, start: Vector2<f64>) -> Option<(Vector2<f64>, ShiftStep)> {
+        let mut at = start;
+        let mut last = self.step(at)?;
+        for _ in 0..MAX_STEPS {
+            at += last.by;
+            if last.by.norm() < CONVERGED_PX {
+                break;
+            }
+            last = self.step(at)?;
+        }
+        at.iter().all(|v| v.is_finite()).then_some((at, last))
+    }
+
+    /// One step from a shift of `b`: the gain by regression of `a` on it, the shift by regression of what is left on the
+    /// gradient.
+    fn step(&self, at: Vector2<f64>) -> Option<ShiftStep> {
+        let b = moved(&self.b, at.into());
+        let (gain, agreement) = self.gain_and_agreement(&b)?;
+        let equations = self.normal_equations(&b, gain);
+        let inverse: Matrix2<f64> = equations.normal.try_inverse()?;
+        let variance = equations.square / equations.count * CORRELATED_PIXELS;
+        let by: Vector2<f64> = inverse * equations.right;
+        Some(ShiftStep {
+            by: by.cap_magnitude(MAX_STEP_PX),
+            sigma: (variance * inverse.trace()).sqrt(),
+            agreement,
+        })
+    }
+
+    /// The pixels that are compared: those of the mask that have neighbours all around.
+    fn compared(&self) -> impl Iterator<Item = (usize, usize)> {
+        let (w, h) = self.a.size();
+        (1..h.saturating_sub(1))
+            .flat_map(move |y| (1..w.saturating_sub(1)).map(move |x| (x, y)))
+            .filter(|&at| self.mask[at].0 > 0.5)
+    }
+
+    /// The factor from `b` to `a`, and their correlation.
+    fn gain_and_agreement(&self, b: &Image<f32>) -> Option<(f64, f64)> {
+        let a = &self.a;
+        let (mut aa, mut ab, mut bb) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for at in self.compared() {
+            aa += f64::from(a[at] * a[at]);
+            ab += f64::from(a[at] * b[at]);
+            bb += f64::from(b[at] * b[at]);
+        }
+        (bb > 0.0).then(|| (ab / bb, ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE)))
+    }
+
+    fn normal_equations(&self, b: &Image<f32>, gain: f64) -> ShiftEquations {
+        let mut sums = ShiftEquations {
+            normal: Matrix2::zeros(),
+            right: Vector2::zeros(),
+            square: 0.0,
+            count: 0.0,
+        };
+        for at in self.compared() {
+            let g = scaled_gradient(b, at, gain);
+            let left = f64::from(self.a[at]) - gain * f64::from(b[at]);
+            sums.normal += g * g.transpose();
+            sums.right -= g * left;
+            sums.square += left * left;
+            sums.count += 1.0;
+        }
+        sums
+    }
+}
+
+/// Central differences of a picture, times a factor.
+fn scaled_gradient(b: &Image<f32>, (x, y): (usize, usize), gain: f64) -> Vector2<f64> {
+    Vector2::new(
+        0.5 * gain * f64::from(b[(x + 1, y)] - b[(x - 1, y)]),
+        0.5 * gain * f64::from(b[(x, y + 1)] - b[(x, y - 1)]),
     )
 }
 
-/// Gauss and Newton from a start; the shift and the last step, nothing where there is no structure.
-fn refined(
-    a: &Image<Coverage>,
-    b: &Image<Coverage>,
-    mask: &Image<Coverage>,
-    start: Vector2<f64>,
-) -> Option<(Vector2<f64>, Step)> {
-    let mut at = start;
-    let mut last = step(a, &moved(b, at.into()), mask)?;
-    for _ in 0..STEPS {
-        at += last.by;
-        if last.by.norm() < SHORT_PX {
-            break;
-        }
-        last = step(a, &moved(b, at.into()), mask)?;
-    }
-    at.iter().all(|v| v.is_finite()).then_some((at, last))
+/// Sums of the least squares problem for a shift.
+struct ShiftEquations {
+    normal: Matrix2<f64>,
+    right: Vector2<f64>,
+    /// Of the residuals.
+    square: f64,
+    count: f64,
 }
 
-struct Step {
+/// One step of Gauss and Newton.
+struct ShiftStep {
     by: Vector2<f64>,
     sigma: f64,
     agreement: f64,
 }
 
-/// One step: the gain by regression of `a` on `b`, the shift by regression of what is left on the gradient.
-fn step(a: &Image<Coverage>, b: &Image<Coverage>, mask: &Image<Coverage>) -> Option<Step> {
-    let (w, h) = a.size();
-    let inside = || {
-        let rows =
-            (1..h.saturating_sub(1)).flat_map(|y| (1..w.saturating_sub(1)).map(move |x| (x, y)));
-        rows.filter(|&at| mask[at].0 > 0.5)
-    };
-    let (mut aa, mut ab, mut bb) = (0.0_f64, 0.0_f64, 0.0_f64);
-    for at in inside() {
-        aa += f64::from(a[at].0 * a[at].0);
-        ab += f64::from(a[at].0 * b[at].0);
-        bb += f64::from(b[at].0 * b[at].0);
-    }
-    let gain = if bb > 0.0 { ab / bb } else { return None };
-    let (mut normal, mut right, mut square, mut count) =
-        (Matrix2::zeros(), Vector2::zeros(), 0.0, 0.0);
-    for (x, y) in inside() {
-        let slope = |p: (usize, usize), q: (usize, usize)| 0.5 * gain * f64::from(b[p].0 - b[q].0);
-        let g = Vector2::new(slope((x + 1, y), (x - 1, y)), slope((x, y + 1), (x, y - 1)));
-        let left = f64::from(a[(x, y)].0) - gain * f64::from(b[(x, y)].0);
-        normal += g * g.transpose();
-        right -= g * left;
-        square += left * left;
-        count += 1.0;
-    }
-    let inverse: Matrix2<f64> = normal.try_inverse()?;
-    let variance = square / count * CORRELATED;
-    let agreement = ab / (aa * bb).sqrt().max(f64::MIN_POSITIVE);
-    let by: Vector2<f64> = inverse * right;
-    Some(Step {
-        by: by.cap_magnitude(LONGEST_PX),
-        sigma: (variance * inverse.trace()).sqrt(),
-        agreement,
-    })
-}
-
 /// Neighbouring pixels that vary together after the blur: the area of its kernel, 4 pi sigma^2.
-const CORRELATED: f64 = 12.6;
+const CORRELATED_PIXELS: f64 = 12.6;
 
 #[cfg(test)]
 mod tests {
@@ -200,7 +269,7 @@ mod tests {
     }
 
     /// All but a rim that the shift moves out of the picture.
-    fn interior() -> Image<bool> {
+    fn interior() -> Mask {
         Image::from_fn(120, 90, |x, y| {
             (12..108).contains(&x) && (12..78).contains(&y)
         })

@@ -2,11 +2,11 @@
 
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, LinearRgb};
 
-/// Width of the zone around the object that is not asked, as a share of the longer side: contact shadows and spill.
-const MARGIN: f64 = 0.02;
+/// Width of the zone around the object that is left out, as a share of the longer side: contact shadows and spill.
+const SCREEN_MARGIN: f64 = 0.02;
 
 /// Mean scene-linear colour of a photo outside a mask and a margin around it (2 % of the longer side).
 ///
@@ -17,7 +17,7 @@ const MARGIN: f64 = 0.02;
 /// # Panics
 /// When the sizes differ.
 pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<LinearRgb> {
-    let far = background(mask, MARGIN);
+    let far = background(mask, SCREEN_MARGIN);
     let found = mean(photo, &far).or_else(|| mean(photo, &background(mask, 0.0)));
     found.ok_or_else(|| Error::Photo {
         what: "the object leaves no background to take the screen colour from".into(),
@@ -25,44 +25,41 @@ pub fn screen_color(photo: &Image<LinearRgb>, mask: &Image<Coverage>) -> Result<
 }
 
 /// The pixels outside a mask and a margin around it.
-pub(super) fn screen_pixels(mask: &Image<Coverage>) -> Image<bool> {
-    background(mask, MARGIN)
+pub(super) fn screen_pixels(mask: &Image<Coverage>) -> Mask {
+    background(mask, SCREEN_MARGIN)
 }
 
-fn background(mask: &Image<Coverage>, margin: f64) -> Image<bool> {
+fn background(mask: &Image<Coverage>, margin: f64) -> Mask {
     let margin_px = margin * mask.width().max(mask.height()) as f64;
-    filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).map(|near| !near)
+    filter::dilate(&mask.map(|c| c.0 > 0.0), margin_px).complement()
 }
 
 /// Sums in double precision and in the order of the pixels: the same at any thread count.
-fn mean(photo: &Image<LinearRgb>, set: &Image<bool>) -> Option<LinearRgb> {
+fn mean(photo: &Image<LinearRgb>, set: &Mask) -> Option<LinearRgb> {
     assert_eq!(photo.size(), set.size(), "photo and mask differ in size");
-    let (mut sum, mut count) = ([0.0; 3], 0u64);
-    for (p, _) in photo
+    let inside = photo
         .pixels()
         .iter()
         .zip(set.pixels())
-        .filter(|(_, inside)| **inside)
-    {
+        .filter(|(_, set)| **set);
+    let (sum, count) = inside.fold(([0.0; 3], 0u64), |(sum, count), (p, _)| {
         let channels: [f32; 3] = (*p).into();
-        for (s, c) in sum.iter_mut().zip(channels) {
-            *s += f64::from(c);
-        }
-        count += 1;
-    }
+        let added: [f64; 3] = std::array::from_fn(|c| sum[c] + f64::from(channels[c]));
+        (added, count + 1)
+    });
     (count > 0).then(|| sum.map(|s| (s / count as f64) as f32).into())
 }
 
 /// Least share by which the screen's largest channel must exceed the mean of the two others to be keyed: a painted
 /// screen has 0.6 and more, a white board in the light of a lamp up to 0.15.
-const KEYABLE: f32 = 0.3;
+const MIN_KEYABLE_EXCESS: f32 = 0.3;
 
-/// The screen has enough colour to tell it from what is in front of it.
+/// The screen has enough colour to distinguish it from what is in front of it.
 pub(super) fn is_keyable(screen: LinearRgb) -> bool {
     let mut channels: [f32; 3] = screen.into();
     channels.sort_by(f32::total_cmp);
     let [low, mid, high] = channels;
-    high > 0.0 && (high - 0.5 * (low + mid)) / high >= KEYABLE
+    high > 0.0 && (high - 0.5 * (low + mid)) / high >= MIN_KEYABLE_EXCESS
 }
 
 /// Which channel of a colour is the largest; of equal ones the first.
@@ -94,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_object_and_what_is_near_it_are_not_asked() {
+    fn the_object_and_what_is_near_it_are_left_out() {
         let mask = disc(200, 50);
         let spill = filter::dilate(&mask.map(|c| c.0 > 0.0), 3.0);
         let photo = spill.map(|near| if near { LinearRgb::WHITE } else { GREEN });

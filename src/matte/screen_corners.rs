@@ -1,42 +1,47 @@
 //! The four corners of a coloured screen that is seen as a whole.
 
 use super::outline::Outline;
+use super::prepared::{longer_side, refused};
 use super::screen::is_keyable;
-use super::segment::Groups;
+use super::segment::PixelGroups;
 use crate::color::rgb_to_hsv;
 use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::{Line, Point2, Vector2};
-use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb, Mix};
+use crate::image::{Image, Mask};
+use crate::pixel::{LinearRgb, Mix};
 
 /// Longer side of the picture that is searched, pixels.
-const WORKING_SIZE: usize = 1024;
-/// A screen that is worth its name covers this share of the photo.
-const LEAST_SHARE: f64 = 0.1;
+const SEARCH_SIZE_PX: usize = 1024;
+/// A screen covers at least this share of the photo.
+const MIN_SCREEN_SHARE: f64 = 0.1;
 /// What is darker has no hue but that of its noise, scene-linear.
-const LEAST_LIGHT: f32 = 0.005;
+const MIN_BRIGHTNESS: f32 = 0.005;
 /// Steps of the circle of hues, how many of them to either side are one hue, and how many hues a photo has at most.
-const HUES: usize = 72;
-const SAME_HUE: usize = 5;
-const MOST_HUES: usize = 4;
+const HUE_STEPS: usize = 72;
+const SAME_HUE_STEPS: usize = 5;
+const MAX_HUES: usize = 4;
 /// What is thinner than twice this is no part of a screen, pixels of the search.
 const THIN_PX: f64 = 2.0;
 /// What lies on a screen is farther than this from its border, and covers this share of it.
 const RIM_PX: f64 = 8.0;
-const LEAST_OBJECT: f64 = 0.002;
+const MIN_OBJECT_SHARE: f64 = 0.002;
 /// So often a corner of a rough quadrangle is moved: it takes two or three rounds.
-const MOST_MOVES: usize = 40;
-/// Stretches along each side, and the part of it near its corners that is not looked at: corners are worn.
-const PROBES: usize = 96;
+const MAX_CORNER_MOVES: usize = 40;
+/// Stretches along each side, and the part of it near its corners that is left out: corners are worn.
+const PROBE_COUNT: usize = 96;
 const CORNER_PART: f64 = 0.08;
-/// How far across a side is looked, pixels of the search, and samples to the pixel of the photo.
+/// How far across a side a probe reaches, pixels of the search, and samples to the pixel of the photo.
 const REACH_PX: f64 = 4.0;
 const STEPS_PER_PX: f64 = 2.0;
 /// The two sides of a border differ by this, scene-linear, or there is none.
-const LEAST_CHANGE: f32 = 0.01;
+const MIN_CHANGE: f32 = 0.01;
+/// A border is found at most this share of the reach from where it is expected.
+const MAX_OFFSET_SHARE: f64 = 0.75;
 /// Probes farther from a side's line than so many times the median are of something else: an object, a shadow.
-const OUTLYING: f64 = 3.0;
+const OUTLIER_FACTOR: f64 = 3.0;
+/// Rounds in which such probes are dropped.
+const OUTLIER_ROUNDS: usize = 4;
 /// Distances from a line below this are those of noise, pixels.
 const NOISE_PX: f64 = 0.1;
 /// A border of so many pixels of the search beside a side's line is no straight one.
@@ -65,32 +70,49 @@ pub struct ScreenCorners {
 /// [`Error::Photo`] where there is no coloured screen, it reaches the border of the photo, or its outline is no
 /// rectangle's.
 pub fn screen_corners(photo: &Image<LinearRgb>) -> Result<ScreenCorners> {
-    let longer = photo.width().max(photo.height());
     if photo.width().min(photo.height()) == 0 {
-        return Err(refused("the photo is empty"));
+        return Err(not_found("the photo is empty"));
     }
-    let side = |len: usize| (len * WORKING_SIZE.min(longer)).div_ceil(longer).max(1);
-    let picture = filter::resize(photo, side(photo.width()), side(photo.height()));
+    let picture = at_search_size(photo);
     let scale = photo.width() as f64 / picture.width() as f64;
-    let rough = four_corners(&screen(&picture)?.hull)
-        .ok_or_else(|| refused("its outline has no four corners"))?;
-    let mut corners = rough.map(|p| Point2::from(p.coords * scale));
-    let mut sigma_px = 0.0;
+    let rough = four_corners(&screen_region(&picture)?.hull)
+        .ok_or_else(|| not_found("its outline has no four corners"))?;
+    let rough = rough.map(|p| Point2::from(p.coords * scale));
     // The second time the probes stand where the sides are.
-    for _ in 0..2 {
-        let sides = sides(photo, &corners, scale)?;
-        for i in 0..4 {
-            let meeting = sides[(i + 3) % 4].line.meeting(&sides[i].line);
-            corners[i] =
-                meeting.ok_or_else(|| refused("two of its sides are parallel that should meet"))?;
-        }
-        sigma_px = sides
-            .iter()
-            .map(|side| side.off_px)
-            .fold(NOISE_PX, f64::max);
-    }
+    let near = refined(photo, &rough, scale)?;
+    let found = refined(photo, &near.corners_px, scale)?;
     Ok(ScreenCorners {
-        corners_px: from_top_left(corners),
+        corners_px: from_top_left(found.corners_px),
+        ..found
+    })
+}
+
+fn at_search_size(photo: &Image<LinearRgb>) -> Image<LinearRgb> {
+    let longer = longer_side(photo);
+    let [width, height] = [photo.width(), photo.height()]
+        .map(|side| (side * SEARCH_SIZE_PX.min(longer)).div_ceil(longer).max(1));
+    filter::resize(photo, width, height)
+}
+
+/// Where lines that are fitted near the sides of a quadrangle meet.
+fn refined(
+    photo: &Image<LinearRgb>,
+    corners: &[Point2<f64>; 4],
+    scale: f64,
+) -> Result<ScreenCorners> {
+    let sides = sides(photo, corners, scale)?;
+    let mut corners_px = *corners;
+    for (i, corner) in corners_px.iter_mut().enumerate() {
+        let meeting = sides[(i + 3) % 4].line.meeting(&sides[i].line);
+        *corner =
+            meeting.ok_or_else(|| not_found("two of its sides are parallel that should meet"))?;
+    }
+    let sigma_px = sides
+        .iter()
+        .map(|side| side.off_px)
+        .fold(NOISE_PX, f64::max);
+    Ok(ScreenCorners {
+        corners_px,
         sigma_px,
     })
 }
@@ -103,16 +125,16 @@ pub(crate) fn from_top_left(corners: [Point2<f64>; 4]) -> [Point2<f64>; 4] {
     [0, 1, 2, 3].map(|i| corners[(first + i) % 4])
 }
 
-fn refused(what: impl std::fmt::Display) -> Error {
-    let instead = "photograph all of it on something of another colour, give its corners (`asset add --screen-corners`), \
-                   or measure the object's length with a tape";
-    Error::Photo {
-        what: format!("the corners of the screen cannot be found: {what}; {instead}"),
-    }
+fn not_found(what: impl std::fmt::Display) -> Error {
+    refused(format!(
+        "the corners of the screen cannot be found: {what}; \
+         photograph all of it on something of another colour, give its corners (`asset add --screen-corners`), \
+         or measure the object's length with a tape"
+    ))
 }
 
 /// A connected region of one hue.
-struct Region {
+struct HueRegion {
     pixels: usize,
     hull: Vec<Point2<f64>>,
     /// It reaches the border of the picture.
@@ -122,125 +144,121 @@ struct Region {
 }
 
 /// The region that is a screen.
-fn screen(picture: &Image<LinearRgb>) -> Result<Region> {
-    let least = LEAST_SHARE * picture.pixels().len() as f64;
-    let mut regions: Vec<Region> = regions(picture)
-        .into_iter()
-        .filter(|r| r.pixels as f64 >= least)
-        .collect();
+fn screen_region(picture: &Image<LinearRgb>) -> Result<HueRegion> {
+    let least = MIN_SCREEN_SHARE * picture.pixels().len() as f64;
+    let mut regions = hue_regions(picture);
+    regions.retain(|region| region.pixels as f64 >= least);
     regions.sort_by_key(|region| std::cmp::Reverse(region.pixels));
-    let whole = |covered: bool| {
-        regions
-            .iter()
-            .position(|r| !r.is_cut && r.is_covered == covered)
-    };
     let is_cut = regions.iter().any(|region| region.is_cut);
+    regions.retain(|region| !region.is_cut);
     // A box on a screen that is not seen as a whole has four corners, too, but nothing lies on it.
-    match (whole(true), whole(false)) {
-        (Some(covered), _) => Ok(regions.swap_remove(covered)),
-        (None, _) if is_cut => Err(refused("it reaches the border of the photo")),
-        (None, Some(empty)) => Ok(regions.swap_remove(empty)),
-        (None, None) => Err(refused(
-            "no tenth of the photo has one colour such as green or blue",
-        )),
+    if let Some(covered) = regions.iter().position(|region| region.is_covered) {
+        return Ok(regions.swap_remove(covered));
     }
+    if is_cut {
+        return Err(not_found("it reaches the border of the photo"));
+    }
+    regions
+        .into_iter()
+        .next()
+        .ok_or_else(|| not_found("no tenth of the photo has one colour such as green or blue"))
 }
 
 /// The largest region of each hue.
-fn regions(picture: &Image<LinearRgb>) -> Vec<Region> {
-    let hues = picture.map(hue);
+fn hue_regions(picture: &Image<LinearRgb>) -> Vec<HueRegion> {
+    let hues = picture.map(hue_step);
     let common = common_hues(&hues);
-    let nearest = |hue: usize| {
-        common
-            .iter()
-            .copied()
-            .min_by_key(|&other| apart(hue, other))
-    };
-    let of = |common: usize| {
-        let is_near = |hue: usize| nearest(hue) == Some(common) && apart(hue, common) <= SAME_HUE;
-        let set = hues.map(|hue| hue.is_some_and(is_near));
-        largest_region(&filter::dilate(&filter::erode(&set, THIN_PX), THIN_PX))
-    };
-    common.iter().filter_map(|&hue| of(hue)).collect()
+    common
+        .iter()
+        .filter_map(|&hue| {
+            let set = hues.map(|other| other.is_some_and(|other| is_of_hue(other, hue, &common)));
+            largest_region(&filter::dilate(&filter::erode(&set, THIN_PX), THIN_PX))
+        })
+        .collect()
+}
+
+/// A hue is near one of the common hues, and nearer to it than to the others.
+fn is_of_hue(hue: usize, common_hue: usize, common: &[usize]) -> bool {
+    let nearest = common
+        .iter()
+        .copied()
+        .min_by_key(|&other| hue_distance(hue, other));
+    nearest == Some(common_hue) && hue_distance(hue, common_hue) <= SAME_HUE_STEPS
 }
 
 /// The step of the circle of hues; none for a grey.
-fn hue(p: LinearRgb) -> Option<usize> {
-    let seen = is_keyable(p) && p.r.max(p.g).max(p.b) >= LEAST_LIGHT;
-    seen.then(|| (rgb_to_hsv(p).h * HUES as f32) as usize % HUES)
+fn hue_step(p: LinearRgb) -> Option<usize> {
+    let has_hue = is_keyable(p) && p.r.max(p.g).max(p.b) >= MIN_BRIGHTNESS;
+    has_hue.then(|| (rgb_to_hsv(p).h * HUE_STEPS as f32) as usize % HUE_STEPS)
 }
 
 /// Steps between two hues, the shorter way around.
-fn apart(a: usize, b: usize) -> usize {
+fn hue_distance(a: usize, b: usize) -> usize {
     let steps = a.abs_diff(b);
-    steps.min(HUES - steps)
+    steps.min(HUE_STEPS - steps)
 }
 
-/// The hues that a worthwhile share of the picture has, commonest first.
+/// The hues that cover enough of the picture for a screen, most common first.
 fn common_hues(hues: &Image<Option<usize>>) -> Vec<usize> {
-    let mut counts = [0_usize; HUES];
-    hues.pixels()
-        .iter()
-        .flatten()
-        .for_each(|&hue| counts[hue] += 1);
+    let mut counts = [0_usize; HUE_STEPS];
+    for &hue in hues.pixels().iter().flatten() {
+        counts[hue] += 1;
+    }
+    let least = MIN_SCREEN_SHARE * hues.pixels().len() as f64;
     let mut common = Vec::new();
-    while common.len() < MOST_HUES {
-        let near =
-            |hue: usize, reach: usize| (0..HUES).filter(move |&other| apart(hue, other) <= reach);
-        let around = |hue: usize| {
-            near(hue, SAME_HUE)
-                .map(|other| counts[other])
-                .sum::<usize>()
-        };
+    while common.len() < MAX_HUES {
         // Of windows that hold the same pixels the one around the highest count.
-        let Some(most) = (0..HUES).max_by_key(|&hue| (around(hue), counts[hue])) else {
+        let windows = (0..HUE_STEPS).map(|hue| (window_count(&counts, hue), counts[hue], hue));
+        let Some((count, _, hue)) = windows.max() else {
             break;
         };
-        if (around(most) as f64) < LEAST_SHARE * hues.pixels().len() as f64 {
+        if (count as f64) < least {
             break;
         }
-        common.push(most);
-        near(most, SAME_HUE).for_each(|other| counts[other] = 0);
+        common.push(hue);
+        same_hues(hue).for_each(|other| counts[other] = 0);
     }
     common
 }
 
+/// The steps that are one hue.
+fn same_hues(hue: usize) -> impl Iterator<Item = usize> {
+    (0..HUE_STEPS).filter(move |&other| hue_distance(hue, other) <= SAME_HUE_STEPS)
+}
+
+fn window_count(counts: &[usize; HUE_STEPS], hue: usize) -> usize {
+    same_hues(hue).map(|other| counts[other]).sum()
+}
+
 /// The largest connected region of a set.
-fn largest_region(set: &Image<bool>) -> Option<Region> {
-    let groups = Groups::of(set);
+fn largest_region(set: &Mask) -> Option<HueRegion> {
+    let groups = PixelGroups::new(set);
     let sizes = groups.sizes(set);
     let largest = (0..sizes.len()).max_by_key(|&i| sizes[i])?;
     let only = groups.only(|i| i == largest);
-    let (w, h) = only.size();
-    let border = (0..w)
-        .flat_map(|x| [(x, 0), (x, h - 1)])
-        .chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
-    let is_cut = border.into_iter().any(|at| only[at]);
-    let hull = Outline::around(&only.map(|inside| Coverage(f32::from(u8::from(inside))))).hull();
-    let is_covered = is_covered(&only, &hull);
-    Some(Region {
+    let hull = Outline::around(&only.to_coverage()).hull();
+    Some(HueRegion {
         pixels: sizes[largest],
+        is_cut: reaches_border(&only),
+        is_covered: is_covered(&only, &hull),
         hull,
-        is_cut,
-        is_covered,
     })
 }
 
+fn reaches_border(set: &Mask) -> bool {
+    let (w, h) = set.size();
+    (0..w).any(|x| set[(x, 0)] || set[(x, h - 1)]) || (0..h).any(|y| set[(0, y)] || set[(w - 1, y)])
+}
+
 /// Something lies within the hull of a region, away from its border.
-fn is_covered(region: &Image<bool>, hull: &[Point2<f64>]) -> bool {
+fn is_covered(region: &Mask, hull: &[Point2<f64>]) -> bool {
     let (w, h) = region.size();
-    let within = Outline {
-        rings: vec![hull.to_vec()],
-    }
-    .coverage(w, h)
-    .map(|c| c.0 > 0.5);
+    let within = Outline::from_ring(hull.to_vec())
+        .coverage(w, h)
+        .map(|c| c.0 > 0.5);
     let free = filter::erode(&within, RIM_PX).zip_map(region, |inside, screen| inside && !screen);
-    let largest = Groups::of(&free)
-        .sizes(&free)
-        .into_iter()
-        .max()
-        .unwrap_or(0);
-    largest as f64 > LEAST_OBJECT * within.pixels().iter().filter(|inside| **inside).count() as f64
+    let largest = PixelGroups::new(&free).sizes(&free).into_iter().max();
+    largest.unwrap_or(0) as f64 > MIN_OBJECT_SHARE * within.count() as f64
 }
 
 /// The four points of a convex polygon that enclose the most of it, in its order.
@@ -249,41 +267,49 @@ fn is_covered(region: &Image<bool>, hull: &[Point2<f64>]) -> bool {
 /// From any four, each in turn becomes the point that is farthest from the way between its neighbours, until none moves.
 fn four_corners(ring: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
     let n = ring.len();
-    let mut corners = [0, 1, 2, 3].map(|i| i * n / 4);
-    let off = |p: usize, [a, b]: [usize; 2]| (ring[b] - ring[a]).perp(&(ring[p] - ring[a])).abs();
-    for i in (0..if n < 4 { 0 } else { MOST_MOVES }).map(|move_| move_ % 4) {
-        let [before, after] = [corners[(i + 3) % 4], corners[(i + 1) % 4]];
-        let between = (1..n)
-            .map(|step| (before + step) % n)
-            .take_while(|&p| p != after);
-        corners[i] =
-            between.max_by(|&p, &q| off(p, [before, after]).total_cmp(&off(q, [before, after])))?;
+    if n < 4 {
+        return None;
     }
-    (n >= 4).then(|| corners.map(|i| ring[i]))
+    let mut corners = [0, 1, 2, 3].map(|i| i * n / 4);
+    for i in (0..MAX_CORNER_MOVES).map(|round| round % 4) {
+        corners[i] = farthest_between(ring, corners[(i + 3) % 4], corners[(i + 1) % 4])?;
+    }
+    Some(corners.map(|i| ring[i]))
+}
+
+/// Which point of a ring between two others is farthest from the line through them.
+fn farthest_between(ring: &[Point2<f64>], before: usize, after: usize) -> Option<usize> {
+    let n = ring.len();
+    let along = ring[after] - ring[before];
+    let off = |p: usize| along.perp(&(ring[p] - ring[before])).abs();
+    (1..n)
+        .map(|step| (before + step) % n)
+        .take_while(|&p| p != after)
+        .max_by(|&p, &q| off(p).total_cmp(&off(q)))
 }
 
 /// A straight side of a screen.
 #[derive(Clone, Copy)]
-struct Side {
+struct ScreenSide {
     line: Line,
     /// Root mean square distance of the border from it, pixels.
     off_px: f64,
 }
 
-fn sides(photo: &Image<LinearRgb>, corners: &[Point2<f64>; 4], scale: f64) -> Result<[Side; 4]> {
-    let side = |i: usize| {
-        Side::near(
-            photo,
-            [corners[i], corners[(i + 1) % 4]],
-            REACH_PX * scale.max(1.0),
-        )
-    };
-    let found: Vec<Side> = (0..4).filter_map(side).collect();
-    let found: [Side; 4] = found
+fn sides(
+    photo: &Image<LinearRgb>,
+    corners: &[Point2<f64>; 4],
+    scale: f64,
+) -> Result<[ScreenSide; 4]> {
+    let reach = REACH_PX * scale.max(1.0);
+    let found: Vec<ScreenSide> = (0..4)
+        .filter_map(|i| ScreenSide::near(photo, [corners[i], corners[(i + 1) % 4]], reach))
+        .collect();
+    let found: [ScreenSide; 4] = found
         .try_into()
-        .map_err(|_| refused("a side of it shows no straight border"))?;
+        .map_err(|_| not_found("a side of it shows no straight border"))?;
     match found.iter().find(|side| side.off_px > CROOKED_PX * scale) {
-        Some(side) => Err(refused(format!(
+        Some(side) => Err(not_found(format!(
             "a side of it is crooked by {:.1} pixels",
             side.off_px
         ))),
@@ -291,23 +317,12 @@ fn sides(photo: &Image<LinearRgb>, corners: &[Point2<f64>; 4], scale: f64) -> Re
     }
 }
 
-impl Side {
+impl ScreenSide {
     /// The line of the border near the way from a corner to the next, clockwise.
-    fn near(photo: &Image<LinearRgb>, [from, to]: [Point2<f64>; 2], reach: f64) -> Option<Self> {
-        let along = to - from;
-        let outward = Vector2::new(along.y, -along.x).try_normalize(0.0)?;
-        let probe = |i: usize| {
-            let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBES as f64;
-            let foot = from + along * part;
-            Some(foot + outward * border(photo, foot, outward, reach)?)
-        };
-        let mut points: Vec<Point2<f64>> = (0..PROBES).filter_map(probe).collect();
-        for _ in 0..4 {
-            let line = Line::through(&points)?;
-            let mut off: Vec<f64> = points.iter().map(|p| line.distance(*p).abs()).collect();
-            let (_, median, _) = off.select_nth_unstable_by(points.len() / 2, f64::total_cmp);
-            let most = OUTLYING * median.max(NOISE_PX);
-            points.retain(|p| line.distance(*p).abs() <= most);
+    fn near(photo: &Image<LinearRgb>, ends: [Point2<f64>; 2], reach: f64) -> Option<Self> {
+        let mut points = border_points(photo, ends, reach)?;
+        for _ in 0..OUTLIER_ROUNDS {
+            drop_outliers(&mut points)?;
         }
         let line = Line::through(&points)?;
         let squares: f64 = points
@@ -315,44 +330,97 @@ impl Side {
             .map(|p| line.distance(*p) * line.distance(*p))
             .sum();
         let off_px = (squares / points.len() as f64).sqrt();
-        (points.len() >= PROBES / 2).then_some(Self { line, off_px })
+        (points.len() >= PROBE_COUNT / 2).then_some(Self { line, off_px })
     }
 }
 
-/// How far outwards of a place the colour inside changes to that outside; none where there is no such change.
-fn border(
+/// Where probes along the way from one corner to the next find a border.
+fn border_points(
     photo: &Image<LinearRgb>,
+    [from, to]: [Point2<f64>; 2],
+    reach: f64,
+) -> Option<Vec<Point2<f64>>> {
+    let along = to - from;
+    let outward = Vector2::new(along.y, -along.x).try_normalize(0.0)?;
+    let points = (0..PROBE_COUNT).filter_map(|i| {
+        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBE_COUNT as f64;
+        let probe = BorderProbe {
+            photo,
+            foot: from + along * part,
+            outward,
+        };
+        probe.border(reach)
+    });
+    Some(points.collect())
+}
+
+/// Drops the points that are far from the line through all.
+fn drop_outliers(points: &mut Vec<Point2<f64>>) -> Option<()> {
+    let line = Line::through(points)?;
+    let mut off: Vec<f64> = points.iter().map(|p| line.distance(*p).abs()).collect();
+    let (_, median, _) = off.select_nth_unstable_by(points.len() / 2, f64::total_cmp);
+    let most = OUTLIER_FACTOR * median.max(NOISE_PX);
+    points.retain(|p| line.distance(*p).abs() <= most);
+    Some(())
+}
+
+/// A profile across a side.
+struct BorderProbe<'a> {
+    photo: &'a Image<LinearRgb>,
     foot: Point2<f64>,
     outward: Vector2<f64>,
-    reach: f64,
-) -> Option<f64> {
-    let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
-    let step = 2.0 * reach / steps as f64;
-    let color = |t: f64| {
-        filter::sample_bilinear_clamped(photo, foot.x + outward.x * t, foot.y + outward.y * t)
-    };
-    let beyond = |side: f64| {
-        let samples = (0..steps / 2).map(|k| color(side * (reach + k as f64 * step)));
-        samples
+}
+
+impl BorderProbe<'_> {
+    /// Where the colour inside changes to that outside; none where there is no such change.
+    ///
+    /// # Method
+    /// The centre of gravity of the change in linear light, which blur does not move.
+    fn border(&self, reach: f64) -> Option<Point2<f64>> {
+        let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
+        let step = 2.0 * reach / steps as f64;
+        let [inside, outside] = [-1.0, 1.0].map(|side| self.mean_beyond(side, reach, steps));
+        let change = inside.add_scaled(-1.0, outside);
+        let square = dot(change, change);
+        let inside_length: f64 = (0..steps)
+            .map(|k| self.color_at(-reach + (k as f64 + 0.5) * step))
+            .map(|color| {
+                let inside_share = dot(color.add_scaled(-1.0, outside), change) / square;
+                step * f64::from(inside_share)
+            })
+            .sum();
+        let at = inside_length - reach;
+        (square > MIN_CHANGE * MIN_CHANGE && at.abs() < MAX_OFFSET_SHARE * reach)
+            .then(|| self.foot + self.outward * at)
+    }
+
+    fn color_at(&self, t: f64) -> LinearRgb {
+        filter::sample_bilinear_clamped(
+            self.photo,
+            self.foot.x + self.outward.x * t,
+            self.foot.y + self.outward.y * t,
+        )
+    }
+
+    /// Mean colour on one side (-1 inside, 1 outside), from the reach on outwards.
+    fn mean_beyond(&self, side: f64, reach: f64, steps: usize) -> LinearRgb {
+        let step = 2.0 * reach / steps as f64;
+        (0..steps / 2)
+            .map(|k| self.color_at(side * (reach + k as f64 * step)))
             .fold(LinearRgb::BLACK, |sum, p| sum + p)
             .scale(2.0 / steps as f32)
-    };
-    let (inside, outside) = (beyond(-1.0), beyond(1.0));
-    let change = inside.add_scaled(-1.0, outside);
-    let dot = |a: LinearRgb, b: LinearRgb| a.r * b.r + a.g * b.g + a.b * b.b;
-    let square = dot(change, change);
-    let share = |t: f64| f64::from(dot(color(t).add_scaled(-1.0, outside), change) / square);
-    let within: f64 = (0..steps)
-        .map(|k| step * share(-reach + (k as f64 + 0.5) * step))
-        .sum();
-    let at = within - reach;
-    (square > LEAST_CHANGE * LEAST_CHANGE && at.abs() < 0.75 * reach).then_some(at)
+    }
+}
+
+fn dot(a: LinearRgb, b: LinearRgb) -> f32 {
+    a.r * b.r + a.g * b.g + a.b * b.b
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geom::{Pose, UnitQuaternion, Vector3};
+    use crate::pixel::Coverage;
     use crate::{Camera, camera::project_picture, filter::Pyramid};
 
     const BROWN: LinearRgb = LinearRgb {
@@ -460,7 +528,7 @@ mod tests {
                 told(&near)
             );
         }
-        // Then a box that fills the photo is not taken for it.
+        // Then a box that fills the photo is not mistaken for it.
         let boxed = Image::from_fn(200, 150, |x, y| {
             let inside = (50..150).contains(&x) && (40..110).contains(&y);
             if inside {

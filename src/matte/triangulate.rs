@@ -5,13 +5,14 @@ mod lines;
 
 use super::film::{covered, view};
 use super::plate::ScreenPlate;
+use super::prepared::refused;
 use super::register;
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, Result};
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::pixel::{Coverage, Film, LinearRgb};
-use lines::{Borrowed, Line, Pixel};
+use lines::{Inferred, PixelLines, ScreenLine, SolvedFilm};
 use serde::{Deserialize, Serialize};
 
 /// How film is triangulated.
@@ -36,7 +37,7 @@ impl Default for TriangulateOptions {
     }
 }
 
-/// What two or more photos tell of a film.
+/// The film that two or more photos show.
 #[derive(Clone, Debug)]
 pub struct Triangulated {
     /// Reflected light F and opacity `1 - V` by the view transmittance V, which is *estimated* from T. Of the photos' size,
@@ -44,9 +45,9 @@ pub struct Triangulated {
     pub film: Image<Film>,
     /// Transmittance T per channel as *measured*: the screen seen through the object and in its shadow. 1 outside.
     pub transmittance: Image<LinearRgb>,
-    /// Expected error of T in each pixel, 0 to 1, of the channel that is told worst.
-    pub uncertainty: Image<Coverage>,
-    /// Which channels of T the screens determine; another one is told from these.
+    /// Expected error of T in each pixel, 0 to 1, of its least certain channel.
+    pub uncertainty: Image<f32>,
+    /// Which channels of T the screens determine; another one is inferred from these.
     pub determined: [bool; 3],
     /// T of the plastic where it lies flat: what relates V to T.
     pub flat: LinearRgb,
@@ -66,11 +67,11 @@ pub struct Triangulated {
 /// # Method
 /// [Smith and Blinn 1996], theorem 4, per channel: T is the slope and F the intercept of the photos' values over the
 /// screens'. A channel in which the screens are alike (red, on green and blue) leaves T open there. The determined ones
-/// tell the dye of PET, and by how much a pixel is such plastic and by how much bare; what little the screens differ in
+/// give the dye of PET, and by how much a pixel is such plastic and by how much bare; what little the screens differ in
 /// the open channel corrects the dye over the whole object, and the pixel, by the variances.
 ///
 /// Photos are aligned first. Between two screens grey film changes only along the difference of their colours; the light
-/// across it is the same in both photos, and tells how far they lie apart.
+/// across it is the same in both photos, and shows how far they lie apart.
 ///
 /// # Errors
 /// [`Error::Value`] (`photos`) for fewer than two or of different size; [`Error::Photo`] where no channel of the screens
@@ -84,64 +85,78 @@ pub fn triangulate(
     inside: &Image<Coverage>,
     opts: &TriangulateOptions,
 ) -> Result<Triangulated> {
-    check(shots, inside)?;
-    let aligned = aligned(shots, inside, opts)?;
+    check_sizes(shots, inside)?;
+    let aligned = align(shots, inside, opts)?;
     let noise = shots
         .iter()
-        .map(|(_, plate)| loudest(plate.residual))
-        .fold(FINEST, f32::max);
-    let lines = fitted(&aligned, noise);
-    let determined = determined(&lines, inside, opts.max_sigma);
+        .map(|(_, plate)| strongest_noise(plate.residual))
+        .fold(MIN_NOISE, f32::max);
+    let lines = fit_lines(&aligned, noise);
+    let determined = determined_channels(&lines, inside, opts.max_sigma);
     if determined == [false; 3] {
         return Err(refused(
-            "the screens are too alike in every channel to tell film from background",
+            "the screens are too similar in every channel to separate film from background",
         ));
     }
-    let borrowed = Borrowed::fit(
-        &lines,
-        inside,
-        determined,
-        dye::told(&lines, inside, determined),
-    );
-    let solved = lines.map(|line| borrowed.complete(&line));
-    let shift_px: Vec<[f64; 2]> = aligned.iter().map(|shot| shot.shift_px).collect();
-    let moves = (1..).zip(&shift_px).filter(|(_, s)| **s != [0.0; 2]);
-    let moved = moves.map(|(photo, shift_px)| moved_photo(photo, *shift_px));
-    let names = CHANNELS
-        .into_iter()
-        .zip(determined)
-        .filter(|(_, told)| !told);
-    let diagnostics = moved
-        .chain(names.map(|(name, _)| similar_screens(name)))
-        .collect();
-    let flat = lines::flat(&solved, inside);
-    let transmittance = solved.zip_map(inside, |p, c| covered(p.transmittance, c));
-    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
-    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
+    let dye = dye::fit(&lines, inside, determined);
+    let inferred = Inferred::fit(&lines, inside, determined, dye);
+    let solved = lines.map(|line| inferred.complete(&line));
+    let shift_px: Vec<[f64; 2]> = aligned.iter().map(|photo| photo.shift_px).collect();
     Ok(Triangulated {
         residual: residual(&aligned, &solved, inside),
-        film: reflected.zip_map(&seen, Film::new),
-        transmittance,
-        uncertainty: solved.zip_map(inside, |p, c| Coverage((p.sigma * c.0).min(1.0))),
+        diagnostics: diagnostics(&shift_px, determined),
         determined,
-        flat,
         shift_px,
-        diagnostics,
+        ..composed(&solved, inside)
     })
 }
 
-/// Coded pictures are no finer than this.
-const FINEST: f32 = 0.002;
+/// What is found of the film, without what is known of the photos.
+fn composed(solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> Triangulated {
+    let flat = lines::flat_transmittance(solved, inside);
+    let seen = view(&solved.map(|p| p.transmittance), flat, inside).zip_map(inside, covered);
+    let reflected = solved.zip_map(inside, |p, c| p.reflected.scale(c.0));
+    Triangulated {
+        film: reflected.zip_map(&seen, Film::new),
+        transmittance: solved.zip_map(inside, |p, c| covered(p.transmittance, c)),
+        uncertainty: solved.zip_map(inside, |p, c| (p.sigma * c.0).min(1.0)),
+        flat,
+        determined: [false; 3],
+        shift_px: Vec::new(),
+        residual: 0.0,
+        diagnostics: Vec::new(),
+    }
+}
+
+fn diagnostics(shift_px: &[[f64; 2]], determined: [bool; 3]) -> Vec<Diagnostic> {
+    let moved = (1..)
+        .zip(shift_px)
+        .filter(|(_, shift)| **shift != [0.0; 2])
+        .map(|(photo, shift)| moved_photo(photo, *shift));
+    let open = CHANNELS
+        .into_iter()
+        .zip(determined)
+        .filter(|(_, determined)| !determined)
+        .map(|(name, _)| similar_screens(name));
+    moved.chain(open).collect()
+}
+
+/// Noise of a photo at least: coded pictures are no finer.
+const MIN_NOISE: f32 = 0.002;
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
 /// A photo and its screen, moved to lie on the first.
-struct Shot {
+struct AlignedPhoto {
     photo: Image<LinearRgb>,
     screen: Image<LinearRgb>,
+    /// Where the object lay, not where it was moved.
     shift_px: [f64; 2],
 }
 
-fn check(shots: &[(&Image<LinearRgb>, &ScreenPlate)], inside: &Image<Coverage>) -> Result<()> {
+fn check_sizes(
+    shots: &[(&Image<LinearRgb>, &ScreenPlate)],
+    inside: &Image<Coverage>,
+) -> Result<()> {
     if shots.len() < 2 {
         return Err(Error::value(
             "photos",
@@ -165,109 +180,125 @@ fn check(shots: &[(&Image<LinearRgb>, &ScreenPlate)], inside: &Image<Coverage>) 
     Ok(())
 }
 
-fn aligned(
+fn align(
     shots: &[(&Image<LinearRgb>, &ScreenPlate)],
     inside: &Image<Coverage>,
     opts: &TriangulateOptions,
-) -> Result<Vec<Shot>> {
+) -> Result<Vec<AlignedPhoto>> {
+    let ((first, first_plate), others) = (shots[0], &shots[1..]);
     let reach = opts.max_shift_px.ceil().max(0.0);
-    let near = filter::dilate(&inside.map(|c| c.0 > 0.0), reach);
-    let (first, first_plate) = shots[0];
-    let shot = |(i, &(photo, plate)): (usize, &(&Image<LinearRgb>, &ScreenPlate))| {
-        if i == 0 {
-            return Ok(Shot {
-                photo: photo.clone(),
-                screen: plate.image.clone(),
-                shift_px: [0.0; 2],
-            });
-        }
-        let across = across(first_plate.color(), plate.color());
-        let found = register::shift(first, photo, &near, across);
-        let [x, y] = found.shift_px;
-        let place = format!("photo {}", i + 1);
-        if x.abs().max(y.abs()) > opts.max_shift_px {
-            return Err(refused(format!(
-                "the object in {place} lies ({:.1}, {:.1}) pixels off the first, expected at most {}; did it move?",
-                -x, -y, opts.max_shift_px
-            )));
-        }
-        if found.sigma_px < TELLING_PX && found.agreement < opts.least_agreement {
-            return Err(refused(format!(
-                "{place} agrees with the first by {:.2} only, expected {:.2}; did the object turn or the light change?",
-                found.agreement, opts.least_agreement
-            )));
-        }
-        if let Some(apart) = turned_px(first, photo, &near, across) {
-            return Err(refused(format!(
-                "the two ends of the object in {place} moved {apart:.1} pixels apart from the first, expected at most \
-                 {MOST_APART_PX}; did it turn?"
-            )));
-        }
-        let (photo, screen) = (
-            register::moved(photo, [x, y]),
-            register::moved(&plate.image, [x, y]),
-        );
-        // Told as where the object lay, not as where it was moved.
-        Ok(Shot {
-            photo,
-            screen,
-            shift_px: [0.0 - x, 0.0 - y],
-        })
+    let aligner = Aligner {
+        first,
+        near: filter::dilate(&inside.map(|c| c.0 > 0.0), reach),
+        opts,
     };
-    shots.iter().enumerate().map(shot).collect()
+    let mut aligned = vec![AlignedPhoto {
+        photo: first.clone(),
+        screen: first_plate.image.clone(),
+        shift_px: [0.0; 2],
+    }];
+    for (number, (photo, plate)) in (2..).zip(others) {
+        let weights = unchanged_light(first_plate.color(), plate.color());
+        let [x, y] = aligner.shift_px(number, photo, weights)?;
+        aligned.push(AlignedPhoto {
+            photo: register::moved(photo, [x, y]),
+            screen: register::moved(&plate.image, [x, y]),
+            shift_px: [0.0 - x, 0.0 - y],
+        });
+    }
+    Ok(aligned)
 }
 
-/// How far the ends of an object moved apart, in pixels, where that is more than they may and surely so.
-fn turned_px(
-    first: &Image<LinearRgb>,
-    photo: &Image<LinearRgb>,
-    near: &Image<bool>,
-    across: [f32; 3],
-) -> Option<f64> {
-    let [low, high] = ends(near).map(|end| register::shift(first, photo, &end, across));
-    let apart = libm::hypot(
-        low.shift_px[0] - high.shift_px[0],
-        low.shift_px[1] - high.shift_px[1],
-    );
-    let sigma = libm::hypot(low.sigma_px, high.sigma_px);
-    (apart > MOST_APART_PX.max(SURE * sigma)).then_some(apart)
+/// What the other photos are aligned to.
+struct Aligner<'a> {
+    first: &'a Image<LinearRgb>,
+    /// The object and as far around it as it may have moved.
+    near: Mask,
+    opts: &'a TriangulateOptions,
 }
 
+impl Aligner<'_> {
+    /// Pixels by which photo `number` (the first is 1) must be moved to lie on the first, by the light that the screens do
+    /// not change.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] where it was moved too far, turned, or differs otherwise.
+    fn shift_px(
+        &self,
+        number: usize,
+        photo: &Image<LinearRgb>,
+        weights: [f32; 3],
+    ) -> Result<[f64; 2]> {
+        let found = register::shift(self.first, photo, &self.near, weights);
+        let ([x, y], most) = (found.shift_px, self.opts.max_shift_px);
+        if x.abs().max(y.abs()) > most {
+            return Err(refused(format!(
+                "photo {number}: the object is offset by ({:.1}, {:.1}) px from the first, expected at most {most}; did it move?",
+                -x, -y
+            )));
+        }
+        let least = self.opts.least_agreement;
+        if found.sigma_px < MAX_JUDGED_SIGMA_PX && found.agreement < least {
+            return Err(refused(format!(
+                "photo {number}: correlation with the first is {:.2}, expected {least:.2}; did the object turn or the light change?",
+                found.agreement
+            )));
+        }
+        if let Some(apart) = self.turned_px(photo, weights) {
+            return Err(refused(format!(
+                "photo {number}: the two ends of the object moved {apart:.1} px apart from the first, expected at most \
+                 {MAX_END_SHIFT_PX}; did it turn?"
+            )));
+        }
+        Ok([x, y])
+    }
+
+    /// How far the ends of the object moved apart, in pixels, where that is more than they may and certainly so.
+    fn turned_px(&self, photo: &Image<LinearRgb>, weights: [f32; 3]) -> Option<f64> {
+        let [low, high] =
+            halves(&self.near).map(|end| register::shift(self.first, photo, &end, weights));
+        let apart = libm::hypot(
+            low.shift_px[0] - high.shift_px[0],
+            low.shift_px[1] - high.shift_px[1],
+        );
+        let sigma = libm::hypot(low.sigma_px, high.sigma_px);
+        (apart > MAX_END_SHIFT_PX.max(SIGNIFICANT_SIGMAS * sigma)).then_some(apart)
+    }
+}
+
+/// A shift known worse than this does not show how well the photos agree.
+const MAX_JUDGED_SIGMA_PX: f64 = 0.2;
 /// Ends that move farther apart than this leave double edges.
-const MOST_APART_PX: f64 = 1.0;
+const MAX_END_SHIFT_PX: f64 = 1.0;
 /// Standard deviations beyond which a difference is one.
-const SURE: f64 = 4.0;
+const SIGNIFICANT_SIGMAS: f64 = 4.0;
 
 /// The two halves of an object, cut across the longer side of its box.
-fn ends(mask: &Image<bool>) -> [Image<bool>; 2] {
+fn halves(mask: &Mask) -> [Mask; 2] {
     let (w, h) = mask.size();
-    let set = || {
-        (0..w * h)
-            .filter(|&i| mask.pixels()[i])
-            .map(|i| [i % w, i / w])
-    };
-    let span = |side: usize| {
-        let [low, high] = set().fold([usize::MAX, 0], |[low, high], at| {
-            [low.min(at[side]), high.max(at[side])]
-        });
-        [low.min(high), high]
-    };
-    let spans = [span(0), span(1)];
-    let side = usize::from(spans[1][1] - spans[1][0] > spans[0][1] - spans[0][0]);
-    let middle = usize::midpoint(spans[side][0], spans[side][1]);
-    let half = |above: bool| {
+    let spans = [0, 1].map(|axis| span(mask, axis));
+    let axis = usize::from(spans[1][1] - spans[1][0] > spans[0][1] - spans[0][0]);
+    let middle = usize::midpoint(spans[axis][0], spans[axis][1]);
+    [false, true].map(|above| {
         Image::from_fn(w, h, |x, y| {
-            mask[(x, y)] && ([x, y][side] > middle) == above
+            mask[(x, y)] && ([x, y][axis] > middle) == above
         })
-    };
-    [half(false), half(true)]
+    })
 }
 
-/// A shift known worse than this says nothing of how well the photos agree.
-const TELLING_PX: f64 = 0.2;
+/// First and last column (axis 0) or row (axis 1) with a set pixel; two equal ones without any.
+fn span(mask: &Mask, axis: usize) -> [usize; 2] {
+    let (w, h) = mask.size();
+    let set = (0..w * h).filter(|&i| mask.pixels()[i]);
+    let [low, high] = set.fold([usize::MAX, 0], |[low, high], i| {
+        let at = [i % w, i / w][axis];
+        [low.min(at), high.max(at)]
+    });
+    [low.min(high), high]
+}
 
-/// The light that does not change between two screens: luminance without its part along the difference.
-fn across(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
+/// The light that does not change between two screens: the mean of the channels without its part along the difference.
+fn unchanged_light(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     let even = [1.0_f32 / 3.0; 3];
     let (a, b): ([f32; 3], [f32; 3]) = (a.into(), b.into());
     let along: [f32; 3] = std::array::from_fn(|c| a[c] - b[c]);
@@ -279,47 +310,38 @@ fn across(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     std::array::from_fn(|c| even[c] - share * along[c])
 }
 
-fn fitted(shots: &[Shot], noise: f32) -> Image<Pixel> {
-    let (w, h) = shots[0].photo.size();
+fn fit_lines(photos: &[AlignedPhoto], noise: f32) -> Image<PixelLines> {
+    let (w, h) = photos[0].photo.size();
     Image::from_fn(w, h, |x, y| {
-        let mut lines = [Line::default(); 3];
-        for shot in shots {
-            let (p, k): ([f32; 3], [f32; 3]) =
-                (shot.photo[(x, y)].into(), shot.screen[(x, y)].into());
-            (0..3).for_each(|c| lines[c].add(k[c], p[c]));
+        let mut lines = [ScreenLine::default(); 3];
+        for aligned in photos {
+            let pixel: [f32; 3] = aligned.photo[(x, y)].into();
+            let screen: [f32; 3] = aligned.screen[(x, y)].into();
+            (0..3).for_each(|c| lines[c].add(screen[c], pixel[c]));
         }
-        Pixel { lines, noise }
+        PixelLines { lines, noise }
     })
 }
 
-/// Channels whose slope is told well enough, by the median over the object.
-fn determined(lines: &Image<Pixel>, inside: &Image<Coverage>, max_sigma: f32) -> [bool; 3] {
+/// Channels whose slope is measured well enough, by the median over the object.
+fn determined_channels(
+    lines: &Image<PixelLines>,
+    inside: &Image<Coverage>,
+    max_sigma: f32,
+) -> [bool; 3] {
     [0, 1, 2].map(|c| {
-        let sigmas = lines
-            .pixels()
-            .iter()
-            .zip(inside.pixels())
-            .filter(|(_, inside)| inside.0 > 0.5);
-        lines::median(sigmas.map(|(p, _)| p.sigma(c))).is_some_and(|sigma| sigma <= max_sigma)
+        let sigmas = lines::covered_pixels(lines, inside).map(|p| p.sigma(c));
+        lines::median(sigmas).is_some_and(|sigma| sigma <= max_sigma)
     })
 }
 
-fn residual(shots: &[Shot], solved: &Image<lines::Solved>, inside: &Image<Coverage>) -> f32 {
+/// Root mean square of what the film does not explain of the photos inside the object.
+fn residual(photos: &[AlignedPhoto], solved: &Image<SolvedFilm>, inside: &Image<Coverage>) -> f32 {
     let (mut square, mut count) = (0.0_f64, 0.0_f64);
     for i in (0..solved.pixels().len()).filter(|&i| inside.pixels()[i].0 > 0.5) {
-        let lines::Solved {
-            transmittance,
-            reflected,
-            ..
-        } = solved.pixels()[i];
-        for shot in shots {
-            let told: [f32; 3] = (reflected + transmittance * shot.screen.pixels()[i]).into();
-            let seen: [f32; 3] = shot.photo.pixels()[i].into();
-            square += told
-                .iter()
-                .zip(seen)
-                .map(|(a, b)| f64::from(a - b).powi(2))
-                .sum::<f64>();
+        for aligned in photos {
+            let explained = solved.pixels()[i].over(aligned.screen.pixels()[i]);
+            square += square_distance(explained, aligned.photo.pixels()[i]);
             count += 3.0;
         }
     }
@@ -330,12 +352,13 @@ fn residual(shots: &[Shot], solved: &Image<lines::Solved>, inside: &Image<Covera
     }
 }
 
-fn loudest(noise: LinearRgb) -> f32 {
-    noise.r.max(noise.g).max(noise.b)
+fn square_distance(a: LinearRgb, b: LinearRgb) -> f64 {
+    let (a, b): ([f32; 3], [f32; 3]) = (a.into(), b.into());
+    a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum()
 }
 
-fn refused(what: impl Into<String>) -> Error {
-    Error::Photo { what: what.into() }
+fn strongest_noise(noise: LinearRgb) -> f32 {
+    noise.r.max(noise.g).max(noise.b)
 }
 
 /// `photo` counts from 1.

@@ -1,30 +1,32 @@
 //! Charts of curves on logarithmic or linear axes, side by side, as SVG.
 
-use super::escaped;
+use super::markup::{label, tenths, text};
 use super::number::power;
-use std::fmt::Write;
+use maud::{Markup, html};
 
 /// Size of the frame of a chart in a row, and of one alone, in SVG units.
-const FRAME: [f64; 2] = [300.0, 260.0];
-const ALONE: [f64; 2] = [620.0, 360.0];
+const ROW_FRAME_SIZE: [f64; 2] = [300.0, 260.0];
+const LONE_FRAME_SIZE: [f64; 2] = [620.0, 360.0];
 /// The room around a frame for words.
-const LEFT: f64 = 62.0;
-const TOP: f64 = 40.0;
-const BELOW: f64 = 48.0;
+const LEFT_MARGIN: f64 = 62.0;
+const TOP_MARGIN: f64 = 40.0;
+const BOTTOM_MARGIN: f64 = 48.0;
 /// Width of the column of names at the right, beside its letters, and of one letter.
-const NAMES: f64 = 56.0;
-const LETTER: f64 = 7.0;
+const LEGEND_WIDTH: f64 = 56.0;
+const LEGEND_LETTER_WIDTH: f64 = 7.0;
 /// Size of the words beside points, and the room that a letter of them takes.
-const LABEL: f64 = 10.0;
-const LABEL_LETTER: f64 = 5.6;
+const POINT_LABEL_SIZE: f64 = 10.0;
+const POINT_LABEL_LETTER_WIDTH: f64 = 5.6;
 /// How far a word stands from its point.
-const BESIDE: f64 = 7.0;
+const POINT_LABEL_DISTANCE: f64 = 7.0;
+/// Half the side of the room that a point takes from words.
+const POINT_CLEARANCE: f64 = 3.0;
 /// Logarithmic axes on which values are up to so many times each other also have lines at 2 and 5.
 const FEW_DECADES: f64 = 100.0;
 /// Where logarithmic axes have lines in a decade.
-const STEPS: [f64; 3] = [1.0, 2.0, 5.0];
-/// What powers of ten may be off by.
-const HAIR: f64 = 1e-9;
+const DECADE_STEPS: [f64; 3] = [1.0, 2.0, 5.0];
+/// What powers of ten may be off by, as a share.
+const ROUNDING_SHARE: f64 = 1e-9;
 /// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design").
 /// Yellow, which is faint on white, comes last.
 const COLORS: [&str; 8] = [
@@ -74,19 +76,12 @@ pub struct Axis {
 impl Axis {
     /// A logarithmic axis over powers of ten that hold all positive values; 1 to 10 where there are none.
     pub fn over_decades(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let seen = values.into_iter().filter(|v| v.is_finite() && *v > 0.0);
-        let [low, high] = seen.fold([f64::INFINITY, 0.0], |[low, high], v| {
-            [v.min(low), v.max(high)]
-        });
-        let range = if low <= high {
-            [libm::floor(libm::log10(low)), libm::ceil(libm::log10(high))]
-        } else {
-            [0.0, 1.0]
-        };
-        let range = [range[0], range[1].max(range[0] + 1.0)].map(libm::exp10);
+        let [low, high] = positive_extent(values).unwrap_or([1.0, 10.0]);
+        let first = libm::floor(libm::log10(low));
+        let last = libm::ceil(libm::log10(high)).max(first + 1.0);
         Self {
             title: title.into(),
-            range,
+            range: [first, last].map(libm::exp10),
             logarithmic: true,
         }
     }
@@ -94,229 +89,307 @@ impl Axis {
     /// A logarithmic axis that begins and ends at 1, 2 or 5 times a power of ten, as near to all positive values as can be; 1
     /// to 10 where there are none.
     pub fn around(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let seen: Vec<f64> = values
-            .into_iter()
-            .filter(|v| v.is_finite() && *v > 0.0)
-            .collect();
-        let wide = Self::over_decades(title, seen.iter().copied());
-        let [first, last] = wide.range.map(|v| libm::round(libm::log10(v)) as i32);
-        let lines = || (first..=last).flat_map(|e| STEPS.map(|step| step * decade(e)));
-        let least = seen.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = seen.iter().copied().fold(0.0, f64::max);
-        let low = lines()
-            .filter(|v| *v <= least * (1.0 + HAIR))
+        let Some([least, most]) = positive_extent(values) else {
+            return Self::over_decades(title, []);
+        };
+        let wide = Self::over_decades(title, [least, most]);
+        let lines = wide.lines_at(&DECADE_STEPS);
+        let low = lines
+            .iter()
+            .copied()
+            .filter(|v| *v <= least * (1.0 + ROUNDING_SHARE))
             .fold(wide.range[0], f64::max);
-        let high = lines()
-            .filter(|v| *v >= most * (1.0 - HAIR) && *v > low)
+        let high = lines
+            .into_iter()
+            .filter(|v| *v >= most * (1.0 - ROUNDING_SHARE) && *v > low)
             .fold(wide.range[1], f64::min);
-        if seen.is_empty() {
-            wide
-        } else {
-            Self {
-                range: [low, high],
-                ..wide
-            }
+        Self {
+            range: [low, high],
+            ..wide
         }
     }
 
     /// How far along a value is, from 0 to 1; none where it cannot be shown.
-    fn part(&self, value: f64) -> Option<f64> {
+    fn fraction(&self, value: f64) -> Option<f64> {
         let [low, high, value] = [self.range[0], self.range[1], value]
             .map(|v| if self.logarithmic { libm::log10(v) } else { v });
-        let part = (value - low) / (high - low);
-        part.is_finite().then(|| part.clamp(0.0, 1.0))
+        let fraction = (value - low) / (high - low);
+        fraction.is_finite().then(|| fraction.clamp(0.0, 1.0))
     }
 
     /// Values with a line through the chart.
     fn marks(&self) -> Vec<f64> {
-        if self.logarithmic {
-            let [low, high] = [
-                libm::floor(libm::log10(self.range[0])),
-                libm::ceil(libm::log10(self.range[1])),
-            ];
-            let steps = if self.range[1] > FEW_DECADES * self.range[0] {
-                &STEPS[..1]
-            } else {
-                &STEPS
-            };
-            let all = (low as i32..=high as i32)
-                .flat_map(|e| steps.iter().map(move |step| step * decade(e)));
-            return all
-                .filter(|v| {
-                    *v >= self.range[0] * (1.0 - HAIR) && *v <= self.range[1] * (1.0 + HAIR)
-                })
+        let [low, high] = self.range;
+        if !self.logarithmic {
+            return (0..=4)
+                .map(|i| low + (high - low) * f64::from(i) / 4.0)
                 .collect();
         }
-        (0..=4)
-            .map(|i| self.range[0] + (self.range[1] - self.range[0]) * f64::from(i) / 4.0)
+        let steps = if high > FEW_DECADES * low {
+            &DECADE_STEPS[..1]
+        } else {
+            &DECADE_STEPS
+        };
+        let mut lines = self.lines_at(steps);
+        lines.retain(|v| *v >= low * (1.0 - ROUNDING_SHARE) && *v <= high * (1.0 + ROUNDING_SHARE));
+        lines
+    }
+
+    /// Multiples of the powers of ten of a logarithmic axis, in order.
+    fn lines_at(&self, steps: &[f64]) -> Vec<f64> {
+        let [low, high] = self.range.map(libm::log10);
+        (libm::floor(low) as i32..=libm::ceil(high) as i32)
+            .flat_map(|e| {
+                steps
+                    .iter()
+                    .map(move |step| step * libm::exp10(f64::from(e)))
+            })
             .collect()
     }
+}
+
+/// Least and greatest of the finite, positive values.
+fn positive_extent(values: impl IntoIterator<Item = f64>) -> Option<[f64; 2]> {
+    values
+        .into_iter()
+        .filter(|v| v.is_finite() && *v > 0.0)
+        .map(|v| [v, v])
+        .reduce(|[low, high], [v, _]| [v.min(low), v.max(high)])
 }
 
 impl Chart {
     /// Charts side by side with one list of names, the first chart's, as an SVG document.
     pub fn row(charts: &[Self]) -> String {
-        Self::drawing(charts, FRAME, &Beside::default())
+        drawing(charts, ROW_FRAME_SIZE, &Beside::default())
     }
 
     /// A chart by itself, larger than in a row, as an SVG document.
     #[doc(hidden)]
     pub fn alone(&self, beside: &Beside) -> String {
-        Self::drawing(std::slice::from_ref(self), ALONE, beside)
+        drawing(std::slice::from_ref(self), LONE_FRAME_SIZE, beside)
+    }
+}
+
+fn drawing(charts: &[Chart], frame: [f64; 2], beside: &Beside) -> String {
+    let names = charts.first().map_or(&[][..], |c| &c.names);
+    let longest = names.iter().map(|name| name.chars().count()).max();
+    let legend_width = LEGEND_WIDTH + LEGEND_LETTER_WIDTH * longest.unwrap_or(0) as f64;
+    let width = charts.len() as f64 * (LEFT_MARGIN + frame[0]) + legend_width;
+    let height = TOP_MARGIN + frame[1] + BOTTOM_MARGIN;
+    html! {
+        svg xmlns="http://www.w3.org/2000/svg" viewBox=(format_args!("0 0 {width} {height}")) width=(width)
+            height=(height) font-family="sans-serif" font-size="12" {
+            rect width=(width) height=(height) fill="white" {}
+            @for (i, chart) in charts.iter().enumerate() {
+                (Framed { chart, left: LEFT_MARGIN + i as f64 * (LEFT_MARGIN + frame[0]), size: frame }.svg(beside))
+            }
+            (legend(names, width - legend_width + 16.0))
+        }
+    }
+    .into_string()
+        + "\n"
+}
+
+/// A line and a name for each curve.
+fn legend(names: &[String], left: f64) -> Markup {
+    html! {
+        @for (i, name) in names.iter().enumerate() {
+            @let y = TOP_MARGIN + 14.0 + 20.0 * i as f64;
+            path d=(format_args!("M{left} {y}h24")) stroke=(color(i)) stroke-width="2" {}
+            (label(left + 32.0, y + 4.0, "start", name))
+        }
+    }
+}
+
+/// The colour of a curve.
+fn color(i: usize) -> &'static str {
+    COLORS[i % COLORS.len()]
+}
+
+/// A chart and where its frame stands in the drawing.
+struct Framed<'a> {
+    chart: &'a Chart,
+    left: f64,
+    size: [f64; 2],
+}
+
+impl Framed<'_> {
+    fn x(&self, value: f64) -> Option<f64> {
+        let fraction = self.chart.across.fraction(value)?;
+        Some(self.left + self.size[0] * fraction)
     }
 
-    fn drawing(charts: &[Self], frame: [f64; 2], beside: &Beside) -> String {
-        let names = charts.first().map_or(&[][..], |c| &c.names);
-        let longest = names
-            .iter()
-            .map(|name| name.chars().count())
-            .max()
-            .unwrap_or(0);
-        let column = NAMES + LETTER * longest as f64;
-        let width = charts.len() as f64 * (LEFT + frame[0]) + column;
-        let height = TOP + frame[1] + BELOW;
-        let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-             height=\"{height}\" font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"{width}\" height=\"{height}\" fill=\"white\"/>\n"
-        );
-        for (i, chart) in charts.iter().enumerate() {
-            let left = LEFT + i as f64 * (LEFT + frame[0]);
-            chart.draw(&mut svg, left, frame, beside);
-        }
-        let left = width - column + 16.0;
-        for (i, name) in names.iter().enumerate() {
-            let y = TOP + 14.0 + 20.0 * i as f64;
-            let color = COLORS[i % COLORS.len()];
-            svg += &format!("<path d=\"M{left} {y}h24\" stroke=\"{color}\" stroke-width=\"2\"/>\n");
-            svg += &words(left + 32.0, y + 4.0, "start", name);
-        }
-        svg + "</svg>\n"
+    fn y(&self, value: f64) -> Option<f64> {
+        let fraction = self.chart.up.fraction(value)?;
+        Some(TOP_MARGIN + self.size[1] * (1.0 - fraction))
     }
 
-    fn draw(&self, svg: &mut String, left: f64, [w, h]: [f64; 2], beside: &Beside) {
-        let x = |value| self.across.part(value).map(|part| left + w * part);
-        let y = |value| self.up.part(value).map(|part| TOP + h * (1.0 - part));
-        for mark in self.across.marks() {
-            let Some(x) = x(mark) else { continue };
-            *svg += &format!("<path d=\"M{x:.1} {TOP}v{h}\" stroke=\"#ddd\"/>\n");
-            *svg += &words(x, TOP + h + 16.0, "middle", &short(mark));
-        }
-        for mark in self.up.marks() {
-            let Some(y) = y(mark) else { continue };
-            *svg += &format!("<path d=\"M{left} {y:.1}h{w}\" stroke=\"#ddd\"/>\n");
-            *svg += &words(left - 6.0, y + 4.0, "end", &short(mark));
-        }
-        *svg += &format!(
-            "<rect x=\"{left}\" y=\"{TOP}\" width=\"{w}\" height=\"{h}\" fill=\"none\" stroke=\"#888\"/>\n"
-        );
-        *svg += &words(left + w / 2.0, TOP - 10.0, "middle", &self.title);
-        *svg += &words(left + w / 2.0, TOP + h + 36.0, "middle", &self.across.title);
-        *svg += &words(left - LEFT + 8.0, TOP - 26.0, "start", &self.up.title);
-        for (i, curve) in self.curves.iter().enumerate() {
-            let seen: Vec<_> = curve
-                .iter()
-                .filter_map(|p| Some([x(p[0])?, y(p[1])?]))
-                .collect();
-            let color = COLORS[i % COLORS.len()];
-            if !beside.apart {
-                let path = seen
-                    .iter()
-                    .map(|[x, y]| format!("{x:.1},{y:.1} "))
-                    .collect::<String>();
-                let points = path.trim_end();
-                *svg += &format!(
-                    "<polyline points=\"{points}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.5\"/>\n"
-                );
+    /// Where a point of a curve stands; none where it cannot be shown.
+    fn place(&self, point: &[f64; 2]) -> Option<[f64; 2]> {
+        Some([self.x(point[0])?, self.y(point[1])?])
+    }
+
+    fn bottom(&self) -> f64 {
+        TOP_MARGIN + self.size[1]
+    }
+
+    fn svg(&self, beside: &Beside) -> Markup {
+        html! {
+            (self.grid())
+            rect x=(self.left) y=(TOP_MARGIN) width=(self.size[0]) height=(self.size[1]) fill="none" stroke="#888" {}
+            (self.titles())
+            @for (i, curve) in self.chart.curves.iter().enumerate() {
+                (self.curve(curve, color(i), !beside.apart))
             }
-            for [x, y] in seen {
-                let _ = writeln!(
-                    svg,
-                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"{color}\"/>"
-                );
+            @for [x, y] in self.chart.defaults.iter().filter_map(|p| self.place(p)) {
+                circle cx=(tenths(x)) cy=(tenths(y)) r="6" fill="none" stroke="#c00" {}
+            }
+            (self.point_labels(beside))
+        }
+    }
+
+    /// Lines at round values, with the values.
+    fn grid(&self) -> Markup {
+        let [w, h] = self.size;
+        html! {
+            @for mark in self.chart.across.marks() {
+                @if let Some(x) = self.x(mark) {
+                    path d=(format_args!("M{x:.1} {TOP_MARGIN}v{h}")) stroke="#ddd" {}
+                    (label(x, self.bottom() + 16.0, "middle", &short(mark)))
+                }
+            }
+            @for mark in self.chart.up.marks() {
+                @if let Some(y) = self.y(mark) {
+                    path d=(format_args!("M{} {y:.1}h{w}", self.left)) stroke="#ddd" {}
+                    (label(self.left - 6.0, y + 4.0, "end", &short(mark)))
+                }
             }
         }
-        for [x, y] in self
-            .defaults
+    }
+
+    fn titles(&self) -> Markup {
+        let middle = self.left + self.size[0] / 2.0;
+        html! {
+            (label(middle, TOP_MARGIN - 10.0, "middle", &self.chart.title))
+            (label(middle, self.bottom() + 36.0, "middle", &self.chart.across.title))
+            (label(self.left - LEFT_MARGIN + 8.0, TOP_MARGIN - 26.0, "start", &self.chart.up.title))
+        }
+    }
+
+    /// The points of a curve, joined by a line where it is asked for.
+    fn curve(&self, curve: &Curve, color: &str, joined: bool) -> Markup {
+        let places: Vec<_> = curve.iter().filter_map(|p| self.place(p)).collect();
+        let points: Vec<String> = places
             .iter()
-            .filter_map(|p| Some([x(p[0])?, y(p[1])?]))
-        {
-            let _ = writeln!(
-                svg,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"6\" fill=\"none\" stroke=\"#c00\"/>"
-            );
+            .map(|[x, y]| format!("{x:.1},{y:.1}"))
+            .collect();
+        html! {
+            @if joined {
+                polyline points=(points.join(" ")) fill="none" stroke=(color) stroke-width="1.5" {}
+            }
+            @for [x, y] in places {
+                circle cx=(tenths(x)) cy=(tenths(y)) r="2.5" fill=(color) {}
+            }
         }
+    }
+
+    fn point_labels(&self, beside: &Beside) -> Markup {
         let labels = beside
             .labels
             .iter()
-            .filter_map(|(p, text)| Some(([x(p[0])?, y(p[1])?], text.as_str())));
-        let points = self
-            .curves
-            .iter()
-            .flatten()
-            .filter_map(|p| Some([x(p[0])?, y(p[1])?]));
-        *svg += &set_beside(
+            .filter_map(|(point, text)| Some((self.place(point)?, text.as_str())));
+        let points = self.chart.curves.iter().flatten();
+        let frame = Area {
+            left: self.left,
+            top: TOP_MARGIN,
+            right: self.left + self.size[0],
+            bottom: self.bottom(),
+        };
+        labels_beside(
             labels.collect(),
-            points.collect(),
-            [left, left + w, TOP, TOP + h],
-        );
+            points.filter_map(|p| self.place(p)).collect(),
+            frame,
+        )
     }
 }
 
-/// Words beside points, where they cover neither each other nor another point, and stay between two sides, a top and a bottom;
-/// lines that run behind them are kept off by a rim.
-fn set_beside(
-    labels: Vec<([f64; 2], &str)>,
-    points: Vec<[f64; 2]>,
-    [left, right, top, bottom]: [f64; 4],
-) -> String {
-    let mut taken: Vec<[f64; 4]> = points
-        .iter()
-        .map(|[x, y]| [x - 3.0, y - 3.0, x + 3.0, y + 3.0])
-        .collect();
-    let mut svg = String::new();
-    for ([x, y], text) in labels {
-        let width = LABEL_LETTER * text.chars().count() as f64;
-        let places = [
-            [BESIDE, -3.0],
-            [BESIDE, LABEL],
-            [-BESIDE - width, -3.0],
-            [-BESIDE - width, LABEL],
-        ];
-        let free = places
-            .into_iter()
-            .map(|[dx, dy]| [x + dx, y + dy])
-            .find(|[x, y]| {
-                let own = [*x, y - 0.8 * LABEL, x + width, *y];
-                let apart =
-                    |b: &[f64; 4]| own[2] < b[0] || b[2] < own[0] || own[3] < b[1] || b[3] < own[1];
-                own[0] >= left
-                    && own[2] <= right
-                    && own[1] >= top
-                    && own[3] <= bottom
-                    && taken.iter().all(apart)
-            });
-        let Some([x, y]) = free else { continue };
-        taken.push([x, y - 0.8 * LABEL, x + width, y]);
-        let text = escaped(text);
-        let _ = writeln!(
-            svg,
-            "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{LABEL}\" fill=\"#444\" stroke=\"white\" stroke-width=\"3\" \
-             stroke-linejoin=\"round\" paint-order=\"stroke\">{text}</text>"
-        );
+/// A part of the drawing.
+#[derive(Clone, Copy)]
+struct Area {
+    left: f64,
+    top: f64,
+    right: f64,
+    bottom: f64,
+}
+
+impl Area {
+    /// What a point takes.
+    fn of_point([x, y]: [f64; 2]) -> Self {
+        Self {
+            left: x - POINT_CLEARANCE,
+            top: y - POINT_CLEARANCE,
+            right: x + POINT_CLEARANCE,
+            bottom: y + POINT_CLEARANCE,
+        }
     }
-    svg
+
+    /// What a word takes that begins at a place.
+    fn of_word([x, y]: [f64; 2], width: f64) -> Self {
+        Self {
+            left: x,
+            top: y - 0.8 * POINT_LABEL_SIZE,
+            right: x + width,
+            bottom: y,
+        }
+    }
+
+    fn overlaps(&self, other: &Self) -> bool {
+        self.right >= other.left
+            && other.right >= self.left
+            && self.bottom >= other.top
+            && other.bottom >= self.top
+    }
+
+    fn holds(&self, inner: &Self) -> bool {
+        inner.left >= self.left
+            && inner.right <= self.right
+            && inner.top >= self.top
+            && inner.bottom <= self.bottom
+    }
 }
 
-fn decade(exponent: i32) -> f64 {
-    libm::exp10(f64::from(exponent))
+/// Words beside points, where they cover neither each other nor another point, and stay in the frame; lines that run behind
+/// them are kept off by a rim.
+fn labels_beside(labels: Vec<([f64; 2], &str)>, points: Vec<[f64; 2]>, frame: Area) -> Markup {
+    let mut taken: Vec<Area> = points.into_iter().map(Area::of_point).collect();
+    let mut placed = Vec::new();
+    for (point, word) in labels {
+        let width = POINT_LABEL_LETTER_WIDTH * word.chars().count() as f64;
+        let free = places_beside(point, width).into_iter().find(|place| {
+            let area = Area::of_word(*place, width);
+            frame.holds(&area) && !taken.iter().any(|other| other.overlaps(&area))
+        });
+        if let Some(place) = free {
+            taken.push(Area::of_word(place, width));
+            placed.push((place, word));
+        }
+    }
+    html! {
+        @for ([x, y], word) in placed {
+            text x=(tenths(x)) y=(tenths(y)) font-size=(POINT_LABEL_SIZE) fill="#444" stroke="white" stroke-width="3"
+                stroke-linejoin="round" paint-order="stroke" { (text(word)) }
+        }
+    }
 }
 
-fn words(x: f64, y: f64, anchor: &str, text: &str) -> String {
-    let text = escaped(text);
-    format!("<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{text}</text>\n")
+/// Where a word beside a point may begin, best first: to its right or left, above or below.
+fn places_beside([x, y]: [f64; 2], width: f64) -> [[f64; 2]; 4] {
+    let (right, left) = (x + POINT_LABEL_DISTANCE, x - POINT_LABEL_DISTANCE - width);
+    let (above, below) = (y - 3.0, y + POINT_LABEL_SIZE);
+    [[right, above], [right, below], [left, above], [left, below]]
 }
 
-/// A number as short as it can be told; beyond a thousandth and a hundred thousand with a power of ten.
+/// A number as short as it can be; beyond a thousandth and a hundred thousand with a power of ten.
 fn short(value: f64) -> String {
     if value != 0.0 && !(9e-4..9e4).contains(&value.abs()) {
         return power(value);
@@ -328,6 +401,20 @@ fn short(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn set_beside(
+        labels: Vec<([f64; 2], &str)>,
+        points: Vec<[f64; 2]>,
+        [left, right, top, bottom]: [f64; 4],
+    ) -> String {
+        let frame = Area {
+            left,
+            top,
+            right,
+            bottom,
+        };
+        labels_beside(labels, points, frame).into_string()
+    }
 
     #[test]
     fn decades_hold_all_values_and_something_where_there_are_none() {
@@ -442,8 +529,8 @@ mod tests {
         };
         let middle = format!(
             "cx=\"{:.1}\" cy=\"{:.1}\"",
-            LEFT + FRAME[0] / 2.0,
-            TOP + FRAME[1] / 2.0
+            LEFT_MARGIN + ROW_FRAME_SIZE[0] / 2.0,
+            TOP_MARGIN + ROW_FRAME_SIZE[1] / 2.0
         );
         assert!(Chart::row(&[chart]).contains(&middle));
     }

@@ -1,56 +1,61 @@
 //! Maps of where things are in pictures.
 
-use super::escaped;
-use std::fmt::Write;
+use super::markup::text;
+use maud::{Markup, html};
 
 /// Cells across and down, and a cell's side in SVG units.
-const CELLS: [usize; 2] = [32, 24];
-const CELL: f64 = 9.0;
-/// Room for the title.
-const TOP: f64 = 22.0;
+const GRID_CELLS: [usize; 2] = [32, 24];
+const CELL_SIDE: f64 = 9.0;
+/// Room for the title, SVG units.
+const TITLE_HEIGHT: f64 = 22.0;
 
 /// How many places, as shares of a picture's width and height, lie in each part of it: the darker the more. Those
 /// outside the picture are left out.
 pub(crate) fn heat_map(title: &str, places: &[[f64; 2]]) -> String {
-    let mut counts = vec![0_u64; CELLS[0] * CELLS[1]];
-    for place in places
+    let [width, height] = GRID_CELLS.map(|n| n as f64 * CELL_SIDE);
+    let whole_height = height + TITLE_HEIGHT;
+    html! {
+        svg xmlns="http://www.w3.org/2000/svg" class="heat" width=(width) height=(whole_height)
+            viewBox=(format_args!("0 0 {width} {whole_height}")) font-family="sans-serif" font-size="11" {
+            text x="0" y="14" { (text(title)) }
+            (cells(&counts(places)))
+            rect x="0.5" y=(TITLE_HEIGHT) width=(width - 1.0) height=(height - 0.5) fill="none" stroke="#888" {}
+        }
+    }
+    .into_string()
+        + "\n"
+}
+
+/// Places in each cell, row by row.
+fn counts(places: &[[f64; 2]]) -> Vec<u64> {
+    let mut counts = vec![0_u64; GRID_CELLS[0] * GRID_CELLS[1]];
+    let inside = places
         .iter()
-        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)))
-    {
+        .filter(|place| place.iter().all(|share| (0.0..=1.0).contains(share)));
+    for place in inside {
         let [column, row] =
-            [0, 1].map(|i| ((place[i] * CELLS[i] as f64) as usize).min(CELLS[i] - 1));
-        counts[row * CELLS[0] + column] += 1;
+            [0, 1].map(|i| ((place[i] * GRID_CELLS[i] as f64) as usize).min(GRID_CELLS[i] - 1));
+        counts[row * GRID_CELLS[0] + column] += 1;
     }
+    counts
+}
+
+/// The cells with something in them.
+fn cells(counts: &[u64]) -> Markup {
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
-    let [width, height] = CELLS.map(|n| n as f64 * CELL);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"heat\" width=\"{:.0}\" height=\"{:.0}\" \
-         viewBox=\"0 0 {width} {:.0}\" font-family=\"sans-serif\" font-size=\"11\">\n",
-        width,
-        height + TOP,
-        height + TOP
-    );
-    let _ = writeln!(svg, "<text x=\"0\" y=\"14\">{}</text>", escaped(title));
-    for (i, &count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let [x, y] = [
-            (i % CELLS[0]) as f64 * CELL,
-            TOP + (i / CELLS[0]) as f64 * CELL,
-        ];
-        // By the square root, so that few are told from none.
-        let ink = 0.06 + 0.94 * (count as f64 / most as f64).sqrt();
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{x}\" y=\"{y}\" width=\"{CELL}\" height=\"{CELL}\" fill=\"#0072b2\" opacity=\"{ink:.2}\">\
-             <title>{count}</title></rect>"
-        );
+    html! {
+        @for (i, count) in counts.iter().copied().enumerate().filter(|(_, count)| *count > 0) {
+            rect x=((i % GRID_CELLS[0]) as f64 * CELL_SIDE)
+                y=(TITLE_HEIGHT + (i / GRID_CELLS[0]) as f64 * CELL_SIDE)
+                width=(CELL_SIDE) height=(CELL_SIDE) fill="#0072b2"
+                opacity=(format_args!("{:.2}", opacity(count, most))) { title { (count) } }
+        }
     }
-    let _ = writeln!(
-        svg,
-        "<rect x=\"0.5\" y=\"{TOP}\" width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#888\"/>",
-        width - 1.0,
-        height - 0.5
-    );
-    svg + "</svg>\n"
+}
+
+/// By the square root, so that few can be told from none.
+fn opacity(count: u64, most: u64) -> f64 {
+    0.06 + 0.94 * (count as f64 / most as f64).sqrt()
 }
 
 #[cfg(test)]

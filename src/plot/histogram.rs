@@ -1,15 +1,19 @@
 //! Histograms as SVG: what was drawn against what it was drawn from.
 
-use super::escaped;
-use std::fmt::Write;
+use super::markup::{tenths, text};
+use maud::{Markup, html};
 
-/// Size of the bars' frame and the room around it, SVG units.
-const FRAME: [f64; 2] = [250.0, 110.0];
-const LEFT: f64 = 40.0;
-const TOP: f64 = 24.0;
-const BELOW: f64 = 24.0;
+/// Size of the bars' frame, SVG units.
+const FRAME_SIZE: [f64; 2] = [250.0, 110.0];
+/// The room around it for words, SVG units.
+const LEFT_MARGIN: f64 = 40.0;
+const RIGHT_MARGIN: f64 = 12.0;
+const TOP_MARGIN: f64 = 24.0;
+const BOTTOM_MARGIN: f64 = 24.0;
+/// Where the bars end below.
+const BASELINE: f64 = TOP_MARGIN + FRAME_SIZE[1];
 /// Width of a letter of 11 units on average, a little more than most sans-serif fonts need.
-const LETTER: f64 = 6.0;
+const LETTER_WIDTH: f64 = 6.0;
 
 /// Counts in bins of the same width.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,28 +30,24 @@ pub struct Histogram {
 
 impl Histogram {
     /// Counts numbers in `bins` bins over a range; values outside count in the first or last bin.
-    pub fn of(
+    pub fn new(
         title: impl Into<String>,
         values: &[f64],
         [low, high]: [f64; 2],
         bins: usize,
     ) -> Self {
         let mut counts = vec![0; bins.max(1)];
+        let last = counts.len() - 1;
         for value in values {
             let place = (value - low) / (high - low) * bins as f64;
-            let last = counts.len() - 1;
-            counts[if place > 0.0 {
-                (place as usize).min(last)
-            } else {
-                0
-            }] += 1;
+            let bin = if place > 0.0 { place as usize } else { 0 };
+            counts[bin.min(last)] += 1;
         }
-        let expected = None;
         Self {
             title: title.into(),
             ends: [short(low), short(high)],
             counts,
-            expected,
+            expected: None,
         }
     }
 
@@ -74,67 +74,85 @@ impl Histogram {
 
     /// An SVG document: bars, and a dashed line at what is expected with a band of two standard deviations around it.
     pub fn svg(&self) -> String {
-        let [w, h] = FRAME;
-        let (width, height) = (LEFT + w + 12.0, TOP + h + BELOW);
-        let most = self
-            .counts
-            .iter()
-            .map(|&n| n as f64)
-            .chain(self.expected)
-            .fold(1.0, f64::max)
-            * 1.1;
-        let y = |count: f64| TOP + h * (1.0 - (count / most).clamp(0.0, 1.0));
-        let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"histogram\" width=\"{width}\" height=\"{height}\" \
-             font-family=\"sans-serif\" font-size=\"11\">\n"
-        );
-        if let Some(expected) = self.expected {
-            let spread = 2.0 * (expected * (1.0 - 1.0 / self.counts.len().max(1) as f64)).sqrt();
-            let (top, bottom) = (y(expected + spread), y(expected - spread));
-            let _ = writeln!(
-                svg,
-                "<rect x=\"{LEFT}\" y=\"{top:.1}\" width=\"{w}\" height=\"{:.1}\" fill=\"#d55e00\" opacity=\"0.15\"/>",
-                bottom - top
-            );
+        let width = LEFT_MARGIN + FRAME_SIZE[0] + RIGHT_MARGIN;
+        html! {
+            svg xmlns="http://www.w3.org/2000/svg" class="histogram" width=(width)
+                height=(BASELINE + BOTTOM_MARGIN) font-family="sans-serif" font-size="11" {
+                @if let Some(expected) = self.expected { (self.band(expected)) }
+                (self.bars())
+                @if let Some(expected) = self.expected {
+                    path d=(across(&tenths(self.y(expected)))) stroke="#d55e00" stroke-dasharray="5 3" {}
+                }
+                path d=(across(&BASELINE.to_string())) stroke="#888" {}
+                (self.words(width))
+            }
         }
-        let wide = w / self.counts.len().max(1) as f64;
-        for (i, &count) in self.counts.iter().enumerate() {
-            let (x, top) = (LEFT + wide * i as f64, y(count as f64));
-            let _ = writeln!(
-                svg,
-                "<rect x=\"{:.2}\" y=\"{top:.1}\" width=\"{:.2}\" height=\"{:.1}\" fill=\"#0072b2\"><title>{count}</title></rect>",
-                x + wide * 0.05,
-                wide * 0.9,
-                TOP + h - top
-            );
+        .into_string()
+            + "\n"
+    }
+
+    /// The count at the top of the frame.
+    fn top_count(&self) -> f64 {
+        let counts = self.counts.iter().map(|&n| n as f64);
+        counts.chain(self.expected).fold(1.0, f64::max) * 1.1
+    }
+
+    /// Height of a count in the drawing.
+    fn y(&self, count: f64) -> f64 {
+        TOP_MARGIN + FRAME_SIZE[1] * (1.0 - (count / self.top_count()).clamp(0.0, 1.0))
+    }
+
+    /// Two standard deviations on either side of what is expected.
+    fn band(&self, expected: f64) -> Markup {
+        let spread = 2.0 * (expected * (1.0 - 1.0 / self.counts.len().max(1) as f64)).sqrt();
+        let (top, bottom) = (self.y(expected + spread), self.y(expected - spread));
+        html! {
+            rect x=(LEFT_MARGIN) y=(tenths(top)) width=(FRAME_SIZE[0]) height=(tenths(bottom - top))
+                fill="#d55e00" opacity="0.15" {}
         }
-        if let Some(expected) = self.expected {
-            let y = y(expected);
-            let _ = writeln!(
-                svg,
-                "<path d=\"M{LEFT} {y:.1}h{w}\" stroke=\"#d55e00\" stroke-dasharray=\"5 3\"/>"
-            );
+    }
+
+    fn bars(&self) -> Markup {
+        let bin_width = FRAME_SIZE[0] / self.counts.len().max(1) as f64;
+        html! {
+            @for (i, &count) in self.counts.iter().enumerate() {
+                @let x = LEFT_MARGIN + bin_width * (i as f64 + 0.05);
+                @let y = self.y(count as f64);
+                rect x=(format_args!("{x:.2}")) y=(tenths(y)) width=(format_args!("{:.2}", bin_width * 0.9))
+                    height=(tenths(BASELINE - y)) fill="#0072b2" { title { (count) } }
+            }
         }
-        let line = TOP + h;
-        let _ = writeln!(svg, "<path d=\"M{LEFT} {line}h{w}\" stroke=\"#888\"/>");
-        let mut words = |[x, y, room]: [f64; 3], anchor: &str, text: &str| {
-            let (shown, whole) = (escaped(&fitted(text, room)), escaped(text));
-            let _ = writeln!(
-                svg,
-                "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{shown}<title>{whole}</title></text>"
-            );
-        };
-        words([LEFT, TOP - 10.0, width - LEFT], "start", &self.title);
-        words([LEFT - 4.0, TOP + 8.0, LEFT - 4.0], "end", &short(most));
-        words([LEFT, line + 14.0, w / 2.0], "start", &self.ends[0]);
-        words([LEFT + w, line + 14.0, w / 2.0], "end", &self.ends[1]);
-        svg + "</svg>\n"
+    }
+
+    fn words(&self, width: f64) -> Markup {
+        let [w, below] = [FRAME_SIZE[0], BASELINE + 14.0];
+        let [low, high] = &self.ends;
+        html! {
+            (clipped([LEFT_MARGIN, TOP_MARGIN - 10.0], width - LEFT_MARGIN, "start", &self.title))
+            (clipped([LEFT_MARGIN - 4.0, TOP_MARGIN + 8.0], LEFT_MARGIN - 4.0, "end", &short(self.top_count())))
+            (clipped([LEFT_MARGIN, below], w / 2.0, "start", low))
+            (clipped([LEFT_MARGIN + w, below], w / 2.0, "end", high))
+        }
+    }
+}
+
+/// A line through the frame at a height.
+fn across(y: &str) -> String {
+    format!("M{LEFT_MARGIN} {y}h{}", FRAME_SIZE[0])
+}
+
+/// A text, cut where there is no more room for it; the whole appears where it is pointed at.
+fn clipped([x, y]: [f64; 2], room: f64, anchor: &str, whole: &str) -> Markup {
+    html! {
+        text x=(tenths(x)) y=(tenths(y)) text-anchor=(anchor) {
+            (text(&fitted(whole, room))) title { (text(whole)) }
+        }
     }
 }
 
 /// A text, cut where there is no more room for it.
 fn fitted(text: &str, room: f64) -> String {
-    let most = (room / LETTER) as usize;
+    let most = (room / LETTER_WIDTH) as usize;
     if text.chars().count() <= most {
         return text.to_owned();
     }
@@ -164,7 +182,7 @@ mod tests {
 
     #[test]
     fn every_value_is_counted_once() {
-        let h = Histogram::of(
+        let h = Histogram::new(
             "x",
             &[0.0, 0.1, 0.5, 0.99, 1.0, -3.0, 9.0, f64::NAN],
             [0.0, 1.0],
@@ -179,7 +197,7 @@ mod tests {
         let even: Vec<f64> = (0..1000).map(|i| f64::from(i) / 1000.0).collect();
         let slanted: Vec<f64> = even.iter().map(|x| x * x).collect();
         let worst = |values: &[f64]| {
-            Histogram::of("x", values, [0.0, 1.0], 10)
+            Histogram::new("x", values, [0.0, 1.0], 10)
                 .uniform()
                 .worst_deviation()
                 .unwrap()
@@ -213,7 +231,7 @@ mod tests {
 
     #[test]
     fn a_drawing_has_a_bar_for_each_bin_and_no_nonsense() {
-        let svg = Histogram::of("a < b", &[], [0.0, 0.0], 5).uniform().svg();
+        let svg = Histogram::new("a < b", &[], [0.0, 0.0], 5).uniform().svg();
         assert_eq!(svg.matches("<rect").count(), 1 + 5);
         assert!(
             !svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"),

@@ -3,6 +3,7 @@
 mod chart;
 pub(crate) mod heat;
 mod histogram;
+pub(crate) mod markup;
 mod number;
 mod page;
 mod table;
@@ -11,7 +12,8 @@ mod table;
 pub use chart::Beside;
 pub use chart::{Axis, Chart, Curve};
 pub use histogram::Histogram;
+pub use markup::escaped;
 #[doc(hidden)]
 pub use number::three;
-pub use page::{Page, base64, escaped};
+pub use page::{Page, base64};
 pub use table::Table;

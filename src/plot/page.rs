@@ -1,7 +1,8 @@
 //! A page of text, tables, charts and pictures in one HTML file that needs nothing else.
 
 use super::Table;
-use crate::error::printable;
+use super::markup::text;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// A self-contained HTML page, built from top to bottom.
 #[derive(Clone, Debug)]
@@ -28,23 +29,23 @@ impl Page {
     }
 
     /// Starts a section.
-    pub fn heading(&mut self, text: &str) -> &mut Self {
-        self.html(&format!("<h2>{}</h2>\n", escaped(text)))
+    pub fn heading(&mut self, heading: &str) -> &mut Self {
+        self.push(html! { h2 { (text(heading)) } })
     }
 
     /// Starts a part of a section.
-    pub fn subheading(&mut self, text: &str) -> &mut Self {
-        self.html(&format!("<h3>{}</h3>\n", escaped(text)))
+    pub fn subheading(&mut self, heading: &str) -> &mut Self {
+        self.push(html! { h3 { (text(heading)) } })
     }
 
     /// A paragraph.
-    pub fn text(&mut self, text: &str) -> &mut Self {
-        self.html(&format!("<p>{}</p>\n", escaped(text)))
+    pub fn text(&mut self, paragraph: &str) -> &mut Self {
+        self.push(html! { p { (text(paragraph)) } })
     }
 
     /// A table.
     pub fn table(&mut self, table: &Table) -> &mut Self {
-        self.html(&format!("<figure>{}</figure>\n", table.html()))
+        self.push(html! { figure { (PreEscaped(table.html())) } })
     }
 
     /// The first rows of a table that may be long, and where the others are.
@@ -61,19 +62,13 @@ impl Page {
 
     /// A drawing with what is to be seen in it; `svg` is an SVG document, e.g. of [`Chart::row`](super::Chart::row).
     pub fn chart(&mut self, svg: &str, caption: &str) -> &mut Self {
-        self.html(&format!(
-            "<figure>{svg}<figcaption>{}</figcaption></figure>\n",
-            escaped(caption)
-        ))
+        self.push(html! { figure { (PreEscaped(svg)) figcaption { (text(caption)) } } })
     }
 
     /// A picture with what is to be seen in it; `png` are the bytes of a PNG file.
     pub fn picture(&mut self, png: &[u8], caption: &str) -> &mut Self {
-        let data = base64(png);
-        self.html(&format!(
-            "<figure><img alt=\"\" src=\"data:image/png;base64,{data}\"><figcaption>{}</figcaption></figure>\n",
-            escaped(caption)
-        ))
+        let data = format!("data:image/png;base64,{}", base64(png));
+        self.push(html! { figure { img alt="" src=(data); figcaption { (text(caption)) } } })
     }
 
     /// Markup as it is.
@@ -82,24 +77,30 @@ impl Page {
         self
     }
 
+    fn push(&mut self, markup: Markup) -> &mut Self {
+        self.body += &markup.0;
+        self.body.push('\n');
+        self
+    }
+
     /// The whole document.
     pub fn document(&self) -> String {
-        let Self { title, body } = self;
-        let title = escaped(title);
-        format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
-             <style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n{body}</body>\n</html>\n"
-        )
+        html! {
+            (DOCTYPE)
+            html lang="en" {
+                head {
+                    meta charset="utf-8";
+                    title { (text(&self.title)) }
+                    style { (PreEscaped(STYLE)) }
+                }
+                body {
+                    h1 { (text(&self.title)) }
+                    (PreEscaped(&self.body))
+                }
+            }
+        }
+        .into_string()
     }
-}
-
-/// Text as it may stand in HTML and SVG, attributes included; control characters, which SVG does not allow, are written out.
-pub fn escaped(text: &str) -> String {
-    printable(text)
-        .replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 /// Bytes in the alphabet of RFC 4648 section 4, padded.
@@ -125,6 +126,7 @@ pub fn base64(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::markup::escaped;
     use super::*;
 
     #[test]

@@ -1,7 +1,8 @@
 //! Tables of text: CSV for programs, Markdown for the README, HTML for the page.
 
-use super::page::escaped;
+use super::markup::text;
 use crate::error::printable;
+use maud::html;
 
 /// A table: what the columns are, with their units, and a row of texts for each line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -33,8 +34,8 @@ impl Table {
 
     /// The same with a column for each row: for tables that are wider than long.
     pub fn transposed(&self) -> Self {
-        let column = |i: usize| self.lines().map(|row| row[i].clone()).collect();
-        let mut columns = (0..self.columns.len()).map(column);
+        let mut columns =
+            (0..self.columns.len()).map(|i| self.lines().map(|row| row[i].clone()).collect());
         Self {
             columns: columns.next().unwrap_or_default(),
             rows: columns.collect(),
@@ -43,55 +44,58 @@ impl Table {
 
     /// As comma-separated values (RFC 4180), the titles first.
     pub fn csv(&self) -> String {
-        let cell = |text: &String| {
-            let quoted = text.contains([',', '"', '\n', '\r']);
-            if quoted {
-                format!("\"{}\"", text.replace('"', "\"\""))
-            } else {
-                text.clone()
-            }
-        };
         self.lines()
-            .map(|row| row.iter().map(cell).collect::<Vec<_>>().join(",") + "\n")
+            .map(|row| joined(row, ",", csv_cell) + "\n")
             .collect()
     }
 
     /// As a Markdown table.
     pub fn markdown(&self) -> String {
-        let cell = |text: &String| printable(text).replace('|', "\\|");
-        let line = |row: &Vec<String>| {
-            format!(
-                "| {} |\n",
-                row.iter().map(cell).collect::<Vec<_>>().join(" | ")
-            )
-        };
-        let rule = format!("|{}\n", " --- |".repeat(self.columns.len()));
-        line(&self.columns) + &rule + &self.rows.iter().map(line).collect::<String>()
+        let rule = format!("|{}", " --- |".repeat(self.columns.len()));
+        let mut lines = self
+            .lines()
+            .map(|row| format!("| {} |", joined(row, " | ", markdown_cell)));
+        let titles = lines.next().unwrap_or_default();
+        [titles, rule]
+            .into_iter()
+            .chain(lines)
+            .map(|line| line + "\n")
+            .collect()
     }
 
     /// As an HTML table.
     pub fn html(&self) -> String {
-        let line = |row: &Vec<String>, tag: &str| {
-            let cells = row
-                .iter()
-                .map(|text| format!("<{tag}>{}</{tag}>", escaped(text)))
-                .collect::<String>();
-            format!("<tr>{cells}</tr>\n")
-        };
-        let rows = self
-            .rows
-            .iter()
-            .map(|row| line(row, "td"))
-            .collect::<String>();
-        format!(
-            "<table>\n<thead>{}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n",
-            line(&self.columns, "th")
-        )
+        html! {
+            table {
+                thead { tr { @for title in &self.columns { th { (text(title)) } } } }
+                tbody {
+                    @for row in &self.rows { tr { @for cell in row { td { (text(cell)) } } } }
+                }
+            }
+        }
+        .into_string()
     }
 
     fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
         std::iter::once(&self.columns).chain(&self.rows)
     }
+}
+
+fn joined(row: &[String], separator: &str, cell: fn(&str) -> String) -> String {
+    let cells: Vec<String> = row.iter().map(|text| cell(text)).collect();
+    cells.join(separator)
+}
+
+fn csv_cell(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+fn markdown_cell(text: &str) -> String {
+    printable(text).replace('|', "\\|")
 }
 
 #[cfg(test)]

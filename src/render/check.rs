@@ -1,12 +1,13 @@
-//! What the renderer asks of a shot, asked once.
+//! What the renderer requires of a shot, checked once.
 
 use crate::asset::Texture;
 use crate::error::{Error, Result};
-use crate::scene::{Card, Shot};
+use crate::pixel::Film;
+use crate::scene::{AreaLight, Card, Shot};
 
 /// Is a shot something that can be rendered?
 ///
-/// Reads every texel, so ask once per shot that comes from outside, not once per frame. [`cast`](super::cast) itself
+/// Reads every texel, so ask once per shot that comes from outside, not once per frame. [`render`](super::render) itself
 /// neither asks nor panics: a NaN in a texture then becomes a NaN in the picture. Cards that are edge-on, behind the
 /// eye or without area are fine; they are not seen.
 ///
@@ -14,36 +15,54 @@ use crate::scene::{Card, Shot};
 /// [`Error::Value`] that names the card: a texel that is NaN or infinite, an alpha outside 0..1, the id 0 or one used
 /// twice; a plate of another size; a light or an exposure that is not finite.
 pub fn check(shot: &Shot) -> Result<()> {
-    let size = (shot.camera.image[0] as usize, shot.camera.image[1] as usize);
-    if let Some(plate) = &shot.plate
-        && plate.size() != size
-    {
-        let (w, h) = plate.size();
-        return Err(Error::value(
-            "plate",
-            format!("{w} x {h} pixels, expected {} x {}", size.0, size.1),
-        ));
-    }
-    for (i, light) in shot.lights.iter().enumerate() {
-        let numbers = light
-            .position
-            .iter()
-            .chain(&light.target)
-            .chain(&light.size)
-            .chain([&light.power]);
-        if !numbers.into_iter().all(|v| v.is_finite()) || !light.color.is_finite() {
-            return Err(Error::value(
-                format!("lights[{i}]"),
-                "not finite, expected numbers",
-            ));
+    check_plate(shot)?;
+    shot.lights
+        .iter()
+        .enumerate()
+        .try_for_each(|(i, light)| check_light(i, light))?;
+    check_sky(shot)?;
+    check_ids(&shot.cards)?;
+    shot.cards.iter().enumerate().try_for_each(|(i, card)| {
+        check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what))
+    })
+}
+
+fn check_plate(shot: &Shot) -> Result<()> {
+    let [width, height] = shot.camera.image.map(|side| side as usize);
+    match &shot.plate {
+        Some(plate) if plate.size() != (width, height) => {
+            let (w, h) = plate.size();
+            let what = format!("{w} x {h} pixels, expected {width} x {height}");
+            Err(Error::value("plate", what))
         }
+        _ => Ok(()),
     }
+}
+
+fn check_light(i: usize, light: &AreaLight) -> Result<()> {
+    let numbers = light
+        .position
+        .iter()
+        .chain(&light.target)
+        .chain(&light.size)
+        .chain([&light.power]);
+    if numbers.into_iter().all(|v| v.is_finite()) && light.color.is_finite() {
+        return Ok(());
+    }
+    Err(Error::value(
+        format!("lights[{i}]"),
+        "not finite, expected numbers",
+    ))
+}
+
+/// The environment, constant or a map, and the exposure.
+fn check_sky(shot: &Shot) -> Result<()> {
     if let Some(map) = &shot.environment
         && !(map.rotation.is_finite() && map.strength.is_finite() && map.strength >= 0.0)
     {
         return Err(Error::value(
             "environment",
-            "rotation or strength is not a number that can be, expected finite ones",
+            "rotation or strength is out of range, expected a finite rotation and a strength of at least 0",
         ));
     }
     if !shot.exposure.is_finite() || !shot.ambient.is_finite() {
@@ -52,17 +71,19 @@ pub fn check(shot: &Shot) -> Result<()> {
             "exposure or ambient is not finite, expected numbers",
         ));
     }
-    let mut ids: Vec<_> = shot.cards.iter().map(|c| c.id).collect();
+    Ok(())
+}
+
+fn check_ids(cards: &[Card]) -> Result<()> {
+    let mut ids: Vec<_> = cards.iter().map(|card| card.id).collect();
     ids.sort_unstable();
-    if let Some(twice) = ids.windows(2).find(|w| w[0] == w[1]) {
-        return Err(Error::value(
+    match ids.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(twice) => Err(Error::value(
             "cards",
             format!("id {} is used twice, expected one card each", twice[0].0),
-        ));
+        )),
+        None => Ok(()),
     }
-    shot.cards.iter().enumerate().try_for_each(|(i, card)| {
-        check_card(card).map_err(|what| Error::value(format!("cards[{i}]"), what))
-    })
 }
 
 fn check_card(card: &Card) -> std::result::Result<(), String> {
@@ -77,19 +98,22 @@ fn check_card(card: &Card) -> std::result::Result<(), String> {
 
 fn check_texture(texture: &Texture) -> std::result::Result<(), String> {
     let (width, height) = texture.size();
-    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        let texel = texture.texel(x, y);
-        let opacity: [f32; 3] = texel.opacity.into();
-        if !texel.color.is_finite() || !texel.opacity.is_finite() {
-            return Err(format!(
-                "texture has a value that is not finite at ({x}, {y})"
-            ));
-        }
-        if let Some(wrong) = opacity.iter().find(|o| !(0.0..=1.0).contains(*o)) {
-            return Err(format!(
-                "texture has alpha {wrong} at ({x}, {y}), expected 0 to 1"
-            ));
-        }
+    (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .try_for_each(|(x, y)| check_texel(&texture.texel(x, y), x, y))
+}
+
+fn check_texel(texel: &Film, x: usize, y: usize) -> std::result::Result<(), String> {
+    if !texel.color.is_finite() || !texel.opacity.is_finite() {
+        return Err(format!(
+            "texture has a value that is not finite at ({x}, {y})"
+        ));
     }
-    Ok(())
+    let opacity: [f32; 3] = texel.opacity.into();
+    match opacity.iter().find(|o| !(0.0..=1.0).contains(*o)) {
+        Some(wrong) => Err(format!(
+            "texture has alpha {wrong} at ({x}, {y}), expected 0 to 1"
+        )),
+        None => Ok(()),
+    }
 }

@@ -6,17 +6,17 @@
 //! channels; text attributes name the layer, the hash and the objects. Readers need the floats exactly: no half, and no
 //! compression with loss.
 
-use crate::deep::DeepImage;
+use crate::deep::{DeepImage, DeepSample};
 use crate::pixel::ObjectId;
 
 /// Sets of four channels, two ranks each: the six ranks that most programs write.
-const SETS: usize = 3;
+const CHANNEL_SETS: usize = 3;
 
 /// Channels of a set: id and coverage of the one rank, then of the next.
-const SET: [&str; 4] = ["R", "G", "B", "A"];
+const SET_CHANNELS: [&str; 4] = ["R", "G", "B", "A"];
 
 /// Characters of the layer's key in its attributes.
-const KEY: usize = 7;
+const KEY_DIGITS: usize = 7;
 
 /// The channels and attributes of one layer.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,48 +34,58 @@ impl Cryptomatte {
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
         let ids: Vec<(ObjectId, f32)> = names
             .iter()
-            .map(|(object, name)| (*object, id_of(name)))
+            .map(|(object, name)| (*object, id_of_name(name)))
             .collect();
-        let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); SETS * SET.len()];
+        let count = CHANNEL_SETS * SET_CHANNELS.len();
+        let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); count];
         for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
-            let id = |object| {
-                ids.iter()
-                    .find(|(known, _)| *known == object)
-                    .map(|&(_, id)| id)
-            };
-            let seen = deep
-                .at(x, y)
-                .iter()
-                .filter(|s| s.visible > 0.0)
-                .filter_map(|s| Some((id(s.object)?, s.visible)));
-            let mut ranks: Vec<(f32, f32)> = seen.collect();
-            // By id where coverage is the same, so that nothing depends on depth.
-            ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
-            ranks.resize(planes.len() / 2, (0.0, 0.0));
+            let ranks = ranked_objects(deep.at(x, y), &ids, count / 2);
             for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
                 pair[0].push(id);
                 pair[1].push(coverage);
             }
         }
-        let name = |i: usize| format!("{layer}{:02}.{}", i / SET.len(), SET[i % SET.len()]);
         let channels = planes
             .into_iter()
             .enumerate()
-            .map(|(i, plane)| (name(i), plane))
+            .map(|(i, plane)| (channel_name(layer, i), plane))
             .collect();
         Self {
             channels,
-            metadata: metadata(layer, names),
+            metadata: layer_metadata(layer, names),
         }
     }
 }
 
-fn metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
-    let key = &format!("{:08x}", murmur3(layer.as_bytes()))[..KEY];
-    let hex = |name: &str| format!("{:08x}", id_of(name).to_bits());
+/// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are ranks.
+fn ranked_objects(
+    samples: &[DeepSample],
+    ids: &[(ObjectId, f32)],
+    count: usize,
+) -> Vec<(f32, f32)> {
+    let mut ranks: Vec<(f32, f32)> = samples
+        .iter()
+        .filter(|s| s.visible > 0.0)
+        .filter_map(|s| {
+            let &(_, id) = ids.iter().find(|(known, _)| *known == s.object)?;
+            Some((id, s.visible))
+        })
+        .collect();
+    // By id where coverage is the same, so that nothing depends on depth.
+    ranks.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.total_cmp(&b.0)));
+    ranks.resize(count, (0.0, 0.0));
+    ranks
+}
+
+fn channel_name(layer: &str, i: usize) -> String {
+    let (set, channel) = (i / SET_CHANNELS.len(), SET_CHANNELS[i % SET_CHANNELS.len()]);
+    format!("{layer}{set:02}.{channel}")
+}
+
+fn layer_metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> {
     let manifest: serde_json::Map<_, _> = names
         .iter()
-        .map(|(_, name)| (name.clone(), hex(name).into()))
+        .map(|(_, name)| (name.clone(), hex_id(name).into()))
         .collect();
     let texts = [
         ("name", layer.to_owned()),
@@ -85,12 +95,23 @@ fn metadata(layer: &str, names: &[(ObjectId, String)]) -> Vec<(String, String)> 
     ];
     texts
         .into_iter()
-        .map(|(what, text)| (format!("cryptomatte/{key}/{what}"), text))
+        .map(|(what, text)| (attribute_name(layer, what), text))
         .collect()
 }
 
+/// Name of a layer's attribute, which has the layer's key in it.
+pub(crate) fn attribute_name(layer: &str, what: &str) -> String {
+    let hash = format!("{:08x}", murmur3(layer.as_bytes()));
+    format!("cryptomatte/{}/{what}", &hash[..KEY_DIGITS])
+}
+
+/// The id of a name as the manifest has it.
+pub(crate) fn hex_id(name: &str) -> String {
+    format!("{:08x}", id_of_name(name).to_bits())
+}
+
 /// The id of a name: its hash as a float, the exponent moved away from those of zero, subnormals, infinity and NaN.
-pub(crate) fn id_of(name: &str) -> f32 {
+pub(crate) fn id_of_name(name: &str) -> f32 {
     const MANTISSA: u32 = (1 << 23) - 1;
     const SIGN: u32 = 1 << 31;
     let hash = murmur3(name.as_bytes());
@@ -100,41 +121,42 @@ pub(crate) fn id_of(name: &str) -> f32 {
 
 /// MurmurHash3_x86_32 with seed 0, by Austin Appleby, who put it into the public domain.
 pub(crate) fn murmur3(bytes: &[u8]) -> u32 {
-    let mix = |word: u32| {
-        word.wrapping_mul(0xcc9e_2d51)
-            .rotate_left(15)
-            .wrapping_mul(0x1b87_3593)
-    };
-    let mut hash = 0_u32;
     let words = bytes.chunks_exact(4);
     let rest = words
         .remainder()
         .iter()
         .rev()
         .fold(0, |word, &byte| word << 8 | u32::from(byte));
-    for word in words {
-        hash ^= mix(u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
-        hash = hash
+    let mut hash = words.fold(0_u32, |hash, word| {
+        let word = u32::from_le_bytes([word[0], word[1], word[2], word[3]]);
+        (hash ^ mix_word(word))
             .rotate_left(13)
             .wrapping_mul(5)
-            .wrapping_add(0xe654_6b64);
-    }
-    hash ^= mix(rest) ^ bytes.len() as u32;
+            .wrapping_add(0xe654_6b64)
+    });
+    hash ^= mix_word(rest) ^ bytes.len() as u32;
     hash = (hash ^ hash >> 16).wrapping_mul(0x85eb_ca6b);
     hash = (hash ^ hash >> 13).wrapping_mul(0xc2b2_ae35);
     hash ^ hash >> 16
 }
 
+fn mix_word(word: u32) -> u32 {
+    word.wrapping_mul(0xcc9e_2d51)
+        .rotate_left(15)
+        .wrapping_mul(0x1b87_3593)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deep::DeepSample;
     use crate::image::Image;
     use crate::pixel::LinearRgb;
 
-    /// Values of the Python package mmh3 5.
-    const HASHES: [(&str, u32); 7] = [
+    /// Values of the Python package mmh3 5, and published test vectors of MurmurHash3_x86_32.
+    const HASHES: [(&str, u32); 9] = [
         ("", 0),
+        ("test", 0xba6b_d213),
+        ("Hello, world!", 0xc036_3e43),
         ("a", 0x3c25_69b2),
         ("ab", 0x9bbf_d75f),
         ("abc", 0xb3dd_93fa),
@@ -153,7 +175,7 @@ mod tests {
     #[test]
     fn ids_are_ordinary_numbers() {
         for i in 0..100_000 {
-            assert!(id_of(&format!("object{i}")).is_normal());
+            assert!(id_of_name(&format!("object{i}")).is_normal());
         }
     }
 
@@ -177,7 +199,7 @@ mod tests {
         let values: Vec<_> = found.channels.iter().map(|(_, plane)| plane[0]).collect();
         assert_eq!(
             values[..5],
-            [id_of("object2"), 0.5, id_of("object1"), 0.25, 0.0]
+            [id_of_name("object2"), 0.5, id_of_name("object1"), 0.25, 0.0]
         );
         assert_eq!(
             (found.channels.len(), found.channels[7].0.as_str()),

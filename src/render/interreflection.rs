@@ -4,100 +4,98 @@ use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::geom::Vector3;
 use crate::image::Image;
-use crate::pixel::LinearRgb;
-use crate::render::reference::texel;
-use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::pixel::{Film, LinearRgb};
+use crate::render::reference::card_texel;
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, visible_planes};
 use crate::scene::{Card, Shot};
 
-/// How far light spreads on its way to and fro, metres: the order of a pile's height; 4 to 16 mm do as well.
-const SPREAD: f64 = 0.008;
+/// How far light spreads on its way to and fro: the order of a pile's height; 4 to 16 mm do as well.
+const BOUNCE_SPREAD_M: f64 = 0.008;
 
-/// Distance of the places on the surface that look up, metres.
-const STEP: f64 = 0.002;
+/// Distance of the grid's points on the surface.
+const GRID_STEP_M: f64 = 0.002;
 
-/// Most places along a side; more distant ones for larger scenes.
-const MOST_STEPS: f64 = 1024.0;
+/// Most steps along a side; longer ones for larger scenes.
+const MAX_GRID_STEPS: f64 = 1024.0;
 
-/// Brightens the surface by what cards above throw back to it; for who knows the surface's albedo.
+/// A white surface under a white card would glow for ever.
+const MAX_BOUNCE: f32 = 0.95;
+
+/// Brightens the surface by what cards above reflect back to it; for callers who know the surface's albedo.
 ///
-/// Not part of the definition, which leaves bounces out: [`cast`](super::cast) never does this. A black albedo changes no
-/// bit; shadow factors may come out above 1.
+/// Not part of the definition, which leaves bounces out: [`render`](super::render) never does this. A black albedo changes
+/// no bit; shadow factors may come out above 1.
 ///
 /// # Method
 /// `S` is divided by `1 - albedo R`, with `R` the light that comes back from straight above: the sum over cards upwards
 /// of their colour times the squared transmittance of what lies below, blurred over the surface.
 pub fn interreflect(deep: DeepImage, shot: &Shot, albedo: LinearRgb) -> DeepImage {
-    let view = View::of(&shot.camera);
-    let seen = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
-    let (Some(seen), Some(above)) = (seen, Above::of(shot)) else {
+    let view = CameraView::from_camera(&shot.camera);
+    let surface = ProjectedPlane::new(&ScenePlane::shadow_catcher(shot.catcher), &view)
+        .filter(|plane| plane.normal.z > 0.0);
+    let (Some(surface), Some(bounce)) = (surface, BounceMap::new(shot)) else {
         return deep;
     };
     deep.map_shadow(|x, y, factor| {
         let p = Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0);
-        let w = seen.w.dot(&p);
+        let w = surface.w.dot(&p);
         if w <= 0.0 {
             return factor;
         }
-        let back = albedo * above.at(&(seen.point * p / w));
-        // A white surface under a white card would glow for ever.
-        factor * back.map(|b| 1.0 / (1.0 - b.clamp(0.0, 0.95)))
+        let back = albedo * bounce.at(&(surface.point * p / w));
+        factor * back.map(|b| 1.0 / (1.0 - b.clamp(0.0, MAX_BOUNCE)))
     })
 }
 
 /// What comes back from above, on a grid over the part of the surface that has cards over it.
-struct Above {
+struct BounceMap {
     corner: [f64; 2],
     step: f64,
     back: Image<LinearRgb>,
 }
 
-impl Above {
+impl BounceMap {
     /// None without cards.
-    fn of(shot: &Shot) -> Option<Self> {
-        let cards = sheets(shot);
+    fn new(shot: &Shot) -> Option<Self> {
+        let cards = visible_planes(shot);
         let corners: Vec<_> = cards
             .iter()
-            .flat_map(|(_, sheet)| sheet.corners())
+            .flat_map(|(_, plane)| plane.corners())
             .collect();
-        let side = |axis: usize| {
-            let low = corners.iter().map(|c| c[axis]).reduce(f64::min)? - 3.0 * SPREAD;
-            let high = corners.iter().map(|c| c[axis]).reduce(f64::max)? + 3.0 * SPREAD;
-            Some((low, high - low))
-        };
-        let ((left, width), (bottom, height)) = (side(0)?, side(1)?);
-        let step = STEP.max(width.max(height) / MOST_STEPS);
+        let (left, width) = extent(&corners, 0)?;
+        let (bottom, height) = extent(&corners, 1)?;
+        let step = GRID_STEP_M.max(width.max(height) / MAX_GRID_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
-        let at = |i: usize, j: usize| {
-            Vector3::new(left + i as f64 * step, bottom + j as f64 * step, 0.0)
-        };
-        let back = Image::from_fn(columns, rows, |i, j| straight_above(&cards, &at(i, j)));
+        let back = Image::from_fn(columns, rows, |i, j| {
+            let point = Vector3::new(left + i as f64 * step, bottom + j as f64 * step, 0.0);
+            light_from_above(&cards, &point)
+        });
         Some(Self {
             corner: [left, bottom],
             step,
-            back: gaussian_blur(&back, (SPREAD / step) as f32),
+            back: gaussian_blur(&back, (BOUNCE_SPREAD_M / step) as f32),
         })
     }
 
     fn at(&self, point: &Vector3<f64>) -> LinearRgb {
-        let place = |axis: usize| (point[axis] - self.corner[axis]) / self.step + 0.5;
-        crate::filter::sample_bilinear(&self.back, place(0), place(1))
+        let [x, y] = [0, 1].map(|axis: usize| (point[axis] - self.corner[axis]) / self.step + 0.5);
+        crate::filter::sample_bilinear(&self.back, x, y)
     }
 }
 
+/// Low end and length of points along an axis, with room for the blur.
+fn extent(points: &[Vector3<f64>], axis: usize) -> Option<(f64, f64)> {
+    let low = points.iter().map(|p| p[axis]).reduce(f64::min)? - 3.0 * BOUNCE_SPREAD_M;
+    let high = points.iter().map(|p| p[axis]).reduce(f64::max)? + 3.0 * BOUNCE_SPREAD_M;
+    Some((low, high - low))
+}
+
 /// Light that cards straight above a point of the surface send back to it.
-fn straight_above(cards: &[(&Card, Sheet)], point: &Vector3<f64>) -> LinearRgb {
-    let hit = |(card, sheet): &(&Card, Sheet)| {
-        let height = sheet.normal.dot(&(sheet.center - point)) / sheet.normal.z;
-        let local = point + Vector3::z() * height - sheet.center;
-        let uv = [
-            local.dot(&sheet.x) / sheet.size[0] + 0.5,
-            0.5 - local.dot(&sheet.y) / sheet.size[1],
-        ];
-        let inside =
-            height > 0.0 && height.is_finite() && uv.iter().all(|c| (0.0..=1.0).contains(c));
-        inside.then(|| (height, texel(card, sheet, uv, point)))
-    };
-    let mut hits: Vec<_> = cards.iter().filter_map(hit).collect();
+fn light_from_above(cards: &[(&Card, ScenePlane)], point: &Vector3<f64>) -> LinearRgb {
+    let mut hits: Vec<_> = cards
+        .iter()
+        .filter_map(|(card, plane)| hit_above(card, plane, point))
+        .collect();
     hits.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut back, mut through) = (LinearRgb::BLACK, LinearRgb::WHITE);
     for (_, film) in hits {
@@ -105,4 +103,12 @@ fn straight_above(cards: &[(&Card, Sheet)], point: &Vector3<f64>) -> LinearRgb {
         through = through * film.transmittance();
     }
     back
+}
+
+/// Height over a point of the surface at which a card is, and what it shows there.
+fn hit_above(card: &Card, plane: &ScenePlane, point: &Vector3<f64>) -> Option<(f64, Film)> {
+    let height = plane.normal.dot(&(plane.center - point)) / plane.normal.z;
+    let uv = plane.texture_coordinates(&(point + Vector3::z() * height));
+    let inside = height > 0.0 && height.is_finite() && uv.iter().all(|c| (0.0..=1.0).contains(c));
+    inside.then(|| (height, card_texel(card, plane, uv, point)))
 }

@@ -1,10 +1,10 @@
-//! Places in the picture where light is worked out.
+//! The lattice of picture positions at which light is computed.
 //!
 //! Light varies slowly where textures do not, so it is computed once per node and receiver, and looked up between nodes.
 //! The lattice lies in the *picture*, not on the receiver: nodes are as dense as pixels ask for, at any distance and
-//! slant, and nothing is spent on what the eye does not see.
+//! slant, and nothing is spent on what the camera does not see.
 
-use crate::render::view::View;
+use crate::render::view::CameraView;
 use nalgebra::Matrix3;
 
 /// Nodes over the picture: node `(i, j)` lies at pixel position `((i - 1) cell, (j - 1) cell)`.
@@ -13,40 +13,46 @@ pub(super) struct Lattice {
     /// Distance of nodes, pixels.
     cell: f64,
     /// The camera, in nodes instead of pixels.
-    pub(super) view: View,
+    pub(super) view: CameraView,
 }
 
 /// Where a pixel position lies between nodes: the node before it, and the way to the next.
-pub(super) type Place = (u32, f32);
+pub(super) type LatticePosition = (u32, f32);
 
 impl Lattice {
-    pub(super) fn new(view: &View, cell: f64) -> Self {
+    pub(super) fn new(view: &CameraView, cell: f64) -> Self {
         let pixel_from_node = Matrix3::new(cell, 0.0, -cell, 0.0, cell, -cell, 0.0, 0.0, 1.0);
         // One pixel beyond the picture's end: sub-samples reach over it.
-        let count = |pixels: usize| ((pixels as f64 + 1.0) / cell) as usize + 3;
-        let view = View {
+        let [width, height] =
+            [view.width, view.height].map(|pixels| ((pixels as f64 + 1.0) / cell) as usize + 3);
+        let view = CameraView {
             ray: view.ray * pixel_from_node,
-            width: count(view.width),
-            height: count(view.height),
+            width,
+            height,
             ..*view
         };
         Self { cell, view }
     }
 
-    /// The places of pixel positions `i + 0.5 + offset`, for all `i` below `pixels` and all offsets in turn.
-    pub(super) fn places(&self, pixels: usize, offsets: &[f64]) -> Vec<Place> {
-        let place = |at: f64| {
-            let node = (at / self.cell + 1.0).max(0.0);
-            (node as u32, (node - node.floor()) as f32)
-        };
+    /// Lattice positions of the picture positions `i + 0.5 + offset`, for all `i` below `pixels` and all offsets in turn.
+    pub(super) fn positions_of(&self, pixels: usize, offsets: &[f64]) -> Vec<LatticePosition> {
         (0..pixels)
-            .flat_map(|i| offsets.iter().map(move |o| place(i as f64 + 0.5 + o)))
+            .flat_map(|i| {
+                offsets
+                    .iter()
+                    .map(move |o| self.position_at(i as f64 + 0.5 + o))
+            })
             .collect()
+    }
+
+    fn position_at(&self, pixel: f64) -> LatticePosition {
+        let node = (pixel / self.cell + 1.0).max(0.0);
+        (node as u32, (node - node.floor()) as f32)
     }
 }
 
 /// The two nodes of a lattice of twice the distance around a node, the same one twice where it lies on it.
-pub(super) fn coarser(node: usize) -> [usize; 2] {
+pub(super) fn coarser_nodes(node: usize) -> [usize; 2] {
     if node.is_multiple_of(2) {
         [node / 2, node / 2 + 1]
     } else {
@@ -62,7 +68,7 @@ mod tests {
     fn a_node_lies_in_the_middle_of_its_coarser_ones() {
         for node in 0..9 {
             let at = |node: usize, cell: f64| (node as f64 - 1.0) * cell;
-            let [a, b] = coarser(node).map(|n| at(n, 2.0));
+            let [a, b] = coarser_nodes(node).map(|n| at(n, 2.0));
             assert_eq!(0.5 * (a + b), at(node, 1.0));
         }
     }

@@ -7,13 +7,17 @@
 use crate::deep::DeepSample;
 use crate::geom::Vector3;
 use crate::pixel::{Depth, LinearRgb, ObjectId};
-use crate::render::four::Four;
-use crate::render::half_plane::{meet, sides, span, whole};
-use crate::render::irradiance::Map;
-use crate::render::lattice::Place;
-use crate::render::texture::{Baked, Linear, mean};
-use crate::render::through::{LayerRow, Through};
-use crate::render::view::Seen;
+use crate::render::block::PixelBlock;
+use crate::render::float4::Float4;
+use crate::render::grade::channel_mean;
+use crate::render::half_plane::{quad_sides, row_span};
+use crate::render::irradiance::IrradianceMap;
+use crate::render::lattice::LatticePosition;
+use crate::render::ranges::{integer_range, range_overlap, range_union, ranges_meet};
+use crate::render::texel_grid::TexelLine;
+use crate::render::texture::BakedTexture;
+use crate::render::transmittance::{LayerRow, SubsampleRun, Transmittance};
+use crate::render::view::ProjectedPlane;
 use crate::work::{self, Kind};
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -24,11 +28,11 @@ pub(super) struct Layer {
     /// Whose it is.
     pub(super) id: ObjectId,
     /// How it lies.
-    pub(super) seen: Seen,
+    pub(super) plane: ProjectedPlane,
     /// Its colours.
-    pub(super) texture: Baked,
+    pub(super) texture: BakedTexture,
     /// Light on it; none in the dark.
-    pub(super) light: Option<Map>,
+    pub(super) light: Option<IrradianceMap>,
     /// Where it ends, its texture's soft border included.
     pub(super) sides: [Vector3<f64>; 5],
     /// Pixels it may touch.
@@ -39,60 +43,44 @@ pub(super) struct Layer {
 
 /// Where the samples of all pixels lie.
 #[derive(Debug)]
-pub(super) struct Samples {
+pub(super) struct SampleGrid {
     /// Positions along each side of a pixel, from its centre.
     pub(super) offsets: Vec<f64>,
     /// Light is looked up for each sub-sample, not for each pixel: where the lattice is finer than pixels are.
-    pub(super) each: bool,
-    /// Places in the lattice: sub-sample by sub-sample, or the middles of pixels.
-    pub(super) columns: Vec<Place>,
-    /// Places in the lattice, the same way.
-    pub(super) rows: Vec<Place>,
+    pub(super) per_subsample: bool,
+    /// Positions in the lattice: sub-sample by sub-sample, or the middles of pixels.
+    pub(super) columns: Vec<LatticePosition>,
+    /// Positions in the lattice, the same way.
+    pub(super) rows: Vec<LatticePosition>,
 }
 
-impl Samples {
-    /// Places along a side of a pixel.
-    fn per_side(&self) -> usize {
-        if self.each { self.offsets.len() } else { 1 }
-    }
-}
-
-/// The plane under the cards.
+/// The surface under the cards, which their shadows fall on.
 #[derive(Debug)]
-pub(super) struct Ground {
+pub(super) struct ShadowCatcher {
     /// How it lies; none where the camera does not look down on it.
-    pub(super) seen: Option<Seen>,
+    pub(super) plane: Option<ProjectedPlane>,
     /// What shadows leave of its light; none where there is no shadow.
-    pub(super) share: Option<Map>,
+    pub(super) share: Option<IrradianceMap>,
 }
 
 /// A picture's parts, ready to be put together.
 #[derive(Debug)]
-pub(super) struct Stack {
+pub(super) struct LayerStack {
     /// Cards, in the order of their ids.
     pub(super) layers: Vec<Layer>,
     /// The surface.
-    pub(super) ground: Ground,
+    pub(super) catcher: ShadowCatcher,
     /// Sub-samples.
-    pub(super) samples: Samples,
+    pub(super) samples: SampleGrid,
     /// Factor on light.
     pub(super) exposure: f32,
     /// Some layer is film.
     pub(super) tinted: bool,
 }
 
-/// A rectangle of pixels.
-#[derive(Clone, Debug)]
-pub(super) struct Block {
-    /// Columns.
-    pub(super) x: Range<usize>,
-    /// Rows.
-    pub(super) y: Range<usize>,
-}
-
 /// Deep samples in any order of pixels, front to back for each.
 #[derive(Debug, Default)]
-pub(super) struct Painting {
+pub(super) struct TileSamples {
     /// Column, row and sample.
     pub(super) samples: Vec<(u32, u32, DeepSample)>,
     /// What each sample hides, per channel; empty where no layer is film.
@@ -101,264 +89,277 @@ pub(super) struct Painting {
 
 /// A block's result.
 #[derive(Debug)]
-pub(super) struct Painted {
+pub(super) struct RenderedTile {
     /// Which pixels.
-    pub(super) block: Block,
+    pub(super) block: PixelBlock,
     /// Samples and their tints.
-    pub(super) painting: Painting,
+    pub(super) samples: TileSamples,
     /// The plate's factor, row by row; none where it is 1 everywhere.
     pub(super) shadow: Option<Vec<LinearRgb>>,
 }
 
-impl Block {
-    pub(super) fn len(&self) -> usize {
-        self.x.len() * self.y.len()
+impl RenderedTile {
+    /// The plate's factors of a row of a part of the block.
+    fn shadow_row(&mut self, part: &PixelBlock, y: usize) -> Option<&mut [LinearRgb]> {
+        let start = (y - self.block.y.start) * self.block.x.len() + part.x.start;
+        let row = self.shadow.as_mut()?;
+        Some(&mut row[start - self.block.x.start..][..part.x.len()])
     }
+}
 
-    fn corners(&self) -> [Vector3<f64>; 4] {
-        let x = [self.x.start as f64 + 0.5, self.x.end as f64 - 0.5];
-        let y = [self.y.start as f64 + 0.5, self.y.end as f64 - 0.5];
-        [[x[0], y[0]], [x[1], y[0]], [x[0], y[1]], [x[1], y[1]]]
-            .map(|[x, y]| Vector3::new(x, y, 1.0))
-    }
-
-    /// Two halves across the longer side.
-    fn halves(&self) -> [Self; 2] {
-        let cut = |r: &Range<usize>| r.start + r.len() / 2;
-        if self.x.len() >= self.y.len() {
-            let c = cut(&self.x);
-            [
-                Self {
-                    x: self.x.start..c,
-                    ..self.clone()
-                },
-                Self {
-                    x: c..self.x.end,
-                    ..self.clone()
-                },
-            ]
+impl SampleGrid {
+    /// Lattice positions along a side of a pixel.
+    fn positions_per_side(&self) -> usize {
+        if self.per_subsample {
+            self.offsets.len()
         } else {
-            let c = cut(&self.y);
-            [
-                Self {
-                    y: self.y.start..c,
-                    ..self.clone()
-                },
-                Self {
-                    y: c..self.y.end,
-                    ..self.clone()
-                },
-            ]
+            1
         }
+    }
+
+    /// Weight of each sub-sample in its pixel.
+    #[inline(always)]
+    fn sample_weight(&self) -> f32 {
+        let r = self.offsets.len();
+        1.0 / (r * r) as f32
+    }
+
+    /// How far sub-samples lie from their pixel's centre, at most.
+    fn reach_px(&self) -> f64 {
+        self.offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()))
+    }
+
+    /// Lattice nodes around some pixels, of the positions along one axis.
+    fn node_range(&self, pixels: &Range<usize>, positions: &[LatticePosition]) -> Range<usize> {
+        let n = self.positions_per_side();
+        let [first, last] = [pixels.start * n, pixels.end * n - 1].map(|i| positions[i].0 as usize);
+        // A node more on either side: sub-samples reach beyond the middle of their pixel.
+        first.saturating_sub(1)..last + 3
     }
 }
 
 impl Layer {
-    fn touches(&self, block: &Block) -> bool {
-        meet(&self.columns, &block.x) && meet(&self.rows, &block.y)
+    fn touches(&self, block: &PixelBlock) -> bool {
+        ranges_meet(&self.columns, &block.x) && ranges_meet(&self.rows, &block.y)
     }
 
     /// Reciprocal depth, rounded so that planes that coincide have the same.
-    fn nearness(&self, p: &Vector3<f64>) -> f32 {
-        (self.seen.w.dot(p) / self.seen.height) as f32
+    fn reciprocal_depth(&self, p: &Vector3<f64>) -> f32 {
+        (self.plane.w.dot(p) / self.plane.height) as f32
+    }
+
+    /// Depth at a pixel's centre; as far as can be where the plane is behind the camera.
+    fn depth_at(&self, x: usize, y: usize) -> Depth {
+        let center = Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0);
+        let w = self.plane.w.dot(&center);
+        Depth(if w > 0.0 {
+            (self.plane.height / w) as f32
+        } else {
+            f32::MAX
+        })
     }
 }
 
-impl Stack {
+impl LayerStack {
     /// Everything that is to know about a block.
-    pub(super) fn paint(&self, block: Block) -> Painted {
+    pub(super) fn render_tile(&self, block: PixelBlock) -> RenderedTile {
         let layers: Vec<_> = (0..self.layers.len())
             .filter(|&k| self.layers[k].touches(&block))
             .collect();
-        let mut painting = Painting::default();
-        let mut shadow = self
-            .may_be_shadowed(&block)
-            .then(|| vec![LinearRgb::WHITE; block.len()]);
-        if !layers.is_empty() || shadow.is_some() {
-            self.split(&block, &block, &layers, &mut painting, &mut shadow);
+        let may_be_shadowed = self.may_be_shadowed(&block);
+        let mut tile = RenderedTile {
+            samples: TileSamples::default(),
+            shadow: may_be_shadowed.then(|| vec![LinearRgb::WHITE; block.len()]),
+            block: block.clone(),
+        };
+        if !layers.is_empty() || may_be_shadowed {
+            self.render_part(&block, &layers, &mut tile);
         }
-        Painted {
-            block,
-            painting,
-            shadow,
+        tile
+    }
+
+    /// Renders a part of a tile, in halves where its layers cross.
+    fn render_part(&self, part: &PixelBlock, layers: &[usize], tile: &mut RenderedTile) {
+        let corners = part.corners();
+        let layers = self.sorted_layers(part, &corners, layers);
+        if part.len() > 1 && !self.is_sorted_at(&layers, &corners) {
+            for half in &part.halves() {
+                self.render_part(half, &layers, tile);
+            }
+            return;
+        }
+        let through = self.render_layers(part, &layers, &mut tile.samples);
+        if tile.shadow.is_some() {
+            work::add(Kind::ShadowedPixels, part.len() as u64);
+            self.shade_catcher(part, &through, tile);
         }
     }
 
-    fn split(
+    /// The layers that touch a block, the nearest in its middle first.
+    fn sorted_layers(
         &self,
-        whole: &Block,
-        part: &Block,
+        part: &PixelBlock,
+        corners: &[Vector3<f64>; 4],
         layers: &[usize],
-        painting: &mut Painting,
-        shadow: &mut Option<Vec<LinearRgb>>,
-    ) {
-        let mut layers: Vec<_> = layers
+    ) -> Vec<usize> {
+        let mut sorted: Vec<_> = layers
             .iter()
             .copied()
             .filter(|&k| self.layers[k].touches(part))
             .collect();
-        let corners = part.corners();
         let middle = corners.iter().sum::<Vector3<f64>>() / 4.0;
         // A stable sort: cards that coincide stay in the order of their ids.
-        layers.sort_by(|&a, &b| {
-            self.layers[b]
-                .nearness(&middle)
-                .total_cmp(&self.layers[a].nearness(&middle))
+        sorted.sort_by(|&a, &b| {
+            let [a, b] = [a, b].map(|k| self.layers[k].reciprocal_depth(&middle));
+            b.total_cmp(&a)
         });
-        if part.len() > 1 && !self.sorted_everywhere(&layers, &corners) {
-            return part
-                .halves()
-                .iter()
-                .for_each(|half| self.split(whole, half, &layers, painting, shadow));
-        }
-        let through = self.walk(part, &layers, painting);
-        if let Some(shadow) = shadow {
-            work::add(Kind::ShadowedPixels, part.len() as u64);
-            self.shade_ground(whole, part, &through, shadow);
-        }
+        sorted
     }
 
-    fn sorted_everywhere(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
-        let nearer =
-            |a: usize, b: usize, p| self.layers[a].nearness(p) >= self.layers[b].nearness(p);
-        layers
-            .windows(2)
-            .all(|pair| corners.iter().all(|p| nearer(pair[0], pair[1], p)))
+    fn is_sorted_at(&self, layers: &[usize], corners: &[Vector3<f64>; 4]) -> bool {
+        layers.windows(2).all(|pair| {
+            let [near, far] = [pair[0], pair[1]].map(|k| &self.layers[k]);
+            corners
+                .iter()
+                .all(|p| near.reciprocal_depth(p) >= far.reciprocal_depth(p))
+        })
     }
 
     /// Walks a block's layers front to back; returns what passes through all of them.
-    fn walk(&self, block: &Block, layers: &[usize], out: &mut Painting) -> Through {
+    fn render_layers(
+        &self,
+        block: &PixelBlock,
+        layers: &[usize],
+        out: &mut TileSamples,
+    ) -> Transmittance {
         let r = self.samples.offsets.len();
-        let mut through = Through::all(block, r, self.tinted);
+        let mut through = Transmittance::unobstructed(block, r, self.tinted);
         let mut row = LayerRow::default();
         for &k in layers {
             let layer = &self.layers[k];
-            for y in overlap(&block.y, &layer.rows) {
-                self.walk_row(layer, block, y, &mut through, &mut row);
-                self.keep(layer, block, y, &mut row, out);
+            for y in range_overlap(&block.y, &layer.rows) {
+                self.sample_row(layer, block, y, &mut through, &mut row);
+                self.keep_row(layer, block, y, &mut row, out);
             }
         }
-        work::add_all(row.counts(self.tinted));
+        work::add_all(row.work_counts(self.tinted));
         through
     }
 
     /// One row of one layer: every sub-sample's colour and opacity, added up by pixel.
-    fn walk_row(
+    fn sample_row(
         &self,
         layer: &Layer,
-        block: &Block,
+        block: &PixelBlock,
         y: usize,
-        through: &mut Through,
+        through: &mut Transmittance,
         row: &mut LayerRow,
     ) {
         let offsets = &self.samples.offsets;
         let r = offsets.len();
         row.start(block.x.len(), self.tinted);
         for (sy, offset_y) in offsets.iter().enumerate() {
-            let line = Line::of(layer, block.x.start, y as f64 + 0.5 + offset_y);
+            let line = LayerLine::new(layer, block.x.start, y as f64 + 0.5 + offset_y);
             for (sx, offset_x) in offsets.iter().enumerate() {
                 let pixels = line.pixels(0.5 + *offset_x as f32, block.x.len());
                 if pixels.is_empty() {
                     continue;
                 }
-                row.touched = join(&row.touched, &pixels);
-                if let (true, Some(light)) = (self.samples.each, &layer.light) {
-                    let place = |i: usize| self.samples.columns[(block.x.start + i) * r + sx];
-                    row.light_between(light, pixels.clone(), place, self.samples.rows[y * r + sy]);
+                row.touched = range_union(row.touched.clone(), pixels.clone());
+                if self.samples.per_subsample {
+                    self.light_subsamples(layer, block, [sx, y * r + sy], &pixels, row);
                 }
-                let at = line.at(0.5 + *offset_x as f32 + pixels.start as f32);
-                let plane = sy * r + sx;
                 row.read += pixels.len();
-                through.pass(layer, &at, plane, y - block.y.start, pixels, row);
+                let run = SubsampleRun {
+                    line: &line.starting_at(0.5 + *offset_x as f32 + pixels.start as f32),
+                    plane: sy * r + sx,
+                    y: y - block.y.start,
+                    pixels,
+                };
+                through.pass_layer(&layer.texture, run, row);
             }
         }
     }
 
+    /// Looks up the light at one sub-sample of some pixels: the column inside its pixel, the row inside the picture.
+    fn light_subsamples(
+        &self,
+        layer: &Layer,
+        block: &PixelBlock,
+        [sx, row_of_samples]: [usize; 2],
+        pixels: &Range<usize>,
+        row: &mut LayerRow,
+    ) {
+        let Some(light) = &layer.light else { return };
+        let (samples, r) = (&self.samples, self.samples.offsets.len());
+        row.look_up_light(
+            light,
+            pixels.clone(),
+            |i| samples.columns[(block.x.start + i) * r + sx],
+            samples.rows[row_of_samples],
+        );
+    }
+
     /// Keeps what a row's pixels got from a layer.
-    fn keep(&self, layer: &Layer, block: &Block, y: usize, row: &mut LayerRow, out: &mut Painting) {
-        let r = self.samples.offsets.len();
-        let weight = 1.0 / (r * r) as f32;
+    fn keep_row(
+        &self,
+        layer: &Layer,
+        block: &PixelBlock,
+        y: usize,
+        row: &mut LayerRow,
+        out: &mut TileSamples,
+    ) {
+        let weight = self.samples.sample_weight();
         for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
             let x = block.x.start + i;
-            let light = match &layer.light {
-                Some(map) if !self.samples.each && row.light[i].alpha() > 0.0 => {
-                    row.lit += 1;
-                    row.light[i].times(self.light_at(map, x, y))
-                }
-                Some(_) => row.light[i],
-                None => Four([0.0, 0.0, 0.0, row.light[i].alpha()]),
-            };
+            let light = self.pixel_light(layer, [x, y], row.light[i], &mut row.lit);
             let hidden = if self.tinted {
                 row.hidden[i].rgb()
             } else {
                 LinearRgb::grey(row.light[i].alpha())
             };
-            let (sample, tint) = self.sample(
-                layer,
-                [x, y],
-                light,
-                row.alpha[i] * weight,
-                hidden.scale(weight),
-            );
+            let hidden = hidden.scale(weight);
+            let alpha = (row.alpha[i] * weight).min(1.0);
+            let sample = DeepSample {
+                object: layer.id,
+                depth: layer.depth_at(x, y),
+                light: light.rgb().scale(weight * self.exposure / PI),
+                alpha,
+                visible: channel_mean(hidden).min(alpha),
+            };
             out.samples.push((x as u32, y as u32, sample));
             if self.tinted {
-                out.tints.push(tint);
+                out.tints.push(hidden.map(|h| h.min(1.0)));
             }
         }
     }
 
-    /// Irradiance in the middle of a pixel.
+    /// Light from a layer at a pixel, lit here where its sub-samples were not; `lit` counts the pixels that were.
     #[inline(always)]
-    fn light_at(&self, light: &Map, x: usize, y: usize) -> Four {
-        light.at(self.samples.columns[x], self.samples.rows[y])
-    }
-
-    fn sample(
+    fn pixel_light(
         &self,
         layer: &Layer,
         [x, y]: [usize; 2],
-        light: Four,
-        alpha: f32,
-        hidden: LinearRgb,
-    ) -> (DeepSample, LinearRgb) {
-        let r = self.samples.offsets.len();
-        let weight = 1.0 / (r * r) as f32;
-        let w = layer
-            .seen
-            .w
-            .dot(&Vector3::new(x as f64 + 0.5, y as f64 + 0.5, 1.0));
-        let depth = if w > 0.0 {
-            (layer.seen.height / w) as f32
-        } else {
-            f32::MAX
-        };
-        let alpha = alpha.min(1.0);
-        let sample = DeepSample {
-            object: layer.id,
-            depth: Depth(depth),
-            light: light.rgb().scale(weight * self.exposure / PI),
-            alpha,
-            visible: mean(hidden).min(alpha),
-        };
-        (sample, hidden.map(|h| h.min(1.0)))
+        sum: Float4,
+        lit: &mut usize,
+    ) -> Float4 {
+        match &layer.light {
+            Some(map) if !self.samples.per_subsample && sum.alpha() > 0.0 => {
+                *lit += 1;
+                sum.times(map.value_at(self.samples.columns[x], self.samples.rows[y]))
+            }
+            Some(_) => sum,
+            None => Float4::ZERO.with_fourth(sum.alpha()),
+        }
     }
 
-    fn may_be_shadowed(&self, block: &Block) -> bool {
-        let Some(map) = &self.ground.share else {
+    fn may_be_shadowed(&self, block: &PixelBlock) -> bool {
+        let Some(map) = &self.catcher.share else {
             return false;
         };
-        let n = self.samples.per_side();
-        let places = |range: &Range<usize>, all: &[Place]| {
-            [all[range.start * n], all[range.end * n - 1]].map(|p| p.0 as usize)
-        };
-        let [x, y] = [
-            places(&block.x, &self.samples.columns),
-            places(&block.y, &self.samples.rows),
-        ];
-        // A node more on either side: sub-samples reach beyond the middle of their pixel.
         map.meets(
-            x[0].saturating_sub(1)..x[1] + 3,
-            y[0].saturating_sub(1)..y[1] + 3,
+            self.samples.node_range(&block.x, &self.samples.columns),
+            self.samples.node_range(&block.y, &self.samples.rows),
         )
     }
 
@@ -366,120 +367,139 @@ impl Stack {
     ///
     /// The definition divides average irradiances; the unshadowed one is the same all over a pixel (to about 1e-4 of
     /// it), so that averaging the share itself is the same.
-    fn shade_ground(
-        &self,
-        whole: &Block,
-        block: &Block,
-        through: &Through,
-        shadow: &mut [LinearRgb],
-    ) {
-        let (Some(map), Some(seen)) = (&self.ground.share, &self.ground.seen) else {
+    fn shade_catcher(&self, part: &PixelBlock, through: &Transmittance, tile: &mut RenderedTile) {
+        let (Some(map), Some(plane)) = (&self.catcher.share, &self.catcher.plane) else {
             return;
         };
-        let offsets = &self.samples.offsets;
-        let edges = sides(&seen.u, &seen.v, &seen.w, [0.0; 2]);
-        let reach = offsets.iter().fold(0.0, |m: f64, o| m.max(o.abs()));
-        for y in block.y.clone() {
-            let spans: Vec<_> = offsets
-                .iter()
-                .map(|o| span(&edges, y as f64 + 0.5 + o))
-                .collect();
-            let low = spans.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max) + reach;
-            let high = spans.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) - reach;
-            let line =
-                &mut shadow[(y - whole.y.start) * whole.x.len() + block.x.start - whole.x.start..];
-            for (i, shadow) in line.iter_mut().take(block.x.len()).enumerate() {
-                let x = block.x.start + i;
-                let inside = x as f64 + 0.5 >= low && x as f64 + 0.5 <= high;
-                *shadow = if inside && !self.samples.each {
+        let edges = quad_sides(&plane.u, &plane.v, &plane.w, [0.0; 2]);
+        for y in part.y.clone() {
+            let Some(row) = tile.shadow_row(part, y) else {
+                return;
+            };
+            let spans = CatcherSpans::new(&self.samples, &edges, y);
+            for (i, shadow) in row.iter_mut().enumerate() {
+                let x = part.x.start + i;
+                *shadow = if spans.hold_pixel(x) && !self.samples.per_subsample {
                     self.share_at(map, x, y).rgb()
                 } else {
-                    self.mean_share(map, [x, y], &spans, through.of(i, y - block.y.start))
+                    let through = through.of_pixel(i, y - part.y.start);
+                    self.mean_share(map, [x, y], &spans, through)
                 };
             }
         }
     }
 
-    /// The share in the middle of a pixel.
-    fn share_at(&self, map: &Map, x: usize, y: usize) -> Four {
+    /// The share at one position of the sample grid.
+    #[inline(always)]
+    fn share_at(&self, map: &IrradianceMap, x: usize, y: usize) -> Float4 {
         let (column, row) = (self.samples.columns[x], self.samples.rows[y]);
         if map.holds(column, row) {
-            map.at(column, row)
+            map.value_at(column, row)
         } else {
-            Four::ONE
+            Float4::ONE
         }
     }
 
     /// The mean share of a pixel by what passes to each sub-sample; 1 beyond the end of the surface.
     fn mean_share(
         &self,
-        map: &Map,
+        map: &IrradianceMap,
         [x, y]: [usize; 2],
-        spans: &[(f64, f64)],
-        through: impl Iterator<Item = Four>,
+        spans: &CatcherSpans,
+        through: impl Iterator<Item = Float4>,
     ) -> LinearRgb {
-        let (r, n) = (self.samples.offsets.len(), self.samples.per_side());
-        let (mut sum, mut weight) = (Four::ZERO, Four::ZERO);
+        let (r, n) = (
+            self.samples.offsets.len(),
+            self.samples.positions_per_side(),
+        );
+        let (mut sum, mut weight) = (Float4::ZERO, Float4::ZERO);
         for (sub, t) in through.enumerate() {
             let (sx, sy) = (sub % r, sub / r);
-            let at = x as f64 + 0.5 + self.samples.offsets[sx];
-            let on_ground = at >= spans[sy].0 && at <= spans[sy].1;
-            let place = if self.samples.each {
-                [x * n + sx, y * n + sy]
+            let share = if !spans.hold_sample(sy, x as f64 + 0.5 + self.samples.offsets[sx]) {
+                Float4::ONE
+            } else if self.samples.per_subsample {
+                self.share_at(map, x * n + sx, y * n + sy)
             } else {
-                [x, y]
+                self.share_at(map, x, y)
             };
-            let share = if on_ground {
-                self.share_at(map, place[0], place[1])
-            } else {
-                Four::ONE
-            };
-            (sum, weight) = (
-                sum.add_scaled(1.0, t.times(share)),
-                weight.add_scaled(1.0, t),
-            );
+            sum = sum.add_scaled(1.0, t.times(share));
+            weight = weight.add_scaled(1.0, t);
         }
-        ratio(&sum, &weight)
+        weighted_mean(&sum, &weight)
+    }
+}
+
+/// Where the surface is in one row of pixels.
+struct CatcherSpans {
+    /// Left and right end at each row of sub-samples.
+    rows: Vec<(f64, f64)>,
+    /// Left-most and right-most pixel centre all of whose sub-samples are on it.
+    inner: (f64, f64),
+}
+
+impl CatcherSpans {
+    fn new(samples: &SampleGrid, edges: &[Vector3<f64>; 5], y: usize) -> Self {
+        let rows: Vec<_> = samples
+            .offsets
+            .iter()
+            .map(|o| row_span(edges, y as f64 + 0.5 + o))
+            .collect();
+        let reach = samples.reach_px();
+        let low = rows.iter().map(|s| s.0).fold(f64::NEG_INFINITY, f64::max) + reach;
+        let high = rows.iter().map(|s| s.1).fold(f64::INFINITY, f64::min) - reach;
+        Self {
+            rows,
+            inner: (low, high),
+        }
+    }
+
+    /// All sub-samples of a pixel are on the surface.
+    #[inline(always)]
+    fn hold_pixel(&self, x: usize) -> bool {
+        x as f64 + 0.5 >= self.inner.0 && x as f64 + 0.5 <= self.inner.1
+    }
+
+    #[inline(always)]
+    fn hold_sample(&self, row: usize, x: f64) -> bool {
+        x >= self.rows[row].0 && x <= self.rows[row].1
     }
 }
 
 /// The weighted mean of a share, per channel; 1 for no weight, and exactly 1 where the share is 1 all over.
-fn ratio(sum: &Four, weight: &Four) -> LinearRgb {
-    let channel = |c: usize| {
+fn weighted_mean(sum: &Float4, weight: &Float4) -> LinearRgb {
+    let [r, g, b] = [0, 1, 2].map(|c| {
         if weight.0[c] > 0.0 {
             (sum.0[c] / weight.0[c]).min(1.0)
         } else {
             1.0
         }
-    };
-    LinearRgb::new(channel(0), channel(1), channel(2))
+    });
+    LinearRgb::new(r, g, b)
 }
 
 /// A layer along one row of sub-samples; `x` counts pixels from the block's left edge.
-struct Line {
+struct LayerLine {
     low: f32,
     high: f32,
-    position: Linear,
+    position: TexelLine,
 }
 
-impl Line {
-    fn of(layer: &Layer, left: usize, y: f64) -> Self {
-        let seen = &layer.seen;
-        let (low, high) = span(&layer.sides, y);
-        let [u, v] = layer.texture.grid.rows(&seen.u, &seen.v, &seen.w);
+impl LayerLine {
+    fn new(layer: &Layer, left: usize, y: f64) -> Self {
+        let plane = &layer.plane;
+        let (low, high) = row_span(&layer.sides, y);
+        let [u, v] = layer.texture.grid.texel_rows(&plane.u, &plane.v, &plane.w);
         let first = Vector3::new(left as f64, y, 1.0);
-        let linear = |row: &Vector3<f64>| (row.dot(&first) as f32, row.x as f32);
-        let relative = |x: f64| (x - left as f64) as f32;
         Self {
-            low: relative(low),
-            high: relative(high),
-            position: [linear(&u), linear(&v), linear(&seen.w)],
+            low: (low - left as f64) as f32,
+            high: (high - left as f64) as f32,
+            position: [u, v, plane.w].map(|row| (row.dot(&first) as f32, row.x as f32)),
         }
     }
 
     /// The pixels whose sub-sample at this offset is on the layer.
     fn pixels(&self, offset: f32, count: usize) -> Range<usize> {
-        whole(
+        integer_range(
             f64::from(self.low - offset),
             f64::from(self.high - offset),
             &(0..count),
@@ -487,20 +507,7 @@ impl Line {
     }
 
     /// The same line, counted from `x`.
-    fn at(&self, x: f32) -> Linear {
+    fn starting_at(&self, x: f32) -> TexelLine {
         self.position.map(|(start, step)| (start + step * x, step))
     }
-}
-
-fn join(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    if a.is_empty() {
-        b.clone()
-    } else {
-        a.start.min(b.start)..a.end.max(b.end)
-    }
-}
-
-fn overlap(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    let start = a.start.max(b.start);
-    start..a.end.min(b.end).max(start)
 }

@@ -1,27 +1,22 @@
-//! How much work goes into a picture.
+//! How finely a picture is sampled.
 
 use crate::bounds::Bounds;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::quality::Quality;
 use serde::{Deserialize, Serialize};
 
-/// A named point on the curve of error against time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Preset {
-    /// For a look.
-    Draft,
-    /// For training pictures.
-    #[default]
-    Fast,
-    /// For pictures that people look at.
-    Good,
-    /// For comparisons.
-    High,
-    /// As near to the definition as it gets, at seconds a picture.
-    Reference,
-}
-
 /// How finely a picture is sampled; the same numbers give the same bits.
+///
+/// One for each [`Quality`]: points on the measured curve of error (against Cycles) over run time.
+///
+/// ```
+/// use petcomp::Quality;
+/// use petcomp::render::RenderOptions;
+///
+/// assert_eq!(RenderOptions::from(Quality::Normal), RenderOptions::default());
+/// let finer = RenderOptions { subsamples: 4, ..RenderOptions::default() };
+/// assert!(finer.check().is_ok());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RenderOptions {
@@ -35,52 +30,42 @@ pub struct RenderOptions {
     pub cell_px: f64,
 }
 
-impl Preset {
-    /// All of them with their names, the quickest first.
-    pub const ALL: [(&'static str, Self); 5] = [
-        ("draft", Self::Draft),
-        ("fast", Self::Fast),
-        ("good", Self::Good),
-        ("high", Self::High),
-        ("reference", Self::Reference),
-    ];
-
-    /// The numbers behind the name: points on the measured curve of error (against Cycles) over run time.
-    pub fn options(self) -> RenderOptions {
-        let [subsamples, light_samples, ambient_samples] = match self {
-            Self::Draft => [1, 2, 12],
-            Self::Fast => [2, 3, 32],
-            Self::Good => [2, 4, 64],
-            Self::High => [3, 6, 100],
-            Self::Reference => [6, 8, 400],
-        };
-        let cell_px = match self {
-            Self::Draft => 2.0,
-            Self::Fast => 1.5,
-            Self::Good => 1.0,
-            Self::High => 0.66,
-            Self::Reference => 0.33,
-        };
-        RenderOptions {
-            subsamples,
-            light_samples,
-            ambient_samples,
-            cell_px,
+impl From<Quality> for RenderOptions {
+    fn from(quality: Quality) -> Self {
+        match quality {
+            Quality::Draft => Self {
+                subsamples: 1,
+                light_samples: 2,
+                ambient_samples: 12,
+                cell_px: 2.0,
+            },
+            Quality::Normal => Self {
+                subsamples: 2,
+                light_samples: 3,
+                ambient_samples: 32,
+                cell_px: 1.5,
+            },
+            Quality::Reference => Self {
+                subsamples: 6,
+                light_samples: 8,
+                ambient_samples: 400,
+                cell_px: 0.33,
+            },
         }
     }
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Preset::Fast.options()
+        Self::from(Quality::Normal)
     }
 }
 
-/// The reference preset has 6; beyond 16 the error is below a code of 8 bits, and the time without bounds.
-const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "the reference preset has 6");
-const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "the reference preset has 8");
-const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "the reference preset has 400");
-const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells see no more");
+/// `Quality::Reference` has 6; beyond 16 the error is below a code of 8 bits, and the time without bounds.
+const SUBSAMPLES: Bounds = Bounds::new(1.0, 16.0, "quality reference has 6");
+const LIGHT_SAMPLES: Bounds = Bounds::new(1.0, 32.0, "quality reference has 8");
+const AMBIENT_SAMPLES: Bounds = Bounds::new(1.0, 4096.0, "quality reference has 400");
+const CELL_PX: Bounds = Bounds::new(0.25, 16.0, "pixels; smaller cells resolve nothing more");
 
 impl RenderOptions {
     /// Fails on the first number that has no use: none at all, or so many that a picture takes hours.
@@ -110,69 +95,63 @@ impl RenderOptions {
     }
 }
 
-impl std::str::FromStr for Preset {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        let known = Self::ALL.iter().find(|(n, _)| *n == name);
-        known.map(|&(_, quality)| quality).ok_or_else(|| {
-            let names = Self::ALL.map(|(n, _)| n).join(", ");
-            Error::value("quality", format!("\"{name}\", expected one of {names}"))
-        })
-    }
-}
-
-impl From<Preset> for RenderOptions {
-    fn from(quality: Preset) -> Self {
-        quality.options()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn numbers_without_an_end_or_a_beginning_are_refused() {
-        assert!(
-            Preset::ALL
-                .iter()
-                .all(|(_, preset)| preset.options().check().is_ok())
-        );
-        let usual = RenderOptions::default();
-        let told = |options: RenderOptions| options.check().unwrap_err().to_string();
-        let said = told(RenderOptions {
-            subsamples: 1_000_000,
-            ..usual
+    fn the_numbers_of_each_quality_stay() {
+        let numbers = Quality::ALL.map(|quality| {
+            let o = RenderOptions::from(quality);
+            (o.subsamples, o.light_samples, o.ambient_samples, o.cell_px)
         });
         assert_eq!(
-            said,
-            "subsamples: 1000000, expected 1 to 16 (the reference preset has 6)"
+            numbers,
+            [(1, 2, 12, 2.0), (2, 3, 32, 1.5), (6, 8, 400, 0.33)]
+        );
+    }
+
+    #[test]
+    fn numbers_without_an_end_or_a_beginning_are_refused() {
+        assert!(
+            Quality::ALL
+                .into_iter()
+                .all(|quality| RenderOptions::from(quality).check().is_ok())
+        );
+        let default = RenderOptions::default();
+        let message = |options: RenderOptions| options.check().unwrap_err().to_string();
+        let many = message(RenderOptions {
+            subsamples: 1_000_000,
+            ..default
+        });
+        assert_eq!(
+            many,
+            "subsamples: 1000000, expected 1 to 16 (quality reference has 6)"
         );
         assert!(
-            told(RenderOptions {
+            message(RenderOptions {
                 subsamples: 0,
-                ..usual
+                ..default
             })
             .starts_with("subsamples: 0, expected 1 to 16")
         );
         assert!(
-            told(RenderOptions {
+            message(RenderOptions {
                 light_samples: usize::MAX,
-                ..usual
+                ..default
             })
             .starts_with("light_samples: 1.8")
         );
         assert!(
-            told(RenderOptions {
+            message(RenderOptions {
                 ambient_samples: 0,
-                ..usual
+                ..default
             })
             .starts_with("ambient_samples: 0")
         );
         for cell_px in [0.0, -1.0, f64::NAN] {
             assert!(
-                told(RenderOptions { cell_px, ..usual }).starts_with("cell_px: "),
+                message(RenderOptions { cell_px, ..default }).starts_with("cell_px: "),
                 "{cell_px}"
             );
         }

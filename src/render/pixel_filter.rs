@@ -3,35 +3,35 @@
 use std::f64::consts::TAU;
 
 /// Half of the window's width, pixels: Cycles' default filter is 1.5 wide to either side.
-const RADIUS: f64 = 1.5;
+const WINDOW_RADIUS_PX: f64 = 1.5;
 
 /// Variance of the window, square pixels.
-const VARIANCE: f64 = 0.17266;
+const WINDOW_VARIANCE_PX2: f64 = 0.17266;
 
 /// Coefficients of the Blackman-Harris window (Harris 1978, four terms, 92 dB).
-const TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
+const WINDOW_TERMS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
 
 /// Positions, pixels from the centre, that split the window's weight into `count` equal parts at their middle.
 ///
 /// All samples of a pixel have the same weight then.
-pub(super) fn quantiles(count: usize) -> Vec<f64> {
+pub(super) fn filter_quantiles(count: usize) -> Vec<f64> {
     (0..count)
-        .map(|i| quantile((i as f64 + 0.5) / count as f64))
+        .map(|i| filter_quantile((i as f64 + 0.5) / count as f64))
         .collect()
 }
 
 /// What the positions leave of the window's width: the standard deviation that the texture's own filter must add.
-pub(super) fn left_over_sigma(offsets: &[f64]) -> f64 {
+pub(super) fn residual_sigma(offsets: &[f64]) -> f64 {
     let covered = offsets.iter().map(|o| o * o).sum::<f64>() / offsets.len() as f64;
-    (VARIANCE - covered).max(0.0).sqrt()
+    (WINDOW_VARIANCE_PX2 - covered).max(0.0).sqrt()
 }
 
-fn quantile(share: f64) -> f64 {
+fn filter_quantile(share: f64) -> f64 {
     // The window is symmetric; bisection to the last bit of a position of order one.
-    let (mut low, mut high) = (-RADIUS, RADIUS);
+    let (mut low, mut high) = (-WINDOW_RADIUS_PX, WINDOW_RADIUS_PX);
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
-        if cumulative(mid) < share {
+        if cumulative_weight(mid) < share {
             low = mid;
         } else {
             high = mid;
@@ -41,10 +41,11 @@ fn quantile(share: f64) -> f64 {
 }
 
 /// Weight of the window left of `s`; 0 at its left end, 1 at its right end.
-fn cumulative(s: f64) -> f64 {
-    let t = s / (2.0 * RADIUS) + 0.5;
-    let wave = |k: usize| TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64);
-    t + (wave(1) + wave(2) + wave(3)) / TERMS[0]
+fn cumulative_weight(s: f64) -> f64 {
+    let t = s / (2.0 * WINDOW_RADIUS_PX) + 0.5;
+    let [first, second, third] = [1, 2, 3]
+        .map(|k: usize| WINDOW_TERMS[k] * libm::sin(TAU * k as f64 * t) / (TAU * k as f64));
+    t + (first + second + third) / WINDOW_TERMS[0]
 }
 
 #[cfg(test)]
@@ -65,12 +66,12 @@ mod tests {
             ),
         ];
         for (offsets, sigma) in table {
-            let ours = quantiles(offsets.len());
+            let ours = filter_quantiles(offsets.len());
             assert!(
                 ours.iter().zip(offsets).all(|(a, b)| (a - b).abs() < 2e-5),
                 "{ours:?}"
             );
-            assert!((left_over_sigma(&ours) - sigma).abs() < 1e-4);
+            assert!((residual_sigma(&ours) - sigma).abs() < 1e-4);
         }
     }
 }

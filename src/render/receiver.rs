@@ -1,82 +1,131 @@
-//! What reaches a card or the surface: all its light in the open, less what blockers take away.
+//! What reaches a card or the surface: all its light in the open, less what occluders take away.
 //!
-//! Keeping what is *lost* instead of what arrives makes work sparse, since most beams meet no blocker at most nodes, and
+//! Keeping what is *lost* instead of what arrives makes work sparse, since most rays meet no occluder at most nodes, and
 //! makes light exact where nothing is in its way.
 
 use crate::geom::Vector3;
 use crate::pixel::LinearRgb;
 use crate::render::RenderOptions;
-use crate::render::four::Four;
-use crate::render::half_plane::{grown, sides, span, whole};
+use crate::render::float4::Float4;
+use crate::render::half_plane::{grown_side, quad_sides, row_span};
 use crate::render::lattice::Lattice;
-use crate::render::shadow::{Area, Beam, Casters, Readings, rows_and_columns};
-use crate::render::source::{Lamp, Lamps};
-use crate::render::view::{HORIZON, Seen, Sheet};
-use crate::scene::Shot;
+use crate::render::light_samples::{LightGroup, LightSamples};
+use crate::render::occluders::Occluders;
+use crate::render::ranges::{integer_range, range_union, range_until};
+use crate::render::shadow::{ShadowedReceiver, TexelReads};
+use crate::render::shadow_ray::{ShadowRay, shadow_rays};
+use crate::render::view::{
+    CameraView, HORIZON_M, LatticeArea, ProjectedPlane, ScenePlane, rows_and_columns,
+};
+use crate::scene::{Card, Shot};
 use crate::work::{self, Kind};
 use std::ops::Range;
 
-/// One receiver under some of its lamps, on a lattice.
+/// One receiver under some of its lights, on a lattice.
 #[derive(Debug)]
 pub(super) struct Receiver {
-    seen: Seen,
+    plane: ProjectedPlane,
     /// Nodes outside of these conditions are not asked for.
     outline: Vec<Vector3<f64>>,
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
-    lamps: Vec<(LinearRgb, Vec<Beam>)>,
-    /// Channels that blockers differ in: 1, or 3 where there is film.
+    groups: Vec<RayGroup>,
+    /// Channels that occluders differ in: 1, or 3 where there is film.
     channels: usize,
-    /// Irradiance that comes from other lamps than these, before anything is lost.
-    pub(super) rest: LinearRgb,
+    /// Irradiance that comes from other lights than these, before anything is lost.
+    open_sky: LinearRgb,
+}
+
+/// Rays to light samples of one colour.
+#[derive(Debug)]
+struct RayGroup {
+    radiance: LinearRgb,
+    rays: Vec<ShadowRay>,
+}
+
+impl RayGroup {
+    fn has_faces(&self) -> bool {
+        self.rays.iter().any(ShadowRay::is_face)
+    }
 }
 
 /// A receiver under area lights, whose shadows are sharp, and under the sky, whose shadows are soft enough for half the
 /// nodes.
 #[derive(Debug)]
-pub(super) struct Lit {
+pub(super) struct ReceiverIrradiance {
     pub(super) fine: Receiver,
     pub(super) coarse: Receiver,
     /// The share of open irradiance is asked for, not irradiance itself.
     pub(super) relative: bool,
 }
 
-impl Lit {
-    /// No lamp shines on it.
+impl ReceiverIrradiance {
+    /// No light shines on it.
     pub(super) fn is_dark(&self) -> bool {
-        self.fine.lamps.is_empty() && self.coarse.lamps.is_empty()
+        self.fine.groups.is_empty() && self.coarse.groups.is_empty()
+    }
+
+    /// The value of nodes that are not asked for.
+    pub(super) fn unlit_value(&self) -> Float4 {
+        if self.relative {
+            Float4::ONE
+        } else {
+            Float4::ZERO
+        }
     }
 }
 
 /// What receivers are made from.
-pub(super) struct Studio<'a> {
+pub(super) struct LightingContext<'a> {
     pub(super) fine: Lattice,
-    pub(super) coarse: Lattice,
-    pub(super) casters: Casters<'a>,
-    pub(super) shot: &'a Shot,
-    pub(super) options: RenderOptions,
+    coarse: Lattice,
+    pub(super) occluders: Occluders<'a>,
+    shot: &'a Shot,
+    options: RenderOptions,
 }
 
-impl Studio<'_> {
-    /// What lights a sheet on the side of the eye; none where it is seen edge-on. The normal is that of every lattice.
-    fn lamps(&self, sheet: &Sheet) -> Option<Lamps> {
-        let seen = Seen::of(sheet, &self.fine.view)?;
-        Some(Lamps::of(
+/// The lights that a receiver's shadows are computed for, and the irradiance of the whole sky.
+#[derive(Clone, Copy)]
+struct SelectedLights<'a> {
+    groups: &'a [LightGroup],
+    open_sky: LinearRgb,
+}
+
+impl<'a> LightingContext<'a> {
+    /// The lattices and occluders of a shot with these cards.
+    pub(super) fn new(
+        shot: &'a Shot,
+        cards: &[(&'a Card, ScenePlane)],
+        view: &CameraView,
+        options: RenderOptions,
+    ) -> Self {
+        Self {
+            fine: Lattice::new(view, options.cell_px),
+            coarse: Lattice::new(view, 2.0 * options.cell_px),
+            occluders: Occluders::new(cards, ScenePlane::shadow_catcher(shot.catcher)),
+            shot,
+            options,
+        }
+    }
+
+    /// What lights a plane on the side of the camera; none where it is seen edge-on. The normal is that of every lattice.
+    fn light_samples(&self, plane: &ScenePlane) -> Option<LightSamples> {
+        let projected = ProjectedPlane::new(plane, &self.fine.view)?;
+        Some(LightSamples::above(
             self.shot,
             &self.options,
-            &sheet.center,
-            &seen.normal,
+            &plane.center,
+            &projected.normal,
         ))
     }
 
     /// Card number `own`, asked for where the card is seen and a node around. None where it is not seen at all.
-    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<Lit> {
-        let lamps = self.lamps(&self.casters.cards[own].sheet)?;
-        let fine = self.card_on(&self.fine, own, reach, &lamps, &lamps.faces)?;
-        let coarse = self.card_on(&self.coarse, own, reach, &lamps, &lamps.sky)?;
-        Some(Lit {
-            fine,
-            coarse,
+    pub(super) fn card(&self, own: usize, reach: [f64; 2]) -> Option<ReceiverIrradiance> {
+        let lights = self.light_samples(&self.occluders.cards[own].plane)?;
+        let [faces, sky] = SelectedLights::split(&lights);
+        Some(ReceiverIrradiance {
+            fine: self.card_on(&self.fine, own, reach, faces)?,
+            coarse: self.card_on(&self.coarse, own, reach, sky)?,
             relative: false,
         })
     }
@@ -86,46 +135,41 @@ impl Studio<'_> {
         lattice: &Lattice,
         own: usize,
         reach: [f64; 2],
-        all: &Lamps,
-        some: &[Lamp],
+        lights: SelectedLights<'_>,
     ) -> Option<Receiver> {
-        let sheet = &self.casters.cards[own].sheet;
-        let seen = Seen::of(sheet, &lattice.view)?;
-        let (rows, columns) = rows_and_columns(sheet, reach, &lattice.view);
-        if rows.len() < 2 || columns.len() < 2 {
+        let plane = &self.occluders.cards[own].plane;
+        let projected = ProjectedPlane::new(plane, &lattice.view)?;
+        let area = rows_and_columns(plane, reach, &lattice.view);
+        if area.0.len() < 2 || area.1.len() < 2 {
             return None;
         }
+        let shadowed = ShadowedReceiver {
+            plane: &projected,
+            area: &area,
+            view: &lattice.view,
+            own: Some(own),
+            cell_m: projected.cell_metres(&lattice.view, &plane.center),
+        };
         // Two nodes, for the finer lattice's one that lies between them.
-        let outline = sides(&seen.u, &seen.v, &seen.w, reach)
+        let outline = quad_sides(&projected.u, &projected.v, &projected.w, reach)
             .iter()
-            .map(|s| grown(s, 2.0))
+            .map(|s| grown_side(s, 2.0))
             .collect();
-        let cell = seen.cell_metres(&lattice.view, &sheet.center);
-        let area = (rows, columns);
-        let receiver = self.receiver(lattice, (seen, &area), Some(own), cell, (all, some));
-        Some(receiver.within(outline, area.0, area.1))
+        let groups = self.ray_groups(&shadowed, lights);
+        Some(self.receiver(projected, groups, lights, (outline, area)))
     }
 
     /// The surface; asked for where a shadow may fall on it. None where there is no shadow, or none to be seen.
-    pub(super) fn surface(&self) -> Option<Lit> {
-        let lamps = self.lamps(&self.casters.surface)?;
-        let fine = self.surface_on(&self.fine, &lamps, &lamps.faces)?;
-        let coarse = self.surface_on(&self.coarse, &lamps, &lamps.sky)?;
-        let doubled = |r: &Range<usize>| {
-            if r.is_empty() {
-                0..0
-            } else {
-                (2 * r.start).saturating_sub(2)..2 * r.end
-            }
-        };
+    pub(super) fn surface(&self) -> Option<ReceiverIrradiance> {
+        let lights = self.light_samples(&self.occluders.surface)?;
+        let [faces, sky] = SelectedLights::split(&lights);
+        let fine = self.surface_on(&self.fine, faces)?;
+        let coarse = self.surface_on(&self.coarse, sky)?;
         let view = &self.fine.view;
-        let rows = cut(union(fine.rows.clone(), doubled(&coarse.rows)), view.height);
-        let columns = cut(
-            union(fine.columns.clone(), doubled(&coarse.columns)),
-            view.width,
-        );
-        let seen = rows.len() > 1 && columns.len() > 1;
-        seen.then_some(Lit {
+        let rows = range_until(finer_union(&fine.rows, &coarse.rows), view.height);
+        let columns = range_until(finer_union(&fine.columns, &coarse.columns), view.width);
+        let is_seen = rows.len() > 1 && columns.len() > 1;
+        is_seen.then_some(ReceiverIrradiance {
             fine: Receiver {
                 rows,
                 columns,
@@ -136,94 +180,117 @@ impl Studio<'_> {
         })
     }
 
-    fn surface_on(&self, lattice: &Lattice, all: &Lamps, some: &[Lamp]) -> Option<Receiver> {
-        let seen = Seen::of(&self.casters.surface, &lattice.view).filter(|s| s.normal.z > 0.0)?;
-        let cell = seen.cell_metres(&lattice.view, &Vector3::zeros());
-        let everywhere = (0..lattice.view.height, 0..lattice.view.width);
-        let receiver = self.receiver(lattice, (seen, &everywhere), None, cell, (all, some));
-        let blockers = receiver
-            .lamps
+    fn surface_on(&self, lattice: &Lattice, lights: SelectedLights<'_>) -> Option<Receiver> {
+        let projected = ProjectedPlane::new(&self.occluders.surface, &lattice.view)
+            .filter(|plane| plane.normal.z > 0.0)?;
+        let shadowed = ShadowedReceiver {
+            plane: &projected,
+            area: &(0..lattice.view.height, 0..lattice.view.width),
+            view: &lattice.view,
+            own: None,
+            cell_m: projected.cell_metres(&lattice.view, &Vector3::zeros()),
+        };
+        let groups = self.ray_groups(&shadowed, lights);
+        let area = shadowed_area(&groups);
+        Some(self.receiver(projected, groups, lights, (vec![projected.w], area)))
+    }
+
+    fn ray_groups(
+        &self,
+        receiver: &ShadowedReceiver<'_>,
+        lights: SelectedLights<'_>,
+    ) -> Vec<RayGroup> {
+        lights
+            .groups
             .iter()
-            .flat_map(|(_, beams)| beams)
-            .flat_map(|b| &b.blockers);
-        let areas = blockers.map(|b| (b.rows.clone(), b.columns.clone()));
-        let (rows, columns) = areas
-            .reduce(|a, b| (union(a.0, b.0), union(a.1, b.1)))
-            .unwrap_or((0..0, 0..0));
-        Some(receiver.within(vec![seen.w], rows, columns))
+            .map(|group| RayGroup {
+                radiance: group.radiance,
+                rays: shadow_rays(&self.occluders, receiver, group),
+            })
+            .collect()
     }
 
     fn receiver(
         &self,
-        lattice: &Lattice,
-        (seen, area): (Seen, &Area),
-        own: Option<usize>,
-        cell: f64,
-        (all, some): (&Lamps, &[Lamp]),
+        plane: ProjectedPlane,
+        groups: Vec<RayGroup>,
+        lights: SelectedLights<'_>,
+        (outline, (rows, columns)): (Vec<Vector3<f64>>, LatticeArea),
     ) -> Receiver {
-        let beams = |lamp: &Lamp| {
-            (
-                lamp.radiance,
-                self.casters
-                    .beams((&seen, area), &lattice.view, lamp, own, cell),
-            )
-        };
         Receiver {
-            lamps: some.iter().map(beams).collect(),
-            channels: if self.casters.tinted { 3 } else { 1 },
-            rest: all.open_sky(),
-            seen,
-            outline: Vec::new(),
-            columns: 0..0,
-            rows: 0..0,
+            groups,
+            channels: if self.occluders.tinted { 3 } else { 1 },
+            open_sky: lights.open_sky,
+            plane,
+            outline,
+            columns,
+            rows,
         }
     }
 }
 
-fn union(a: Range<usize>, b: Range<usize>) -> Range<usize> {
-    match (a.is_empty(), b.is_empty()) {
-        (true, _) => b,
-        (_, true) => a,
-        _ => a.start.min(b.start)..a.end.max(b.end),
+impl<'a> SelectedLights<'a> {
+    /// Area lights, and the sky.
+    fn split(all: &'a LightSamples) -> [Self; 2] {
+        let open_sky = all.open_sky();
+        [&all.faces, &all.sky].map(|groups| Self { groups, open_sky })
     }
 }
 
-fn cut(range: Range<usize>, end: usize) -> Range<usize> {
-    range.start.min(end)..range.end.min(end)
+/// Bounds of all shadows on a receiver.
+fn shadowed_area(groups: &[RayGroup]) -> LatticeArea {
+    let shadows = groups
+        .iter()
+        .flat_map(|group| &group.rays)
+        .flat_map(|ray| &ray.shadows);
+    shadows
+        .map(|shadow| (shadow.rows.clone(), shadow.columns.clone()))
+        .reduce(|a, b| (range_union(a.0, b.0), range_union(a.1, b.1)))
+        .unwrap_or((0..0, 0..0))
+}
+
+/// Nodes of a lattice, and those around the nodes of the lattice of twice its distance.
+fn finer_union(fine: &Range<usize>, coarse: &Range<usize>) -> Range<usize> {
+    let doubled = if coarse.is_empty() {
+        0..0
+    } else {
+        (2 * coarse.start).saturating_sub(2)..2 * coarse.end
+    };
+    range_union(fine.clone(), doubled)
 }
 
 /// Scratch of one task, a value per node of a row.
 #[derive(Default)]
-pub(super) struct Buffers {
+pub(super) struct RowBuffers {
     /// World position.
     position: [Vec<f32>; 3],
-    /// Irradiance by unit radiance of one beam, and of all beams of a lamp.
-    strength: Vec<f32>,
-    lamp: Vec<f32>,
-    /// Share of a beam that passes the blockers, and what a lamp loses to them, per channel.
+    /// Irradiance by unit radiance of one ray, and of all rays of a group.
+    ray: Vec<f32>,
+    group: Vec<f32>,
+    /// Share of a ray that passes the occluders, and what a group loses to them, per channel.
     through: [Vec<f32>; 3],
     lost: [Vec<f32>; 3],
-    /// Nodes that each blocker of a beam touches.
+    /// Nodes that each shadow of a ray touches.
     touched: Vec<(usize, Range<usize>)>,
     /// Irradiance in the open.
-    pub(super) open: Vec<Four>,
-    /// Irradiance that blockers take away.
-    pub(super) hidden: Vec<Four>,
+    pub(super) open: Vec<Float4>,
+    /// Irradiance that occluders take away.
+    pub(super) hidden: Vec<Float4>,
     /// A row of hidden irradiance of the coarser lattice.
-    pub(super) coarse: Vec<Four>,
-    rays: Rays,
+    pub(super) coarse: Vec<Float4>,
+    counts: RayCounts,
 }
 
 /// What one row took.
 #[derive(Default)]
-struct Rays {
+struct RayCounts {
     light: usize,
     shadow: usize,
-    through: Readings,
+    through: TexelReads,
 }
 
-impl Rays {
-    fn counts(self) -> [(Kind, u64); 4] {
+impl RayCounts {
+    fn into_work(self) -> [(Kind, u64); 4] {
         [
             (Kind::LightSamples, self.light as u64),
             (Kind::ShadowRays, self.shadow as u64),
@@ -234,122 +301,99 @@ impl Rays {
 }
 
 impl Receiver {
-    fn within(self, outline: Vec<Vector3<f64>>, rows: Range<usize>, columns: Range<usize>) -> Self {
-        Self {
-            outline,
-            rows,
-            columns,
-            ..self
-        }
-    }
-
     /// The nodes of a row that are asked for.
-    pub(super) fn asked(&self, j: usize) -> Range<usize> {
-        let (low, high) = span(&self.outline, j as f64);
-        whole(low, high, &self.columns)
+    pub(super) fn asked_nodes(&self, j: usize) -> Range<usize> {
+        let (low, high) = row_span(&self.outline, j as f64);
+        integer_range(low, high, &self.columns)
     }
 
-    /// Open and hidden irradiance at the asked nodes of a row: `rest` and this receiver's own lamps.
-    pub(super) fn gather(&self, j: usize, asked: &Range<usize>, buffers: &mut Buffers) {
+    /// Open and hidden irradiance at the asked nodes of a row: the open sky and this receiver's own lights.
+    pub(super) fn gather_row(&self, j: usize, asked: &Range<usize>, buffers: &mut RowBuffers) {
         let n = asked.len();
-        let LinearRgb { r, g, b } = self.rest;
-        refill(&mut buffers.open, n, Four([r, g, b, 0.0]));
-        refill(&mut buffers.hidden, n, Four::ZERO);
-        if self
-            .lamps
-            .iter()
-            .flat_map(|(_, beams)| beams)
-            .any(Beam::is_face)
-        {
-            self.positions(j, asked, &mut buffers.position);
+        let LinearRgb { r, g, b } = self.open_sky;
+        refill(&mut buffers.open, n, Float4([r, g, b, 0.0]));
+        refill(&mut buffers.hidden, n, Float4::ZERO);
+        if self.groups.iter().any(RayGroup::has_faces) {
+            self.fill_positions(j, asked, &mut buffers.position);
         }
-        for (radiance, beams) in &self.lamps {
-            let is_face = beams.iter().any(Beam::is_face);
-            refill(&mut buffers.lamp, if is_face { n } else { 0 }, 0.0);
-            buffers
-                .lost
-                .iter_mut()
-                .take(self.channels)
-                .for_each(|lost| refill(lost, n, 0.0));
-            let touched = beams
-                .iter()
-                .map(|beam| self.beam(beam, j, asked, buffers))
-                .reduce(union);
-            add_lamp(&mut buffers.open, &buffers.lamp, (*radiance).into());
-            if let Some(touched) = touched.filter(|t| !t.is_empty()) {
-                let lost = |c: usize| &buffers.lost[c.min(self.channels - 1)][touched.clone()];
-                add_lost(
-                    &mut buffers.hidden[touched.clone()],
-                    [lost(0), lost(1), lost(2)],
-                    *radiance,
-                );
-            }
+        for group in &self.groups {
+            self.gather_group(group, j, asked, buffers);
         }
-        work::add_all(std::mem::take(&mut buffers.rays).counts());
+        work::add_all(std::mem::take(&mut buffers.counts).into_work());
     }
 
-    /// Adds up a beam; tells the nodes (counted from the first that is asked for) where something is in its way.
-    fn beam(
+    fn gather_group(
         &self,
-        beam: &Beam,
+        group: &RayGroup,
         j: usize,
         asked: &Range<usize>,
-        buffers: &mut Buffers,
-    ) -> Range<usize> {
-        let Buffers {
-            position,
-            strength,
-            lamp,
-            through,
-            lost,
-            touched,
-            rays,
-            ..
-        } = buffers;
-        strength.resize(asked.len(), 0.0);
-        // What the sky gives in the open is in `rest`.
-        if beam.is_face() {
-            beam.strength()
-                .fill([&position[0], &position[1], &position[2]], strength);
-            lamp.iter_mut()
-                .zip(&*strength)
-                .for_each(|(sum, e)| *sum += e);
-            rays.light += asked.len();
+        buffers: &mut RowBuffers,
+    ) {
+        let n = asked.len();
+        refill(
+            &mut buffers.group,
+            if group.has_faces() { n } else { 0 },
+            0.0,
+        );
+        for lost in buffers.lost.iter_mut().take(self.channels) {
+            refill(lost, n, 0.0);
         }
-        touched.clear();
-        let nodes = beam.blockers.iter().map(|b| b.nodes(j, asked)).enumerate();
-        touched.extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
-        let Some(all) = touched.iter().map(|(_, nodes)| nodes.clone()).reduce(union) else {
+        let touched = group
+            .rays
+            .iter()
+            .map(|ray| self.gather_ray(ray, j, asked, buffers))
+            .reduce(range_union);
+        add_open(&mut buffers.open, &buffers.group, group.radiance.into());
+        if let Some(touched) = touched.filter(|t| !t.is_empty()) {
+            let lost = [0, 1, 2].map(|c: usize| {
+                let channel = &buffers.lost[c.min(self.channels - 1)];
+                &channel[touched.clone()]
+            });
+            add_hidden(&mut buffers.hidden[touched.clone()], lost, group.radiance);
+        }
+    }
+
+    /// Adds up a ray; returns the nodes (counted from the first that is asked for) where something is in its way.
+    fn gather_ray(
+        &self,
+        ray: &ShadowRay,
+        j: usize,
+        asked: &Range<usize>,
+        buffers: &mut RowBuffers,
+    ) -> Range<usize> {
+        buffers.ray.resize(asked.len(), 0.0);
+        // What the sky gives in the open is in `open_sky`.
+        if ray.is_face() {
+            buffers.add_face(ray);
+        }
+        let Some(all) = buffers.touch_shadows(ray, j, asked) else {
             return 0..0;
         };
         let here = all.start - asked.start..all.end - asked.start;
-        if !beam.is_face() {
-            beam.strength().fill([&[]; 3], &mut strength[here.clone()]);
+        if !ray.is_face() {
+            let strength = &mut buffers.ray[here.clone()];
+            ray.unit_irradiance().fill([&[]; 3], strength);
         }
-        rays.shadow += all.len();
+        buffers.counts.shadow += all.len();
         for channel in 0..self.channels {
-            let through = &mut through[channel];
-            refill(through, all.len(), 1.0);
-            for (k, nodes) in touched.iter() {
-                let through = &mut through[nodes.start - all.start..nodes.end - all.start];
-                rays.through += beam.blockers[*k].darken(channel, j, nodes, through);
-            }
-            lose(
-                &mut lost[channel][here.clone()],
+            buffers.fill_through(ray, channel, j, &all);
+            let (lost, strength) = (&mut buffers.lost[channel], &buffers.ray);
+            add_lost(
+                &mut lost[here.clone()],
                 &strength[here.clone()],
-                through,
+                &buffers.through[channel],
             );
         }
         here
     }
 
     /// World positions of a row's nodes.
-    fn positions(&self, j: usize, asked: &Range<usize>, out: &mut [Vec<f32>; 3]) {
-        let seen = &self.seen;
+    fn fill_positions(&self, j: usize, asked: &Range<usize>, out: &mut [Vec<f32>; 3]) {
+        let plane = &self.plane;
         let first = Vector3::new(asked.start as f64, j as f64, 1.0);
-        let (p, w) = (seen.point * first, seen.w.dot(&first));
-        let (step, w_step) = (seen.point.column(0), seen.w.x);
-        let nearest = seen.height / HORIZON;
+        let (p, w) = (plane.point * first, plane.w.dot(&first));
+        let (step, w_step) = (plane.point.column(0), plane.w.x);
+        let nearest = plane.height / HORIZON_M;
         for (axis, out) in out.iter_mut().enumerate() {
             out.resize(asked.len(), 0.0);
             for (i, out) in out.iter_mut().enumerate() {
@@ -360,27 +404,64 @@ impl Receiver {
     }
 }
 
+impl RowBuffers {
+    /// Adds the open irradiance of a piece of an area light to its group.
+    fn add_face(&mut self, ray: &ShadowRay) {
+        let [x, y, z] = &self.position;
+        ray.unit_irradiance().fill([x, y, z], &mut self.ray);
+        for (sum, e) in self.group.iter_mut().zip(&self.ray) {
+            *sum += e;
+        }
+        self.counts.light += self.ray.len();
+    }
+
+    /// Notes which nodes of a row each shadow touches; returns the bounds of all of them.
+    fn touch_shadows(
+        &mut self,
+        ray: &ShadowRay,
+        j: usize,
+        asked: &Range<usize>,
+    ) -> Option<Range<usize>> {
+        self.touched.clear();
+        let nodes = ray.shadows.iter().map(|s| s.nodes(j, asked)).enumerate();
+        self.touched
+            .extend(nodes.filter(|(_, nodes)| !nodes.is_empty()));
+        let touched = self.touched.iter().map(|(_, nodes)| nodes.clone());
+        touched.reduce(range_union)
+    }
+
+    /// Computes what passes all shadows of a ray at these nodes, in one channel.
+    fn fill_through(&mut self, ray: &ShadowRay, channel: usize, j: usize, all: &Range<usize>) {
+        let through = &mut self.through[channel];
+        refill(through, all.len(), 1.0);
+        for (k, nodes) in &self.touched {
+            let through = &mut through[nodes.start - all.start..nodes.end - all.start];
+            self.counts.through += ray.shadows[*k].attenuate(channel, j, nodes, through);
+        }
+    }
+}
+
 fn refill<T: Copy>(buffer: &mut Vec<T>, n: usize, value: T) {
     buffer.clear();
     buffer.resize(n, value);
 }
 
-fn lose(lost: &mut [f32], strength: &[f32], through: &[f32]) {
+fn add_lost(lost: &mut [f32], strength: &[f32], through: &[f32]) {
     for ((lost, e), t) in lost.iter_mut().zip(strength).zip(through) {
         *lost += e * (1.0 - t);
     }
 }
 
-fn add_lamp(open: &mut [Four], lamp: &[f32], radiance: Four) {
-    open.iter_mut()
-        .zip(lamp)
-        .for_each(|(o, &e)| *o = o.add_scaled(e, radiance));
+fn add_open(open: &mut [Float4], group: &[f32], radiance: Float4) {
+    for (o, &e) in open.iter_mut().zip(group) {
+        *o = o.add_scaled(e, radiance);
+    }
 }
 
-fn add_lost(hidden: &mut [Four], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
+fn add_hidden(hidden: &mut [Float4], [r, g, b]: [&[f32]; 3], radiance: LinearRgb) {
     for (((h, &r), &g), &b) in hidden.iter_mut().zip(r).zip(g).zip(b) {
         let [x, y, z, _] = h.0;
-        *h = Four([
+        *h = Float4([
             x + r * radiance.r,
             y + g * radiance.g,
             z + b * radiance.b,

@@ -7,10 +7,10 @@ use crate::geom::Vector3;
 use crate::image::Image;
 use crate::pixel::{Depth, Film, LinearRgb, Mix};
 use crate::render::RenderOptions;
-use crate::render::pixel_filter::quantiles;
-use crate::render::source::{Kind, Lamp, Lamps, Source};
-use crate::render::texture::{graded_opacity, mean};
-use crate::render::view::{Seen, Sheet, View, sheets};
+use crate::render::grade::{channel_mean, graded_opacity};
+use crate::render::light_samples::{LightGroup, LightSample, LightSamples, SampleKind};
+use crate::render::pixel_filter::filter_quantiles;
+use crate::render::view::{CameraView, ProjectedPlane, ScenePlane, visible_planes};
 use crate::scene::{Card, Shot};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -18,149 +18,153 @@ use std::f32::consts::PI;
 /// Renders a shot without any shortcut: every sub-sample of every pixel sends a ray to every light sample.
 ///
 /// Textures are read at full size, colours are graded after interpolation, `cell_px` is not used. Takes minutes where
-/// [`cast`](super::cast) takes milliseconds; its error against the definition falls with the numbers in `options`.
-pub fn reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
+/// [`render`](super::render) takes milliseconds; its error against the definition falls with the numbers in `options`.
+pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
-    let world = World::of(shot, &options);
-    let offsets = quantiles(options.subsamples);
+    let world = ReferenceWorld::new(shot, &options);
+    let offsets = filter_quantiles(options.subsamples);
     let (width, height) = (world.view.width, world.view.height);
-    let pixel =
-        |i: usize| world.pixel((i % width) as f64 + 0.5, (i / width) as f64 + 0.5, &offsets);
-    let (lists, shadow): (Vec<Vec<(DeepSample, LinearRgb)>>, Vec<_>) =
-        (0..width * height).into_par_iter().map(pixel).unzip();
+    let (lists, shadow): (Vec<Vec<ReferenceSample>>, Vec<_>) = (0..width * height)
+        .into_par_iter()
+        .map(|i| {
+            let (column, row) = (i % width, i / width);
+            world.render_pixel(column as f64 + 0.5, row as f64 + 0.5, &offsets)
+        })
+        .unzip();
     let tints = lists
         .iter()
         .flatten()
         .filter(|_| world.tinted)
-        .map(|(_, tint)| *tint)
+        .map(|sample| sample.hidden)
         .collect();
     let samples = lists
         .into_iter()
-        .map(|list| list.into_iter().map(|(sample, _)| sample).collect());
+        .map(|list| list.into_iter().map(|sample| sample.deep).collect());
     DeepImage::from_pixels(Image::from_vec(width, height, shadow), samples).with_tints(tints)
 }
 
-/// A card with everything that a ray asks of it.
-struct Facing<'a> {
-    card: &'a Card,
-    sheet: Sheet,
-    seen: Option<Seen>,
-    lamps: Vec<Lamp>,
+/// A deep sample and what it hides per channel.
+struct ReferenceSample {
+    deep: DeepSample,
+    hidden: LinearRgb,
 }
 
-struct World<'a> {
+/// A card with everything that a ray asks of it.
+struct ReferenceCard<'a> {
+    card: &'a Card,
+    plane: ScenePlane,
+    projected: Option<ProjectedPlane>,
+    lights: Vec<LightGroup>,
+}
+
+struct ReferenceWorld<'a> {
     shot: &'a Shot,
-    view: View,
-    cards: Vec<Facing<'a>>,
-    surface: Option<Seen>,
-    surface_lamps: Vec<Lamp>,
+    view: CameraView,
+    cards: Vec<ReferenceCard<'a>>,
+    surface: Option<ProjectedPlane>,
+    surface_lights: Vec<LightGroup>,
     tinted: bool,
 }
 
-impl<'a> World<'a> {
-    fn of(shot: &'a Shot, options: &RenderOptions) -> Self {
-        let view = View::of(&shot.camera);
-        let lit = |normal: &Vector3<f64>| Lamps::plain(shot, options, normal);
-        let facing = |(card, sheet): (&'a Card, Sheet)| {
-            let seen = Seen::of(&sheet, &view);
-            let lamps = seen.as_ref().map_or(Vec::new(), |s| lit(&s.normal));
-            Facing {
-                card,
-                sheet,
-                seen,
-                lamps,
-            }
-        };
-        let surface = Seen::of(&Sheet::surface(shot.catcher), &view).filter(|s| s.normal.z > 0.0);
-        let cards: Vec<_> = sheets(shot).into_iter().map(facing).collect();
-        let is_film = |f: &Facing<'_>| {
-            f.card.texture.is_film() || f.card.back.as_ref().is_some_and(Texture::is_film)
-        };
-        let tinted = cards.iter().any(is_film);
+/// Irradiance without and with the cards in the way.
+#[derive(Default)]
+struct PointIrradiance {
+    open: LinearRgb,
+    shadowed: LinearRgb,
+}
+
+impl<'a> ReferenceWorld<'a> {
+    fn new(shot: &'a Shot, options: &RenderOptions) -> Self {
+        let view = CameraView::from_camera(&shot.camera);
+        let cards: Vec<_> = visible_planes(shot)
+            .into_iter()
+            .map(|(card, plane)| ReferenceCard::new(card, plane, &view, (shot, options)))
+            .collect();
         Self {
             shot,
             view,
+            surface: ProjectedPlane::new(&ScenePlane::shadow_catcher(shot.catcher), &view)
+                .filter(|plane| plane.normal.z > 0.0),
+            surface_lights: LightSamples::plain(shot, options, &Vector3::z()),
+            tinted: cards.iter().any(ReferenceCard::is_film),
             cards,
-            surface,
-            surface_lamps: lit(&Vector3::z()),
-            tinted,
         }
     }
 
     /// Samples of one pixel and the factor on its plate.
-    fn pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<(DeepSample, LinearRgb)>, LinearRgb) {
-        let mut order: Vec<_> = (0..self.cards.len())
-            .filter_map(|k| Some((k, self.depth(k, x, y)?)))
-            .collect();
-        order.sort_by(|a, b| {
-            a.1.total_cmp(&b.1)
-                .then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id))
-        });
+    fn render_pixel(&self, x: f64, y: f64, offsets: &[f64]) -> (Vec<ReferenceSample>, LinearRgb) {
+        let order = self.depth_order(x, y);
         let mut samples: Vec<_> = order
             .iter()
             .map(|&(k, depth)| self.empty_sample(k, depth))
             .collect();
         let weight = 1.0 / (offsets.len() * offsets.len()) as f32;
-        let mut shadow = Ratio::default();
+        let mut shadow = ShadowRatio::default();
         for oy in offsets {
             for ox in offsets {
-                let through = self.walk(x + ox, y + oy, &order, weight, &mut samples);
-                self.shade_surface(x + ox, y + oy, through.scale(weight), &mut shadow);
+                let at = [x + ox, y + oy];
+                let through = self.trace_cards(at, &order, weight, &mut samples);
+                self.shade_surface(at, through.scale(weight), &mut shadow);
             }
         }
-        samples.retain(|(s, _)| s.alpha > 0.0);
-        samples
-            .iter_mut()
-            .for_each(|(s, hidden)| s.visible = mean(*hidden));
-        (samples, shadow.value())
+        samples.retain(|sample| sample.deep.alpha > 0.0);
+        for sample in &mut samples {
+            sample.deep.visible = channel_mean(sample.hidden);
+        }
+        (samples, shadow.ratio())
     }
 
-    fn empty_sample(&self, k: usize, depth: f64) -> (DeepSample, LinearRgb) {
-        let sample = DeepSample {
+    /// The cards that are not edge-on, the nearest at a pixel's centre first, with their depths there.
+    fn depth_order(&self, x: f64, y: f64) -> Vec<(usize, f64)> {
+        let mut order: Vec<_> = (0..self.cards.len())
+            .filter_map(|k| Some((k, self.cards[k].depth_at(x, y)?)))
+            .collect();
+        order.sort_by(|a, b| {
+            a.1.total_cmp(&b.1)
+                .then(self.cards[a.0].card.id.cmp(&self.cards[b.0].card.id))
+        });
+        order
+    }
+
+    fn empty_sample(&self, k: usize, depth: f64) -> ReferenceSample {
+        let deep = DeepSample {
             object: self.cards[k].card.id,
             depth: Depth(depth as f32),
             ..DeepSample::default()
         };
-        (sample, LinearRgb::BLACK)
-    }
-
-    /// Depth of a card's plane at a pixel position; as far as can be where it is behind the eye.
-    fn depth(&self, k: usize, x: f64, y: f64) -> Option<f64> {
-        let seen = self.cards[k].seen.as_ref()?;
-        let w = seen.w.dot(&Vector3::new(x, y, 1.0));
-        Some(if w > 0.0 {
-            seen.height / w
-        } else {
-            f64::from(f32::MAX)
-        })
+        ReferenceSample {
+            deep,
+            hidden: LinearRgb::BLACK,
+        }
     }
 
     /// Adds what the cards do along one ray, front to back; returns what passes through all of them.
-    fn walk(
+    fn trace_cards(
         &self,
-        x: f64,
-        y: f64,
+        [x, y]: [f64; 2],
         order: &[(usize, f64)],
         weight: f32,
-        samples: &mut [(DeepSample, LinearRgb)],
+        samples: &mut [ReferenceSample],
     ) -> LinearRgb {
         let mut through = LinearRgb::WHITE;
-        for (&(k, _), (sample, hidden)) in order.iter().zip(samples) {
-            let facing = &self.cards[k];
-            let Some((seen, (uv, depth))) =
-                facing.seen.as_ref().and_then(|s| Some((s, s.hit(x, y)?)))
-            else {
+        for (&(k, _), sample) in order.iter().zip(samples) {
+            let card = &self.cards[k];
+            let Some(projected) = &card.projected else {
                 continue;
             };
-            let film = facing.texel(uv, &self.view.eye);
-            sample.alpha += weight * mean(film.opacity);
-            *hidden = hidden.add_scaled(weight, through * film.opacity);
-            let point = self.view.eye + self.view.ray * Vector3::new(x, y, 1.0) * depth;
+            let Some((uv, depth)) = projected.intersect_px(x, y) else {
+                continue;
+            };
+            let film = card.texel(uv, &self.view.eye);
+            sample.deep.alpha += weight * channel_mean(film.opacity);
+            sample.hidden = sample.hidden.add_scaled(weight, through * film.opacity);
+            let point = self.view.point_at(x, y, depth);
             let e = self
-                .irradiance(&point, &seen.normal, &facing.lamps, Some(k))
-                .1;
+                .irradiance(&point, &projected.normal, &card.lights, Some(k))
+                .shadowed;
             let light = through * film.color * e;
-            sample.light = sample
+            sample.deep.light = sample
+                .deep
                 .light
                 .add_scaled(weight * self.shot.exposure / PI, light);
             through = through * film.transmittance();
@@ -168,47 +172,52 @@ impl<'a> World<'a> {
         through
     }
 
-    fn shade_surface(&self, x: f64, y: f64, weight: LinearRgb, shadow: &mut Ratio) {
-        let hit = self.surface.as_ref().and_then(|s| s.hit(x, y));
-        let (open, shadowed) = match hit {
-            None => (LinearRgb::BLACK, LinearRgb::BLACK),
+    fn shade_surface(&self, [x, y]: [f64; 2], weight: LinearRgb, shadow: &mut ShadowRatio) {
+        let hit = self.surface.as_ref().and_then(|s| s.intersect_px(x, y));
+        let light = match hit {
+            None => PointIrradiance::default(),
             Some((_, depth)) => {
-                let point = self.view.eye + self.view.ray * Vector3::new(x, y, 1.0) * depth;
-                self.irradiance(&point, &Vector3::z(), &self.surface_lamps, None)
+                let point = self.view.point_at(x, y, depth);
+                self.irradiance(&point, &Vector3::z(), &self.surface_lights, None)
             }
         };
-        if hit.is_none() || open == LinearRgb::BLACK {
+        if hit.is_none() || light.open == LinearRgb::BLACK {
             shadow.outside = shadow.outside + weight;
         }
         shadow.weight = shadow.weight + weight;
-        shadow.open = shadow.open + weight * open;
-        shadow.shadowed = shadow.shadowed + weight * shadowed;
+        shadow.open = shadow.open + weight * light.open;
+        shadow.shadowed = shadow.shadowed + weight * light.shadowed;
     }
 
-    /// Irradiance without and with the other cards in the way.
     fn irradiance(
         &self,
         p: &Vector3<f64>,
         n: &Vector3<f64>,
-        lamps: &[Lamp],
+        lights: &[LightGroup],
         own: Option<usize>,
-    ) -> (LinearRgb, LinearRgb) {
-        let (mut open, mut shadowed) = (LinearRgb::BLACK, LinearRgb::BLACK);
-        for lamp in lamps {
-            for source in &lamp.sources {
-                let e = source.irradiance(p, n) as f32;
-                open = open.add_scaled(e, lamp.radiance);
-                shadowed = shadowed.add_scaled(e, self.passes(p, source, own) * lamp.radiance);
+    ) -> PointIrradiance {
+        let mut sum = PointIrradiance::default();
+        for group in lights {
+            for sample in &group.samples {
+                let e = sample.irradiance(p, n) as f32;
+                sum.open = sum.open.add_scaled(e, group.radiance);
+                let passes = self.transmittance(p, sample, own);
+                sum.shadowed = sum.shadowed.add_scaled(e, passes * group.radiance);
             }
         }
-        (open, shadowed)
+        sum
     }
 
-    /// Share of a source's light that reaches a point.
-    fn passes(&self, p: &Vector3<f64>, source: &Source, own: Option<usize>) -> LinearRgb {
+    /// Share of a sample's light that reaches a point.
+    fn transmittance(
+        &self,
+        p: &Vector3<f64>,
+        sample: &LightSample,
+        own: Option<usize>,
+    ) -> LinearRgb {
         if own.is_some()
-            && matches!(source.kind, Kind::Sky { .. })
-            && self.surface_blocks(p, &source.at.xyz())
+            && matches!(sample.kind, SampleKind::Sky { .. })
+            && self.surface_blocks(p, &sample.at.xyz())
         {
             return LinearRgb::BLACK;
         }
@@ -217,9 +226,9 @@ impl<'a> World<'a> {
             .iter()
             .enumerate()
             .filter(|&(k, _)| Some(k) != own);
-        others.fold(LinearRgb::WHITE, |through, (_, facing)| {
-            match crossing(&facing.sheet, p, source) {
-                Some(uv) => through * facing.texel(uv, p).transmittance(),
+        others.fold(LinearRgb::WHITE, |through, (_, card)| {
+            match crossing_uv(&card.plane, p, sample) {
+                Some(uv) => through * card.texel(uv, p).transmittance(),
                 None => through,
             }
         })
@@ -232,16 +241,12 @@ impl<'a> World<'a> {
     }
 }
 
-/// Texture coordinates where the way from a point to a source crosses a sheet.
-fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]> {
-    let way = source.at.xyz() - p * source.at.w;
-    let s = sheet.normal.dot(&(sheet.center - p)) / sheet.normal.dot(&way);
-    let local = p + way * s - sheet.center;
-    let uv = [
-        local.dot(&sheet.x) / sheet.size[0] + 0.5,
-        0.5 - local.dot(&sheet.y) / sheet.size[1],
-    ];
-    let end = if source.at.w > 0.0 {
+/// Texture coordinates where the way from a point to a light sample crosses a plane.
+fn crossing_uv(plane: &ScenePlane, p: &Vector3<f64>, sample: &LightSample) -> Option<[f64; 2]> {
+    let way = sample.at.xyz() - p * sample.at.w;
+    let s = plane.normal.dot(&(plane.center - p)) / plane.normal.dot(&way);
+    let uv = plane.texture_coordinates(&(p + way * s));
+    let end = if sample.at.w > 0.0 {
         1.0
     } else {
         f64::INFINITY
@@ -249,52 +254,85 @@ fn crossing(sheet: &Sheet, p: &Vector3<f64>, source: &Source) -> Option<[f64; 2]
     (s > 0.0 && s < end && uv.iter().all(|c| (0.0..=1.0).contains(c))).then_some(uv)
 }
 
-impl Facing<'_> {
+impl<'a> ReferenceCard<'a> {
+    fn new(
+        card: &'a Card,
+        plane: ScenePlane,
+        view: &CameraView,
+        (shot, options): (&Shot, &RenderOptions),
+    ) -> Self {
+        let projected = ProjectedPlane::new(&plane, view);
+        let normal = projected.as_ref().map(|projected| projected.normal);
+        Self {
+            card,
+            plane,
+            projected,
+            lights: normal.map_or(Vec::new(), |n| LightSamples::plain(shot, options, &n)),
+        }
+    }
+
+    fn is_film(&self) -> bool {
+        self.card.texture.is_film() || self.card.back.as_ref().is_some_and(Texture::is_film)
+    }
+
+    /// Depth of its plane at a picture position; as far as can be where it is behind the camera.
+    fn depth_at(&self, x: f64, y: f64) -> Option<f64> {
+        let projected = self.projected.as_ref()?;
+        let w = projected.w.dot(&Vector3::new(x, y, 1.0));
+        Some(if w > 0.0 {
+            projected.height / w
+        } else {
+            f64::from(f32::MAX)
+        })
+    }
+
     fn texel(&self, uv: [f64; 2], from: &Vector3<f64>) -> Film {
-        texel(self.card, &self.sheet, uv, from)
+        card_texel(self.card, &self.plane, uv, from)
     }
 }
 
-/// What a card shows to whoever looks at it from a point: full detail, what lies outside counts as nothing.
-pub(super) fn texel(card: &Card, sheet: &Sheet, [u, v]: [f64; 2], from: &Vector3<f64>) -> Film {
-    let from_behind = sheet.normal.dot(&(from - sheet.center)) < 0.0;
-    let (texture, u) = match &card.back {
-        Some(back) if from_behind => (back, 1.0 - u),
-        _ => (&card.texture, u),
-    };
-    let (width, height) = texture.size();
-    let (x, y) = (u * width as f64, v * height as f64);
-    let film = match texture {
-        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y).into(),
-        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y),
+/// What a card shows seen from a point: full detail, nothing outside of its texture.
+pub(super) fn card_texel(
+    card: &Card,
+    plane: &ScenePlane,
+    [u, v]: [f64; 2],
+    from: &Vector3<f64>,
+) -> Film {
+    let from_behind = plane.normal.dot(&(from - plane.center)) < 0.0;
+    let film = match &card.back {
+        Some(back) if from_behind => texture_at(back, 1.0 - u, v),
+        _ => texture_at(&card.texture, u, v),
     };
     let grade = &card.grade;
-    let color = crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value);
     Film {
-        color,
+        color: crate::color::shift_hsv(film.color, grade.hue_deg, grade.saturation, grade.value),
         opacity: graded_opacity(film.opacity, grade),
+    }
+}
+
+fn texture_at(texture: &Texture, u: f64, v: f64) -> Film {
+    let (width, height) = texture.size();
+    let (x, y) = (u * width as f64, v * height as f64);
+    match texture {
+        Texture::Rgba(pyramid) => sample_bilinear(pyramid.base(), x, y).into(),
+        Texture::Film(pyramid) => sample_bilinear(pyramid.base(), x, y),
     }
 }
 
 /// A ratio of averages, per channel; 1 where there is nothing to average.
 #[derive(Default)]
-struct Ratio {
+struct ShadowRatio {
     open: LinearRgb,
     shadowed: LinearRgb,
     outside: LinearRgb,
     weight: LinearRgb,
 }
 
-impl Ratio {
-    fn value(&self) -> LinearRgb {
-        let of = |c: LinearRgb| <[f32; 3]>::from(c);
-        let (shadowed, open, outside, weight) = (
-            of(self.shadowed),
-            of(self.open),
-            of(self.outside),
-            of(self.weight),
-        );
-        let channel = |c: usize| {
+impl ShadowRatio {
+    fn ratio(&self) -> LinearRgb {
+        let [shadowed, open, outside, weight] =
+            [self.shadowed, self.open, self.outside, self.weight].map(<[f32; 3]>::from);
+        let [r, g, b] = [0, 1, 2].map(|c: usize| {
             let share = if weight[c] > 0.0 {
                 1.0 - outside[c] / weight[c]
             } else {
@@ -306,7 +344,7 @@ impl Ratio {
             } else {
                 1.0
             }
-        };
-        LinearRgb::new(channel(0), channel(1), channel(2))
+        });
+        LinearRgb::new(r, g, b)
     }
 }

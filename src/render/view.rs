@@ -1,19 +1,21 @@
-//! Cards and the surface as the eye sees them: every map is a row of three numbers times `(x, y, 1)`.
+//! Cards and the surface as the camera sees them: every map is a row of three numbers times `(x, y, 1)`.
 
 use crate::camera::Camera;
 use crate::geom::Vector3;
+use crate::render::ranges::integer_range;
 use crate::scene::{Card, Shot};
 use nalgebra::Matrix3;
+use std::ops::Range;
 
-/// Areas below this (square metres) and angles below this (sine) are nothing to look at.
-const VANISHING: f64 = 1e-12;
+/// Areas (square metres), distances (metres) and sines below this count as zero.
+const GEOMETRY_EPSILON: f64 = 1e-12;
 
 /// Depth beyond which a plane is its horizon, metres: keeps points finite where a plane is seen past its own edge.
-pub(super) const HORIZON: f64 = 1e6;
+pub(super) const HORIZON_M: f64 = 1e6;
 
 /// A card or the surface as a plane in the world.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sheet {
+pub(super) struct ScenePlane {
     /// Centre.
     pub(super) center: Vector3<f64>,
     /// Unit vector along texture columns.
@@ -26,13 +28,13 @@ pub(super) struct Sheet {
     pub(super) size: [f64; 2],
 }
 
-impl Sheet {
+impl ScenePlane {
     /// A card's plane; none for a card without area or place.
-    pub(super) fn of(card: &Card) -> Option<Self> {
+    pub(super) fn from_card(card: &Card) -> Option<Self> {
         let pose = &card.quad.world_from_card;
         let [w, h] = card.quad.size;
         let center = pose.translation.vector;
-        let solid = w > 0.0 && h > 0.0 && w * h > VANISHING && (w * h).is_finite();
+        let solid = w > 0.0 && h > 0.0 && w * h > GEOMETRY_EPSILON && (w * h).is_finite();
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
         let placed = axes
             .iter()
@@ -48,7 +50,7 @@ impl Sheet {
     }
 
     /// The plane `z = 0` as far as it receives shadows.
-    pub(super) fn surface(size: [f64; 2]) -> Self {
+    pub(super) fn shadow_catcher(size: [f64; 2]) -> Self {
         Self {
             center: Vector3::zeros(),
             x: Vector3::x(),
@@ -58,13 +60,21 @@ impl Sheet {
         }
     }
 
-    /// The same sheet, reaching further out on each side by shares of its size.
-    pub(super) fn grown(&self, reach: [f64; 2]) -> Self {
-        let grow = |k: usize| self.size[k] * (1.0 + 2.0 * reach[k]);
+    /// The same plane, reaching further out on each side by shares of its size.
+    pub(super) fn grown_by(&self, reach: [f64; 2]) -> Self {
         Self {
-            size: [grow(0), grow(1)],
+            size: [0, 1].map(|k| self.size[k] * (1.0 + 2.0 * reach[k])),
             ..*self
         }
+    }
+
+    /// Texture coordinates, right and down, of a point of the plane.
+    pub(super) fn texture_coordinates(&self, point: &Vector3<f64>) -> [f64; 2] {
+        let local = point - self.center;
+        [
+            local.dot(&self.x) / self.size[0] + 0.5,
+            0.5 - local.dot(&self.y) / self.size[1],
+        ]
     }
 
     /// The four corners, in turn.
@@ -79,9 +89,9 @@ impl Sheet {
     }
 }
 
-/// The camera as linear algebra.
+/// The camera as linear maps.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct CameraView {
     /// Centre of projection.
     pub(super) eye: Vector3<f64>,
     /// Ray direction from `(x, y, 1)`; its parameter is the depth.
@@ -92,20 +102,8 @@ pub(super) struct View {
     pub(super) height: usize,
 }
 
-impl View {
-    pub(super) fn of(camera: &Camera) -> Self {
-        let (f, c) = (camera.focal_px, camera.principal_px);
-        let from_px = Matrix3::new(
-            1.0 / f.x,
-            0.0,
-            -c.x / f.x,
-            0.0,
-            1.0 / f.y,
-            -c.y / f.y,
-            0.0,
-            0.0,
-            1.0,
-        );
+impl CameraView {
+    pub(super) fn from_camera(camera: &Camera) -> Self {
         let rotation = camera
             .camera_from_world
             .rotation
@@ -113,14 +111,19 @@ impl View {
             .to_rotation_matrix();
         Self {
             eye: camera.center().coords,
-            ray: rotation.matrix() * from_px,
+            ray: rotation.matrix() * ray_from_pixel(camera),
             width: camera.image[0] as usize,
             height: camera.image[1] as usize,
         }
     }
 
+    /// The world point at a depth behind a picture position.
+    pub(super) fn point_at(&self, x: f64, y: f64, depth: f64) -> Vector3<f64> {
+        self.eye + self.ray * Vector3::new(x, y, 1.0) * depth
+    }
+
     /// Picture positions `(x, y, 1)` of world points; none where one of them is at or behind the eye.
-    pub(super) fn project<const N: usize>(
+    pub(super) fn project_points<const N: usize>(
         &self,
         world: &[Vector3<f64>; N],
     ) -> Option<[Vector3<f64>; N]> {
@@ -128,21 +131,67 @@ impl View {
         let seen = world.map(|point| picture_from_world * (point - self.eye));
         let in_front = seen
             .iter()
-            .all(|p| p.z > VANISHING && p.iter().all(|c| c.is_finite()));
+            .all(|p| p.z > GEOMETRY_EPSILON && p.iter().all(|c| c.is_finite()));
         in_front.then(|| seen.map(|p| p / p.z))
+    }
+
+    /// All rows and columns.
+    pub(super) fn whole_area(&self) -> LatticeArea {
+        (0..self.height, 0..self.width)
+    }
+
+    /// Rows and columns of projected points, one more on each side; all where one of the points is not in front.
+    pub(super) fn area_around(&self, points: &[Vector3<f64>; 4]) -> LatticeArea {
+        let Some(px) = self.project_points(points) else {
+            return self.whole_area();
+        };
+        let [columns, rows] = [(0, self.width), (1, self.height)].map(|(axis, count)| {
+            let low = px.iter().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
+            let high = px.iter().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
+            integer_range(low - 2.0, high + 2.0, &(0..count))
+        });
+        (rows, columns)
     }
 }
 
-/// How a sheet lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and `v.p / w.p`.
+/// Rows and columns of the lattice, or pixels of a picture.
+pub(super) type LatticeArea = (Range<usize>, Range<usize>);
+
+/// Rows and columns that a plane is seen in, grown by shares of its size; one more on each side.
+pub(super) fn rows_and_columns(
+    plane: &ScenePlane,
+    reach: [f64; 2],
+    view: &CameraView,
+) -> LatticeArea {
+    view.area_around(&plane.grown_by(reach).corners())
+}
+
+/// The camera's own ray direction from `(x, y, 1)`, its depth 1.
+fn ray_from_pixel(camera: &Camera) -> Matrix3<f64> {
+    let (f, c) = (camera.focal_px, camera.principal_px);
+    Matrix3::new(
+        1.0 / f.x,
+        0.0,
+        -c.x / f.x,
+        0.0,
+        1.0 / f.y,
+        -c.y / f.y,
+        0.0,
+        0.0,
+        1.0,
+    )
+}
+
+/// How a plane lies in the picture: with `p = (x, y, 1)`, texture coordinates are `u.p / w.p` and `v.p / w.p`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
+pub(super) struct ProjectedPlane {
     /// Numerator of the texture coordinate to the right, 0 to 1.
     pub(super) u: Vector3<f64>,
     /// Numerator of the texture coordinate downwards, 0 to 1.
     pub(super) v: Vector3<f64>,
-    /// Denominator; positive where the sheet is in front of the eye.
+    /// Denominator; positive where the plane is in front of the eye.
     pub(super) w: Vector3<f64>,
-    /// Depth times `w.p`: the distance of the eye from the sheet's plane.
+    /// Depth times `w.p`: the distance of the eye from the plane's plane.
     pub(super) height: f64,
     /// The world point is `point * p / w.p`.
     pub(super) point: Matrix3<f64>,
@@ -150,19 +199,19 @@ pub(super) struct Seen {
     pub(super) normal: Vector3<f64>,
 }
 
-impl Seen {
-    /// None for a sheet seen edge-on.
-    pub(super) fn of(sheet: &Sheet, view: &View) -> Option<Self> {
-        let above = sheet.normal.dot(&(view.eye - sheet.center));
+impl ProjectedPlane {
+    /// None for a plane seen edge-on.
+    pub(super) fn new(plane: &ScenePlane, view: &CameraView) -> Option<Self> {
+        let above = plane.normal.dot(&(view.eye - plane.center));
         let (normal, height) = if above >= 0.0 {
-            (sheet.normal, above)
+            (plane.normal, above)
         } else {
-            (-sheet.normal, -above)
+            (-plane.normal, -above)
         };
         let w = -(view.ray.transpose() * normal);
         let point = view.eye * w.transpose() + view.ray * height;
-        let [u, v] = texture_rows(sheet, &point, &w);
-        (height > VANISHING).then_some(Self {
+        let [u, v] = texture_rows(plane, &point, &w);
+        (height > GEOMETRY_EPSILON).then_some(Self {
             u,
             v,
             w,
@@ -172,19 +221,19 @@ impl Seen {
         })
     }
 
-    /// Side of the square that a pixel (or lattice cell) covers on the sheet's plane, metres, where it shows `target`; in
+    /// Side of the square that a pixel (or lattice cell) covers on the plane's plane, metres, where it shows `target`; in
     /// the middle of the picture where that is behind the eye.
-    pub(super) fn cell_metres(&self, view: &View, target: &Vector3<f64>) -> f64 {
+    pub(super) fn cell_metres(&self, view: &CameraView, target: &Vector3<f64>) -> f64 {
         let middle = Vector3::new(0.5 * view.width as f64, 0.5 * view.height as f64, 1.0);
-        let p = view.project(&[*target]).map_or(middle, |[p]| p);
-        let w = self.w.dot(&p).max(self.height / HORIZON);
+        let p = view.project_points(&[*target]).map_or(middle, |[p]| p);
+        let w = self.w.dot(&p).max(self.height / HORIZON_M);
         let point = self.point * p / w;
         let along = |k: usize| (self.point.column(k) - point * self.w[k]) / w;
         along(0).cross(&along(1)).norm().sqrt()
     }
 
-    /// Texture coordinates and depth at a pixel position; none outside the sheet or behind the eye.
-    pub(super) fn hit(&self, x: f64, y: f64) -> Option<([f64; 2], f64)> {
+    /// Texture coordinates and depth at a pixel position; none outside the plane or behind the eye.
+    pub(super) fn intersect_px(&self, x: f64, y: f64) -> Option<([f64; 2], f64)> {
         let p = Vector3::new(x, y, 1.0);
         let w = self.w.dot(&p);
         let uv = [self.u.dot(&p) / w, self.v.dot(&p) / w];
@@ -193,30 +242,30 @@ impl Seen {
     }
 }
 
-/// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a sheet's plane.
+/// Rows of the texture coordinates' numerators, for points `point * p / w.p` of a plane's plane.
 pub(super) fn texture_rows(
-    sheet: &Sheet,
+    plane: &ScenePlane,
     point: &Matrix3<f64>,
     w: &Vector3<f64>,
 ) -> [Vector3<f64>; 2] {
-    let along = |axis: &Vector3<f64>| point.transpose() * axis - w * axis.dot(&sheet.center);
-    let [a, b] = sheet.size;
+    let along = |axis: &Vector3<f64>| point.transpose() * axis - w * axis.dot(&plane.center);
+    let [a, b] = plane.size;
     if a.is_finite() && b.is_finite() {
-        [along(&sheet.x) / a + w * 0.5, w * 0.5 - along(&sheet.y) / b]
+        [along(&plane.x) / a + w * 0.5, w * 0.5 - along(&plane.y) / b]
     } else {
-        // An endless sheet has no edges: everything is its middle.
+        // An endless plane has no edges: everything is its middle.
         [w * 0.5, w * 0.5]
     }
 }
 
-/// The cards of a shot that are there at all, in the order of their ids.
-pub(super) fn sheets(shot: &Shot) -> Vec<(&Card, Sheet)> {
+/// The cards of a shot that have an area, a place and texels, with their planes, in the order of their ids.
+pub(super) fn visible_planes(shot: &Shot) -> Vec<(&Card, ScenePlane)> {
     let there = shot.cards.iter().filter(|card| !card.texture.is_empty());
-    let mut sheets: Vec<_> = there
-        .filter_map(|card| Some((card, Sheet::of(card)?)))
+    let mut planes: Vec<_> = there
+        .filter_map(|card| Some((card, ScenePlane::from_card(card)?)))
         .collect();
-    sheets.sort_by_key(|(card, _)| card.id);
-    sheets
+    planes.sort_by_key(|(card, _)| card.id);
+    planes
 }
 
 #[cfg(test)]
@@ -245,16 +294,16 @@ mod tests {
                 size: [0.3, 0.2],
             };
             let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|a| rotation * a);
-            let sheet = Sheet {
+            let sheet = ScenePlane {
                 center: Vector3::new(0.1, 0.0, 0.1),
                 x: axes[0],
                 y: axes[1],
                 normal: axes[2],
                 size: quad.size,
             };
-            let seen = Seen::of(&sheet, &View::of(&camera)).unwrap();
+            let seen = ProjectedPlane::new(&sheet, &CameraView::from_camera(&camera)).unwrap();
             let (px, depth) = camera.project(quad.point(0.3, 0.8)).unwrap();
-            let ([u, v], t) = seen.hit(px.x, px.y).unwrap();
+            let ([u, v], t) = seen.intersect_px(px.x, px.y).unwrap();
             assert!(
                 (u - 0.3).abs() < 1e-12 && (v - 0.8).abs() < 1e-12 && (t - depth).abs() < 1e-12
             );

@@ -10,7 +10,7 @@ use crate::scene::bounds::{
     PIXEL, PLACE, RADIANCE, SHARE, TURN,
 };
 use crate::scene::hull::turn;
-use crate::scene::{AreaLight, CameraSource, Cast, Exposure, Object, Placement, Scene};
+use crate::scene::{AreaLight, CameraSource, Exposure, LightTint, Object, Placement, Scene};
 use std::fmt::{Debug, Display};
 
 /// How far the norm of a quaternion may be from 1: what six written decimals leave.
@@ -109,10 +109,10 @@ fn check_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
     ))
 }
 
-pub(super) fn check_cast(cast: &Cast) -> Result<()> {
+pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     match *cast {
-        Cast::Known(color) => check_color(color, "cast.known"),
-        Cast::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
+        LightTint::Known(color) => check_color(color, "cast.known"),
+        LightTint::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
     }
 }
 

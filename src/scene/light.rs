@@ -63,7 +63,7 @@ pub enum Exposure {
 /// Colour that all lights and the constant environment are multiplied with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Cast {
+pub enum LightTint {
     /// This one.
     Known(LinearRgb),
     /// Found by the `light` stage: that of the surface in the plate, to the power of `share`.
@@ -73,13 +73,13 @@ pub enum Cast {
     },
 }
 
-impl Default for Cast {
+impl Default for LightTint {
     fn default() -> Self {
         Self::Known(LinearRgb::WHITE)
     }
 }
 
-impl Cast {
+impl LightTint {
     /// Nothing is changed.
     pub fn is_white(&self) -> bool {
         *self == Self::default()

@@ -32,7 +32,7 @@ pub use fall::{SettleMode, SettleOptions};
 #[cfg(feature = "settle")]
 pub(crate) use fall::{half_extent, level};
 pub use finish::{Finish, FinishRanges, Noise, white_balance};
-pub use light::{AreaLight, Cast, Exposure, LightShape};
+pub use light::{AreaLight, Exposure, LightShape, LightTint};
 pub use limit::Limit;
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
@@ -77,8 +77,8 @@ pub struct Scene {
     #[serde(default)]
     pub exposure: Exposure,
     /// Colour of the light, on top of that of lights and `ambient`; pictures of the surroundings bring their own.
-    #[serde(default, skip_serializing_if = "Cast::is_white")]
-    pub cast: Cast,
+    #[serde(default, skip_serializing_if = "LightTint::is_white")]
+    pub cast: LightTint,
     /// What happens to the finished frame.
     #[serde(default, skip_serializing_if = "Finish::is_nothing")]
     pub finish: Finish,
@@ -93,7 +93,7 @@ impl Scene {
             ambient: LinearRgb::BLACK,
             environment: None,
             exposure: Exposure::Ev(0.0),
-            cast: Cast::default(),
+            cast: LightTint::default(),
             finish: Finish::default(),
             ..self
         }

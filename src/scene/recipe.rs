@@ -11,8 +11,8 @@ use crate::scene::bounds::{
 use crate::scene::check::{check_cast, check_count, check_image};
 use crate::scene::stack::{Column, Start, too_large};
 use crate::scene::{
-    AreaLight, CameraSource, Cast, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure,
-    FinishRanges, Grade, LightShape, Limit, Object, Range, Scene, SettleOptions, Source, Surface,
+    AreaLight, CameraSource, DrawLog, Drawn, Draws, EnvironmentRanges, Exposure, FinishRanges,
+    Grade, LightShape, LightTint, Limit, Object, Range, Scene, SettleOptions, Source, Surface,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -63,7 +63,7 @@ pub struct Recipe {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface_albedo: Option<f64>,
     /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
-    pub cast: Cast,
+    pub cast: LightTint,
     /// What happens to the finished frame. Default: nothing.
     pub finish: FinishRanges,
     /// How objects come to rest.
@@ -207,7 +207,7 @@ impl Default for Recipe {
             restitution: Range::fixed(0.0),
             collider: Collider::Box,
             surface_albedo: None,
-            cast: Cast::default(),
+            cast: LightTint::default(),
             finish: FinishRanges::default(),
             settle: SettleOptions::default(),
         }

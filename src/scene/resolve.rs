@@ -7,8 +7,8 @@ use crate::geom::{Point2, Pose, Quad};
 use crate::image::Image;
 use crate::pixel::{LinearRgb, ObjectId};
 use crate::scene::{
-    AreaLight, CameraSource, Card, Cast, EnvironmentMap, Exposure, Noise, Object, Placement, Scene,
-    Shot,
+    AreaLight, CameraSource, Card, EnvironmentMap, Exposure, LightTint, Noise, Object, Placement,
+    Scene, Shot,
 };
 use std::sync::Arc;
 
@@ -147,8 +147,8 @@ impl Scene {
             ));
         }
         match self.cast {
-            Cast::Known(color) => Ok(color),
-            Cast::MatchSurface { .. } => Err(Error::value(
+            LightTint::Known(color) => Ok(color),
+            LightTint::MatchSurface { .. } => Err(Error::value(
                 "cast",
                 "still to be matched to the plate; light it first",
             )),
@@ -279,7 +279,7 @@ mod tests {
             told,
             "exposure: still to be matched to the plate; light it first"
         );
-        let told = complaint(|s| s.cast = Cast::MatchSurface { share: 1.0 });
+        let told = complaint(|s| s.cast = LightTint::MatchSurface { share: 1.0 });
         assert_eq!(
             told,
             "cast: still to be matched to the plate; light it first"

@@ -53,6 +53,22 @@ pub struct Card {
     pub grade: Grade,
 }
 
+impl Card {
+    /// A card of class 0 with its whole texture as the outline, in its own colours.
+    pub fn new(id: ObjectId, quad: Quad, texture: impl Into<Texture>) -> Self {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        Self {
+            id,
+            class: 0,
+            quad,
+            texture: texture.into(),
+            back: None,
+            outline_uv: corners.map(Point2::from).into(),
+            grade: Grade::default(),
+        }
+    }
+}
+
 impl Shot {
     /// An empty shot: no plate, no card, no light, black ambient.
     pub fn new(camera: Camera) -> Self {

@@ -1,6 +1,6 @@
 //! What a library of assets offers to recipes and to shots.
 
-use crate::asset::{Asset, Library};
+use crate::asset::{Asset, Library, Photo};
 use crate::scene::hull::prism;
 use crate::scene::{Choice, Look, Object};
 
@@ -9,15 +9,15 @@ pub fn stock(library: &Library) -> Vec<Choice> {
     library.assets.iter().map(Choice::from).collect()
 }
 
-impl From<&Asset> for Choice {
-    fn from(asset: &Asset) -> Self {
+impl From<&Asset<Photo>> for Choice {
+    fn from(asset: &Asset<Photo>) -> Self {
         Self {
             asset: asset.name.clone(),
-            photo_sizes: asset.photos.iter().map(|photo| photo.size).collect(),
+            photo_sizes: asset.photos.iter().map(Photo::size).collect(),
             photo_outlines: asset
                 .photos
                 .iter()
-                .map(|photo| prism(&photo.outline_uv, photo.size))
+                .map(|photo| prism(&photo.outline_uv, photo.size()))
                 .collect(),
             thickness: asset.thickness,
             mass: asset.mass,
@@ -35,7 +35,7 @@ impl Look {
             None => None,
         };
         Some(Self {
-            class: asset.class,
+            class: library.class_number(asset),
             texture: photo.texture.clone(),
             back,
             outline_uv: photo.outline_uv.clone(),

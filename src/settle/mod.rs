@@ -701,6 +701,7 @@ mod tests {
     }
 
     /// Counted as if all of it lay where it lands.
+    #[cfg(feature = "counters")]
     #[test]
     fn settings_without_an_end_are_refused_before_a_step_is_made() {
         let little = SettleOptions {
@@ -718,6 +719,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "counters")]
     #[test]
     fn settings_without_an_end_end_with_the_work_of_one_picture() {
         let told = || settle(dropped(0, 5), &endless()).unwrap_err().to_string();

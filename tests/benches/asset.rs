@@ -3,7 +3,8 @@
 //! `petcomp asset add -vv PHOTO ... -j 1` tells which stage takes how much of it.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use petcomp::asset::{AddPhoto, Library, Scale, add_photo, contact_sheet};
+use petcomp::asset::{Library, PhotoEntry, Scale, add_photo, contact_sheet};
+use petcomp::matte::CutOutOptions;
 use petcomp::{Image, LinearRgb, io};
 use std::path::Path;
 
@@ -30,12 +31,9 @@ fn photo() -> Image<LinearRgb> {
 }
 
 fn add(photo: &Path, folder: &Path) -> petcomp::Result<Image<petcomp::Srgb8>> {
-    let added = add_photo(
-        folder,
-        photo,
-        &AddPhoto::new("bottle", "cap_label", Scale::Length(0.25)),
-    )?;
-    Ok(contact_sheet(&Library::open_with(folder, &[added])?))
+    let entry = PhotoEntry::new(photo, "bottle", "cap_label", Scale::Length(0.25));
+    let added = add_photo(folder, &entry, &[], &CutOutOptions::default())?;
+    Ok(contact_sheet(&Library::open_with(folder, vec![added])?))
 }
 
 fn asset(c: &mut Criterion) {

@@ -62,7 +62,7 @@ fn all_stages(profile: Profile) -> KeyOptions {
         blur_post: 4,
         dilate_distance: 3,
         feather_distance: 8,
-        ..KeyOptions::of(profile)
+        ..KeyOptions::for_profile(profile)
     }
 }
 

@@ -5,9 +5,27 @@
 //! share of pixels that the case states.
 
 use crate::case::Case;
-use petcomp::render::{Preset, RenderOptions, cast, check};
+use petcomp::Quality;
+use petcomp::render::{RenderOptions, check, render};
 use petcomp::scene::cycles;
 use petcomp::{Image, LinearRgb, PremulRgba, Shot, composite, io};
+
+/// Between the default and a reference.
+const GOOD: RenderOptions = RenderOptions {
+    subsamples: 2,
+    light_samples: 4,
+    ambient_samples: 64,
+    cell_px: 1.0,
+};
+
+/// The numbers that a case means by a word: a quality, or `good`.
+fn sampling(name: &str) -> Result<RenderOptions, String> {
+    if name == "good" {
+        return Ok(GOOD);
+    }
+    let quality: Quality = name.parse().map_err(|e| format!("limits: {e}"))?;
+    Ok(quality.into())
+}
 
 /// Renders a case and compares it with its reference.
 pub(crate) fn run(case: &Case) -> Result<(), String> {
@@ -24,17 +42,14 @@ pub(crate) fn run(case: &Case) -> Result<(), String> {
         let limit = limit
             .as_float()
             .ok_or_else(|| format!("limits.{name}: expected a number"))?;
-        let options = name
-            .parse::<Preset>()
-            .map_err(|e| format!("limits: {e}"))?
-            .options();
-        judge(case, name, &render(&shot, &options), &reference, limit)?;
+        let options = sampling(name)?;
+        judge(case, name, &picture_of(&shot, &options), &reference, limit)?;
     }
     Ok(())
 }
 
-fn render(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
-    composite::frame(&cast(shot, options), shot.plate.as_deref())
+fn picture_of(shot: &Shot, options: &RenderOptions) -> Image<PremulRgba> {
+    composite::frame(&render(shot, options), shot.plate.as_deref())
 }
 
 fn judge(

@@ -2,7 +2,8 @@
 
 use crate::common::{Common, NeedsReview};
 use crate::print;
-use petcomp::asset::{self, AddPhoto, Library, Manifest, Photo, Scale, ScreenSource};
+use petcomp::asset::{self, Library, Manifest, PhotoEntry, Scale, ScreenSource};
+use petcomp::matte::CutOutOptions;
 use petcomp::{Quality, io};
 use std::path::{Path, PathBuf};
 
@@ -130,7 +131,7 @@ fn corners(text: &str) -> Result<[[f64; 2]; 4], String> {
 
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
-        Command::Build { list, output } => build(list, output, common),
+        Command::Build { list, output } => build(list, output, common).map(|_| ()),
         Command::Add(args) => add(args, common),
         Command::List { folder } => list(folder),
         Command::Check { folder, strict } => check(folder, *strict),
@@ -177,13 +178,14 @@ fn check(folder: &Path, strict: bool) -> anyhow::Result<()> {
     }
 }
 
-/// Cuts out all photos of a list, showing progress.
-pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Result<()> {
+/// Cuts out all photos of a list, showing progress; returns all that the folder holds.
+pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Result<Library> {
     let progress = common.progress("cut-outs");
     let built = asset::build(list, folder, &|done, total| {
         progress.at(done as u64, total as u64)
     })?;
     drop(progress);
+    let library = built.library;
     built
         .refused
         .iter()
@@ -196,23 +198,21 @@ pub(crate) fn build(list: &Path, folder: &Path, common: &Common) -> anyhow::Resu
         "{}: {} photos, {} assets",
         folder.display(),
         built.photos,
-        built.assets
+        library.assets.len()
     ));
     let (lengths, errors) = spread(&built.lengths);
     common.say(format_args!(
         "objects are {lengths} mm long, to {errors} mm; `petcomp asset list` shows each"
     ));
-    tell_classes(&built.classes, "`classes = [...]` in the list", common);
-    sheet(folder, &[], common)
+    show_classes(&library.classes, "`classes = [...]` in the list", common);
+    write_sheet(folder, &library, common)?;
+    Ok(library)
 }
 
-/// Writes the contact sheet of a folder; what was just added need not be read.
-fn sheet(folder: &Path, added: &[Photo], common: &Common) -> anyhow::Result<()> {
+/// Writes the contact sheet of a folder.
+fn write_sheet(folder: &Path, library: &Library, common: &Common) -> anyhow::Result<()> {
     let path = folder.join(SHEET);
-    io::write(
-        &path,
-        &asset::contact_sheet(&Library::open_with(folder, added)?),
-    )?;
+    io::write(&path, &asset::contact_sheet(library))?;
     common.say(format_args!("look at {}", path.display()));
     Ok(())
 }
@@ -228,19 +228,15 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
         .name
         .clone()
         .unwrap_or_else(|| first.to_string_lossy().into_owned());
-    let add = AddPhoto {
-        screen: args.screen.clone(),
-        thickness: args.thickness,
-        ..AddPhoto::new(name, &args.class, scale)
-    };
-    let add = AddPhoto {
-        options: args.quality.cut_out(add.options),
-        classes: args.classes.clone(),
-        ..add
-    };
+    let options = args.quality.cut_out(CutOutOptions::default());
     let mut added = Vec::new();
     for photo in &args.photos {
-        let photo = asset::add_photo(&args.output, photo, &add)?;
+        let entry = PhotoEntry {
+            screen: args.screen.clone(),
+            thickness: args.thickness,
+            ..PhotoEntry::new(photo, &name, &args.class, scale)
+        };
+        let photo = asset::add_photo(&args.output, &entry, &args.classes, &options)?;
         let record = &photo.record;
         let ([length, width], error) = (record.object_m.map(|m| m * 1e3), record.error_m * 1e3);
         common.say(format_args!(
@@ -253,8 +249,9 @@ fn add(args: &Add, common: &Common) -> anyhow::Result<()> {
             .for_each(|diagnostic| common.say(format_args!("{}: {diagnostic}", record.file)));
         added.push(photo);
     }
-    tell_classes(&Manifest::read(&args.output)?.classes, "--classes", common);
-    sheet(&args.output, &added, common)
+    let library = Library::open_with(&args.output, added)?;
+    show_classes(&library.classes, "--classes", common);
+    write_sheet(&args.output, &library, common)
 }
 
 /// Smallest and largest of lengths, and the same of their errors, millimetres.
@@ -272,8 +269,8 @@ fn spread(lengths: &[[f64; 2]]) -> (String, String) {
     )
 }
 
-/// Says which number each class has, and what says it otherwise.
-fn tell_classes(classes: &[String], how: &str, common: &Common) {
+/// Shows which number each class has, and how to change that.
+fn show_classes(classes: &[String], how: &str, common: &Common) {
     let numbered = classes
         .iter()
         .enumerate()

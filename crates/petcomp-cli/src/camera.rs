@@ -2,7 +2,9 @@
 
 use crate::common::{Batch, Common};
 use crate::print;
-use petcomp::camera::{self, CameraFile, ColmapModel, Label, Labelled, Solution, SolveOptions};
+use petcomp::camera::{
+    self, CameraFile, ColmapModel, Label, LabelledPhoto, Solution, SolveOptions,
+};
 use petcomp::filter::Pyramid;
 use petcomp::{Error, Image, LinearRgb, PremulRgba, io};
 use std::path::{Path, PathBuf};
@@ -195,7 +197,7 @@ fn label_beside(photo: &Path) -> PathBuf {
 
 impl LabelArgs {
     /// All labels of all files.
-    fn read(&self) -> anyhow::Result<Vec<Labelled>> {
+    fn read(&self) -> anyhow::Result<Vec<LabelledPhoto>> {
         let files = self
             .labels
             .iter()
@@ -204,7 +206,7 @@ impl LabelArgs {
     }
 
     /// Does something with every label; where there are several, one that cannot be used does not stop the others.
-    fn each(&self, act: impl Fn(&Labelled) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    fn each(&self, act: impl Fn(&LabelledPhoto) -> anyhow::Result<()>) -> anyhow::Result<()> {
         if let [path] = &self.labels[..]
             && let [labelled] = &camera::read_labels(path, self.size)?[..]
         {
@@ -251,8 +253,8 @@ fn joint(args: &JointArgs, common: &Common) -> anyhow::Result<()> {
         .map(|labelled| labelled.label.clone())
         .collect();
     let mut batch = Batch::default();
-    for group in camera::one_camera(&all) {
-        let members: Vec<&Labelled> = group.iter().map(|&i| &labels[i]).collect();
+    for group in camera::group_by_camera(&all) {
+        let members: Vec<&LabelledPhoto> = group.iter().map(|&i| &labels[i]).collect();
         joint_camera(&members, args.force, common, &mut batch)?;
     }
     batch.finish()
@@ -260,7 +262,7 @@ fn joint(args: &JointArgs, common: &Common) -> anyhow::Result<()> {
 
 /// Photos of one camera.
 fn joint_camera(
-    members: &[&Labelled],
+    members: &[&LabelledPhoto],
     force: bool,
     common: &Common,
     batch: &mut Batch,
@@ -268,15 +270,19 @@ fn joint_camera(
     let labels: Vec<Label> = members.iter().map(|member| member.label.clone()).collect();
     let joint = camera::solve_joint(&labels, &SolveOptions::default())
         .map_err(|e| located(e, members[0]))?;
-    for warning in &joint.warnings {
-        common.warn(named(warning, members));
+    for outlier in &joint.outliers {
+        common.warn(format_args!(
+            "{}: {}",
+            members[outlier.photo],
+            outlier.diagnostic()
+        ));
     }
     for (member, photo) in members.iter().zip(joint.photos) {
         let one = || {
             let solution = accepted(photo.map_err(|e| located(e, member))?, member, force)?;
             let mut file = CameraFile::new(&member.label, &solution);
             if let Some(from) = file.solved_from.as_mut().filter(|_| members.len() > 1) {
-                from.together = camera::together(members.iter().copied());
+                from.together = camera::label_checksums(members.iter().copied());
             }
             write(
                 &member.beside("camera.json"),
@@ -289,19 +295,6 @@ fn joint_camera(
         batch.count(one());
     }
     Ok(())
-}
-
-/// A warning about photos of one camera, with the photo's name instead of its number.
-fn named(warning: &camera::Warning, members: &[&Labelled]) -> String {
-    match warning {
-        camera::Warning::OutlierPhoto { photo, chi2 } if *photo < members.len() => {
-            format!(
-                "{}: contradicts the other photos (chi squared {chi2:.1}) and was left out",
-                members[*photo]
-            )
-        }
-        other => format!("photos of {}: {other}", members[0]),
-    }
 }
 
 fn doctor(args: &LabelArgs) -> anyhow::Result<()> {
@@ -391,7 +384,7 @@ fn rectify(args: &RectifyArgs) -> anyhow::Result<()> {
 }
 
 /// The only label of a file.
-fn only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<Labelled> {
+fn only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<LabelledPhoto> {
     let mut labels = camera::read_labels(path, size)?;
     anyhow::ensure!(
         labels.len() == 1,
@@ -402,7 +395,7 @@ fn only(path: &Path, size: Option<[f64; 2]>) -> anyhow::Result<Labelled> {
     Ok(labels.remove(0))
 }
 
-fn solved(labelled: &Labelled) -> petcomp::Result<Solution> {
+fn solved(labelled: &LabelledPhoto) -> petcomp::Result<Solution> {
     let solution = camera::solve(&labelled.label, &SolveOptions::default())
         .map_err(|e| located(e, labelled))?;
     camera::check_distance(&solution.camera).map_err(|e| e.in_file(&labelled.source))?;
@@ -410,7 +403,7 @@ fn solved(labelled: &Labelled) -> petcomp::Result<Solution> {
 }
 
 /// A solution that fits its label, or any where that is asked for.
-fn accepted(solution: Solution, labelled: &Labelled, force: bool) -> anyhow::Result<Solution> {
+fn accepted(solution: Solution, labelled: &LabelledPhoto, force: bool) -> anyhow::Result<Solution> {
     match solution.misfit() {
         Some(error) if !force => Err(Error::file(
             &labelled.source,
@@ -421,14 +414,14 @@ fn accepted(solution: Solution, labelled: &Labelled, force: bool) -> anyhow::Res
     }
 }
 
-fn located(error: camera::SolveError, labelled: &Labelled) -> Error {
+fn located(error: camera::SolveError, labelled: &LabelledPhoto) -> Error {
     Error::from(error).in_file(&labelled.source)
 }
 
 /// Writes the camera and, where the photo is there, the overlay; says what was found.
 fn write(
     target: &Path,
-    labelled: &Labelled,
+    labelled: &LabelledPhoto,
     file: &CameraFile,
     solution: &Solution,
     common: &Common,
@@ -451,7 +444,7 @@ fn write(
     Ok(())
 }
 
-fn report(labelled: &Labelled, solution: &Solution, common: &Common) {
+fn report(labelled: &LabelledPhoto, solution: &Solution, common: &Common) {
     let camera = &solution.camera;
     let (tilt, height) = (camera.tilt().to_degrees(), camera.center().z);
     let (focal, percent) = (camera.focal_px.x, 100.0 * solution.sigma.ln_focal);

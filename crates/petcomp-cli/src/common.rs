@@ -4,11 +4,12 @@ use crate::print;
 use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{DatasetConfig, Pipeline};
-use petcomp::io::{Fallback, Limits, Override, Raise, ReadOptions};
-use petcomp::printable;
+use petcomp::io::{Fallback, LimitOverride, Limits, Override, ReadOptions};
+use petcomp::{Diagnostic, Result, Severity, io, printable};
+use serde::de::DeserializeOwned;
 use std::io::{IsTerminal, Write as _};
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -33,7 +34,7 @@ pub(crate) struct Common {
     /// Let pictures and documents ask for more, or less: side=65536, pixels=512M, decoded_bytes=4G, seconds=60,
     /// document_bytes=64M, ...
     #[arg(long = "limit", value_name = "NAME=N", global = true)]
-    limits: Vec<Raise>,
+    limits: Vec<LimitOverride>,
     /// What reads pictures that petcomp's own decoders do not know
     #[arg(long, value_enum, default_value_t, global = true)]
     oiio: OpenImageIo,
@@ -177,6 +178,23 @@ impl Common {
     pub(crate) fn progress(&self, what: &'static str) -> Progress {
         Progress::new(what, self.quiet, self.progress)
     }
+}
+
+/// Logs what a stage noticed about a file: `FILE: message [code]`, a note at the level of notes.
+pub(crate) fn report_diagnostics(file: &Path, diagnostics: &[Diagnostic]) {
+    for diagnostic in diagnostics {
+        let level = match diagnostic.severity {
+            Severity::Note => log::Level::Info,
+            _ => log::Level::Warn,
+        };
+        let (file, code) = (file.display(), diagnostic.code);
+        log::log!(level, "{file}: {diagnostic} [{code}]");
+    }
+}
+
+/// Options from a TOML file, or the defaults where there is none.
+pub(crate) fn options_file<T: Default + DeserializeOwned>(file: Option<&Path>) -> Result<T> {
+    file.map_or_else(|| Ok(T::default()), io::read_toml)
 }
 
 /// A recipe file, and values in it that are to be different.

@@ -33,9 +33,9 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
     }
     io::create_folder(&args.output)?;
     let recipe = write_recipe(args)?;
-    asset::build(&list, &args.output.join("assets"), common)?;
+    let library = asset::build(&list, &args.output.join("assets"), common)?;
     let folder = args.output.join("dataset");
-    let pipeline = Pipeline::open(DatasetConfig::read(&recipe, &[])?)?;
+    let pipeline = Pipeline::with_library(DatasetConfig::read(&recipe, &[])?, library)?;
     let report = dataset::make(
         &pipeline,
         &pipeline.plan(args.count, args.seed, &folder)?,

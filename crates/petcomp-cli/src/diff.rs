@@ -3,7 +3,9 @@
 use crate::common::Common;
 use crate::print;
 use petcomp::color::linear_to_srgb;
-use petcomp::diff::{Likeness, Rows, RowsBy, Thresholds, Verdict, absolute_difference, compare};
+use petcomp::diff::{
+    Likeness, RowSource, RowsFromFn, Thresholds, Verdict, absolute_difference, compare,
+};
 use petcomp::io::{Format, Picture};
 use petcomp::{Image, LinearRgb, PremulRgba, StraightRgba, io};
 use std::ffi::OsString;
@@ -131,11 +133,11 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<ExitCode> {
 /// What the two are to the eye, over black: the second is what the first should be.
 fn likeness(a: &Picture, b: &Picture) -> Option<Likeness> {
     let light = |picture: &Picture, rows| picture.rows::<PremulRgba>(rows).map(PremulRgba::color);
-    let [a, b] = [a, b].map(|picture| RowsBy {
+    let [a, b] = [a, b].map(|picture| RowsFromFn {
         size: picture.size(),
         make: move |rows| light(picture, rows),
     });
-    Likeness::of(&a, &b)
+    Likeness::measure(&a, &b)
 }
 
 fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
@@ -143,8 +145,11 @@ fn opaque([r, g, b, _]: [f32; 4]) -> LinearRgb {
 }
 
 /// The values of a picture's rows, made into pixels.
-fn rows<P: Copy + Send>(picture: &Picture, pixel: impl Fn([f32; 4]) -> P + Sync) -> impl Rows<P> {
-    RowsBy {
+fn rows<P: Copy + Send>(
+    picture: &Picture,
+    pixel: impl Fn([f32; 4]) -> P + Sync,
+) -> impl RowSource<P> {
+    RowsFromFn {
         size: picture.size(),
         make: move |rows| stored_values(picture, rows).map(&pixel),
     }

@@ -3,7 +3,7 @@
 use crate::common::{Common, RecipeArgs};
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
-use petcomp::io::exr_parts::write_parts;
+use petcomp::io::exr::write_parts;
 use petcomp::{Image, LinearRgb, PremulRgba, Quality, Scene, io};
 use std::path::{Path, PathBuf};
 

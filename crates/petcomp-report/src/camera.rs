@@ -12,7 +12,7 @@ pub use diagram::diagrams;
 use super::clock::cpu_seconds;
 use petcomp::camera::distorted;
 use petcomp::camera::simulate::{Scenario, View};
-use petcomp::camera::{self, Effort, Priors, Solution, SolveOptions};
+use petcomp::camera::{self, Priors, Solution, SolveOptions};
 use petcomp::geom::Point3;
 use petcomp::plot::{Axis, Chart, Curve};
 use petcomp::{Error, Result, io};
@@ -145,14 +145,13 @@ impl Method {
     }
 
     fn options(self, lens: Lens) -> SolveOptions {
-        let effort = if let Self::Steps(n) = self {
-            Effort::Steps(n)
-        } else {
-            Effort::Whole
+        let max_iterations = match self {
+            Self::Steps(limit) => Some(limit),
+            Self::Whole | Self::Joint => None,
         };
         SolveOptions {
             priors: lens.priors(self),
-            effort,
+            max_iterations,
             ..Default::default()
         }
     }

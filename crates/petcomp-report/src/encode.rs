@@ -8,9 +8,9 @@ use super::pile::pile;
 use super::{Diagram, Point};
 use petcomp::Image;
 use petcomp::Quality;
-use petcomp::io::{self, Bits, Compression, PngEffort, WriteOptions};
+use petcomp::io::{self, Bits, Compression, WriteOptions};
 use petcomp::plot::three;
-use petcomp::render::cast;
+use petcomp::render::render;
 use petcomp::{Error, Result};
 use petcomp::{LinearRgb, PremulRgba};
 use petcomp::{Shot, composite};
@@ -134,7 +134,7 @@ fn ways() -> Vec<Way> {
         extension: "png",
         options: WriteOptions {
             bits: Some(bits),
-            png: effort,
+            png_effort: effort,
             ..WriteOptions::default()
         },
     };
@@ -148,11 +148,10 @@ fn ways() -> Vec<Way> {
         },
     });
     let mut all = vec![
-        png(PNG, "least", Bits::Eight, PngEffort::Least),
-        png(PNG, "fast", Bits::Eight, PngEffort::Fast),
-        png(PNG, "usual", Bits::Eight, PngEffort::Usual),
-        png(PNG, "most", Bits::Eight, PngEffort::Most),
-        png("PNG, 16 bits", "fast", Bits::Sixteen, PngEffort::Fast),
+        png(PNG, "draft", Bits::Eight, Quality::Draft),
+        png(PNG, "normal", Bits::Eight, Quality::Normal),
+        png(PNG, "reference", Bits::Eight, Quality::Reference),
+        png("PNG, 16 bits", "normal", Bits::Sixteen, Quality::Normal),
         exr(HALF, "uncompressed", Bits::Half, Compression::None),
         exr(HALF, "PIZ", Bits::Half, Compression::Piz),
         exr(HALF, "ZIP", Bits::Half, Compression::Zip),
@@ -221,7 +220,7 @@ fn picture() -> Image<LinearRgb> {
         .iter_mut()
         .for_each(|p| *p = *p + LinearRgb::new(grain(), grain(), grain()));
     let shot: Shot = pile(CARDS, SIZE).with_plate(Arc::new(plate));
-    let deep = cast(&shot, &Quality::default().render());
+    let deep = render(&shot, &Quality::default().render());
     composite::frame(&deep, shot.plate.as_deref()).map(PremulRgba::color)
 }
 

@@ -9,7 +9,7 @@ use super::{Diagram, Point};
 use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector3};
-use petcomp::label::{LabelOptions, Labels, Mask, label, outline_of, trace};
+use petcomp::label::{LabelOptions, Labels, RleMask, label, outline_of, trace};
 use petcomp::scene::{Card, Grade, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
@@ -156,7 +156,7 @@ fn usual_threshold() -> f32 {
 }
 
 /// The mask of the one object.
-fn mask(labels: &Labels) -> Mask {
+fn mask(labels: &Labels) -> RleMask {
     labels
         .objects
         .first()
@@ -234,7 +234,7 @@ impl Ellipse {
         inside as f64 / (POINTS * POINTS) as f64
     }
 
-    fn iou(&self, mask: &Mask) -> f64 {
+    fn iou(&self, mask: &RleMask) -> f64 {
         let both: f64 = mask.pixels().map(|(x, y)| self.coverage(x, y)).sum();
         both / (mask.area() as f64 + self.area() - both)
     }
@@ -394,6 +394,6 @@ mod tests {
             )))
         };
         assert!(at(0.02) < at(0.1) && at(0.1) < at(0.5));
-        assert_eq!(ellipse.iou(&Mask::default()), 0.0);
+        assert_eq!(ellipse.iou(&RleMask::default()), 0.0);
     }
 }

@@ -13,7 +13,7 @@ use petcomp::Quality;
 use petcomp::Result;
 use petcomp::geom::{Plane, Point2, Point3, Pose, Quad, UnitQuaternion, Vector3};
 use petcomp::light::{frame, polygon_irradiance};
-use petcomp::render::{RenderOptions, cast, reference};
+use petcomp::render::{RenderOptions, render, render_reference};
 use petcomp::scene::{AreaLight, Card, Grade, LightShape, Shot};
 use petcomp::{LinearRgb, ObjectId, PremulRgba};
 use std::f64::consts::PI;
@@ -77,7 +77,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &sampled(n),
-            cast,
+            render,
         )?);
     }
     for cell_px in CELLS.into_iter().filter(|c| *c != usual.cell_px) {
@@ -87,7 +87,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &options,
-            cast,
+            render,
         )?);
     }
     for n in counts.into_iter().filter(|n| *n <= MOST_PLAIN) {
@@ -101,7 +101,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &options,
-            reference,
+            render_reference,
         )?);
     }
     for quality in [Quality::Draft, Quality::Reference] {
@@ -111,7 +111,7 @@ fn diagram(kind: Kind) -> Result<Diagram> {
             &shot,
             &exact,
             &options,
-            cast,
+            render,
         )?;
         points.push(point.used_where(|q| q == quality));
     }
@@ -321,7 +321,7 @@ mod tests {
         let shot = shot(Kind::Area);
         let exact = exact(&shot, Kind::Area);
         let error = |options: RenderOptions| {
-            measured(("", String::new()), &shot, &exact, &options, cast)
+            measured(("", String::new()), &shot, &exact, &options, render)
                 .unwrap()
                 .error
         };

@@ -98,13 +98,13 @@ fn bottle(k: u32) -> Image<PremulRgba> {
 mod tests {
     use super::*;
     use petcomp::Quality;
-    use petcomp::render::{cast, check};
+    use petcomp::render::{check, render};
 
     #[test]
     fn a_pile_can_be_rendered_and_every_card_is_seen() {
         let shot = pile(12, [160, 120]);
         assert!(check(&shot).is_ok());
-        let deep = cast(&shot, &Quality::Draft.render());
+        let deep = render(&shot, &Quality::Draft.render());
         let mut seen = vec![false; 12];
         for (x, y) in (0..120).flat_map(|y| (0..160).map(move |x| (x, y))) {
             deep.at(x, y)

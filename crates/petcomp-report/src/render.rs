@@ -8,9 +8,10 @@ pub use diagram::diagrams;
 
 use super::clock::timed;
 use petcomp::Image;
+use petcomp::Quality;
 use petcomp::diff::{Likeness, triple};
 use petcomp::plot::{Axis, Chart, Table};
-use petcomp::render::{Preset, RenderOptions, cast, reference};
+use petcomp::render::{RenderOptions, render, render_reference};
 use petcomp::scene::{Shot, cycles};
 use petcomp::{Error, Result, composite, io};
 use petcomp::{LinearRgb, PremulRgba};
@@ -28,7 +29,7 @@ pub struct RenderReportOptions {
     pub cycles: PathBuf,
     /// Folder of golden scenes; one without scenes is left out.
     pub golden: PathBuf,
-    /// Renderings per preset, of which the median is told. Default: 5.
+    /// Renderings per setting, of which the median is told. Default: 5.
     pub repeats: usize,
 }
 
@@ -42,12 +43,34 @@ const QUADRATURE: RenderOptions = RenderOptions {
     cell_px: 1.0,
 };
 
+/// Between the default and a reference: 2 x 2 samples a pixel, 4 x 4 a light.
+pub(super) const GOOD: RenderOptions = RenderOptions {
+    subsamples: 2,
+    light_samples: 4,
+    ambient_samples: 64,
+    cell_px: 1.0,
+};
+
+/// The same with 3 x 3 samples a pixel, 6 x 6 a light.
+pub(super) const HIGH: RenderOptions = RenderOptions {
+    subsamples: 3,
+    light_samples: 6,
+    ambient_samples: 100,
+    cell_px: 0.66,
+};
+
+/// Points on the curve of error over run time, the quickest first: each [`Quality`], and two finer than the default.
+pub fn settings() -> [(&'static str, RenderOptions); 5] {
+    let [draft, normal, reference] = Quality::ALL.map(|quality| (quality.name(), quality.render()));
+    [draft, normal, ("good", GOOD), ("high", HIGH), reference]
+}
+
 /// A picture and its error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     /// `petcomp` or the other program with its version.
     pub program: String,
-    /// Preset, or samples per pixel.
+    /// Setting, or samples per pixel.
     pub setting: String,
     /// CPU seconds.
     pub cpu_seconds: f64,
@@ -57,12 +80,12 @@ pub struct Row {
     pub quadrature: Option<Likeness>,
 }
 
-/// A golden scene at one preset.
+/// A golden scene at one setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GoldenRow {
     /// Name of the case.
     pub case: String,
-    /// Name of the preset.
+    /// Name of the setting.
     pub quality: &'static str,
     /// Against the reference.
     pub likeness: Likeness,
@@ -80,7 +103,7 @@ pub fn write(
     let folder = folder.as_ref();
     io::create_folder(folder)?;
     let rows = measure(options)?;
-    let (golden, sheet) = golden(&options.golden, Preset::Good)?;
+    let (golden, sheet) = golden(&options.golden, "good")?;
     io::write_text(folder.join("render.csv"), &table(&rows).csv())?;
     io::write_text(folder.join("render.md"), &markdown(&rows, &golden, options))?;
     io::write_text(folder.join("render.svg"), &Chart::row(&charts(&rows)))?;
@@ -94,7 +117,7 @@ pub fn write(
     Ok((rows, golden))
 }
 
-/// Every preset, and every picture of the other program that is there.
+/// Every setting, and every picture of the other program that is there.
 ///
 /// # Errors
 /// As [`write()`].
@@ -105,21 +128,22 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
         Some(options.size.map(|side| (side / QUADRATURE_SHRINK).max(1))),
     )?;
     let truth = finished(&composite::frame(
-        &reference(&small, &QUADRATURE),
+        &render_reference(&small, &QUADRATURE),
         small.plate.as_deref(),
     ));
     let others = Others::read(&options.cycles)?;
     let best = others.best()?;
     let mut rows = Vec::new();
-    for (name, quality) in Preset::ALL {
-        let sampling = quality.options();
-        let (picture, cpu_seconds) = timed(options.repeats, || Ok(render(&shot, &sampling)))?;
+    for (name, sampling) in settings() {
+        let (picture, cpu_seconds) = timed(options.repeats, || Ok(picture_of(&shot, &sampling)))?;
         rows.push(Row {
             program: "petcomp".into(),
             setting: name.into(),
             cpu_seconds,
-            cycles: best.as_ref().and_then(|best| Likeness::of(&picture, best)),
-            quadrature: Likeness::of(&render(&small, &sampling), &truth),
+            cycles: best
+                .as_ref()
+                .and_then(|best| Likeness::measure(&picture, best)),
+            quadrature: Likeness::measure(&picture_of(&small, &sampling), &truth),
         });
     }
     for entry in &others.pictures {
@@ -132,16 +156,16 @@ pub fn measure(options: &RenderReportOptions) -> Result<Vec<Row>> {
             cycles: best
                 .as_ref()
                 .filter(|_| !is_best)
-                .and_then(|best| Likeness::of(&picture, best)),
+                .and_then(|best| Likeness::measure(&picture, best)),
             quadrature: None,
         });
     }
     Ok(rows)
 }
 
-fn render(shot: &Shot, options: &RenderOptions) -> Image<LinearRgb> {
+fn picture_of(shot: &Shot, options: &RenderOptions) -> Image<LinearRgb> {
     finished(&composite::frame(
-        &cast(shot, options),
+        &render(shot, options),
         shot.plate.as_deref(),
     ))
 }
@@ -192,11 +216,11 @@ impl Others {
     }
 }
 
-/// Every golden scene at every preset, and a sheet of all of them at one preset; no sheet where there are no scenes.
+/// Every golden scene at every setting, and a sheet of all of them at one of them; no sheet where there are no scenes.
 ///
 /// # Errors
 /// A scene or a reference that cannot be read.
-pub fn golden(folder: &Path, shown: Preset) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
+pub fn golden(folder: &Path, shown: &str) -> Result<(Vec<GoldenRow>, Option<Image<LinearRgb>>)> {
     let entries = std::fs::read_dir(folder)
         .into_iter()
         .flatten()
@@ -214,9 +238,9 @@ pub fn golden(folder: &Path, shown: Preset) -> Result<(Vec<GoldenRow>, Option<Im
             .file_name()
             .map(|n| n.to_string_lossy().into_owned())
             .unwrap_or_default();
-        for (quality_name, quality) in Preset::ALL {
-            let picture = render(&shot, &quality.options());
-            let likeness = Likeness::of(&picture, &wanted).ok_or_else(|| {
+        for (setting, options) in settings() {
+            let picture = picture_of(&shot, &options);
+            let likeness = Likeness::measure(&picture, &wanted).ok_or_else(|| {
                 Error::file(
                     &case,
                     format!(
@@ -228,10 +252,10 @@ pub fn golden(folder: &Path, shown: Preset) -> Result<(Vec<GoldenRow>, Option<Im
             })?;
             rows.push(GoldenRow {
                 case: name.clone(),
-                quality: quality_name,
+                quality: setting,
                 likeness,
             });
-            if quality == shown {
+            if setting == shown {
                 strips.push(triple(&wanted, &picture));
             }
         }
@@ -284,7 +308,7 @@ pub fn table(rows: &[Row]) -> Table {
             format!("{cpu_seconds:.4}"),
             number(cycles.map(|l| l.rmse), 5),
             number(cycles.map(|l| l.bias), 6),
-            number(cycles.map(|l| l.ssim), 5),
+            number(cycles.and_then(|l| l.ssim), 5),
             number(cycles.map(|l| l.flip), 4),
             number(quadrature.map(|l| l.rmse), 5),
             number(speed_up(row, rows), 0),
@@ -321,7 +345,7 @@ pub fn charts(rows: &[Row]) -> Vec<Chart> {
     let measures: [(&str, Measure); 3] = [
         ("RMSE, scene-linear", |l| l.rmse),
         ("FLIP", |l| l.flip),
-        ("1 - SSIM", |l| 1.0 - l.ssim),
+        ("1 - SSIM", |l| l.ssim.map_or(f64::NAN, |s| 1.0 - s)),
     ];
     let mut names: Vec<String> = rows.iter().map(|row| row.program.clone()).collect();
     names.dedup();
@@ -349,7 +373,7 @@ pub fn charts(rows: &[Row]) -> Vec<Chart> {
     measures.iter().map(chart).collect()
 }
 
-/// The golden scenes as a table: a row per scene and preset.
+/// The golden scenes as a table: a row per scene and setting.
 pub fn golden_table(rows: &[GoldenRow]) -> Table {
     let mut table = Table::new(["scene", "quality", "RMSE", "bias", "SSIM", "FLIP"]);
     for GoldenRow {
@@ -369,7 +393,7 @@ pub fn golden_table(rows: &[GoldenRow]) -> Table {
             quality.to_string(),
             format!("{rmse:.5}"),
             format!("{bias:+.6}"),
-            format!("{ssim:.5}"),
+            ssim.map_or_else(String::new, |ssim| format!("{ssim:.5}")),
             format!("{flip:.4}"),
         ]);
     }
@@ -401,12 +425,12 @@ mod tests {
         let cycles = Some(Likeness {
             rmse,
             bias: 0.0,
-            ssim: 0.9,
+            ssim: Some(0.9),
             flip: 0.01,
         });
         Row {
             program: program.into(),
-            setting: "fast".into(),
+            setting: "normal".into(),
             cpu_seconds,
             cycles,
             quadrature: None,
@@ -438,7 +462,7 @@ mod tests {
             repeats: 1,
         };
         let (rows, golden) = write(folder.path(), &options).unwrap();
-        assert_eq!((rows.len(), golden.len()), (Preset::ALL.len(), 0));
+        assert_eq!((rows.len(), golden.len()), (settings().len(), 0));
         // So small a picture may be done before the system's clock of CPU time moves.
         assert!(
             rows.iter()

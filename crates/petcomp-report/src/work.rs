@@ -13,7 +13,7 @@ use cases::{Asked, Case, cases};
 use petcomp::PremulRgba;
 use petcomp::dataset::{Pipeline, generate};
 use petcomp::plot::Table;
-use petcomp::work::{self, Kind, LARGE, Work};
+use petcomp::work::{self, Kind, LARGE_BYTES, Work};
 use petcomp::{Error, Result, io};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -109,7 +109,7 @@ fn make(world: &World, case: &Case, folder: &Path) -> Result<()> {
 
 /// Whether the allocator of this program tells what it gives.
 fn allocations_are_told() -> Result<bool> {
-    let (_, work) = counted(|| drop(std::hint::black_box(vec![1_u8; LARGE])))?;
+    let (_, work) = counted(|| drop(std::hint::black_box(vec![1_u8; LARGE_BYTES])))?;
     Ok(work[Kind::LargeAllocations] > 0)
 }
 

@@ -3,7 +3,7 @@
 #[path = "../src/allocator.rs"]
 mod allocator;
 
-use petcomp::work::{Kind, LARGE, counted};
+use petcomp::work::{Kind, LARGE_BYTES, counted};
 use petcomp_report::work::measure;
 
 #[test]
@@ -13,10 +13,14 @@ fn an_allocation_of_a_mebibyte_is_one_and_a_smaller_one_is_none() {
             .unwrap()
             .1[Kind::LargeAllocations]
     };
-    assert_eq!([LARGE - 1, LARGE, 3 * LARGE].map(large), [0, 1, 1]);
-    let (_, work) =
-        counted(|| std::hint::black_box(Vec::<u8>::with_capacity(LARGE)).reserve_exact(2 * LARGE))
-            .unwrap();
+    assert_eq!(
+        [LARGE_BYTES - 1, LARGE_BYTES, 3 * LARGE_BYTES].map(large),
+        [0, 1, 1]
+    );
+    let (_, work) = counted(|| {
+        std::hint::black_box(Vec::<u8>::with_capacity(LARGE_BYTES)).reserve_exact(2 * LARGE_BYTES)
+    })
+    .unwrap();
     assert_eq!(work[Kind::LargeAllocations], 2, "growing is another one");
 }
 

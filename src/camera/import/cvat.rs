@@ -1,11 +1,11 @@
 //! CVAT: the export "CVAT for images 1.1", an XML file for many pictures.
 
-use super::{Drawing, Kind, Shape, between};
+use super::{AnnotatedShape, Annotation, ShapeKind, upright_corners};
 use crate::error::{Error, Result};
 use roxmltree::{Document, Node};
 
-/// The pictures with something on them; none for XML of another kind.
-pub(super) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
+/// The pictures with shapes on them; none for XML of another kind.
+pub(super) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     if !text.contains("<annotations") {
         return Ok(None);
     }
@@ -16,75 +16,73 @@ pub(super) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
         return Ok(None);
     }
     let images = root.children().filter(|node| node.has_tag_name("image"));
-    let all: Result<Vec<Drawing>> = images
+    let all: Result<Vec<Annotation>> = images
         .enumerate()
-        .map(|(i, node)| drawing(node, i))
+        .map(|(i, node)| annotation(node).map_err(|e| e.within(&format!("image[{i}]"))))
         .collect();
     Ok(Some(
         all?.into_iter()
-            .filter(|drawing| !drawing.shapes.is_empty())
+            .filter(|annotation| !annotation.shapes.is_empty())
             .collect(),
     ))
 }
 
 /// CVAT's pixels are ours: 0 is the edge of the picture.
-fn drawing(image: Node<'_, '_>, index: usize) -> Result<Drawing> {
-    let at = |e: Error| e.within(&format!("image[{index}]"));
-    let side = |name: &str| number(image, name).map(|px| px as u32);
-    let size = [side("width").map_err(at)?, side("height").map_err(at)?];
-    let shapes: Result<Vec<Option<Shape>>> = image
+fn annotation(image: Node<'_, '_>) -> Result<Annotation> {
+    let (width, height) = (number(image, "width")?, number(image, "height")?);
+    let shapes = image
         .children()
         .filter(Node::is_element)
-        .map(|node| shape(node).map_err(at))
-        .collect();
-    Ok(Drawing {
-        files: vec![
-            image
-                .attribute("name")
-                .unwrap_or_default()
-                .replace('\\', "/"),
-        ],
-        size: Some(size),
-        shapes: shapes?.into_iter().flatten().collect(),
+        .map(shape)
+        .collect::<Result<Vec<_>>>()?;
+    let name = image.attribute("name").unwrap_or_default();
+    Ok(Annotation {
+        files: vec![name.replace('\\', "/")],
+        size: Some([width as u32, height as u32]),
+        shapes: shapes.into_iter().flatten().collect(),
         source: "cvat",
     })
 }
 
-fn shape(node: Node<'_, '_>) -> Result<Option<Shape>> {
+fn shape(node: Node<'_, '_>) -> Result<Option<AnnotatedShape>> {
     let name = node.attribute("label").unwrap_or_default().to_owned();
     let (kind, points) = match node.tag_name().name() {
-        "polygon" | "polyline" => (Kind::Polygon, points(node)?),
-        "points" => (Kind::Points, points(node)?),
-        "box" => {
-            let side = |name| number(node, name);
-            let corners = between([side("xtl")?, side("ytl")?], [side("xbr")?, side("ybr")?]);
-            (
-                Kind::Rectangle,
-                turned(
-                    corners,
-                    node.attribute("rotation")
-                        .map_or(Ok(0.0), |_| side("rotation"))?,
-                ),
-            )
-        }
+        "polygon" | "polyline" => (ShapeKind::Polygon, points(node)?),
+        "points" => (ShapeKind::Points, points(node)?),
+        "box" => (ShapeKind::Rectangle, box_corners(node)?),
         _ => return Ok(None),
     };
-    Ok(Some(Shape { kind, name, points }))
+    Ok(Some(AnnotatedShape { kind, name, points }))
+}
+
+fn box_corners(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
+    let first = [number(node, "xtl")?, number(node, "ytl")?];
+    let opposite = [number(node, "xbr")?, number(node, "ybr")?];
+    let degrees = match node.attribute("rotation") {
+        None => 0.0,
+        Some(_) => number(node, "rotation")?,
+    };
+    Ok(turned_about_middle(
+        upright_corners(first, opposite),
+        degrees,
+    ))
 }
 
 /// `x,y;x,y` as numbers.
 fn points(node: Node<'_, '_>) -> Result<Vec<[f64; 2]>> {
     let text = node.attribute("points").unwrap_or_default();
-    let wrong = |part: &str| Error::value("points", format!("\"{part}\", expected x,y"));
-    let one = |part: &str| {
-        let (x, y) = part.split_once(',').ok_or_else(|| wrong(part))?;
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong(part));
-        Ok([number(x)?, number(y)?])
-    };
     text.split(';')
         .filter(|part| !part.trim().is_empty())
-        .map(one)
+        .map(|part| {
+            point(part).ok_or_else(|| Error::value("points", format!("\"{part}\", expected x,y")))
+        })
         .collect()
+}
+
+/// `x,y` as numbers.
+fn point(text: &str) -> Option<[f64; 2]> {
+    let (x, y) = text.split_once(',')?;
+    Some([x.trim().parse().ok()?, y.trim().parse().ok()?])
 }
 
 fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {
@@ -96,25 +94,25 @@ fn number(node: Node<'_, '_>, name: &str) -> Result<f64> {
 }
 
 /// The corners of a rectangle that was turned clockwise about its middle.
-fn turned(corners: Vec<[f64; 2]>, degrees: f64) -> Vec<[f64; 2]> {
+fn turned_about_middle(corners: Vec<[f64; 2]>, degrees: f64) -> Vec<[f64; 2]> {
     if degrees == 0.0 {
         return corners;
     }
     let middle = [0, 1].map(|axis| (corners[0][axis] + corners[2][axis]) / 2.0);
-    let (sin, cos) = (
-        libm::sin(degrees.to_radians()),
-        libm::cos(degrees.to_radians()),
-    );
-    let turn = |[x, y]: [f64; 2]| {
-        let [u, v] = [x - middle[0], y - middle[1]];
-        [middle[0] + u * cos - v * sin, middle[1] + u * sin + v * cos]
-    };
-    corners.into_iter().map(turn).collect()
+    let angle = degrees.to_radians();
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    corners
+        .into_iter()
+        .map(|[x, y]| {
+            let [u, v] = [x - middle[0], y - middle[1]];
+            [middle[0] + u * cos - v * sin, middle[1] + u * sin + v * cos]
+        })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::drawings;
+    use super::super::annotations;
     use super::super::tests::only;
 
     const XML: &str = r#"<?xml version="1.0" encoding="utf-8"?>
@@ -129,12 +127,12 @@ mod tests {
 
     #[test]
     fn pictures_with_a_polygon_are_labels() {
-        let drawing = only(XML);
+        let annotation = only(XML);
         assert_eq!(
-            (drawing.size, drawing.files.as_slice()),
+            (annotation.size, annotation.files.as_slice()),
             (Some([200, 100]), &["bg0.jpg".to_owned()][..])
         );
-        let label = drawing.label().unwrap();
+        let label = annotation.label().unwrap();
         assert_eq!(
             label.surface.corners_px,
             Some([[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]])
@@ -166,7 +164,7 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let error = |text: &str| drawings(text).unwrap_err().to_string();
+        let error = |text: &str| annotations(text).unwrap_err().to_string();
         assert!(
             error(&XML.replace("110.00,22.00", "110.00"))
                 .contains("image[0].points: \"110.00\", expected x,y")

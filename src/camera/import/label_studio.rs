@@ -1,29 +1,29 @@
 //! Label Studio: the exports JSON (tasks with annotations and results) and JSON-MIN (tasks with their results beside each
-//! other). Places are in percent of the picture.
+//! other). Positions are in percent of the picture.
 
-use super::{Drawing, Kind, Shape};
+use super::{AnnotatedShape, Annotation, ShapeKind};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 
 /// Length of what Label Studio puts before the name of an uploaded file: eight hexadecimal digits and a hyphen.
-const PREFIX: usize = 9;
+const UPLOAD_PREFIX_LENGTH: usize = 9;
 
 /// A result as both exports write it; JSON keeps the geometry in `value`, JSON-MIN in the result itself.
 #[derive(Deserialize)]
-struct Drawn {
+struct AnnotationResult {
     original_width: u32,
     original_height: u32,
     #[serde(default)]
     image_rotation: f64,
-    value: Option<Geometry>,
+    value: Option<ResultGeometry>,
     #[serde(flatten)]
-    own: Geometry,
+    own: ResultGeometry,
 }
 
 #[derive(Clone, Default, Deserialize)]
 #[serde(default)]
-struct Geometry {
+struct ResultGeometry {
     points: Option<Vec<[f64; 2]>>,
     x: Option<f64>,
     y: Option<f64>,
@@ -36,7 +36,7 @@ struct Geometry {
     labels: Vec<String>,
 }
 
-pub(super) fn is_one(value: &Value) -> bool {
+pub(super) fn is_label_studio(value: &Value) -> bool {
     let tasks = value.as_array().map_or(&[][..], Vec::as_slice);
     !tasks.is_empty()
         && tasks
@@ -44,26 +44,26 @@ pub(super) fn is_one(value: &Value) -> bool {
             .all(|task| task.get("annotations").is_some() || !results_beside(task).is_empty())
 }
 
-pub(super) fn drawings(value: Value) -> Result<Vec<Drawing>> {
+pub(super) fn annotations(value: Value) -> Result<Vec<Annotation>> {
     let tasks = value.as_array().map_or(&[][..], Vec::as_slice);
-    let found: Result<Vec<Drawing>> = tasks
+    let found: Result<Vec<Annotation>> = tasks
         .iter()
         .enumerate()
-        .map(|(i, task)| drawing(task).map_err(|e| e.within(&format!("[{i}]"))))
+        .map(|(i, task)| annotation(task).map_err(|e| e.within(&format!("[{i}]"))))
         .collect();
     Ok(found?
         .into_iter()
-        .filter(|drawing| !drawing.shapes.is_empty())
+        .filter(|annotation| !annotation.shapes.is_empty())
         .collect())
 }
 
-fn drawing(task: &Value) -> Result<Drawing> {
+fn annotation(task: &Value) -> Result<Annotation> {
     let results = match task.get("annotations") {
-        Some(annotations) => of_annotations(annotations)?,
+        Some(annotations) => only_annotation_results(annotations)?,
         None => results_beside(task),
     };
-    let mut drawing = Drawing {
-        files: names(task),
+    let mut annotation = Annotation {
+        files: picture_names(task),
         source: "label-studio",
         ..Default::default()
     };
@@ -72,23 +72,24 @@ fn drawing(task: &Value) -> Result<Drawing> {
         if result.get("original_width").is_none() {
             continue;
         }
-        let at = |e: String| Error::value(format!("result[{i}]"), e);
-        let drawn: Drawn =
-            serde_path_to_error::deserialize((*result).clone()).map_err(|e| at(e.to_string()))?;
-        if drawn.image_rotation != 0.0 {
-            return Err(at(format!(
-                "image_rotation: {}, expected 0",
-                drawn.image_rotation
-            )));
-        }
-        drawing.size = Some([drawn.original_width, drawn.original_height]);
-        drawing.shapes.extend(shape(&drawn));
+        let result = read_result(result).map_err(|e| Error::value(format!("result[{i}]"), e))?;
+        annotation.size = Some([result.original_width, result.original_height]);
+        annotation.shapes.extend(result.shape());
     }
-    Ok(drawing)
+    Ok(annotation)
+}
+
+fn read_result(value: &Value) -> std::result::Result<AnnotationResult, String> {
+    let result: AnnotationResult =
+        serde_path_to_error::deserialize(value.clone()).map_err(|e| e.to_string())?;
+    match result.image_rotation {
+        0.0 => Ok(result),
+        turned => Err(format!("image_rotation: {turned}, expected 0")),
+    }
 }
 
 /// The results of the only annotation that was not cancelled.
-fn of_annotations(annotations: &Value) -> Result<Vec<&Value>> {
+fn only_annotation_results(annotations: &Value) -> Result<Vec<&Value>> {
     let all = annotations.as_array().map_or(&[][..], Vec::as_slice);
     let kept: Vec<&Value> = all
         .iter()
@@ -120,83 +121,97 @@ fn results_beside(task: &Value) -> Vec<&Value> {
         .collect()
 }
 
-fn shape(drawn: &Drawn) -> Option<Shape> {
-    let geometry = drawn.value.as_ref().unwrap_or(&drawn.own);
-    let percent = [
-        f64::from(drawn.original_width) / 100.0,
-        f64::from(drawn.original_height) / 100.0,
-    ];
-    let px = |[x, y]: [f64; 2]| [x * percent[0], y * percent[1]];
-    let names = [
-        &geometry.polygonlabels,
-        &geometry.rectanglelabels,
-        &geometry.labels,
-    ];
-    let points_of = geometry.keypointlabels.iter();
-    let name = names
-        .into_iter()
-        .chain(points_of)
-        .find_map(|names| names.first())
-        .cloned()
-        .unwrap_or_default();
-    let (kind, points) = match (&geometry.points, geometry.x.zip(geometry.y)) {
-        (Some(points), _) => (Kind::Polygon, points.iter().copied().map(px).collect()),
-        (None, Some((x, y))) if geometry.keypointlabels.is_some() => {
-            (Kind::Points, vec![px([x, y])])
-        }
-        (None, Some((x, y))) => {
-            let [w, h] = px([geometry.width?, geometry.height?]);
-            (
-                Kind::Rectangle,
-                turned(px([x, y]), [w, h], geometry.rotation),
-            )
-        }
-        _ => return None,
-    };
-    Some(Shape { kind, name, points })
+impl AnnotationResult {
+    /// What was drawn; none for a result that is neither points nor a rectangle.
+    fn shape(&self) -> Option<AnnotatedShape> {
+        let geometry = self.value.as_ref().unwrap_or(&self.own);
+        let (kind, points) = match (&geometry.points, geometry.x.zip(geometry.y)) {
+            (Some(points), _) => (
+                ShapeKind::Polygon,
+                points.iter().map(|p| self.to_px(*p)).collect(),
+            ),
+            (None, Some((x, y))) if geometry.keypointlabels.is_some() => {
+                (ShapeKind::Points, vec![self.to_px([x, y])])
+            }
+            (None, Some((x, y))) => {
+                let size = self.to_px([geometry.width?, geometry.height?]);
+                let corners = turned_about_corner(self.to_px([x, y]), size, geometry.rotation);
+                (ShapeKind::Rectangle, corners)
+            }
+            _ => return None,
+        };
+        let name = geometry.name();
+        Some(AnnotatedShape { kind, name, points })
+    }
+
+    /// Pixels from percent of the picture.
+    fn to_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [
+            x * (f64::from(self.original_width) / 100.0),
+            y * (f64::from(self.original_height) / 100.0),
+        ]
+    }
+}
+
+impl ResultGeometry {
+    /// The first class that any of the tools gave it.
+    fn name(&self) -> String {
+        [&self.polygonlabels, &self.rectanglelabels, &self.labels]
+            .into_iter()
+            .chain(self.keypointlabels.iter())
+            .find_map(|names| names.first())
+            .cloned()
+            .unwrap_or_default()
+    }
 }
 
 /// The corners of a rectangle that was turned clockwise about its first one.
-fn turned([x, y]: [f64; 2], [w, h]: [f64; 2], degrees: f64) -> Vec<[f64; 2]> {
-    let (sin, cos) = (
-        libm::sin(degrees.to_radians()),
-        libm::cos(degrees.to_radians()),
-    );
-    let corners = [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
-    corners
+fn turned_about_corner([x, y]: [f64; 2], [w, h]: [f64; 2], degrees: f64) -> Vec<[f64; 2]> {
+    let angle = degrees.to_radians();
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    [[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]]
         .map(|[u, v]| [x + u * cos - v * sin, y + u * sin + v * cos])
         .into()
 }
 
+/// Endings of pictures.
+const PICTURE_ENDINGS: [&str; 8] = [
+    ".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".webp", ".exr",
+];
+
 /// Names that a task's picture may have, the most likely first.
-fn names(task: &Value) -> Vec<String> {
-    const ENDINGS: [&str; 8] = [
-        ".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".webp", ".exr",
-    ];
+fn picture_names(task: &Value) -> Vec<String> {
     let data = task.get("data").unwrap_or(task);
-    let texts = data
-        .as_object()
+    data.as_object()
         .into_iter()
         .flat_map(|data| data.values())
-        .filter_map(Value::as_str);
-    let texts = texts.chain(task.get("file_upload").and_then(Value::as_str));
-    let file = |text: &str| {
-        let path = text.rsplit_once("?d=").map_or(text, |(_, path)| path);
-        let name = decoded(path.rsplit(['/', '\\']).next()?);
-        ENDINGS
-            .iter()
-            .any(|end| name.to_lowercase().ends_with(end))
-            .then_some(name)
-    };
-    let mut names: Vec<String> = Vec::new();
-    for name in texts.filter_map(file) {
-        let bare = name.as_bytes().get(..PREFIX).filter(|front| {
-            front[..PREFIX - 1].iter().all(u8::is_ascii_hexdigit) && front[PREFIX - 1] == b'-'
-        });
-        let bare = bare.map(|_| name[PREFIX..].to_owned());
-        names.extend([Some(name), bare].into_iter().flatten());
-    }
-    names
+        .chain(task.get("file_upload"))
+        .filter_map(|value| picture_name(value.as_str()?))
+        .flat_map(|name| {
+            let bare = without_upload_prefix(&name).map(str::to_owned);
+            [Some(name), bare].into_iter().flatten()
+        })
+        .collect()
+}
+
+/// The name of the picture at an address.
+fn picture_name(address: &str) -> Option<String> {
+    let path = address.rsplit_once("?d=").map_or(address, |(_, path)| path);
+    let name = decoded(path.rsplit(['/', '\\']).next()?);
+    PICTURE_ENDINGS
+        .iter()
+        .any(|end| name.to_lowercase().ends_with(end))
+        .then_some(name)
+}
+
+/// The name that a file had before it was uploaded.
+fn without_upload_prefix(name: &str) -> Option<&str> {
+    let (digits, rest) = name.split_at_checked(UPLOAD_PREFIX_LENGTH - 1)?;
+    let bare = rest.strip_prefix('-')?;
+    digits
+        .bytes()
+        .all(|byte| byte.is_ascii_hexdigit())
+        .then_some(bare)
 }
 
 /// A text with its `%20` and the like undone.
@@ -234,14 +249,14 @@ mod tests {
 
     #[test]
     fn percent_become_pixels_and_the_added_name_is_known() {
-        let drawing = only(JSON);
-        assert_eq!(drawing.size, Some([200, 100]));
+        let annotation = only(JSON);
+        assert_eq!(annotation.size, Some([200, 100]));
         assert!(
-            drawing.files.contains(&"bg_1.jpg".into()),
+            annotation.files.contains(&"bg_1.jpg".into()),
             "{:?}",
-            drawing.files
+            annotation.files
         );
-        let label = drawing.label().unwrap();
+        let label = annotation.label().unwrap();
         assert_eq!(
             label.surface.corners_px,
             Some([[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]])
@@ -251,9 +266,9 @@ mod tests {
 
     #[test]
     fn the_short_export_is_read_too() {
-        let drawing = only(MIN);
-        assert_eq!(drawing.files, ["my bg.jpg"]);
-        let corners = drawing.label().unwrap().surface.corners_px;
+        let annotation = only(MIN);
+        assert_eq!(annotation.files, ["my bg.jpg"]);
+        let corners = annotation.label().unwrap().surface.corners_px;
         assert_eq!(
             corners,
             Some([[20.0, 20.0], [120.0, 20.0], [120.0, 80.0], [20.0, 80.0]])
@@ -282,7 +297,7 @@ mod tests {
 
     #[test]
     fn a_turned_rectangle_is_turned_about_its_first_corner() {
-        let corners = turned([10.0, 20.0], [30.0, 40.0], 90.0);
+        let corners = turned_about_corner([10.0, 20.0], [30.0, 40.0], 90.0);
         let expected = [[10.0, 20.0], [10.0, 50.0], [-30.0, 50.0], [-30.0, 20.0]];
         for (a, b) in corners.iter().zip(expected) {
             assert!(
@@ -296,14 +311,14 @@ mod tests {
     fn two_annotators_and_turned_pictures_are_named() {
         let two = JSON.replace("\"was_cancelled\": true", "\"was_cancelled\": false");
         assert!(
-            super::super::drawings(&two)
+            super::super::annotations(&two)
                 .unwrap_err()
                 .to_string()
                 .contains("[0].annotations: 2, expected one")
         );
         let turned = JSON.replace("\"image_rotation\": 0", "\"image_rotation\": 90");
         assert!(
-            super::super::drawings(&turned)
+            super::super::annotations(&turned)
                 .unwrap_err()
                 .to_string()
                 .contains("image_rotation: 90")
@@ -313,6 +328,6 @@ mod tests {
     #[test]
     fn tasks_without_a_drawing_are_left_out() {
         let empty = r#"[{"annotations": [], "data": {"image": "a.jpg"}}]"#;
-        assert_eq!(super::super::drawings(empty).unwrap(), Some(vec![]));
+        assert_eq!(super::super::annotations(empty).unwrap(), Some(vec![]));
     }
 }

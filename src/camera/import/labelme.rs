@@ -1,11 +1,11 @@
 //! LabelMe: a JSON file for each picture.
 
-use super::{Drawing, Kind, Shape, between};
+use super::{AnnotatedShape, Annotation, ShapeKind, upright_corners};
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;
 
-/// What is read of a file; it has more.
+/// What is read from a file; there is more in it.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct LabelMe {
@@ -15,11 +15,11 @@ struct LabelMe {
     image_width: Option<u32>,
     #[serde(default)]
     image_height: Option<u32>,
-    shapes: Vec<Drawn>,
+    shapes: Vec<LabelMeShape>,
 }
 
 #[derive(Deserialize)]
-struct Drawn {
+struct LabelMeShape {
     #[serde(default)]
     label: String,
     #[serde(default)]
@@ -27,15 +27,15 @@ struct Drawn {
     points: Vec<[f64; 2]>,
 }
 
-pub(super) fn is_one(value: &Value) -> bool {
+pub(super) fn is_labelme(value: &Value) -> bool {
     value.get("shapes").is_some_and(Value::is_array)
 }
 
 /// LabelMe's pixels are ours: 0 is the edge of the picture.
-pub(super) fn drawing(value: Value) -> Result<Drawing> {
+pub(super) fn annotation(value: Value) -> Result<Annotation> {
     let file: LabelMe = serde_path_to_error::deserialize(value)
         .map_err(|e| Error::value(e.path().to_string(), e.inner()))?;
-    Ok(Drawing {
+    Ok(Annotation {
         files: vec![file.image_path.replace('\\', "/")],
         size: file.image_width.zip(file.image_height).map(|(w, h)| [w, h]),
         shapes: file.shapes.into_iter().map(shape).collect(),
@@ -44,19 +44,19 @@ pub(super) fn drawing(value: Value) -> Result<Drawing> {
 }
 
 fn shape(
-    Drawn {
+    LabelMeShape {
         label: name,
         shape_type,
         points,
-    }: Drawn,
-) -> Shape {
+    }: LabelMeShape,
+) -> AnnotatedShape {
     let (kind, points) = match (shape_type.as_str(), points.as_slice()) {
-        ("rectangle", [a, b]) => (Kind::Rectangle, between(*a, *b)),
-        ("rectangle", _) => (Kind::Rectangle, points),
-        ("point" | "points", _) => (Kind::Points, points),
-        _ => (Kind::Polygon, points),
+        ("rectangle", [a, b]) => (ShapeKind::Rectangle, upright_corners(*a, *b)),
+        ("rectangle", _) => (ShapeKind::Rectangle, points),
+        ("point" | "points", _) => (ShapeKind::Points, points),
+        _ => (ShapeKind::Polygon, points),
     };
-    Shape { kind, name, points }
+    AnnotatedShape { kind, name, points }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Labels that were drawn in other programs: LabelMe, CVAT, Label Studio.
 //!
-//! Each format is read into [`Drawing`]s, a picture and the shapes on it; what they mean is decided here: one quadrangle,
+//! Each format is read into [`Annotation`]s, a picture and the shapes on it; what they mean is decided here: one quadrangle,
 //! or else one upright rectangle, or else four points, is the surface.
 
 mod cvat;
@@ -12,29 +12,29 @@ use crate::error::{Error, Result};
 use crate::io;
 use serde_json::Value;
 
-/// What programs write of a picture.
+/// What a program recorded for a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Drawing {
+pub(crate) struct Annotation {
     /// Names that its file may have, the most likely first; the program may have added something.
     pub(crate) files: Vec<String>,
-    /// Width and height, pixels; none where the program does not tell.
+    /// Width and height, pixels; none where the program does not record them.
     pub(crate) size: Option<[u32; 2]>,
-    pub(crate) shapes: Vec<Shape>,
+    pub(crate) shapes: Vec<AnnotatedShape>,
     /// Which program.
     pub(crate) source: &'static str,
 }
 
 /// Something drawn on a picture, with pixels as ours: 0 is the picture's edge.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Shape {
-    pub(crate) kind: Kind,
+pub(crate) struct AnnotatedShape {
+    pub(crate) kind: ShapeKind,
     /// Name of its class.
     pub(crate) name: String,
     pub(crate) points: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum ShapeKind {
     Polygon,
     /// Its four corners.
     Rectangle,
@@ -45,19 +45,19 @@ pub(crate) enum Kind {
 ///
 /// # Errors
 /// [`Error::Value`] for a file of one of the programs that does not hold what theirs do.
-pub(crate) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
+pub(crate) fn annotations(text: &str) -> Result<Option<Vec<Annotation>>> {
     let text = text.trim_start_matches('\u{feff}');
     if text.trim_start().starts_with('<') {
-        return cvat::drawings(text);
+        return cvat::annotations(text);
     }
     let Ok(value) = io::parse_json::<Value>(text) else {
         return Ok(None);
     };
-    if labelme::is_one(&value) {
-        return labelme::drawing(value).map(|drawing| Some(vec![drawing]));
+    if labelme::is_labelme(&value) {
+        return labelme::annotation(value).map(|one| Some(vec![one]));
     }
-    if label_studio::is_one(&value) {
-        return label_studio::drawings(value).map(Some);
+    if label_studio::is_label_studio(&value) {
+        return label_studio::annotations(value).map(Some);
     }
     Ok(None)
 }
@@ -67,13 +67,13 @@ pub(crate) fn drawings(text: &str) -> Result<Option<Vec<Drawing>>> {
 /// # Errors
 /// [`Error::Value`] for text that is not LabelMe's, and for anything but one quadrangle, one rectangle or four points.
 pub fn from_labelme(text: &str, size: [f64; 2]) -> Result<Label> {
-    let mut label = labelme::drawing(io::parse_json(text)?)?.label()?;
+    let mut label = labelme::annotation(io::parse_json(text)?)?.label()?;
     (label.surface.width_m, label.surface.height_m) = (Some(size[0]), Some(size[1]));
     Ok(label)
 }
 
-impl Drawing {
-    /// The label that the drawing means; the sides of its rectangle are not known.
+impl Annotation {
+    /// The label that the annotation means; the sides of its rectangle are not known.
     pub(crate) fn label(&self) -> Result<Label> {
         let (name, corners_px) = self.rectangle()?;
         let mut label = Label::new(self.size.unwrap_or_default(), corners_px, [1.0; 2]);
@@ -89,46 +89,55 @@ impl Drawing {
     }
 
     /// Name and corners of the only shape that can be the surface.
-    fn rectangle(&self) -> Result<(String, [[f64; 2]; 4])> {
-        if self
-            .shapes
-            .iter()
-            .flat_map(|s| s.points.as_flattened())
-            .any(|v| !v.is_finite())
-        {
+    fn rectangle(&self) -> Result<NamedCorners> {
+        let mut numbers = self.shapes.iter().flat_map(|s| s.points.as_flattened());
+        if numbers.any(|v| !v.is_finite()) {
             return Err(Error::value("shapes", "a point is not finite"));
         }
-        let of = |kind: Kind| self.shapes.iter().filter(move |shape| shape.kind == kind);
-        let four =
-            |shape: &Shape| Some((shape.name.clone(), opened(&shape.points).try_into().ok()?));
-        let quads: Vec<_> = of(Kind::Polygon).filter_map(four).collect();
-        let boxes: Vec<_> = of(Kind::Rectangle).filter_map(four).collect();
-        let points: Vec<_> = of(Kind::Points)
+        let quads = self.four_cornered(ShapeKind::Polygon);
+        let boxes = self.four_cornered(ShapeKind::Rectangle);
+        let points: Vec<_> = self
+            .shapes_of(ShapeKind::Points)
             .flat_map(|s| s.points.iter().map(|p| (&s.name, *p)))
             .collect();
         match (quads.as_slice(), boxes.as_slice(), points.as_slice()) {
             ([quad], ..) => Ok(quad.clone()),
             ([], [one], _) => Ok(one.clone()),
-            ([], [], [a, b, c, d]) => Ok(four_points([*a, *b, *c, *d])),
-            _ => {
-                let others = of(Kind::Polygon).count() - quads.len();
-                Err(Error::value(
-                    "shapes",
-                    format!(
-                        "{} polygons of four points, {others} of another number, {} rectangles and {} points, expected \
-                         one polygon of four points, or one rectangle, or four points",
-                        quads.len(),
-                        boxes.len(),
-                        points.len()
-                    ),
-                ))
-            }
+            ([], [], [a, b, c, d]) => Ok(corners_from_points([*a, *b, *c, *d])),
+            _ => Err(self.unclear([quads.len(), boxes.len(), points.len()])),
         }
+    }
+
+    fn shapes_of(&self, kind: ShapeKind) -> impl Iterator<Item = &AnnotatedShape> {
+        self.shapes.iter().filter(move |shape| shape.kind == kind)
+    }
+
+    /// Name and corners of the shapes of a kind that have four.
+    fn four_cornered(&self, kind: ShapeKind) -> Vec<NamedCorners> {
+        self.shapes_of(kind)
+            .filter_map(|shape| {
+                let corners = without_repeated_end(&shape.points).try_into().ok()?;
+                Some((shape.name.clone(), corners))
+            })
+            .collect()
+    }
+
+    /// The error of an annotation in which no shape, or more than one, can be the surface.
+    fn unclear(&self, [quads, boxes, points]: [usize; 3]) -> Error {
+        let others = self.shapes_of(ShapeKind::Polygon).count() - quads;
+        let what = format!(
+            "{quads} polygons of four points, {others} of another number, {boxes} rectangles and {points} points, expected \
+             one polygon of four points, or one rectangle, or four points"
+        );
+        Error::value("shapes", what)
     }
 }
 
+/// Name of a surface and its corners, pixels.
+type NamedCorners = (String, [[f64; 2]; 4]);
+
 /// A polygon without a last point that repeats the first.
-fn opened(points: &[[f64; 2]]) -> &[[f64; 2]] {
+fn without_repeated_end(points: &[[f64; 2]]) -> &[[f64; 2]] {
     match points {
         [first, rest @ .., last] if first == last && !rest.is_empty() => {
             &points[..points.len() - 1]
@@ -137,20 +146,18 @@ fn opened(points: &[[f64; 2]]) -> &[[f64; 2]] {
     }
 }
 
-/// Single points as they were drawn, or where they are called so, from the top left.
-fn four_points(points: [(&String, [f64; 2]); 4]) -> (String, [[f64; 2]; 4]) {
-    const NAMES: [&[&str]; 4] = [
-        &["tl", "top left", "topleft", "left top"],
-        &["tr", "top right", "topright", "right top"],
-        &["br", "bottom right", "bottomright", "right bottom"],
-        &["bl", "bottom left", "bottomleft", "left bottom"],
-    ];
-    let place = |name: &str| {
-        let name = name.to_lowercase().replace(['_', '-'], " ");
-        NAMES.iter().position(|words| words.contains(&name.trim()))
-    };
-    let places = points.map(|(name, _)| place(name));
+/// What single points are called that are corners, from the top left.
+const CORNER_NAMES: [&[&str]; 4] = [
+    &["tl", "top left", "topleft", "left top"],
+    &["tr", "top right", "topright", "right top"],
+    &["br", "bottom right", "bottomright", "right bottom"],
+    &["bl", "bottom left", "bottomleft", "left bottom"],
+];
+
+/// Single points as they were drawn, or where they are named so, from the top left.
+fn corners_from_points(points: [(&String, [f64; 2]); 4]) -> NamedCorners {
     let corners = points.map(|(_, point)| point);
+    let places = points.map(|(name, _)| corner_named(name));
     if (0..4).all(|corner| places.contains(&Some(corner))) {
         let mut named = corners;
         for (place, point) in places.into_iter().flatten().zip(corners) {
@@ -158,19 +165,24 @@ fn four_points(points: [(&String, [f64; 2]); 4]) -> (String, [[f64; 2]; 4]) {
         }
         return ("surface".into(), named);
     }
-    let one_name = points.iter().all(|(name, _)| *name == points[0].0);
-    (
-        if one_name {
-            points[0].0.clone()
-        } else {
-            "surface".into()
-        },
-        corners,
-    )
+    let first = points[0].0;
+    let name = match points.iter().all(|(name, _)| *name == first) {
+        true => first.clone(),
+        false => "surface".into(),
+    };
+    (name, corners)
+}
+
+/// Which corner a point is by its name, from the top left.
+fn corner_named(name: &str) -> Option<usize> {
+    let name = name.to_lowercase().replace(['_', '-'], " ");
+    CORNER_NAMES
+        .iter()
+        .position(|words| words.contains(&name.trim()))
 }
 
 /// The corners of an upright rectangle between two opposite ones, clockwise from the top left.
-pub(crate) fn between([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> Vec<[f64; 2]> {
+pub(crate) fn upright_corners([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> Vec<[f64; 2]> {
     let ([left, right], [top, bottom]) = ([ax.min(bx), ax.max(bx)], [ay.min(by), ay.max(by)]);
     vec![[left, top], [right, top], [right, bottom], [left, bottom]]
 }
@@ -179,14 +191,14 @@ pub(crate) fn between([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> Vec<[f64; 2]> {
 pub(crate) mod tests {
     use super::*;
 
-    pub(crate) fn only(text: &str) -> Drawing {
-        let mut drawings = drawings(text).unwrap().unwrap();
-        assert_eq!(drawings.len(), 1);
-        drawings.remove(0)
+    pub(crate) fn only(text: &str) -> Annotation {
+        let mut annotations = annotations(text).unwrap().unwrap();
+        assert_eq!(annotations.len(), 1);
+        annotations.remove(0)
     }
 
-    fn shape(kind: Kind, name: &str, points: &[[f64; 2]]) -> Shape {
-        Shape {
+    fn shape(kind: ShapeKind, name: &str, points: &[[f64; 2]]) -> AnnotatedShape {
+        AnnotatedShape {
             kind,
             name: name.into(),
             points: points.to_vec(),
@@ -195,12 +207,12 @@ pub(crate) mod tests {
 
     const QUAD: [[f64; 2]; 4] = [[10.0, 20.0], [110.0, 22.0], [108.0, 90.0], [9.0, 88.0]];
 
-    fn corners(shapes: Vec<Shape>) -> std::result::Result<[[f64; 2]; 4], String> {
-        let drawing = Drawing {
+    fn corners(shapes: Vec<AnnotatedShape>) -> std::result::Result<[[f64; 2]; 4], String> {
+        let annotation = Annotation {
             shapes,
             ..Default::default()
         };
-        drawing
+        annotation
             .label()
             .map(|l| l.surface.corners_px.unwrap())
             .map_err(|e| e.to_string())
@@ -208,20 +220,20 @@ pub(crate) mod tests {
 
     #[test]
     fn a_quadrangle_comes_before_a_rectangle_and_that_before_points() {
-        let quad = shape(Kind::Polygon, "tray", &QUAD);
+        let quad = shape(ShapeKind::Polygon, "tray", &QUAD);
         let rectangle = shape(
-            Kind::Rectangle,
+            ShapeKind::Rectangle,
             "tray",
-            &between([100.0, 80.0], [10.0, 20.0]),
+            &upright_corners([100.0, 80.0], [10.0, 20.0]),
         );
-        let dots = QUAD.map(|p| shape(Kind::Points, "dot", &[p])).to_vec();
-        let all: Vec<Shape> = dots
+        let dots = QUAD.map(|p| shape(ShapeKind::Points, "dot", &[p])).to_vec();
+        let all: Vec<AnnotatedShape> = dots
             .iter()
             .cloned()
             .chain([rectangle.clone(), quad])
             .collect();
         assert_eq!(corners(all).unwrap(), QUAD);
-        let without: Vec<Shape> = dots.iter().cloned().chain([rectangle]).collect();
+        let without: Vec<AnnotatedShape> = dots.iter().cloned().chain([rectangle]).collect();
         assert_eq!(
             corners(without).unwrap(),
             [[10.0, 20.0], [100.0, 20.0], [100.0, 80.0], [10.0, 80.0]]
@@ -233,7 +245,7 @@ pub(crate) mod tests {
     fn points_that_are_called_by_their_corner_are_put_in_order() {
         let named = [(2, "BR"), (0, "top_left"), (3, "bottom-left"), (1, "tr")];
         let shapes = named
-            .map(|(i, name)| shape(Kind::Points, name, &[QUAD[i]]))
+            .map(|(i, name)| shape(ShapeKind::Points, name, &[QUAD[i]]))
             .to_vec();
         assert_eq!(corners(shapes).unwrap(), QUAD);
     }
@@ -242,7 +254,7 @@ pub(crate) mod tests {
     fn a_closed_polygon_has_one_point_less() {
         let closed: Vec<[f64; 2]> = QUAD.into_iter().chain([QUAD[0]]).collect();
         assert_eq!(
-            corners(vec![shape(Kind::Polygon, "", &closed)]).unwrap(),
+            corners(vec![shape(ShapeKind::Polygon, "", &closed)]).unwrap(),
             QUAD
         );
     }
@@ -250,19 +262,19 @@ pub(crate) mod tests {
     #[test]
     fn anything_else_is_counted_in_the_message() {
         let two = vec![
-            shape(Kind::Polygon, "a", &QUAD),
-            shape(Kind::Polygon, "b", &QUAD),
+            shape(ShapeKind::Polygon, "a", &QUAD),
+            shape(ShapeKind::Polygon, "b", &QUAD),
         ];
         assert!(
             corners(two)
                 .unwrap_err()
                 .contains("2 polygons of four points")
         );
-        let three = vec![shape(Kind::Polygon, "a", &QUAD[..3])];
+        let three = vec![shape(ShapeKind::Polygon, "a", &QUAD[..3])];
         assert!(corners(three).unwrap_err().contains("1 of another number"));
         assert!(corners(vec![]).unwrap_err().contains("0 points"));
         assert!(
-            corners(vec![shape(Kind::Polygon, "a", &[[f64::NAN, 0.0]; 4])])
+            corners(vec![shape(ShapeKind::Polygon, "a", &[[f64::NAN, 0.0]; 4])])
                 .unwrap_err()
                 .contains("finite")
         );
@@ -281,7 +293,7 @@ pub(crate) mod tests {
             "{",
             "",
         ] {
-            assert_eq!(drawings(text).unwrap(), None, "{text}");
+            assert_eq!(annotations(text).unwrap(), None, "{text}");
         }
     }
 }

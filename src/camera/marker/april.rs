@@ -11,8 +11,8 @@ use apriltag::{Detection, Detector, Family};
 pub(super) const FAMILY: &str = "tag36h11";
 /// Noise of a tag's corner, pixels; on rendered boards it is 0.06 along each axis.
 pub(super) const CORNER_SIGMA_PX: f64 = 0.1;
-/// Wrong bits that are forgiven; the least distance between two tags is 11.
-const FORGIVEN: usize = 1;
+/// Wrong bits that are corrected; the least distance between two tags is 11.
+const MAX_WRONG_BITS: usize = 1;
 
 /// All tags in a scene-linear photo, with corners as they were printed; empty where the library gives up.
 ///
@@ -22,7 +22,7 @@ pub(super) fn find(photo: &Image<LinearRgb>, artwork: Artwork) -> Vec<Marker> {
         return Vec::new();
     };
     let Ok(mut detector) = Detector::builder()
-        .add_family_bits(Family::tag_36h11(), FORGIVEN)
+        .add_family_bits(Family::tag_36h11(), MAX_WRONG_BITS)
         .build()
     else {
         return Vec::new();
@@ -43,17 +43,20 @@ fn grey(photo: &Image<LinearRgb>) -> Option<apriltag::Image> {
     if width == 0 || height == 0 {
         return None;
     }
-    let light = |p: &LinearRgb| p.luminance().clamp(0.0, 1.0);
     let brightest = photo
         .pixels()
         .iter()
-        .map(light)
+        .map(clamped_luminance)
         .fold(f32::MIN_POSITIVE, f32::max);
     let mut grey = apriltag::Image::zeros_with_stride(width, height, width).ok()?;
     for (to, from) in grey.as_slice_mut().iter_mut().zip(photo.pixels()) {
-        *to = (255.0 * light(from) / brightest).round() as u8;
+        *to = (255.0 * clamped_luminance(from) / brightest).round() as u8;
     }
     Some(grey)
+}
+
+fn clamped_luminance(pixel: &LinearRgb) -> f32 {
+    pixel.luminance().clamp(0.0, 1.0)
 }
 
 /// The library lists corners anticlockwise from the bottom left of the official picture; OpenCV prints it upside down.
@@ -74,9 +77,8 @@ fn marker(tag: &Detection, artwork: Artwork) -> Option<Marker> {
 mod tests {
     use super::*;
     use crate::camera::simulate::Scenario;
-    use crate::camera::{
-        self, Label, MarkerMap, SolveOptions, Warning, project_picture, with_markers,
-    };
+    use crate::camera::{self, Label, MarkerMap, SolveOptions, project_picture, with_markers};
+    use crate::diagnostic::Code;
     use crate::filter::Pyramid;
     use crate::geom::Point3;
     use crate::pixel::PremulRgba;
@@ -223,7 +225,7 @@ mod tests {
                 !solution
                     .warnings
                     .iter()
-                    .any(|w| matches!(w, Warning::LoneMarker { .. }))
+                    .any(|w| w.code == Code::SmallMarkerSpan)
             );
         }
     }
@@ -237,7 +239,7 @@ mod tests {
             solution
                 .warnings
                 .iter()
-                .any(|w| matches!(w, Warning::LoneMarker { .. })),
+                .any(|w| w.code == Code::SmallMarkerSpan),
             "{:?}",
             solution.warnings
         );

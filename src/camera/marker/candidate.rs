@@ -3,78 +3,83 @@
 use crate::color::linear_to_srgb;
 use crate::filter::box_blur;
 use crate::geom::{Point2, Vector2};
-use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::image::{Image, Mask};
+use crate::pixel::LinearRgb;
+use std::collections::BTreeMap;
 
 /// Half the window of the local mean, in longer picture sides: larger than a marker's border, smaller than its ground.
-const WINDOW: f64 = 1.0 / 40.0;
+const WINDOW_SIDES: f64 = 1.0 / 40.0;
 /// Darker than the local mean by this, display-encoded, is dark.
-const DARKER: f32 = 0.03;
+const DARK_DIFFERENCE: f32 = 0.03;
 /// Regions of fewer pixels cannot be read: cells of 2 pixels.
-const FEWEST_PIXELS: usize = 100;
+const MIN_REGION_PIXELS: usize = 100;
 /// A quadrangle holds this part of its region's hull, at least.
-const FILLED: f64 = 0.88;
+const MIN_HULL_SHARE: f64 = 0.88;
 /// Shortest side, pixels.
-const SHORTEST_PX: f64 = 10.0;
+const MIN_SIDE_PX: f64 = 10.0;
+
+/// First and last column of each row of a region.
+type RowEnds = BTreeMap<usize, (usize, usize)>;
 
 /// Rough corners of every dark quadrangle, clockwise in the picture.
 pub(super) fn quads(photo: &Image<LinearRgb>) -> Vec<[Point2<f64>; 4]> {
     if photo.is_empty() {
         return Vec::new();
     }
-    let tone = photo.map(|p| Coverage(linear_to_srgb(p.luminance())));
-    let radius = (WINDOW * photo.width().max(photo.height()) as f64)
+    let tone = photo.map(|p| linear_to_srgb(p.luminance()));
+    let radius = (WINDOW_SIDES * photo.width().max(photo.height()) as f64)
         .ceil()
         .max(5.0) as usize;
     let ground = box_blur(&tone, radius);
-    let dark = tone.zip_map(&ground, |t, g| t.0 < g.0 - DARKER);
+    let dark = tone.zip_map(&ground, |t, g| t < g - DARK_DIFFERENCE);
     regions(dark)
         .into_iter()
         .filter_map(|region| quad(&region))
         .collect()
 }
 
-/// The outermost pixels of every connected dark region, row by row: its left and right ends.
-fn regions(mut dark: Image<bool>) -> Vec<Vec<Point2<f64>>> {
-    let (w, h) = dark.size();
+/// The outer corners of every connected dark region that is large enough.
+fn regions(mut dark: Mask) -> Vec<Vec<Point2<f64>>> {
     let mut found = Vec::new();
-    let mut stack = Vec::new();
-    for start in 0..w * h {
-        if !dark.pixels()[start] {
+    for start in 0..dark.pixels().len() {
+        if !std::mem::take(&mut dark.pixels_mut()[start]) {
             continue;
         }
-        let (mut pixels, mut ends) = (
-            0,
-            std::collections::BTreeMap::<usize, (usize, usize)>::new(),
-        );
-        dark.pixels_mut()[start] = false;
-        stack.push(start);
-        while let Some(at) = stack.pop() {
-            let (x, y) = (at % w, at / w);
-            pixels += 1;
-            let end = ends.entry(y).or_insert((x, x));
-            *end = (end.0.min(x), end.1.max(x));
-            let next = [
-                (x > 0, at.wrapping_sub(1)),
-                (x + 1 < w, at + 1),
-                (y > 0, at.wrapping_sub(w)),
-                (y + 1 < h, at + w),
-            ];
-            for (_, neighbour) in next.into_iter().filter(|(inside, _)| *inside) {
-                if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
-                    stack.push(neighbour);
-                }
-            }
-        }
-        if pixels >= FEWEST_PIXELS {
+        let (pixels, ends) = take_region(&mut dark, start);
+        if pixels >= MIN_REGION_PIXELS {
             found.push(outer_corners(&ends));
         }
     }
     found
 }
 
+/// Number of pixels and ends of the rows of the region around a pixel, which is taken out of the mask.
+fn take_region(dark: &mut Mask, start: usize) -> (usize, RowEnds) {
+    let (width, height) = dark.size();
+    let (mut pixels, mut ends) = (0, RowEnds::new());
+    let mut stack = vec![start];
+    while let Some(at) = stack.pop() {
+        let (x, y) = (at % width, at / width);
+        pixels += 1;
+        let end = ends.entry(y).or_insert((x, x));
+        *end = (end.0.min(x), end.1.max(x));
+        let next = [
+            (x > 0, at.wrapping_sub(1)),
+            (x + 1 < width, at + 1),
+            (y > 0, at.wrapping_sub(width)),
+            (y + 1 < height, at + width),
+        ];
+        for (_, neighbour) in next.into_iter().filter(|(inside, _)| *inside) {
+            if std::mem::take(&mut dark.pixels_mut()[neighbour]) {
+                stack.push(neighbour);
+            }
+        }
+    }
+    (pixels, ends)
+}
+
 /// The corners of the first and last pixel of each row.
-fn outer_corners(ends: &std::collections::BTreeMap<usize, (usize, usize)>) -> Vec<Point2<f64>> {
+fn outer_corners(ends: &RowEnds) -> Vec<Point2<f64>> {
     let corners = ends.iter().flat_map(|(&y, &(x0, x1))| {
         let (top, bottom) = (y as f64, y as f64 + 1.0);
         let (left, right) = (x0 as f64, x1 as f64 + 1.0);
@@ -85,33 +90,39 @@ fn outer_corners(ends: &std::collections::BTreeMap<usize, (usize, usize)>) -> Ve
 
 /// The four corners of a region that is nearly a quadrangle.
 fn quad(outline: &[Point2<f64>]) -> Option<[Point2<f64>; 4]> {
-    let mean = outline
+    let sum = outline
         .iter()
-        .fold(Vector2::zeros(), |sum, p| sum + p.coords)
-        / outline.len() as f64;
-    let farthest = |from: Point2<f64>| {
-        outline
-            .iter()
-            .copied()
-            .max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()))
-    };
-    let a = farthest(mean.into())?;
-    let c = farthest(a)?;
-    let beside = |p: &Point2<f64>| (c - a).perp(&(p - a));
-    let b = outline
-        .iter()
-        .copied()
-        .min_by(|p, q| beside(p).total_cmp(&beside(q)))?;
-    let d = outline
-        .iter()
-        .copied()
-        .max_by(|p, q| beside(p).total_cmp(&beside(q)))?;
+        .fold(Vector2::zeros(), |sum, p| sum + p.coords);
+    let mean = sum / outline.len() as f64;
+    let a = farthest(outline, mean.into())?;
+    let c = farthest(outline, a)?;
+    let [b, d] = extremes_beside(outline, a, c)?;
     // b lies to the left of the way from a to c, so that a, b, c, d run clockwise where y runs down.
     let corners = [a, b, c, d];
-    let sides = [0, 1, 2, 3].map(|i| (corners[(i + 1) % 4] - corners[i]).norm());
-    let area = polygon_area(&corners);
-    let hull = hull_area(outline);
-    (sides.into_iter().all(|s| s >= SHORTEST_PX) && area >= FILLED * hull).then_some(corners)
+    let are_long = (0..4).all(|i| (corners[(i + 1) % 4] - corners[i]).norm() >= MIN_SIDE_PX);
+    let fills_hull = polygon_area(&corners) >= MIN_HULL_SHARE * hull_area(outline);
+    (are_long && fills_hull).then_some(corners)
+}
+
+fn farthest(points: &[Point2<f64>], from: Point2<f64>) -> Option<Point2<f64>> {
+    points
+        .iter()
+        .copied()
+        .max_by(|a, b| (a - from).norm().total_cmp(&(b - from).norm()))
+}
+
+/// The points farthest to the left and to the right of a line.
+fn extremes_beside(
+    points: &[Point2<f64>],
+    a: Point2<f64>,
+    c: Point2<f64>,
+) -> Option<[Point2<f64>; 2]> {
+    let by_side = |p: &Point2<f64>, q: &Point2<f64>| {
+        let [p, q] = [p, q].map(|point| (c - a).perp(&(point - a)));
+        p.total_cmp(&q)
+    };
+    let left = points.iter().copied().min_by(by_side)?;
+    Some([left, points.iter().copied().max_by(by_side)?])
 }
 
 fn polygon_area(corners: &[Point2<f64>]) -> f64 {
@@ -127,20 +138,22 @@ fn polygon_area(corners: &[Point2<f64>]) -> f64 {
 fn hull_area(points: &[Point2<f64>]) -> f64 {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let chain = |points: &mut dyn Iterator<Item = Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for p in points {
-            while let [.., a, b] = chain[..]
-                && (b - a).perp(&(p - a)) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(p);
-        }
-        chain.pop();
-        chain
-    };
-    let mut hull = chain(&mut sorted.iter().copied());
-    hull.extend(chain(&mut sorted.iter().rev().copied()));
+    let mut hull = half_hull(sorted.iter().copied());
+    hull.extend(half_hull(sorted.iter().rev().copied()));
     polygon_area(&hull).abs()
+}
+
+/// The hull on one side of points in order, without the last of them.
+fn half_hull(points: impl Iterator<Item = Point2<f64>>) -> Vec<Point2<f64>> {
+    let mut chain: Vec<Point2<f64>> = Vec::new();
+    for p in points {
+        while let [.., a, b] = chain[..]
+            && (b - a).perp(&(p - a)) <= 0.0
+        {
+            chain.pop();
+        }
+        chain.push(p);
+    }
+    chain.pop();
+    chain
 }

@@ -2,19 +2,19 @@
 
 use crate::camera::rectangle::square_from_corners;
 use crate::filter::sample_nearest;
-use crate::geom::Point2;
+use crate::geom::{Homography, Point2};
 use crate::image::Image;
 
 /// Cells per side of the pattern, and of the marker with its black border.
-const PATTERN: usize = 4;
-pub(super) const CELLS: usize = PATTERN + 2;
-/// Wrong bits that are forgiven: the least distance between two markers is 4.
-const FORGIVEN: u32 = 1;
+const PATTERN_CELLS: usize = 4;
+pub(super) const MARKER_CELLS: usize = PATTERN_CELLS + 2;
+/// Wrong bits that are corrected: the least distance between two markers is 4.
+const MAX_WRONG_BITS: u32 = 1;
 /// White has to be this many times brighter than black.
-const CONTRAST: f32 = 1.6;
+const MIN_CONTRAST: f32 = 1.6;
 
 /// From here on a white cell counts as too bright for the sensor, scene-linear.
-const OVEREXPOSED: f32 = 0.95;
+const OVEREXPOSED_LIGHT: f32 = 0.95;
 
 /// `DICT_4X4_50` of OpenCV 5.0 (`getPredefinedDictionary`, `getBitsFromByteList`): row by row from the top left, the
 /// highest bit first, 1 is white.
@@ -26,82 +26,83 @@ const DICT_4X4_50: [u16; 50] = [
     0x502e, 0x5013,
 ];
 
-/// A cell of the printed sheet (marker and a white margin of one cell) is white.
-#[cfg(test)]
-pub(super) fn is_white(id: u32, column: usize, row: usize) -> bool {
-    let inner = |i: usize| (2..2 + PATTERN).contains(&i);
-    let margin = |i: usize| i == 0 || i == CELLS + 1;
-    let bit = || DICT_4X4_50[id as usize] >> (15 - (PATTERN * (row - 2) + column - 2)) & 1 == 1;
-    margin(column) || margin(row) || (inner(column) && inner(row) && bit())
-}
+/// Which cells of a marker are white, row by row from the first corner.
+pub(super) type WhiteCells = [[bool; MARKER_CELLS]; MARKER_CELLS];
 
-/// What stands between four corners.
-pub(super) struct Reading {
+/// The marker between four corners, as read.
+pub(super) struct MarkerReading {
     pub(super) id: u32,
     /// How many corners the printed top left is further on.
     pub(super) turns: usize,
-    /// Which cells are white, row by row from the first corner.
-    pub(super) white: [[bool; CELLS]; CELLS],
-    /// White is as bright as the picture's format can say.
+    pub(super) white: WhiteCells,
+    /// White is as bright as the picture's format allows.
     pub(super) is_overexposed: bool,
 }
 
 /// The marker between four corners (clockwise).
-pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<Reading> {
-    let photo_from_square = square_from_corners(corners);
-    let mut cells = [[0.0; CELLS]; CELLS];
-    for (row, line) in cells.iter_mut().enumerate() {
-        for (column, cell) in line.iter_mut().enumerate() {
-            *cell = cell_mean(
-                light,
-                |u, v| photo_from_square.map(Point2::new(u, v)),
-                column,
-                row,
-            )?;
-        }
-    }
-    let all = cells.as_flattened();
+pub(super) fn read(light: &Image<f32>, corners: &[Point2<f64>; 4]) -> Option<MarkerReading> {
+    let cells = cell_means(light, corners)?;
+    let all = cells.as_flattened().iter().copied();
     let (dark, bright) = (
-        all.iter().copied().fold(f32::MAX, f32::min),
-        all.iter().copied().fold(0.0, f32::max),
+        all.clone().fold(f32::MAX, f32::min),
+        all.fold(0.0, f32::max),
     );
     let middle = (dark + bright) / 2.0;
     let white = cells.map(|line| line.map(|cell| cell > middle));
-    let border = |i: usize| i == 0 || i == CELLS - 1;
+    let code = pattern_code(&white)?;
+    if bright < MIN_CONTRAST * dark {
+        return None;
+    }
+    let (id, turns) = lookup(code)?;
+    Some(MarkerReading {
+        id,
+        turns,
+        white,
+        is_overexposed: bright >= OVEREXPOSED_LIGHT,
+    })
+}
+
+/// The light of each cell between four corners; none where the photo does not show one.
+fn cell_means(
+    light: &Image<f32>,
+    corners: &[Point2<f64>; 4],
+) -> Option<[[f32; MARKER_CELLS]; MARKER_CELLS]> {
+    let photo_from_square = square_from_corners(corners);
+    let mut cells = [[0.0; MARKER_CELLS]; MARKER_CELLS];
+    for (row, line) in cells.iter_mut().enumerate() {
+        for (column, cell) in line.iter_mut().enumerate() {
+            *cell = cell_mean(light, &photo_from_square, [column, row])?;
+        }
+    }
+    Some(cells)
+}
+
+/// The bits of the pattern; none where the border is not black.
+fn pattern_code(white: &WhiteCells) -> Option<u16> {
     let mut code = 0;
     for (row, line) in white.iter().enumerate() {
         for (column, &white) in line.iter().enumerate() {
-            match border(row) || border(column) {
+            match is_border(row) || is_border(column) {
                 true if white => return None,
                 true => {}
                 false => code = (code << 1) | u16::from(white),
             }
         }
     }
-    let (id, turns) = if bright < CONTRAST * dark {
-        None
-    } else {
-        lookup(code)
-    }?;
-    Some(Reading {
-        id,
-        turns,
-        white,
-        is_overexposed: bright >= OVEREXPOSED,
-    })
+    Some(code)
 }
 
-/// The mean of nine samples inside a cell.
-fn cell_mean(
-    light: &Image<f32>,
-    place: impl Fn(f64, f64) -> Point2<f64>,
-    column: usize,
-    row: usize,
-) -> Option<f32> {
+fn is_border(i: usize) -> bool {
+    i == 0 || i == MARKER_CELLS - 1
+}
+
+/// The mean of nine samples inside a cell (column and row).
+fn cell_mean(light: &Image<f32>, photo_from_square: &Homography, cell: [usize; 2]) -> Option<f32> {
     let mut sum = 0.0;
     for i in 0..9 {
-        let inside = |cell: usize, k: usize| (cell as f64 + 0.3 + 0.2 * k as f64) / CELLS as f64;
-        let at = place(inside(column, i % 3), inside(row, i / 3));
+        let [u, v] = [(cell[0], i % 3), (cell[1], i / 3)]
+            .map(|(cell, k)| (cell as f64 + 0.3 + 0.2 * k as f64) / MARKER_CELLS as f64);
+        let at = photo_from_square.map(Point2::new(u, v));
         sum += sample_nearest(light, at.x, at.y)?;
     }
     Some(sum / 9.0)
@@ -109,8 +110,10 @@ fn cell_mean(
 
 fn lookup(mut code: u16) -> Option<(u32, usize)> {
     for turns in 0..4 {
-        let near = |&known: &u16| (known ^ code).count_ones() <= FORGIVEN;
-        if let Some(id) = DICT_4X4_50.iter().position(near) {
+        let id = DICT_4X4_50
+            .iter()
+            .position(|&known| (known ^ code).count_ones() <= MAX_WRONG_BITS);
+        if let Some(id) = id {
             return Some((id as u32, turns));
         }
         code = turned(code);
@@ -120,14 +123,24 @@ fn lookup(mut code: u16) -> Option<(u32, usize)> {
 
 /// The pattern turned by a quarter anticlockwise: as read from the next corner clockwise.
 fn turned(code: u16) -> u16 {
-    let bit = |row: usize, column: usize| code >> (15 - (PATTERN * row + column)) & 1;
     let mut turned = 0;
-    for row in 0..PATTERN {
-        for column in 0..PATTERN {
-            turned = turned << 1 | bit(column, PATTERN - 1 - row);
+    for row in 0..PATTERN_CELLS {
+        for column in 0..PATTERN_CELLS {
+            let bit = PATTERN_CELLS * column + PATTERN_CELLS - 1 - row;
+            turned = turned << 1 | code >> (15 - bit) & 1;
         }
     }
     turned
+}
+
+/// A cell of the printed sheet (marker and a white margin of one cell) is white.
+#[cfg(test)]
+pub(super) fn is_white(id: u32, column: usize, row: usize) -> bool {
+    let inner = |i: usize| (2..2 + PATTERN_CELLS).contains(&i);
+    let margin = |i: usize| i == 0 || i == MARKER_CELLS + 1;
+    let bit =
+        || DICT_4X4_50[id as usize] >> (15 - (PATTERN_CELLS * (row - 2) + column - 2)) & 1 == 1;
+    margin(column) || margin(row) || (inner(column) && inner(row) && bit())
 }
 
 #[cfg(test)]

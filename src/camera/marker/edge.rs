@@ -1,15 +1,15 @@
 //! Corners of a dark square to a fraction of a pixel: where its fitted sides meet.
 
-use super::dictionary::CELLS;
+use super::dictionary::{MARKER_CELLS, WhiteCells};
 use crate::camera::rectangle::square_from_corners;
-use crate::geom::{Line, Point2, Vector2};
+use crate::geom::{Homography, Line, Point2, Vector2};
 use crate::image::Image;
 
 /// Stretches along each side, and the part of it near its corners that is not looked at.
-const PROBES: usize = 32;
+const SIDE_PROBES: usize = 32;
 const CORNER_PART: f64 = 0.12;
 /// Samples per pixel across a side.
-const STEPS_PER_PX: f64 = 4.0;
+const SAMPLES_PER_PX: f64 = 4.0;
 /// How far across is looked, in cells of the marker as they are seen across that side: its border is one cell wide, and so
 /// should be the paper's margin.
 const REACH_CELLS: f64 = 0.6;
@@ -17,23 +17,26 @@ const REACH_CELLS: f64 = 0.6;
 const REACH_PX: std::ops::RangeInclusive<f64> = 1.2..=5.0;
 /// The same for edges inside the pattern.
 const INNER_REACH_CELLS: f64 = 0.45;
-/// White that has grown by more, pixels, is another fault; fewer edges than these do not tell.
-const MOST_GROWTH_PX: f64 = 1.0;
-const FEWEST_EDGES: usize = 6;
+/// White that has grown by more, pixels, has another cause; fewer edges than these are not conclusive.
+const MAX_GROWTH_PX: f64 = 1.0;
+const MIN_EDGES: usize = 6;
 /// So often the sides are fitted anew at most; corners that move by less stay.
-const MOST_ROUNDS: usize = 6;
+const MAX_ROUNDS: usize = 6;
 const SETTLED_PX: f64 = 0.01;
 /// Noise of a corner of a marker that is seen as sharp as can be, pixels.
-const LEAST_SIGMA_PX: f64 = 0.03;
-/// Errors of the outline beside those of the cells' edges, which are told by fewer pixels: on rendered views of 0 to 59
+const MIN_SIGMA_PX: f64 = 0.03;
+/// Errors of the outline over those of the cells' edges, which are measured by fewer pixels: on rendered views of 0 to 59
 /// degrees, sharp and blurred, it is 0.4 to 0.8.
-const SIDE_SHARE: f64 = 0.5;
+const OUTLINE_ERROR_SHARE: f64 = 0.5;
 /// Probes farther than this from the fitted line do not belong to it, pixels.
-const OFF_LINE_PX: f64 = 0.7;
+const MAX_OFF_LINE_PX: f64 = 0.7;
+
+/// Across an edge light rises by this at least, scene-linear.
+const MIN_RISE: f64 = 0.02;
 
 /// Corners of a dark square, and how well they are known.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Corners {
+pub(super) struct RefinedCorners {
     pub(super) px: [Point2<f64>; 4],
     /// Standard deviation of a coordinate, pixels.
     pub(super) sigma_px: f64,
@@ -43,7 +46,7 @@ pub(super) struct Corners {
 pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[Point2<f64>; 4]> {
     let mut corners = *rough;
     // From the second time on the probes stand where the sides are.
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let mut lines = [Line {
             normal: Vector2::zeros(),
             offset: 0.0,
@@ -62,105 +65,87 @@ pub(super) fn refined(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<[P
     Some(corners)
 }
 
-/// The corners of a marker by what its cells tell of them.
+/// The corners of a marker, corrected by the edges between its cells.
 ///
 /// In a picture that is too bright for the sensor white has grown over black: a pixel that is half white is as white as one
-/// that is all white, and every edge moves into the dark. The cells tell by how much: each edge between them that rises
+/// that is all white, and every edge moves into the dark. The cells show by how much: each edge between them that rises
 /// along an axis has moved back, each that falls, forward, while the grid they should lie on has shrunk with the outline.
-/// Least squares over all edges of the pattern. How far they are off after that is how far the outline can be believed:
-/// blur moves both where cells are narrow.
+/// Least squares over all edges of the pattern. How far they are off after that is the uncertainty of the outline: blur
+/// moves both where cells are narrow.
 pub(super) fn by_cells(
     light: &Image<f32>,
     corners: &[Point2<f64>; 4],
-    white: &[[bool; CELLS]; CELLS],
+    white: &WhiteCells,
     is_overexposed: bool,
-) -> Option<Corners> {
-    let cells = Cells::of(light, corners, white);
-    let growth = if is_overexposed { cells.growth() } else { 0.0 };
-    let lines = [0, 1, 2, 3].map(|i| {
-        let along = corners[(i + 1) % 4] - corners[i];
-        let normal = Vector2::new(along.y, -along.x).normalize();
-        Line {
-            normal,
-            offset: normal.dot(&corners[i].coords) + growth,
-        }
-    });
+) -> Option<RefinedCorners> {
+    let edges = EdgeShifts::measure(light, corners, white);
+    let growth = if is_overexposed { edges.growth() } else { 0.0 };
+    let lines = [0, 1, 2, 3].map(|i| moved_side(corners, i, growth));
     let mut px = *corners;
     for i in 0..4 {
         px[i] = lines[(i + 3) % 4].meeting(&lines[i])?;
     }
-    let off = cells.off(growth);
+    let off = edges.rms_px(growth);
     // Lines that meet at an acute angle meet far away when one is off.
     let spread = (0..4)
         .map(|i| lines[(i + 3) % 4].normal.perp(&lines[i].normal).powi(-2))
         .sum::<f64>()
         / 4.0;
-    Some(Corners {
+    Some(RefinedCorners {
         px,
-        sigma_px: libm::hypot(LEAST_SIGMA_PX, SIDE_SHARE * off * spread.sqrt()),
+        sigma_px: libm::hypot(MIN_SIGMA_PX, OUTLINE_ERROR_SHARE * off * spread.sqrt()),
     })
 }
 
+/// The line through a side, moved outwards.
+fn moved_side(corners: &[Point2<f64>; 4], first: usize, outwards_px: f64) -> Line {
+    let along = corners[(first + 1) % 4] - corners[first];
+    let normal = Vector2::new(along.y, -along.x).normalize();
+    Line {
+        normal,
+        offset: normal.dot(&corners[first].coords) + outwards_px,
+    }
+}
+
 /// How far the edges between the cells of a marker are from where its corners put them.
-struct Cells {
+struct EdgeShifts {
     /// For each edge by how much a growth of white by a pixel would move it, and by how much it is moved, both towards
     /// where it rises along its axis, pixels.
     moved: Vec<[f64; 2]>,
 }
 
-impl Cells {
-    fn of(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &[[bool; CELLS]; CELLS]) -> Self {
+impl EdgeShifts {
+    fn measure(light: &Image<f32>, corners: &[Point2<f64>; 4], white: &WhiteCells) -> Self {
         let photo_from_square = square_from_corners(corners);
-        let place = |edge: &InnerEdge, along: f64| {
-            let (along, across) = (
-                along / CELLS as f64,
-                (edge.across as f64 + 0.5) / CELLS as f64,
-            );
-            photo_from_square.map(if edge.upright {
-                Point2::new(across, along)
-            } else {
-                Point2::new(along, across)
-            })
-        };
-        let moved = |edge: &InnerEdge| {
-            let along = edge.along as f64;
-            let (foot, step) = (
-                place(edge, along),
-                place(edge, along + 0.5) - place(edge, along - 0.5),
-            );
-            let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
-            let moved = crossing(light, foot, step.normalize() * edge.rising, reach)?;
-            Some([
-                2.0 * along / CELLS as f64 - edge.rising - 1.0,
-                moved * edge.rising,
-            ])
-        };
         Self {
-            moved: inner_edges(white).iter().filter_map(moved).collect(),
+            moved: inner_edges(white)
+                .iter()
+                .filter_map(|edge| edge.shift(light, &photo_from_square))
+                .collect(),
         }
     }
 
-    /// How far white has grown over black, pixels; 0 where too few edges tell.
+    /// How far white has grown over black, pixels; 0 where too few edges were found.
     fn growth(&self) -> f64 {
         let (xy, xx) = self
             .moved
             .iter()
             .fold((0.0, 0.0), |(xy, xx), [x, y]| (xy + x * y, xx + x * x));
-        if self.moved.len() < FEWEST_EDGES {
+        if self.moved.len() < MIN_EDGES {
             0.0
         } else {
-            (xy / xx).clamp(-MOST_GROWTH_PX, MOST_GROWTH_PX)
+            (xy / xx).clamp(-MAX_GROWTH_PX, MAX_GROWTH_PX)
         }
     }
 
     /// Root mean square distance of the edges from their places when white has grown so far, pixels; of too few edges a
     /// pixel.
-    fn off(&self, growth: f64) -> f64 {
+    fn rms_px(&self, growth: f64) -> f64 {
         let squares = self
             .moved
             .iter()
             .map(|[x, y]| (y - growth * x) * (y - growth * x));
-        if self.moved.len() < FEWEST_EDGES {
+        if self.moved.len() < MIN_EDGES {
             1.0
         } else {
             (squares.sum::<f64>() / self.moved.len() as f64).sqrt()
@@ -180,26 +165,51 @@ struct InnerEdge {
     rising: f64,
 }
 
-fn inner_edges(white: &[[bool; CELLS]; CELLS]) -> Vec<InnerEdge> {
+impl InnerEdge {
+    /// The edge between two cells, where one is black and the other white.
+    fn between(white: &WhiteCells, upright: bool, across: usize, along: usize) -> Option<Self> {
+        let [before, after] = [along - 1, along].map(|i| match upright {
+            true => white[i][across],
+            false => white[across][i],
+        });
+        (before != after).then_some(Self {
+            upright,
+            across,
+            along,
+            rising: if after { 1.0 } else { -1.0 },
+        })
+    }
+
+    /// Where the middle of the edge is in the photo, or would be at another line of the grid.
+    fn position(&self, photo_from_square: &Homography, along: f64) -> Point2<f64> {
+        let cells = MARKER_CELLS as f64;
+        let (along, across) = (along / cells, (self.across as f64 + 0.5) / cells);
+        photo_from_square.map(match self.upright {
+            true => Point2::new(across, along),
+            false => Point2::new(along, across),
+        })
+    }
+
+    /// By how much a growth of white by a pixel would move the edge, and by how much it is moved; none where it is not found.
+    fn shift(&self, light: &Image<f32>, photo_from_square: &Homography) -> Option<[f64; 2]> {
+        let along = self.along as f64;
+        let foot = self.position(photo_from_square, along);
+        let step = self.position(photo_from_square, along + 0.5)
+            - self.position(photo_from_square, along - 0.5);
+        let reach = (INNER_REACH_CELLS * step.norm()).clamp(*REACH_PX.start(), *REACH_PX.end());
+        let moved = crossing(light, foot, step.normalize() * self.rising, reach)?;
+        let per_growth = 2.0 * along / MARKER_CELLS as f64 - self.rising - 1.0;
+        Some([per_growth, moved * self.rising])
+    }
+}
+
+fn inner_edges(white: &WhiteCells) -> Vec<InnerEdge> {
     let mut edges = Vec::new();
-    for (upright, across, along) in [false, true]
-        .into_iter()
-        .flat_map(|u| (1..CELLS - 1).flat_map(move |x| (1..CELLS).map(move |a| (u, x, a))))
-    {
-        let cell = |i: usize| {
-            if upright {
-                white[i][across]
-            } else {
-                white[across][i]
-            }
-        };
-        if cell(along - 1) != cell(along) {
-            edges.push(InnerEdge {
-                upright,
-                across,
-                along,
-                rising: if cell(along) { 1.0 } else { -1.0 },
-            });
+    for upright in [false, true] {
+        for across in 1..MARKER_CELLS - 1 {
+            let found = (1..MARKER_CELLS)
+                .filter_map(|along| InnerEdge::between(white, upright, across, along));
+            edges.extend(found);
         }
     }
     edges
@@ -212,18 +222,23 @@ fn side(light: &Image<f32>, corners: &[Point2<f64>; 4], first: usize) -> Option<
     let outward = Vector2::new(along.y, -along.x).normalize();
     // From a steep side a marker is much longer than high, and so are its cells.
     let across = (outward.dot(&(a - d)) + outward.dot(&(b - c))) / 2.0;
-    let reach = (REACH_CELLS * across / CELLS as f64).clamp(*REACH_PX.start(), *REACH_PX.end());
-    let probe = |i: usize| {
-        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / PROBES as f64;
+    let reach =
+        (REACH_CELLS * across / MARKER_CELLS as f64).clamp(*REACH_PX.start(), *REACH_PX.end());
+    let points = (0..SIDE_PROBES).filter_map(|i| {
+        let part = CORNER_PART + (1.0 - 2.0 * CORNER_PART) * (i as f64 + 0.5) / SIDE_PROBES as f64;
         let foot = a + along * part;
         Some(foot + outward * crossing(light, foot, outward, reach)?)
-    };
-    let mut points: Vec<_> = (0..PROBES).filter_map(probe).collect();
+    });
+    line_through_most(points.collect())
+}
+
+/// The line through the probes of a side, without those that are off it; none where half of them are.
+fn line_through_most(mut points: Vec<Point2<f64>>) -> Option<Line> {
     for _ in 0..2 {
         let line = Line::through(&points)?;
-        points.retain(|p| line.distance(*p).abs() < OFF_LINE_PX);
+        points.retain(|p| line.distance(*p).abs() < MAX_OFF_LINE_PX);
     }
-    if points.len() < PROBES / 2 {
+    if points.len() < SIDE_PROBES / 2 {
         None
     } else {
         Line::through(&points)
@@ -237,21 +252,24 @@ fn crossing(
     direction: Vector2<f64>,
     reach: f64,
 ) -> Option<f64> {
-    let steps = (2.0 * reach * STEPS_PER_PX).ceil() as usize;
-    let place = |i: f64| -reach + 2.0 * reach * i / steps as f64;
-    let value = |i: usize| {
-        let at = foot + direction * place(i as f64);
-        f64::from(bilinear(light, at.x - 0.5, at.y - 0.5))
-    };
-    let (mut rise, mut moment, mut before) = (0.0, 0.0, value(0));
-    for i in 1..=steps {
-        let now = value(i);
-        rise += now - before;
-        moment += (now - before) * place(i as f64 - 0.5);
+    let steps = (2.0 * reach * SAMPLES_PER_PX).ceil() as usize;
+    let (mut rise, mut moment, mut before) = (0.0, 0.0, 0.0);
+    for i in 0..=steps {
+        let at = foot + direction * along_probe(i as f64, steps, reach);
+        let now = f64::from(bilinear(light, at.x - 0.5, at.y - 0.5));
+        if i > 0 {
+            rise += now - before;
+            moment += (now - before) * along_probe(i as f64 - 0.5, steps, reach);
+        }
         before = now;
     }
     let edge = moment / rise;
-    (rise > 0.02 && edge.abs() <= reach).then_some(edge)
+    (rise > MIN_RISE && edge.abs() <= reach).then_some(edge)
+}
+
+/// The position of a sample along a probe of so many steps, from its middle.
+fn along_probe(i: f64, steps: usize, reach: f64) -> f64 {
+    -reach + 2.0 * reach * i / steps as f64
 }
 
 /// The value between pixel centres at integers; outside as the nearest pixel inside.

@@ -4,8 +4,9 @@
 //! # Method
 //! Dark regions of a locally thresholded picture whose hull has four corners are candidates; each side is then fitted as a
 //! straight edge in linear light, neighbours meet in the corners, and the cells in between are read as bits. Their edges
-//! tell how far an overexposed white has grown over the black, and the corners are moved back by that; they also tell how
-//! far the outline can be believed, which from a steep side and out of focus is less than from above. The bits are looked up in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
+//! show how far an overexposed white has grown over the black, and the corners are moved back by that; they also show the
+//! uncertainty of the outline, which from a steep side and out of focus is larger than from above. The bits are looked up
+//! in the dictionary in all four rotations, one wrong bit allowed, so that corner 0 is the printed top left.
 
 #[cfg(feature = "markers")]
 mod april;
@@ -13,9 +14,11 @@ mod candidate;
 mod dictionary;
 mod edge;
 
+use super::chi::CHI2_99;
 use super::label::{Label, LabelPoint, MarkerMap, PixelOrigin};
 use super::options::SolveOptions;
-use super::search::TELLING;
+use super::solution::Fit;
+use super::solve::solve;
 use crate::error::{Error, Result};
 use crate::geom::Point2;
 use crate::image::Image;
@@ -23,11 +26,11 @@ use crate::pixel::LinearRgb;
 
 /// The family of markers that is always found.
 pub const FAMILY: &str = "DICT_4X4_50";
-/// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no marker by itself tells.
+/// Least noise of a corner that a label states, pixels: lenses bend and paper is not flat, which no marker by itself shows.
 /// Root mean square on the sample background with markers.
-const LEAST_SIGMA_PX: f64 = 0.15;
+const MIN_STATED_SIGMA_PX: f64 = 0.15;
 /// Markers that fit less well than this are tried in the other directions, too.
-const IMPROBABLE: f64 = 1e-4;
+const POOR_FIT_P: f64 = 1e-4;
 
 /// A marker in a photo.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,32 +47,29 @@ pub struct Marker {
 pub fn find_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     let light = photo.map(LinearRgb::luminance);
     let mut found: Vec<Marker> = candidate::quads(photo)
-        .into_iter()
-        .filter_map(|rough| {
-            let fine = edge::refined(&light, &rough)?;
-            let dictionary::Reading {
-                id,
-                turns,
-                white,
-                is_overexposed,
-            } = dictionary::read(&light, &fine)?;
-            let edge::Corners { px, sigma_px } =
-                edge::by_cells(&light, &fine, &white, is_overexposed)?;
-            Some(Marker {
-                id,
-                corners_px: [0, 1, 2, 3].map(|i| px[(i + turns) % 4]),
-                sigma_px,
-            })
-        })
+        .iter()
+        .filter_map(|rough| marker_at(&light, rough))
         .collect();
     found.sort_by(|a, b| {
-        a.id.cmp(&b.id)
-            .then(a.corners_px[0].x.total_cmp(&b.corners_px[0].x))
+        let [left, right] = [a, b].map(|marker| marker.corners_px[0].x);
+        a.id.cmp(&b.id).then(left.total_cmp(&right))
     });
     found
 }
 
-/// The markers of every family that is known, of which nothing but their size is told.
+/// The marker between four rough corners.
+fn marker_at(light: &Image<f32>, rough: &[Point2<f64>; 4]) -> Option<Marker> {
+    let fine = edge::refined(light, rough)?;
+    let reading = dictionary::read(light, &fine)?;
+    let corners = edge::by_cells(light, &fine, &reading.white, reading.is_overexposed)?;
+    Some(Marker {
+        id: reading.id,
+        corners_px: [0, 1, 2, 3].map(|i| corners.px[(i + reading.turns) % 4]),
+        sigma_px: corners.sigma_px,
+    })
+}
+
+/// The markers of every known family, of which nothing but their size is given.
 pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
     #[cfg(feature = "markers")]
     {
@@ -78,11 +78,11 @@ pub(crate) fn any_markers(photo: &Image<LinearRgb>) -> Vec<Marker> {
             return tags;
         }
     }
-    let floored = |marker: Marker| Marker {
-        sigma_px: marker.sigma_px.max(LEAST_SIGMA_PX),
-        ..marker
-    };
-    find_markers(photo).into_iter().map(floored).collect()
+    let mut found = find_markers(photo);
+    for marker in &mut found {
+        marker.sigma_px = marker.sigma_px.max(MIN_STATED_SIGMA_PX);
+    }
+    found
 }
 
 /// The label with the corners of its markers, found in its photo, as points of known place.
@@ -108,21 +108,26 @@ pub fn with_markers(label: Label, photo: &Image<LinearRgb>) -> Result<Label> {
             "none of them was found in the photo",
         ));
     }
-    let turned = |turns| with_points(&label, map, &found, least_px, turns);
-    let turns = turns_that_fit(turned);
+    let layout = MarkerLayout {
+        label: &label,
+        map,
+        found: &found,
+        min_sigma_px: least_px,
+    };
+    let turns = layout.fitting_turns();
     if turns > 0 {
         let degrees = 90 * turns;
         log::warn!(
-            "markers: they fit the map only when turned by {degrees} degrees (markers.artwork, or the map's axes)"
+            "markers: they fit the map only if turned by {degrees} degrees (markers.artwork, or the map's axes)"
         );
     }
-    Ok(turned(turns))
+    Ok(layout.label_turned(turns))
 }
 
 /// The markers of a map's family, and the least noise that is stated of their corners.
 fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>, f64)> {
     match map.family.as_str() {
-        FAMILY => Ok((find_markers(photo), LEAST_SIGMA_PX)),
+        FAMILY => Ok((find_markers(photo), MIN_STATED_SIGMA_PX)),
         #[cfg(feature = "markers")]
         april::FAMILY => Ok((april::find(photo, map.artwork), april::CORNER_SIGMA_PX)),
         #[cfg(not(feature = "markers"))]
@@ -137,60 +142,75 @@ fn find_family(map: &MarkerMap, photo: &Image<LinearRgb>) -> Result<(Vec<Marker>
     }
 }
 
-/// The label with the corners of some markers as points, each marker turned by so many right angles.
-fn with_points(
-    label: &Label,
-    map: &MarkerMap,
-    found: &[Marker],
-    least_px: f64,
-    turns: usize,
-) -> Label {
-    let mut label = label.clone();
-    let half = map.size_m / 2.0;
-    let offset = if label.pixel_origin == PixelOrigin::Center {
-        0.5
-    } else {
-        0.0
-    };
-    for (marker, [x, y, z]) in found.iter().filter_map(|m| Some((m, map.map.get(&m.id)?))) {
-        let places = [
-            [x - half, y + half],
-            [x + half, y + half],
-            [x + half, y - half],
-            [x - half, y - half],
-        ];
-        for (i, [x, y]) in places.into_iter().enumerate() {
-            let px = marker.corners_px[(i + turns) % 4];
-            label.points.push(LabelPoint {
-                xyz_m: [x, y, *z],
-                px: [px.x - offset, px.y - offset],
-                sigma_px: Some(marker.sigma_px.max(least_px)),
-                note: Some(format!("marker {}", marker.id)),
-            });
-        }
-    }
-    label
+/// Markers that were found in the photo of a label with a marker map.
+struct MarkerLayout<'a> {
+    label: &'a Label,
+    map: &'a MarkerMap,
+    found: &'a [Marker],
+    /// Least noise that is stated of their corners, pixels.
+    min_sigma_px: f64,
 }
 
-/// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where the
-/// photo does not tell.
-fn turns_that_fit(turned: impl Fn(usize) -> Label) -> usize {
-    let chi2 = |turns| {
-        super::solve(&turned(turns), &SolveOptions::default()).map_or(f64::INFINITY, |s| s.fit.chi2)
-    };
-    let straight = super::solve(&turned(0), &SolveOptions::default()).ok();
-    if straight
-        .as_ref()
-        .is_some_and(|s| s.fit.p_value.is_none_or(|p| p >= IMPROBABLE))
-    {
-        return 0;
+impl MarkerLayout<'_> {
+    /// The label with the corners of the markers as points, each marker turned by so many right angles.
+    fn label_turned(&self, turns: usize) -> Label {
+        let mut label = self.label.clone();
+        for marker in self.found {
+            label.points.extend(self.points(marker, turns));
+        }
+        label
     }
-    let straight = straight.map_or(f64::INFINITY, |s| s.fit.chi2);
-    let others = (1..4).map(|turns| (turns, chi2(turns)));
-    let best = others
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .filter(|(_, chi2)| chi2 + TELLING < straight);
-    best.map_or(0, |(turns, _)| turns)
+
+    /// The corners of a marker where the map has it; none where it has not.
+    fn points(&self, marker: &Marker, turns: usize) -> impl Iterator<Item = LabelPoint> {
+        let center = self.map.map.get(&marker.id).copied();
+        let half = self.map.size_m / 2.0;
+        let offset = match self.label.pixel_origin {
+            PixelOrigin::Center => 0.5,
+            PixelOrigin::Corner => 0.0,
+        };
+        let sigma_px = marker.sigma_px.max(self.min_sigma_px);
+        let marker = *marker;
+        center.into_iter().flat_map(move |[x, y, z]| {
+            let places = [
+                [x - half, y + half],
+                [x + half, y + half],
+                [x + half, y - half],
+                [x - half, y - half],
+            ];
+            [0, 1, 2, 3].map(|i| {
+                let px = marker.corners_px[(i + turns) % 4];
+                LabelPoint {
+                    xyz_m: [places[i][0], places[i][1], z],
+                    px: [px.x - offset, px.y - offset],
+                    sigma_px: Some(sigma_px),
+                    note: Some(format!("marker {}", marker.id)),
+                }
+            })
+        })
+    }
+
+    /// By how many right angles the markers have to be turned for a camera to fit clearly better than as they are; 0 where
+    /// the photo does not decide it.
+    fn fitting_turns(&self) -> usize {
+        let straight = self.fit(0);
+        if straight.is_some_and(|fit| fit.p_value.is_none_or(|p| p >= POOR_FIT_P)) {
+            return 0;
+        }
+        let straight = straight.map_or(f64::INFINITY, |fit| fit.chi2);
+        (1..4)
+            .map(|turns| (turns, self.fit(turns).map_or(f64::INFINITY, |fit| fit.chi2)))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, chi2)| chi2 + CHI2_99 < straight)
+            .map_or(0, |(turns, _)| turns)
+    }
+
+    /// How well a camera fits the markers when they are turned.
+    fn fit(&self, turns: usize) -> Option<Fit> {
+        let label = self.label_turned(turns);
+        let solution = solve(&label, &SolveOptions::default()).ok()?;
+        Some(solution.fit)
+    }
 }
 
 #[cfg(test)]

@@ -33,7 +33,7 @@ impl CheckedImage {
         part: Part,
         class_count: Option<usize>,
     ) -> Self {
-        let checksum = io::Checksum::of(folder.join(&path))
+        let checksum = io::Checksum::from_file(folder.join(&path))
             .ok()
             .map(|sum| (sum.bytes, sum.crc32));
         let mut image = Self {

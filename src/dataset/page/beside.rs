@@ -193,7 +193,7 @@ fn figure(set: &LabelledSet, picture: &LabelledPicture) -> Option<Figure> {
     let mut figure = Figure::whole(&picture.path, size)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
-    let (letter, top) = (figure.letter(), figure.top());
+    let (letter, top) = (figure.letter_height(), figure.top());
     for (class, shares) in picture.boxes.iter().flatten() {
         let bbox = in_pixels(*shares, size);
         let (name, color) = (set.name(*class), super::color_of(*class));

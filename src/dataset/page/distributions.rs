@@ -49,12 +49,12 @@ fn drawn_histogram(key: &str, values: &[f64], range: Option<([f64; 2], bool)>) -
         Some(([low, high], true)) => {
             let ends = [low - 0.5, high + 0.5];
             let mut histogram =
-                Histogram::of(key, values, ends, integer_bars([low, high])).uniform();
+                Histogram::new(key, values, ends, integer_bars([low, high])).uniform();
             histogram.ends = [low.to_string(), high.to_string()];
             histogram
         }
-        Some((range, false)) => Histogram::of(key, values, range, HISTOGRAM_BINS).uniform(),
-        None => Histogram::of(key, values, extremes(values), HISTOGRAM_BINS),
+        Some((range, false)) => Histogram::new(key, values, range, HISTOGRAM_BINS).uniform(),
+        None => Histogram::new(key, values, extremes(values), HISTOGRAM_BINS),
     }
 }
 
@@ -124,20 +124,20 @@ fn count_histogram(
     let counts: Vec<f64> = samples.iter().map(|sample| count(sample) as f64).collect();
     let most = counts.iter().copied().fold(1.0, f64::max);
     let bins = (most as usize + 1).min(MAX_COUNT_BINS);
-    let mut histogram = Histogram::of(title, &counts, [-0.5, most + 0.5], bins);
+    let mut histogram = Histogram::new(title, &counts, [-0.5, most + 0.5], bins);
     histogram.ends = ["0".into(), most.to_string()];
     histogram
 }
 
 /// Seen shares of objects.
 pub(super) fn visible_histogram(title: &str, shares: &[f64]) -> Histogram {
-    Histogram::of(title, shares, [0.0, 1.0], HISTOGRAM_BINS)
+    Histogram::new(title, shares, [0.0, 1.0], HISTOGRAM_BINS)
 }
 
 fn side_histogram(title: &str, boxes: &[[f64; 2]], side: usize) -> Histogram {
     let sides: Vec<f64> = boxes.iter().map(|sides| sides[side]).collect();
     let largest = boxes.iter().flatten().copied().fold(1.0, f64::max);
-    Histogram::of(title, &sides, [0.0, largest], HISTOGRAM_BINS)
+    Histogram::new(title, &sides, [0.0, largest], HISTOGRAM_BINS)
 }
 
 /// Adds where the labels are, all of them and those of each class that is not too many.

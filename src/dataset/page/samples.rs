@@ -153,7 +153,7 @@ fn longer_sides(sample: &SampleSummary) -> impl Iterator<Item = f64> {
 fn figure(shown: &ShownSample, classes: &[String], why: Option<&str>) -> Result<Figure> {
     let record = &shown.record;
     let mut figure = Figure::whole(&shown.picture, record.labels.image.map(f64::from))?;
-    let letter = figure.letter();
+    let letter = figure.letter_height();
     let (mut boxes, mut masks, mut others) = (String::new(), String::new(), String::new());
     let mut labelled = 0;
     for object in &record.labels.objects {

@@ -125,11 +125,11 @@ fn figure(run: &Run, mistake: &Mistake, options: &EvalReportOptions) -> Option<F
     let shown = ShownMistake::new(run, mistake);
     let Picture { path, size } = options.pictures.get(mistake.sheet)?.as_ref()?;
     let view = shown.view(*size);
-    let mut figure = Figure::of(path, *size, view)
+    let mut figure = Figure::cropped(path, *size, view)
         .inspect_err(|error| log::warn!("{error}"))
         .ok()?;
     let canvas = Canvas {
-        letter: figure.letter(),
+        letter: figure.letter_height(),
         top: figure.top(),
         options,
     };

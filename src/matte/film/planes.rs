@@ -21,27 +21,30 @@ pub fn film_planes(
         transmittance.size(),
         "film and transmittance differ in size"
     );
-    let color = |of: fn(LinearRgb) -> f32| film.pixels().iter().map(|f| of(f.color)).collect();
-    let view = |of: fn(LinearRgb) -> f32| {
-        film.pixels()
-            .iter()
-            .map(|f| of(f.transmittance()))
-            .collect()
-    };
-    let measured =
-        |of: fn(LinearRgb) -> f32| transmittance.pixels().iter().map(|&t| of(t)).collect();
+    let alpha = film.pixels().iter().map(|f| f.to_rgba().a).collect();
+    let [r, g, b] = channels(film, |f| f.color);
+    let [tr, tg, tb] = channels(transmittance, |t| t);
+    let [vr, vg, vb] = channels(film, Film::transmittance);
     vec![
-        ("R", color(|c| c.r)),
-        ("G", color(|c| c.g)),
-        ("B", color(|c| c.b)),
-        ("A", film.pixels().iter().map(|f| f.to_rgba().a).collect()),
-        (TRANSMITTANCE[0], measured(|t| t.r)),
-        (TRANSMITTANCE[1], measured(|t| t.g)),
-        (TRANSMITTANCE[2], measured(|t| t.b)),
-        (VIEW_TRANSMITTANCE[0], view(|t| t.r)),
-        (VIEW_TRANSMITTANCE[1], view(|t| t.g)),
-        (VIEW_TRANSMITTANCE[2], view(|t| t.b)),
+        ("R", r),
+        ("G", g),
+        ("B", b),
+        ("A", alpha),
+        (TRANSMITTANCE[0], tr),
+        (TRANSMITTANCE[1], tg),
+        (TRANSMITTANCE[2], tb),
+        (VIEW_TRANSMITTANCE[0], vr),
+        (VIEW_TRANSMITTANCE[1], vg),
+        (VIEW_TRANSMITTANCE[2], vb),
     ]
+}
+
+/// The three channels of a colour of every pixel.
+fn channels<P: Copy>(image: &Image<P>, color: impl Fn(P) -> LinearRgb) -> [Vec<f32>; 3] {
+    [0, 1, 2].map(|c| {
+        let channel = |&p: &P| <[f32; 3]>::from(color(p))[c];
+        image.pixels().iter().map(channel).collect()
+    })
 }
 
 #[cfg(test)]

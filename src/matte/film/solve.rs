@@ -1,8 +1,9 @@
 //! One pixel of film: by which factor it is the plastic of its photo.
 
 use super::FilmOptions;
-use super::tint::{CLEAR, body};
+use super::tint::{CLEAR_TRANSMITTANCE, scattered_tint};
 use crate::pixel::LinearRgb;
+use std::ops::RangeInclusive;
 
 /// How see-through a pixel is beside flat plastic.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -11,7 +12,7 @@ pub(super) struct Factor {
     pub(super) value: f32,
     /// Standard deviation of it.
     pub(super) sigma: f32,
-    /// What the photo alone says, before anything bounds it.
+    /// What the photo alone gives, before anything bounds it.
     pub(super) raw: f32,
     /// Reflected light, of the channels that the screen has little of.
     pub(super) reflected: f32,
@@ -33,52 +34,57 @@ pub(super) struct Solver {
     spread: f32,
 }
 
-/// Tints must differ by so much of the largest to tell glint from scattered light.
-const TELLING: f32 = 0.25;
-/// Light of the key channel over the others' that tells nothing, however many pixels have it; its square is a number still.
-const LEAST_GAIN: f32 = 1e-12;
-/// Coded pictures are no finer than this.
-const FINEST: f32 = 0.004;
+/// Tints must differ by so much of the largest to separate glint from scattered light.
+const MIN_TINT_CONTRAST: f32 = 0.25;
+/// Least light of the key channel over the others': with less no pixel measures anything. Its square is a number still.
+const MIN_GAIN: f32 = 1e-12;
+/// Noise of a pixel at least: coded pictures are no finer.
+const MIN_NOISE: f32 = 0.004;
 /// Clear plastic reflects neutrally: this much of the error of the key channel's reflection is due to the tint.
-const DUE_TO_TINT: f32 = 0.8;
+const TINT_ERROR_SHARE: f32 = 0.8;
 /// Scene-linear value from which on to which reflected light passes from that of plastic to that of paint. An exposure that
 /// has the screen at 0.3 to 0.45 has white paper at 0.5.
-const PAINT: [f32; 2] = [0.15, 0.3];
+const PAINT_LIGHT: RangeInclusive<f32> = 0.15..=0.3;
 /// Difference of two channels from what plastic can reflect, as a share of the larger, beyond which it is paint; lights a
 /// fifth warmer or colder than the photo's white make a third of it.
-const COLOURED: f32 = 0.4;
+const MAX_CAST_DIFFERENCE: f32 = 0.4;
 /// The same, scene-linear light, that noise and rounding leave in dark places; single pixels of noise are no paint yet.
-const COLOURED_LEAST: f32 = 0.02;
+const MAX_DARK_CAST_DIFFERENCE: f32 = 0.02;
 
 impl Solver {
     pub(super) fn new(key: usize, flat: [f32; 3], noise: LinearRgb, opts: &FilmOptions) -> Self {
         let others = [(key + 1) % 3, (key + 2) % 3];
-        let tinted = 1.0 - (flat[key] / CLEAR).clamp(0.0, 1.0) * DUE_TO_TINT;
-        let body = body(flat);
+        let clearness = (flat[key] / CLEAR_TRANSMITTANCE).clamp(0.0, 1.0);
+        let scattered = scattered_tint(flat);
         Self {
             key,
             others,
             flat,
-            shares: shares(key, others, body),
-            cast: body[others[1]] / body[others[0]],
-            noise: noise.r.max(noise.g).max(noise.b).max(FINEST),
-            reflection_error: opts.reflection_error * tinted,
+            shares: shares(key, others, scattered),
+            cast: scattered[others[1]] / scattered[others[0]],
+            noise: noise.r.max(noise.g).max(noise.b).max(MIN_NOISE),
+            reflection_error: opts.reflection_error * (1.0 - clearness * TINT_ERROR_SHARE),
             spread: opts.thickness_spread,
         }
     }
 
     /// The factor on a screen with a hue.
     pub(super) fn solve(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
-        self.drawn(pixel, screen, |reflected, _| {
-            self.expected(pixel, reflected)
-        })
+        let measured = self.measure(pixel, screen);
+        let brightest = pixel[self.others[0]]
+            .max(pixel[self.others[1]])
+            .max(measured.reflected);
+        self.combine(pixel, &measured, plastic_factor(brightest))
     }
 
-    /// The factor on a screen that has too little hue to tell much: that of flat plastic unless more light is left than
+    /// The factor on a screen that has too little hue to measure much: that of flat plastic unless more light is left than
     /// plastic throws back. The deviation is that of something of which it is not known whether it is plastic.
     pub(super) fn guess(&self, pixel: [f32; 3], screen: [f32; 3]) -> Factor {
-        let left = |through: [f32; 3]| (0..3).map(|c| pixel[c] - through[c]).fold(0.0, f32::max);
-        let factor = self.drawn(pixel, screen, |_, through| plastic(left(through)));
+        let measured = self.measure(pixel, screen);
+        let left = (0..3)
+            .map(|c| pixel[c] - measured.through[c])
+            .fold(0.0, f32::max);
+        let factor = self.combine(pixel, &measured, plastic_factor(left));
         Factor {
             raw: factor.value,
             sigma: factor.sigma / self.spread,
@@ -86,30 +92,39 @@ impl Solver {
         }
     }
 
-    /// What the photo says, drawn to what is expected from the reflected light, or from the screen behind flat plastic.
-    fn drawn(
-        &self,
-        pixel: [f32; 3],
-        screen: [f32; 3],
-        expected: impl Fn(f32, [f32; 3]) -> f32,
-    ) -> Factor {
-        let mixed = |of: [f32; 3]| {
-            self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]]
-        };
+    /// What the photo alone gives.
+    #[inline(always)]
+    fn measure(&self, pixel: [f32; 3], screen: [f32; 3]) -> Measured {
         let through: [f32; 3] = std::array::from_fn(|c| self.flat[c] * screen[c]);
-        let reflected = mixed(pixel).max(0.0);
-        let gain = (through[self.key] - mixed(through)).max(LEAST_GAIN);
-        let raw = (pixel[self.key] - mixed(pixel)) / gain;
+        let reflected = self.mixed(pixel).max(0.0);
+        let gain = (through[self.key] - self.mixed(through)).max(MIN_GAIN);
         let reflection = self.reflection_error * reflected;
-        let variance = (reflection * reflection + self.noise * self.noise) / (gain * gain);
+        Measured {
+            through,
+            reflected,
+            factor: (pixel[self.key] - self.mixed(pixel)) / gain,
+            variance: (reflection * reflection + self.noise * self.noise) / (gain * gain),
+        }
+    }
+
+    /// The part of the other channels that makes up the key channel's reflection.
+    #[inline(always)]
+    fn mixed(&self, of: [f32; 3]) -> f32 {
+        self.shares[0] * of[self.others[0]] + self.shares[1] * of[self.others[1]]
+    }
+
+    /// What the photo gives, drawn to what is expected by the variances.
+    #[inline(always)]
+    fn combine(&self, pixel: [f32; 3], measured: &Measured, expected: f32) -> Factor {
+        let &Measured {
+            through,
+            factor: raw,
+            variance,
+            ..
+        } = measured;
         let prior = self.spread * self.spread;
-        let drawn = (raw * prior + expected(reflected, through) * variance) / (prior + variance);
-        // Nothing reflects less than no light: no channel shows more screen than light.
-        let bound = (0..3)
-            .map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE))
-            .fold(f32::MAX, f32::min);
-        let most = 1.0 / self.flat.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-        let value = drawn.min(bound).clamp(0.0, most);
+        let drawn = (raw * prior + expected * variance) / (prior + variance);
+        let value = drawn.min(bound(pixel, through)).clamp(0.0, self.most());
         let [a, b] = self.others.map(|c| pixel[c] - value * through[c]);
         Factor {
             value,
@@ -120,6 +135,12 @@ impl Solver {
         }
     }
 
+    /// The factor at which the clearest channel lets everything through.
+    #[inline(always)]
+    fn most(&self) -> f32 {
+        1.0 / self.flat.iter().copied().fold(f32::MIN_POSITIVE, f32::max)
+    }
+
     /// Plastic reflects neutrally, scatters in its own tint, or both: what lies beyond is paint.
     fn is_coloured(&self, a: f32, b: f32) -> bool {
         let [least, most] = if self.cast < 1.0 {
@@ -128,30 +149,42 @@ impl Solver {
             [a, self.cast * a]
         };
         let beyond = (least - b).max(b - most);
-        beyond > COLOURED_LEAST + COLOURED * a.abs().max(b.abs())
+        beyond > MAX_DARK_CAST_DIFFERENCE + MAX_CAST_DIFFERENCE * a.abs().max(b.abs())
     }
+}
 
-    /// The factor of a pixel of which nothing but its brightness is known: plastic, or paint.
-    fn expected(&self, pixel: [f32; 3], reflected: f32) -> f32 {
-        let brightest = pixel[self.others[0]]
-            .max(pixel[self.others[1]])
-            .max(reflected);
-        plastic(brightest)
-    }
+/// What a pixel alone gives.
+struct Measured {
+    /// The screen through flat plastic.
+    through: [f32; 3],
+    /// Reflected light of the key channel.
+    reflected: f32,
+    factor: f32,
+    /// Of the factor.
+    variance: f32,
+}
+
+/// Nothing reflects less than no light: no channel shows more screen than light.
+#[inline(always)]
+fn bound(pixel: [f32; 3], through: [f32; 3]) -> f32 {
+    (0..3)
+        .map(|c| pixel[c] / through[c].max(f32::MIN_POSITIVE))
+        .fold(f32::MAX, f32::min)
 }
 
 /// The factor of what reflects so much light: plastic, or paint.
-fn plastic(brightest: f32) -> f32 {
-    ((PAINT[1] - brightest) / (PAINT[1] - PAINT[0])).clamp(0.0, 1.0)
+fn plastic_factor(brightest: f32) -> f32 {
+    let (low, high) = (PAINT_LIGHT.start(), PAINT_LIGHT.end());
+    ((high - brightest) / (high - low)).clamp(0.0, 1.0)
 }
 
 /// The shares of two channels' light that make up the third's, for light of which a part is neutral and the rest has the
-/// colour `body`; half and half where the two do not differ.
-fn shares(key: usize, [a, b]: [usize; 2], body: [f32; 3]) -> [f32; 2] {
-    let soft = TELLING * body.iter().copied().fold(0.0, f32::max);
-    let differ = body[a] - body[b];
-    let share =
-        (differ * (body[key] - body[b]) + 0.5 * soft * soft) / (differ * differ + soft * soft);
+/// colour `scattered`; half and half where the two do not differ.
+fn shares(key: usize, [a, b]: [usize; 2], scattered: [f32; 3]) -> [f32; 2] {
+    let soft = MIN_TINT_CONTRAST * scattered.iter().copied().fold(0.0, f32::max);
+    let differ = scattered[a] - scattered[b];
+    let share = (differ * (scattered[key] - scattered[b]) + 0.5 * soft * soft)
+        / (differ * differ + soft * soft);
     let share = share.clamp(0.0, 1.0);
     [share, 1.0 - share]
 }
@@ -165,7 +198,7 @@ mod tests {
     fn clear() -> Solver {
         Solver::new(
             1,
-            [CLEAR; 3],
+            [CLEAR_TRANSMITTANCE; 3],
             LinearRgb::grey(0.001),
             &FilmOptions::default(),
         )
@@ -174,7 +207,7 @@ mod tests {
     #[test]
     fn neutral_glint_on_clear_plastic_is_told_from_the_screen() {
         for (u, glint) in [(1.0, 0.0), (0.8, 0.1), (0.3, 0.05), (1.2, 0.12)] {
-            let pixel = GREEN.map(|k| u * CLEAR * k + glint);
+            let pixel = GREEN.map(|k| u * CLEAR_TRANSMITTANCE * k + glint);
             let found = clear().solve(pixel, GREEN);
             assert!(
                 (found.value - u).abs() < 0.02,
@@ -186,7 +219,8 @@ mod tests {
     #[test]
     fn paint_of_another_colour_than_the_plastic_is_told_from_its_glints() {
         let seen = |reflected: [f32; 3]| {
-            let pixel = std::array::from_fn(|c| 0.5 * CLEAR * GREEN[c] + reflected[c]);
+            let pixel =
+                std::array::from_fn(|c| 0.5 * CLEAR_TRANSMITTANCE * GREEN[c] + reflected[c]);
             clear().solve(pixel, GREEN).coloured
         };
         assert!(seen([0.3, 0.35, 0.02]) && seen([0.02, 0.1, 0.3]));

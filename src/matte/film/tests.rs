@@ -241,7 +241,7 @@ fn noise_of_3_percent_is_survived_and_told() {
     let found = world.solved();
     let error = world.error(&found, |_| true);
     assert!(error < 0.045, "{error}");
-    let mean = |found: &FilmMatte| found.uncertainty.pixels().iter().map(|u| u.0).sum::<f32>();
+    let mean = |found: &FilmMatte| found.uncertainty.pixels().iter().sum::<f32>();
     assert!(mean(&found) > 2.0 * mean(&World::default().solved()));
 }
 
@@ -272,7 +272,7 @@ fn a_label_of_the_screens_hue_is_opaque_and_said() {
     assert!(world.error(&found, is_label) < 0.08);
     assert!(
         found.diagnostics.iter().any(|d| d.code == Code::ScreenHue)
-            && found.doubts.screen_hue > 0.1,
+            && found.color_uncertainty.screen_hue > 0.1,
         "{:?}",
         found.diagnostics
     );
@@ -342,9 +342,9 @@ fn on_a_board_without_a_hue_film_is_guessed_and_said_and_better_than_a_slab_or_t
             found.diagnostics
         );
         assert!(
-            found.uncertainty[(50, 60)].0 > 0.1 && found.doubts.confidence() < 0.7,
+            found.uncertainty[(50, 60)] > 0.1 && found.color_uncertainty.confidence() < 0.7,
             "{:?}",
-            found.doubts
+            found.color_uncertainty
         );
         let cut = |cutout: Image<PremulRgba>| {
             let film: Image<Film> = cutout.zip_map(&inside(), |p, m| p.masked(m).into());
@@ -450,7 +450,10 @@ fn a_label_of_the_screens_colour_is_keyed_away_and_that_is_said() {
             "{:?}",
             painted.diagnostics
         );
-        let sure = [plain.doubts.confidence(), painted.doubts.confidence()];
+        let sure = [
+            plain.color_uncertainty.confidence(),
+            painted.color_uncertainty.confidence(),
+        ];
         assert!(sure[0] > 0.7 && sure[1] < 0.2, "{sure:?}");
     }
 }

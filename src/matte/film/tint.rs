@@ -1,174 +1,223 @@
-//! The plastic of a photo: which dye, and how much of it, told from the pixels that reflect least.
+//! The plastic of a photo: which dye, and how much of it, found from the pixels that reflect least.
 
-use super::bright::is_screen;
+use super::object::{OPAQUE, dot, is_screen};
 use crate::image::Image;
 use crate::matte::plate::ScreenPlate;
 use crate::pixel::{Coverage, LinearRgb};
 
-/// Plastic where it lies flat.
+/// Plastic where it lies flat, as a photo shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Tint {
+pub(super) struct Tint {
     /// Its transmittance as measured: two walls looked through, and lit through.
+    pub(super) flat: [f32; 3],
+    /// How far tints that explain the photo as well differ from it in some channel.
+    pub(super) uncertainty: f32,
+}
+
+/// A tint that is tried.
+#[derive(Clone, Copy)]
+struct TintHypothesis {
     flat: [f32; 3],
-    /// Median misfit of the pixels it was told from, in standard deviations squared.
+    /// Median misfit of the sampled pixels, in standard deviations squared.
     misfit: f32,
 }
 
 /// Transmittance of two clear walls of PET, looked through and lit through: 8 surfaces that reflect 5 to 10 % each.
-pub(in crate::matte) const CLEAR: f32 = 0.56;
+pub(in crate::matte) const CLEAR_TRANSMITTANCE: f32 = 0.56;
 
 /// Absorbances per channel of the dyes that PET bottles have: light blue, green and brown, the fractions that
 /// recyclers sort clear bottles from. Only the ratios count; the amount is fitted.
-const DYES: [[f32; 3]; 3] = [[1.0, 0.32, 0.03], [1.0, 0.25, 0.78], [0.3, 0.72, 1.0]];
+const DYE_ABSORBANCES: [[f32; 3]; 3] = [[1.0, 0.32, 0.03], [1.0, 0.25, 0.78], [0.3, 0.72, 1.0]];
 /// Amounts of a dye that are tried: the least that differs from clear, the most that leaves any light, the step.
-const AMOUNTS: [f32; 3] = [0.3, 5.0, 0.1];
-/// Least transmittance of the screen's channel; plastic that passes less cannot be told from opaque.
-const LEAST: f32 = 0.005;
-/// Share of the object that reflects least, and tells its tint.
-pub(super) const DARKEST: f64 = 0.25;
-/// Pixels that are asked for the share above, and of them for the tint.
-const ASKED: [usize; 2] = [20_000, 400];
+const DYE_AMOUNTS: [f32; 3] = [0.3, 5.0, 0.1];
+/// Least transmittance of the screen's channel; plastic that passes less cannot be distinguished from opaque.
+const MIN_KEY_TRANSMITTANCE: f32 = 0.005;
+/// Share of the object that reflects least, and shows its tint.
+pub(super) const DARKEST_SHARE: f64 = 0.25;
+/// Pixels that are sampled to find the darkest.
+const OBJECT_SAMPLES: usize = 20_000;
+/// Pixels among the darkest that are sampled for the tint.
+const TINT_SAMPLES: usize = 400;
 /// Share of the screen's strongest channel from which on, in the screen's shade, a pixel is bare screen: plastic passes
 /// three quarters at most.
-const BARE: f32 = 0.9;
+const MIN_BARE_SHARE: f32 = 0.9;
 /// Noise of a pixel: least, and as a share of its value.
-const NOISE: [f32; 2] = [0.004, 0.05];
+const PIXEL_NOISE: [f32; 2] = [0.004, 0.05];
 /// Misfit beyond which a pixel is something else than plastic.
-const OUTLIER: f32 = 25.0;
-/// Weight of thickness: misfit that plastic twice as see-through as it should be counts for.
-const THICKNESS: f32 = 1.0;
+const MAX_MISFIT: f32 = 25.0;
+/// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
+const THICKNESS_WEIGHT: f32 = 1.0;
 /// Misfit by which a dye must be better than clear plastic.
-const DYED: f32 = 0.4;
+const DYE_HANDICAP: f32 = 0.4;
 /// How much the light that plastic scatters has of its tint: as if it went halfway through.
-const BODY: f32 = 0.5;
+const SCATTER_DEPTH: f32 = 0.5;
+/// Flat plastic passes at most so many times what two walls do.
+const MAX_THICKNESS_FACTOR: f32 = 1.3;
+/// Misfit by which tints are as good as each other.
+const EQUAL_MISFIT: f32 = 0.1;
 
 /// What the light scattered by the plastic itself is multiplied by, per channel; 1 for clear.
-pub(super) fn body(flat: [f32; 3]) -> [f32; 3] {
-    flat.map(|t| libm::powf(t / CLEAR, BODY))
+pub(super) fn scattered_tint(flat: [f32; 3]) -> [f32; 3] {
+    flat.map(|t| libm::powf(t / CLEAR_TRANSMITTANCE, SCATTER_DEPTH))
 }
-
-/// The tint that explains the darkest pixels best, and how far those that explain them as well differ from it in some channel.
-///
-/// `asked` is the share of the object that is asked, the darkest first: all of it where a screen has no hue, since what is
-/// dark there may as well be paint. Each hypothesis, clear or a dye of some amount, is held against every asked pixel: how far it is from
-/// `u * flat * screen + f * body` with the best thickness factor u and reflection f that are not negative. The lowest median wins.
-pub(super) fn fit(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    key: usize,
-    asked: f64,
-) -> ([f32; 3], f32) {
-    let pixels = darkest(photo, plate, inside, key, asked);
-    let clear = judged([CLEAR; 3], &pixels, 0.0);
-    let tints = dyed()
-        .filter(|flat| flat[key] >= LEAST)
-        .map(|flat| judged(flat, &pixels, DYED));
-    let tints: Vec<Tint> = std::iter::once(clear).chain(tints).collect();
-    let best = tints.iter().fold(clear, |best, tint| {
-        if tint.misfit < best.misfit {
-            *tint
-        } else {
-            best
-        }
-    });
-    let alike = tints
-        .iter()
-        .filter(|tint| tint.misfit <= best.misfit + ALIKE);
-    let differs = |tint: &Tint| {
-        (0..3)
-            .map(|c| (tint.flat[c] - best.flat[c]).abs())
-            .fold(0.0, f32::max)
-    };
-    (best.flat, alike.map(differs).fold(0.0, f32::max))
-}
-
-/// Misfit by which tints are as good as each other.
-const ALIKE: f32 = 0.1;
 
 /// Transmittance of flat plastic with each dye in each amount.
 pub(in crate::matte) fn dyed() -> impl Iterator<Item = [f32; 3]> {
-    let count = ((AMOUNTS[1] - AMOUNTS[0]) / AMOUNTS[2]) as usize;
-    let amounts = (0..=count).map(|i| AMOUNTS[0] + i as f32 * AMOUNTS[2]);
-    amounts.flat_map(|amount| DYES.map(|dye| dye.map(|a| CLEAR * libm::expf(-amount * a))))
+    let [least, most, step] = DYE_AMOUNTS;
+    let count = ((most - least) / step) as usize;
+    let amounts = (0..=count).map(move |i| least + i as f32 * step);
+    amounts.flat_map(|amount| {
+        DYE_ABSORBANCES.map(|dye| dye.map(|a| CLEAR_TRANSMITTANCE * libm::expf(-amount * a)))
+    })
+}
+
+/// The pixels that show a tint.
+pub(super) struct TintSamples {
+    /// The screen's strongest channel.
+    key: usize,
+    pixels: Vec<ScreenPair>,
 }
 
 /// A pixel of the photo and of the screen behind it.
-type Pair = ([f32; 3], [f32; 3]);
-
-/// The asked pixels: wholly inside, no bare screen, and darkest in the channels that the screen has little of.
-fn darkest(
-    photo: &Image<LinearRgb>,
-    plate: &ScreenPlate,
-    inside: &Image<Coverage>,
-    key: usize,
-    share: f64,
-) -> Vec<Pair> {
-    let is_bare = |i: usize| {
-        let (pixel, screen): Pair = (photo.pixels()[i].into(), plate.image.pixels()[i].into());
-        pixel[key] >= BARE * screen[key] && is_screen(pixel, screen)
-    };
-    let is_whole = |i: usize| inside.pixels()[i].0 >= WHOLE && !is_bare(i);
-    let whole: Vec<usize> = (0..photo.pixels().len()).filter(|&i| is_whole(i)).collect();
-    let step = (whole.len() / ASKED[0]).max(1);
-    let others = |i: usize| {
-        let p: [f32; 3] = photo.pixels()[i].into();
-        p[(key + 1) % 3] + p[(key + 2) % 3]
-    };
-    let mut asked: Vec<(f32, usize)> = whole
-        .into_iter()
-        .step_by(step)
-        .map(|i| (others(i), i))
-        .collect();
-    asked.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    asked.truncate((asked.len() as f64 * share).ceil() as usize);
-    let step = (asked.len() / ASKED[1]).max(1);
-    let pair = |(_, i): (f32, usize)| (photo.pixels()[i].into(), plate.image.pixels()[i].into());
-    asked.into_iter().step_by(step).map(pair).collect()
+#[derive(Clone, Copy)]
+struct ScreenPair {
+    pixel: [f32; 3],
+    screen: [f32; 3],
 }
 
-/// Coverage from which on a pixel is wholly inside: one 8-bit code below 1.
-pub(in crate::matte) const WHOLE: f32 = 0.99;
+impl TintSamples {
+    /// A share of the object, the darkest first in the channels that the screen has little of: pixels wholly inside that are
+    /// no bare screen. All of it where a screen has no hue, since what is dark there may as well be paint.
+    pub(super) fn new(
+        photo: &Image<LinearRgb>,
+        plate: &ScreenPlate,
+        inside: &Image<Coverage>,
+        key: usize,
+        share: f64,
+    ) -> Self {
+        let pair = |i: usize| ScreenPair {
+            pixel: photo.pixels()[i].into(),
+            screen: plate.image.pixels()[i].into(),
+        };
+        let object: Vec<usize> = (0..photo.pixels().len())
+            .filter(|&i| inside.pixels()[i].0 >= OPAQUE && !pair(i).is_bare(key))
+            .collect();
+        let sampled = object
+            .iter()
+            .copied()
+            .step_by((object.len() / OBJECT_SAMPLES).max(1));
+        let mut sampled: Vec<(f32, usize)> = sampled.map(|i| (pair(i).reflected(key), i)).collect();
+        sampled.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        sampled.truncate((sampled.len() as f64 * share).ceil() as usize);
+        let step = (sampled.len() / TINT_SAMPLES).max(1);
+        Self {
+            key,
+            pixels: sampled
+                .iter()
+                .step_by(step)
+                .map(|(_, i)| pair(*i))
+                .collect(),
+        }
+    }
 
-fn judged(flat: [f32; 3], pixels: &[Pair], handicap: f32) -> Tint {
-    let scattered = body(flat);
-    let fits: Vec<(f32, f32)> = pixels
-        .iter()
-        .map(|pixel| explained(pixel, flat, scattered))
-        .collect();
-    let misfit = median(fits.iter().map(|fit| fit.0));
-    let thickness = median(fits.iter().map(|fit| fit.1));
-    Tint {
-        flat,
-        misfit: misfit + THICKNESS * (thickness - 1.0).powi(2) + handicap,
+    /// The tint that explains the pixels best.
+    ///
+    /// # Method
+    /// Each hypothesis, clear or a dye of some amount, is compared with every pixel: how far it is from
+    /// `u * flat * screen + f * scattered` with the best thickness factor u and reflection f that are not negative. The
+    /// lowest median wins.
+    pub(super) fn fit(&self) -> Tint {
+        let clear = self.judge([CLEAR_TRANSMITTANCE; 3], 0.0);
+        let dyed = dyed()
+            .filter(|flat| flat[self.key] >= MIN_KEY_TRANSMITTANCE)
+            .map(|flat| self.judge(flat, DYE_HANDICAP));
+        let tried: Vec<TintHypothesis> = std::iter::once(clear).chain(dyed).collect();
+        let best = tried.iter().fold(clear, |best, tint| {
+            if tint.misfit < best.misfit {
+                *tint
+            } else {
+                best
+            }
+        });
+        let as_good = tried
+            .iter()
+            .filter(|tint| tint.misfit <= best.misfit + EQUAL_MISFIT);
+        Tint {
+            flat: best.flat,
+            uncertainty: as_good
+                .map(|tint| largest_difference(tint.flat, best.flat))
+                .fold(0.0, f32::max),
+        }
+    }
+
+    fn judge(&self, flat: [f32; 3], handicap: f32) -> TintHypothesis {
+        let scattered = scattered_tint(flat);
+        let fits: Vec<PixelFit> = self
+            .pixels
+            .iter()
+            .map(|pair| pair.explained_by(flat, scattered))
+            .collect();
+        let misfit = median(fits.iter().map(|fit| fit.misfit));
+        let thickness = median(fits.iter().map(|fit| fit.thickness));
+        TintHypothesis {
+            flat,
+            misfit: misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap,
+        }
     }
 }
 
-/// Squared misfit of a pixel and its thickness factor, by least squares with neither coefficient negative.
-fn explained((pixel, screen): &Pair, flat: [f32; 3], scattered: [f32; 3]) -> (f32, f32) {
-    let noise = pixel.map(|p| NOISE[0] + NOISE[1] * p.max(0.0));
-    let through: [f32; 3] = std::array::from_fn(|c| flat[c] * screen[c] / noise[c]);
-    let body: [f32; 3] = std::array::from_fn(|c| scattered[c] / noise[c]);
-    let seen: [f32; 3] = std::array::from_fn(|c| pixel[c] / noise[c]);
-    let dot = |a: &[f32; 3], b: &[f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (aa, bb, ab) = (
-        dot(&through, &through),
-        dot(&body, &body),
-        dot(&through, &body),
-    );
-    let (sa, sb) = (dot(&seen, &through), dot(&seen, &body));
-    let determinant = (aa * bb - ab * ab).max(f32::MIN_POSITIVE);
-    let u = ((sa * bb - sb * ab) / determinant).clamp(0.0, THICKEST);
-    let f = ((sb - u * ab) / bb.max(f32::MIN_POSITIVE)).max(0.0);
-    let u = ((sa - f * ab) / aa.max(f32::MIN_POSITIVE)).clamp(0.0, THICKEST);
-    let misfit: f32 = (0..3)
-        .map(|c| (seen[c] - u * through[c] - f * body[c]).powi(2))
-        .sum();
-    (misfit.min(OUTLIER), u)
+fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f32::max)
 }
 
-/// Flat plastic passes at most so many times what two walls do.
-const THICKEST: f32 = 1.3;
+/// How well plastic of a tint explains a pixel.
+struct PixelFit {
+    /// In standard deviations squared.
+    misfit: f32,
+    /// Times that the pixel is as see-through as flat plastic.
+    thickness: f32,
+}
+
+impl ScreenPair {
+    fn is_bare(&self, key: usize) -> bool {
+        self.pixel[key] >= MIN_BARE_SHARE * self.screen[key] && is_screen(self.pixel, self.screen)
+    }
+
+    /// Light of the channels that the screen has little of.
+    fn reflected(&self, key: usize) -> f32 {
+        self.pixel[(key + 1) % 3] + self.pixel[(key + 2) % 3]
+    }
+
+    /// Least squares over the channels, in units of their noise, with neither coefficient negative.
+    fn explained_by(&self, flat: [f32; 3], scattered: [f32; 3]) -> PixelFit {
+        let noise = self
+            .pixel
+            .map(|p| PIXEL_NOISE[0] + PIXEL_NOISE[1] * p.max(0.0));
+        let through = std::array::from_fn(|c| flat[c] * self.screen[c] / noise[c]);
+        let body = std::array::from_fn(|c| scattered[c] / noise[c]);
+        let seen = std::array::from_fn(|c| self.pixel[c] / noise[c]);
+        let (thickness, reflection) = non_negative_fit(seen, through, body);
+        let misfit: f32 = (0..3)
+            .map(|c| (seen[c] - thickness * through[c] - reflection * body[c]).powi(2))
+            .sum();
+        PixelFit {
+            misfit: misfit.min(MAX_MISFIT),
+            thickness,
+        }
+    }
+}
+
+/// The factors of `through` (no more than plastic can have) and of `body` whose sum is nearest to `seen`.
+#[inline(always)]
+fn non_negative_fit(seen: [f32; 3], through: [f32; 3], body: [f32; 3]) -> (f32, f32) {
+    let (aa, bb, ab) = (dot(through, through), dot(body, body), dot(through, body));
+    let (sa, sb) = (dot(seen, through), dot(seen, body));
+    let determinant = (aa * bb - ab * ab).max(f32::MIN_POSITIVE);
+    let u = ((sa * bb - sb * ab) / determinant).clamp(0.0, MAX_THICKNESS_FACTOR);
+    let f = ((sb - u * ab) / bb.max(f32::MIN_POSITIVE)).max(0.0);
+    let u = ((sa - f * ab) / aa.max(f32::MIN_POSITIVE)).clamp(0.0, MAX_THICKNESS_FACTOR);
+    (u, f)
+}
 
 fn median(values: impl Iterator<Item = f32>) -> f32 {
     let mut values: Vec<f32> = values.collect();
@@ -189,7 +238,7 @@ mod tests {
 
     /// Plastic of one tint with glints, on a screen.
     fn photo(flat: [f32; 3], screen: LinearRgb) -> Image<LinearRgb> {
-        let b = body(flat);
+        let b = scattered_tint(flat);
         Image::from_fn(60, 40, |x, y| {
             let (thick, haze) = (0.9 + 0.002 * x as f32, 0.01 + 0.002 * y as f32);
             let k: [f32; 3] = screen.into();
@@ -197,42 +246,36 @@ mod tests {
         })
     }
 
+    fn fit(photo: &Image<LinearRgb>, plate: &ScreenPlate, key: usize) -> Tint {
+        let all = Image::filled(60, 40, Coverage(1.0));
+        TintSamples::new(photo, plate, &all, key, DARKEST_SHARE).fit()
+    }
+
     fn found(flat: [f32; 3], screen: LinearRgb, key: usize) -> [f32; 3] {
         let plate = ScreenPlate::even(screen, (60, 40));
-        fit(
-            &photo(flat, screen),
-            &plate,
-            &Image::filled(60, 40, Coverage(1.0)),
-            key,
-            DARKEST,
-        )
-        .0
+        fit(&photo(flat, screen), &plate, key).flat
     }
 
     #[test]
     fn clear_plastic_is_clear_on_any_screen() {
-        assert_eq!(found([0.56; 3], GREEN, 1), [CLEAR; 3]);
-        assert_eq!(found([0.52; 3], BLUE, 2), [CLEAR; 3]);
+        assert_eq!(found([0.56; 3], GREEN, 1), [CLEAR_TRANSMITTANCE; 3]);
+        assert_eq!(found([0.52; 3], BLUE, 2), [CLEAR_TRANSMITTANCE; 3]);
     }
 
     #[test]
     fn the_tint_of_plastic_of_the_screens_hue_is_unsure_and_known_to_be() {
         let unsure = |flat: [f32; 3], screen, key| {
             let plate = ScreenPlate::even(screen, (60, 40));
-            fit(
-                &photo(flat, screen),
-                &plate,
-                &Image::filled(60, 40, Coverage(1.0)),
-                key,
-                DARKEST,
-            )
-            .1
+            fit(&photo(flat, screen), &plate, key).uncertainty
         };
         for green in [[0.05, 0.3, 0.09], [0.03, 0.27, 0.06]] {
             let [on_green, on_blue] = [unsure(green, GREEN, 1), unsure(green, BLUE, 2)];
             assert!(on_green > 0.08 && on_blue < 0.03, "{on_green} {on_blue}");
         }
-        assert!(unsure([CLEAR; 3], GREEN, 1) < 0.03 && unsure([CLEAR; 3], BLUE, 2) < 0.03);
+        assert!(
+            unsure([CLEAR_TRANSMITTANCE; 3], GREEN, 1) < 0.03
+                && unsure([CLEAR_TRANSMITTANCE; 3], BLUE, 2) < 0.03
+        );
     }
 
     #[test]
@@ -252,13 +295,12 @@ mod tests {
 
     #[test]
     fn bare_screen_under_a_wide_mask_has_no_dye() {
-        let (key, all) = (1, Image::filled(60, 40, Coverage(1.0)));
         let plate = ScreenPlate::even(GREEN, (60, 40));
-        assert_eq!(fit(&plate.image, &plate, &all, key, DARKEST).0, [CLEAR; 3]);
+        assert_eq!(fit(&plate.image, &plate, 1).flat, [CLEAR_TRANSMITTANCE; 3]);
         // Half of the mask is a brown bottle: the other half says nothing of it.
         let (bottle, flat) = (photo([0.17, 0.05, 0.015], GREEN), [0.17, 0.05, 0.015]);
         let half = Image::from_fn(60, 40, |x, y| if x < 30 { bottle[(x, y)] } else { GREEN });
-        let told = fit(&half, &plate, &all, key, DARKEST).0;
+        let told = fit(&half, &plate, 1).flat;
         assert!((0..3).all(|c| (told[c] - flat[c]).abs() < 0.06), "{told:?}");
     }
 }

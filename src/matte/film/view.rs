@@ -6,6 +6,7 @@
 //! the sight as it blocks the light. Deep inside it lies flat: what dims the screen there is mostly shadow, light that the
 //! folds above sent elsewhere, and the sight goes on; only what lets hardly anything through is a label or a fold.
 
+use super::object::side_px;
 use crate::filter;
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
@@ -15,78 +16,81 @@ use std::ops::RangeInclusive;
 // finds it and that for the true T. The powers are those of a free fit, rounded.
 
 /// V of flat plastic over the root of its T.
-const FLAT: f32 = 1.033;
+const FLAT_VIEW_GAIN: f32 = 1.033;
 /// At the rim V falls with u, T over that of flat plastic, like this times `u^(5/4)`.
-const RIM: f32 = 0.77;
+const RIM_GAIN: f32 = 0.77;
 /// Deep inside it is that of flat plastic, and turns to nothing around this u, with its third power.
-const TURNS: f32 = 0.45;
-/// Depth below the outline where both count the same, with its power 5/2; depths are shares of the side of a square of the
+const OPAQUE_RATIO: f32 = 0.45;
+/// Depth below the outline where both weigh the same, with its power 5/2, as a share of the side of a square of the
 /// object's area.
-const HALFWAY: f32 = 0.05;
+const RIM_DEPTH: f32 = 0.05;
 /// Blur of T, standard deviation as a share of that side: finer than that are only grains of light on the screen.
-const GRAIN: f32 = 0.0025;
+const GRAIN_SIZE: f32 = 0.0025;
 /// No plastic passes more than so many times what flat plastic does.
-const CLEAREST: f32 = 1.3;
-/// From the first transmittance on to the second a pixel passes for bare screen.
-const BARE: RangeInclusive<f32> = 0.9..=0.97;
+const MAX_RATIO: f32 = 1.3;
+/// From the first transmittance on to the second a pixel turns to bare screen.
+const BARE_TRANSMITTANCE: RangeInclusive<f32> = 0.9..=0.97;
 
 /// View transmittance from the measured one, channel by channel, of plastic that where it lies flat measures `flat`.
 ///
-/// `transmittance` is that of the object alone, wherever `inside` is not 0; elsewhere nothing is asked of it.
+/// `transmittance` is that of the object alone, wherever `inside` is not 0; elsewhere it is ignored.
 pub(in crate::matte) fn view(
     transmittance: &Image<LinearRgb>,
     flat: LinearRgb,
     inside: &Image<Coverage>,
 ) -> Image<LinearRgb> {
-    let side = inside
-        .pixels()
-        .iter()
-        .map(|c| f64::from(c.0))
-        .sum::<f64>()
-        .sqrt() as f32;
+    let side = side_px(inside);
     let depths = filter::depth(&inside.map(|c| c.0 >= 0.5));
     let weighted = transmittance.zip_map(inside, |t, c| {
         PremulRgba::new(t.r * c.0, t.g * c.0, t.b * c.0, c.0)
     });
-    let smooth = filter::gaussian_blur(&weighted, GRAIN * side);
+    let smooth = filter::gaussian_blur(&weighted, GRAIN_SIZE * side);
     smooth.zip3_map(&depths, transmittance, |smooth, depth, t| {
         let smooth = smooth
             .color()
             .scale(smooth.a.max(f32::MIN_POSITIVE).recip());
-        // Outside the object, where nothing is asked, there is nothing to smooth either.
+        // Outside the object there is nothing to smooth.
         if smooth == LinearRgb::BLACK {
             return smooth;
         }
         let inner = flatness(depth / side.max(f32::MIN_POSITIVE));
-        let channel = |smooth: f32, flat: f32, t: f32| {
-            let plastic =
-                (FLAT * flat.sqrt() * relative(smooth / flat.max(f32::MIN_POSITIVE), inner))
-                    .clamp(0.0, 1.0);
-            let bare = ((t - BARE.start()) / (BARE.end() - BARE.start())).clamp(0.0, 1.0);
-            plastic + bare * (1.0 - plastic)
-        };
         LinearRgb::new(
-            channel(smooth.r, flat.r, t.r),
-            channel(smooth.g, flat.g, t.g),
-            channel(smooth.b, flat.b, t.b),
+            channel_view(smooth.r, flat.r, t.r, inner),
+            channel_view(smooth.g, flat.g, t.g, inner),
+            channel_view(smooth.b, flat.b, t.b, inner),
         )
     })
 }
 
+/// View transmittance of one channel: `smooth` is its T without grain, `flat` that of flat plastic, `t` its own T.
+#[inline(always)]
+fn channel_view(smooth: f32, flat: f32, t: f32, inner: f32) -> f32 {
+    let plastic =
+        (FLAT_VIEW_GAIN * flat.sqrt() * relative_view(smooth / flat.max(f32::MIN_POSITIVE), inner))
+            .clamp(0.0, 1.0);
+    let (low, high) = (BARE_TRANSMITTANCE.start(), BARE_TRANSMITTANCE.end());
+    let bare = ((t - low) / (high - low)).clamp(0.0, 1.0);
+    plastic + bare * (1.0 - plastic)
+}
+
 /// How far plastic so deep below the outline counts as flat, 0 to 1.
 fn flatness(depth: f32) -> f32 {
-    let ratio = depth / HALFWAY;
+    let ratio = depth / RIM_DEPTH;
     let power = (ratio * ratio * ratio.sqrt()).min(f32::MAX);
     power / (1.0 + power)
 }
 
 /// V over that of flat plastic, by T over that of flat plastic.
-fn relative(u: f32, inner: f32) -> f32 {
-    let u = u.clamp(0.0, CLEAREST);
-    let rim = RIM * u * u.sqrt().sqrt();
-    let cube = |x: f32| x * x * x;
-    let deep = cube(u) * (1.0 + cube(TURNS)) / (cube(u) + cube(TURNS));
+fn relative_view(u: f32, inner: f32) -> f32 {
+    let u = u.clamp(0.0, MAX_RATIO);
+    let rim = RIM_GAIN * u * u.sqrt().sqrt();
+    let deep = cube(u) * (1.0 + cube(OPAQUE_RATIO)) / (cube(u) + cube(OPAQUE_RATIO));
     rim + inner * (deep - rim)
+}
+
+#[inline(always)]
+fn cube(x: f32) -> f32 {
+    x * x * x
 }
 
 #[cfg(test)]
@@ -135,7 +139,7 @@ mod tests {
     #[test]
     fn more_is_never_seen_through_less() {
         for inner in [0.0, 0.3, 1.0] {
-            let at = |i: u8| relative(f32::from(i) / 100.0, inner);
+            let at = |i: u8| relative_view(f32::from(i) / 100.0, inner);
             assert!((1..=150).all(|i| at(i) >= at(i - 1)));
         }
     }

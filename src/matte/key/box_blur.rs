@@ -1,13 +1,13 @@
 //! Box blur with Blender's two windows, sums in Blender's order.
 
-use super::calm::{Calm, Extremes, RUN};
+use super::calm::{Calm, Extremes, RUN_COLUMNS};
 use super::model::Behaviour;
 use super::options::{Blur, KeyOptions};
-use super::rows::{Pad, Rows, Source, Window, around, window_rows};
-use super::running_blur::{Reach, RunningBlur};
+use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
+use super::running_blur::{BoxReach, RunningBlur};
 
 /// A plane blurred by a box of `size` (at least 1), in the way that the options ask for.
-pub(super) fn blurred<'a>(
+pub(super) fn box_blurred<'a>(
     source: impl Rows + 'a,
     opts: &KeyOptions,
     size: u32,
@@ -17,7 +17,7 @@ pub(super) fn blurred<'a>(
     match opts.blur {
         Blur::Exact => Box::new(BoxBlur::new(source, behaviour, size, picture)),
         Blur::RunningSum => {
-            let reach = Kernel::new(behaviour, size, picture).reach();
+            let reach = BoxKernel::new(behaviour, size, picture).reach();
             Box::new(RunningBlur::new(source, reach, picture))
         }
     }
@@ -26,7 +26,7 @@ pub(super) fn blurred<'a>(
 /// A plane blurred by a box, along x and then along y.
 struct BoxBlur<S> {
     source: S,
-    kernel: Kernel,
+    kernel: BoxKernel,
     height: usize,
     padded: Vec<f32>,
     window: Window,
@@ -36,7 +36,7 @@ struct BoxBlur<S> {
 }
 
 /// The window of a blur.
-enum Kernel {
+enum BoxKernel {
     /// Cut off at the border: the mean of the samples inside, `radius` to each side.
     CutOff { radius: usize, columns: Vec<f32> },
     /// Repeating the border: the weights of the centre and of the samples at distance 1, 2, ..., and what they make of a
@@ -44,7 +44,7 @@ enum Kernel {
     Repeat { weights: Vec<f32>, of_ones: f32 },
 }
 
-impl Kernel {
+impl BoxKernel {
     fn new(behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
         if behaviour.repeats_border() {
             let weights = weights(size);
@@ -56,21 +56,21 @@ impl Kernel {
         Self::CutOff {
             radius,
             columns: (0..width)
-                .map(|x| around(x, radius, width).len() as f32)
+                .map(|x| rows_around(x, radius, width).len() as f32)
                 .collect(),
         }
     }
 
     /// The samples whose weight is not 0.
-    fn reach(&self) -> Reach {
+    fn reach(&self) -> BoxReach {
         match self {
-            Self::CutOff { radius, .. } => Reach {
+            Self::CutOff { radius, .. } => BoxReach {
                 radius: *radius,
                 repeat: false,
             },
             Self::Repeat { weights, .. } => {
                 let radius = weights.iter().filter(|w| **w > 0.0).count() - 1;
-                Reach {
+                BoxReach {
                     radius,
                     repeat: true,
                 }
@@ -101,7 +101,7 @@ fn weights(size: usize) -> Vec<f32> {
 impl<S: Rows> BoxBlur<S> {
     /// A blur of `size` (at least 1) over a plane of that width and height.
     fn new(source: S, behaviour: Behaviour, size: usize, (width, height): (usize, usize)) -> Self {
-        let kernel = Kernel::new(behaviour, size, (width, height));
+        let kernel = BoxKernel::new(behaviour, size, (width, height));
         let capacity = window_rows(kernel.radius(), height);
         Self {
             source,
@@ -126,20 +126,20 @@ impl<S: Rows> Rows for BoxBlur<S> {
             calm_source,
             calm,
         } = self;
-        window.cover(around(y, kernel.radius(), *height), |y, row| {
+        window.cover_rows(rows_around(y, kernel.radius(), *height), |y, row| {
             let inside = kernel.radius()..kernel.radius() + row.len();
             source.row(y, &mut padded[inside.clone()]);
-            calm_source.note(0, &padded[inside]);
+            calm_source.note_row(0, &padded[inside]);
             kernel.along_x(padded, calm_source, row);
-            calm.note(y, row);
+            calm.note_row(y, row);
         });
         kernel.along_y(window, calm, (y, *height), out);
     }
 }
 
-impl Kernel {
+impl BoxKernel {
     /// A plane of 0 stays what it is, and so nearly does a plane of 1.
-    fn settled(&self, near: Extremes) -> Option<f32> {
+    fn settled_value(&self, near: Extremes) -> Option<f32> {
         let is =
             |v: f32| near.least.to_bits() == v.to_bits() && near.greatest.to_bits() == v.to_bits();
         let of_ones = if let Self::Repeat { of_ones, .. } = self {
@@ -161,21 +161,21 @@ impl Kernel {
         } else {
             Pad::Repeat
         };
-        pad.fill(padded, radius);
-        calm.fill(
+        pad.fill_margins(padded, radius);
+        calm.fill_row(
             out,
             (0, 0..1, radius),
-            |_, near| self.settled(near),
+            |_, near| self.settled_value(near),
             |columns, out| {
                 let at = |offset: usize| &padded[columns.start + offset..columns.end + offset];
                 match self {
                     Self::CutOff {
                         columns: counts, ..
                     } => {
-                        mean(out, 2 * radius + 1, at, &counts[columns.clone()]);
+                        mean_of_rows(out, 2 * radius + 1, at, &counts[columns.clone()]);
                     }
                     Self::Repeat { weights, .. } => {
-                        weigh(out, weights, at(radius), |i| {
+                        weighted_sum(out, weights, at(radius), |i| {
                             [at(radius + i), at(radius - i)]
                         });
                     }
@@ -192,17 +192,17 @@ impl Kernel {
         (y, height): (usize, usize),
         out: &mut [f32],
     ) {
-        let rows = around(y, self.radius(), height);
-        calm.fill(
+        let rows = rows_around(y, self.radius(), height);
+        calm.fill_row(
             out,
             (y, rows.clone(), 0),
-            |_, near| self.settled(near),
+            |_, near| self.settled_value(near),
             |columns, out| {
                 let at = |row: usize| &window.row(row)[columns.clone()];
                 match self {
                     Self::CutOff { .. } => {
-                        let counts = [rows.len() as f32; RUN];
-                        mean(
+                        let counts = [rows.len() as f32; RUN_COLUMNS];
+                        mean_of_rows(
                             out,
                             rows.len(),
                             |i| at(rows.end - 1 - i),
@@ -210,7 +210,7 @@ impl Kernel {
                         );
                     }
                     Self::Repeat { weights, .. } => {
-                        weigh(out, weights, at(y), |i| {
+                        weighted_sum(out, weights, at(y), |i| {
                             [at(y.saturating_sub(i)), at((y + i).min(height - 1))]
                         });
                     }
@@ -221,7 +221,7 @@ impl Kernel {
 }
 
 /// Rows added in one go, so that sums stay in registers; the order is that of one at a time.
-const AT_ONCE: usize = 4;
+const ROWS_AT_ONCE: usize = 4;
 
 /// Adds up `count` rows in order, over how many samples of each sum lie inside the picture.
 #[multiversion::multiversion(targets(
@@ -229,10 +229,15 @@ const AT_ONCE: usize = 4;
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn mean<'a, F: Fn(usize) -> &'a [f32]>(out: &mut [f32], count: usize, row: F, inside: &[f32]) {
+fn mean_of_rows<'a, F: Fn(usize) -> &'a [f32]>(
+    out: &mut [f32],
+    count: usize,
+    row: F,
+    inside: &[f32],
+) {
     out.fill(0.0);
-    let whole = count - count % AT_ONCE;
-    for i in (0..whole).step_by(AT_ONCE) {
+    let whole = count - count % ROWS_AT_ONCE;
+    for i in (0..whole).step_by(ROWS_AT_ONCE) {
         let rows = row(i)
             .iter()
             .zip(row(i + 1))
@@ -256,7 +261,7 @@ fn mean<'a, F: Fn(usize) -> &'a [f32]>(out: &mut [f32], count: usize, row: F, in
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn weigh<'a, F: Fn(usize) -> [&'a [f32]; 2]>(
+fn weighted_sum<'a, F: Fn(usize) -> [&'a [f32]; 2]>(
     out: &mut [f32],
     weights: &[f32],
     centre: &[f32],

@@ -4,13 +4,13 @@
 //! block of a row are noted once, when the row is made; what the many windows over it then ask is cheap. The shortcuts
 //! taken on that account give the same bits as the computation that they replace.
 
-use super::rows::around;
+use super::rows::rows_around;
 use std::ops::Range;
 
 /// Columns of a block: a few vectors wide, narrow enough to fit between the edges of a subject.
-const BLOCK: usize = 64;
+const BLOCK_COLUMNS: usize = 64;
 /// Columns computed at once where a plane is not calm: what the computation keeps fits the first cache.
-pub(super) const RUN: usize = 512;
+pub(super) const RUN_COLUMNS: usize = 512;
 
 /// The least and the greatest value of some part of a plane, in the total order of floats: a NaN is an extreme, so that
 /// no comparison with it holds.
@@ -35,7 +35,7 @@ pub(super) struct Calm {
 impl Calm {
     /// Room for `capacity` rows of `width` values.
     pub(super) fn new(width: usize, capacity: usize) -> Self {
-        let count = width.div_ceil(BLOCK);
+        let count = width.div_ceil(BLOCK_COLUMNS);
         let rows = vec![0; count * capacity];
         Self {
             width,
@@ -48,7 +48,7 @@ impl Calm {
     }
 
     /// Notes the extremes of row `y`.
-    pub(super) fn note(&mut self, y: usize, row: &[f32]) {
+    pub(super) fn note_row(&mut self, y: usize, row: &[f32]) {
         let slot = self.slot(y);
         note_blocks(row, &mut self.least[slot.clone()], &mut self.greatest[slot]);
     }
@@ -59,7 +59,7 @@ impl Calm {
     }
 
     /// Gathers the extremes of every block over some rows.
-    fn gather(&mut self, rows: Range<usize>) {
+    fn gather_rows(&mut self, rows: Range<usize>) {
         let [mut least, mut greatest] = std::mem::take(&mut self.over);
         least.fill(i32::MAX);
         greatest.fill(i32::MIN);
@@ -78,20 +78,20 @@ impl Calm {
     }
 
     /// Extremes of the gathered rows over the columns within `reach` of a block.
-    fn near(&self, block: usize, reach: usize) -> Extremes {
-        let columns = around(block, reach.div_ceil(BLOCK), self.count);
+    fn window_extremes(&self, block: usize, reach: usize) -> Extremes {
+        let columns = rows_around(block, reach.div_ceil(BLOCK_COLUMNS), self.count);
         let [least, greatest] = &self.over;
         let least = least[columns.clone()].iter().min();
         let greatest = greatest[columns].iter().max();
         Extremes {
-            least: value(*least.unwrap_or(&0)),
-            greatest: value(*greatest.unwrap_or(&0)),
+            least: from_order_key(*least.unwrap_or(&0)),
+            greatest: from_order_key(*greatest.unwrap_or(&0)),
         }
     }
 
-    /// Fills row `y` of a result. `settled` is told the extremes of every block and of the window `rows` x `reach` around
-    /// it, and may know the one value that the block becomes; all other columns go to `compute`, at most [`RUN`] at once.
-    pub(super) fn fill(
+    /// Fills row `y` of a result. `settled` is given the extremes of every block and of the window `rows` x `reach` around
+    /// it, and may know the one value that the block becomes; all other columns go to `compute`, at most [`RUN_COLUMNS`] at once.
+    pub(super) fn fill_row(
         &mut self,
         out: &mut [f32],
         (y, rows, reach): (usize, Range<usize>, usize),
@@ -103,17 +103,17 @@ impl Calm {
                 compute(columns.clone(), &mut out[columns]);
             }
         };
-        self.gather(rows);
+        self.gather_rows(rows);
         let row = self.slot(y).start;
         let mut open = 0..0;
-        for (block, start) in (0..self.width).step_by(BLOCK).enumerate() {
-            let columns = start..(start + BLOCK).min(self.width);
+        for (block, start) in (0..self.width).step_by(BLOCK_COLUMNS).enumerate() {
+            let columns = start..(start + BLOCK_COLUMNS).min(self.width);
             let own = Extremes {
-                least: value(self.least[row + block]),
-                greatest: value(self.greatest[row + block]),
+                least: from_order_key(self.least[row + block]),
+                greatest: from_order_key(self.greatest[row + block]),
             };
-            let known = settled(own, self.near(block, reach));
-            if known.is_none() && open.end == start && open.len() + BLOCK <= RUN {
+            let known = settled(own, self.window_extremes(block, reach));
+            if known.is_none() && open.end == start && open.len() + BLOCK_COLUMNS <= RUN_COLUMNS {
                 open.end = columns.end;
                 continue;
             }
@@ -131,13 +131,13 @@ impl Calm {
 
 /// A float as an integer of the same order.
 #[inline(always)]
-fn key(v: f32) -> i32 {
+fn order_key(v: f32) -> i32 {
     let bits = v.to_bits() as i32;
     bits ^ ((bits >> 31) & i32::MAX)
 }
 
 /// The float of a key.
-fn value(key: i32) -> f32 {
+fn from_order_key(key: i32) -> f32 {
     f32::from_bits((key ^ ((key >> 31) & i32::MAX)) as u32)
 }
 
@@ -147,11 +147,11 @@ fn value(key: i32) -> f32 {
     "aarch64+neon"
 ))]
 fn note_blocks(row: &[f32], least: &mut [i32], greatest: &mut [i32]) {
-    for ((values, least), greatest) in row.chunks(BLOCK).zip(least).zip(greatest) {
+    for ((values, least), greatest) in row.chunks(BLOCK_COLUMNS).zip(least).zip(greatest) {
         (*least, *greatest) = (i32::MAX, i32::MIN);
         for v in values {
-            *least = (*least).min(key(*v));
-            *greatest = (*greatest).max(key(*v));
+            *least = (*least).min(order_key(*v));
+            *greatest = (*greatest).max(order_key(*v));
         }
     }
 }
@@ -174,11 +174,11 @@ mod tests {
             f32::INFINITY,
             f32::NAN,
         ];
-        assert!(rising.windows(2).all(|p| key(p[0]) < key(p[1])));
+        assert!(rising.windows(2).all(|p| order_key(p[0]) < order_key(p[1])));
         assert!(
             rising
                 .iter()
-                .all(|&v| value(key(v)).to_bits() == v.to_bits())
+                .all(|&v| from_order_key(order_key(v)).to_bits() == v.to_bits())
         );
     }
 
@@ -189,11 +189,11 @@ mod tests {
         let row: Vec<f32> = (0..width)
             .map(|x| if (x / 100) % 5 == 2 { x as f32 } else { 1.0 })
             .collect();
-        calm.note(0, &row);
+        calm.note_row(0, &row);
         let mut out = vec![0.0; width];
         let flat = |own: Extremes, _| (own.least == own.greatest).then_some(7.0);
-        calm.fill(&mut out, (0, 0..1, 0), flat, |columns, part| {
-            assert!(columns.len() <= RUN && columns.len() == part.len());
+        calm.fill_row(&mut out, (0, 0..1, 0), flat, |columns, part| {
+            assert!(columns.len() <= RUN_COLUMNS && columns.len() == part.len());
             part.iter_mut().for_each(|v| *v += 1.0);
         });
         assert!(out.iter().all(|v| *v == 1.0 || *v == 7.0));
@@ -203,9 +203,9 @@ mod tests {
     #[test]
     fn a_nan_is_an_extreme() {
         let mut calm = Calm::new(3, 1);
-        calm.note(0, &[0.0, f32::NAN, 1.0]);
-        calm.gather(0..1);
-        let Extremes { least, greatest } = calm.near(0, 0);
+        calm.note_row(0, &[0.0, f32::NAN, 1.0]);
+        calm.gather_rows(0..1);
+        let Extremes { least, greatest } = calm.window_extremes(0, 0);
         assert!(least == 0.0 && greatest.is_nan());
     }
 }

@@ -3,7 +3,7 @@
 //! The signals are those of ITU-R BT.709 with studio swing, in the rounding of Blender's own table. Its two matrices are
 //! not exact inverses of each other: even without blurring, colours move by up to 7e-4 per unit.
 
-use super::box_blur::blurred;
+use super::box_blur::box_blurred;
 use super::model::{Behaviour, Model, Robust};
 use super::options::{KeyOptions, Profile};
 use super::photo::Photo;
@@ -12,31 +12,31 @@ use crate::image::Image;
 use crate::pixel::PremulRgba;
 
 /// Code value 1.0.
-const FULL: f32 = 255.0;
+const CODE_MAX: f32 = 255.0;
 /// Blender multiplies by this float or divides by 255, depending on its version.
-const PER_FULL: f32 = 1.0 / 255.0;
+const PER_CODE_MAX: f32 = 1.0 / 255.0;
 /// Offset of brightness, code values.
-const FOOT: f32 = 16.0;
+const LUMA_OFFSET: f32 = 16.0;
 /// Zero of the colour differences, code values.
-const NEUTRAL: f32 = 128.0;
+const NEUTRAL_CODE: f32 = 128.0;
 /// Weights of R, G, B in brightness.
-const LUMA: [f32; 3] = [0.183, 0.614, 0.062];
+const LUMA_WEIGHTS: [f32; 3] = [0.183, 0.614, 0.062];
 /// Weights of R, G, B in the blue and the red difference.
 const DIFFERENCES: [[f32; 3]; 2] = [[-0.101, -0.338, 0.439], [0.439, -0.399, -0.040]];
 
 /// One signal in code values.
 #[inline(always)]
-fn signal(p: PremulRgba, w: [f32; 3], offset: f32) -> f32 {
-    w[0] * (p.r * FULL) + w[1] * (p.g * FULL) + w[2] * (p.b * FULL) + offset
+fn code_value(p: PremulRgba, w: [f32; 3], offset: f32) -> f32 {
+    w[0] * (p.r * CODE_MAX) + w[1] * (p.g * CODE_MAX) + w[2] * (p.b * CODE_MAX) + offset
 }
 
 /// Code values to unit scale.
 #[inline(always)]
 fn to_unit(code: f32, behaviour: Behaviour) -> f32 {
     if behaviour == Behaviour::V45 {
-        code / FULL
+        code / CODE_MAX
     } else {
-        code * PER_FULL
+        code * PER_CODE_MAX
     }
 }
 
@@ -47,7 +47,7 @@ pub(in crate::matte) fn differences(p: PremulRgba, is_late: bool) -> [f32; 2] {
     } else {
         Behaviour::V34
     };
-    DIFFERENCES.map(|w| to_unit(signal(p, w, NEUTRAL), behaviour))
+    DIFFERENCES.map(|w| to_unit(code_value(p, w, NEUTRAL_CODE), behaviour))
 }
 
 /// All three signals of a colour in unit scale.
@@ -58,27 +58,35 @@ pub(in crate::matte) fn to_ycc(p: PremulRgba, is_late: bool) -> [f32; 3] {
         Behaviour::V34
     };
     let [cb, cr] = differences(p, is_late);
-    [to_unit(signal(p, LUMA, FOOT), behaviour), cb, cr]
+    [
+        to_unit(code_value(p, LUMA_WEIGHTS, LUMA_OFFSET), behaviour),
+        cb,
+        cr,
+    ]
 }
 
 /// The colour of three signals in unit scale.
 pub(in crate::matte) fn from_ycc(signals: [f32; 3]) -> [f32; 3] {
-    let [y, cb, cr] = signals.map(|s| s * FULL);
-    let p = color(y, cb, cr, 1.0);
+    let [y, cb, cr] = signals.map(|s| s * CODE_MAX);
+    let p = color_from_codes(y, cb, cr, 1.0);
     [p.r, p.g, p.b]
 }
 
 /// The colour of three signals in code values.
 #[inline(always)]
-fn color(y: f32, cb: f32, cr: f32, alpha: f32) -> PremulRgba {
-    let (l, cb, cr) = (1.164 * (y - FOOT), cb - NEUTRAL, cr - NEUTRAL);
+fn color_from_codes(y: f32, cb: f32, cr: f32, alpha: f32) -> PremulRgba {
+    let (l, cb, cr) = (
+        1.164 * (y - LUMA_OFFSET),
+        cb - NEUTRAL_CODE,
+        cr - NEUTRAL_CODE,
+    );
     let (r, g, b) = (l + 1.793 * cr, l - 0.534 * cr - 0.213 * cb, l + 2.115 * cb);
-    PremulRgba::new(r / FULL, g / FULL, b / FULL, alpha)
+    PremulRgba::new(r / CODE_MAX, g / CODE_MAX, b / CODE_MAX, alpha)
 }
 
-/// The pixel as the profile is willing to see it.
+/// The pixel; in the robust profile transparent where it is not usable.
 #[inline(always)]
-fn seen(p: PremulRgba, careful: bool) -> PremulRgba {
+fn usable_pixel(p: PremulRgba, careful: bool) -> PremulRgba {
     if careful { Robust::seen(p) } else { p }
 }
 
@@ -116,7 +124,7 @@ fn difference_row<P: Photo>(
 ) {
     for (p, d) in pixels.iter().zip(out) {
         *d = to_unit(
-            signal(seen(p.premul(), careful), weights, NEUTRAL),
+            code_value(usable_pixel(p.premul(), careful), weights, NEUTRAL_CODE),
             behaviour,
         );
     }
@@ -136,15 +144,15 @@ fn recolored_row<P: Photo>(
     careful: bool,
 ) {
     for (((p, cb), cr), o) in pixels.iter().zip(cb).zip(cr).zip(out) {
-        let p = seen(p.premul(), careful);
-        let luma = signal(p, LUMA, FOOT);
+        let p = usable_pixel(p.premul(), careful);
+        let luma = code_value(p, LUMA_WEIGHTS, LUMA_OFFSET);
         // Blender 4.5 alone leaves brightness out of the journey to unit scale and back.
         let luma = if behaviour == Behaviour::V45 {
             luma
         } else {
-            luma * PER_FULL * FULL
+            luma * PER_CODE_MAX * CODE_MAX
         };
-        *o = color(luma, cb * FULL, cr * FULL, p.a);
+        *o = color_from_codes(luma, cb * CODE_MAX, cr * CODE_MAX, p.a);
     }
 }
 
@@ -167,7 +175,7 @@ impl<'a, P: Photo> ChromaBlur<'a, P> {
                 weights,
                 behaviour,
             };
-            blurred(plane, opts, opts.blur_pre, photo.size())
+            box_blurred(plane, opts, opts.blur_pre, photo.size())
         });
         let rows = [vec![0.0; photo.width()], vec![0.0; photo.width()]];
         Self {

@@ -1,7 +1,7 @@
 //! The picture seen through its matte, with the screen's colour cast taken away.
 
-use super::model::{Model, primary};
-use super::raw::split;
+use super::model::{Model, primary_channel};
+use super::raw::split_channels;
 use crate::pixel::{LinearRgb, PremulRgba};
 
 /// What the cut-out needs to know.
@@ -36,7 +36,7 @@ impl Despill {
     /// The primary channel loses its excess over the mix of the others.
     #[inline(always)]
     fn despilled<M: Model, const PRIMARY: usize>(&self, c: PremulRgba) -> PremulRgba {
-        let (main, lo, hi) = split::<PRIMARY>(c);
+        let (main, lo, hi) = split_channels::<PRIMARY>(c);
         let amount = self.factor * (main - (self.balance * lo + (1.0 - self.balance) * hi));
         let main = if amount > 0.0 { main - amount } else { main };
         match PRIMARY {
@@ -55,7 +55,7 @@ impl Despill {
         key: LinearRgb,
         fixed: Option<usize>,
     ) -> PremulRgba {
-        match fixed.unwrap_or_else(|| primary(key)) {
+        match fixed.unwrap_or_else(|| primary_channel(key)) {
             0 => self.cutout::<M, 0>(p, m, key),
             1 => self.cutout::<M, 1>(p, m, key),
             _ => self.cutout::<M, 2>(p, m, key),

@@ -6,10 +6,10 @@
 
 use super::model::Behaviour;
 use super::options::{KeyOptions, Profile};
-use super::rows::{Pad, Rows, Source, Window, around, window_rows};
+use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
 
 /// Blender up to 4.3 offers the disc no more than a window of this half-size, one short to the right and upwards.
-const LEAST_LOPSIDED: usize = 3;
+const MIN_LOPSIDED_DISTANCE: usize = 3;
 
 /// A matte grown or shrunk by a disc.
 pub(super) struct Dilate<'a> {
@@ -32,9 +32,9 @@ struct Disc {
 
 impl Disc {
     /// How far the disc reaches to the left and to the right, `dy` rows from its centre (upwards positive).
-    fn reach(self, dy: isize) -> Option<(usize, usize)> {
+    fn row_reach(self, dy: isize) -> Option<(usize, usize)> {
         let d = self.distance;
-        let cut = self.lopsided && d >= LEAST_LOPSIDED;
+        let cut = self.lopsided && d >= MIN_LOPSIDED_DISTANCE;
         let half = (d * d).checked_sub(dy.unsigned_abs().pow(2))?.isqrt();
         let above = cut && dy == d as isize;
         (!above).then(|| (half, if cut { half.min(d - 1) } else { half }))
@@ -49,9 +49,9 @@ struct Extreme {
 }
 
 impl Extreme {
-    /// The extreme of two samples; the first stays where they are equal or one is no number.
+    /// The extreme of two samples; the first stays where they are equal or one is NaN.
     #[inline(always)]
-    fn of(self, a: f32, b: f32) -> f32 {
+    fn pick(self, a: f32, b: f32) -> f32 {
         let replaces = if self.largest { b > a } else { b < a };
         if replaces { b } else { a }
     }
@@ -101,25 +101,25 @@ impl Rows for Dilate<'_> {
         } = self;
         let margin = shape.distance;
         let stride = *width + 2 * margin;
-        window.cover(around(y, margin, *height), |y, runs| {
-            let row = &mut runs[..stride];
-            source.row(y, &mut row[margin..margin + *width]);
-            row[margin..margin + *width]
-                .iter_mut()
-                .for_each(|v| *v = extreme.of(extreme.start, *v));
-            Pad::Value(extreme.start).fill(row, margin);
+        window.cover_rows(rows_around(y, margin, *height), |y, runs| {
+            let inside = &mut runs[margin..margin + *width];
+            source.row(y, inside);
+            for v in inside {
+                *v = extreme.pick(extreme.start, *v);
+            }
+            Pad::Value(extreme.start).fill_margins(&mut runs[..stride], margin);
             double_runs(runs, stride, *extreme);
         });
         out.fill(extreme.start);
-        for near in around(y, margin, *height) {
-            let Some((left, right)) = shape.reach(y as isize - near as isize) else {
+        for near in rows_around(y, margin, *height) {
+            let Some((left, right)) = shape.row_reach(y as isize - near as isize) else {
                 continue;
             };
             let length = left + right + 1;
             let level = length.ilog2() as usize;
             let runs = &window.row(near)[level * stride..][..stride];
             let (first, second) = (margin - left, margin + right + 1 - (1 << level));
-            widen(
+            widen_row(
                 out,
                 &runs[first..first + *width],
                 &runs[second..second + *width],
@@ -135,7 +135,7 @@ fn double_runs(runs: &mut [f32], stride: usize, extreme: Extreme) {
         let (shorter, longer) = runs.split_at_mut(level * stride);
         let shorter = &shorter[(level - 1) * stride..];
         let half = 1 << (level - 1);
-        pair(
+        pair_row(
             &mut longer[..stride - half],
             &shorter[..stride - half],
             &shorter[half..],
@@ -149,9 +149,9 @@ fn double_runs(runs: &mut [f32], stride: usize, extreme: Extreme) {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn pair(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
+fn pair_row(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
     for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-        *o = extreme.of(*a, *b);
+        *o = extreme.pick(*a, *b);
     }
 }
 
@@ -160,9 +160,9 @@ fn pair(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn widen(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
+fn widen_row(out: &mut [f32], a: &[f32], b: &[f32], extreme: Extreme) {
     for ((o, a), b) in out.iter_mut().zip(a).zip(b) {
-        *o = extreme.of(*o, extreme.of(*a, *b));
+        *o = extreme.pick(*o, extreme.pick(*a, *b));
     }
 }
 
@@ -181,7 +181,7 @@ mod tests {
     fn dilated_dot(profile: Profile, distance: i32) -> Vec<String> {
         let opts = KeyOptions {
             dilate_distance: distance,
-            ..KeyOptions::of(profile)
+            ..KeyOptions::for_profile(profile)
         };
         let mut dilate = Dilate::new(Box::new(Dot), (11, 11), &opts);
         let mut row = [0.0; 11];

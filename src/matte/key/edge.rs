@@ -3,22 +3,22 @@
 use super::calm::{Calm, Extremes};
 use super::model::Behaviour;
 use super::options::KeyOptions;
-use super::rows::{Pad, Rows, Source, Window, around, looked_at, window_rows};
+use super::rows::{Pad, Rows, Source, Window, looked_at, rows_around, window_rows};
 
 /// Share of a pixel's neighbours that must be alike for it not to be an edge; Blender's constant.
 const ALIKE_SHARE: f32 = 0.9;
 
 /// How far a profile looks for edges.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Reach {
+enum EdgeReach {
     /// Nowhere: every pixel gets this answer.
     Nowhere(f32),
     /// In a square window of this half-size.
     Window(usize),
 }
 
-impl Reach {
-    fn of(behaviour: Behaviour, radius: usize) -> Self {
+impl EdgeReach {
+    fn new(behaviour: Behaviour, radius: usize) -> Self {
         match (behaviour, radius) {
             (Behaviour::V34 | Behaviour::V42, 0) => Self::Nowhere(0.0),
             (Behaviour::V34, 1) => Self::Nowhere(1.0),
@@ -33,7 +33,7 @@ struct EdgeSearch<'a> {
     source: Source<'a>,
     behaviour: Behaviour,
     tolerance: f32,
-    reach: Reach,
+    reach: EdgeReach,
     height: usize,
     window: Window,
     calm: Calm,
@@ -44,14 +44,14 @@ struct EdgeSearch<'a> {
 impl<'a> EdgeSearch<'a> {
     fn new(source: Source<'a>, (width, height): (usize, usize), opts: &KeyOptions) -> Self {
         let behaviour = opts.profile.behaviour();
-        let reach = Reach::of(behaviour, opts.edge_kernel_radius as usize);
-        let half = if let Reach::Window(half) = reach {
+        let reach = EdgeReach::new(behaviour, opts.edge_kernel_radius as usize);
+        let half = if let EdgeReach::Window(half) = reach {
             half
         } else {
             0
         };
         let columns = (0..width)
-            .map(|x| around(x, half, width).len() as f32)
+            .map(|x| rows_around(x, half, width).len() as f32)
             .collect();
         let capacity = window_rows(half, height);
         let window = Window::new(width + 2 * half, capacity);
@@ -71,46 +71,47 @@ impl<'a> EdgeSearch<'a> {
     /// Writes row `y` of the searched matte, and 1 at its edges, 0 elsewhere.
     fn row(&mut self, y: usize, matte: &mut [f32], edges: &mut [f32]) {
         match self.reach {
-            Reach::Window(half) => self.search(y, half, matte, edges),
-            Reach::Nowhere(answer) => {
+            EdgeReach::Window(half) => self.search_row(y, half, matte, edges),
+            EdgeReach::Nowhere(answer) => {
                 self.source.row(y, matte);
                 edges.fill(answer);
             }
         }
     }
 
-    fn search(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
+    fn search_row(&mut self, y: usize, half: usize, matte: &mut [f32], edges: &mut [f32]) {
         let (width, height, repeat) = (matte.len(), self.height, self.behaviour.repeats_border());
         let pad = if repeat {
             Pad::Repeat
         } else {
             Pad::Value(f32::NAN)
         };
-        self.window.cover(around(y, half, height), |y, row| {
-            self.source.row(y, &mut row[half..half + width]);
-            self.calm.note(y, &row[half..half + width]);
-            pad.fill(row, half);
-        });
+        self.window
+            .cover_rows(rows_around(y, half, height), |y, row| {
+                self.source.row(y, &mut row[half..half + width]);
+                self.calm.note_row(y, &row[half..half + width]);
+                pad.fill_margins(row, half);
+            });
         matte.copy_from_slice(&self.window.row(y)[half..half + width]);
-        let rows = around(y, half, height);
+        let rows = rows_around(y, half, height);
         // Where the whole window is alike no pixel is an edge; a lone pixel has no neighbours to be like.
         let alike = |_, near: Extremes| {
             (near.greatest - near.least < self.tolerance && width * height > 1).then_some(0.0)
         };
         let seen = rows.len() as f32;
         self.calm
-            .fill(edges, (y, rows, half), alike, |columns, edges| {
+            .fill_row(edges, (y, rows, half), alike, |columns, edges| {
                 edges.fill(0.0);
                 for near in looked_at(y, half, height, repeat) {
                     let samples = &self.window.row(near)[columns.start..columns.end + 2 * half];
                     count_alike(edges, &matte[columns.clone()], samples, self.tolerance);
                 }
-                let window = Seen {
+                let window = WindowInside {
                     rows: seen,
                     columns: &self.columns[columns.clone()],
                     half,
                 };
-                judge(
+                mark_edges(
                     edges,
                     &matte[columns],
                     &window,
@@ -122,19 +123,19 @@ impl<'a> EdgeSearch<'a> {
 }
 
 /// How much of a search window lies inside the picture.
-struct Seen<'a> {
+struct WindowInside<'a> {
     rows: f32,
     columns: &'a [f32],
     half: usize,
 }
 
 #[inline(always)]
-fn edge(found: bool) -> f32 {
+fn edge_value(found: bool) -> f32 {
     if found { 1.0 } else { 0.0 }
 }
 
 #[inline(always)]
-fn alike(a: f32, b: f32, tolerance: f32) -> f32 {
+fn alike_value(a: f32, b: f32, tolerance: f32) -> f32 {
     if (a - b).abs() < tolerance { 1.0 } else { 0.0 }
 }
 
@@ -147,7 +148,7 @@ fn alike(a: f32, b: f32, tolerance: f32) -> f32 {
 fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32) {
     for samples in padded.windows(matte.len()) {
         for ((count, m), s) in counts.iter_mut().zip(matte).zip(samples) {
-            *count += alike(*s, *m, tolerance);
+            *count += alike_value(*s, *m, tolerance);
         }
     }
 }
@@ -158,20 +159,26 @@ fn count_alike(counts: &mut [f32], matte: &[f32], padded: &[f32], tolerance: f32
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn judge(counts: &mut [f32], matte: &[f32], seen: &Seen<'_>, tolerance: f32, behaviour: Behaviour) {
+fn mark_edges(
+    counts: &mut [f32],
+    matte: &[f32],
+    seen: &WindowInside<'_>,
+    tolerance: f32,
+    behaviour: Behaviour,
+) {
     let pixels = counts.iter_mut().zip(matte).zip(seen.columns);
     let all = ((2 * seen.half + 1) * (2 * seen.half + 1)) as f32;
     match behaviour {
         Behaviour::V34 => pixels.for_each(|((count, m), columns)| {
-            let others = *count - alike(*m, *m, tolerance);
+            let others = *count - alike_value(*m, *m, tolerance);
             let samples = columns * seen.rows - 1.0;
-            *count = edge((others < (ALIKE_SHARE * samples).ceil()) | (samples == 0.0));
+            *count = edge_value((others < (ALIKE_SHARE * samples).ceil()) | (samples == 0.0));
         }),
         Behaviour::V42 => pixels.for_each(|((count, _), columns)| {
-            *count = edge(*count < (ALIKE_SHARE * (columns * seen.rows)).ceil());
+            *count = edge_value(*count < (ALIKE_SHARE * (columns * seen.rows)).ceil());
         }),
         Behaviour::V45 => {
-            pixels.for_each(|((count, _), _)| *count = edge(*count < ALIKE_SHARE * all))
+            pixels.for_each(|((count, _), _)| *count = edge_value(*count < ALIKE_SHARE * all))
         }
     }
 }
@@ -228,7 +235,7 @@ fn clip_row(matte: &mut [f32], edges: &[f32], [black, white]: [f32; 2], behaviou
             *m = if *e > 0.0 {
                 *m
             } else {
-                remapped(*m, black, white)
+                remapped_to_levels(*m, black, white)
             }
         });
     } else {
@@ -236,7 +243,7 @@ fn clip_row(matte: &mut [f32], edges: &[f32], [black, white]: [f32; 2], behaviou
             *m = if *e > 0.0 {
                 *m
             } else {
-                levelled(*m, black, white)
+                clipped_to_levels(*m, black, white)
             }
         });
     }
@@ -244,7 +251,7 @@ fn clip_row(matte: &mut [f32], edges: &[f32], [black, white]: [f32; 2], behaviou
 
 /// 0 below black, 1 from white on, linear between; a threshold where white is not above black.
 #[inline(always)]
-fn levelled(m: f32, black: f32, white: f32) -> f32 {
+fn clipped_to_levels(m: f32, black: f32, white: f32) -> f32 {
     let between = (m - black) / (white - black);
     let bright = if m >= white { 1.0 } else { between };
     if m < black { 0.0 } else { bright }
@@ -252,7 +259,7 @@ fn levelled(m: f32, black: f32, white: f32) -> f32 {
 
 /// Black to 0 and white to 1, whichever is larger, held between.
 #[inline(always)]
-fn remapped(m: f32, black: f32, white: f32) -> f32 {
+fn remapped_to_levels(m: f32, black: f32, white: f32) -> f32 {
     let v = (m - black) / (white - black);
     let v = if v < 0.0 { 0.0 } else { v };
     if v > 1.0 { 1.0 } else { v }

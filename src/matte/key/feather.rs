@@ -1,19 +1,19 @@
 //! Feather: the matte grows along a falloff, and blends into a Gaussian blur of itself where it does.
 
-use super::calm::{Calm, Extremes, RUN};
+use super::calm::{Calm, Extremes, RUN_COLUMNS};
 use super::model::Behaviour;
 use super::options::{Falloff, KeyOptions};
-use super::rows::{Pad, Rows, Source, Window, around, window_rows};
+use super::rows::{Pad, Rows, Source, Window, rows_around, window_rows};
 
 /// Blender's half-width of the unit Gaussian, in units of its own sigma.
-const REACH: f32 = 3.0 * 1.6;
+const GAUSSIAN_REACH: f32 = 3.0 * 1.6;
 /// Twice the variance of that Gaussian.
 const TWICE_VARIANCE: f32 = 2.0 * 1.6 * 1.6;
 
 /// A matte feathered along x and then along y.
 pub(super) struct Feather<'a> {
     source: Source<'a>,
-    kernel: Kernel,
+    kernel: FeatherKernel,
     height: usize,
     /// The row with margins that no candidate comes from.
     candidates: Vec<f32>,
@@ -28,7 +28,7 @@ pub(super) struct Feather<'a> {
 }
 
 /// The two tables, by distance, and what the profile does with them.
-struct Kernel {
+struct FeatherKernel {
     gauss: Vec<f32>,
     falloff: Vec<f32>,
     /// Offsets in the order in which samples are visited.
@@ -37,35 +37,18 @@ struct Kernel {
     inward: bool,
 }
 
-impl Kernel {
+impl FeatherKernel {
     fn new(opts: &KeyOptions) -> Self {
         let distance = opts.feather_distance.unsigned_abs() as usize;
         let step = 1.0 / distance as f32;
         let behaviour = opts.profile.behaviour();
-        let mut gauss: Vec<f32> = (0..=distance).map(|i| gaussian(i as f32 * step)).collect();
-        let total = if behaviour.repeats_border() {
-            total_from_centre(&gauss)
-        } else {
-            total_from_left(&gauss)
-        };
-        match behaviour {
-            Behaviour::V45 => gauss.iter_mut().for_each(|g| *g /= total),
-            Behaviour::V34 | Behaviour::V42 => gauss.iter_mut().for_each(|g| *g *= 1.0 / total),
-        }
         let falloff = (0..=distance)
-            .map(|i| fall(opts.feather_falloff, 1.0 - i as f32 * step))
+            .map(|i| falloff_weight(opts.feather_falloff, 1.0 - i as f32 * step))
             .collect();
-        let radius = distance as isize;
-        let order = match behaviour {
-            Behaviour::V45 => std::iter::once(0)
-                .chain((1..=radius).flat_map(|i| [-i, i]))
-                .collect(),
-            Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
-        };
         Self {
-            gauss,
+            gauss: gaussian_table(distance, behaviour),
             falloff,
-            order,
+            order: visiting_order(distance as isize, behaviour),
             behaviour,
             inward: opts.feather_distance < 0,
         }
@@ -73,6 +56,36 @@ impl Kernel {
 
     fn radius(&self) -> usize {
         self.gauss.len() - 1
+    }
+}
+
+/// Gaussian weights by distance, over their sum as the profile rounds it.
+fn gaussian_table(distance: usize, behaviour: Behaviour) -> Vec<f32> {
+    let step = 1.0 / distance as f32;
+    let mut gauss: Vec<f32> = (0..=distance)
+        .map(|i| gaussian_weight(i as f32 * step))
+        .collect();
+    let total = if behaviour.repeats_border() {
+        total_from_centre(&gauss)
+    } else {
+        total_from_left(&gauss)
+    };
+    for weight in &mut gauss {
+        match behaviour {
+            Behaviour::V45 => *weight /= total,
+            Behaviour::V34 | Behaviour::V42 => *weight *= 1.0 / total,
+        }
+    }
+    gauss
+}
+
+/// Offsets in the order in which the profile visits samples.
+fn visiting_order(radius: isize, behaviour: Behaviour) -> Vec<isize> {
+    match behaviour {
+        Behaviour::V45 => std::iter::once(0)
+            .chain((1..=radius).flat_map(|i| [-i, i]))
+            .collect(),
+        Behaviour::V34 | Behaviour::V42 => (-radius..=radius).collect(),
     }
 }
 
@@ -89,14 +102,14 @@ fn total_from_left(gauss: &[f32]) -> f32 {
 }
 
 /// The Gaussian at a share `t` of the feather distance, single precision but for the exponential, which is rounded once.
-fn gaussian(t: f32) -> f32 {
-    let q = t * REACH;
+fn gaussian_weight(t: f32) -> f32 {
+    let q = t * GAUSSIAN_REACH;
     let height = 1.0 / (std::f32::consts::PI * TWICE_VARIANCE).sqrt();
     height * libm::exp(f64::from(-(q * q / TWICE_VARIANCE))) as f32
 }
 
 /// Blender's falloff curves.
-fn fall(curve: Falloff, u: f32) -> f32 {
+fn falloff_weight(curve: Falloff, u: f32) -> f32 {
     match curve {
         Falloff::Smooth => 3.0 * u * u - 2.0 * u * u * u,
         Falloff::Sphere => (2.0 * u - u * u).sqrt(),
@@ -113,7 +126,7 @@ impl<'a> Feather<'a> {
         (width, height): (usize, usize),
         opts: &KeyOptions,
     ) -> Self {
-        let kernel = Kernel::new(opts);
+        let kernel = FeatherKernel::new(opts);
         let margined = vec![0.0; width + 2 * kernel.radius()];
         let capacity = window_rows(kernel.radius(), height);
         Self {
@@ -144,35 +157,35 @@ impl Rows for Feather<'_> {
             calm,
         } = self;
         let radius = kernel.radius();
-        window.cover(around(y, radius, *height), |y, row| {
+        window.cover_rows(rows_around(y, radius, *height), |y, row| {
             source.row(y, row);
-            kernel.turn(row);
-            calm_source.note(0, row);
-            kernel.pad(row, candidates, samples);
+            kernel.invert_if_inward(row);
+            calm_source.note_row(0, row);
+            kernel.pad_row(row, candidates, samples);
             kernel.along_x([candidates, samples], columns, calm_source, row);
             // The pass along x ends by turning its result back, the pass along y begins by turning it again.
-            kernel.turn(row);
-            kernel.turn(row);
-            calm.note(y, row);
+            kernel.invert_if_inward(row);
+            kernel.invert_if_inward(row);
+            calm.note_row(y, row);
         });
         kernel.along_y(window, calm, (y, *height), out);
-        kernel.turn(out);
+        kernel.invert_if_inward(out);
     }
 }
 
 /// A row of candidates and the same row as samples of a sum, with the falloff and the Gaussian weight at its distance.
 type Tap<'r> = ([&'r [f32]; 2], [f32; 2]);
 
-impl Kernel {
+impl FeatherKernel {
     /// Feathering inwards is feathering the background outwards.
-    fn turn(&self, row: &mut [f32]) {
+    fn invert_if_inward(&self, row: &mut [f32]) {
         if self.inward {
             row.iter_mut().for_each(|m| *m = 1.0 - *m);
         }
     }
 
     /// Copies a row between margins.
-    fn pad(&self, row: &[f32], candidates: &mut [f32], samples: &mut [f32]) {
+    fn pad_row(&self, row: &[f32], candidates: &mut [f32], samples: &mut [f32]) {
         let (radius, repeat) = (self.radius(), self.behaviour.repeats_border());
         for (padded, value) in [(candidates, f32::NAN), (samples, 0.0)] {
             padded[radius..radius + row.len()].copy_from_slice(row);
@@ -181,18 +194,18 @@ impl Kernel {
             } else {
                 Pad::Value(value)
             };
-            pad.fill(padded, radius);
+            pad.fill_margins(padded, radius);
         }
     }
 
     /// The Gaussian weights whose samples lie inside the picture, added up in the order of the visit.
     fn weight_inside(&self, at: usize, length: usize) -> f32 {
-        around(at, self.radius(), length)
+        rows_around(at, self.radius(), length)
             .fold(0.0, |sum, other| sum + self.gauss[other.abs_diff(at)])
     }
 
     /// Nothing can beat a block that is all at the greatest value of its window.
-    fn settled(own: Extremes, near: Extremes) -> Option<f32> {
+    fn settled_value(own: Extremes, near: Extremes) -> Option<f32> {
         (own.least >= near.greatest && near.least >= 0.0 && near.greatest < f32::INFINITY)
             .then_some(own.least + 0.0)
     }
@@ -205,14 +218,19 @@ impl Kernel {
         out: &mut [f32],
     ) {
         let radius = self.radius();
-        calm.fill(out, (0, 0..1, radius), Self::settled, |columns, out| {
-            let shifted = |side: isize| {
-                let offset = radius.wrapping_add_signed(side);
-                let at = columns.start + offset..columns.end + offset;
-                [&candidates[at.clone()], &samples[at]]
-            };
-            self.visit(&self.order, shifted, &totals[columns.clone()], out);
-        });
+        calm.fill_row(
+            out,
+            (0, 0..1, radius),
+            Self::settled_value,
+            |columns, out| {
+                let shifted = |side: isize| {
+                    let offset = radius.wrapping_add_signed(side);
+                    let at = columns.start + offset..columns.end + offset;
+                    [&candidates[at.clone()], &samples[at]]
+                };
+                self.visit_taps(&self.order, shifted, &totals[columns.clone()], out);
+            },
+        );
     }
 
     /// Blender counts rows from the bottom, so an offset of 1 is one row up.
@@ -230,27 +248,27 @@ impl Kernel {
             Behaviour::V45 => &self.order[..],
             _ => {
                 &self.order[self.radius().saturating_sub(up)..]
-                    [..around(up, self.radius(), height).len()]
+                    [..rows_around(up, self.radius(), height).len()]
             }
         };
-        calm.fill(
+        calm.fill_row(
             out,
-            (y, around(y, self.radius(), height), 0),
-            Self::settled,
+            (y, rows_around(y, self.radius(), height), 0),
+            Self::settled_value,
             |columns, out| {
                 let row = |side: isize| {
                     let row = &window.row(y.saturating_add_signed(-side).min(height - 1))
                         [columns.clone()];
                     [row, row]
                 };
-                self.visit(order, row, &[total; RUN][..columns.len()], out);
+                self.visit_taps(order, row, &[total; RUN_COLUMNS][..columns.len()], out);
             },
         );
     }
 
     /// Visits every sample of the window in order, and blends: the best candidate where there was one, elsewhere more and
     /// more of the Gaussian mean.
-    fn visit<'r>(
+    fn visit_taps<'r>(
         &self,
         order: &[isize],
         row: impl Fn(isize) -> [&'r [f32]; 2],
@@ -262,7 +280,7 @@ impl Kernel {
             (row(side), [self.falloff[i], self.gauss[i]])
         };
         let len = out.len();
-        let mut found = ([0.0; RUN], [1.0; RUN], [0.0; RUN]);
+        let mut found = ([0.0; RUN_COLUMNS], [1.0; RUN_COLUMNS], [0.0; RUN_COLUMNS]);
         let (best, weight, blur) = (
             &mut found.0[..len],
             &mut found.1[..len],
@@ -272,10 +290,10 @@ impl Kernel {
         let state = [best, weight, blur];
         if self.behaviour == Behaviour::V45 {
             offer_all::<false, _>(state, order, tap);
-            blend(&found, &[1.0; RUN][..len], out);
+            blend_row(&found, &[1.0; RUN_COLUMNS][..len], out);
         } else {
             offer_all::<true, _>(state, order, tap);
-            blend(&found, totals, out);
+            blend_row(&found, totals, out);
         }
     }
 }
@@ -286,8 +304,8 @@ impl Kernel {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn blend(
-    (best, weight, blur): &([f32; RUN], [f32; RUN], [f32; RUN]),
+fn blend_row(
+    (best, weight, blur): &([f32; RUN_COLUMNS], [f32; RUN_COLUMNS], [f32; RUN_COLUMNS]),
     totals: &[f32],
     out: &mut [f32],
 ) {
@@ -299,7 +317,7 @@ fn blend(
 }
 
 /// Taps offered in one go, so that what was found stays in registers; the order is that of one at a time.
-const AT_ONCE: usize = 4;
+const TAPS_AT_ONCE: usize = 4;
 
 /// Offers all taps in order to the pixels of a row: best candidate, its weight, sum of the blur.
 #[multiversion::multiversion(targets(
@@ -313,20 +331,20 @@ fn offer_all<'r, const LIMITED: bool, F: Fn(isize) -> Tap<'r>>(
     tap: F,
 ) {
     let [best, weight, blur] = state;
-    let groups = order.chunks_exact(AT_ONCE);
+    let groups = order.chunks_exact(TAPS_AT_ONCE);
     let rest = groups.remainder();
     for group in groups {
         let taps = [tap(group[0]), tap(group[1]), tap(group[2]), tap(group[3])];
-        offer::<LIMITED, AT_ONCE>(best, weight, blur, taps);
+        offer_taps::<LIMITED, TAPS_AT_ONCE>(best, weight, blur, taps);
     }
     for side in rest {
-        offer::<LIMITED, 1>(best, weight, blur, [tap(*side)]);
+        offer_taps::<LIMITED, 1>(best, weight, blur, [tap(*side)]);
     }
 }
 
 /// `LIMITED` candidates must beat the best even before they fall off.
 #[inline(always)]
-fn offer<const LIMITED: bool, const N: usize>(
+fn offer_taps<const LIMITED: bool, const N: usize>(
     best: &mut [f32],
     weight: &mut [f32],
     blur: &mut [f32],
@@ -363,13 +381,15 @@ mod tests {
             feather_distance: 3,
             ..KeyOptions::default()
         };
-        let unscaled: Vec<f32> = (0..=3).map(|i| gaussian(i as f32 * (1.0 / 3.0))).collect();
+        let unscaled: Vec<f32> = (0..=3)
+            .map(|i| gaussian_weight(i as f32 * (1.0 / 3.0)))
+            .collect();
         assert_eq!(
             unscaled,
             [0.249338925, 0.151231691, 0.0337443464, 0.00276990514]
         );
         assert_eq!(
-            Kernel::new(&opts).falloff,
+            FeatherKernel::new(&opts).falloff,
             [1.0, 0.740740657, 0.259259224, 0.0]
         );
     }

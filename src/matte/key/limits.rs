@@ -1,4 +1,4 @@
-//! What a person knows better than the keyer: garbage and core mattes, and the robust profile's bounds.
+//! Bounds of the matte: garbage and core mattes, and the robust profile's range.
 
 use super::model::Behaviour;
 use super::robust::is_usable_matte;
@@ -7,8 +7,8 @@ use crate::image::Image;
 use crate::pixel::Coverage;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A value as the profile is willing to see it.
-fn seen(m: Coverage, careful: bool) -> f32 {
+/// A value of a matte; in the robust profile 0 where it is not usable.
+fn usable_value(m: Coverage, careful: bool) -> f32 {
     if careful && !is_usable_matte(m) {
         0.0
     } else {
@@ -21,16 +21,16 @@ pub(super) struct Garbage<'a> {
     pub(super) source: Source<'a>,
     pub(super) garbage: &'a Image<Coverage>,
     pub(super) behaviour: Behaviour,
-    /// Values that are no number count as 0.
+    /// NaN counts as 0.
     pub(super) careful: bool,
 }
 
 impl Rows for Garbage<'_> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         self.source.row(y, out);
-        // Both ways of writing a minimum are Blender's; they differ where one side is no number.
+        // Both ways of writing a minimum are Blender's; they differ where one side is NaN.
         for (m, g) in out.iter_mut().zip(self.garbage.row(y)) {
-            let most = 1.0 - seen(*g, self.careful);
+            let most = 1.0 - usable_value(*g, self.careful);
             *m = match self.behaviour {
                 Behaviour::V34 | Behaviour::V45 => {
                     if most < *m {
@@ -57,7 +57,7 @@ pub(super) struct Core<'a> {
     /// The core matte; none stands for 0 everywhere.
     pub(super) core: Option<&'a Image<Coverage>>,
     pub(super) behaviour: Behaviour,
-    /// Values that are no number count as 0.
+    /// NaN counts as 0.
     pub(super) careful: bool,
 }
 
@@ -68,14 +68,14 @@ impl Rows for Core<'_> {
             Some(core) => out
                 .iter_mut()
                 .zip(core.row(y))
-                .for_each(|(m, c)| *m = self.larger(*m, seen(*c, self.careful))),
-            None => out.iter_mut().for_each(|m| *m = self.larger(*m, 0.0)),
+                .for_each(|(m, c)| *m = self.larger_value(*m, usable_value(*c, self.careful))),
+            None => out.iter_mut().for_each(|m| *m = self.larger_value(*m, 0.0)),
         }
     }
 }
 
 impl Core<'_> {
-    fn larger(&self, m: f32, c: f32) -> f32 {
+    fn larger_value(&self, m: f32, c: f32) -> f32 {
         match self.behaviour {
             Behaviour::V34 | Behaviour::V45 => {
                 if m < c {

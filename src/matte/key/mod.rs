@@ -97,7 +97,7 @@ pub use photo::Photo;
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
-use stream::{Plane, Stream, fit};
+use stream::{Plane, Stream, fit_size};
 
 /// What the photo was taken against.
 #[derive(Clone, Copy, Debug)]
@@ -128,7 +128,7 @@ pub struct Deviations {
     pub unusable_pixels: usize,
     /// Pixels of the plate that were not finite or too grey to key against, and were filled from around them.
     pub filled_plate: usize,
-    /// Values of the garbage and core matte that were no number, and became 0.
+    /// Values of the garbage and core matte that were NaN or infinite, and became 0.
     pub unusable_mattes: usize,
     /// Values of the finished matte that lay outside 0 to 1.
     pub clamped: usize,
@@ -142,13 +142,13 @@ pub struct Deviations {
 pub fn key(photo: &Image<LinearRgb>, screen: LinearRgb, opts: &KeyOptions) -> Keyed {
     let opts = opts.clamped();
     let mut keyed = Keyed::default();
-    fit(&mut keyed.cutout, photo.width(), photo.height());
+    fit_size(&mut keyed.cutout, photo.width(), photo.height());
     let stream = Stream::new(Keying::new(photo, Screen::Color(screen)), None, &opts);
-    keyed.deviations = stream.compute(Plane::Matte, &mut keyed.matte, &mut keyed.cutout);
+    keyed.deviations = stream.compute_plane(Plane::Matte, &mut keyed.matte, &mut keyed.cutout);
     keyed
 }
 
-/// A photo to key, with all that can be said of it.
+/// A photo to key, its screen, and the mattes that are known of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Keying<'a, P> {
     photo: &'a Image<P>,
@@ -201,8 +201,9 @@ impl<'a, P: Photo> Keying<'a, P> {
     /// As [`run`](Self::run).
     pub fn run_into(&self, opts: &KeyOptions, keyed: &mut Keyed) -> Result<()> {
         let (width, height) = self.photo.size();
-        fit(&mut keyed.cutout, width, height);
-        keyed.deviations = self.plane(opts, Plane::Matte, &mut keyed.matte, &mut keyed.cutout)?;
+        fit_size(&mut keyed.cutout, width, height);
+        keyed.deviations =
+            self.compute_plane(opts, Plane::Matte, &mut keyed.matte, &mut keyed.cutout)?;
         Ok(())
     }
 
@@ -221,7 +222,7 @@ impl<'a, P: Photo> Keying<'a, P> {
     /// # Errors
     /// As [`run`](Self::run).
     pub fn matte_into(&self, opts: &KeyOptions, matte: &mut Image<Coverage>) -> Result<Deviations> {
-        self.plane(opts, Plane::Matte, matte, &mut Image::default())
+        self.compute_plane(opts, Plane::Matte, matte, &mut Image::default())
     }
 
     /// The edges that the levels leave alone: 1 at edges, 0 elsewhere.
@@ -230,11 +231,11 @@ impl<'a, P: Photo> Keying<'a, P> {
     /// As [`run`](Self::run).
     pub fn edges(&self, opts: &KeyOptions) -> Result<Image<Coverage>> {
         let mut edges = Image::default();
-        self.plane(opts, Plane::Edges, &mut edges, &mut Image::default())?;
+        self.compute_plane(opts, Plane::Edges, &mut edges, &mut Image::default())?;
         Ok(edges)
     }
 
-    fn plane(
+    fn compute_plane(
         &self,
         opts: &KeyOptions,
         plane: Plane,
@@ -242,7 +243,7 @@ impl<'a, P: Photo> Keying<'a, P> {
         cutout: &mut Image<PremulRgba>,
     ) -> Result<Deviations> {
         self.check(opts)?;
-        let filled = robust::settle(self.screen, opts)?;
+        let filled = robust::without_holes(self.screen, opts)?;
         let screen = filled
             .as_ref()
             .map_or(self.screen, |f| Screen::Plate(&f.plate));
@@ -251,7 +252,7 @@ impl<'a, P: Photo> Keying<'a, P> {
             filled.as_ref().map(|f| f.channel),
             opts,
         );
-        let deviations = stream.compute(plane, matte, cutout);
+        let deviations = stream.compute_plane(plane, matte, cutout);
         Ok(Deviations {
             filled_plate: filled.as_ref().map_or(0, |f| f.count),
             ..deviations
@@ -260,33 +261,28 @@ impl<'a, P: Photo> Keying<'a, P> {
 
     fn check(&self, opts: &KeyOptions) -> Result<()> {
         opts.check()?;
-        robust::warn(opts);
-        let plate = if let Screen::Plate(p) = self.screen {
-            Some(p.size())
-        } else {
-            None
-        };
-        let others = [
-            ("plate", plate),
-            ("garbage", self.garbage.map(Image::size)),
-            ("core", self.core.map(Image::size)),
-        ];
-        for (name, size) in others {
-            if let Some((w, h)) = size.filter(|&s| s != self.photo.size()) {
-                let (width, height) = self.photo.size();
-                return Err(Error::value(
-                    name,
-                    format!("{w} x {h} pixels, expected the photo's {width} x {height}"),
-                ));
-            }
-        }
+        robust::warn_of_edge_settings(opts);
+        self.check_size("garbage", self.garbage.map(Image::size))?;
+        self.check_size("core", self.core.map(Image::size))?;
         match self.screen {
             Screen::Color(c) if !c.is_finite() => Err(Error::value(
                 "screen",
                 format!("{:?}, expected finite numbers", <[f32; 3]>::from(c)),
             )),
             Screen::Color(c) => robust::check_color(c, opts),
-            Screen::Plate(_) => Ok(()),
+            Screen::Plate(plate) => self.check_size("plate", Some(plate.size())),
+        }
+    }
+
+    /// Refuses a picture of another size than the photo's.
+    fn check_size(&self, name: &str, size: Option<(usize, usize)>) -> Result<()> {
+        let (width, height) = self.photo.size();
+        match size {
+            Some((w, h)) if (w, h) != (width, height) => Err(Error::value(
+                name,
+                format!("{w} x {h} pixels, expected the photo's {width} x {height}"),
+            )),
+            _ => Ok(()),
         }
     }
 }
@@ -302,7 +298,7 @@ impl std::fmt::Display for Deviations {
         write!(
             f,
             "{unusable_pixels} unusable pixels made transparent, {filled_plate} pixels of the plate filled, \
-             {unusable_mattes} unusable values of garbage and core matte taken as 0, {clamped} matte values clamped"
+             {unusable_mattes} unusable values of garbage and core matte treated as 0, {clamped} matte values clamped"
         )
     }
 }

@@ -13,7 +13,7 @@ pub(super) trait Model: 'static {
 
     /// Every channel is above 1, so the pixel is foreground whatever its hue.
     #[inline(always)]
-    fn overexposed(p: PremulRgba) -> bool {
+    fn is_overexposed(p: PremulRgba) -> bool {
         let first = if p.r < p.g { p.r } else { p.g };
         (if first < p.b { first } else { p.b }) > 1.0
     }
@@ -45,7 +45,7 @@ impl Model for V42 {
 
 impl Model for V45 {
     #[inline(always)]
-    fn overexposed(p: PremulRgba) -> bool {
+    fn is_overexposed(p: PremulRgba) -> bool {
         let first = if p.g < p.r { p.g } else { p.r };
         let second = if p.b < first { p.b } else { first };
         (if p.a < second { p.a } else { second }) > 1.0
@@ -64,17 +64,20 @@ impl Model for Robust {
 }
 
 /// Largest magnitude that the robust profile reckons with: from here, sums in single precision could reach infinity.
-const USABLE: f32 = 1e30;
+const MAX_USABLE: f32 = 1e30;
 
 /// Whether the robust profile takes a pixel as it is: no channel is NaN, infinite or beyond all reason.
 #[inline(always)]
 pub(super) fn is_usable(p: PremulRgba) -> bool {
     // `&` instead of `&&`: without branches the row loops vectorise.
-    (p.r.abs() <= USABLE) & (p.g.abs() <= USABLE) & (p.b.abs() <= USABLE) & (p.a.abs() <= USABLE)
+    (p.r.abs() <= MAX_USABLE)
+        & (p.g.abs() <= MAX_USABLE)
+        & (p.b.abs() <= MAX_USABLE)
+        & (p.a.abs() <= MAX_USABLE)
 }
 
 /// Which channel a screen is keyed by: the largest; of equal ones the later, as Blender has it.
-pub(super) fn primary(key: LinearRgb) -> usize {
+pub(super) fn primary_channel(key: LinearRgb) -> usize {
     let LinearRgb { r, g, b } = key;
     let after_red = if g > b { 1 } else { 2 };
     if r > g {
@@ -123,8 +126,8 @@ mod tests {
             ([1.0, 0.0, 1.0], 2),
         ];
         for (key, want) in cases {
-            assert_eq!(primary(key.into()), want, "{key:?}");
+            assert_eq!(primary_channel(key.into()), want, "{key:?}");
         }
-        assert_eq!(primary(LinearRgb::new(3.0, 2.0, 1.0)), 0);
+        assert_eq!(primary_channel(LinearRgb::new(3.0, 2.0, 1.0)), 0);
     }
 }

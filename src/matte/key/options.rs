@@ -1,4 +1,4 @@
-//! What a keyer can be told: one struct, one TOML table, Blender's own names.
+//! Settings of a keyer: one struct, one TOML table, Blender's own names.
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -71,7 +71,7 @@ pub enum Blur {
     #[default]
     Exact,
     /// By running sums, whose cost does not depend on the size: nearer the true mean than Blender is. Samples are rounded
-    /// to 2^-24 and held within 65504 (half precision's largest); one that is no number counts as 0. An edge that only
+    /// to 2^-24 and held within 65504 (half precision's largest); NaN counts as 0. An edge that only
     /// just is one may not be found, so that the levels clip it.
     ///
     /// Worth it beyond a size of about ten: on a 4K frame with both blurs at 6, 20 and 60 it takes 1.1, 0.6 and 0.3 of
@@ -98,7 +98,7 @@ pub struct KeyOptions {
     pub clip_black: f32,
     /// Raw matte at or above this becomes 1, in 0..1. Default: 1.
     pub clip_white: f32,
-    /// Half-size of the window that tells edges, which are not clipped, 0 to 100 pixels. Default: 3.
+    /// Half-size of the window in which edges are found, which are not clipped, 0 to 100 pixels. Default: 3.
     pub edge_kernel_radius: u32,
     /// Matte values closer than this are alike for the edge search, in 0..1. Default: 0.1.
     pub edge_kernel_tolerance: f32,
@@ -119,7 +119,7 @@ pub struct KeyOptions {
     /// The picture loses what is left of the screen, `max(0, I - (1 - M) K)`, instead of being multiplied by its matte
     /// and despilled. Not Blender's picture. Default: false.
     pub subtract_screen: bool,
-    /// Lets the `robust` profile key against a screen too grey to be told from the foreground. Default: false.
+    /// Lets the `robust` profile key against a screen too grey to be distinguished from the foreground. Default: false.
     pub accept_weak_key: bool,
 }
 
@@ -148,13 +148,13 @@ impl Default for KeyOptions {
 }
 
 /// Largest blur size of Blender's node.
-const BLUR_MAX: u32 = 2048;
+const MAX_BLUR_SIZE: u32 = 2048;
 /// Largest edge radius, dilate and feather distance of Blender's node.
-const DISTANCE_MAX: i32 = 100;
+const MAX_DISTANCE: i32 = 100;
 
 impl KeyOptions {
     /// The default settings of another profile.
-    pub fn of(profile: Profile) -> Self {
+    pub fn for_profile(profile: Profile) -> Self {
         Self {
             profile,
             ..Self::default()
@@ -167,14 +167,12 @@ impl KeyOptions {
     /// [`Error::Value`] with the setting's name, its value and what was expected.
     pub fn check(&self) -> Result<()> {
         let near = self.clamped();
-        self.fractions()
-            .iter()
-            .zip(near.fractions())
-            .try_for_each(|(&(at, v), (_, n))| inside(at, v, n, "0 to 1"))?;
-        self.sizes()
-            .iter()
-            .zip(near.sizes())
-            .try_for_each(|(&(at, v, range), (_, n, _))| inside(at, v, n, range))?;
+        for ((at, value), (_, nearest)) in self.fractions().into_iter().zip(near.fractions()) {
+            check_inside(at, value, nearest, "0 to 1")?;
+        }
+        for ((at, value, range), (_, nearest, _)) in self.sizes().into_iter().zip(near.sizes()) {
+            check_inside(at, value, nearest, range)?;
+        }
         if self.profile == Profile::Robust && self.clip_white <= self.clip_black {
             let what = format!(
                 "{}, expected more than clip_black ({})",
@@ -185,21 +183,20 @@ impl KeyOptions {
         Ok(())
     }
 
-    /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is no number becomes 0.
+    /// Every setting moved to the nearest value that Blender's node can hold; a fraction that is NaN becomes 0.
     pub fn clamped(&self) -> Self {
-        let unit = |v: f32| if v > 0.0 { v.min(1.0) } else { 0.0 };
         Self {
-            blur_pre: self.blur_pre.min(BLUR_MAX),
-            screen_balance: unit(self.screen_balance),
-            clip_black: unit(self.clip_black),
-            clip_white: unit(self.clip_white),
-            edge_kernel_radius: self.edge_kernel_radius.min(DISTANCE_MAX.unsigned_abs()),
-            edge_kernel_tolerance: unit(self.edge_kernel_tolerance),
-            blur_post: self.blur_post.min(BLUR_MAX),
-            dilate_distance: self.dilate_distance.clamp(-DISTANCE_MAX, DISTANCE_MAX),
-            feather_distance: self.feather_distance.clamp(-DISTANCE_MAX, DISTANCE_MAX),
-            despill_factor: unit(self.despill_factor),
-            despill_balance: unit(self.despill_balance),
+            blur_pre: self.blur_pre.min(MAX_BLUR_SIZE),
+            screen_balance: clamped_fraction(self.screen_balance),
+            clip_black: clamped_fraction(self.clip_black),
+            clip_white: clamped_fraction(self.clip_white),
+            edge_kernel_radius: self.edge_kernel_radius.min(MAX_DISTANCE.unsigned_abs()),
+            edge_kernel_tolerance: clamped_fraction(self.edge_kernel_tolerance),
+            blur_post: self.blur_post.min(MAX_BLUR_SIZE),
+            dilate_distance: self.dilate_distance.clamp(-MAX_DISTANCE, MAX_DISTANCE),
+            feather_distance: self.feather_distance.clamp(-MAX_DISTANCE, MAX_DISTANCE),
+            despill_factor: clamped_fraction(self.despill_factor),
+            despill_balance: clamped_fraction(self.despill_balance),
             ..self.clone()
         }
     }
@@ -238,7 +235,11 @@ impl KeyOptions {
     }
 }
 
-fn inside<T: PartialEq + std::fmt::Display>(
+fn clamped_fraction(v: f32) -> f32 {
+    if v > 0.0 { v.min(1.0) } else { 0.0 }
+}
+
+fn check_inside<T: PartialEq + std::fmt::Display>(
     at: &str,
     value: T,
     nearest: T,
@@ -263,7 +264,7 @@ mod tests {
             clip_black: 0.25,
             feather_falloff: Falloff::InverseSquare,
             blur: Blur::RunningSum,
-            ..KeyOptions::of(Profile::Blender45)
+            ..KeyOptions::for_profile(Profile::Blender45)
         };
         assert_eq!(opts, want);
     }
@@ -299,7 +300,7 @@ mod tests {
         let levels = |profile| KeyOptions {
             clip_black: 0.5,
             clip_white: 0.5,
-            ..KeyOptions::of(profile)
+            ..KeyOptions::for_profile(profile)
         };
         assert!(levels(Profile::Blender34).check().is_ok());
         assert!(levels(Profile::Robust).check().is_err());

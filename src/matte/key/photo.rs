@@ -2,7 +2,7 @@
 
 use super::Screen;
 use super::cutout::Despill;
-use super::model::{Model, Robust, V34, V42, V45, primary};
+use super::model::{Model, Robust, V34, V42, V45, primary_channel};
 use super::options::{KeyOptions, Profile};
 use super::raw::{Terms, matte_against};
 use crate::pixel::{Coverage, LinearRgb, PremulRgba};
@@ -48,18 +48,22 @@ struct Loops<P> {
 }
 
 impl<P: Photo> Loops<P> {
-    fn of(profile: Profile) -> Self {
+    fn for_profile(profile: Profile) -> Self {
         match profile {
-            Profile::Blender34 => Self::of_model::<V34>(),
-            Profile::Blender42 => Self::of_model::<V42>(),
-            Profile::Blender45 => Self::of_model::<V45>(),
-            Profile::Robust => Self::of_model::<Robust>(),
+            Profile::Blender34 => Self::for_model::<V34>(),
+            Profile::Blender42 => Self::for_model::<V42>(),
+            Profile::Blender45 => Self::for_model::<V45>(),
+            Profile::Robust => Self::for_model::<Robust>(),
         }
     }
 
-    fn of_model<M: Model>() -> Self {
+    fn for_model<M: Model>() -> Self {
         Self {
-            terms: [Terms::of::<M, 0>, Terms::of::<M, 1>, Terms::of::<M, 2>],
+            terms: [
+                Terms::for_key::<M, 0>,
+                Terms::for_key::<M, 1>,
+                Terms::for_key::<M, 2>,
+            ],
             matte: [
                 matte_row::<P, M, 0>,
                 matte_row::<P, M, 1>,
@@ -89,12 +93,13 @@ pub(super) struct Keyer<'a, P> {
 
 impl<'a, P: Photo> Keyer<'a, P> {
     pub(super) fn new(screen: Screen<'a>, channel: Option<usize>, opts: &KeyOptions) -> Self {
-        let loops = Loops::of(opts.profile);
+        let loops = Loops::for_profile(opts.profile);
         let (screen, color) = match screen {
-            Screen::Color(c) => (Screen::Color(socket(c)), socket(c)),
+            Screen::Color(c) => (Screen::Color(socket_color(c)), socket_color(c)),
             Screen::Plate(_) => (screen, LinearRgb::BLACK),
         };
-        let terms = loops.terms[primary(color)](color, opts.screen_balance, opts.ignore_brightness);
+        let terms =
+            loops.terms[primary_channel(color)](color, opts.screen_balance, opts.ignore_brightness);
         let (factor, balance, subtract) = (
             opts.despill_factor,
             opts.despill_balance,
@@ -116,7 +121,7 @@ impl<'a, P: Photo> Keyer<'a, P> {
     /// Row `y` of the raw matte.
     pub(super) fn matte_row(&self, y: usize, pixels: &[P], out: &mut [f32]) {
         match self.screen {
-            Screen::Color(c) => self.loops.matte[primary(c)](pixels, out, self.terms),
+            Screen::Color(c) => self.loops.matte[primary_channel(c)](pixels, out, self.terms),
             Screen::Plate(plate) => {
                 (self.loops.matte_against)(pixels, plate.row(y), self.channel, out, self.terms)
             }
@@ -132,7 +137,9 @@ impl<'a, P: Photo> Keyer<'a, P> {
         out: &mut [PremulRgba],
     ) {
         match self.screen {
-            Screen::Color(c) => self.loops.cutout[primary(c)](pixels, matte, c, out, self.despill),
+            Screen::Color(c) => {
+                self.loops.cutout[primary_channel(c)](pixels, matte, c, out, self.despill)
+            }
             Screen::Plate(plate) => {
                 (self.loops.cutout_against)(
                     pixels,
@@ -148,7 +155,7 @@ impl<'a, P: Photo> Keyer<'a, P> {
 }
 
 /// A key colour as Blender's colour socket holds it: never negative.
-pub(super) fn socket(key: LinearRgb) -> LinearRgb {
+pub(super) fn socket_color(key: LinearRgb) -> LinearRgb {
     key.map(|v| if v > 0.0 { v } else { 0.0 })
 }
 

@@ -1,6 +1,6 @@
 //! The raw matte: how far a pixel is from being as saturated as the screen.
 
-use super::model::{Model, primary};
+use super::model::{Model, primary_channel};
 use crate::pixel::{LinearRgb, PremulRgba};
 
 /// What the raw matte needs to know of a key, worked out once.
@@ -17,7 +17,7 @@ pub(super) struct Terms {
 impl Terms {
     /// The terms of a key colour whose primary channel is `PRIMARY`.
     #[inline(always)]
-    pub(super) fn of<M: Model, const PRIMARY: usize>(
+    pub(super) fn for_key<M: Model, const PRIMARY: usize>(
         key: LinearRgb,
         balance: f32,
         ignore_brightness: bool,
@@ -36,7 +36,7 @@ impl Terms {
     /// `(C[p] - v) |1 - v|`: the excess of the primary channel over the mix of the others.
     #[inline(always)]
     fn saturation_of<M: Model, const PRIMARY: usize>(&self, p: PremulRgba) -> f32 {
-        let (main, lo, hi) = split::<PRIMARY>(p);
+        let (main, lo, hi) = split_channels::<PRIMARY>(p);
         let v = M::mix(self.balance, lo, hi);
         let brightness = if self.ignore_brightness {
             1.0
@@ -53,7 +53,7 @@ impl Terms {
         let s = self.saturation_of::<M, PRIMARY>(p);
         let ratio = 1.0 - s / self.saturation;
         let inside = if s >= self.saturation { 0.0 } else { ratio };
-        if M::overexposed(p) | (s < 0.0) {
+        if M::is_overexposed(p) | (s < 0.0) {
             1.0
         } else {
             inside
@@ -74,16 +74,16 @@ pub(super) fn matte_against<M: Model>(
         ignore_brightness: flat,
         ..
     } = terms;
-    match fixed.unwrap_or_else(|| primary(key)) {
-        0 => Terms::of::<M, 0>(key, balance, flat).matte::<M, 0>(p),
-        1 => Terms::of::<M, 1>(key, balance, flat).matte::<M, 1>(p),
-        _ => Terms::of::<M, 2>(key, balance, flat).matte::<M, 2>(p),
+    match fixed.unwrap_or_else(|| primary_channel(key)) {
+        0 => Terms::for_key::<M, 0>(key, balance, flat).matte::<M, 0>(p),
+        1 => Terms::for_key::<M, 1>(key, balance, flat).matte::<M, 1>(p),
+        _ => Terms::for_key::<M, 2>(key, balance, flat).matte::<M, 2>(p),
     }
 }
 
 /// A pixel's primary channel and the other two in order.
 #[inline(always)]
-pub(super) fn split<const PRIMARY: usize>(p: PremulRgba) -> (f32, f32, f32) {
+pub(super) fn split_channels<const PRIMARY: usize>(p: PremulRgba) -> (f32, f32, f32) {
     match PRIMARY {
         0 => (p.r, p.g, p.b),
         1 => (p.g, p.r, p.b),

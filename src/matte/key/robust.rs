@@ -1,8 +1,8 @@
 //! What the robust profile adds: keys that cannot work are refused, holes in plates are filled, and all is counted.
 
-use super::model::{is_usable, primary};
+use super::model::{is_usable, primary_channel};
 use super::options::{KeyOptions, Profile};
-use super::photo::{Photo, socket};
+use super::photo::{Photo, socket_color};
 use super::{Deviations, Keying, Screen};
 use crate::error::{Error, Result};
 use crate::filter::Pyramid;
@@ -13,13 +13,13 @@ use std::ops::Range;
 
 /// Least excess of a key's primary channel over the other two, and least saturation: below, noise of half a percent
 /// becomes matte noise of a quarter.
-const LEAST_STRENGTH: f32 = 0.02;
+const MIN_KEY_STRENGTH: f32 = 0.02;
 
 /// Channel names for messages.
-const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+const CHANNEL_NAMES: [&str; 3] = ["red", "green", "blue"];
 
 /// How far a colour exceeds the grey of its other channels in `channel`: the lesser of excess and saturation.
-fn strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
+fn key_strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
     let c = <[f32; 3]>::from(key);
     let (lo, hi) = [(c[1], c[2]), (c[0], c[2]), (c[0], c[1])][channel];
     let v = balance * lo + (1.0 - balance) * hi;
@@ -29,24 +29,24 @@ fn strength(key: LinearRgb, channel: usize, balance: f32) -> f32 {
 
 /// Refuses a key colour from which no matte but noise can be made.
 pub(super) fn check_color(key: LinearRgb, opts: &KeyOptions) -> Result<()> {
-    let (key, channel) = (socket(key), primary(socket(key)));
-    let found = strength(key, channel, opts.screen_balance);
-    if opts.profile != Profile::Robust || opts.accept_weak_key || found >= LEAST_STRENGTH {
+    let (key, channel) = (socket_color(key), primary_channel(socket_color(key)));
+    let found = key_strength(key, channel, opts.screen_balance);
+    if opts.profile != Profile::Robust || opts.accept_weak_key || found >= MIN_KEY_STRENGTH {
         return Ok(());
     }
     let LinearRgb { r, g, b } = key;
-    let name = CHANNELS[channel];
+    let name = CHANNEL_NAMES[channel];
     Err(Error::value(
         "screen",
         format!(
-            "{r},{g},{b} is too grey to key: its {name} stands out by {found:.4}, expected at least {LEAST_STRENGTH}; \
+            "{r},{g},{b} is too grey to key: its {name} stands out by {found:.4}, expected at least {MIN_KEY_STRENGTH}; \
              give a more saturated screen colour, or set key.accept_weak_key = true"
         ),
     ))
 }
 
 /// Warns of settings that switch the edge search into something hardly wanted.
-pub(super) fn warn(opts: &KeyOptions) {
+pub(super) fn warn_of_edge_settings(opts: &KeyOptions) {
     if opts.profile != Profile::Robust || (opts.clip_black <= 0.0 && opts.clip_white >= 1.0) {
         return;
     }
@@ -76,14 +76,10 @@ pub(super) struct Filled {
 /// A pyramid of halved means that count only the usable pixels; a hole takes the colour of the finest level that has one.
 /// # Errors
 /// [`Error::Value`] where no pixel of the plate is usable.
-pub(super) fn fill(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled> {
-    let channel = primary(mean(plate));
-    let is_strong = |c: LinearRgb| {
-        is_usable(c.opaque())
-            && (opts.accept_weak_key || strength(c, channel, opts.screen_balance) >= LEAST_STRENGTH)
-    };
+pub(super) fn fill_plate(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled> {
+    let channel = primary_channel(usable_mean(plate));
     let known = plate.map(|c| {
-        if is_strong(c) {
+        if is_usable_key(c, channel, opts) {
             c.opaque()
         } else {
             PremulRgba::TRANSPARENT
@@ -91,12 +87,7 @@ pub(super) fn fill(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled
     });
     let count = known.pixels().par_iter().filter(|p| p.a == 0.0).count();
     if count == plate.pixels().len() && count > 0 {
-        let what = format!(
-            "no pixel's {} stands out by {LEAST_STRENGTH} or more; give a plate of the screen alone, or set \
-             key.accept_weak_key = true",
-            CHANNELS[channel]
-        );
-        return Err(Error::value("plate", what));
+        return Err(no_usable_key(channel));
     }
     let levels = Pyramid::new(known);
     let plate = Image::from_fn(plate.width(), plate.height(), |x, y| {
@@ -109,10 +100,25 @@ pub(super) fn fill(plate: &Image<LinearRgb>, opts: &KeyOptions) -> Result<Filled
     })
 }
 
+/// A pixel of a plate that can be keyed against.
+fn is_usable_key(c: LinearRgb, channel: usize, opts: &KeyOptions) -> bool {
+    is_usable(c.opaque())
+        && (opts.accept_weak_key
+            || key_strength(c, channel, opts.screen_balance) >= MIN_KEY_STRENGTH)
+}
+
+fn no_usable_key(channel: usize) -> Error {
+    let what = format!(
+        "no pixel's {} stands out by {MIN_KEY_STRENGTH} or more; give a plate of the screen alone, or set \
+         key.accept_weak_key = true",
+        CHANNEL_NAMES[channel]
+    );
+    Error::value("plate", what)
+}
+
 fn nearest_known(levels: &Pyramid<PremulRgba>, x: usize, y: usize) -> LinearRgb {
-    let at = |level| levels.level(level)[(x >> level, y >> level)];
     let known = (0..levels.levels())
-        .map(at)
+        .map(|level| levels.level(level)[(x >> level, y >> level)])
         .find(|p| p.a > 0.0)
         .unwrap_or_default();
     if known.a == 1.0 {
@@ -123,7 +129,7 @@ fn nearest_known(levels: &Pyramid<PremulRgba>, x: usize, y: usize) -> LinearRgb 
 }
 
 /// Mean of the usable pixels; black where there is none.
-fn mean(plate: &Image<LinearRgb>) -> LinearRgb {
+fn usable_mean(plate: &Image<LinearRgb>) -> LinearRgb {
     let usable = plate.pixels().iter().filter(|c| is_usable(c.opaque()));
     let (sum, count) = usable.fold(([0.0f64; 3], 0.0), |(sum, count), c| {
         (
@@ -144,7 +150,7 @@ pub(super) fn is_usable_matte(m: Coverage) -> bool {
 }
 
 /// Counts what the robust profile replaces in some rows of the photo and its mattes.
-pub(super) fn unusable<P: Photo>(
+pub(super) fn count_unusable<P: Photo>(
     keying: &Keying<'_, P>,
     opts: &KeyOptions,
     rows: Range<usize>,
@@ -152,31 +158,24 @@ pub(super) fn unusable<P: Photo>(
     if opts.profile != Profile::Robust {
         return Deviations::default();
     }
-    let pixels = |y| {
-        keying
-            .photo
-            .row(y)
-            .iter()
-            .filter(|p| !is_usable(p.premul()))
-            .count()
-    };
-    let mattes = |y| {
-        let given = [keying.garbage, keying.core].into_iter().flatten();
-        given
-            .map(|m| m.row(y).iter().filter(|&&m| !is_usable_matte(m)).count())
-            .sum::<usize>()
-    };
-    Deviations {
-        unusable_pixels: rows.clone().map(pixels).sum(),
-        unusable_mattes: rows.map(mattes).sum(),
-        ..Deviations::default()
+    let mut deviations = Deviations::default();
+    for y in rows {
+        let pixels = keying.photo.row(y).iter();
+        deviations.unusable_pixels += pixels.filter(|p| !is_usable(p.premul())).count();
+        for matte in [keying.garbage, keying.core].into_iter().flatten() {
+            let values = matte.row(y).iter();
+            deviations.unusable_mattes += values.filter(|m| !is_usable_matte(**m)).count();
+        }
     }
+    deviations
 }
 
 /// The screen as the robust profile keys against it: a plate without holes, its mean's primary channel.
-pub(super) fn settle(screen: Screen<'_>, opts: &KeyOptions) -> Result<Option<Filled>> {
+pub(super) fn without_holes(screen: Screen<'_>, opts: &KeyOptions) -> Result<Option<Filled>> {
     match screen {
-        Screen::Plate(plate) if opts.profile == Profile::Robust => fill(plate, opts).map(Some),
+        Screen::Plate(plate) if opts.profile == Profile::Robust => {
+            fill_plate(plate, opts).map(Some)
+        }
         _ => Ok(None),
     }
 }
@@ -192,7 +191,7 @@ mod tests {
         let mut plate = Image::filled(8, 8, GREEN);
         plate[(3, 3)] = LinearRgb::new(f32::NAN, 0.0, 0.0);
         plate[(4, 3)] = LinearRgb::grey(0.5);
-        let filled = fill(&plate, &KeyOptions::of(Profile::Robust)).unwrap();
+        let filled = fill_plate(&plate, &KeyOptions::for_profile(Profile::Robust)).unwrap();
         assert_eq!((filled.count, filled.channel), (2, 1));
         for c in filled.plate.pixels() {
             assert!((c.g - 0.7).abs() < 1e-6 && (c.r - 0.1).abs() < 1e-6);
@@ -202,12 +201,12 @@ mod tests {
     #[test]
     fn a_plate_without_colour_is_refused() {
         let plate = Image::filled(4, 4, LinearRgb::grey(0.5));
-        assert!(fill(&plate, &KeyOptions::of(Profile::Robust)).is_err());
+        assert!(fill_plate(&plate, &KeyOptions::for_profile(Profile::Robust)).is_err());
     }
 
     #[test]
     fn a_grey_key_is_refused_with_advice() {
-        let opts = KeyOptions::of(Profile::Robust);
+        let opts = KeyOptions::for_profile(Profile::Robust);
         let message = check_color(LinearRgb::grey(0.5), &opts)
             .unwrap_err()
             .to_string();

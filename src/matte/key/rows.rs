@@ -3,6 +3,9 @@
 //! Every stage of the keyer turns one plane of matte values into another. A stage that kept whole planes would send a 4K
 //! frame through main memory again and again; instead each stage is asked for one row, asks the stage before it for the
 //! rows that this takes, and keeps those that the next row needs again. A frame then passes through main memory once.
+//!
+//! For this the functions of rows are longer than elsewhere: they borrow the buffers of their stage all at once, and loops
+//! that a compiler is to make vectors of stand in one piece.
 
 use std::ops::Range;
 
@@ -43,7 +46,11 @@ impl Window {
     /// Makes the rows of a range present; those that are missing are made, the oldest forgotten.
     ///
     /// Ranges must not move up, nor be longer than the capacity.
-    pub(super) fn cover(&mut self, range: Range<usize>, mut make: impl FnMut(usize, &mut [f32])) {
+    pub(super) fn cover_rows(
+        &mut self,
+        range: Range<usize>,
+        mut make: impl FnMut(usize, &mut [f32]),
+    ) {
         debug_assert!(range.len() <= self.capacity);
         self.next = self.next.max(range.start);
         while self.next < range.end {
@@ -67,7 +74,7 @@ impl Window {
 }
 
 /// The rows within `radius` of `y` in a picture of `height` rows.
-pub(super) fn around(y: usize, radius: usize, height: usize) -> Range<usize> {
+pub(super) fn rows_around(y: usize, radius: usize, height: usize) -> Range<usize> {
     y.saturating_sub(radius)..y.saturating_add(radius).saturating_add(1).min(height)
 }
 
@@ -108,7 +115,7 @@ pub(super) enum Pad {
 
 impl Pad {
     /// Fills both margins of a padded row whose middle is there.
-    pub(super) fn fill(self, padded: &mut [f32], margin: usize) {
+    pub(super) fn fill_margins(self, padded: &mut [f32], margin: usize) {
         let len = padded.len();
         let (left, right) = match self {
             Self::Repeat => (padded[margin], padded[len - margin - 1]),
@@ -128,11 +135,11 @@ mod tests {
         let mut made = Vec::new();
         let mut window = Window::new(2, 3);
         for y in 0..6 {
-            window.cover(around(y, 1, 6), |y, row| {
+            window.cover_rows(rows_around(y, 1, 6), |y, row| {
                 made.push(y);
                 row.fill(y as f32);
             });
-            for near in around(y, 1, 6) {
+            for near in rows_around(y, 1, 6) {
                 assert_eq!(window.row(near), [near as f32; 2]);
             }
         }
@@ -142,7 +149,7 @@ mod tests {
     #[test]
     fn a_window_that_starts_below_the_top_makes_nothing_above() {
         let mut window = Window::new(1, 3);
-        window.cover(around(10, 1, 20), |y, row| row[0] = y as f32);
+        window.cover_rows(rows_around(10, 1, 20), |y, row| row[0] = y as f32);
         assert_eq!(window.row(9), [9.0]);
         assert_eq!(window.next, 12);
     }
@@ -159,9 +166,9 @@ mod tests {
     #[test]
     fn margins_repeat_or_hold_a_value() {
         let mut row = [0.0, 0.0, 1.0, 2.0, 0.0, 0.0];
-        Pad::Repeat.fill(&mut row, 2);
+        Pad::Repeat.fill_margins(&mut row, 2);
         assert_eq!(row, [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]);
-        Pad::Value(9.0).fill(&mut row, 2);
+        Pad::Value(9.0).fill_margins(&mut row, 2);
         assert_eq!(row, [9.0, 9.0, 1.0, 2.0, 9.0, 9.0]);
     }
 }

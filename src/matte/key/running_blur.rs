@@ -3,27 +3,27 @@
 //! Samples are held to a grid so coarse that sums of them are exact. What enters a sum leaves it without a trace, and a
 //! band of rows finds the same sums wherever it starts.
 
-use super::rows::{Pad, Rows, Window, around, window_rows};
+use super::rows::{Pad, Rows, Window, rows_around, window_rows};
 
 /// Largest magnitude of a sample: that of half precision.
-const MOST: f32 = 65_504.0;
-/// Adding and subtracting this rounds a double to multiples of 2^-24; a sum of 4095 samples up to [`MOST`] then takes 52
+const MAX_SAMPLE: f32 = 65_504.0;
+/// Adding and subtracting this rounds a double to multiples of 2^-24; a sum of 4095 samples up to [`MAX_SAMPLE`] then takes 52
 /// of a double's 53 bits.
-const GRID: f64 = 1.5 * (1u64 << 28) as f64;
+const GRID_ROUNDER: f64 = 1.5 * (1u64 << 28) as f64;
 
 /// Which samples a box covers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(super) struct BoxReach {
     /// How many to each side of the centre.
     pub(super) radius: usize,
     /// The border's samples stand in for those beyond it, which otherwise do not count.
     pub(super) repeat: bool,
 }
 
-impl Reach {
+impl BoxReach {
     /// How many samples around `at` count.
-    fn count(self, at: usize, length: usize) -> f64 {
-        let inside = around(at, self.radius, length).len();
+    fn sample_count(self, at: usize, length: usize) -> f64 {
+        let inside = rows_around(at, self.radius, length).len();
         (if self.repeat {
             2 * self.radius + 1
         } else {
@@ -35,7 +35,7 @@ impl Reach {
 /// A plane blurred by a box, along x and then along y.
 pub(super) struct RunningBlur<S> {
     source: S,
-    reach: Reach,
+    reach: BoxReach,
     height: usize,
     padded: Vec<f32>,
     /// Rows blurred along x: those in the sums, and the one that is about to leave them.
@@ -49,7 +49,7 @@ pub(super) struct RunningBlur<S> {
 
 impl<S: Rows> RunningBlur<S> {
     /// A blur over a plane of that width and height.
-    pub(super) fn new(source: S, reach: Reach, (width, height): (usize, usize)) -> Self {
+    pub(super) fn new(source: S, reach: BoxReach, (width, height): (usize, usize)) -> Self {
         Self {
             source,
             reach,
@@ -58,12 +58,14 @@ impl<S: Rows> RunningBlur<S> {
             window: Window::new(width, window_rows(reach.radius, height) + 1),
             sums: vec![0.0; width],
             summed: 0..0,
-            shares: (0..width).map(|x| 1.0 / reach.count(x, width)).collect(),
+            shares: (0..width)
+                .map(|x| 1.0 / reach.sample_count(x, width))
+                .collect(),
         }
     }
 
     /// Moves the sums to other rows. Sums are exact, so that starting anew gives the same ones.
-    fn sum(&mut self, rows: std::ops::Range<usize>) {
+    fn move_sums(&mut self, rows: std::ops::Range<usize>) {
         let Self {
             source,
             reach,
@@ -73,10 +75,10 @@ impl<S: Rows> RunningBlur<S> {
             shares,
             ..
         } = self;
-        window.cover(rows.clone(), |y, row| {
+        window.cover_rows(rows.clone(), |y, row| {
             let inside = reach.radius..reach.radius + row.len();
             source.row(y, &mut padded[inside.clone()]);
-            hold(&mut padded[inside]);
+            hold_row(&mut padded[inside]);
             along_x(padded, *reach, shares, row);
         });
         let keeps = self.summed.end > rows.start && rows.start - self.summed.start <= 1;
@@ -85,9 +87,9 @@ impl<S: Rows> RunningBlur<S> {
             self.summed = rows.start..rows.start;
         }
         if self.summed.start < rows.start {
-            add(sums, window.row(self.summed.start), -1.0);
+            add_row(sums, window.row(self.summed.start), -1.0);
         }
-        (self.summed.end..rows.end).for_each(|y| add(sums, window.row(y), 1.0));
+        (self.summed.end..rows.end).for_each(|y| add_row(sums, window.row(y), 1.0));
         self.summed = rows;
     }
 }
@@ -95,8 +97,8 @@ impl<S: Rows> RunningBlur<S> {
 impl<S: Rows> Rows for RunningBlur<S> {
     fn row(&mut self, y: usize, out: &mut [f32]) {
         let (radius, height) = (self.reach.radius, self.height);
-        self.sum(around(y, radius, height));
-        let share = 1.0 / self.reach.count(y, height);
+        self.move_sums(rows_around(y, radius, height));
+        let share = 1.0 / self.reach.sample_count(y, height);
         let beyond = |missing: usize| {
             if self.reach.repeat {
                 missing as f64
@@ -124,25 +126,25 @@ impl<S: Rows> Rows for RunningBlur<S> {
     }
 }
 
-/// Puts samples on the grid; what is no number becomes 0.
+/// Puts samples on the grid; NaN becomes 0.
 #[multiversion::multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn hold(samples: &mut [f32]) {
+fn hold_row(samples: &mut [f32]) {
     for s in samples {
-        *s = held(f64::from(*s));
+        *s = held_sample(f64::from(*s));
     }
 }
 
 #[inline(always)]
-fn held(v: f64) -> f32 {
-    let most = f64::from(MOST);
+fn held_sample(v: f64) -> f32 {
+    let most = f64::from(MAX_SAMPLE);
     let low = if v < most { v } else { most };
     let inside = if low > -most { low } else { -most };
     let inside = if v.is_nan() { 0.0 } else { inside };
-    ((inside + GRID) - GRID) as f32
+    ((inside + GRID_ROUNDER) - GRID_ROUNDER) as f32
 }
 
 #[multiversion::multiversion(targets(
@@ -150,25 +152,25 @@ fn held(v: f64) -> f32 {
     "x86_64+avx2",
     "aarch64+neon"
 ))]
-fn add(sums: &mut [f64], row: &[f32], sign: f64) {
+fn add_row(sums: &mut [f64], row: &[f32], sign: f64) {
     sums.iter_mut()
         .zip(row)
         .for_each(|(sum, v)| *sum += sign * f64::from(*v));
 }
 
 /// Blurs a row between margins; the last sample of `padded` is never counted.
-fn along_x(padded: &mut [f32], reach: Reach, shares: &[f64], out: &mut [f32]) {
+fn along_x(padded: &mut [f32], reach: BoxReach, shares: &[f64], out: &mut [f32]) {
     let (diameter, end) = (2 * reach.radius + 1, padded.len() - 1);
     let pad = if reach.repeat {
         Pad::Repeat
     } else {
         Pad::Value(0.0)
     };
-    pad.fill(&mut padded[..end], reach.radius);
+    pad.fill_margins(&mut padded[..end], reach.radius);
     let mut sum: f64 = padded[..diameter].iter().map(|v| f64::from(*v)).sum();
     let steps = padded[diameter..].iter().zip(&padded[..]);
     for ((o, share), (enters, leaves)) in out.iter_mut().zip(shares).zip(steps) {
-        *o = held(sum * share);
+        *o = held_sample(sum * share);
         sum += f64::from(*enters) - f64::from(*leaves);
     }
 }
@@ -192,7 +194,7 @@ mod tests {
         ((x * 7 + y * 11) % 17) as f32 * 0.37 - 1.5
     }
 
-    fn blurred(plane: fn(usize, usize) -> f32, reach: Reach, first: usize) -> Vec<Vec<f32>> {
+    fn blurred(plane: fn(usize, usize) -> f32, reach: BoxReach, first: usize) -> Vec<Vec<f32>> {
         let mut blur = RunningBlur::new(Plane(plane), reach, SIZE);
         (first..SIZE.1)
             .map(|y| {
@@ -206,7 +208,7 @@ mod tests {
     #[test]
     fn a_running_sum_is_the_mean_of_its_window() {
         for (radius, repeat) in [(0, false), (1, false), (3, true), (8, false), (20, true)] {
-            for (y, row) in blurred(uneven, Reach { radius, repeat }, 0)
+            for (y, row) in blurred(uneven, BoxReach { radius, repeat }, 0)
                 .iter()
                 .enumerate()
             {
@@ -230,7 +232,7 @@ mod tests {
     #[test]
     fn sums_are_the_same_wherever_they_start() {
         let wide = |x: usize, y: usize| uneven(x, y) * if x > 6 { 3e4 } else { 1e-7 };
-        let reach = Reach {
+        let reach = BoxReach {
             radius: 2,
             repeat: false,
         };
@@ -242,7 +244,7 @@ mod tests {
         let odd = |x: usize, y: usize| if (x, y) == (4, 4) { f32::NAN } else { 0.5 };
         let rows = blurred(
             odd,
-            Reach {
+            BoxReach {
                 radius: 1,
                 repeat: false,
             },
@@ -251,6 +253,9 @@ mod tests {
         assert_eq!(rows[2], [0.5; 13]);
         assert_eq!((rows[6][4], rows[4][7]), (0.5, 0.5));
         assert!(rows.iter().flatten().all(|v| v.is_finite()));
-        assert_eq!((held(f64::INFINITY), held(-1e30)), (MOST, -MOST));
+        assert_eq!(
+            (held_sample(f64::INFINITY), held_sample(-1e30)),
+            (MAX_SAMPLE, -MAX_SAMPLE)
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! The stages in their order, and the bands of rows that run them side by side.
 
-use super::box_blur::blurred;
+use super::box_blur::box_blurred;
 use super::chroma::ChromaBlur;
 use super::dilate::Dilate;
 use super::edge::{Clip, Edges};
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Rows a band has at least, where there are as many.
-const BAND_MIN: usize = 16;
+const MIN_BAND_ROWS: usize = 16;
 /// Rows a band has for every row that it must compute beyond itself.
 const BAND_PER_HALO: usize = 6;
 
@@ -78,14 +78,14 @@ impl<'a, P: Photo> Stream<'a, P> {
     }
 
     /// Computes a plane, and the cut-out that it makes unless the picture for it is empty.
-    pub(super) fn compute(
+    pub(super) fn compute_plane(
         &self,
         plane: Plane,
         matte: &mut Image<Coverage>,
         cutout: &mut Image<PremulRgba>,
     ) -> Deviations {
         let (width, height) = self.keying.photo.size();
-        fit(matte, width, height);
+        fit_size(matte, width, height);
         if matte.is_empty() {
             return Deviations::default();
         }
@@ -94,8 +94,8 @@ impl<'a, P: Photo> Stream<'a, P> {
         let cutouts = bands_of(cutout, width * rows, height.div_ceil(rows));
         let seen = bands.zip(cutouts).map(|((band, matte), cutout)| {
             let first = band * rows;
-            self.band(&mut *self.source(plane), first, matte, cutout);
-            robust::unusable(&self.keying, self.opts, first..first + matte.len() / width)
+            self.compute_band(&mut *self.plane_source(plane), first, matte, cutout);
+            robust::count_unusable(&self.keying, self.opts, first..first + matte.len() / width)
         });
         Deviations {
             clamped: self.clamped.load(Ordering::Relaxed),
@@ -103,7 +103,7 @@ impl<'a, P: Photo> Stream<'a, P> {
         }
     }
 
-    fn band(
+    fn compute_band(
         &self,
         plane: &mut dyn Rows,
         first: usize,
@@ -127,14 +127,14 @@ impl<'a, P: Photo> Stream<'a, P> {
         let distances = o.dilate_distance.unsigned_abs() + o.feather_distance.unsigned_abs();
         let halo = (o.blur_pre + o.edge_kernel_radius + o.blur_post + distances) as usize;
         let threads = rayon::current_num_threads();
-        let rounds = height / (threads * (halo * BAND_PER_HALO).max(BAND_MIN));
+        let rounds = height / (threads * (halo * BAND_PER_HALO).max(MIN_BAND_ROWS));
         height.div_ceil(threads * rounds.max(1)).max(1)
     }
 
-    fn source(&self, plane: Plane) -> Source<'_> {
+    fn plane_source(&self, plane: Plane) -> Source<'_> {
         match plane {
-            Plane::Matte => self.matte(),
-            Plane::Edges => self.edges(),
+            Plane::Matte => self.finished_matte(),
+            Plane::Edges => self.edge_plane(),
         }
     }
 
@@ -142,7 +142,7 @@ impl<'a, P: Photo> Stream<'a, P> {
         Keyer::new(self.keying.screen, self.channel, self.opts)
     }
 
-    fn raw(&self) -> Source<'_> {
+    fn raw_matte(&self) -> Source<'_> {
         let photo = self.keying.photo;
         if self.opts.blur_pre == 0 {
             return Box::new(RawMatte {
@@ -158,8 +158,8 @@ impl<'a, P: Photo> Stream<'a, P> {
         })
     }
 
-    fn clipped(&self) -> Source<'_> {
-        let raw = self.raw();
+    fn clipped_matte(&self) -> Source<'_> {
+        let raw = self.raw_matte();
         if Clip::is_wanted(self.opts) {
             Box::new(Clip::new(raw, self.size(), self.opts))
         } else {
@@ -168,19 +168,19 @@ impl<'a, P: Photo> Stream<'a, P> {
     }
 
     /// The edges: Blender up to 4.3 looks for them in the clipped matte, later ones in the raw one.
-    fn edges(&self) -> Source<'_> {
+    fn edge_plane(&self) -> Source<'_> {
         let searched = if self.behaviour() == Behaviour::V45 {
-            self.raw()
+            self.raw_matte()
         } else {
-            self.clipped()
+            self.clipped_matte()
         };
         Box::new(Edges::new(searched, self.size(), self.opts))
     }
 
-    fn limited(&self) -> Source<'_> {
+    fn limited_matte(&self) -> Source<'_> {
         let Keying { garbage, core, .. } = self.keying;
         let (behaviour, careful) = (self.behaviour(), self.opts.profile == Profile::Robust);
-        let mut source = self.clipped();
+        let mut source = self.clipped_matte();
         if let Some(garbage) = garbage {
             source = Box::new(Garbage {
                 source,
@@ -202,11 +202,11 @@ impl<'a, P: Photo> Stream<'a, P> {
     }
 
     /// The finished matte.
-    fn matte(&self) -> Source<'_> {
+    fn finished_matte(&self) -> Source<'_> {
         let (o, size) = (self.opts, self.size());
-        let mut source = self.limited();
+        let mut source = self.limited_matte();
         if o.blur_post > 0 {
-            source = blurred(source, o, o.blur_post, size);
+            source = box_blurred(source, o, o.blur_post, size);
         }
         if o.dilate_distance != 0 {
             source = Box::new(Dilate::new(source, size, o));
@@ -234,7 +234,7 @@ impl<'a, P: Photo> Stream<'a, P> {
 
 /// Makes a picture that size, keeping it where it is. Its memory is first touched by the threads that fill it: making
 /// 4K pictures on one thread takes several times as long as keying.
-pub(super) fn fit<Q: Zeroable + Copy>(image: &mut Image<Q>, width: usize, height: usize) {
+pub(super) fn fit_size<Q: Zeroable + Copy>(image: &mut Image<Q>, width: usize, height: usize) {
     if image.size() != (width, height) {
         *image = Image::from_vec(
             width,

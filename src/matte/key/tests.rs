@@ -144,7 +144,7 @@ fn overexposure_looks_at_alpha_in_blender_4_5_alone() {
 #[test]
 fn row_operations_come_out_as_in_blender() {
     let of = |profile, change: fn(&mut KeyOptions)| {
-        let mut opts = KeyOptions::of(profile);
+        let mut opts = KeyOptions::for_profile(profile);
         change(&mut opts);
         row_operation(&ROW, &opts)
     };
@@ -226,7 +226,7 @@ fn all_stages(profile: Profile) -> KeyOptions {
         blur_post: 3,
         dilate_distance: -2,
         feather_distance: 4,
-        ..KeyOptions::of(profile)
+        ..KeyOptions::for_profile(profile)
     }
 }
 
@@ -286,7 +286,7 @@ fn running_sums_are_blenders_up_to_its_own_rounding() {
                     blur_pre,
                     blur_post: size,
                     blur,
-                    ..KeyOptions::of(profile)
+                    ..KeyOptions::for_profile(profile)
                 };
                 job.matte(&opts).unwrap()
             };

@@ -1,9 +1,10 @@
 //! Polynomials of the position, one a channel, for the logarithm of the screen.
 
+use super::PlateOptions;
 use super::cells::{Cell, SIGMA_OF_MEDIAN, median};
-use super::{PlateOptions, refused};
 use crate::error::Result;
 use crate::image::Image;
+use crate::matte::prepared::refused;
 use crate::pixel::LinearRgb;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -16,20 +17,20 @@ pub(super) struct Polynomial {
 }
 
 /// A channel that is darker than this share of the brightest is held there: the logarithm of nothing is not fitted.
-const DARKEST: f64 = 1e-4;
+const MIN_BRIGHTNESS: f64 = 1e-4;
 /// Rounds of reweighting.
-const ROUNDS: usize = 8;
+const REWEIGHTING_ROUNDS: usize = 8;
 /// Residual in standard deviations beyond which a cell does not count at all (Tukey's biweight, 95 % efficient).
-const TUKEY: f64 = 4.685;
+const TUKEY_SIGMAS: f64 = 4.685;
 /// The same for what is darker than the fit, in standard deviations of what is brighter: objects darken the screen around
-/// them far and wide and never brighten it, so that the brighter cells tell the noise, and the darker the shadow.
-const SHADOWED: f64 = 1.5;
+/// them far and wide and never brighten it, so that the brighter cells show the noise, and the darker ones the shadow.
+const SHADOW_SIGMAS: f64 = 1.5;
 /// Relative noise of a cell below which nothing is an outlier: the coding of an 8-bit picture.
-const FINEST: f64 = 2e-3;
+const CELL_NOISE: f64 = 2e-3;
 /// Cells a coefficient, at least.
-const CELLS_A_COEFFICIENT: usize = 4;
+const MIN_CELLS_PER_COEFFICIENT: usize = 4;
 /// Every so many-th cell is left out of the fit that chooses the degree.
-const LEFT_OUT: usize = 3;
+const HELD_OUT_STRIDE: usize = 3;
 
 /// A cell as the fit sees it: the monomials of its place, lower degrees first, and its channels' logarithms.
 struct Sample {
@@ -38,32 +39,14 @@ struct Sample {
 }
 
 impl Polynomial {
+    /// Fits all channels, with the lowest degree that is good enough.
     pub(super) fn fit(cells: &[Cell], size: (usize, usize), opts: &PlateOptions) -> Result<Self> {
         let samples = samples(cells, size, opts.max_degree)?;
-        let most = |degree: usize| samples.len() >= CELLS_A_COEFFICIENT * terms(degree);
-        let degrees: Vec<usize> = (0..=opts.max_degree)
-            .filter(|&d| d == 0 || most(d))
-            .collect();
-        let (left, asked): (Vec<_>, Vec<_>) = samples
-            .iter()
-            .enumerate()
-            .partition(|(i, _)| i % LEFT_OUT == 0);
-        let strip =
-            |part: Vec<(usize, _)>| part.into_iter().map(|(_, s)| s).collect::<Vec<&Sample>>();
-        let (left, asked) = (strip(left), strip(asked));
-        let errors: Vec<f64> = degrees
-            .iter()
-            .map(|&degree| left_out_error(&asked, &left, degree))
-            .collect();
+        let degree = chosen_degree(&samples, opts);
         let all: Vec<&Sample> = samples.iter().collect();
-        let best = errors.iter().copied().fold(f64::MAX, f64::min).max(FINEST);
-        let enough = errors
-            .iter()
-            .position(|e| *e <= best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE));
-        let degree = degrees[enough.unwrap_or(degrees.len() - 1)];
         Ok(Self {
             degree,
-            coefficients: [0, 1, 2].map(|c| robust(&all, degree, c)),
+            coefficients: [0, 1, 2].map(|c| robust_fit(&all, degree, c)),
         })
     }
 
@@ -72,24 +55,23 @@ impl Polynomial {
         let (w, h) = size;
         let mut out = Image::new(w, h);
         let u: Vec<f32> = (0..w)
-            .map(|x| place([x as f64 + 0.5, 0.0], size)[0] as f32)
+            .map(|x| normalized([x as f64 + 0.5, 0.0], size)[0] as f32)
             .collect();
-        out.par_rows_mut()
-            .enumerate()
-            .for_each(|(y, row): (usize, &mut [LinearRgb])| {
-                let v = place([0.0, y as f64 + 0.5], size)[1];
-                let [r, g, b] = [0, 1, 2].map(|c| exponentials(&self.along(c, v), &u));
-                for (pixel, (r, (g, b))) in
-                    row.iter_mut().zip(r.into_iter().zip(g.into_iter().zip(b)))
-                {
-                    *pixel = LinearRgb::new(r, g, b);
-                }
-            });
+        out.par_rows_mut().enumerate().for_each(|(y, row)| {
+            self.fill_row(normalized([0.0, y as f64 + 0.5], size)[1], &u, row)
+        });
         out
     }
 
+    fn fill_row(&self, v: f64, u: &[f32], row: &mut [LinearRgb]) {
+        let [r, g, b] = [0, 1, 2].map(|c| exponentials(&self.row_coefficients(c, v), u));
+        for (pixel, (r, (g, b))) in row.iter_mut().zip(r.into_iter().zip(g.into_iter().zip(b))) {
+            *pixel = LinearRgb::new(r, g, b);
+        }
+    }
+
     /// Coefficients of the polynomial in x that is left of a channel in one row.
-    fn along(&self, channel: usize, v: f64) -> Vec<f32> {
+    fn row_coefficients(&self, channel: usize, v: f64) -> Vec<f32> {
         let mut along = vec![0.0_f64; self.degree + 1];
         for (&[i, j], k) in exponents(self.degree)
             .iter()
@@ -114,8 +96,8 @@ fn exponentials(coefficients: &[f32], at: &[f32]) -> Vec<f32> {
     values
 }
 
-/// Added to a number and taken away again it leaves the nearest whole one: its unit in the last place is 1.
-const ROUNDER: f32 = 1.5 * (1 << 23) as f32;
+/// Added to a number and taken away again it leaves the nearest integer: its unit in the last place is 1.
+const NEAREST_INTEGER: f32 = 1.5 * (1 << 23) as f32;
 /// The logarithm of 2 as the sum of a number of few bits, of which any multiple here is exact, and a small rest.
 const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
 /// Where the result would be too small or too large for a normal number.
@@ -126,7 +108,7 @@ const EXP_RANGE: [f32; 2] = [-87.0, 88.0];
 /// `e^x = 2^k e^r` with `|r| <= ln 2 / 2`, the latter by its series.
 fn exp(x: f32) -> f32 {
     let x = x.clamp(EXP_RANGE[0], EXP_RANGE[1]);
-    let k = x * std::f32::consts::LOG2_E + ROUNDER - ROUNDER;
+    let k = x * std::f32::consts::LOG2_E + NEAREST_INTEGER - NEAREST_INTEGER;
     let r = x - k * LN_2[0] - k * LN_2[1];
     let series = [
         1.0 / 720.0,
@@ -154,7 +136,7 @@ fn exponents(degree: usize) -> Vec<[usize; 2]> {
 }
 
 /// A position in units of half the longer side, from the centre.
-fn place([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
+fn normalized([x, y]: [f64; 2], (w, h): (usize, usize)) -> [f64; 2] {
     let half = 0.5 * w.max(h) as f64;
     [(x - 0.5 * w as f64) / half, (y - 0.5 * h as f64) / half]
 }
@@ -171,36 +153,76 @@ fn samples(cells: &[Cell], size: (usize, usize), max_degree: usize) -> Result<Ve
             "the background is black; a screen plate needs light on the screen",
         ));
     }
-    let exponents = exponents(max_degree);
-    let sample = |cell: &Cell| {
-        let [u, v] = place(cell.at_px, size);
-        Sample {
-            basis: exponents
-                .iter()
-                .map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32))
-                .collect(),
-            log: cell.color.map(|c| libm::log(c.max(DARKEST * brightest))),
-        }
-    };
-    Ok(cells.iter().map(sample).collect())
+    let (exponents, darkest) = (exponents(max_degree), MIN_BRIGHTNESS * brightest);
+    let samples = cells.iter().map(|cell| Sample {
+        basis: monomials(&exponents, normalized(cell.at_px, size)),
+        log: cell.color.map(|c| libm::log(c.max(darkest))),
+    });
+    Ok(samples.collect())
 }
 
-/// Median absolute error of the cells that a fit to the others leaves, of the brightest channel: the others have its shape
-/// and more noise.
-fn left_out_error(asked: &[&Sample], left: &[&Sample], degree: usize) -> f64 {
-    if asked.len() < terms(degree) {
-        return f64::MAX;
-    }
-    let brightness = |c: usize| asked.iter().map(|s| s.log[c]).sum::<f64>();
-    let brightest = (1..3).fold(0, |best, c| {
-        if brightness(c) > brightness(best) {
-            c
-        } else {
-            best
+fn monomials(exponents: &[[usize; 2]], [u, v]: [f64; 2]) -> Vec<f64> {
+    exponents
+        .iter()
+        .map(|&[i, j]| u.powi(i as i32) * v.powi(j as i32))
+        .collect()
+}
+
+/// The lowest degree that no higher one beats by the least gain, by the error at cells that are left out.
+fn chosen_degree(samples: &[Sample], opts: &PlateOptions) -> usize {
+    let degrees: Vec<usize> = (0..=opts.max_degree)
+        .filter(|&d| d == 0 || samples.len() >= MIN_CELLS_PER_COEFFICIENT * terms(d))
+        .collect();
+    let split = HeldOut::new(samples);
+    let errors: Vec<f64> = degrees.iter().map(|&d| split.error(d)).collect();
+    let best = errors
+        .iter()
+        .copied()
+        .fold(f64::MAX, f64::min)
+        .max(CELL_NOISE);
+    let enough = best / (1.0 - opts.least_gain).max(f64::MIN_POSITIVE);
+    let lowest = errors.iter().position(|e| *e <= enough);
+    degrees[lowest.unwrap_or(degrees.len() - 1)]
+}
+
+/// Samples parted in those that are fitted and those that the fit is judged by.
+struct HeldOut<'a> {
+    fitted: Vec<&'a Sample>,
+    left_out: Vec<&'a Sample>,
+}
+
+impl<'a> HeldOut<'a> {
+    fn new(samples: &'a [Sample]) -> Self {
+        let (mut fitted, mut left_out) = (Vec::new(), Vec::new());
+        for (i, sample) in samples.iter().enumerate() {
+            if i % HELD_OUT_STRIDE == 0 {
+                left_out.push(sample);
+            } else {
+                fitted.push(sample);
+            }
         }
-    });
-    let k = robust(asked, degree, brightest);
-    median(left.iter().map(|s| (s.log[brightest] - value(&k, s)).abs())).unwrap_or(f64::MAX)
+        Self { fitted, left_out }
+    }
+
+    /// Median absolute error at the cells that were left out, of the brightest channel: the others have its shape and more
+    /// noise.
+    fn error(&self, degree: usize) -> f64 {
+        if self.fitted.len() < terms(degree) {
+            return f64::MAX;
+        }
+        let channel = self.brightest_channel();
+        let k = robust_fit(&self.fitted, degree, channel);
+        let errors = self
+            .left_out
+            .iter()
+            .map(|s| (s.log[channel] - value(&k, s)).abs());
+        median(errors).unwrap_or(f64::MAX)
+    }
+
+    fn brightest_channel(&self) -> usize {
+        let sums = [0, 1, 2].map(|c: usize| self.fitted.iter().map(|s| s.log[c]).sum::<f64>());
+        (1..3).fold(0, |best, c| if sums[c] > sums[best] { c } else { best })
+    }
 }
 
 /// The polynomial where a sample is; the basis may go on to higher degrees.
@@ -209,32 +231,41 @@ fn value(k: &DVector<f64>, sample: &Sample) -> f64 {
 }
 
 /// Iteratively reweighted least squares for one channel.
-fn robust(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
+fn robust_fit(samples: &[&Sample], degree: usize, channel: usize) -> DVector<f64> {
     let mut weights = vec![1.0; samples.len()];
     let mut k = DVector::zeros(terms(degree));
-    for _ in 0..ROUNDS {
-        k = solved(samples, channel, &weights, terms(degree));
+    for _ in 0..REWEIGHTING_ROUNDS {
+        k = least_squares(samples, channel, &weights, terms(degree));
         let residuals: Vec<f64> = samples
             .iter()
             .map(|s| s.log[channel] - value(&k, s))
             .collect();
-        let spread = |set: &dyn Fn(f64) -> bool| {
-            let chosen = residuals.iter().filter(|r| set(**r)).map(|r| r.abs());
-            (SIGMA_OF_MEDIAN * median(chosen).unwrap_or(0.0)).max(FINEST)
-        };
-        let (above, below) = (TUKEY * spread(&|_| true), SHADOWED * spread(&|r| r > 0.0));
-        let reach = |r: f64| if r > 0.0 { above } else { below };
-        weights = residuals
-            .iter()
-            .map(|r| (1.0 - (r / reach(*r)).powi(2)).max(0.0).powi(2))
-            .collect();
+        weights = biweights(&residuals);
     }
     k
 }
 
+/// Tukey's weights, narrower on the dark side.
+fn biweights(residuals: &[f64]) -> Vec<f64> {
+    let above = TUKEY_SIGMAS * robust_sigma(residuals.iter());
+    let below = SHADOW_SIGMAS * robust_sigma(residuals.iter().filter(|r| **r > 0.0));
+    residuals
+        .iter()
+        .map(|&r| {
+            let reach = if r > 0.0 { above } else { below };
+            (1.0 - (r / reach).powi(2)).max(0.0).powi(2)
+        })
+        .collect()
+}
+
+/// Standard deviation by the median of the absolute values, at least the noise of a cell.
+fn robust_sigma<'a>(residuals: impl Iterator<Item = &'a f64>) -> f64 {
+    (SIGMA_OF_MEDIAN * median(residuals.map(|r| r.abs())).unwrap_or(0.0)).max(CELL_NOISE)
+}
+
 /// Weighted least squares by the first `n` monomials, a trace of the identity added so that too few cells are no disaster.
-fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
-    let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE, DVector::zeros(n));
+fn least_squares(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVector<f64> {
+    let (mut normal, mut right) = (DMatrix::identity(n, n) * RIDGE_WEIGHT, DVector::zeros(n));
     for (sample, weight) in samples
         .iter()
         .zip(weights)
@@ -253,7 +284,7 @@ fn solved(samples: &[&Sample], channel: usize, weights: &[f64], n: usize) -> DVe
 }
 
 /// Far below what a single cell adds.
-const RIDGE: f64 = 1e-6;
+const RIDGE_WEIGHT: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {

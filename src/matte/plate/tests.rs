@@ -20,7 +20,7 @@ fn screen(uneven: f32) -> Image<LinearRgb> {
     })
 }
 
-fn free() -> Image<bool> {
+fn free() -> Mask {
     Image::from_fn(SIZE.0, SIZE.1, |x, y| {
         !((30..210).contains(&x) && (30..130).contains(&y))
     })

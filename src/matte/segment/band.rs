@@ -1,15 +1,16 @@
 //! Bands of a Laplacian pyramid, in units of their noise.
 
+use crate::error::{Error, Result};
 use crate::filter;
 use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// What the pyramid is made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Tone {
+pub enum LumaMode {
     /// Each channel by itself: sees a red cap on a blue screen of the same grey.
     #[default]
     Channels,
@@ -17,41 +18,60 @@ pub enum Tone {
     Grey([f32; 3]),
 }
 
+impl LumaMode {
+    /// # Errors
+    /// [`Error::Value`] (`tone.grey`) for weights that cannot be right.
+    pub(super) fn check(self) -> Result<()> {
+        let Self::Grey(weights) = self else {
+            return Ok(());
+        };
+        if !weights.iter().all(|w| (0.0..=1e6).contains(w)) || weights == [0.0; 3] {
+            return Err(Error::value(
+                "tone.grey",
+                format!("{weights:?}, expected weights of 0 to 1e6, not all 0"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The pictures whose bands are taken.
+    fn pictures(self, photo: &Image<LinearRgb>) -> Vec<Image<f32>> {
+        match self {
+            Self::Channels => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|channel| luma_root(photo, channel))
+                .into(),
+            Self::Grey(weights) => vec![luma_root(photo, weights)],
+        }
+    }
+}
+
 /// The bands of a photo, in units of noise.
 pub(super) struct Bands {
     /// What is finer than about 2 pixels, of the photo's size.
-    pub(super) first: Image<Coverage>,
+    pub(super) finest: Image<f32>,
     /// The other bands, each of its own size, from the second one.
-    coarser: Vec<Image<Coverage>>,
+    coarser: Vec<Image<f32>>,
     /// Sizes of the pyramid's levels, the photo's own first.
     sizes: Vec<(usize, usize)>,
 }
 
 impl Bands {
     /// Splits a photo into so many bands.
-    pub(super) fn of(photo: &Image<LinearRgb>, tone: Tone, count: usize) -> Self {
-        let pictures = match tone {
-            Tone::Channels => {
-                vec![
-                    root(photo, [1.0, 0.0, 0.0]),
-                    root(photo, [0.0, 1.0, 0.0]),
-                    root(photo, [0.0, 0.0, 1.0]),
-                ]
-            }
-            Tone::Grey(weights) => vec![root(photo, weights)],
-        };
-        let mut channels: Vec<_> = pictures
+    pub(super) fn new(photo: &Image<LinearRgb>, luma: LumaMode, count: usize) -> Self {
+        let mut channels: Vec<_> = luma
+            .pictures(photo)
             .into_iter()
-            .map(|picture| magnitudes(picture, count).into_iter())
+            .map(|picture| band_magnitudes(picture, count).into_iter())
             .collect();
-        let mut bands =
-            (0..count).map(|_| joined(channels.iter_mut().filter_map(Iterator::next).collect()));
-        let first = bands.next().unwrap_or_default();
+        let mut bands = (0..count)
+            .map(|_| in_units_of_noise(channels.iter_mut().filter_map(Iterator::next).collect()));
+        let finest = bands.next().unwrap_or_default();
         let coarser: Vec<_> = bands.map(|band| largest_around(&band, 1)).collect();
-        let mut sizes = vec![first.size()];
-        sizes.extend(coarser.iter().map(Image::size));
+        let sizes = std::iter::once(finest.size())
+            .chain(coarser.iter().map(Image::size))
+            .collect();
         Self {
-            first,
+            finest,
             coarser,
             sizes,
         }
@@ -60,8 +80,8 @@ impl Bands {
     /// What is about `2^level` pixels wide, brought to the photo's size; `level` is 2 or more.
     ///
     /// Each pixel holds the largest of the 3 x 3 values around it: a band passes through 0 on the very edge that it
-    /// tells of.
-    pub(super) fn last(&self, level: usize) -> Image<Coverage> {
+    /// shows.
+    pub(super) fn at_full_size(&self, level: usize) -> Image<f32> {
         let band = self.coarser[level - 2].clone();
         let finer = self.sizes[..level - 1].iter().rev();
         finer.fold(band, |picture, &(w, h)| filter::expand(&picture, w, h))
@@ -73,47 +93,49 @@ impl Bands {
 /// The square root makes the shot noise of a sensor the same everywhere (the transform of Anscombe without its offset)
 /// and is near to what a display-encoded picture holds. Equal weights keep a blue screen from going black, which
 /// luminance would do.
-pub(super) fn root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<Coverage> {
+pub(super) fn luma_root(photo: &Image<LinearRgb>, weights: [f32; 3]) -> Image<f32> {
     let sum: f32 = weights.iter().sum();
     let [r, g, b] = weights.map(|w| w / sum);
     photo.map(|p| {
         let root = p.map(|v| v.max(0.0).sqrt());
-        Coverage(r * root.r + g * root.g + b * root.b)
+        r * root.r + g * root.g + b * root.b
     })
 }
 
 /// Magnitudes of the bands of one picture, each of its own size.
-fn magnitudes(picture: Image<Coverage>, count: usize) -> Vec<Image<Coverage>> {
+fn band_magnitudes(picture: Image<f32>, count: usize) -> Vec<Image<f32>> {
     let mut smooth = picture;
-    let band = |_| {
+    let mut bands = Vec::with_capacity(count);
+    for _ in 0..count {
         let coarse = filter::reduce(&smooth);
         let expanded = filter::expand(&coarse, smooth.width(), smooth.height());
-        let band = smooth.zip_map(&expanded, |a, b| Coverage((a.0 - b.0).abs()));
+        bands.push(smooth.zip_map(&expanded, |a, b| (a - b).abs()));
         smooth = coarse;
-        band
-    };
-    (0..count).map(band).collect()
+    }
+    bands
 }
 
 /// The bands of some channels as one, in units of noise: root of the sum of squares.
 ///
 /// No channel counts as less noisy than half their median: square roots have the same shot noise in all of them, and one
 /// that seems to have none is clipped.
-fn joined(bands: Vec<Image<Coverage>>) -> Image<Coverage> {
-    let noises: Vec<f32> = bands.iter().map(noise).collect();
-    let mut sorted = noises.clone();
-    sorted.sort_by(f32::total_cmp);
-    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(ROUNDING);
-    let units = bands.iter().zip(&noises).map(|(band, noise)| {
-        let unit = 1.0 / noise.max(0.5 * median);
-        band.map(|c| Coverage((c.0 * unit) * (c.0 * unit)))
-    });
-    let sum = units.reduce(|a, b| a.zip_map(&b, |a, b| Coverage(a.0 + b.0)));
-    sum.unwrap_or_default().map(|c| Coverage(c.0.sqrt()))
+fn in_units_of_noise(bands: Vec<Image<f32>>) -> Image<f32> {
+    let noises: Vec<f32> = bands.iter().map(noise_sigma).collect();
+    let least = 0.5 * median(&noises);
+    bands
+        .iter()
+        .zip(&noises)
+        .map(|(band, noise)| {
+            let unit = 1.0 / noise.max(least);
+            band.map(|v| (v * unit) * (v * unit))
+        })
+        .reduce(|a, b| a.zip_map(&b, |a, b| a + b))
+        .unwrap_or_default()
+        .map(f32::sqrt)
 }
 
 /// The largest value at most `reach` columns and rows away, for every pixel.
-pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Coverage> {
+pub(super) fn largest_around(band: &Image<f32>, reach: usize) -> Image<f32> {
     let (w, h) = band.size();
     let mut along = band.clone();
     along.par_rows_mut().enumerate().for_each(|(y, row)| {
@@ -130,46 +152,62 @@ pub(super) fn largest_around(band: &Image<Coverage>, reach: usize) -> Image<Cove
 }
 
 /// Raises values to others, where those are larger.
-fn raise(row: &mut [Coverage], other: &[Coverage]) {
-    for (value, other) in row.iter_mut().zip(other) {
-        value.0 = if other.0 > value.0 { other.0 } else { value.0 };
+fn raise(row: &mut [f32], other: &[f32]) {
+    for (value, &other) in row.iter_mut().zip(other) {
+        *value = if other > *value { other } else { *value };
     }
 }
 
+/// The upper one of the values in the middle; the least noise where there is none.
+fn median(values: &[f32]) -> f32 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f32::total_cmp);
+    sorted
+        .get(sorted.len() / 2)
+        .copied()
+        .unwrap_or(ROUNDING_SIGMA)
+}
+
 /// Width of the frame along the border that shows the background, as a share of the longer side.
-const FRAME: f64 = 1.0 / 24.0;
+const FRAME_WIDTH: f64 = 1.0 / 24.0;
 /// Share of the frame that the noise is read from: an object may cover almost three quarters of it.
-const QUIET: f64 = 0.25;
+const QUIET_SHARE: f64 = 0.25;
 /// The magnitude below which a quarter of a normal variate of deviation 1 lies.
-const QUIET_OF_NORMAL: f32 = 0.318_64;
+const QUARTILE_OF_NORMAL: f32 = 0.318_64;
 /// Least noise: the rounding of an 8-bit picture, one step over the square root of 12.
-const ROUNDING: f32 = 1.0 / 255.0 / 3.464;
+const ROUNDING_SIGMA: f32 = 1.0 / 255.0 / 3.464;
 
 /// Standard deviation of a band on the background, robust against an object that reaches into the frame.
 ///
 /// # Method
 /// As the median absolute deviation, but from the lower quartile and along the border of the picture, where an object
 /// is not: `quartile / 0.3186` for normal noise.
-fn noise(magnitudes: &Image<Coverage>) -> f32 {
-    let (w, h) = magnitudes.size();
-    let frame = ((w.max(h) as f64 * FRAME) as usize).max(1);
-    let (left, right) = (frame.min(w), w.saturating_sub(frame).max(frame.min(w)));
-    let on_frame = |(y, row): (usize, &'_ [Coverage])| match y < frame || y + frame >= h {
-        true => row.to_vec(),
-        false => [&row[..left], &row[right..]].concat(),
-    };
-    let mut values: Vec<f32> = magnitudes
-        .rows()
-        .enumerate()
-        .flat_map(on_frame)
-        .map(|c| c.0)
-        .collect();
-    let rank = (values.len() as f64 * QUIET) as usize;
+fn noise_sigma(magnitudes: &Image<f32>) -> f32 {
+    let mut values = frame_values(magnitudes);
+    let rank = (values.len() as f64 * QUIET_SHARE) as usize;
     if rank >= values.len() {
-        return ROUNDING;
+        return ROUNDING_SIGMA;
     }
     let (_, quartile, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    (*quartile / QUIET_OF_NORMAL).max(ROUNDING)
+    (*quartile / QUARTILE_OF_NORMAL).max(ROUNDING_SIGMA)
+}
+
+/// The values in a frame along the border.
+fn frame_values(image: &Image<f32>) -> Vec<f32> {
+    let (w, h) = image.size();
+    let frame = ((w.max(h) as f64 * FRAME_WIDTH) as usize).max(1);
+    let left = frame.min(w);
+    let right = w.saturating_sub(frame).max(left);
+    let mut values = Vec::new();
+    for (y, row) in image.rows().enumerate() {
+        if y < frame || y + frame >= h {
+            values.extend_from_slice(row);
+        } else {
+            values.extend_from_slice(&row[..left]);
+            values.extend_from_slice(&row[right..]);
+        }
+    }
+    values
 }
 
 #[cfg(test)]
@@ -182,50 +220,48 @@ mod tests {
         (0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0
     }
 
-    fn noisy(size: usize, sigma: f32) -> Image<Coverage> {
+    fn noisy(size: usize, sigma: f32) -> Image<f32> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
         Image::from_vec(
             size,
             size,
             (0..size * size)
-                .map(|_| Coverage((sigma * normal(&mut rng)).abs()))
+                .map(|_| (sigma * normal(&mut rng)).abs())
                 .collect(),
         )
     }
 
     #[test]
     fn noise_is_the_standard_deviation_of_normal_noise() {
-        let measured = noise(&noisy(200, 0.02));
+        let measured = noise_sigma(&noisy(200, 0.02));
         assert!((measured / 0.02 - 1.0).abs() < 0.05, "{measured}");
     }
 
     #[test]
     fn noise_does_not_see_an_object_even_at_two_borders() {
         let quiet = noisy(200, 0.02);
-        let busy = Image::from_fn(200, 200, |x, y| {
-            if x < 90 || y < 50 {
-                Coverage(0.5)
-            } else {
-                quiet[(x, y)]
-            }
-        });
+        let busy = Image::from_fn(
+            200,
+            200,
+            |x, y| {
+                if x < 90 || y < 50 { 0.5 } else { quiet[(x, y)] }
+            },
+        );
         // Two thirds of the frame are covered: the lower quartile is then the 0.76 quantile of the noise, 3.7 times its own.
-        assert!(noise(&busy) < 4.0 * noise(&quiet));
+        assert!(noise_sigma(&busy) < 4.0 * noise_sigma(&quiet));
     }
 
     #[test]
     fn the_largest_around_a_pixel_is_found_up_to_the_border() {
-        let band = Image::from_fn(7, 5, |x, y| {
-            Coverage(((x * 7919 + y * 104_729) % 31) as f32)
-        });
+        let band = Image::from_fn(7, 5, |x, y| ((x * 7919 + y * 104_729) % 31) as f32);
         for reach in [1, 2, 9] {
             let found = largest_around(&band, reach);
             for (x, y) in (0..35_usize).map(|i| (i % 7, i / 7)) {
                 let near = (0..35_usize)
                     .filter(|i| x.abs_diff(i % 7) <= reach && y.abs_diff(i / 7) <= reach);
                 assert_eq!(
-                    found[(x, y)].0,
-                    near.map(|i| band.pixels()[i].0).fold(0.0, f32::max)
+                    found[(x, y)],
+                    near.map(|i| band.pixels()[i]).fold(0.0, f32::max)
                 );
             }
         }
@@ -233,18 +269,18 @@ mod tests {
 
     #[test]
     fn a_constant_has_no_bands() {
-        let bands = Bands::of(
+        let bands = Bands::new(
             &Image::filled(40, 33, LinearRgb::new(0.2, 0.7, 0.1)),
-            Tone::Channels,
+            LumaMode::Channels,
             4,
         );
         assert!(
             bands
-                .first
+                .finest
                 .pixels()
                 .iter()
-                .chain(bands.last(4).pixels())
-                .all(|c| c.0 < 0.01)
+                .chain(bands.at_full_size(4).pixels())
+                .all(|v| *v < 0.01)
         );
     }
 
@@ -257,7 +293,7 @@ mod tests {
                 LinearRgb::new(0.04, 0.25, 0.0)
             }
         });
-        let seen = |tone| Bands::of(&photo, tone, 4).first[(32, 32)].0;
-        assert!(seen(Tone::Grey([1.0; 3])) < 0.01 && seen(Tone::Channels) > 50.0);
+        let seen = |luma| Bands::new(&photo, luma, 4).finest[(32, 32)];
+        assert!(seen(LumaMode::Grey([1.0; 3])) < 0.01 && seen(LumaMode::Channels) > 50.0);
     }
 }

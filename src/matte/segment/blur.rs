@@ -1,7 +1,6 @@
 //! How blurred the edges of an object are.
 
-use super::snap::{distance, evenly, lanes, normal};
-use crate::geom::Vector2;
+use super::snap::{EdgePoint, distance, edge_points, evenly_spaced};
 use crate::image::Image;
 use crate::matte::Outline;
 use crate::pixel::LinearRgb;
@@ -9,68 +8,59 @@ use rayon::prelude::*;
 
 /// How far to either side of the outline a profile goes, pixels of the picture that was searched: an edge blurred by 2
 /// pixels is over.
-const REACH: i32 = 5;
+const PROFILE_REACH_PX: i32 = 5;
 /// Distance of the profiles along the outline, likewise.
-const SPACING: f64 = 2.0;
-/// Least change along a profile (of square roots) that tells a blur: ten steps of an 8-bit picture.
-const LEAST_CHANGE: f32 = 0.04;
+const PROFILE_SPACING_PX: f64 = 2.0;
+/// Least change along a profile (of square roots) that has a measurable blur: ten steps of an 8-bit picture.
+const MIN_CHANGE: f32 = 0.04;
 /// Highest slope of a step of height 1 that is blurred by a Gaussian of deviation 1: `1 / sqrt(2 pi)`.
-const STEEPEST: f64 = 0.398_942;
+const GAUSSIAN_SLOPE: f64 = 0.398_942;
 
-/// Standard deviation of the edges' blur, in pixels of the picture that was searched; 0 where there is no edge to tell.
+/// Standard deviation of the edges' blur, in pixels of the picture that was searched; 0 where no edge is clear enough.
 ///
 /// `scale` is pixels of the photo for one of those.
 ///
 /// # Method
 /// Along profiles across the outline, the steepest change over one pixel as a share of the whole change: `1 / (sqrt(2 pi)
 /// sigma)` for a blurred step. The median over the outline.
-pub(super) fn blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> f64 {
+pub(super) fn edge_blur_px(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> f64 {
     let points: Vec<_> = outline
         .rings
         .iter()
-        .flat_map(|ring| across(&evenly(ring, SPACING * scale.max(1.0))))
+        .flat_map(|ring| edge_points(&evenly_spaced(ring, PROFILE_SPACING_PX * scale.max(1.0)), 1))
         .collect();
     let mut slopes: Vec<f32> = points
         .par_iter()
-        .filter_map(|(at, normal)| slope(roots, *at, *normal, scale))
+        .filter_map(|point| steepest_share(&profile(roots, point, scale)))
         .collect();
-    let middle = slopes.len() / 2;
     if slopes.is_empty() {
         return 0.0;
     }
+    let middle = slopes.len() / 2;
     let (_, median, _) = slopes.select_nth_unstable_by(middle, f32::total_cmp);
-    STEEPEST / f64::from(*median)
+    GAUSSIAN_SLOPE / f64::from(*median)
 }
 
-/// The points of a ring and the normals there.
-fn across(ring: &[crate::geom::Point2<f64>]) -> Vec<(crate::geom::Point2<f64>, Vector2<f64>)> {
-    let n = ring.len();
-    (0..n)
-        .map(|i| (ring[i], normal(ring[(i + n - 1) % n], ring[(i + 1) % n])))
+/// The photo along the normal, at steps of half a pixel of the search.
+fn profile(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Vec<LinearRgb> {
+    (-2 * PROFILE_REACH_PX..=2 * PROFILE_REACH_PX)
+        .map(|k| point.mean_at(roots, 0.5 * f64::from(k), scale))
         .collect()
 }
 
 /// The steepest change over a pixel, as a share of the whole change; nothing where hardly anything changes.
-fn slope(
-    roots: &Image<LinearRgb>,
-    at: crate::geom::Point2<f64>,
-    normal: Vector2<f64>,
-    scale: f64,
-) -> Option<f32> {
-    let values: Vec<LinearRgb> = (-2 * REACH..=2 * REACH)
-        .map(|k| lanes(roots, at, normal, 0.5 * f64::from(k), scale))
-        .collect();
-    let pairs = values
+fn steepest_share(profile: &[LinearRgb]) -> Option<f32> {
+    let whole = profile
         .iter()
         .enumerate()
-        .flat_map(|(i, a)| values[i..].iter().map(move |b| distance(*a, *b)));
-    let whole = pairs.fold(0.0, f32::max);
-    let steepest = values
+        .flat_map(|(i, a)| profile[i..].iter().map(move |b| distance(*a, *b)))
+        .fold(0.0, f32::max);
+    let steepest = profile
         .iter()
-        .zip(values.iter().skip(2))
+        .zip(profile.iter().skip(2))
         .map(|(a, b)| distance(*a, *b))
         .fold(0.0, f32::max);
-    (whole > LEAST_CHANGE).then(|| steepest / whole)
+    (whole > MIN_CHANGE).then(|| steepest / whole)
 }
 
 #[cfg(test)]
@@ -93,7 +83,7 @@ mod tests {
             rings: vec![(0..200).map(at).collect()],
         };
         for sigma in [1.0f32, 1.5, 2.0] {
-            let found = blur_px(&circle, &filter::gaussian_blur(&sharp, sigma), 1.0);
+            let found = edge_blur_px(&circle, &filter::gaussian_blur(&sharp, sigma), 1.0);
             // The slope is taken over a pixel, and pixels and sampling blur by about half of one themselves.
             assert!(
                 (found - f64::from(sigma)).abs() < 0.3,
@@ -101,7 +91,7 @@ mod tests {
             );
         }
         assert_eq!(
-            blur_px(&circle, &Image::filled(100, 90, LinearRgb::grey(0.4)), 1.0),
+            edge_blur_px(&circle, &Image::filled(100, 90, LinearRgb::grey(0.4)), 1.0),
             0.0
         );
     }

@@ -1,39 +1,47 @@
 //! The depth of the search, chosen by how well searches agree.
 
+use super::confidence::Confidence;
+use super::holes::{self, ObjectArea};
 use super::pass::{Pass, Search};
-use super::{Confidence, SegmentOptions, hull};
+use super::{SegmentOptions, SegmentStep, band};
+use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
 use crate::filter;
-use crate::image::Image;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::image::{Image, Mask};
+use crate::matte::prepared::longer_side;
+use crate::pixel::LinearRgb;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
-/// The search that is believed.
-pub(super) struct Chosen {
+/// The search that agrees best with the others.
+pub(super) struct ChosenSearch<'a> {
     /// What it found.
     pub(super) pass: Pass,
-    /// Its first band.
-    pub(super) first: Image<Coverage>,
-    /// Where that is above its cut.
-    pub(super) first_binary: Image<bool>,
-    /// The band that served as the last one.
+    /// The picture that it searched.
+    pub(super) picture: Cow<'a, Image<LinearRgb>>,
+    /// Its finest band.
+    pub(super) finest: Image<f32>,
+    /// Where that is above its threshold.
+    pub(super) finest_binary: Mask,
+    /// The band that served as the coarsest one.
     pub(super) levels: usize,
-    /// How far it can be believed.
+    /// How well it agrees.
     pub(super) confidence: Confidence,
 }
 
-/// A picture size and the depths to search it at, the usual one first.
+/// A picture size and the depths to search it at, the default one first.
 ///
 /// Half the size sees half the noise, and a third of it at a quarter; the bands then are as wide as those of one depth more.
-const SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
-/// The last band has at least so many pixels along the longer side: below that, it does not tell an object from the rest.
-const LEAST_CELLS: usize = 30;
+const SEARCHED_SIZES: [(usize, &[usize]); 3] = [(1, &[4, 3, 5, 2]), (2, &[3, 2, 4]), (4, &[2, 3])];
+/// The coarsest band has at least so many pixels along the longer side: below that, it does not separate an object from
+/// the rest.
+const MIN_COARSEST_SIDE: usize = 30;
 /// Shorter side of a smaller picture, at least, pixels.
-const SMALLEST_SEARCHED: usize = 32;
+const MIN_SEARCHED_SIDE_PX: usize = 32;
 /// A finer picture is preferred to one that scores better by less than this factor.
-const PREFERENCE: f64 = 0.8;
+const FINER_PREFERENCE: f64 = 0.8;
 /// Longer side of the pictures in which outlines are compared, pixels.
-const COMPARED: usize = 256;
+const COMPARED_SIDE_PX: usize = 256;
 
 /// Searches the picture at several sizes and depths.
 ///
@@ -43,8 +51,11 @@ const COMPARED: usize = 256;
 /// searches found; a search that finds nothing overlaps with nothing. The best score wins, the finer picture when in
 /// doubt.
 /// # Errors
-/// That of the usual search when more than half of the searches fail.
-pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<Chosen> {
+/// That of the default search when more than half of the searches fail.
+pub(super) fn best_search<'a>(
+    picture: &'a Image<LinearRgb>,
+    opts: &SegmentOptions,
+) -> Result<ChosenSearch<'a>> {
     let scales = scales(picture, opts);
     let mut searched = searches(&scales, opts);
     let failed = searched.iter().filter(|s| s.pass.is_err()).count();
@@ -52,198 +63,309 @@ pub(super) fn best(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Result<
         let first = searched.iter().position(|s| s.pass.is_err()).unwrap_or(0);
         return searched
             .swap_remove(first)
-            .chosen(scales, Confidence::default());
+            .into_chosen(scales, Confidence::default());
     }
-    let outlines: Vec<Option<Image<bool>>> = searched
-        .iter()
-        .map(|s| s.compared(picture.size()))
-        .collect();
-    let beliefs: Vec<Confidence> = searched
-        .iter()
-        .enumerate()
-        .map(|(i, s)| Confidence {
-            support: s.support(),
-            agreement: agreement(&outlines, i),
-            ..Default::default()
-        })
-        .collect();
-    let wanted = |i: usize| {
-        opts.levels
-            .is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels)
-    };
-    let most = (0..searched.len())
-        .filter(|&i| wanted(i))
-        .map(|i| beliefs[i].value())
-        .fold(0.0, f64::max);
-    let pick = (0..searched.len())
-        .find(|&i| wanted(i) && beliefs[i].value() >= PREFERENCE * most)
-        .unwrap_or(0);
+    let confidences = confidences(&searched, picture.size());
+    let pick = best_candidate(&searched, &confidences, opts.levels);
     let confidence = Confidence {
         drift_px: drift_px(&searched, pick, &scales, opts),
-        ..beliefs[pick]
+        ..confidences[pick]
     };
-    searched.swap_remove(pick).chosen(scales, confidence)
+    searched.swap_remove(pick).into_chosen(scales, confidence)
+}
+
+/// Support and agreement of each search.
+fn confidences(searched: &[SearchResult], size: (usize, usize)) -> Vec<Confidence> {
+    let areas: Vec<Option<Mask>> = searched.iter().map(|s| s.small_area(size)).collect();
+    let confidence = searched.iter().enumerate().map(|(i, s)| Confidence {
+        support: s.edge_support(),
+        agreement: agreement(&areas, i),
+        ..Default::default()
+    });
+    confidence.collect()
+}
+
+/// The first search, finer pictures before coarser ones, that scores almost as well as the best; of those at a depth that
+/// was asked for, if one was.
+fn best_candidate(
+    searched: &[SearchResult],
+    confidences: &[Confidence],
+    levels: Option<usize>,
+) -> usize {
+    let candidates: Vec<usize> = (0..searched.len())
+        .filter(|&i| {
+            levels.is_none_or(|levels| searched[i].scale == 0 && searched[i].levels == levels)
+        })
+        .collect();
+    let most = candidates
+        .iter()
+        .map(|&i| confidences[i].value())
+        .fold(0.0, f64::max);
+    candidates
+        .into_iter()
+        .find(|&i| confidences[i].value() >= FINER_PREFERENCE * most)
+        .unwrap_or(0)
 }
 
 /// A picture of one size, ready to be searched, and at which depths.
-struct Scale {
+struct SearchScale<'a> {
     /// Pixels of the whole picture for one of this one.
     reduction: usize,
+    picture: Cow<'a, Image<LinearRgb>>,
     search: Search,
     depths: Vec<usize>,
 }
 
+impl<'a> SearchScale<'a> {
+    fn new(
+        whole: &'a Image<LinearRgb>,
+        reduction: usize,
+        depths: Vec<usize>,
+        opts: &SegmentOptions,
+    ) -> Self {
+        let picture = if reduction > 1 {
+            let (w, h) = whole.size();
+            Cow::Owned(filter::resize(whole, w / reduction, h / reduction))
+        } else {
+            Cow::Borrowed(whole)
+        };
+        let deepest = depths.iter().copied().max().unwrap_or(2);
+        Self {
+            reduction,
+            search: Search::new(&picture, opts, deepest),
+            picture,
+            depths,
+        }
+    }
+}
+
+fn scales<'a>(picture: &'a Image<LinearRgb>, opts: &SegmentOptions) -> Vec<SearchScale<'a>> {
+    let (w, h) = picture.size();
+    let sizes: Vec<_> = SEARCHED_SIZES
+        .into_iter()
+        .filter(|(reduction, _)| *reduction == 1 || w.min(h) / reduction >= MIN_SEARCHED_SIDE_PX)
+        .collect();
+    sizes
+        .par_iter()
+        .map(|&(reduction, depths)| {
+            let asked = opts.levels.filter(|_| reduction == 1);
+            let depths = usable_depths(depths, w.max(h) / reduction, asked);
+            SearchScale::new(picture, reduction, depths, opts)
+        })
+        .collect()
+}
+
+/// The depths at which a picture of a longer side still has enough pixels in its coarsest band, and the one that is asked for.
+fn usable_depths(depths: &[usize], longer: usize, asked: Option<usize>) -> Vec<usize> {
+    let mut usable: Vec<usize> = depths
+        .iter()
+        .copied()
+        .filter(|&depth| depth == 2 || longer >> depth >= MIN_COARSEST_SIDE)
+        .collect();
+    usable.extend(asked.filter(|depth| !usable.contains(depth)));
+    usable
+}
+
 /// One search and its setting.
-struct Searched {
+struct SearchResult {
     /// Which of the scales it was done at.
     scale: usize,
     levels: usize,
     pass: Result<Pass>,
 }
 
-fn scales(picture: &Image<LinearRgb>, opts: &SegmentOptions) -> Vec<Scale> {
-    let (w, h) = picture.size();
-    let large_enough =
-        |reduction: usize| reduction == 1 || w.min(h) / reduction >= SMALLEST_SEARCHED;
-    let sizes: Vec<_> = SIZES
-        .into_iter()
-        .filter(|(reduction, _)| large_enough(*reduction))
-        .collect();
-    let scale = |&(reduction, depths): &(usize, &[usize])| {
-        let longer = w.max(h) / reduction;
-        let mut depths: Vec<usize> = depths
-            .iter()
-            .copied()
-            .filter(|&d| d == 2 || longer >> d >= LEAST_CELLS)
-            .collect();
-        depths.extend(
-            opts.levels
-                .filter(|levels| reduction == 1 && !depths.contains(levels)),
-        );
-        let smaller =
-            (reduction > 1).then(|| filter::resize(picture, w / reduction, h / reduction));
-        let search = Search::of(
-            smaller.as_ref().unwrap_or(picture),
-            opts,
-            depths.iter().copied().max().unwrap_or(2),
-        );
-        Scale {
-            reduction,
-            search,
-            depths,
-        }
-    };
-    sizes.par_iter().map(scale).collect()
-}
-
-fn searches(scales: &[Scale], opts: &SegmentOptions) -> Vec<Searched> {
-    let settings = scales
+fn searches(scales: &[SearchScale<'_>], opts: &SegmentOptions) -> Vec<SearchResult> {
+    let settings: Vec<(usize, usize)> = scales
         .iter()
         .enumerate()
-        .flat_map(|(i, scale)| scale.depths.iter().map(move |&levels| (i, levels)));
-    let settings: Vec<(usize, usize)> = settings.collect();
-    let search = |&(scale, levels): &(usize, usize)| {
-        let picture: &Scale = &scales[scale];
-        Searched {
+        .flat_map(|(i, scale)| scale.depths.iter().map(move |&levels| (i, levels)))
+        .collect();
+    settings
+        .par_iter()
+        .map(|&(scale, levels)| SearchResult {
             scale,
             levels,
-            pass: picture.search.at(levels, opts),
-        }
-    };
-    settings.par_iter().map(search).collect()
+            pass: scales[scale].search.at_depth(levels, opts),
+        })
+        .collect()
 }
 
-/// So many times the cut of the first band is a stricter search: half a step of exposure.
-const STRICTER: f32 = 1.4;
+/// A stricter search has so many times the threshold of the finest band: half a step of exposure.
+const STRICTER_FACTOR: f32 = 1.4;
 
 /// How far a side of the hull's box moves when edges must be stronger, or when the same picture is searched at another
 /// depth, pixels of the whole picture. What such a search does not find at all moves by the picture's longer side.
-fn drift_px(searched: &[Searched], pick: usize, scales: &[Scale], opts: &SegmentOptions) -> f64 {
+fn drift_px(
+    searched: &[SearchResult],
+    pick: usize,
+    scales: &[SearchScale<'_>],
+    opts: &SegmentOptions,
+) -> f64 {
     let (own, scale) = (&searched[pick], &scales[searched[pick].scale]);
     let Ok(pass) = &own.pass else { return 0.0 };
-    let stricter = scale.search.at_cut(own.levels, STRICTER, opts);
-    let lost = pass.inside.width().max(pass.inside.height()) as f64;
-    let deeper = searched
+    let stricter = scale
+        .search
+        .at_threshold(own.levels, STRICTER_FACTOR, opts)
+        .map_or(longer_side(&pass.inside) as f64, |other| {
+            pass.distance(&other)
+        });
+    let other_depths = searched
         .iter()
         .filter(|other| other.scale == own.scale)
-        .filter_map(|other| other.pass.as_ref().ok());
-    let moved = deeper.map(|other| hull::farthest_side(&pass.hull, &other.hull));
-    let stricter = stricter.map_or(lost, |other| hull::farthest_side(&pass.hull, &other.hull));
-    scale.reduction as f64 * moved.fold(stricter, f64::max)
+        .filter_map(|other| other.pass.as_ref().ok())
+        .map(|other| pass.distance(other));
+    scale.reduction as f64 * other_depths.fold(stricter, f64::max)
 }
 
-impl Searched {
-    fn chosen(self, mut scales: Vec<Scale>, confidence: Confidence) -> Result<Chosen> {
-        let (first, first_binary) = scales.swap_remove(self.scale).search.into_first();
-        Ok(Chosen {
+impl SearchResult {
+    fn into_chosen(
+        self,
+        mut scales: Vec<SearchScale<'_>>,
+        confidence: Confidence,
+    ) -> Result<ChosenSearch<'_>> {
+        let scale = scales.swap_remove(self.scale);
+        let (finest, finest_binary) = scale.search.into_finest();
+        Ok(ChosenSearch {
             pass: self.pass?,
-            first,
-            first_binary,
+            picture: scale.picture,
+            finest,
+            finest_binary,
             levels: self.levels,
             confidence,
         })
     }
 
     /// The inside in a picture small enough to be compared quickly.
-    fn compared(&self, (w, h): (usize, usize)) -> Option<Image<bool>> {
+    fn small_area(&self, (w, h): (usize, usize)) -> Option<Mask> {
         let pass = self.pass.as_ref().ok()?;
         let longer = w.max(h);
-        let side = |len: usize| (len * COMPARED.min(longer)).div_ceil(longer);
-        let inside = pass.inside.map(|p| Coverage(f32::from(u8::from(p))));
-        Some(filter::resize(&inside, side(w), side(h)).map(|c| c.0 > 0.5))
+        let [w, h] = [w, h].map(|side| (side * COMPARED_SIDE_PX.min(longer)).div_ceil(longer));
+        let inside = pass.inside.to_coverage();
+        Some(filter::resize(&inside, w, h).map(|c| c.0 > 0.5))
     }
 
     /// Share of the outline that lies on edges; what lies on the picture's border does not count.
-    fn support(&self) -> f64 {
+    fn edge_support(&self) -> f64 {
         let Ok(pass) = &self.pass else { return 0.0 };
         let near = filter::dilate(&pass.object, EDGE_REACH_PX);
         let core = filter::erode(&pass.inside, 1.0);
-        let (w, h) = core.size();
+        let rim = pass.inside.zip_map(&core, |inside, core| inside && !core);
         let (mut length, mut on_edges) = (0u64, 0u64);
-        for (y, (inside, core)) in pass.inside.rows().zip(core.rows()).enumerate() {
-            for x in (0..w)
-                .filter(|&x| inside[x] && !core[x] && x > 0 && y > 0 && x + 1 < w && y + 1 < h)
-            {
-                length += 1;
-                on_edges += u64::from(near[(x, y)]);
-            }
+        for at in off_border(rim.size()).filter(|&at| rim[at]) {
+            length += 1;
+            on_edges += u64::from(near[at]);
         }
         on_edges as f64 / length.max(1) as f64
     }
 }
 
-/// How far from an edge pixel an outline still lies on it, pixels: the smear of the first band.
+/// The pixels of a picture without those on its border.
+fn off_border((w, h): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+    (1..h.saturating_sub(1)).flat_map(move |y| (1..w.saturating_sub(1)).map(move |x| (x, y)))
+}
+
+/// How far from an edge pixel an outline still lies on it, pixels: the smear of the finest band.
 const EDGE_REACH_PX: f64 = 2.0;
 
-/// Mean overlap of one outline with the others.
-fn agreement(outlines: &[Option<Image<bool>>], i: usize) -> f64 {
-    let others = (0..outlines.len()).filter(|&j| j != i);
-    let overlap = |j: usize| {
-        outlines[i]
-            .as_ref()
-            .zip(outlines[j].as_ref())
-            .map_or(0.0, |(a, b)| overlap(a, b))
-    };
-    others.clone().map(overlap).sum::<f64>() / others.count().max(1) as f64
+/// Mean overlap of one area with the others.
+fn agreement(areas: &[Option<Mask>], i: usize) -> f64 {
+    let others = areas.iter().enumerate().filter(|(j, _)| *j != i);
+    let sum: f64 = others
+        .map(|(_, other)| match (&areas[i], other) {
+            (Some(own), Some(other)) => overlap(own, other),
+            _ => 0.0,
+        })
+        .sum();
+    sum / areas.len().saturating_sub(1).max(1) as f64
 }
 
 /// Intersection over union.
-fn overlap(a: &Image<bool>, b: &Image<bool>) -> f64 {
-    let count = |holds: fn(bool, bool) -> bool| {
-        a.pixels()
-            .iter()
-            .zip(b.pixels())
-            .filter(|(a, b)| holds(**a, **b))
-            .count()
-    };
-    count(|a, b| a && b) as f64 / count(|a, b| a || b).max(1) as f64
+fn overlap(a: &Mask, b: &Mask) -> f64 {
+    let both = a.zip_map(b, |a, b| a && b).count();
+    let either = a.zip_map(b, |a, b| a || b).count();
+    both as f64 / either.max(1) as f64
+}
+
+impl ChosenSearch<'_> {
+    /// What it left out or saw only in part; `asked` is the width of the picture that should have been searched.
+    pub(super) fn diagnostics(&self, asked: usize) -> Vec<Diagnostic> {
+        let mut diagnostics = self.pass.diagnostics.clone();
+        diagnostics.extend(truncated(self.pass.touches));
+        diagnostics.extend(noisy(asked, self.picture.width()));
+        diagnostics
+    }
+
+    /// What the edges enclose, without holes.
+    pub(super) fn object_area(&self) -> ObjectArea {
+        holes::object_area(&self.picture, &self.pass.inside)
+    }
+
+    /// The pictures (a) to (e) of the paper's Figure 2, and what lies between; `whole` is the picture at full search size.
+    pub(super) fn into_steps(self, whole: &Image<LinearRgb>) -> Vec<SegmentStep> {
+        let pass = self.pass;
+        let both = self
+            .finest_binary
+            .zip_map(&pass.coarsest_binary, |a, b| a && b);
+        let steps = [
+            ("grey", band::luma_root(whole, [1.0; 3])),
+            ("first_band", self.finest),
+            ("last_band", pass.coarsest),
+            ("first_binary", as_plane(&self.finest_binary)),
+            ("last_binary", as_plane(&pass.coarsest_binary)),
+            ("both", as_plane(&both)),
+            ("edges", as_plane(&pass.edges)),
+            ("object", as_plane(&pass.object)),
+            ("inside", as_plane(&pass.inside)),
+        ];
+        steps
+            .map(|(name, image)| SegmentStep { name, image })
+            .into()
+    }
+}
+
+/// 1 where set, 0 elsewhere.
+fn as_plane(set: &Mask) -> Image<f32> {
+    set.map(|set| f32::from(u8::from(set)))
+}
+
+/// Names of the borders in the order of [`Pass::touches`].
+const BORDERS: [&str; 4] = ["left", "top", "right", "bottom"];
+
+/// The warning about an object that the photo cuts off; none for a whole one.
+fn truncated(touches: [bool; 4]) -> Option<Diagnostic> {
+    let reached: Vec<_> = BORDERS
+        .into_iter()
+        .zip(touches)
+        .filter(|(_, touches)| *touches)
+        .map(|(name, _)| name)
+        .collect();
+    (!reached.is_empty()).then(|| {
+        let message = format!(
+            "the object reaches the {} border: the part beyond is missing from its size",
+            reached.join(" and ")
+        );
+        Diagnostic::warning(Code::Truncated, message)
+    })
+}
+
+/// The warning about an object that was found at a lower resolution than asked for; from the widths of the pictures.
+fn noisy(asked: usize, searched: usize) -> Option<Diagnostic> {
+    let reduction = asked as f64 / searched as f64;
+    (reduction > 1.0).then(|| {
+        Diagnostic::warning(
+            Code::Noisy,
+            format_args!(
+                "the photo is noisy: the outline was found at 1/{reduction:.0} of the resolution and is accurate to one of its pixels"
+            ),
+        )
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn square(side: usize) -> Option<Image<bool>> {
+    fn square(side: usize) -> Option<Mask> {
         Some(Image::from_fn(20, 20, |x, y| x < side && y < side))
     }
 
@@ -269,7 +391,7 @@ mod tests {
             }
         });
         for levels in [2, 3, 6] {
-            let chosen = best(
+            let chosen = best_search(
                 &photo,
                 &SegmentOptions {
                     levels: Some(levels),
@@ -279,6 +401,21 @@ mod tests {
             .unwrap();
             assert_eq!(chosen.levels, levels);
             assert_eq!(chosen.pass.inside.size(), photo.size());
+        }
+    }
+
+    #[test]
+    fn the_picture_of_the_chosen_search_is_kept_and_not_made_again() {
+        let disc = |x: f64, y: f64| (x - 150.0).hypot(y - 100.0) < 60.0;
+        let photo = Image::from_fn(300, 200, |x, y| {
+            LinearRgb::grey(if disc(x as f64, y as f64) { 0.8 } else { 0.1 })
+        });
+        let opts = SegmentOptions::default();
+        let whole = best_search(&photo, &opts).unwrap();
+        assert!(matches!(whole.picture, Cow::Borrowed(picture) if std::ptr::eq(picture, &photo)));
+        for scale in scales(&photo, &opts) {
+            let searched = scale.search.at_depth(2, &opts).unwrap().inside.size();
+            assert_eq!(scale.picture.size(), searched);
         }
     }
 }

@@ -1,53 +1,38 @@
 //! Connected groups of pixels.
 
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use std::ops::Range;
 
 /// The connected groups (8 neighbours) of a set, in the order of their first pixel, row by row.
-pub(in super::super) struct Groups {
+pub(in super::super) struct PixelGroups {
     size: (usize, usize),
     /// The set as runs of pixels, row by row.
-    runs: Vec<Run>,
+    runs: Vec<PixelRun>,
     /// Number of groups.
     count: usize,
 }
 
 /// Set pixels side by side.
-struct Run {
+struct PixelRun {
     row: usize,
     columns: Range<usize>,
     /// Until all groups are found: an earlier run of the same group, or itself.
     group: usize,
 }
 
-impl Groups {
+impl PixelGroups {
     /// Finds the groups: runs that touch the same run, corners included, are of one.
-    pub(in super::super) fn of(set: &Image<bool>) -> Self {
-        let mut runs: Vec<Run> = Vec::new();
-        let (mut above, mut here) = (0, 0);
+    pub(in super::super) fn new(set: &Mask) -> Self {
+        let mut runs: Vec<PixelRun> = Vec::new();
+        let mut above = 0..0;
         for (row, pixels) in set.rows().enumerate() {
+            let start = runs.len();
             for columns in runs_of(pixels) {
-                let group = runs.len();
-                // What ends before this run touches neither it nor a later one.
-                while above < here && runs[above].columns.end < columns.start {
-                    above += 1;
-                }
-                runs.push(Run {
-                    row,
-                    columns,
-                    group,
-                });
-                let touches = |run: &Run| run.columns.start <= runs[group].columns.end;
-                let end = above
-                    + runs[above..here]
-                        .iter()
-                        .take_while(|run| touches(run))
-                        .count();
-                (above..end).for_each(|other| join(&mut runs, group, other));
+                push_joined(&mut runs, row, columns, &mut above);
             }
-            (above, here) = (here, runs.len());
+            above = start..runs.len();
         }
-        let count = number(&mut runs);
+        let count = number_groups(&mut runs);
         Self {
             size: set.size(),
             runs,
@@ -56,7 +41,7 @@ impl Groups {
     }
 
     /// How many pixels of `members` are in each group.
-    pub(in super::super) fn sizes(&self, members: &Image<bool>) -> Vec<usize> {
+    pub(in super::super) fn sizes(&self, members: &Mask) -> Vec<usize> {
         let mut sizes = vec![0; self.count];
         for run in &self.runs {
             sizes[run.group] += members.row(run.row)[run.columns.clone()]
@@ -68,7 +53,7 @@ impl Groups {
     }
 
     /// The pixels of the groups for which a claim, by index from 0, holds.
-    pub(in super::super) fn only(&self, holds: impl Fn(usize) -> bool) -> Image<bool> {
+    pub(in super::super) fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
         let mut only = Image::new(self.size.0, self.size.1);
         for run in self.runs.iter().filter(|run| holds(run.group)) {
             only.row_mut(run.row)[run.columns.clone()].fill(true);
@@ -101,8 +86,34 @@ fn runs_of(row: &[bool]) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
+/// Adds a run, joined with those of the row above that it touches. What of `above` ends before it is dropped: it touches
+/// no later run of the row either.
+fn push_joined(
+    runs: &mut Vec<PixelRun>,
+    row: usize,
+    columns: Range<usize>,
+    above: &mut Range<usize>,
+) {
+    let group = runs.len();
+    while above.start < above.end && runs[above.start].columns.end < columns.start {
+        above.start += 1;
+    }
+    let end = columns.end;
+    runs.push(PixelRun {
+        row,
+        columns,
+        group,
+    });
+    for other in above.clone() {
+        if runs[other].columns.start > end {
+            break;
+        }
+        join(runs, group, other);
+    }
+}
+
 /// The first run of a run's group; what is on the way points nearer to it from then on.
-fn first_of(runs: &mut [Run], mut run: usize) -> usize {
+fn first_of(runs: &mut [PixelRun], mut run: usize) -> usize {
     while runs[run].group != run {
         runs[run].group = runs[runs[run].group].group;
         run = runs[run].group;
@@ -110,13 +121,13 @@ fn first_of(runs: &mut [Run], mut run: usize) -> usize {
     run
 }
 
-fn join(runs: &mut [Run], a: usize, b: usize) {
+fn join(runs: &mut [PixelRun], a: usize, b: usize) {
     let (a, b) = (first_of(runs, a), first_of(runs, b));
     runs[a.max(b)].group = a.min(b);
 }
 
 /// Numbers the groups in the order of their first runs; how many there are.
-fn number(runs: &mut [Run]) -> usize {
+fn number_groups(runs: &mut [PixelRun]) -> usize {
     let mut count = 0;
     for i in 0..runs.len() {
         // Earlier runs have their number by now.
@@ -131,16 +142,16 @@ fn number(runs: &mut [Run]) -> usize {
 }
 
 /// The set without its groups of fewer than `least` pixels.
-pub(super) fn without_specks(set: &Image<bool>, least: usize) -> Image<bool> {
-    let groups = Groups::of(set);
+pub(super) fn without_specks(set: &Mask, least: usize) -> Mask {
+    let groups = PixelGroups::new(set);
     let sizes = groups.sizes(set);
     groups.only(|group| sizes[group] >= least)
 }
 
 /// The set with its holes filled: all that cannot be reached from the border of the picture. Outlines must be two
 /// pixels thick, since the way around goes over corners too.
-pub(super) fn filled(set: &Image<bool>) -> Image<bool> {
-    let groups = Groups::of(&set.map(|inside| !inside));
+pub(super) fn filled(set: &Mask) -> Mask {
+    let groups = PixelGroups::new(&set.map(|inside| !inside));
     let reaching = groups.reaching_border();
     groups.only(|group| reaching[group]).map(|open| !open)
 }
@@ -149,23 +160,19 @@ pub(super) fn filled(set: &Image<bool>) -> Image<bool> {
 mod tests {
     use super::*;
 
-    fn count(set: &Image<bool>) -> usize {
-        set.pixels().iter().filter(|p| **p).count()
-    }
-
     #[test]
     fn groups_are_joined_over_corners_and_counted() {
         let set = Image::from_fn(6, 3, |x, y| {
             matches!((x, y), (0, 0) | (1, 1) | (4, 1) | (5, 1) | (4, 2))
         });
-        assert_eq!(Groups::of(&set).sizes(&set), [2, 3]);
-        assert_eq!(count(&without_specks(&set, 3)), 3);
+        assert_eq!(PixelGroups::new(&set).sizes(&set), [2, 3]);
+        assert_eq!(without_specks(&set, 3).count(), 3);
     }
 
     #[test]
     fn a_ring_is_filled_and_a_horseshoe_is_not() {
         let ring = Image::from_fn(9, 9, |x, y| x.abs_diff(4).max(y.abs_diff(4)) == 2);
-        assert_eq!(count(&filled(&ring)), 25);
+        assert_eq!(filled(&ring).count(), 25);
         let horseshoe = Image::from_fn(9, 9, |x, y| ring[(x, y)] && y != 6);
         assert_eq!(filled(&horseshoe), horseshoe);
     }
@@ -173,7 +180,7 @@ mod tests {
     #[test]
     fn empty_pictures_have_no_groups() {
         assert!(
-            Groups::of(&Image::new(0, 3))
+            PixelGroups::new(&Image::new(0, 3))
                 .sizes(&Image::new(0, 3))
                 .is_empty()
         );

@@ -1,9 +1,9 @@
-//! How far a segmentation can be believed.
+//! How reliable a segmentation is.
 
 use crate::diagnostic::{Code, Diagnostic};
 use serde::{Deserialize, Serialize};
 
-/// How far an outline can be believed.
+/// How reliable an outline is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Confidence {
     /// Share of the outline that lies on edges, 0 to 1.
@@ -22,21 +22,21 @@ pub struct Confidence {
     pub width_px: f64,
 }
 
-/// An outline with less of itself on edges is worth a look: where it is open, a faint part of the object may lie beyond. On
-/// 24 photos in 29 variants, the outlines that were wrong without another doubt had up to 0.8, one in twelve of those that
+/// An outline with less of itself on edges gives a warning: where it is open, a faint part of the object may lie beyond. On
+/// 24 photos in 29 variants, the outlines that were wrong without another warning had up to 0.8, one in twelve of those that
 /// were right had.
-const LEAST_SUPPORT: f64 = 0.8;
-/// An outline that agrees less with other searches is worth a look.
-const LEAST_AGREEMENT: f64 = 0.75;
-/// A box that moves farther than it may be wrong is worth a look.
-const MOST_DRIFT_PX: f64 = 2.0;
-/// A box that lies farther beyond the outline than it may be wrong is worth a look: what is there encloses nothing.
-const MOST_STRAY_PX: f64 = 2.0;
-/// Edges that are softer than this are worth a look: their band reaches 2 pixels, what a box may be wrong, to either side
+const MIN_SUPPORT: f64 = 0.8;
+/// An outline that agrees less with other searches gives a warning.
+const MIN_AGREEMENT: f64 = 0.75;
+/// A box that moves by more than its tolerance gives a warning.
+const MAX_DRIFT_PX: f64 = 2.0;
+/// A box that lies farther beyond the outline than its tolerance gives a warning: what is there encloses no area.
+const MAX_STRAY_PX: f64 = 2.0;
+/// Edges that are softer than this give a warning: their band reaches 2 pixels, the tolerance of a box, to either side
 /// (twice a Gaussian's deviation). Photos in focus have 0.9 at most, and those of a camera that moved by 6 pixels 0.97.
-const MOST_BLUR_PX: f64 = 0.95;
-/// Narrower objects are worth a look: half a pixel around them is 3 % of them, and their tips are fainter than that.
-const LEAST_WIDTH_PX: f64 = 30.0;
+const MAX_BLUR_PX: f64 = 0.95;
+/// Narrower objects give a warning: half a pixel around them is 3 % of them, and their tips are fainter than that.
+const MIN_WIDTH_PX: f64 = 30.0;
 
 impl Confidence {
     /// Support and agreement in one number: their product.
@@ -47,12 +47,12 @@ impl Confidence {
     /// Why it is low; nothing where it is not.
     pub(super) fn diagnostics(self) -> Vec<Diagnostic> {
         let warnings = [
-            (self.agreement < LEAST_AGREEMENT).then(|| self.unstable_outline()),
-            (self.support < LEAST_SUPPORT).then(|| self.weak_edges()),
-            (self.drift_px > MOST_DRIFT_PX).then(|| self.threshold_sensitive()),
-            (self.stray_px > MOST_STRAY_PX).then(|| self.box_beyond_outline()),
-            (self.blur_px > MOST_BLUR_PX).then(|| self.blurred()),
-            (self.width_px < LEAST_WIDTH_PX).then(|| self.small_object()),
+            (self.agreement < MIN_AGREEMENT).then(|| self.unstable_outline()),
+            (self.support < MIN_SUPPORT).then(|| self.weak_edges()),
+            (self.drift_px > MAX_DRIFT_PX).then(|| self.threshold_sensitive()),
+            (self.stray_px > MAX_STRAY_PX).then(|| self.box_beyond_outline()),
+            (self.blur_px > MAX_BLUR_PX).then(|| self.blurred()),
+            (self.width_px < MIN_WIDTH_PX).then(|| self.small_object()),
         ];
         warnings.into_iter().flatten().collect()
     }
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_reason_is_said_alone() {
+    fn each_reason_is_reported_alone() {
         let sure = Confidence {
             support: 0.9,
             agreement: 0.95,

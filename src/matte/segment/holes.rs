@@ -1,94 +1,140 @@
 //! Holes: where the screen is seen through an opaque object, as in a ring.
 
-use super::cluster::Groups;
+use super::cluster::PixelGroups;
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::plate::{PlateOptions, ScreenPlate};
+use crate::matte::prepared::longer_side;
 use crate::matte::screen::is_keyable;
 use crate::pixel::LinearRgb;
 
+/// Width of the zone around the object that is not used as background, as a share of the longer side: contact shadows.
+const BACKGROUND_MARGIN: f64 = 0.04;
 /// A pixel is like the screen when no channel differs from the plate by more than this share, or this many times the noise.
 const LIKE_SHARE: f32 = 0.06;
-const LIKE_NOISE: f32 = 3.0;
+const LIKE_SIGMAS: f32 = 3.0;
 /// A pixel is unlike the screen when a channel differs by this share of the plate's strongest channel.
 const UNLIKE_SHARE: f32 = 0.3;
 /// Least area of a hole as a share of what is enclosed; smaller ones are a matter of the matte.
-const LEAST_AREA: f64 = 0.005;
+const MIN_HOLE_AREA: f64 = 0.005;
 /// Share of the rim that must be unlike the screen: clear plastic is like it, and then what it encloses is the object.
-const OPAQUE_RIM: f64 = 0.8;
+const OPAQUE_RIM_SHARE: f64 = 0.8;
 /// The rim lies so far around a hole: past the blur of its edge.
 const RIM_PX: [f64; 2] = [2.0, 5.0];
+
+/// What an object covers in the picture that was searched.
+pub(super) struct ObjectArea {
+    /// What its edges enclose, without holes where the screen has the colour to recognise them.
+    pub(super) solid: Mask,
+    /// Something inside looks like the screen.
+    pub(super) has_screen_like_parts: bool,
+}
+
+/// The area of the object whose edges enclose `inside`.
+pub(super) fn object_area(picture: &Image<LinearRgb>, inside: &Mask) -> ObjectArea {
+    let background = background(inside, BACKGROUND_MARGIN * longer_side(picture) as f64);
+    let holed = without_holes(picture, inside, &background);
+    let has_screen_like_parts = holed != *inside;
+    // What is like a grey board may be clear plastic before it.
+    let solid = if are_distinguishable(picture, &background) {
+        holed
+    } else {
+        inside.clone()
+    };
+    ObjectArea {
+        solid,
+        has_screen_like_parts,
+    }
+}
 
 /// What is enclosed, without the holes.
 ///
 /// A hole looks like the screen all over and has a rim that does not: a rim of clear plastic encloses clear plastic.
-pub(super) fn without_holes(
-    picture: &Image<LinearRgb>,
-    inside: &Image<bool>,
-    background: &Image<bool>,
-) -> Image<bool> {
+fn without_holes(picture: &Image<LinearRgb>, inside: &Mask, background: &Mask) -> Mask {
     let Ok(plate) = ScreenPlate::fit(picture, background, &PlateOptions::default()) else {
         return inside.clone();
     };
     let smooth = filter::box_blur(picture, 1);
-    let noise: [f32; 3] = plate.residual.into();
-    let like = smooth.zip3_map(&plate.image, inside, |p, k, inside| {
-        let (off, k) = (differences(p, k), <[f32; 3]>::from(k));
-        inside && (0..3).all(|c| off[c] <= (LIKE_SHARE * k[c]).max(LIKE_NOISE * noise[c]))
-    });
-    let groups = Groups::of(&filter::erode(&like, 1.0));
-    let (sizes, area) = (groups.sizes(&like), count(inside) as f64);
-    let large: Vec<usize> = (0..sizes.len())
-        .filter(|&g| sizes[g] as f64 >= LEAST_AREA * area)
-        .collect();
-    if large.is_empty() {
+    let candidates = large_groups(&screen_like(&smooth, &plate, inside), inside.count());
+    if candidates.is_empty() {
         return inside.clone();
     }
-    let unlike = smooth.zip_map(&plate.image, |p, k| {
-        let strongest = <[f32; 3]>::from(k).into_iter().fold(0.0, f32::max);
-        differences(p, k)
-            .into_iter()
-            .any(|d| d >= UNLIKE_SHARE * strongest)
-    });
-    let mut kept = inside.clone();
-    for group in large {
-        let hole = filter::dilate(&groups.only(|g| g == group), RIM_PX[0]);
-        let rim =
-            filter::dilate(&hole, RIM_PX[1] - RIM_PX[0]).zip_map(&hole, |near, hole| near && !hole);
-        let opaque = rim.zip_map(&unlike, |rim, unlike| rim && unlike);
-        let enclosed = rim
-            .zip_map(inside, |rim, inside| !rim || inside)
-            .pixels()
-            .iter()
-            .all(|p| *p);
-        if enclosed && count(&opaque) as f64 >= OPAQUE_RIM * count(&rim) as f64 {
-            kept = kept.zip_map(&hole, |kept, hole| kept && !hole);
-        }
-    }
-    kept
+    let unlike = smooth.zip_map(&plate.image, is_unlike_screen);
+    candidates
+        .iter()
+        .map(|core| Hole::new(core))
+        .filter(|hole| hole.has_opaque_rim(inside, &unlike))
+        .fold(inside.clone(), |kept, hole| {
+            kept.zip_map(&hole.area, |kept, hole| kept && !hole)
+        })
 }
 
-/// Whether the screen has enough colour to be told from clear plastic.
-pub(super) fn are_told(picture: &Image<LinearRgb>, background: &Image<bool>) -> bool {
-    let seen = picture
+/// The pixels inside that have the plate's colour.
+fn screen_like(smooth: &Image<LinearRgb>, plate: &ScreenPlate, inside: &Mask) -> Mask {
+    let noise: [f32; 3] = plate.residual.into();
+    smooth.zip3_map(&plate.image, inside, |p, k, inside| {
+        let (off, k) = (differences(p, k), <[f32; 3]>::from(k));
+        inside && (0..3).all(|c| off[c] <= (LIKE_SHARE * k[c]).max(LIKE_SIGMAS * noise[c]))
+    })
+}
+
+/// The cores of the groups that are large enough for a hole in an area of so many pixels.
+fn large_groups(like: &Mask, area: usize) -> Vec<Mask> {
+    let groups = PixelGroups::new(&filter::erode(like, 1.0));
+    let sizes = groups.sizes(like);
+    (0..sizes.len())
+        .filter(|&group| sizes[group] as f64 >= MIN_HOLE_AREA * area as f64)
+        .map(|group| groups.only(|g| g == group))
+        .collect()
+}
+
+fn is_unlike_screen(pixel: LinearRgb, plate: LinearRgb) -> bool {
+    let strongest = <[f32; 3]>::from(plate).into_iter().fold(0.0, f32::max);
+    differences(pixel, plate)
+        .into_iter()
+        .any(|d| d >= UNLIKE_SHARE * strongest)
+}
+
+/// What may be a hole.
+struct Hole {
+    area: Mask,
+    /// The pixels around it.
+    rim: Mask,
+}
+
+impl Hole {
+    fn new(core: &Mask) -> Self {
+        let area = filter::dilate(core, RIM_PX[0]);
+        let rim =
+            filter::dilate(&area, RIM_PX[1] - RIM_PX[0]).zip_map(&area, |near, hole| near && !hole);
+        Self { area, rim }
+    }
+
+    /// It is enclosed all around, mostly by what is unlike the screen.
+    fn has_opaque_rim(&self, inside: &Mask, unlike: &Mask) -> bool {
+        let opaque = self.rim.zip_map(unlike, |rim, unlike| rim && unlike);
+        let open = self.rim.zip_map(inside, |rim, inside| rim && !inside);
+        open.count() == 0 && opaque.count() as f64 >= OPAQUE_RIM_SHARE * self.rim.count() as f64
+    }
+}
+
+/// Whether the screen has enough colour to be distinguished from clear plastic.
+fn are_distinguishable(picture: &Image<LinearRgb>, background: &Mask) -> bool {
+    let free = picture
         .pixels()
         .iter()
         .zip(background.pixels())
         .filter(|(_, free)| **free);
-    is_keyable(seen.fold(LinearRgb::BLACK, |sum, (p, _)| sum + *p))
+    is_keyable(free.fold(LinearRgb::BLACK, |sum, (p, _)| sum + *p))
 }
 
 fn differences(a: LinearRgb, b: LinearRgb) -> [f32; 3] {
     [(a.r - b.r).abs(), (a.g - b.g).abs(), (a.b - b.b).abs()]
 }
 
-fn count(set: &Image<bool>) -> usize {
-    set.pixels().iter().filter(|p| **p).count()
-}
-
-/// The pixels of the picture that was searched that surely show the screen.
-pub(super) fn around(inside: &Image<bool>, margin_px: f64) -> Image<bool> {
-    filter::dilate(inside, margin_px).map(|near| !near)
+/// The pixels that surely show the screen: farther than a margin from what is enclosed.
+fn background(inside: &Mask, margin_px: f64) -> Mask {
+    filter::dilate(inside, margin_px).complement()
 }
 
 #[cfg(test)]
@@ -97,19 +143,19 @@ mod tests {
 
     const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 
-    fn disc(radius: f64) -> Image<bool> {
+    fn disc(radius: f64) -> Mask {
         Image::from_fn(120, 100, |x, y| {
             (x as f64 - 60.0).hypot(y as f64 - 50.0) < radius
         })
     }
 
-    fn kept(rim: LinearRgb) -> Image<bool> {
+    fn kept(rim: LinearRgb) -> Mask {
         let (outer, inner) = (disc(40.0), disc(20.0));
         let photo = outer.zip_map(
             &inner,
             |outer, inner| if outer && !inner { rim } else { GREEN },
         );
-        without_holes(&photo, &outer, &around(&outer, 3.0))
+        without_holes(&photo, &outer, &background(&outer, 3.0))
     }
 
     #[test]
@@ -117,18 +163,18 @@ mod tests {
         let kept = kept(LinearRgb::new(0.5, 0.05, 0.05));
         assert!(!kept[(60, 50)] && kept[(60, 80)] && kept[(60, 79)]);
         assert!(
-            (count(&disc(20.0)) as f64 / (count(&disc(40.0)) - count(&kept)) as f64 - 1.0).abs()
+            (disc(20.0).count() as f64 / (disc(40.0).count() - kept.count()) as f64 - 1.0).abs()
                 < 0.15
         );
     }
 
     #[test]
-    fn a_grey_board_tells_no_holes() {
+    fn holes_are_not_distinguishable_on_a_grey_board() {
         let background = disc(40.0).map(|inside| !inside);
         let board = |color: LinearRgb| Image::filled(120, 100, color);
         assert!(
-            are_told(&board(GREEN), &background)
-                && !are_told(&board(LinearRgb::grey(0.6)), &background)
+            are_distinguishable(&board(GREEN), &background)
+                && !are_distinguishable(&board(LinearRgb::grey(0.6)), &background)
         );
     }
 
@@ -142,6 +188,6 @@ mod tests {
     fn a_picture_without_background_keeps_what_is_enclosed() {
         let full = Image::filled(40, 40, true);
         let photo = Image::filled(40, 40, GREEN);
-        assert_eq!(without_holes(&photo, &full, &around(&full, 3.0)), full);
+        assert_eq!(without_holes(&photo, &full, &background(&full, 3.0)), full);
     }
 }

@@ -1,24 +1,17 @@
 //! The convex hull of a set of pixels.
 
 use crate::geom::Point2;
-use crate::image::Image;
+use crate::image::Mask;
 use geo::{Area, ConvexHull, MultiPoint, Point};
 
 /// Convex hull of the object whose edges these pixels are, in order, clockwise as seen; empty where there is no area.
 ///
 /// It goes through the pixels' centres: an edge marks the pixel on either side of it, so that the outer one's centre is
 /// nearer to the edge than its outer corner. Where a pixel lies on the border of the picture, so does the hull.
-pub(super) fn convex_hull(edges: &Image<bool>) -> Vec<Point2<f64>> {
-    let ends = edges.rows().enumerate().filter_map(|(y, row)| {
-        let first = row.iter().position(|p| *p)?;
-        let last = row.iter().rposition(|p| *p)?;
-        Some([(first, y), (last, y)])
-    });
+pub(super) fn convex_hull(edges: &Mask) -> Vec<Point2<f64>> {
     let (w, h) = edges.size();
-    let point = |(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h));
-    let hull = ends
-        .flatten()
-        .map(point)
+    let hull = row_ends(edges)
+        .map(|(x, y)| Point::new(center_or_border(x, w), center_or_border(y, h)))
         .collect::<MultiPoint>()
         .convex_hull();
     if hull.unsigned_area() <= 0.0 {
@@ -34,6 +27,16 @@ pub(super) fn convex_hull(edges: &Image<bool>) -> Vec<Point2<f64>> {
         .collect()
 }
 
+/// The first and the last pixel of every row that has any.
+fn row_ends(set: &Mask) -> impl Iterator<Item = (usize, usize)> {
+    let ends = set.rows().enumerate().filter_map(|(y, row)| {
+        let first = row.iter().position(|p| *p)?;
+        let last = row.iter().rposition(|p| *p)?;
+        Some([(first, y), (last, y)])
+    });
+    ends.flatten()
+}
+
 fn center_or_border(i: usize, len: usize) -> f64 {
     match i {
         0 => 0.0,
@@ -44,14 +47,12 @@ fn center_or_border(i: usize, len: usize) -> f64 {
 
 /// Left, top, right and bottom of a polygon; infinite where it has no corner.
 pub(super) fn sides(polygon: &[Point2<f64>]) -> [f64; 4] {
-    let least =
-        |along: fn(&Point2<f64>) -> f64| polygon.iter().map(along).fold(f64::INFINITY, f64::min);
-    [
-        least(|p| p.x),
-        least(|p| p.y),
-        -least(|p| -p.x),
-        -least(|p| -p.y),
-    ]
+    let unbounded = [f64::INFINITY, f64::INFINITY, -f64::INFINITY, -f64::INFINITY];
+    polygon
+        .iter()
+        .fold(unbounded, |[left, top, right, bottom], p| {
+            [left.min(p.x), top.min(p.y), right.max(p.x), bottom.max(p.y)]
+        })
 }
 
 /// The largest distance between a side of one polygon's box and that of another.
@@ -74,6 +75,7 @@ pub(super) fn growth(from: &[Point2<f64>], to: &[Point2<f64>]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image::Image;
 
     #[test]
     fn the_hull_goes_through_centres_and_clockwise() {

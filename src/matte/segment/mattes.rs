@@ -1,8 +1,8 @@
-//! What a segmentation tells a keyer: the screen, and what surely is not or surely is the object.
+//! Garbage and core mattes for a keyer, from a segmentation.
 
 use super::Segmentation;
 use crate::filter;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::screen::{screen_pixels, strongest_channel};
 use crate::pixel::{Coverage, LinearRgb};
 
@@ -15,7 +15,7 @@ const CORE_TRANSMITTANCE: f32 = 0.1;
 
 impl Segmentation {
     /// The pixels that surely show nothing but the screen: outside the hull and a margin around it.
-    pub fn background(&self) -> Image<bool> {
+    pub fn background(&self) -> Mask {
         screen_pixels(&self.mask)
     }
 
@@ -38,7 +38,7 @@ impl Segmentation {
     /// Garbage matte: 1 at more than `margin_px` from the tight outline, where there is no object.
     pub fn garbage(&self, margin_px: f64) -> Image<Coverage> {
         let near = filter::dilate(&self.tight.map(|c| c.0 > 0.0), margin_px);
-        near.map(|near| Coverage(f32::from(u8::from(!near))))
+        near.complement().to_coverage()
     }
 
     /// Core matte: 1 where the object is surely opaque, given the photo and its screen plate.
@@ -54,9 +54,8 @@ impl Segmentation {
             let c = strongest_channel(k);
             <[f32; 3]>::from(p)[c] < CORE_TRANSMITTANCE * <[f32; 3]>::from(k)[c]
         });
-        deep.zip_map(&opaque, |deep, opaque| {
-            Coverage(f32::from(u8::from(deep && opaque)))
-        })
+        deep.zip_map(&opaque, |deep, opaque| deep && opaque)
+            .to_coverage()
     }
 }
 

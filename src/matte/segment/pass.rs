@@ -1,106 +1,126 @@
 //! One search of a picture: two of its bands become edges, a cluster of edges, and what they enclose.
 
+use super::SegmentOptions;
 use super::band::{self, Bands};
-use super::cluster::{self, Groups};
+use super::cluster::{self, PixelGroups};
 use super::hull;
-use super::{SegmentOptions, longer_side, refused};
 use crate::diagnostic::{Code, Diagnostic};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::filter;
 use crate::geom::Point2;
-use crate::image::Image;
+use crate::image::{Image, Mask};
 use crate::matte::Outline;
-use crate::pixel::{Coverage, LinearRgb};
+use crate::matte::prepared::{longer_side, refused};
+use crate::pixel::LinearRgb;
+use std::cmp::Reverse;
+use std::ops::Range;
 
 /// A picture ready to be searched at any depth.
 pub(super) struct Search {
     bands: Bands,
-    /// Cut of the first band, in units of noise.
-    cut: f32,
-    /// Where the first band is above its cut.
-    first_binary: Image<bool>,
-    /// Where the first band is no mere smear of a stronger edge.
-    ridges: Image<bool>,
+    /// Threshold of the finest band, in units of noise.
+    threshold: f32,
+    /// Where the finest band is above its threshold.
+    finest_binary: Mask,
+    /// Where the finest band is no mere smear of a stronger edge.
+    ridges: Mask,
 }
 
 /// What a search at one depth found, in pixels of the picture that was searched.
 pub(super) struct Pass {
-    /// The band that served as the last one.
-    pub(super) last: Image<Coverage>,
-    /// Where that is above its cut.
-    pub(super) last_binary: Image<bool>,
+    /// The band that served as the coarsest one.
+    pub(super) coarsest: Image<f32>,
+    /// Where that is above its threshold.
+    pub(super) coarsest_binary: Mask,
     /// The edges, specks left out.
-    pub(super) edges: Image<bool>,
+    pub(super) edges: Mask,
     /// Those of the object.
-    pub(super) object: Image<bool>,
+    pub(super) object: Mask,
     /// Convex hull of the object.
     pub(super) hull: Vec<Point2<f64>>,
     /// What its edges enclose.
-    pub(super) inside: Image<bool>,
+    pub(super) inside: Mask,
     /// Left, top, right and bottom border are reached.
     pub(super) touches: [bool; 4],
     /// What was left out.
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
-/// How far the first band smears an edge, pixels: the reach of its kernel.
-const SMEAR: usize = 2;
+impl Pass {
+    /// The largest distance between a side of the hull's box and that of another search.
+    pub(super) fn distance(&self, other: &Self) -> f64 {
+        hull::farthest_side(&self.hull, &other.hull)
+    }
+}
+
+/// How far the finest band smears an edge, pixels: the reach of its kernel.
+const SMEAR_PX: usize = 2;
 /// Edges nearer than this belong together in the smallest picture, too, pixels: the width of a smeared edge.
-const LEAST_JOIN_PX: f64 = 6.0;
+const MIN_JOIN_PX: f64 = 6.0;
 
 impl Search {
     /// Splits a picture into bands, `deepest` of them.
-    pub(super) fn of(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
-        let bands = Bands::of(picture, opts.tone, deepest);
-        let first = &bands.first;
-        let cut = opts.first_threshold.of(first).max(opts.least_contrast);
-        let first_binary = first.map(|c| c.0 > cut);
-        let strongest = band::largest_around(first, SMEAR);
-        let ridges = first.zip_map(&strongest, |c, most| c.0 >= opts.ridge * most.0);
+    pub(super) fn new(picture: &Image<LinearRgb>, opts: &SegmentOptions, deepest: usize) -> Self {
+        let bands = Bands::new(picture, opts.tone, deepest);
+        let finest = &bands.finest;
+        let threshold = opts
+            .finest_threshold
+            .of_band(finest)
+            .max(opts.least_contrast);
+        let finest_binary = finest.map(|v| v > threshold);
+        let strongest = band::largest_around(finest, SMEAR_PX);
+        let ridges = finest.zip_map(&strongest, |v, most| v >= opts.ridge * most);
         Self {
             bands,
-            cut,
-            first_binary,
+            threshold,
+            finest_binary,
             ridges,
         }
     }
 
-    /// The first band and where it is above its cut.
-    pub(super) fn into_first(self) -> (Image<Coverage>, Image<bool>) {
-        (self.bands.first, self.first_binary)
+    /// The finest band and where it is above its threshold.
+    pub(super) fn into_finest(self) -> (Image<f32>, Mask) {
+        (self.bands.finest, self.finest_binary)
     }
 
-    /// Finds the object with band `levels` as the last one.
-    pub(super) fn at(&self, levels: usize, opts: &SegmentOptions) -> Result<Pass> {
-        self.pass(levels, &self.first_binary, opts)
+    /// Finds the object with band `levels` as the coarsest one.
+    pub(super) fn at_depth(&self, levels: usize, opts: &SegmentOptions) -> Result<Pass> {
+        self.pass(levels, &self.finest_binary, opts)
     }
 
-    /// The same with so many times the cut of the first band.
-    pub(super) fn at_cut(&self, levels: usize, times: f32, opts: &SegmentOptions) -> Result<Pass> {
-        let cut = times * self.cut;
-        self.pass(levels, &self.bands.first.map(|c| c.0 > cut), opts)
-    }
-
-    fn pass(
+    /// The same with so many times the threshold of the finest band.
+    pub(super) fn at_threshold(
         &self,
         levels: usize,
-        first_binary: &Image<bool>,
+        times: f32,
         opts: &SegmentOptions,
     ) -> Result<Pass> {
-        let last = self.bands.last(levels);
-        let cut = opts.last_threshold.of(&last);
-        let last_binary = last.map(|c| c.0 > cut);
-        let both = first_binary.zip_map(&last_binary, |a, b| a && b);
-        let edges = cluster::without_specks(&both.zip_map(&self.ridges, |a, b| a && b), opts.speck);
-        let join_px = (opts.join * longer_side(&edges) as f64).max(LEAST_JOIN_PX);
-        let (object, diagnostics) = main_cluster(&edges, join_px)?;
+        let threshold = times * self.threshold;
+        let finest_binary = self.bands.finest.map(|v| v > threshold);
+        self.pass(levels, &finest_binary, opts)
+    }
+
+    /// Where both bands have an edge, thinned, without groups of fewer pixels than a speck.
+    fn thin_edges(&self, finest: &Mask, coarsest: &Mask, speck: usize) -> Mask {
+        let both = finest.zip_map(coarsest, |a, b| a && b);
+        let thin = both.zip_map(&self.ridges, |both, ridge| both && ridge);
+        cluster::without_specks(&thin, speck)
+    }
+
+    fn pass(&self, levels: usize, finest_binary: &Mask, opts: &SegmentOptions) -> Result<Pass> {
+        let coarsest = self.bands.at_full_size(levels);
+        let threshold = opts.coarsest_threshold.of_band(&coarsest);
+        let coarsest_binary = coarsest.map(|v| v > threshold);
+        let edges = self.thin_edges(finest_binary, &coarsest_binary, opts.speck);
+        let join_px = (opts.join * longer_side(&edges) as f64).max(MIN_JOIN_PX);
+        let (object, diagnostics) = main_object(&edges, join_px)?;
         let hull = hull::convex_hull(&object);
-        let touches = touches(&object);
+        let touches = reached_borders(&object);
         check_object(&hull, touches, edges.size())?;
-        let inside = enclosed(&object, join_px);
+        let inside = enclosed_area(&object, join_px);
         Ok(Pass {
-            last,
-            last_binary,
+            coarsest,
+            coarsest_binary,
             edges,
             object,
             hull,
@@ -112,63 +132,107 @@ impl Search {
 }
 
 /// Two clusters are two objects when the smaller one has at least this share of the larger one's edge pixels.
-const RIVAL: f64 = 0.3;
+const RIVAL_SHARE: f64 = 0.3;
 /// A smaller cluster is worth a warning from this share on.
-const REMNANT: f64 = 0.05;
-
-/// So many clusters too small for a warning are worth one together: where they lie on the screen, one may lie beside the
+const REMNANT_SHARE: f64 = 0.05;
+/// So many clusters too small for a warning each give one together: where they lie on the screen, one may lie beside the
 /// object.
-const SPECKS: usize = 2;
+const SPECK_COUNT: usize = 2;
+
+/// Edge pixels in clusters, of which the one with the most is the main one.
+struct EdgeClusters<'a> {
+    edges: &'a Mask,
+    groups: PixelGroups,
+    /// Edge pixels of each cluster.
+    sizes: Vec<usize>,
+    main: usize,
+    /// Edge pixels of each cluster within the hull of the main one.
+    sizes_inside: Vec<usize>,
+}
+
+impl<'a> EdgeClusters<'a> {
+    /// Edges nearer to each other than `join_px` form a cluster; nothing where there are no edges.
+    fn new(edges: &'a Mask, join_px: f64) -> Option<Self> {
+        let groups = PixelGroups::new(&filter::dilate(edges, join_px / 2.0));
+        let sizes = groups.sizes(edges);
+        let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], Reverse(i)))?;
+        let mut clusters = Self {
+            edges,
+            groups,
+            sizes,
+            main,
+            sizes_inside: Vec::new(),
+        };
+        let hull = under_hull(&clusters.only(|i| i == main), 0.0);
+        let inside = edges.zip_map(&hull, |edge, inside| edge && inside);
+        clusters.sizes_inside = clusters.groups.sizes(&inside);
+        Some(clusters)
+    }
+
+    /// The edge pixels of the clusters for which a claim holds.
+    fn only(&self, holds: impl Fn(usize) -> bool) -> Mask {
+        self.groups
+            .only(holds)
+            .zip_map(self.edges, |near, edge| near && edge)
+    }
+
+    /// Where the main cluster and another one are, in words.
+    fn places(&self, other: usize) -> [String; 2] {
+        [self.main, other].map(|cluster| place(&self.only(|i| i == cluster)))
+    }
+
+    /// At least half of a cluster lies within the hull of the main one, or it is that.
+    fn belongs(&self, cluster: usize) -> bool {
+        cluster == self.main || 2 * self.sizes_inside[cluster] >= self.sizes[cluster]
+    }
+
+    /// The clusters that do not belong to the main one, and their sizes as shares of its size.
+    fn others(&self) -> impl Iterator<Item = (usize, f64)> {
+        (0..self.sizes.len())
+            .filter(|&i| !self.belongs(i))
+            .map(|i| (i, self.sizes[i] as f64 / self.sizes[self.main] as f64))
+    }
+}
 
 /// The edges of the one object.
 ///
 /// Edges nearer to each other than `join_px` form a cluster; the object is the cluster of most edge pixels and what
 /// lies inside its hull. A cluster outside it is an error if it could be an object of its own, else it is left out.
-fn main_cluster(edges: &Image<bool>, join_px: f64) -> Result<(Image<bool>, Vec<Diagnostic>)> {
-    let groups = Groups::of(&filter::dilate(edges, join_px / 2.0));
-    let sizes = groups.sizes(edges);
-    let Some(main) = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i))) else {
+fn main_object(edges: &Mask, join_px: f64) -> Result<(Mask, Vec<Diagnostic>)> {
+    let Some(clusters) = EdgeClusters::new(edges, join_px) else {
         return Err(refused(
             "nothing stands out from what is along the borders; is there an object, in focus, with background all around it?",
         ));
     };
-    let member = |i: usize| {
-        groups
-            .only(move |group| group == i)
-            .zip_map(edges, |near, edge| near && edge)
-    };
-    let object = member(main);
-    let hull = under_hull(&object, 0.0);
-    let inside = groups.sizes(&edges.zip_map(&hull, |edge, inside| edge && inside));
     let mut diagnostics = Vec::new();
     let mut specks = 0;
-    for i in (0..sizes.len()).filter(|&i| i != main && 2 * inside[i] < sizes[i]) {
-        let share = sizes[i] as f64 / sizes[main] as f64;
-        if share >= RIVAL {
-            return Err(refused(format!(
-                "two objects, {} and {}; photograph them one by one (or, if it is one, raise segment.join)",
-                place(&object),
-                place(&member(i))
-            )));
+    for (i, share) in clusters.others() {
+        if share >= RIVAL_SHARE {
+            return Err(two_objects(&clusters.places(i)));
         }
-        if share >= REMNANT {
-            let message = format!(
-                "left out what is {}: too far from the object {}",
-                place(&member(i)),
-                place(&object)
-            );
-            diagnostics.push(Diagnostic::warning(Code::LeftOut, message));
+        if share >= REMNANT_SHARE {
+            diagnostics.push(left_out(&clusters.places(i)));
         } else {
             specks += 1;
         }
     }
-    diagnostics.extend((specks >= SPECKS).then(|| specks_on_screen(specks)));
-    let belongs = |i: usize| i == main || 2 * inside[i] >= sizes[i];
-    let object = groups
-        .only(belongs)
-        .zip_map(edges, |near, edge| near && edge);
-    diagnostics.extend(parted(&object, PARTED * join_px));
+    diagnostics.extend((specks >= SPECK_COUNT).then(|| specks_on_screen(specks)));
+    let object = clusters.only(|i| clusters.belongs(i));
+    diagnostics.extend(possibly_two_objects(&object, CLOSER_JOIN_SHARE * join_px));
     Ok((object, diagnostics))
+}
+
+fn two_objects([one, other]: &[String; 2]) -> Error {
+    refused(format!(
+        "two objects, {one} and {other}; photograph them one by one (or, if it is one, raise segment.join)"
+    ))
+}
+
+fn left_out([object, other]: &[String; 2]) -> Diagnostic {
+    Diagnostic::warning(
+        Code::LeftOut,
+        format_args!("left out what is {other}: too far from the object {object}"),
+    )
 }
 
 fn specks_on_screen(count: usize) -> Diagnostic {
@@ -181,64 +245,53 @@ fn specks_on_screen(count: usize) -> Diagnostic {
 }
 
 /// Edges that fall apart into two clusters when they are joined over this share of the gap may be of two objects.
-const PARTED: f64 = 0.5;
+const CLOSER_JOIN_SHARE: f64 = 0.5;
 
 /// The warning about an object whose edges are two clusters beside each other unless gaps of `join_px` are bridged.
-fn parted(object: &Image<bool>, join_px: f64) -> Option<Diagnostic> {
-    let groups = Groups::of(&filter::dilate(object, join_px / 2.0));
-    let sizes = groups.sizes(object);
-    let main = (0..sizes.len()).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
-    let member = |i: usize| {
-        groups
-            .only(move |group| group == i)
-            .zip_map(object, |near, edge| near && edge)
-    };
-    let first = member(main);
-    let hull = under_hull(&first, 0.0);
-    let inside = groups.sizes(&object.zip_map(&hull, |edge, inside| edge && inside));
-    let rival = |i: &usize| {
-        *i != main && 2 * inside[*i] < sizes[*i] && sizes[*i] as f64 >= RIVAL * sizes[main] as f64
-    };
-    let other = (0..sizes.len()).find(rival)?;
-    let message = format!(
-        "possibly two objects, {} and {}: only a narrow gap separates them",
-        place(&first),
-        place(&member(other))
-    );
+fn possibly_two_objects(object: &Mask, join_px: f64) -> Option<Diagnostic> {
+    let clusters = EdgeClusters::new(object, join_px)?;
+    let least = RIVAL_SHARE * clusters.sizes[clusters.main] as f64;
+    let (other, _) = clusters
+        .others()
+        .find(|(i, _)| clusters.sizes[*i] as f64 >= least)?;
+    let [one, other] = clusters.places(other);
+    let message =
+        format!("possibly two objects, {one} and {other}: only a narrow gap separates them");
     Some(Diagnostic::warning(Code::TwoObjects, message))
 }
 
 /// The pixels of which more than a share lies in the convex hull of a set.
-fn under_hull(set: &Image<bool>, share: f32) -> Image<bool> {
-    let hull = Outline {
-        rings: vec![hull::convex_hull(set)],
-    };
-    hull.coverage(set.width(), set.height())
+fn under_hull(set: &Mask, share: f32) -> Mask {
+    Outline::from_ring(hull::convex_hull(set))
+        .coverage(set.width(), set.height())
         .map(|c| c.0 > share)
 }
 
 /// Where a set of pixels is, in words, as shares of the picture.
-fn place(set: &Image<bool>) -> String {
+fn place(set: &Mask) -> String {
     let hull = hull::convex_hull(set);
-    let n = hull.len().max(1) as f64;
-    let percent = |sum: f64, len: usize| (100.0 * sum / n / len as f64).round();
-    let x = percent(hull.iter().map(|p| p.x).sum(), set.width());
-    let y = percent(hull.iter().map(|p| p.y).sum(), set.height());
+    let x = mean_percent(hull.iter().map(|p| p.x), set.width());
+    let y = mean_percent(hull.iter().map(|p| p.y), set.height());
     format!("at {x} % of the width and {y} % of the height")
 }
 
+/// Mean of coordinates as a rounded percentage of a length.
+fn mean_percent(coordinates: impl ExactSizeIterator<Item = f64>, len: usize) -> f64 {
+    let n = coordinates.len().max(1) as f64;
+    (100.0 * coordinates.sum::<f64>() / n / len as f64).round()
+}
+
 /// The area may grow by this factor when twice the gap is bridged; by more, and it had leaked.
-const LEAK: f64 = 1.1;
+const LEAK_AREA_RATIO: f64 = 1.1;
 
 /// The area inside the hull that the edges enclose, gaps up to twice `join_px` bridged; wider ones while that makes the
 /// area jump, for then the outline had a gap through which the inside leaked out.
-fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
+fn enclosed_area(edges: &Mask, join_px: f64) -> Mask {
     let hull = under_hull(edges, 0.5);
-    let area = |set: &Image<bool>| set.pixels().iter().filter(|p| **p).count() as f64;
     let mut narrow = closed(edges, &hull, join_px / 2.0);
     for times in [1.0, 2.0, 4.0] {
         let wide = closed(edges, &hull, times * join_px);
-        if area(&wide) <= LEAK * area(&narrow) {
+        if wide.count() as f64 <= LEAK_AREA_RATIO * narrow.count() as f64 {
             return wide;
         }
         narrow = wide;
@@ -246,45 +299,38 @@ fn enclosed(edges: &Image<bool>, join_px: f64) -> Image<bool> {
     hull
 }
 
-fn closed(edges: &Image<bool>, hull: &Image<bool>, radius_px: f64) -> Image<bool> {
-    let whole = filter::erode(
-        &cluster::filled(&filter::dilate(edges, radius_px)),
-        radius_px,
-    );
-    whole.zip_map(hull, |inside, hull| inside && hull)
+fn closed(edges: &Mask, hull: &Mask, radius_px: f64) -> Mask {
+    let filled = cluster::filled(&filter::dilate(edges, radius_px));
+    filter::erode(&filled, radius_px).zip_map(hull, |inside, hull| inside && hull)
 }
 
 /// An object whose edges come so near to the border, pixels, may go on beyond: an edge has two sides, and a faint tip is
 /// seen a few pixels late.
-const NEAR_BORDER: usize = 4;
+const NEAR_BORDER_PX: usize = 4;
 
-fn touches(set: &Image<bool>) -> [bool; 4] {
+/// Whether a set comes near the left, top, right and bottom border.
+fn reached_borders(set: &Mask) -> [bool; 4] {
     let (w, h) = set.size();
-    let columns =
-        |xs: std::ops::Range<usize>| set.rows().any(|row| row[xs.clone()].contains(&true));
-    let rows = |ys: std::ops::Range<usize>| ys.into_iter().any(|y| set.row(y).contains(&true));
-    let near = |len: usize| NEAR_BORDER.min(len);
+    let [near_x, near_y] = [w, h].map(|len| NEAR_BORDER_PX.min(len));
     [
-        columns(0..near(w)),
-        rows(0..near(h)),
-        columns(w - near(w)..w),
-        rows(h - near(h)..h),
+        is_any_set(set, 0..near_x, 0..h),
+        is_any_set(set, 0..w, 0..near_y),
+        is_any_set(set, w - near_x..w, 0..h),
+        is_any_set(set, 0..w, h - near_y..h),
     ]
 }
 
+fn is_any_set(set: &Mask, columns: Range<usize>, mut rows: Range<usize>) -> bool {
+    rows.any(|y| set.row(y)[columns.clone()].contains(&true))
+}
+
 /// Least length of an object as a share of the photo's longer side; anything smaller is dirt.
-const LEAST_LENGTH: f64 = 0.05;
+const MIN_OBJECT_LENGTH: f64 = 0.05;
 
 fn check_object(hull: &[Point2<f64>], touches: [bool; 4], (w, h): (usize, usize)) -> Result<()> {
-    let extent = |along: fn(&Point2<f64>) -> f64| {
-        let (low, high) = hull
-            .iter()
-            .map(along)
-            .fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
-        (high - low).max(0.0)
-    };
-    let (width, height) = (extent(|p| p.x), extent(|p| p.y));
-    if hull.is_empty() || width.max(height) < LEAST_LENGTH * w.max(h) as f64 {
+    let [left, top, right, bottom] = hull::sides(hull);
+    let (width, height) = ((right - left).max(0.0), (bottom - top).max(0.0));
+    if hull.is_empty() || width.max(height) < MIN_OBJECT_LENGTH * w.max(h) as f64 {
         return Err(refused(format!(
             "the largest thing found is {width:.0} x {height:.0} of {w} x {h} pixels; is there an object, and is it in focus?"
         )));

@@ -8,21 +8,21 @@ use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 
 /// How far to either side of the outline the change is looked for, in pixels of the picture that was searched.
-const REACH: f64 = 1.5;
+const PROFILE_REACH_PX: f64 = 1.5;
 /// Where the outside is taken from, beyond the reach, likewise.
-const OUTSIDE: f64 = 2.0;
+const OUTSIDE_PX: f64 = 2.0;
 /// Steps of a profile to a pixel of the search.
-const STEPS: usize = 4;
+const STEPS_PER_PX: usize = 4;
 /// Profiles are averaged over so many pixels of the photo along the outline.
-const LANES: i32 = 3;
+const LANE_COUNT: i32 = 3;
 /// A change counts from this many times the noise on the outside.
-const LEAST_CHANGE: f32 = 5.0;
+const MIN_CHANGE_SIGMAS: f32 = 5.0;
 /// .. and from this share of the strongest one nearby: less is a shadow before the object.
-const LEAST_SHARE: f32 = 0.2;
+const MIN_CHANGE_SHARE: f32 = 0.2;
 /// Least noise: a step of an 8-bit picture.
-const ROUNDING: f32 = 1.0 / 255.0;
+const ROUNDING_STEP: f32 = 1.0 / 255.0;
 /// Points to either side whose median a displacement becomes.
-const NEIGHBOURS: usize = 2;
+const MEDIAN_REACH: usize = 2;
 
 /// An outline whose points lie where the photo changes halfway from the outside to the object's rim.
 ///
@@ -34,131 +34,175 @@ const NEIGHBOURS: usize = 2;
 /// that value. Displacements pass a median of five along the outline. A blurred step has half its height at its true
 /// place, whatever the blur.
 pub(super) fn snapped(outline: &Outline, roots: &Image<LinearRgb>, scale: f64) -> Outline {
-    let ring = |ring: &Vec<Point2<f64>>| snapped_ring(&evenly(ring, scale.max(1.0)), roots, scale);
+    let rings = outline
+        .rings
+        .iter()
+        .map(|ring| snapped_ring(&evenly_spaced(ring, scale.max(1.0)), roots, scale));
     Outline {
-        rings: outline.rings.iter().map(ring).collect(),
+        rings: rings.collect(),
     }
 }
 
 fn snapped_ring(ring: &[Point2<f64>], roots: &Image<LinearRgb>, scale: f64) -> Vec<Point2<f64>> {
     let n = ring.len();
-    if n < 2 * NEIGHBOURS + 1 {
+    if n < 2 * MEDIAN_REACH + 1 {
         return ring.to_vec();
     }
-    let normals: Vec<Vector2<f64>> = (0..n)
-        .map(|i| normal(ring[(i + n - 2) % n], ring[(i + 2) % n]))
-        .collect();
-    let profiles: Vec<Profile> = ring
+    let points = edge_points(ring, 2);
+    let profiles: Vec<EdgeProfile> = points
         .par_iter()
-        .zip(&normals)
-        .map(|(p, normal)| Profile::of(roots, *p, *normal, scale))
+        .map(|point| EdgeProfile::new(roots, point, scale))
         .collect();
+    let least = least_change(&profiles);
+    let found: Vec<Option<f64>> = profiles.iter().map(|p| p.half_way(least)).collect();
+    points
+        .iter()
+        .enumerate()
+        .map(|(i, point)| point.displaced(median_around(&found, i), roots.size(), scale))
+        .collect()
+}
+
+/// The points of a ring, with normals across the chords between the neighbours `reach` points away.
+pub(super) fn edge_points(ring: &[Point2<f64>], reach: usize) -> Vec<EdgePoint> {
+    let n = ring.len();
+    (0..n)
+        .map(|i| EdgePoint::new(ring[i], [ring[(i + n - reach) % n], ring[(i + reach) % n]]))
+        .collect()
+}
+
+/// The least change that is no noise, from the median noise of all profiles.
+fn least_change(profiles: &[EdgeProfile]) -> f32 {
     let mut noises: Vec<f32> = profiles.iter().map(|p| p.noise).collect();
     noises.sort_by(f32::total_cmp);
-    let least = LEAST_CHANGE * noises[n / 2].max(ROUNDING);
-    let found: Vec<Option<f64>> = profiles.iter().map(|p| p.half_way(least)).collect();
-    let moved = |i: usize| {
-        let mut near: Vec<f64> = (0..=2 * NEIGHBOURS)
-            .filter_map(|k| found[(i + n + k - NEIGHBOURS) % n])
-            .collect();
-        near.sort_by(f64::total_cmp);
-        let by = near.get(near.len() / 2).copied().unwrap_or(0.0);
-        let (w, h) = (roots.width() as f64, roots.height() as f64);
-        let at = ring[i] + normals[i] * (by * scale);
-        // What reaches the border of the photo stays there.
-        let on_border = |v: f64, len: f64| v <= scale || v >= len - scale;
-        let keep = on_border(ring[i].x, w) || on_border(ring[i].y, h);
-        if keep {
-            ring[i]
-        } else {
-            Point2::new(at.x.clamp(0.0, w), at.y.clamp(0.0, h))
-        }
-    };
-    (0..n).map(moved).collect()
+    MIN_CHANGE_SIGMAS * noises[noises.len() / 2].max(ROUNDING_STEP)
 }
 
-/// The mean of a few pixels along the outline at a distance `t` outwards, pixels of the search.
-pub(super) fn lanes(
-    roots: &Image<LinearRgb>,
+/// Median of what was found at a point of a ring and its neighbours; 0 where nothing was.
+fn median_around(found: &[Option<f64>], i: usize) -> f64 {
+    let n = found.len();
+    let mut near: Vec<f64> = (0..=2 * MEDIAN_REACH)
+        .filter_map(|k| found[(i + n + k - MEDIAN_REACH) % n])
+        .collect();
+    near.sort_by(f64::total_cmp);
+    near.get(near.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// A point of an outline and the unit normal to its outside.
+pub(super) struct EdgePoint {
     at: Point2<f64>,
     normal: Vector2<f64>,
-    t: f64,
-    scale: f64,
-) -> LinearRgb {
-    let along = Vector2::new(-normal.y, normal.x);
-    let lanes = (-(LANES / 2)..=LANES / 2).map(|lane| {
-        let p = at + normal * (t * scale) + along * (f64::from(lane) * scale / 2.0);
-        filter::sample_bilinear_clamped(roots, p.x, p.y)
-    });
-    lanes
-        .fold(LinearRgb::BLACK, |sum, p| sum + p)
-        .scale(1.0 / LANES as f32)
 }
 
-/// Unit normal to the outside of a ring that goes from `a` to `b`, clockwise as seen.
-pub(super) fn normal(a: Point2<f64>, b: Point2<f64>) -> Vector2<f64> {
-    let along = b - a;
-    Vector2::new(along.y, -along.x)
-        .try_normalize(0.0)
-        .unwrap_or_default()
+impl EdgePoint {
+    /// A point of a ring that goes clockwise as seen, and two neighbours of it, the earlier one first.
+    fn new(at: Point2<f64>, [before, after]: [Point2<f64>; 2]) -> Self {
+        let along = after - before;
+        let normal = Vector2::new(along.y, -along.x)
+            .try_normalize(0.0)
+            .unwrap_or_default();
+        Self { at, normal }
+    }
+
+    /// The mean of a few pixels along the outline at a distance `t` outwards, pixels of the search.
+    pub(super) fn mean_at(&self, roots: &Image<LinearRgb>, t: f64, scale: f64) -> LinearRgb {
+        let along = Vector2::new(-self.normal.y, self.normal.x);
+        let lanes = (-(LANE_COUNT / 2)..=LANE_COUNT / 2).map(|lane| {
+            let p = self.at + self.normal * (t * scale) + along * (f64::from(lane) * scale / 2.0);
+            filter::sample_bilinear_clamped(roots, p.x, p.y)
+        });
+        lanes
+            .fold(LinearRgb::BLACK, |sum, p| sum + p)
+            .scale(1.0 / LANE_COUNT as f32)
+    }
+
+    /// The point moved outwards; what reaches the border of the photo stays there.
+    fn displaced(&self, by: f64, (w, h): (usize, usize), scale: f64) -> Point2<f64> {
+        let (w, h) = (w as f64, h as f64);
+        if is_on_border(self.at.x, w, scale) || is_on_border(self.at.y, h, scale) {
+            return self.at;
+        }
+        let moved = self.at + self.normal * (by * scale);
+        Point2::new(moved.x.clamp(0.0, w), moved.y.clamp(0.0, h))
+    }
+}
+
+fn is_on_border(v: f64, len: f64, scale: f64) -> bool {
+    v <= scale || v >= len - scale
 }
 
 /// Difference from the outside along a normal, from the outside inwards.
-struct Profile {
+struct EdgeProfile {
     /// One value per step.
     change: Vec<f32>,
     /// Deviation of the samples on the outside.
     noise: f32,
 }
 
-impl Profile {
-    fn of(roots: &Image<LinearRgb>, at: Point2<f64>, normal: Vector2<f64>, scale: f64) -> Self {
-        let sample = |t: f64| lanes(roots, at, normal, t, scale);
-        let step = 1.0 / STEPS as f64;
-        let outside: Vec<_> = (0..(OUTSIDE * STEPS as f64) as usize)
-            .map(|k| sample(REACH + k as f64 * step))
+impl EdgeProfile {
+    fn new(roots: &Image<LinearRgb>, point: &EdgePoint, scale: f64) -> Self {
+        let step = 1.0 / STEPS_PER_PX as f64;
+        let outside: Vec<_> = (0..(OUTSIDE_PX * STEPS_PER_PX as f64) as usize)
+            .map(|k| point.mean_at(roots, PROFILE_REACH_PX + k as f64 * step, scale))
             .collect();
-        let mean = outside
-            .iter()
-            .fold(LinearRgb::BLACK, |sum, p| sum + *p)
-            .scale(1.0 / outside.len() as f32);
-        let off = |p: &LinearRgb| distance(*p, mean);
-        let square: f32 = outside.iter().map(|p| off(p) * off(p)).sum();
-        let inwards = (0..=(2.0 * REACH * STEPS as f64) as usize)
-            .map(|k| off(&sample(REACH - k as f64 * step)));
+        let (mean, noise) = mean_and_deviation(&outside);
+        let change = (0..=(2.0 * PROFILE_REACH_PX * STEPS_PER_PX as f64) as usize).map(|k| {
+            let inwards = point.mean_at(roots, PROFILE_REACH_PX - k as f64 * step, scale);
+            distance(inwards, mean)
+        });
         Self {
-            change: inwards.collect(),
-            noise: (square / outside.len() as f32).sqrt(),
+            change: change.collect(),
+            noise,
         }
     }
 
     /// Where the first clear change is half done: outwards from the outline, pixels of the search.
     fn half_way(&self, least: f32) -> Option<f64> {
         let change = &self.change;
-        let most = change.iter().fold(0.0f32, |most, c| most.max(*c));
-        let least = least.max(LEAST_SHARE * most);
-        let rim = (0..change.len()).find(|&k| {
-            change[k] >= least && change.get(k + 1).is_none_or(|next| *next <= change[k])
-        })?;
+        let rim = self.rim(least)?;
         let half = 0.5 * change[rim];
         let k = (1..=rim).find(|&k| change[k] >= half)?;
         let part = f64::from((half - change[k - 1]) / (change[k] - change[k - 1]));
-        (change[k - 1] < half).then(|| REACH - (k as f64 - 1.0 + part) / STEPS as f64)
+        (change[k - 1] < half)
+            .then(|| PROFILE_REACH_PX - (k as f64 - 1.0 + part) / STEPS_PER_PX as f64)
+    }
+
+    /// The first local maximum that is a clear change.
+    fn rim(&self, least: f32) -> Option<usize> {
+        let change = &self.change;
+        let most = change.iter().fold(0.0f32, |most, c| most.max(*c));
+        let least = least.max(MIN_CHANGE_SHARE * most);
+        (0..change.len()).find(|&k| {
+            change[k] >= least && change.get(k + 1).is_none_or(|next| *next <= change[k])
+        })
     }
 }
 
+/// The mean of some colours, and the root mean square of their distances from it.
+fn mean_and_deviation(colors: &[LinearRgb]) -> (LinearRgb, f32) {
+    let n = colors.len() as f32;
+    let mean = colors
+        .iter()
+        .fold(LinearRgb::BLACK, |sum, p| sum + *p)
+        .scale(1.0 / n);
+    let square: f32 = colors
+        .iter()
+        .map(|p| distance(*p, mean) * distance(*p, mean))
+        .sum();
+    (mean, (square / n).sqrt())
+}
+
+/// Euclidean distance of two colours.
 pub(super) fn distance(a: LinearRgb, b: LinearRgb) -> f32 {
     let d = a + b.scale(-1.0);
     (d.r * d.r + d.g * d.g + d.b * d.b).sqrt()
 }
 
 /// Points of a ring at equal distances of about `spacing`.
-pub(super) fn evenly(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
-    let sides = || ring.iter().zip(ring.iter().cycle().skip(1));
-    let length: f64 = sides().map(|(a, b)| (b - a).norm()).sum();
+pub(super) fn evenly_spaced(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
+    let length: f64 = sides(ring).map(|(a, b)| (b - a).norm()).sum();
     let step = length / (length / spacing).round().max(1.0);
     let (mut points, mut walked, mut next) = (Vec::new(), 0.0, 0.0);
-    for (a, b) in sides() {
+    for (a, b) in sides(ring) {
         let side = (b - a).norm();
         while next < walked + side && next < length - 0.5 * step {
             points.push(a + (b - a) * ((next - walked) / side));
@@ -167,6 +211,11 @@ pub(super) fn evenly(ring: &[Point2<f64>], spacing: f64) -> Vec<Point2<f64>> {
         walked += side;
     }
     points
+}
+
+/// The sides of a closed ring.
+fn sides(ring: &[Point2<f64>]) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
 }
 
 #[cfg(test)]

@@ -298,7 +298,7 @@ fn impossible_options_are_named() {
     );
     assert!(
         said(SegmentOptions {
-            tone: Tone::Grey([0.0; 3]),
+            tone: LumaMode::Grey([0.0; 3]),
             ..Default::default()
         })
         .starts_with("tone.grey")

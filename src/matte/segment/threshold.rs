@@ -1,7 +1,6 @@
-//! Where to cut a picture of magnitudes in two.
+//! The threshold of a picture of magnitudes.
 
 use crate::image::Image;
-use crate::pixel::Coverage;
 use serde::{Deserialize, Serialize};
 
 /// How a band is binarised.
@@ -16,8 +15,8 @@ pub enum Threshold {
 }
 
 impl Threshold {
-    /// The value to cut a band at, in units of noise.
-    pub(super) fn of(self, band: &Image<Coverage>) -> f32 {
+    /// The threshold of a band, in units of noise.
+    pub(super) fn of_band(self, band: &Image<f32>) -> f32 {
         match self {
             Self::Otsu => otsu(band),
             Self::Noise(times) => times,
@@ -26,7 +25,7 @@ impl Threshold {
 }
 
 /// Bins of the histogram that Otsu's threshold is found in.
-const BINS: usize = 256;
+const HISTOGRAM_BINS: usize = 256;
 
 /// The value that maximises the variance between the two groups it makes; the largest one where all is noise.
 ///
@@ -36,43 +35,46 @@ const BINS: usize = 256;
 /// instead of between edges and background.
 ///
 /// [Otsu 1979]: https://doi.org/10.1109/TSMC.1979.4310076
-fn otsu(band: &Image<Coverage>) -> f32 {
-    let largest = band.pixels().iter().map(|c| c.0).fold(0.0, f32::max);
+fn otsu(band: &Image<f32>) -> f32 {
+    let largest = band.pixels().iter().copied().fold(0.0, f32::max);
     let span = libm::logf(largest.max(1.0));
     if span <= 0.0 {
         return largest;
     }
-    let mut histogram = [0u64; BINS];
-    for c in band.pixels() {
-        let bin = (libm::logf(c.0.max(1.0)) / span * BINS as f32) as usize;
-        histogram[bin.min(BINS - 1)] += 1;
+    let mut histogram = [0u64; HISTOGRAM_BINS];
+    for v in band.pixels() {
+        let bin = (libm::logf(v.max(1.0)) / span * HISTOGRAM_BINS as f32) as usize;
+        histogram[bin.min(HISTOGRAM_BINS - 1)] += 1;
     }
-    libm::expf((best_split(&histogram) + 1) as f32 / BINS as f32 * span)
+    libm::expf((best_split(&histogram) + 1) as f32 / HISTOGRAM_BINS as f32 * span)
 }
 
 /// Last bin of the lower group.
-fn best_split(histogram: &[u64; BINS]) -> usize {
+fn best_split(histogram: &[u64; HISTOGRAM_BINS]) -> usize {
     let count: u64 = histogram.iter().sum();
-    let total: u64 = histogram
-        .iter()
-        .zip(0..)
-        .map(|(n, bin): (_, u64)| n * bin)
-        .sum();
-    let (mut below, mut sum, mut best) = (0, 0, (0, -1.0));
+    let total: u64 = (0..).zip(histogram).map(|(bin, n)| bin * n).sum();
+    let (mut below, mut sum) = (0, 0);
+    let (mut best_bin, mut most) = (0, -1.0);
     for (bin, &n) in histogram.iter().enumerate() {
         below += n;
         sum += bin as u64 * n;
-        let above = count - below;
-        if below == 0 || above == 0 {
-            continue;
-        }
-        let step = sum as f64 / below as f64 - (total - sum) as f64 / above as f64;
-        let between = below as f64 * above as f64 * step * step;
-        if between > best.1 {
-            best = (bin, between);
+        let between = variance_between([below, count - below], [sum, total - sum]);
+        if between > most {
+            (best_bin, most) = (bin, between);
         }
     }
-    best.0
+    best_bin
+}
+
+/// Variance between two groups of so many values with these sums, times the square of all their number; negative where a
+/// group is empty.
+fn variance_between(counts: [u64; 2], sums: [u64; 2]) -> f64 {
+    if counts.contains(&0) {
+        return -1.0;
+    }
+    let [below, above] = counts.map(|n| n as f64);
+    let step = sums[0] as f64 / below - sums[1] as f64 / above;
+    below * above * step * step
 }
 
 #[cfg(test)]
@@ -81,25 +83,25 @@ mod tests {
 
     #[test]
     fn otsu_cuts_between_two_groups() {
-        let img = Image::from_fn(40, 10, |x, _| Coverage(if x < 30 { 2.0 } else { 80.0 }));
-        let cut = Threshold::Otsu.of(&img);
+        let img = Image::from_fn(40, 10, |x, _| if x < 30 { 2.0 } else { 80.0 });
+        let cut = Threshold::Otsu.of_band(&img);
         assert!(cut > 2.0 && cut < 80.0, "{cut}");
     }
 
     #[test]
     fn highlights_do_not_hide_faint_edges() {
         let img = Image::from_fn(100, 10, |x, _| {
-            Coverage([2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)])
+            [2.0, 20.0, 900.0][usize::from(x >= 70) + usize::from(x >= 95)]
         });
-        let cut = Threshold::Otsu.of(&img);
+        let cut = Threshold::Otsu.of_band(&img);
         assert!(cut > 2.0 && cut < 20.0, "{cut}");
     }
 
     #[test]
     fn nothing_is_above_the_cut_of_noise() {
         for level in [0.0, 0.5, 1.0] {
-            assert!(Threshold::Otsu.of(&Image::filled(4, 4, Coverage(level))) >= level);
+            assert!(Threshold::Otsu.of_band(&Image::filled(4, 4, level)) >= level);
         }
-        assert_eq!(Threshold::Otsu.of(&Image::new(0, 4)), 0.0);
+        assert_eq!(Threshold::Otsu.of_band(&Image::new(0, 4)), 0.0);
     }
 }

@@ -1,86 +1,111 @@
 //! The plastic of an object whose transmittance is known in some channels: what it is in the others.
 
-use super::lines::{Pixel, median};
+use super::lines::{PixelLines, median};
 use crate::image::Image;
-use crate::matte::film::tint;
+use crate::matte::film::{OPAQUE, tint};
 use crate::pixel::Coverage;
 
-/// Pixels that are asked.
-const ASKED: usize = 400;
+/// Pixels that are sampled.
+const DYE_SAMPLES: usize = 400;
 /// Standard deviation of a pixel's transmittance around flat plastic of another thickness, beside its noise.
-const SCATTER: f32 = 0.04;
+const SCATTER_SIGMA: f32 = 0.04;
 /// Misfit by which a dye must be better than clear plastic; as in [`tint`], where less is known.
-const DYED: f32 = 0.4;
-/// Weight of thickness: misfit that plastic twice as see-through as it should be counts for.
-const THICKNESS: f32 = 1.0;
+const DYE_HANDICAP: f32 = 0.4;
+/// Weight of thickness: the misfit of plastic that is twice as see-through as it should be.
+const THICKNESS_WEIGHT: f32 = 1.0;
 
 /// Transmittance per channel of flat plastic with the dye, or none, that explains the determined channels best: by the
 /// median over the clearer half of the object of how far a pixel is from that plastic times any factor.
-pub(super) fn told(
-    pixels: &Image<Pixel>,
+pub(super) fn fit(
+    pixels: &Image<PixelLines>,
     inside: &Image<Coverage>,
     determined: [bool; 3],
 ) -> [f32; 3] {
-    let asked = clearer(pixels, inside, determined);
-    let judged = |flat: [f32; 3], handicap: f32| {
-        let fits: Vec<(f32, f32)> = asked
-            .iter()
-            .map(|pixel| explained(pixel, flat, determined))
-            .collect();
-        let thickness = median(fits.iter().map(|fit| fit.1)).unwrap_or(1.0);
-        let misfit = median(fits.iter().map(|fit| fit.0)).unwrap_or(0.0);
-        (
-            misfit + THICKNESS * (thickness - 1.0).powi(2) + handicap,
-            flat,
-        )
+    let samples = DyeSamples {
+        pixels: clearer_half(pixels, inside, determined),
+        determined,
     };
-    let clear = judged([tint::CLEAR; 3], 0.0);
-    let dyed = tint::dyed().map(|flat| judged(flat, DYED));
-    dyed.fold(
-        clear,
-        |best, next| if next.0 < best.0 { next } else { best },
-    )
-    .1
+    let clear = [tint::CLEAR_TRANSMITTANCE; 3];
+    let mut best = (samples.misfit(clear, 0.0), clear);
+    for flat in tint::dyed() {
+        let misfit = samples.misfit(flat, DYE_HANDICAP);
+        if misfit < best.0 {
+            best = (misfit, flat);
+        }
+    }
+    best.1
 }
 
 /// Some pixels of the object that are at least as clear as its median one: plastic, if it has any.
-fn clearer(pixels: &Image<Pixel>, inside: &Image<Coverage>, determined: [bool; 3]) -> Vec<Pixel> {
-    let mean = |p: &Pixel| {
-        (0..3)
-            .filter(|&c| determined[c])
-            .map(|c| p.slope(c))
-            .sum::<f32>()
-    };
+fn clearer_half(
+    pixels: &Image<PixelLines>,
+    inside: &Image<Coverage>,
+    determined: [bool; 3],
+) -> Vec<PixelLines> {
     let object = || {
         pixels
             .pixels()
             .iter()
             .zip(inside.pixels())
-            .filter(|(_, c)| c.0 >= tint::WHOLE)
+            .filter(|(_, c)| c.0 >= OPAQUE)
             .map(|(p, _)| p)
     };
-    let Some(middle) = median(object().map(mean)) else {
+    let Some(middle) = median(object().map(|p| clearness(p, determined))) else {
         return Vec::new();
     };
-    let clear: Vec<&Pixel> = object().filter(|p| mean(p) >= middle).collect();
+    let clear: Vec<&PixelLines> = object()
+        .filter(|p| clearness(p, determined) >= middle)
+        .collect();
     clear
         .iter()
-        .step_by((clear.len() / ASKED).max(1))
+        .step_by((clear.len() / DYE_SAMPLES).max(1))
         .map(|p| **p)
         .collect()
 }
 
-/// Squared misfit of a pixel in standard deviations, and its factor of thickness.
-fn explained(pixel: &Pixel, flat: [f32; 3], determined: [bool; 3]) -> (f32, f32) {
-    let channels = || (0..3).filter(|&c| determined[c]);
-    let weight = |c: usize| 1.0 / (pixel.sigma(c).powi(2) + SCATTER * SCATTER);
-    let over: f32 = channels()
-        .map(|c| weight(c) * pixel.slope(c) * flat[c])
-        .sum();
-    let under: f32 = channels().map(|c| weight(c) * flat[c] * flat[c]).sum();
-    let factor = (over / under.max(f32::MIN_POSITIVE)).max(0.0);
-    let misfit = channels()
-        .map(|c| weight(c) * (pixel.slope(c) - factor * flat[c]).powi(2))
-        .sum();
-    (misfit, factor)
+/// Sum of the determined channels' transmittances.
+fn clearness(pixel: &PixelLines, determined: [bool; 3]) -> f32 {
+    channels(determined).map(|c| pixel.slope(c)).sum()
+}
+
+fn channels(determined: [bool; 3]) -> impl Iterator<Item = usize> {
+    (0..3).filter(move |&c| determined[c])
+}
+
+/// The pixels that show a dye.
+struct DyeSamples {
+    pixels: Vec<PixelLines>,
+    determined: [bool; 3],
+}
+
+impl DyeSamples {
+    /// Median misfit of plastic in standard deviations squared, and what its thickness and a handicap add.
+    fn misfit(&self, flat: [f32; 3], handicap: f32) -> f32 {
+        let fits: Vec<(f32, f32)> = self
+            .pixels
+            .iter()
+            .map(|pixel| self.explained(pixel, flat))
+            .collect();
+        let thickness = median(fits.iter().map(|fit| fit.1)).unwrap_or(1.0);
+        let misfit = median(fits.iter().map(|fit| fit.0)).unwrap_or(0.0);
+        misfit + THICKNESS_WEIGHT * (thickness - 1.0).powi(2) + handicap
+    }
+
+    /// Squared misfit of a pixel in standard deviations, and its factor of thickness.
+    fn explained(&self, pixel: &PixelLines, flat: [f32; 3]) -> (f32, f32) {
+        let (mut over, mut under) = (0.0, 0.0);
+        for c in channels(self.determined) {
+            over += weight(pixel, c) * pixel.slope(c) * flat[c];
+            under += weight(pixel, c) * flat[c] * flat[c];
+        }
+        let factor = (over / under.max(f32::MIN_POSITIVE)).max(0.0);
+        let misfit = channels(self.determined)
+            .map(|c| weight(pixel, c) * (pixel.slope(c) - factor * flat[c]).powi(2))
+            .sum();
+        (misfit, factor)
+    }
+}
+
+fn weight(pixel: &PixelLines, channel: usize) -> f32 {
+    1.0 / (pixel.sigma(channel).powi(2) + SCATTER_SIGMA * SCATTER_SIGMA)
 }

@@ -1,11 +1,12 @@
 //! Straight lines through a pixel's values on several screens, one a channel: slope T, intercept F.
 
 use crate::image::Image;
+use crate::matte::film::OPAQUE;
 use crate::pixel::{Coverage, LinearRgb};
 
 /// Sums for a straight line through points.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Line {
+pub(super) struct ScreenLine {
     count: f32,
     x: f32,
     y: f32,
@@ -13,7 +14,7 @@ pub(super) struct Line {
     xy: f32,
 }
 
-impl Line {
+impl ScreenLine {
     pub(super) fn add(&mut self, x: f32, y: f32) {
         self.count += 1.0;
         self.x += x;
@@ -44,12 +45,12 @@ impl Line {
 
 /// A pixel's lines, and the noise of its values.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Pixel {
-    pub(super) lines: [Line; 3],
+pub(super) struct PixelLines {
+    pub(super) lines: [ScreenLine; 3],
     pub(super) noise: f32,
 }
 
-impl Pixel {
+impl PixelLines {
     /// Transmittance of a channel as its line has it.
     pub(super) fn slope(&self, channel: usize) -> f32 {
         self.lines[channel].slope()
@@ -57,65 +58,88 @@ impl Pixel {
 
     /// Standard deviation of a channel's slope.
     pub(super) fn sigma(&self, channel: usize) -> f32 {
-        (self.noise / self.lines[channel].spread().sqrt().max(f32::MIN_POSITIVE)).min(UNKNOWN)
+        (self.noise / self.lines[channel].spread().sqrt().max(f32::MIN_POSITIVE)).min(UNKNOWN_SIGMA)
     }
 }
 
 /// Standard deviation of a transmittance of which nothing is known.
-const UNKNOWN: f32 = 1e3;
-/// Standard deviation of a transmittance told from other channels around what it is.
-const BORROWED: f32 = 0.06;
+const UNKNOWN_SIGMA: f32 = 1e3;
+/// Standard deviation of a transmittance inferred from other channels around what it is.
+const INFERRED_SIGMA: f32 = 0.06;
+/// Standard deviation of an open channel of the plastic that is inferred from its dye, as a share of it.
+const DYE_SIGMA: f32 = 0.15;
+/// Plates are so much off, as a share.
+const PLATE_ERROR: f32 = 0.01;
+/// Prior of a pixel's share of flat plastic, standard deviation around 0: plastic up to one and a half times as clear as
+/// flat.
+const SHARE_SIGMA: f32 = 1.5;
+/// Prior of a pixel's bare share, standard deviation around 0: now and then a rim with screen beside it.
+const BARE_SIGMA: f32 = 0.27;
+/// Standard deviation of transmittances around any sum of plastic and nothing.
+const MODEL_SIGMA: f32 = 0.015;
+/// Pixels that pass at least this share of what the clearest do are plastic that lies flat, or nearly.
+const MIN_FLAT_SHARE: f32 = 0.5;
+/// The clearest: this share of the object passes more.
+const CLEAREST_SHARE: f64 = 0.05;
 
 /// A pixel's film.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Solved {
+pub(super) struct SolvedFilm {
     pub(super) transmittance: LinearRgb,
     pub(super) reflected: LinearRgb,
-    /// Standard deviation of the transmittance that is told worst.
+    /// Standard deviation of the least certain channel of the transmittance.
     pub(super) sigma: f32,
 }
 
+impl SolvedFilm {
+    /// The film in front of a screen.
+    pub(super) fn over(&self, screen: LinearRgb) -> LinearRgb {
+        self.reflected + self.transmittance * screen
+    }
+}
+
 /// How the channels that the screens leave open follow from the others: a pixel is plastic in some share, and bare in some.
-pub(super) struct Borrowed {
+pub(super) struct Inferred {
     determined: [bool; 3],
     /// Transmittance of the plastic where it lies flat.
     plastic: [f32; 3],
 }
 
-impl Borrowed {
-    /// `plastic` is what is believed of flat plastic; in open channels it is scaled by what little the screens differ there,
-    /// over the whole object, mixed by the variances.
+impl Inferred {
+    /// `plastic` is the prior of flat plastic; in open channels it is scaled by what little the screens differ there, over
+    /// the whole object, mixed by the variances.
     pub(super) fn fit(
-        pixels: &Image<Pixel>,
+        pixels: &Image<PixelLines>,
         inside: &Image<Coverage>,
         determined: [bool; 3],
         plastic: [f32; 3],
     ) -> Self {
-        let believed = Self {
+        let prior = Self {
             determined,
             plastic,
         };
-        let scaled = |c: usize| {
-            let (gain, variance) = believed.gain(pixels, inside, c);
-            let trust = BELIEF * BELIEF;
-            (plastic[c] * (variance + gain * trust) / (variance + trust)).clamp(0.0, 1.0)
-        };
-        Self {
-            plastic: std::array::from_fn(|c| if determined[c] { plastic[c] } else { scaled(c) }),
-            ..believed
-        }
+        let plastic = std::array::from_fn(|c| {
+            if determined[c] {
+                plastic[c]
+            } else {
+                let (gain, variance) = prior.gain(pixels, inside, c);
+                let dye = DYE_SIGMA * DYE_SIGMA;
+                (plastic[c] * (variance + gain * dye) / (variance + dye)).clamp(0.0, 1.0)
+            }
+        });
+        Self { plastic, ..prior }
     }
 
     /// By what the plastic of an open channel must be multiplied by its own lines, and the variance of that: noise, and
     /// plates that are a little off.
-    fn gain(&self, pixels: &Image<Pixel>, inside: &Image<Coverage>, channel: usize) -> (f32, f32) {
+    fn gain(
+        &self,
+        pixels: &Image<PixelLines>,
+        inside: &Image<Coverage>,
+        channel: usize,
+    ) -> (f32, f32) {
         let (mut top, mut bottom, mut levers) = (0.0, f64::MIN_POSITIVE, Vec::new());
-        for (pixel, _) in pixels
-            .pixels()
-            .iter()
-            .zip(inside.pixels())
-            .filter(|(_, inside)| inside.0 > 0.5)
-        {
+        for pixel in covered_pixels(pixels, inside) {
             let (share, bare) = self.shares(pixel);
             let expected = f64::from(share * self.plastic[channel]);
             let weight = 1.0 / f64::from(pixel.sigma(channel)).powi(2);
@@ -124,93 +148,115 @@ impl Borrowed {
             levers.push(pixel.lines[channel].lever());
         }
         let gain = (top / bottom) as f32;
-        let off = PLATE_ERROR
-            * median(levers.into_iter()).unwrap_or(UNKNOWN).min(UNKNOWN)
-            * gain.max(1.0);
+        let lever = median(levers.into_iter()).unwrap_or(UNKNOWN_SIGMA);
+        let off = PLATE_ERROR * lever.min(UNKNOWN_SIGMA) * gain.max(1.0);
         (gain, (1.0 / bottom) as f32 + off * off)
     }
 
-    /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with beliefs
-    /// that hold where the channels do not tell them apart. No less than nothing is bare.
-    fn shares(&self, pixel: &Pixel) -> (f32, f32) {
+    /// The share of flat plastic, and of nothing, that a pixel's determined channels are made of: least squares, with priors
+    /// that hold where the channels do not separate them. No less than nothing is bare.
+    fn shares(&self, pixel: &PixelLines) -> (f32, f32) {
         let (mut pp, mut pb, mut bb) = (SHARE_SIGMA.powi(-2), 0.0, BARE_SIGMA.powi(-2));
         let (mut tp, mut tb) = (0.0, 0.0);
         for c in (0..3).filter(|&c| self.determined[c]) {
             let weight = 1.0 / (pixel.sigma(c).powi(2) + MODEL_SIGMA * MODEL_SIGMA);
-            let (plastic, told) = (self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
+            let (plastic, measured) = (self.plastic[c], pixel.slope(c).clamp(0.0, 1.0));
             pp += weight * plastic * plastic;
             pb += weight * plastic;
             bb += weight;
-            tp += weight * told * plastic;
-            tb += weight * told;
+            tp += weight * measured * plastic;
+            tb += weight * measured;
         }
         let bare =
             ((pp * tb - pb * tp) / (pp * bb - pb * pb).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         (((tp - pb * bare) / pp).max(0.0), bare)
     }
 
-    /// The film of one pixel: what is measured, mixed with what the other channels say by the variances.
-    pub(super) fn complete(&self, pixel: &Pixel) -> Solved {
+    /// The film of one pixel: what is measured, mixed with what follows from the other channels by the variances.
+    pub(super) fn complete(&self, pixel: &PixelLines) -> SolvedFilm {
         let (share, bare) = self.shares(pixel);
-        let mut worst = 0.0_f32;
-        let told: [f32; 3] = std::array::from_fn(|c| {
-            let (slope, sigma) = (pixel.slope(c), pixel.sigma(c));
+        let channels = [0, 1, 2].map(|c| {
             if self.determined[c] {
-                worst = worst.max(sigma);
-                return slope.clamp(0.0, 1.0);
+                (pixel.slope(c).clamp(0.0, 1.0), pixel.sigma(c))
+            } else {
+                mixed(
+                    pixel.slope(c),
+                    pixel.sigma(c),
+                    share * self.plastic[c] + bare,
+                )
             }
-            let (measured, borrowed) = (1.0 / (sigma * sigma), 1.0 / (BORROWED * BORROWED));
-            worst = worst.max((measured + borrowed).sqrt().recip());
-            ((slope * measured + (share * self.plastic[c] + bare) * borrowed)
-                / (measured + borrowed))
-                .clamp(0.0, 1.0)
         });
-        let reflected = std::array::from_fn(|c| pixel.lines[c].intercept(told[c]).max(0.0));
-        Solved {
-            transmittance: told.into(),
+        let transmittance = channels.map(|(t, _)| t);
+        let reflected =
+            std::array::from_fn(|c| pixel.lines[c].intercept(transmittance[c]).max(0.0));
+        SolvedFilm {
+            transmittance: transmittance.into(),
             reflected: LinearRgb::from(reflected),
-            sigma: worst,
+            sigma: channels
+                .iter()
+                .fold(0.0, |worst, (_, sigma)| worst.max(*sigma)),
         }
     }
 }
 
-/// Standard deviation of an open channel of the plastic that is told from its dye, as a share of it.
-const BELIEF: f32 = 0.15;
-/// Plates are so much off, as a share.
-const PLATE_ERROR: f32 = 0.01;
-/// What is believed of the two shares of a pixel before it is looked at, standard deviations around 0: plastic up to one
-/// and a half times as clear as flat, and now and then a rim with screen beside it.
-const SHARE_SIGMA: f32 = 1.5;
-const BARE_SIGMA: f32 = 0.27;
-/// Standard deviation of transmittances around any sum of plastic and nothing.
-const MODEL_SIGMA: f32 = 0.015;
-/// Pixels that pass at least this share of what the clearest do are plastic that lies flat, or nearly.
-const FLAT: f32 = 0.5;
-/// The clearest: this share of the object passes more.
-const CLEAREST: f64 = 0.05;
+/// A measured transmittance and one inferred from other channels, mixed by their variances, and the deviation of that.
+#[inline(always)]
+fn mixed(slope: f32, sigma: f32, inferred: f32) -> (f32, f32) {
+    let (measured, prior) = (
+        1.0 / (sigma * sigma),
+        1.0 / (INFERRED_SIGMA * INFERRED_SIGMA),
+    );
+    let value = (slope * measured + inferred * prior) / (measured + prior);
+    (value.clamp(0.0, 1.0), (measured + prior).sqrt().recip())
+}
+
+/// The pixels that lie more inside than outside.
+pub(super) fn covered_pixels<'a, P: Copy>(
+    pixels: &'a Image<P>,
+    inside: &'a Image<Coverage>,
+) -> impl Iterator<Item = &'a P> {
+    pixels
+        .pixels()
+        .iter()
+        .zip(inside.pixels())
+        .filter(|(_, c)| c.0 > 0.5)
+        .map(|(p, _)| p)
+}
 
 /// Transmittance per channel where the plastic lies flat: the median over what is not much darker than the clearest.
-pub(super) fn flat(solved: &Image<Solved>, inside: &Image<Coverage>) -> LinearRgb {
-    let mean = |t: LinearRgb| (t.r + t.g + t.b) / 3.0;
-    let object = || {
-        solved
-            .pixels()
-            .iter()
-            .zip(inside.pixels())
-            .filter(|(_, c)| c.0 >= 0.99)
-            .map(|(p, _)| p.transmittance)
-    };
-    let mut means: Vec<f32> = object().map(mean).collect();
-    if means.is_empty() {
+pub(super) fn flat_transmittance(
+    solved: &Image<SolvedFilm>,
+    inside: &Image<Coverage>,
+) -> LinearRgb {
+    let object: Vec<LinearRgb> = solved
+        .pixels()
+        .iter()
+        .zip(inside.pixels())
+        .filter(|(_, c)| c.0 >= OPAQUE)
+        .map(|(p, _)| p.transmittance)
+        .collect();
+    let Some(clearest) = clearest(&object) else {
         return LinearRgb::WHITE;
-    }
-    let at = ((means.len() as f64 * (1.0 - CLEAREST)) as usize).min(means.len() - 1);
-    let clearest = *means.select_nth_unstable_by(at, f32::total_cmp).1;
-    let channel = |of: fn(LinearRgb) -> f32| {
-        median(object().filter(|t| mean(*t) >= FLAT * clearest).map(of)).unwrap_or(1.0)
     };
-    LinearRgb::new(channel(|t| t.r), channel(|t| t.g), channel(|t| t.b))
-        .map(|t| t.clamp(0.001, 1.0))
+    let flat: Vec<[f32; 3]> = object
+        .into_iter()
+        .filter(|t| mean_channel(*t) >= MIN_FLAT_SHARE * clearest)
+        .map(Into::into)
+        .collect();
+    let medians = [0, 1, 2].map(|c| median(flat.iter().map(|t| t[c])).unwrap_or(1.0));
+    LinearRgb::from(medians).map(|t| t.clamp(0.001, 1.0))
+}
+
+/// Mean transmittance of the clearest pixels; none without pixels.
+fn clearest(object: &[LinearRgb]) -> Option<f32> {
+    let mut means: Vec<f32> = object.iter().copied().map(mean_channel).collect();
+    let rank = (means.len() as f64 * (1.0 - CLEAREST_SHARE)) as usize;
+    let rank = rank.min(means.len().checked_sub(1)?);
+    Some(*means.select_nth_unstable_by(rank, f32::total_cmp).1)
+}
+
+fn mean_channel(t: LinearRgb) -> f32 {
+    (t.r + t.g + t.b) / 3.0
 }
 
 pub(super) fn median(values: impl Iterator<Item = f32>) -> Option<f32> {

@@ -171,7 +171,7 @@ fn screens_that_are_alike_and_single_photos_are_refused() {
     let alike = solved(&[GREEN, GREEN], [0.0; 2], 0.002)
         .unwrap_err()
         .to_string();
-    assert!(alike.contains("too alike"), "{alike}");
+    assert!(alike.contains("too similar"), "{alike}");
     let single = solved(&[GREEN], [0.0; 2], 0.0).unwrap_err().to_string();
     assert_eq!(single, "photos: 1, expected at least 2");
 }

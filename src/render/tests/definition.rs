@@ -8,10 +8,27 @@ use crate::geom::{Point2, Point3, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::light;
 use crate::pixel::{Film, LinearRgb, ObjectId, PremulRgba};
-use crate::render::{Preset, RenderOptions, cast, check, interreflect, reference};
+use crate::quality::Quality;
+use crate::render::{RenderOptions, check, interreflect, render, render_reference};
 use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
 use std::f64::consts::PI;
 use std::sync::Arc;
+
+/// Between the default and a reference: 2 x 2 samples a pixel, 4 x 4 a light.
+const GOOD: RenderOptions = RenderOptions {
+    subsamples: 2,
+    light_samples: 4,
+    ambient_samples: 64,
+    cell_px: 1.0,
+};
+
+/// The same with 3 x 3 samples a pixel, 6 x 6 a light.
+const HIGH: RenderOptions = RenderOptions {
+    subsamples: 3,
+    light_samples: 6,
+    ambient_samples: 100,
+    cell_px: 0.66,
+};
 
 /// A camera at height 1 over the surface, looking straight down; picture up is world `+y`.
 fn above(width: u32, height: u32, focal_px: f64) -> Camera {
@@ -118,7 +135,7 @@ fn shadows_of_a_square_hit_the_published_numbers() {
             let caster = level(1, [0.06, 0.02, 0.1], 0.1, grey(alpha));
             // The card would hide the surface from above; looked at from a slant it is out of the way.
             let shot = seen_from_the_side(shot.with_card(caster), x, y);
-            for way in [cast, reference] {
+            for way in [render, render_reference] {
                 let found = way(&shot, &sharp()).shadow()[(1, 1)].g;
                 assert!(
                     (found - s).abs() < 0.01,
@@ -152,8 +169,11 @@ fn far_from_any_card_the_factor_is_exactly_one() {
         ambient: LinearRgb::BLACK,
         ..shot
     };
-    assert_eq!(factor_at(&lit_only, &sharp(), cast, -0.6, -0.6), 1.0);
-    assert_eq!(factor_at(&lit_only, &sharp(), reference, -0.6, -0.6), 1.0);
+    assert_eq!(factor_at(&lit_only, &sharp(), render, -0.6, -0.6), 1.0);
+    assert_eq!(
+        factor_at(&lit_only, &sharp(), render_reference, -0.6, -0.6),
+        1.0
+    );
 }
 
 #[test]
@@ -164,7 +184,7 @@ fn each_layer_takes_its_share() {
             let z = 0.1 + 0.01 * f64::from(k);
             shot = shot.with_card(level(k + 1, [0.0, 0.0, z], 4.0, grey(0.2)));
         }
-        for way in [cast, reference] {
+        for way in [render, render_reference] {
             let deep = way(&shot, &RenderOptions::default());
             let left = 0.8f32.powi(n as i32);
             // All cards cover the whole light: the surface keeps the same share, the eye sees it through the same.
@@ -199,8 +219,8 @@ fn a_lit_card_is_as_bright_as_the_closed_form_says() {
             1.0,
             PremulRgba::new(0.4, 0.3, 0.2, 1.0),
         ));
-    for way in [cast, reference] {
-        let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
+    for way in [render, render_reference] {
+        let c = way(&shot, &RenderOptions::default()).at(2, 2)[0].light;
         let e = 2.975061 / std::f32::consts::PI;
         assert!(
             (c.r - 0.4 * e).abs() < 2e-4 && (c.b - 0.2 * e).abs() < 2e-4,
@@ -214,8 +234,8 @@ fn ambient_alone_lights_a_card_by_its_albedo() {
     let shot = Shot::new(above(5, 5, 400.0))
         .with_ambient(LinearRgb::new(0.5, 1.0, 2.0))
         .with_card(level(1, [0.0, 0.0, 0.1], 1.0, grey(1.0)));
-    for way in [cast, reference] {
-        let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
+    for way in [render, render_reference] {
+        let c = way(&shot, &RenderOptions::default()).at(2, 2)[0].light;
         assert!(
             (c.r - 0.25).abs() < 1e-5 && (c.b - 1.0).abs() < 1e-5,
             "{c:?}"
@@ -249,9 +269,9 @@ fn textures_follow_the_convention() {
     let (shot, texture) = magnified();
     let one = RenderOptions {
         subsamples: 1,
-        ..Preset::High.options()
+        ..HIGH
     };
-    for way in [cast, reference] {
+    for way in [render, render_reference] {
         // The card spans 0.5 to 40.5: texel centres lie on pixel centres 5, 15, 25, 35.
         let deep = way(&shot, &one);
         let at = |x: usize, y: usize| deep.at(x, y)[0];
@@ -299,7 +319,7 @@ fn an_edge_is_as_soft_as_the_window() {
         );
         let shot = Shot::new(above(9, 9, 100.0)).with_card(edge);
         let alpha = |deep: DeepImage| deep.at(4, 4).first().map_or(0.0, |s| s.alpha);
-        let fine = alpha(reference(
+        let fine = alpha(render_reference(
             &shot,
             &RenderOptions {
                 subsamples: 64,
@@ -310,7 +330,7 @@ fn an_edge_is_as_soft_as_the_window() {
             (fine - coverage).abs() < 0.01,
             "{t}: {fine} against {coverage}"
         );
-        let coarse = alpha(cast(&shot, &Preset::High.options()));
+        let coarse = alpha(render(&shot, &HIGH));
         assert!(
             (coarse - coverage).abs() < 0.17,
             "{t}: {coarse} against {coverage}"
@@ -330,8 +350,8 @@ fn without_cards_the_plate_is_the_picture_bit_for_bit() {
     let shot = Shot::new(above(33, 21, 30.0))
         .with_light(square_light())
         .with_ambient(LinearRgb::grey(0.2));
-    for way in [cast, reference] {
-        let out = composite::frame(&way(&shot, &Preset::Draft.options()), Some(&plate));
+    for way in [render, render_reference] {
+        let out = composite::frame(&way(&shot, &Quality::Draft.into()), Some(&plate));
         assert!(
             out.pixels()
                 .iter()
@@ -347,7 +367,7 @@ fn pixels_that_no_card_can_shadow_keep_the_plate_s_bits() {
     let shot = Shot::new(above(64, 48, 60.0))
         .with_light(square_light())
         .with_card(level(1, [-0.1, -0.1, 0.05], 0.1, grey(0.7)));
-    let deep = cast(&shot, &Preset::Fast.options());
+    let deep = render(&shot, &RenderOptions::default());
     let out = composite::frame(&deep, Some(&plate));
     for (x, y) in [(0, 0), (63, 0), (63, 47), (40, 10)] {
         assert_eq!(out[(x, y)], plate[(x, y)].opaque());
@@ -361,23 +381,20 @@ fn pixels_that_no_card_can_shadow_keep_the_plate_s_bits() {
 #[test]
 fn ways_agree_on_a_pile() {
     let shot = pile();
-    let exact = composite::frame(
-        &reference(&shot, &Preset::High.options()),
-        Some(&plate(64, 48)),
-    );
-    for (quality, limit) in [
-        (Preset::Draft, 0.012),
-        (Preset::Fast, 0.008),
-        (Preset::High, 0.005),
+    let exact = composite::frame(&render_reference(&shot, &HIGH), Some(&plate(64, 48)));
+    for (options, limit) in [
+        (RenderOptions::from(Quality::Draft), 0.012),
+        (RenderOptions::default(), 0.008),
+        (HIGH, 0.005),
     ] {
-        let fast = composite::frame(&cast(&shot, &quality.options()), Some(&plate(64, 48)));
+        let fast = composite::frame(&render(&shot, &options), Some(&plate(64, 48)));
         let squares = fast
             .pixels()
             .iter()
             .zip(exact.pixels())
             .map(|(a, b)| f64::from((a.g - b.g).powi(2)));
         let rmse = (squares.sum::<f64>() / (64.0 * 48.0)).sqrt();
-        assert!(rmse < limit, "{quality:?}: {rmse}");
+        assert!(rmse < limit, "{options:?}: {rmse}");
     }
 }
 
@@ -419,8 +436,8 @@ fn the_order_of_cards_changes_nothing() {
     let mut turned = shot.clone();
     turned.cards.reverse();
     assert!(same(
-        &cast(&shot, &RenderOptions::default()),
-        &cast(&turned, &RenderOptions::default())
+        &render(&shot, &RenderOptions::default()),
+        &render(&turned, &RenderOptions::default())
     ));
 }
 
@@ -431,7 +448,7 @@ fn crossing_cards_swap_places_where_they_cross() {
     let shot = Shot::new(above(40, 9, 40.0))
         .with_card(card(1, [0.0, 0.0, 0.2], tilt(0.4), [0.6; 2], whole.clone()))
         .with_card(card(2, [0.0, 0.0, 0.2], tilt(-0.4), [0.6; 2], whole));
-    for way in [cast, reference] {
+    for way in [render, render_reference] {
         let deep = way(&shot, &RenderOptions::default());
         // Turned about +y by a positive angle, a card sinks towards +x.
         for (x, front) in [(12, 1), (18, 1), (21, 2), (27, 2)] {
@@ -456,8 +473,8 @@ fn brightest(shot: &Shot, light: &AreaLight) -> f32 {
 fn everything_stays_within_its_bounds() {
     let shot = pile();
     let most = brightest(&shot, &square_light());
-    for quality in [Preset::Draft, Preset::Fast, Preset::High] {
-        let deep = cast(&shot, &quality.options());
+    for options in [Quality::Draft.into(), RenderOptions::default(), HIGH] {
+        let deep = render(&shot, &options);
         assert!(
             deep.shadow()
                 .pixels()
@@ -486,7 +503,7 @@ fn any_number_of_threads_gives_the_same_bits() {
             .num_threads(threads)
             .build()
             .unwrap();
-        pool.install(|| cast(&shot, &RenderOptions::default()))
+        pool.install(|| render(&shot, &RenderOptions::default()))
     };
     assert!(same(&with(1), &with(4)));
 }
@@ -499,8 +516,8 @@ fn exposure_scales_the_cards_alone() {
         ..shot.clone()
     };
     let (a, b) = (
-        cast(&shot, &RenderOptions::default()),
-        cast(&bright, &RenderOptions::default()),
+        render(&shot, &RenderOptions::default()),
+        render(&bright, &RenderOptions::default()),
     );
     assert_eq!(a.shadow(), b.shadow());
     assert_eq!(b.at(32, 24)[0].light, a.at(32, 24)[0].light.scale(2.0));
@@ -514,7 +531,7 @@ fn a_finite_catcher_ends_the_shadow() {
     });
     shot = shot.with_card(level(1, [0.0, 0.0, 0.3], 0.3, grey(0.5)));
     shot.catcher = [0.1, 0.1];
-    for way in [cast, reference] {
+    for way in [render, render_reference] {
         let deep = way(&shot, &RenderOptions::default());
         assert!(deep.shadow()[(10, 10)].r < 0.6);
         assert_eq!(deep.shadow()[(13, 10)], LinearRgb::WHITE);
@@ -558,8 +575,8 @@ fn awkward() -> Vec<(&'static str, Shot)> {
 #[test]
 fn awkward_shots_give_defined_pictures() {
     for (name, shot) in awkward() {
-        for way in [cast, reference] {
-            let deep = way(&shot, &Preset::Fast.options());
+        for way in [render, render_reference] {
+            let deep = way(&shot, &RenderOptions::default());
             let out = composite::frame(&deep, None);
             assert!(
                 out.pixels()
@@ -607,8 +624,8 @@ fn grey_film_gives_the_bits_of_alpha() {
     };
     let as_alpha = tinted(|film| grey(film).into());
     let as_film = tinted(|film| Texture::Film(Arc::new(crate::filter::Pyramid::new(grey(film)))));
-    for way in [cast, reference] {
-        let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &Preset::Fast.options()));
+    for way in [render, render_reference] {
+        let [a, b] = [&as_alpha, &as_film].map(|shot| way(shot, &RenderOptions::default()));
         assert_eq!(a.shadow(), b.shadow());
         assert_eq!(
             composite::frame(&a, Some(&plate(64, 48))),
@@ -631,7 +648,7 @@ fn film_tints_what_is_behind_and_its_shadow() {
     let shot = Shot::new(above(5, 5, 50.0))
         .with_light(square_light())
         .with_card(card);
-    for way in [cast, reference] {
+    for way in [render, render_reference] {
         let deep = way(&shot, &RenderOptions::default());
         let (s, flat) = (deep.shadow()[(2, 2)], deep.flat(2, 2));
         assert!(
@@ -649,8 +666,8 @@ fn film_tints_what_is_behind_and_its_shadow() {
 #[test]
 fn both_ways_agree_on_film() {
     let shot = tinted(Texture::from);
-    let [a, b] = [cast, reference]
-        .map(|way| composite::frame(&way(&shot, &Preset::High.options()), Some(&plate(64, 48))));
+    let [a, b] = [render, render_reference]
+        .map(|way| composite::frame(&way(&shot, &HIGH), Some(&plate(64, 48))));
     assert!(difference(&a, &b) < 0.006, "{}", difference(&a, &b));
 }
 
@@ -674,7 +691,7 @@ fn interreflection_brightens_the_surface_under_a_card_alone() {
             0.1,
             PremulRgba::new(0.5, 0.25, 0.0, 0.5),
         ));
-    let plain = cast(&shot, &RenderOptions::default());
+    let plain = render(&shot, &RenderOptions::default());
     let bounced = interreflect(plain.clone(), &shot, LinearRgb::grey(0.8));
     let gain = |x: usize| {
         let (a, b) = (bounced.shadow()[(x, 10)], plain.shadow()[(x, 10)]);
@@ -705,7 +722,7 @@ fn a_card_turned_over_shows_its_back_the_right_way_round() {
             .with_ambient(LinearRgb::WHITE)
             .with_card(card.clone())
     };
-    for way in [cast, reference] {
+    for way in [render, render_reference] {
         let at = |card: &Card, x: usize| {
             way(&lit(card), &RenderOptions::default()).at(x, 20)[0]
                 .light
@@ -732,8 +749,8 @@ fn an_even_map_lights_as_the_constant_environment_does() {
     let radiance = LinearRgb::new(0.5, 1.0, 2.0);
     let shot = Shot::new(above(5, 5, 400.0)).with_card(level(1, [0.0, 0.0, 0.1], 1.0, grey(1.0)));
     let shot = shot.with_environment(surroundings(Image::filled(16, 8, radiance), 0.3));
-    for way in [cast, reference] {
-        let c = way(&shot, &Preset::Fast.options()).at(2, 2)[0].light;
+    for way in [render, render_reference] {
+        let c = way(&shot, &RenderOptions::default()).at(2, 2)[0].light;
         assert!(
             (c.r - 0.25).abs() < 1e-3 && (c.b - 1.0).abs() < 4e-3,
             "{c:?}"
@@ -767,11 +784,11 @@ fn the_shadow_of_a_sun_lies_across_from_it_at_any_rotation() {
         let (x, y) = (-0.1 * cos, -0.1 * sin);
         let pixel = ((40.5 + 100.0 * x) as usize, (40.5 - 100.0 * y) as usize);
         let across = ((40.5 - 100.0 * x) as usize, (40.5 + 100.0 * y) as usize);
-        for way in [cast, reference] {
+        for way in [render, render_reference] {
             let options = RenderOptions {
                 ambient_samples: 128,
                 subsamples: 1,
-                ..Preset::Good.options()
+                ..GOOD
             };
             let deep = way(&shot, &options);
             let (dark, bright) = (deep.shadow()[pixel].g, deep.shadow()[across].g);
@@ -789,7 +806,7 @@ fn both_ways_agree_under_a_map() {
     shot.ambient = LinearRgb::BLACK;
     let options = RenderOptions {
         ambient_samples: 400,
-        ..Preset::High.options()
+        ..HIGH
     };
     let exact = RenderOptions {
         ambient_samples: 3200,
@@ -797,8 +814,8 @@ fn both_ways_agree_under_a_map() {
         light_samples: 3,
         cell_px: 1.0,
     };
-    let a = composite::frame(&cast(&shot, &options), Some(&plate(64, 48)));
-    let b = composite::frame(&reference(&shot, &exact), Some(&plate(64, 48)));
+    let a = composite::frame(&render(&shot, &options), Some(&plate(64, 48)));
+    let b = composite::frame(&render_reference(&shot, &exact), Some(&plate(64, 48)));
     assert!(difference(&a, &b) < 0.012, "{}", difference(&a, &b));
 }
 
@@ -810,7 +827,7 @@ fn options_out_of_range_are_brought_into_it() {
         ambient_samples: 0,
         cell_px: f64::NAN,
     };
-    let deep = cast(&pile(), &none);
+    let deep = render(&pile(), &none);
     assert!(
         composite::frame(&deep, None)
             .pixels()
@@ -865,6 +882,6 @@ fn the_closed_form_is_what_a_bare_surface_gets() {
         .with_light(square_light())
         .with_card(level(1, [0.0; 3], 1.0, PremulRgba::new(1.0, 1.0, 1.0, 1.0)));
     let e = light::irradiance(&square_light(), Point3::origin(), Vector3::z());
-    let c = cast(&shot, &Preset::High.options()).at(2, 2)[0].light;
+    let c = render(&shot, &HIGH).at(2, 2)[0].light;
     assert!((c.g - e.g / std::f32::consts::PI).abs() < 1e-5);
 }

@@ -10,7 +10,7 @@ use petcomp::dataset::{self, DatasetConfig, Listing, Partition, Pipeline, YoloSe
 use petcomp::eval::page::{EvalReportOptions, Metrics, Run};
 use petcomp::eval::{self, Tags};
 use petcomp::filter::Pyramid;
-use petcomp::io::{self, Override, Raise};
+use petcomp::io::{self, LimitOverride, Override};
 use petcomp::label::{self, Labels};
 use petcomp::matte::key::{KeyOptions, Keying, Screen};
 use petcomp::matte::{CutOutOptions, FilmOptions, SegmentOptions, cut_out, segment};
@@ -579,7 +579,7 @@ fn reference_scene(world: &World) {
         return;
     };
     if ends(render::check(&shot)).is_some() && shot.cards.len() < 5 && shot.lights.len() < 5 {
-        render::cast(&shot, &RenderOptions::default());
+        render::render(&shot, &RenderOptions::default());
     }
 }
 
@@ -588,7 +588,7 @@ fn overrides(world: &World) {
     let (limits, rest): (Vec<&str>, Vec<&str>) =
         text.lines().partition(|line| line.starts_with("limit."));
     for limit in limits {
-        let _ = ends(limit.trim_start_matches("limit.").parse::<Raise>());
+        let _ = ends(limit.trim_start_matches("limit.").parse::<LimitOverride>());
     }
     let given: Vec<Override> = rest.iter().filter_map(|line| ends(line.parse())).collect();
     let of = |table: &str| {

@@ -1,6 +1,6 @@
 //! A small world of valid files: photos, assets, a label, a recipe, a scene, a dataset and its shards.
 
-use petcomp::asset::{self, AddPhoto, Scale};
+use petcomp::asset::{self, PhotoEntry, Scale};
 use petcomp::dataset::{DatasetConfig, Pipeline, SampleRange, Shard, generate};
 use petcomp::scene::cycles;
 use petcomp::{Image, LinearRgb, io};
@@ -49,8 +49,8 @@ impl World {
             io::write(world.path(name), &slab).unwrap();
         }
         for (name, length) in [("a", 0.2), ("b", 0.15)] {
-            let add = AddPhoto::new(name, "cap", Scale::Length(length));
-            asset::add_photo(world.path("assets"), world.path("slab.png"), &add).unwrap();
+            let entry = PhotoEntry::new(world.path("slab.png"), name, "cap", Scale::Length(length));
+            asset::add_photo(world.path("assets"), &entry, &[], &Default::default()).unwrap();
         }
         let place = Image::from_fn(96, 72, |x, y| {
             LinearRgb::grey(0.2 + 0.01 * ((7 * x + 13 * y) % 11) as f32)

@@ -2,7 +2,7 @@
 
 use crate::build::{ihdr, png, stored};
 use crate::make::{Folder, behind, tiff};
-use petcomp::io::exr_parts::{Part, Plane, write_parts};
+use petcomp::io::exr::{ChannelSamples, Part, write_parts};
 use petcomp::io::{self, exr::write_channels};
 use petcomp::{Coverage, Depth, Image, LinearRgb, PremulRgba, Srgb8, color};
 use std::io::Write;
@@ -382,7 +382,7 @@ fn the_part_with_colours_is_taken_wherever_it_stands() {
         name: name.into(),
         channels: channels
             .iter()
-            .map(|(name, v)| (name.to_string(), Plane::Float(vec![*v])))
+            .map(|(name, v)| (name.to_string(), ChannelSamples::Float(vec![*v])))
             .collect(),
         metadata: Vec::new(),
     };

@@ -7,7 +7,7 @@ use petcomp::Image;
 use petcomp::Quality;
 use petcomp::composite;
 use petcomp::io;
-use petcomp::render::{Preset, RenderOptions, cast, reference};
+use petcomp::render::{RenderOptions, render, render_reference};
 use petcomp::scene::{Shot, cycles};
 use petcomp::{Error, Result};
 use petcomp::{LinearRgb, PremulRgba};
@@ -65,7 +65,7 @@ pub fn diagrams(golden: &Path, runs: usize) -> Result<Vec<Diagram>> {
 fn samples(scenes: &[Scene], runs: usize) -> Result<Vec<Diagram>> {
     let (mut all, mut piles) = (Vec::new(), Vec::new());
     for (curve, setting, options) in settings() {
-        let costs = measured(scenes, runs, |shot| cast(shot, &options))?;
+        let costs = measured(scenes, runs, |shot| render(shot, &options))?;
         let of = |is_in: fn(&Scene) -> bool| {
             let some = scenes
                 .iter()
@@ -107,13 +107,13 @@ fn filter(scenes: &[Scene], runs: usize) -> Result<Diagram> {
         let filtered = point(
             "filtered",
             &setting,
-            &measured(scenes, runs, |shot| cast(shot, &options))?,
+            &measured(scenes, runs, |shot| render(shot, &options))?,
         );
         points.push(filtered.used_where(|q| is_default && q == Quality::default()));
         points.push(point(
             "plain samples",
             &setting,
-            &measured(scenes, 1, |shot| reference(shot, &options))?,
+            &measured(scenes, 1, |shot| render_reference(shot, &options))?,
         ));
     }
     Ok(diagram(
@@ -145,9 +145,9 @@ fn diagram(file: &str, title: &str, input: String, points: Vec<Point>) -> Diagra
 /// The presets, and each number of the default changed by itself.
 fn settings() -> Vec<(&'static str, String, RenderOptions)> {
     let usual = RenderOptions::default();
-    let presets = Preset::ALL
+    let presets = super::settings()
         .into_iter()
-        .map(|(name, preset)| (PRESETS, name.to_owned(), preset.options()));
+        .map(|(name, options)| (PRESETS, name.to_owned(), options));
     let square = |n: usize| format!("{n} x {n}");
     let pixels = PIXELS.map(|n| {
         (
@@ -318,12 +318,17 @@ mod tests {
             .filter(|s| s.name == "pile_of_5")
             .collect();
         let measured =
-            |preset: Preset| measured(&scenes, 1, |shot| cast(shot, &preset.options())).unwrap();
-        let error = |preset| point("", "", &measured(preset)).error;
-        let [draft, fast, high] = [Preset::Draft, Preset::Fast, Preset::High].map(error);
+            |options: RenderOptions| measured(&scenes, 1, |shot| render(shot, &options)).unwrap();
+        let error = |options| point("", "", &measured(options)).error;
+        let [draft, normal, high] = [
+            Quality::Draft.render(),
+            RenderOptions::default(),
+            super::super::HIGH,
+        ]
+        .map(error);
         assert!(
-            draft > fast && fast > high && high > 0.0,
-            "{draft} {fast} {high}"
+            draft > normal && normal > high && high > 0.0,
+            "{draft} {normal} {high}"
         );
     }
 

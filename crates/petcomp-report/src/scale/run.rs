@@ -12,7 +12,7 @@ use petcomp::dataset::{
 };
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{
     CameraSource, Exposure, Grade, Look, Object, Placement, Scene, Shot, Surface,
 };
@@ -149,7 +149,7 @@ impl World {
     }
 
     fn sample(&self) -> Sample {
-        let deep = cast(&self.shot, &RenderOptions::default());
+        let deep = render(&self.shot, &RenderOptions::default());
         let frame = composite::frame(&deep, self.shot.plate.as_deref());
         let labels = label(&deep, &self.shot, &LabelOptions::default());
         Sample {

@@ -2,11 +2,11 @@
 //! a cap, in its own soft shadow.
 
 use crate::matte::{GOOD_BOX_PX, GOOD_IOU, normal};
-use petcomp::Image;
 use petcomp::LinearRgb;
 use petcomp::Result;
 use petcomp::color::{linear_to_srgb, srgb_to_linear};
 use petcomp::matte::{CutOut, CutOutOptions, cut_out};
+use petcomp::{Image, Mask};
 
 pub(super) const GREEN: LinearRgb = LinearRgb::new(0.04, 0.4, 0.08);
 pub(super) const BLUE: LinearRgb = LinearRgb::new(0.03, 0.06, 0.35);
@@ -127,7 +127,7 @@ impl Take {
     }
 
     /// The photo in 8 bits, and which pixels show a bottle.
-    pub(super) fn taken(&self) -> (Image<LinearRgb>, Image<bool>) {
+    pub(super) fn taken(&self) -> (Image<LinearRgb>, Mask) {
         const OFFSETS: [[f64; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
         let (w, h) = self.size;
         let mut photo = Image::from_fn(w, h, |x, y| {
@@ -173,7 +173,7 @@ pub(super) struct Likeness {
 }
 
 impl Likeness {
-    fn of(cut: &CutOut, mask: &Image<bool>) -> Self {
+    fn of(cut: &CutOut, mask: &Mask) -> Self {
         let found = cut.segmentation.tight.map(|c| c.0 >= 0.5);
         let count = |holds: fn(bool, bool) -> bool| {
             found
@@ -219,7 +219,7 @@ impl Likeness {
 }
 
 /// Left, top, right and bottom of what is true.
-fn sides_of(mask: &Image<bool>) -> [f64; 4] {
+fn sides_of(mask: &Mask) -> [f64; 4] {
     let (w, h) = mask.size();
     let columns = || (0..w).filter(|&x| (0..h).any(|y| mask[(x, y)]));
     let rows = || (0..h).filter(|&y| (0..w).any(|x| mask[(x, y)]));

@@ -6,7 +6,7 @@ use petcomp::Image;
 use petcomp::Result;
 use petcomp::composite::{finish, frame};
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{Finish, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
@@ -84,7 +84,7 @@ fn everything_off() -> Case {
         || {
             let plate = Arc::new(plate(64, 48));
             let shot = Shot::new(above([64, 48], 60.0)).with_plate(plate.clone());
-            let deep = cast(&shot, &RenderOptions::default());
+            let deep = render(&shot, &RenderOptions::default());
             let out = finish(
                 frame(&deep, Some(&plate)),
                 &deep,
@@ -120,7 +120,7 @@ fn empty_without_plate() -> Case {
         "no card, no plate",
         "transparent black everywhere: 0 pixels differ",
         || {
-            let deep = cast(
+            let deep = render(
                 &Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE),
                 &RenderOptions::default(),
             );
@@ -200,7 +200,7 @@ fn broken_plate() -> Case {
             let mut plate = plate(64, 48);
             plate[(20, 30)].g = f32::NAN;
             let out = frame(
-                &cast(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
+                &render(&Shot::new(above([64, 48], 60.0)), &RenderOptions::default()),
                 Some(&plate),
             );
             let broken = out

@@ -9,7 +9,7 @@ use petcomp::dataset::{
 };
 use petcomp::io;
 use petcomp::label::{LabelOptions, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{Background, CameraSource, Range, Recipe, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Error, Result};
@@ -45,7 +45,7 @@ pub(super) fn cases() -> Result<Vec<Case>> {
 
 /// A picture of a shot, its labels, and what it was made from.
 fn taken(shot: &Shot) -> Sample {
-    let deep = cast(shot, &RenderOptions::default());
+    let deep = render(shot, &RenderOptions::default());
     sample(shot, deep)
 }
 

@@ -34,7 +34,7 @@ fn all_stages(profile: Profile) -> KeyOptions {
         blur_post: 3,
         dilate_distance: -2,
         feather_distance: 4,
-        ..KeyOptions::of(profile)
+        ..KeyOptions::for_profile(profile)
     }
 }
 
@@ -62,7 +62,7 @@ fn weak(saturation: f32) -> Case {
                 LinearRgb::new(0.5, 0.49 + 0.005 * x as f32, 0.48 + 0.01 * y as f32)
             });
             Ok(no_shares(Profile::ALL.iter().map(|(_, profile)| {
-                key(&photo, screen, &KeyOptions::of(*profile))
+                key(&photo, screen, &KeyOptions::for_profile(*profile))
             })))
         },
     )
@@ -98,7 +98,7 @@ fn all_of_the_key() -> Case {
         || {
             let photo = Image::filled(64, 64, GREEN);
             let left = |(_, profile): &(&str, Profile)| {
-                let keyed = key(&photo, GREEN, &KeyOptions::of(*profile));
+                let keyed = key(&photo, GREEN, &KeyOptions::for_profile(*profile));
                 let light = keyed
                     .cutout
                     .pixels()
@@ -142,7 +142,7 @@ fn extreme_pixels() -> Case {
             });
             let mut wrong = 0;
             for (_, profile) in Profile::ALL {
-                for opts in [KeyOptions::of(profile), all_stages(profile)] {
+                for opts in [KeyOptions::for_profile(profile), all_stages(profile)] {
                     let keyed = Keying::new(&photo, Screen::Color(GREEN)).run(&opts)?;
                     wrong += keyed.matte.pixels().iter().filter(|m| m.0.is_nan()).count();
                     wrong += keyed

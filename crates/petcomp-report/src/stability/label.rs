@@ -6,8 +6,8 @@ use petcomp::Image;
 use petcomp::Result;
 use petcomp::geom::BBox;
 use petcomp::geom::Point2;
-use petcomp::label::{AmodalBox, LabelOptions, Labels, Mask, ObjectLabel, label};
-use petcomp::render::{RenderOptions, cast};
+use petcomp::label::{AmodalBox, LabelOptions, Labels, ObjectLabel, RleMask, label};
+use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{Card, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, LinearRgb, ObjectId, PremulRgba};
@@ -43,7 +43,7 @@ fn shot(image: [u32; 2], cards: impl IntoIterator<Item = Card>) -> Shot {
 
 fn labelled(shot: &Shot) -> Labels {
     label(
-        &cast(shot, &RenderOptions::default()),
+        &render(shot, &RenderOptions::default()),
         shot,
         &LabelOptions::default(),
     )
@@ -276,7 +276,7 @@ fn edge_on() -> Case {
                     opaque(3, [3.0, 0.0, 0.0], 0.2),
                 ],
             );
-            let deep = cast(&shot, &RenderOptions::default());
+            let deep = render(&shot, &RenderOptions::default());
             let around = |amodal| {
                 label(
                     &deep,
@@ -363,7 +363,7 @@ fn mask_of_16k() -> Case {
         "every pixel of every other column",
         "2^27 pixels, the whole box but the last column, in 16385 runs",
         || {
-            let mask = Mask::from_fn([SIDE; 2], |x, _| x.is_multiple_of(2));
+            let mask = RleMask::from_fn([SIDE; 2], |x, _| x.is_multiple_of(2));
             let bounds = mask.bounds();
             let passed = mask.area() == 1 << 27
                 && [bounds.x0, bounds.y0, bounds.x1, bounds.y1]

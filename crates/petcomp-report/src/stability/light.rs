@@ -8,8 +8,8 @@ use petcomp::LinearRgb;
 use petcomp::Result;
 use petcomp::asset::Panorama;
 use petcomp::geom::{Point3, Vector3};
-use petcomp::light::{expose, irradiance, match_cast, plate_noise, radiance, sky_pieces};
-use petcomp::scene::{AreaLight, Cast, EnvironmentMap, Exposure, LightShape, Noise, Scene};
+use petcomp::light::{expose, irradiance, match_light_tint, plate_noise, radiance, sky_pieces};
+use petcomp::scene::{AreaLight, EnvironmentMap, Exposure, LightShape, LightTint, Noise, Scene};
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -230,7 +230,7 @@ fn pieces_add_up() -> Case {
 }
 
 /// A scene under even light, of which exposure and colour are open.
-fn open(exposure: Exposure, cast: Cast, ambient: LinearRgb) -> Scene {
+fn open(exposure: Exposure, cast: LightTint, ambient: LinearRgb) -> Scene {
     Scene {
         exposure,
         cast,
@@ -315,7 +315,7 @@ fn exposed(name: &str, plate: Image<LinearRgb>, ambient: LinearRgb, expected_ev:
             let exposed = expose(
                 open(
                     Exposure::MatchPlate { gain_ev: 0.0 },
-                    Cast::default(),
+                    LightTint::default(),
                     ambient,
                 ),
                 &plate,
@@ -334,15 +334,15 @@ fn cast_of(name: &str, plate: Image<LinearRgb>) -> Case {
         "taken from the surface",
         "white, to 1e-5",
         move || {
-            let known = match_cast(
+            let known = match_light_tint(
                 open(
                     Exposure::Ev(0.0),
-                    Cast::MatchSurface { share: 1.0 },
+                    LightTint::MatchSurface { share: 1.0 },
                     LinearRgb::WHITE,
                 ),
                 &plate,
             );
-            let Cast::Known(LinearRgb { r, g, b }) = known.cast else {
+            let LightTint::Known(LinearRgb { r, g, b }) = known.cast else {
                 return Ok(Outcome::new("still unknown", false));
             };
             let off = [r, g, b]

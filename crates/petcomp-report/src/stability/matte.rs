@@ -50,7 +50,7 @@ impl Promise {
             Self::Right => {
                 found.is_right
                     && found.doubts.is_empty()
-                    && cut.residue < MOST_RESIDUE
+                    && cut.residual_matte < MOST_RESIDUE
                     && is_reduced(cut)
             }
             Self::RightOrTold => found.is_right || !found.doubts.is_empty(),
@@ -82,7 +82,7 @@ fn cut_out_of(name: &str, promise: Promise, take: Take) -> Case {
                 };
                 let told = format!(
                     "IoU {:.4}, box off by {:.2} px, residue {:.4}, {doubts}",
-                    found.iou, found.box_px, cut.residue
+                    found.iou, found.box_px, cut.residual_matte
                 );
                 Ok(Outcome::new(told, promise.is_kept(&cut, &found)))
             }
@@ -462,7 +462,7 @@ fn underexposed() -> Case {
                 .uncertainty
                 .pixels()
                 .iter()
-                .map(|c| f64::from(c.0))
+                .map(|u| f64::from(*u))
                 .sum::<f64>()
                 / inside_area();
             Ok(Outcome::new(
@@ -545,8 +545,8 @@ fn two_screens() -> Vec<Case> {
         Case::new(
             name,
             "neutral film on both",
-            "refused, by \"too alike\"",
-            move || Ok(Outcome::refused(triangulated(screens, 1.0), "too alike")),
+            "refused, by \"too similar\"",
+            move || Ok(Outcome::refused(triangulated(screens, 1.0), "too similar")),
         )
     };
     vec![
@@ -564,11 +564,11 @@ fn saturated() -> Case {
     Case::new(
         "two photos clipped all over",
         "film on green and blue, 100 times too bright: screens and photos are white",
-        "refused, by \"too alike\"",
+        "refused, by \"too similar\"",
         || {
             Ok(Outcome::refused(
                 triangulated([GREEN, BLUE], 100.0),
-                "too alike",
+                "too similar",
             ))
         },
     )
@@ -586,7 +586,7 @@ fn clipped_screen() -> Case {
                 .uncertainty
                 .pixels()
                 .iter()
-                .map(|c| f64::from(c.0))
+                .map(|u| f64::from(*u))
                 .sum::<f64>()
                 / inside_area();
             let doubts = found

@@ -2,12 +2,14 @@
 
 use super::staged::{above, card, grey, lamp, level, looking_at, projected_area, small, tilted};
 use super::{Case, Outcome, memory, render_light};
+use crate::render::GOOD;
 use petcomp::DeepImage;
 use petcomp::Image;
+use petcomp::Quality;
 use petcomp::Result;
 use petcomp::composite;
 use petcomp::geom::UnitQuaternion;
-use petcomp::render::{Preset, RenderOptions, cast, interreflect, reference};
+use petcomp::render::{RenderOptions, interreflect, render, render_reference};
 use petcomp::scene::{Card, Shot};
 use petcomp::{Film, LinearRgb, PremulRgba};
 use std::f64::consts::FRAC_PI_2;
@@ -65,7 +67,7 @@ fn layers_for_the_eye() -> Case {
         "200 level cards of transmittance 0.99 over one pixel",
         format!("0.99^200 = {expected:.6} passes, to 200 roundings"),
         move || {
-            let deep = cast(
+            let deep = render(
                 &stack(&thin(LinearRgb::grey(0.01))),
                 &RenderOptions::default(),
             );
@@ -82,7 +84,7 @@ fn layers_for_the_light() -> Case {
         "the surface under 200 level cards of transmittance 0.99",
         format!("0.99^200 = {expected:.6} of the light arrives, to 200 roundings"),
         move || {
-            let deep = cast(
+            let deep = render(
                 &stack(&thin(LinearRgb::grey(0.01))),
                 &RenderOptions::default(),
             );
@@ -108,7 +110,7 @@ fn tinted_layers() -> Case {
         ),
         move || {
             let film = thin(passes.map(|t| (1.0 - t) as f32).into());
-            let deep = cast(&stack(&film), &RenderOptions::default());
+            let deep = render(&stack(&film), &RenderOptions::default());
             let [eye, light]: [[f32; 3]; 2] =
                 [deep.flat(2, 2).transmittance(), deep.shadow()[(2, 2)]].map(Into::into);
             let found = eye.iter().zip(&expected).chain(light.iter().zip(&expected));
@@ -140,7 +142,7 @@ fn near() -> Case {
         "alpha 1, light 1/2 and depth 0.01 m in every pixel, to 1e-5",
         || {
             let shot = Shot::new(above([64, 48], 60.0)).with_ambient(LinearRgb::WHITE);
-            let deep = cast(
+            let deep = render(
                 &shot.with_card(level(1, [0.0, 0.0, 0.99], 0.2, grey(1.0))),
                 &RenderOptions::default(),
             );
@@ -162,7 +164,7 @@ fn near_and_grazing() -> Case {
                 60.0,
             );
             let shot = Shot::new(camera).with_ambient(LinearRgb::WHITE);
-            let deep = cast(
+            let deep = render(
                 &shot.with_card(level(1, [0.0; 3], 20.0, grey(1.0))),
                 &RenderOptions::default(),
             );
@@ -230,7 +232,7 @@ fn steep(degrees: f64) -> Case {
         ),
         move || {
             let found: Vec<f64> = (0..PLACES)
-                .map(|place| covered(&cast(&shown(place), &RenderOptions::default())))
+                .map(|place| covered(&render(&shown(place), &RenderOptions::default())))
                 .collect();
             // Moved sideways, a card shows a little more or less of itself.
             let areas: Vec<f64> = (0..PLACES)
@@ -268,7 +270,7 @@ fn one_pixel() -> Case {
                     Shot::new(above([side; 2], 50.0)).with_light(lamp([0.3, 0.2, 0.9], 0.4, 10.0));
                 let sheet = Image::filled(64, 64, grey(0.6));
                 let shot = shot.with_card(card(1, [0.02, 0.0, 0.2], tilted(0.5), [0.3; 2], sheet));
-                let deep = cast(&shot, &Preset::Good.options());
+                let deep = render(&shot, &GOOD);
                 let middle = (side / 2) as usize;
                 (deep.flat(middle, middle), deep.shadow()[(middle, middle)])
             };
@@ -301,7 +303,7 @@ fn white_on_white() -> Case {
                 PremulRgba::new(1.0, 1.0, 1.0, 1.0),
             ));
             let deep = interreflect(
-                cast(&shot, &RenderOptions::default()),
+                render(&shot, &RenderOptions::default()),
                 &shot,
                 LinearRgb::WHITE,
             );
@@ -349,7 +351,7 @@ fn sixteen_k() -> Case {
             let center = [from_corner(1100.0), -from_corner(1100.0), 0.0];
             let sheet = level(1, center, 0.2, grey(1.0));
             let shot = Shot::new(above([SIXTEEN_K; 2], 10_000.0)).with_ambient(LinearRgb::WHITE).with_card(sheet);
-            let (deep, peak) = memory::peak_gib(|| cast(&shot, &Preset::Draft.options()));
+            let (deep, peak) = memory::peak_gib(|| render(&shot, &Quality::Draft.render()));
             let (found, last) = (covered(&deep), SIXTEEN_K as usize - 1);
             let fits = peak.is_none_or(|peak| peak < SIXTEEN_K_GIB);
             let right = (found / SHOWN - 1.0).abs() < 1e-4 && deep.shadow()[(last, last)] == LinearRgb::WHITE;
@@ -419,7 +421,7 @@ fn nothing_to_see() -> Vec<Case> {
             };
             let options = RenderOptions::default();
             Ok(Outcome::near(
-                seen(cast(&shot, &options)) + seen(reference(&shot, &options)),
+                seen(render(&shot, &options)) + seen(render_reference(&shot, &options)),
                 0.0,
                 0.0,
                 "px",
@@ -491,7 +493,7 @@ fn covering(name: &str, shot: Shot, [least, most]: [f64; 2]) -> Case {
     );
     Case::new(name, "under a light of 10 W", promise, move || {
         let options = RenderOptions::default();
-        let ends = [cast(&shot, &options), reference(&shot, &options)];
+        let ends = [render(&shot, &options), render_reference(&shot, &options)];
         let state = if ends.iter().all(is_sound) {
             "sound"
         } else {

@@ -173,8 +173,7 @@ fn quality_where_it_does_not_apply_changes_nothing() {
         objects: vec![],
         ..scene.clone()
     };
-    let finest =
-        |setup: &mut DatasetConfig| setup.render = petcomp::render::Preset::Reference.options();
+    let finest = |setup: &mut DatasetConfig| setup.render = petcomp::Quality::Reference.render();
     assert!(with(finest, &no_cards) == with(|_| {}, &no_cards));
     // How cards fall does not matter to cards that lie.
     let longer = |setup: &mut DatasetConfig| setup.scene.settle.time_limit *= 2.0;

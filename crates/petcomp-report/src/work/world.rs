@@ -1,11 +1,10 @@
 //! A small world in a folder, made in code: three assets, one labelled photo, one picture of the surroundings.
 
 use crate::pile::lamp;
-use petcomp::asset::{AssetRecord, Manifest, PhotoRecord};
+use petcomp::asset::{Asset, Manifest, PhotoRecord};
 use petcomp::camera::Label;
 use petcomp::dataset::DatasetConfig;
 use petcomp::geom::{Pose, UnitQuaternion, Vector3};
-use petcomp::matte::MatteMethod;
 use petcomp::scene::{
     AreaLight, CameraSource, Environment, Exposure, Grade, Object, Placement, Recipe, Scene,
     Surface,
@@ -182,28 +181,13 @@ fn file_of(asset: &str) -> String {
     format!("{asset}.exr")
 }
 
-fn record(asset: &str) -> AssetRecord {
+fn record(asset: &str) -> Asset<PhotoRecord> {
     let [w, h] = TEXELS.map(|n| n as f64);
     let size_m = [w / PER_METRE, h / PER_METRE];
-    let photo = PhotoRecord {
-        file: file_of(asset),
-        source: "made in code".into(),
-        px_per_metre: PER_METRE,
-        size_m,
-        object_m: size_m,
-        error_m: 0.0,
-        hull_m: size_m,
-        screen: LinearRgb::BLACK,
-        matte: MatteMethod::Physical,
-        residue: 0.0,
-        unevenness: 0.0,
-        outline_confidence: 1.0,
-        color_confidence: None,
-        truncated: false,
-        outline_px: vec![[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]],
-        diagnostics: Vec::new(),
-    };
-    AssetRecord {
+    let outline_px = vec![[0.0, 0.0], [w, 0.0], [w, h], [0.0, h]];
+    let mut photo = PhotoRecord::new(file_of(asset), PER_METRE, size_m, outline_px);
+    photo.source = "made in code".into();
+    Asset {
         name: asset.into(),
         class: "none".into(),
         thickness: 0.005,

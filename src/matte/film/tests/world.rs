@@ -2,6 +2,7 @@
 //! FOLDER holding photos with their `_fg`, `_trans`, `_view`, `_mask` and `_plate` pictures.
 
 use super::*;
+use crate::image::Mask;
 use crate::io;
 use crate::matte::{
     KeyOptions, Keying, Screen, TriangulateOptions, Triangulated, screen_color, triangulate,
@@ -139,7 +140,7 @@ impl Truth {
     }
 }
 
-fn free(mask: &Image<Coverage>) -> Image<bool> {
+fn free(mask: &Image<Coverage>) -> Mask {
     crate::matte::screen::screen_pixels(mask)
 }
 
@@ -235,7 +236,7 @@ fn doubts_follow_errors() {
             let hue = strongest_channel(plate.color());
             println!(
                 "{name} {screen} {hue} {lit:.4} {shaded:.4} {:?} {:?}",
-                found.flat, found.doubts
+                found.flat, found.color_uncertainty
             );
         }
     }

@@ -1,0 +1,33 @@
+//! `petcomp matte cut`: the object without its background.
+
+use crate::common::{Common, options_file, report_diagnostics};
+use petcomp::matte::{CutOutOptions, cut_out};
+use petcomp::{LinearRgb, io};
+use std::path::PathBuf;
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Photo of one object on a uniform screen or board
+    photo: PathBuf,
+    /// Cut-out to write: .exr (scene-linear, premultiplied) or .png
+    #[arg(short, long, value_name = "PICTURE")]
+    output: PathBuf,
+    /// Options to use instead of the defaults, as TOML
+    #[arg(long, value_name = "FILE")]
+    options: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
+    let options: CutOutOptions = options_file(args.options.as_deref())?;
+    let photo = io::read::<LinearRgb>(&args.photo)?;
+    let cut = cut_out(&photo, &options).map_err(|e| e.in_file(&args.photo))?;
+    io::write(&args.output, &cut.to_rgba())?;
+    report_diagnostics(&args.photo, &cut.diagnostics);
+    let (w, h) = cut.film.size();
+    common.say(format_args!(
+        "{}: {w} x {h}, matte by {}",
+        args.output.display(),
+        cut.method
+    ));
+    Ok(())
+}

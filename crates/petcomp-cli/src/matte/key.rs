@@ -1,0 +1,132 @@
+//! `petcomp matte key`: Blender's Keying node on one picture.
+
+use super::picture::{color, write, write_some};
+use crate::common::report_diagnostics;
+use anyhow::Result;
+use petcomp::io::{self, Override, Picture};
+use petcomp::matte::key::{Deviations, KeyOptions, Keying, Profile, Screen};
+use petcomp::matte::{PlateOptions, ScreenPlate, SegmentOptions, segment};
+use petcomp::{Coverage, Image, LinearRgb, PremulRgba};
+use std::path::PathBuf;
+
+/// Keys a picture against a screen colour or plate, as Blender's Keying node does.
+#[derive(clap::Args, Debug)]
+pub(crate) struct Args {
+    /// The picture to key; alpha is taken as premultiplied
+    input: PathBuf,
+    /// Where the premultiplied cut-out goes; an EXR holds 32-bit floats
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Where the matte goes
+    #[arg(long, value_name = "FILE")]
+    matte: Option<PathBuf>,
+    /// Where the edges go that the levels leave alone
+    #[arg(long, value_name = "FILE")]
+    edges: Option<PathBuf>,
+    /// Colour of the screen, scene-linear
+    #[arg(long, value_name = "R,G,B", value_parser = color, required_unless_present = "plate", conflicts_with = "plate")]
+    screen: Option<LinearRgb>,
+    /// A picture of the screen alone: every pixel is keyed against its own colour
+    #[arg(long, value_name = "FILE")]
+    plate: Option<PathBuf>,
+    /// A matte of what is surely not foreground
+    #[arg(long, value_name = "FILE")]
+    garbage: Option<PathBuf>,
+    /// A matte of what is surely foreground
+    #[arg(long, value_name = "FILE")]
+    core: Option<PathBuf>,
+    /// Find the object first: what lies around it is garbage, and what surely lets nothing through is core
+    #[arg(long, conflicts_with_all = ["garbage", "core"])]
+    auto_mattes: bool,
+    /// Which keyer to be: blender-3.4, blender-4.2, blender-4.5 or robust
+    #[arg(long, value_name = "NAME", default_value = "blender-3.4")]
+    profile: Profile,
+    /// A setting under Blender's name, such as key.clip_black=0.1
+    #[arg(long = "set", value_name = "key.NAME=VALUE")]
+    settings: Vec<Override>,
+}
+
+impl Args {
+    /// The input and its mattes, those that there are.
+    fn read(&self, plate: Option<&Image<LinearRgb>>) -> Result<Input> {
+        if self.auto_mattes {
+            let picture = Picture::read(&self.input)?;
+            let [garbage, core] = self.find_mattes(&picture.pixels()?, plate)?;
+            return Ok(Input {
+                photo: picture.pixels()?,
+                garbage: Some(garbage),
+                core: Some(core),
+            });
+        }
+        let [garbage, core] =
+            [&self.garbage, &self.core].map(|path| path.as_ref().map(io::read).transpose());
+        Ok(Input {
+            photo: io::read(&self.input)?,
+            garbage: garbage?,
+            core: core?,
+        })
+    }
+
+    /// Garbage and core matte around and inside the object that is found in the photo.
+    fn find_mattes(
+        &self,
+        photo: &Image<LinearRgb>,
+        plate: Option<&Image<LinearRgb>>,
+    ) -> Result<[Image<Coverage>; 2]> {
+        let found =
+            segment(photo, &SegmentOptions::default()).map_err(|e| e.in_file(&self.input))?;
+        report_diagnostics(&self.input, &found.diagnostics);
+        Ok(match plate {
+            Some(plate) => found.mattes(photo, plate),
+            None => {
+                let options = PlateOptions::default();
+                let plate = ScreenPlate::fit_outside(photo, &found.mask, &options)?;
+                found.mattes(photo, &plate.image)
+            }
+        })
+    }
+}
+
+/// What is keyed, and where it is sure not to be foreground, or to be foreground.
+struct Input {
+    photo: Image<PremulRgba>,
+    garbage: Option<Image<Coverage>>,
+    core: Option<Image<Coverage>>,
+}
+
+pub(crate) fn run(args: &Args) -> Result<()> {
+    let opts = KeyOptions {
+        profile: args.profile,
+        ..io::from_overrides("key", &args.settings)?
+    };
+    let plate: Option<Image<LinearRgb>> = args.plate.as_ref().map(io::read).transpose()?;
+    let input = args.read(plate.as_ref())?;
+    let screen = match &plate {
+        Some(plate) => Screen::Plate(plate),
+        None => Screen::Color(args.screen.unwrap_or_default()),
+    };
+    let job = input.keying(screen);
+    let keyed = job.run(&opts)?;
+    if keyed.deviations != Deviations::default() {
+        log::warn!("{}: {}", args.input.display(), keyed.deviations);
+    }
+    write(&args.output, &keyed.cutout)?;
+    write_some(&args.matte, &keyed.matte)?;
+    if let Some(path) = &args.edges {
+        write(path, &job.edges(&opts)?)?;
+    }
+    Ok(())
+}
+
+impl Input {
+    fn keying<'a>(&'a self, screen: Screen<'a>) -> Keying<'a, PremulRgba> {
+        let mut job = Keying::new(&self.photo, screen);
+        if let Some(garbage) = &self.garbage {
+            job = job.with_garbage(garbage);
+        }
+        if let Some(core) = &self.core {
+            job = job.with_core(core);
+        }
+        job
+    }
+}

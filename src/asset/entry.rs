@@ -1,0 +1,227 @@
+//! A photo and what is known of its object.
+
+use super::manifest::{Asset, Manifest, PhotoRecord, check_class, check_name};
+use super::scale::Scale;
+use super::screen_source::ScreenSource;
+use super::{DEFAULT_MASS, DEFAULT_THICKNESS};
+use crate::bounds::{MASS, THICKNESS};
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A photo of an object and what is known that cannot be seen in it: an entry of a [`List`](super::List).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhotoEntry {
+    /// The photo. In a list: relative to it; `.jpg` and `.jpeg` are one, and so are capitals and small letters.
+    pub file: PathBuf,
+    /// Name of the object: letters and digits of any language, `_`, `-` and `.`.
+    pub asset: String,
+    /// Name of its class.
+    pub class: String,
+    /// Pixels of the photo for a metre, at half the object's height.
+    #[serde(
+        default,
+        alias = "px_per_meter",
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub px_per_metre: Option<f64>,
+    /// Or: length of the object along its longest side, metres, 0.005 to 5.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<f64>,
+    /// And its width, metres: then both fix the scale, and contradict an outline of other proportions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width: Option<f64>,
+    /// Or: width and height of the whole screen, metres, all of which is seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screen_size: Option<[f64; 2]>,
+    /// Its corners, from the top left clockwise, pixels. Default: they are found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screen_corners: Option<[[f64; 2]; 4]>,
+    /// Or: side of the black square of a printed marker on the screen, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub marker_size: Option<f64>,
+    /// What it was photographed on: `auto`, a colour `R,G,B` or a photo of the empty screen. Default: `auto`.
+    #[serde(default)]
+    pub screen: ScreenSource,
+    /// Thickness of the body that falls, metres. Default: 0.005.
+    #[serde(default = "default_thickness")]
+    pub thickness: f64,
+    /// Mass, kilograms. Default: 0.025.
+    #[serde(default = "default_mass")]
+    pub mass: f64,
+}
+
+fn default_thickness() -> f64 {
+    DEFAULT_THICKNESS
+}
+
+fn default_mass() -> f64 {
+    DEFAULT_MASS
+}
+
+impl PhotoEntry {
+    /// A photo of an object of default thickness and mass.
+    pub fn new(
+        file: impl Into<PathBuf>,
+        asset: impl Into<String>,
+        class: impl Into<String>,
+        scale: Scale,
+    ) -> Self {
+        let mut entry = Self {
+            file: file.into(),
+            asset: asset.into(),
+            class: class.into(),
+            px_per_metre: None,
+            length: None,
+            width: None,
+            screen_size: None,
+            screen_corners: None,
+            marker_size: None,
+            screen: ScreenSource::Auto,
+            thickness: DEFAULT_THICKNESS,
+            mass: DEFAULT_MASS,
+        };
+        match scale {
+            Scale::PxPerMetre(scale) => entry.px_per_metre = Some(scale),
+            Scale::Length(length) => entry.length = Some(length),
+            Scale::Size([length, width]) => {
+                (entry.length, entry.width) = (Some(length), Some(width));
+            }
+            Scale::Screen(size, corners) => {
+                (entry.screen_size, entry.screen_corners) = (Some(size), corners);
+            }
+            Scale::Marker(side) => entry.marker_size = Some(side),
+        }
+        entry
+    }
+
+    /// The one thing that gives the scale.
+    ///
+    /// # Errors
+    /// [`Error::Value`] where nothing gives it, or more than one thing.
+    pub fn scale(&self) -> Result<Scale> {
+        if self.screen_corners.is_some() && self.screen_size.is_none() {
+            let what = "missing, expected it beside screen_corners";
+            return Err(Error::value("screen_size", what));
+        }
+        if self.width.is_some() && self.length.is_none() {
+            return Err(Error::value("length", "missing, expected it beside width"));
+        }
+        let names = "length, px_per_metre, screen_size or marker_size";
+        match self.scales().into_iter().flatten().collect::<Vec<_>>()[..] {
+            [scale] => Ok(scale),
+            [] => Err(Error::value("length", format!("missing, expected {names}"))),
+            _ => Err(Error::value(
+                "length",
+                format!("one of several scales, expected one of {names}"),
+            )),
+        }
+    }
+
+    fn scales(&self) -> [Option<Scale>; 4] {
+        let of_object = match (self.length, self.width) {
+            (Some(length), Some(width)) => Some(Scale::Size([length, width])),
+            (length, _) => length.map(Scale::Length),
+        };
+        [
+            of_object,
+            self.px_per_metre.map(Scale::PxPerMetre),
+            self.screen_size
+                .map(|size| Scale::Screen(size, self.screen_corners)),
+            self.marker_size.map(Scale::Marker),
+        ]
+    }
+
+    /// Checks all values, the class against those of the folder.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for the first value that cannot be right.
+    pub(super) fn check(&self, manifest: &Manifest) -> Result<()> {
+        let scale = self.scale()?;
+        check_name(&self.asset).map_err(|e| match e {
+            Error::Value { what, .. } => Error::value("asset", what),
+            other => other,
+        })?;
+        check_class(&self.class)?;
+        manifest.class(&self.class)?;
+        scale.check()?;
+        THICKNESS.check("thickness", self.thickness)?;
+        MASS.check("mass", self.mass)
+    }
+
+    /// The object of this entry with one cut-out.
+    pub(super) fn asset_with(&self, photo: PhotoRecord) -> Asset<PhotoRecord> {
+        Asset {
+            name: self.asset.clone(),
+            class: self.class.clone(),
+            thickness: self.thickness,
+            mass: self.mass,
+            photos: vec![photo],
+        }
+    }
+
+    /// Where its cut-out goes, relative to the folder.
+    pub(super) fn cut_out_file(&self) -> String {
+        format!("{}/{}.exr", self.asset, file_stem(&self.file))
+    }
+
+    /// Name of the photo's file.
+    pub(super) fn source(&self) -> String {
+        let name = self.file.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+}
+
+/// The photo's name without ending, safe as a name anywhere.
+fn file_stem(photo: &Path) -> String {
+    let stem = photo.file_stem().unwrap_or_default().to_string_lossy();
+    stem.chars()
+        .map(|c| {
+            if c.is_alphanumeric() || c == '-' {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scale(line: &str) -> std::result::Result<Scale, String> {
+        let text = format!("file = \"a.png\"\nasset = \"a\"\nclass = \"c\"\n{line}");
+        let entry: PhotoEntry = toml::from_str(&text).map_err(|e| e.to_string())?;
+        let scale = entry.scale().map_err(|e| e.to_string())?;
+        assert_eq!(PhotoEntry::new("a.png", "a", "c", scale), entry);
+        Ok(scale)
+    }
+
+    #[test]
+    fn one_thing_gives_the_scale() {
+        assert_eq!(
+            scale("screen_size = [0.6, 0.4]"),
+            Ok(Scale::Screen([0.6, 0.4], None))
+        );
+        assert_eq!(scale("marker_size = 0.05"), Ok(Scale::Marker(0.05)));
+        let corners = [[1.0, 1.0], [9.0, 1.0], [9.0, 6.0], [1.0, 6.0]];
+        let told = scale(&format!(
+            "screen_size = [0.6, 0.4]\nscreen_corners = {corners:?}"
+        ));
+        assert_eq!(told, Ok(Scale::Screen([0.6, 0.4], Some(corners))));
+        let missing = "length: missing, expected length, px_per_metre, screen_size or marker_size";
+        assert_eq!(scale("").unwrap_err(), missing);
+        assert!(
+            scale("length = 0.2\nmarker_size = 0.05")
+                .unwrap_err()
+                .contains("expected one of length")
+        );
+        let alone = scale(&format!("length = 0.2\nscreen_corners = {corners:?}")).unwrap_err();
+        assert_eq!(
+            alone,
+            "screen_size: missing, expected it beside screen_corners"
+        );
+    }
+}

@@ -1,0 +1,456 @@
+//! A photo seen from straight above, by what lies in the plane of its screen: the screen's own four corners, or a printed
+//! marker.
+
+use super::inpaint::inpaint;
+use super::screen_pose::{ReferenceRectangle, ScreenPose, scale_unknown};
+use super::top_view::{TopView, size_px};
+use crate::camera::{Marker, any_markers};
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::Result;
+use crate::geom::Point2;
+use crate::image::{Image, Roi};
+use crate::io::Header;
+use crate::matte::{ScreenCorners, from_top_left, screen_corners};
+use crate::pixel::LinearRgb;
+use std::borrow::Cow;
+
+/// Noise of a corner that a person clicked, pixels.
+const CLICK_SIGMA_PX: f64 = 1.0;
+/// A marker has a white margin, at most as wide as this share of its black square.
+const MARKER_MARGIN: f64 = 0.35;
+/// Sides that may be exchanged need a review where that makes lengths differ by this share.
+const REVIEWED_SWAP_ERROR: f64 = 0.01;
+
+/// A photo as it is seen from straight above, where something in it shows the screen's plane; else as it is.
+///
+/// A camera that is tilted sees an object shorter than it is along one direction, and larger in front than behind: no one
+/// scale is right for it.
+pub(super) struct RectifiedPhoto {
+    pub(super) photo: Image<LinearRgb>,
+    view: Option<TopView>,
+}
+
+/// Pixels per metre, and the standard error of a length as a share.
+pub(super) struct ScreenScale {
+    pub(super) px_per_metre: f64,
+    pub(super) sigma: f64,
+}
+
+impl RectifiedPhoto {
+    /// A photo in which nothing shows the screen's plane.
+    pub(super) fn unchanged(photo: Image<LinearRgb>) -> Self {
+        Self { photo, view: None }
+    }
+
+    /// The inside of a screen of `size` metres, by its four corners, which are found where they are not given; things are
+    /// as large as at `height` metres above it.
+    pub(super) fn by_corners(
+        photo: Image<LinearRgb>,
+        size: [f64; 2],
+        corners_px: Option<[[f64; 2]; 4]>,
+        height: f64,
+        header: &Header,
+    ) -> Result<Self> {
+        let ScreenCorners {
+            corners_px,
+            sigma_px,
+        } = match corners_px {
+            Some(clicked) => ScreenCorners {
+                corners_px: clicked.map(Point2::from),
+                sigma_px: CLICK_SIGMA_PX,
+            },
+            None => screen_corners(&photo)?,
+        };
+        let reference = ReferenceRectangle {
+            size,
+            corners_px,
+            sigma_px,
+        };
+        let pose = ScreenPose::solve(&reference, size_px(&photo), header)?;
+        Self::through(TopView::of_screen(pose, height), photo)
+    }
+
+    /// The photo without its markers, whose black squares have sides of so many metres; the largest shows the plane.
+    pub(super) fn by_marker(
+        photo: Image<LinearRgb>,
+        side: f64,
+        height: f64,
+        header: &Header,
+    ) -> Result<Self> {
+        let markers = any_markers(&photo);
+        let Some(largest) = largest_marker(&markers) else {
+            return Err(scale_unknown(
+                "no marker (AprilTag tag36h11, ArUco DICT_4X4_50) was found on it",
+            ));
+        };
+        let reference = ReferenceRectangle {
+            size: [side; 2],
+            corners_px: from_top_left(largest.corners_px),
+            sigma_px: largest.sigma_px,
+        };
+        let pose = ScreenPose::solve(&reference, size_px(&photo), header)?;
+        let view = TopView::of_photo(pose, height)?;
+        Self::through(view, without_markers(photo, &markers))
+    }
+
+    fn through(view: TopView, photo: Image<LinearRgb>) -> Result<Self> {
+        Ok(Self {
+            photo: view.rectify(photo)?,
+            view: Some(view),
+        })
+    }
+
+    /// Another photo from the same place in the same way.
+    pub(super) fn same_view<'a>(
+        &self,
+        other: Cow<'a, Image<LinearRgb>>,
+    ) -> Result<Cow<'a, Image<LinearRgb>>> {
+        match &self.view {
+            Some(view) => view.rectify(other.into_owned()).map(Cow::Owned),
+            None => Ok(other),
+        }
+    }
+
+    /// The scale at a pixel, where something in the photo shows it.
+    pub(super) fn scale(&self, at: Point2<f64>) -> Option<ScreenScale> {
+        self.view.as_ref().map(|view| ScreenScale {
+            px_per_metre: view.px_per_metre,
+            sigma: view.sigma(at),
+        })
+    }
+
+    /// The warning about a size that is measured by this.
+    pub(super) fn diagnostic(&self) -> Option<Diagnostic> {
+        let pose = &self.view.as_ref()?.pose;
+        let [w, h] = pose.size;
+        if pose.is_poor_fit {
+            let message = format!(
+                "the screen hardly looks like one of {w:.3} x {h:.3} m; are width and height right?"
+            );
+            return Some(Diagnostic::warning(Code::ScreenSizeMismatch, message));
+        }
+        let percent = 100.0 * pose.swap_error;
+        (pose.swap_error > REVIEWED_SWAP_ERROR).then(|| {
+            let message = format!(
+                "the longer side of the screen cannot be identified: lengths may be off by {percent:.0} %"
+            );
+            Diagnostic::warning(Code::ScreenSidesAmbiguous, message)
+        })
+    }
+}
+
+fn largest_marker(markers: &[Marker]) -> Option<&Marker> {
+    markers
+        .iter()
+        .max_by(|a, b| doubled_area(&a.corners_px).total_cmp(&doubled_area(&b.corners_px)))
+}
+
+/// By the diagonals of a quadrilateral.
+fn doubled_area(corners: &[Point2<f64>; 4]) -> f64 {
+    (corners[2] - corners[0])
+        .perp(&(corners[3] - corners[1]))
+        .abs()
+}
+
+fn without_markers(mut photo: Image<LinearRgb>, markers: &[Marker]) -> Image<LinearRgb> {
+    for marker in markers {
+        let part = paper_of(&marker.corners_px, photo.size());
+        inpaint(&mut photo, part);
+    }
+    photo
+}
+
+/// A marker and its white margin, in whole pixels.
+fn paper_of(corners: &[Point2<f64>; 4], (w, h): (usize, usize)) -> Roi {
+    Roi::spanning(
+        span_with_margin(corners.map(|c| c.x), w),
+        span_with_margin(corners.map(|c| c.y), h),
+    )
+}
+
+fn span_with_margin(values: [f64; 4], end: usize) -> std::ops::Range<usize> {
+    let (low, high) = values
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(l, h), v| (v.min(l), v.max(h)));
+    let margin = MARKER_MARGIN * (high - low) + 2.0;
+    let [low, high] = [low - margin, high + margin].map(|v| v.clamp(0.0, end as f64) as usize);
+    low..high.max(low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::screen_pose::{HEIGHT_SIGMA, TAPE_SIGMA};
+    use super::super::{PhotoEntry, Scale, add_photo};
+    use super::*;
+    use crate::camera::{Camera, printed, project_picture};
+    use crate::filter::Pyramid;
+    use crate::geom::{Point3, Pose, UnitQuaternion, Vector2, Vector3};
+    use crate::io;
+    use crate::matte::CutOutOptions;
+    use crate::pixel::Coverage;
+
+    /// A camera 1 m from a screen, tilted.
+    fn camera(tilt: f64, focal_px: f64) -> Camera {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI + tilt);
+        Camera {
+            image: [1000, 750],
+            focal_px: [focal_px; 2].into(),
+            principal_px: [500.0, 375.0].into(),
+            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        }
+    }
+
+    fn seen(camera: &Camera, [x, y]: [f64; 2], z: f64) -> Point2<f64> {
+        camera.project([x, y, z].into()).unwrap().0
+    }
+
+    /// The middles and half sides of some rectangles, metres.
+    fn rectangle([x, y]: [f64; 2], [w, h]: [f64; 2]) -> [[f64; 2]; 4] {
+        [[-w, h], [w, h], [w, -h], [-w, -h]].map(|[dx, dy]| [x + dx / 2.0, y + dy / 2.0])
+    }
+
+    fn reference(camera: &Camera, size: [f64; 2], sigma_px: f64) -> ReferenceRectangle {
+        ReferenceRectangle {
+            size,
+            corners_px: rectangle([0.0; 2], size).map(|at| seen(camera, at, 0.0)),
+            sigma_px,
+        }
+    }
+
+    /// Normal numbers of deviation 1, by their place.
+    fn normal(k: u64) -> f64 {
+        let unit = |i: u64| {
+            let seed = (12 * k + i).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            ((seed ^ (seed >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64
+                / (1_u64 << 53) as f64
+        };
+        (0..12).map(unit).sum::<f64>() - 6.0
+    }
+
+    #[test]
+    fn the_scale_is_that_at_half_the_object_s_height_with_an_honest_error() {
+        let (mut squares, mut count) = (0.0, 0);
+        for (k, tilt) in (0..24).zip([0.0, 0.2, 0.5].into_iter().cycle()) {
+            for (side, sigma_px, far) in [(0.5, 1.0, 0.1), (0.08, 0.15, 0.2)] {
+                let drawn = |i: u64| normal(16 * k + i);
+                // What nobody knows: the lens, the tape's error and the height at which the outline lies.
+                let camera = camera(tilt, 1000.0 * libm::exp(0.35 * drawn(8)));
+                let mut noisy = reference(&camera, [side; 2], sigma_px);
+                noisy.size = [side * (1.0 + TAPE_SIGMA * drawn(9)); 2];
+                for (i, corner) in (0..).zip(&mut noisy.corners_px) {
+                    *corner += sigma_px * Vector2::new(drawn(2 * i), drawn(2 * i + 1));
+                }
+                let ground = ScreenPose::solve(&noisy, camera.image, &Header::default()).unwrap();
+                let height = 0.035 * (1.0 + 2.0 * HEIGHT_SIGMA * drawn(10));
+                let [a, b] = [[far, -0.03], [far, 0.07]].map(|at| {
+                    let ray = ground.camera.ray(seen(&camera, at, height));
+                    ray.at((0.035 - ray.origin.z) / ray.direction.z)
+                });
+                let (off, told) = ((b - a).norm() / 0.1 - 1.0, ground.sigma(a + (b - a) / 2.0));
+                (squares, count) = (squares + (off / told) * (off / told), count + 1);
+            }
+        }
+        let chi = (squares / f64::from(count)).sqrt();
+        assert!((0.6..1.4).contains(&chi), "{chi}");
+    }
+
+    #[test]
+    fn the_error_grows_with_the_distance_from_a_marker() {
+        let camera = camera(0.0, 1000.0);
+        let ground = ScreenPose::solve(
+            &reference(&camera, [0.08; 2], 0.3),
+            camera.image,
+            &Header::default(),
+        )
+        .unwrap();
+        let error = |x: f64| ground.sigma([x, 0.0, 0.005].into());
+        assert!(
+            error(0.3) > 2.0 * error(0.02) && error(0.3) < 0.1,
+            "{} {}",
+            error(0.02),
+            error(0.3)
+        );
+    }
+
+    #[test]
+    fn a_screen_of_other_proportions_is_doubted() {
+        let camera = camera(0.3, 1000.0);
+        let doubt = |size| {
+            let told = ReferenceRectangle {
+                size,
+                ..reference(&camera, SCREEN, 0.2)
+            };
+            let ground = ScreenPose::solve(&told, camera.image, &Header::default()).unwrap();
+            RectifiedPhoto {
+                photo: Image::new(0, 0),
+                view: Some(TopView::of_screen(ground, 0.0)),
+            }
+            .diagnostic()
+        };
+        assert_eq!(doubt(SCREEN), None);
+        assert!(
+            doubt([0.5, 0.5])
+                .unwrap()
+                .message
+                .ends_with("0.500 x 0.500 m; are width and height right?")
+        );
+    }
+
+    #[test]
+    fn a_turned_screen_is_measured_by_its_other_side() {
+        let camera = camera(0.2, 1000.0);
+        let turned = |size| ReferenceRectangle {
+            size,
+            ..reference(&camera, [0.3, 0.4], 0.3)
+        };
+        let ground =
+            |size| ScreenPose::solve(&turned(size), camera.image, &Header::default()).unwrap();
+        for size in [[0.3, 0.4], [0.4, 0.3]] {
+            let found = ground(size);
+            assert!(
+                (found.size[0] - 0.3).abs() < 0.003 && found.swap_error == 0.0,
+                "{:?}",
+                found.size
+            );
+        }
+        // Sides of nearly the same length: the photo does not tell which is which, and that is part of the error.
+        let view = TopView::of_screen(ground([0.303, 0.4]), 0.0);
+        assert!(view.pose.swap_error == 0.0);
+        let nearly = ReferenceRectangle {
+            size: [0.41, 0.4],
+            ..reference(&camera, [0.41, 0.4], 2.0)
+        };
+        let ground = ScreenPose::solve(&nearly, camera.image, &Header::default()).unwrap();
+        assert!(
+            ground.swap_error > REVIEWED_SWAP_ERROR
+                && ground.sigma(Point3::origin()) > ground.swap_error,
+            "{}",
+            ground.swap_error
+        );
+        let seen = RectifiedPhoto {
+            photo: Image::new(0, 0),
+            view: Some(TopView::of_screen(ground, 0.0)),
+        };
+        assert!(
+            seen.diagnostic()
+                .unwrap()
+                .message
+                .starts_with("the longer side of the screen cannot be identified")
+        );
+    }
+
+    /// Metres of the screen in the photos below, and of the red slab on it.
+    const SCREEN: [f64; 2] = [0.6, 0.4];
+    const SLAB: [f64; 2] = [0.18, 0.08];
+    /// Side of the marker's black square: six of the eight cells of what is printed.
+    const MARKER: f64 = 0.072;
+
+    /// A green screen with a slab across it and, where it is asked for, a marker on it, on a brown table.
+    fn photo(camera: &Camera, with_marker: bool) -> Image<LinearRgb> {
+        let marker = printed(7, 12);
+        let screen = Image::from_fn(600, 400, |x, y| {
+            let slab = (300..380).contains(&x) && (110..290).contains(&y);
+            match (
+                slab,
+                with_marker && (150..246).contains(&x) && (130..226).contains(&y),
+            ) {
+                (true, _) => LinearRgb::new(0.6, 0.05, 0.05),
+                (_, true) => marker[(x - 150, y - 130)],
+                _ => LinearRgb::new(0.05, 0.4, 0.1).scale(0.8 + 0.2 * x as f32 / 600.0),
+            }
+        });
+        let seen = project_picture(&Pyramid::new(screen), camera, SCREEN);
+        let alpha = project_picture(
+            &Pyramid::new(Image::filled(600, 400, Coverage(1.0))),
+            camera,
+            SCREEN,
+        );
+        seen.zip_map(&alpha, |p, a| {
+            p + LinearRgb::new(0.2, 0.12, 0.06).scale(1.0 - a.0)
+        })
+    }
+
+    fn added(photo: &Image<LinearRgb>, scale: Scale) -> Result<[f64; 3]> {
+        let folder = tempfile::tempdir().unwrap();
+        io::write(folder.path().join("a.png"), photo).unwrap();
+        let entry = PhotoEntry {
+            thickness: 1e-4,
+            ..PhotoEntry::new(folder.path().join("a.png"), "a", "slab", scale)
+        };
+        let record = add_photo(
+            folder.path().join("assets"),
+            &entry,
+            &[],
+            &CutOutOptions::default(),
+        )?
+        .record;
+        Ok([record.object_m[0], record.object_m[1], record.error_m])
+    }
+
+    fn assert_slab(added: Result<[f64; 3]>) {
+        let [length, width, error] = added.unwrap();
+        assert!(
+            (length / SLAB[0] - 1.0).abs() < 0.02 && error < 0.004,
+            "{length} +- {error}"
+        );
+        assert!(
+            (length - SLAB[0]).abs() < 3.0 * error,
+            "{length} +- {error}"
+        );
+        assert!((width - SLAB[1]).abs() < 3.0 * error, "{width} +- {error}");
+    }
+
+    #[test]
+    fn a_screen_tells_the_size_of_what_lies_on_it() {
+        // From 20 degrees beside the vertical the slab is seen 6 % shorter than it is.
+        let camera = camera(0.35, 1100.0);
+        let photo = photo(&camera, false);
+        let corners = rectangle([0.0; 2], SCREEN).map(|at| seen(&camera, at, 0.0).into());
+        assert_slab(added(&photo, Scale::Screen(SCREEN, None)));
+        assert_slab(added(
+            &photo,
+            Scale::Screen([SCREEN[1], SCREEN[0]], Some(corners)),
+        ));
+        let part = Roi {
+            x: 250,
+            y: 0,
+            width: 750,
+            height: 750,
+        };
+        let told = added(&photo.crop(part), Scale::Screen(SCREEN, None))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.contains(
+                "a.png: the corners of the screen cannot be found: it reaches the border"
+            ),
+            "{told}"
+        );
+        let told = added(&photo, Scale::Screen([0.6, 0.2], None))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            told.contains("its corners are not those of 0.6 x 0.2 m; are width and height right?"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn a_printed_marker_tells_the_size_of_what_lies_beside_it() {
+        let photo = photo(&camera(0.35, 2400.0), true);
+        assert_slab(added(&photo, Scale::Marker(MARKER)));
+    }
+
+    #[test]
+    fn a_photo_without_a_marker_is_told() {
+        let photo = Image::filled(120, 80, LinearRgb::new(0.04, 0.4, 0.08));
+        let told = RectifiedPhoto::by_marker(photo, 0.06, 0.0, &Header::default())
+            .err()
+            .unwrap()
+            .to_string();
+        assert!(
+            told.contains("no marker (AprilTag tag36h11, ArUco DICT_4X4_50) was found"),
+            "{told}"
+        );
+    }
+}

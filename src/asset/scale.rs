@@ -1,0 +1,77 @@
+//! What gives the scale of a photo.
+
+use crate::bounds::{OBJECT, PX_PER_METRE, SURFACE, WIDTH, number};
+use crate::error::{Error, Result};
+
+/// How large the things in a photo are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// Pixels of the photo for a metre.
+    PxPerMetre(f64),
+    /// Length of the object along its longest side, metres.
+    Length(f64),
+    /// Length and width of the object, longest first, metres.
+    Size([f64; 2]),
+    /// Width and height of the whole screen, metres, with its corners where they are known (from the top left, clockwise,
+    /// pixels); else they are found. The object's scale is that at half its thickness above the screen.
+    Screen([f64; 2], Option<[[f64; 2]; 4]>),
+    /// Side of the black square of a printed marker that lies on the screen (AprilTag tag36h11 or ArUco DICT_4X4_50),
+    /// metres.
+    Marker(f64),
+}
+
+impl Scale {
+    /// # Errors
+    /// [`Error::Value`] for a size that nothing has which can be photographed on a screen.
+    pub(super) fn check(self) -> Result<()> {
+        match self {
+            Self::PxPerMetre(scale) => PX_PER_METRE.check("px_per_metre", scale),
+            Self::Length(length) => OBJECT.check("length", length),
+            Self::Size([length, width]) => {
+                OBJECT.check("length", length)?;
+                WIDTH.check("width", width)?;
+                if width <= length {
+                    return Ok(());
+                }
+                let what = format!("{width}, expected at most the length of {length}");
+                Err(Error::value("width", what))
+            }
+            Self::Screen(size, _) => size
+                .into_iter()
+                .try_for_each(|side| SURFACE.check("screen_size", side)),
+            Self::Marker(side) => OBJECT.check("marker_size", side),
+        }
+    }
+
+    /// Checks that the scale makes the object in the photo `source` as long as one that can be photographed on a screen.
+    ///
+    /// # Errors
+    /// [`Error::Value`], which asks about the unit where another one would make sense.
+    pub(super) fn check_length(self, length: f64, source: &str) -> Result<()> {
+        if OBJECT.contains(length) {
+            return Ok(());
+        }
+        let (at, value, question) = match self {
+            Self::Length(_) | Self::Size(_) => return Ok(()),
+            Self::PxPerMetre(scale) => ("px_per_metre", number(scale), question_of_scale(length)),
+            Self::Screen([w, h], _) => (
+                "screen_size",
+                format!("{} x {}", number(w), number(h)),
+                OBJECT.question(length),
+            ),
+            Self::Marker(side) => ("marker_size", number(side), OBJECT.question(length)),
+        };
+        let length = number((1e4 * length).round() / 1e4);
+        let what = format!(
+            "{value}, makes what is in {source} {length} m long, expected {OBJECT}{question}"
+        );
+        Err(Error::value(at, what))
+    }
+}
+
+fn question_of_scale(length: f64) -> String {
+    OBJECT
+        .unit_meant(length)
+        .map(|unit| format!("; is it pixels for a {unit}?"))
+        .unwrap_or_default()
+}

@@ -1,0 +1,34 @@
+//! Parts of a picture as channels of floats.
+
+use crate::deep::DeepImage;
+use crate::io::exr::{ChannelSamples, Part};
+
+/// Every pixel's column and row, in reading order.
+pub(super) fn pixels_of(deep: &DeepImage) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let (width, height) = (deep.width(), deep.height());
+    (0..width * height).map(move |i| (i % width, i / width))
+}
+
+/// A part of float channels from the pixels in reading order.
+pub(super) fn float_part<const N: usize>(
+    name: impl Into<String>,
+    names: [&str; N],
+    values: impl Iterator<Item = [f32; N]>,
+) -> Part {
+    let mut planes = [const { Vec::new() }; N];
+    for value in values {
+        for (plane, v) in planes.iter_mut().zip(value) {
+            plane.push(v);
+        }
+    }
+    let channels = names
+        .iter()
+        .zip(planes)
+        .map(|(name, plane)| (name.to_string(), ChannelSamples::Float(plane)))
+        .collect();
+    Part {
+        name: name.into(),
+        channels,
+        metadata: Vec::new(),
+    }
+}

@@ -1,0 +1,269 @@
+//! EXR channels with fewer samples than pixels: colour of half the size beside luminance (`Y`, `RY`, `BY`).
+//!
+//! # Method
+//! OpenEXR's technical introduction, "Luminance/Chroma Images": `RY = (R - Y) / Y`, `BY = (B - Y) / Y`, and `Y` is the sum
+//! of the colours by the weights of their primaries. Samples of colour lie on the first of the pixels they stand for;
+//! between them it is interpolated linearly, where OpenEXR has a longer filter.
+
+use super::attributes::{FIRST_ATTRIBUTE, RawAttribute, end_of_text};
+use super::samples::{SampleLine, to_floats};
+use crate::color::{RgbSpace, xyz_from_rgb};
+use crate::io::codec::refusal::Refusal;
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
+use exr::meta::header::Header;
+use exr::prelude::{IntegerBounds, Vec2};
+use std::ops::Range;
+
+/// Names of luminance and the two differences.
+pub(super) const LUMINANCE_CHROMA: [&str; 3] = ["Y", "RY", "BY"];
+/// Pixels for a sample, along each axis, at the most.
+const MAX_SAMPLING: u32 = 4;
+/// The sampling of a channel with a sample for each pixel, as bytes.
+const FULL_SAMPLING: [u8; 8] = [1, 0, 0, 0, 1, 0, 0, 0];
+/// Bytes between the name of a channel and its sampling: the kind of its samples, a flag, and three that mean nothing.
+const BEFORE_SAMPLING: usize = 4 + 1 + 3;
+
+/// Pixels for a sample of each channel, along x and y.
+pub(super) struct Sampling(Vec<[usize; 2]>);
+
+impl Sampling {
+    /// The sampling of a file's first part, and the file as if it had a sample for each pixel, which the decoder can take
+    /// in. None for a file that has one, or that is not what it should be.
+    pub(super) fn find(file: &[u8]) -> Option<(Self, Vec<u8>)> {
+        let offsets = sampling_offsets(file)?;
+        let pairs = offsets
+            .iter()
+            .map(|&at| read_pair(file, at))
+            .collect::<Option<Vec<_>>>()?;
+        let known = pairs
+            .iter()
+            .flatten()
+            .all(|n| (1..=MAX_SAMPLING).contains(n));
+        if !known || pairs.iter().flatten().all(|&n| n == 1) {
+            return None;
+        }
+        let mut even = file.to_vec();
+        for at in offsets {
+            even[at..at + FULL_SAMPLING.len()].copy_from_slice(&FULL_SAMPLING);
+        }
+        let pairs = pairs.into_iter().map(|pair| pair.map(|n| n as usize));
+        Some((Self(pairs.collect()), even))
+    }
+
+    /// Whether the part is one that is read: rows, with a window that every sampling divides.
+    pub(super) fn check(&self, header: &Header) -> Result<(), Refusal> {
+        match header.blocks {
+            exr::meta::BlockDescription::ScanLines
+                if self.0.iter().all(|pair| divides(*pair, header)) =>
+            {
+                Ok(())
+            }
+            _ => Err("damaged EXR: sampling of channels that does not divide the picture".into()),
+        }
+    }
+
+    /// Rows of pixels for a sample of a channel.
+    pub(super) fn rows(&self, channel: usize) -> usize {
+        self.0[channel][1]
+    }
+
+    /// The samples of a block of rows, enlarged along x; rows that lie between samples repeat those before them.
+    pub(super) fn decode_lines(
+        &self,
+        header: &Header,
+        chunk: Chunk,
+    ) -> Result<Vec<SampleLine>, Refusal> {
+        let CompressedBlock::ScanLine(block) = chunk.compressed_block else {
+            return Err("damaged EXR: a block of another kind".into());
+        };
+        let rows = block_rows(header, &block)?;
+        let lines = self.stored_lines(header, rows.clone());
+        let bytes = lines.iter().map(|line| line.bytes).sum();
+        let data = self.decompress(header, block, rows, bytes)?;
+        self.split_lines(header, &lines, &data)
+    }
+
+    /// The lines that a block of rows has, in the order of the file.
+    fn stored_lines(&self, header: &Header, rows: Range<usize>) -> Vec<StoredLine> {
+        let mut lines = Vec::new();
+        for y in rows {
+            for (channel, &[x_step, y_step]) in self.0.iter().enumerate() {
+                let kind = header.channels.list[channel].sample_type;
+                if y.is_multiple_of(y_step) {
+                    lines.push(StoredLine {
+                        channel,
+                        y,
+                        bytes: header.layer_size.x() / x_step * kind.bytes_per_sample(),
+                    });
+                }
+            }
+        }
+        lines
+    }
+
+    /// The bytes of a block, which the decoder takes for pixels that have as many bytes each.
+    fn decompress(
+        &self,
+        header: &Header,
+        block: CompressedScanLineBlock,
+        rows: Range<usize>,
+        bytes: usize,
+    ) -> Result<Vec<u8>, Refusal> {
+        let width = header.layer_size.x();
+        let pixels = width * rows.len();
+        if !bytes.is_multiple_of(pixels) {
+            return Err(Refusal::Unsupported(
+                "unsupported EXR: channels of this sampling".into(),
+            ));
+        }
+        let mut declared = header.clone();
+        declared.channels.bytes_per_pixel = bytes / pixels;
+        for (channel, &[x, y]) in declared.channels.list.iter_mut().zip(&self.0) {
+            channel.sampling = Vec2(x, y);
+        }
+        let section = IntegerBounds::new(Vec2(0, rows.start as i32), Vec2(width, rows.len()));
+        let data = header.compression.decompress_image_section_from_le(
+            &declared,
+            block.compressed_pixels_le,
+            section,
+            false,
+        )?;
+        Ok(data)
+    }
+
+    /// The lines out of the bytes of a block, each repeated for the rows that it stands for.
+    fn split_lines(
+        &self,
+        header: &Header,
+        lines: &[StoredLine],
+        mut data: &[u8],
+    ) -> Result<Vec<SampleLine>, Refusal> {
+        let mut out = Vec::new();
+        for &StoredLine { channel, y, bytes } in lines {
+            let (line, rest) = data
+                .split_at_checked(bytes)
+                .ok_or("damaged EXR: a block that is too short")?;
+            data = rest;
+            let [x_step, y_step] = self.0[channel];
+            let mut samples = Vec::new();
+            to_floats(
+                line,
+                header.channels.list[channel].sample_type,
+                &mut samples,
+            );
+            let samples = enlarged(&samples, x_step);
+            let rows = y..(y + y_step).min(header.layer_size.y());
+            out.extend(rows.map(|y| SampleLine {
+                channel,
+                x: 0,
+                y,
+                samples: samples.clone(),
+            }));
+        }
+        Ok(out)
+    }
+}
+
+/// A line of samples in a block.
+struct StoredLine {
+    channel: usize,
+    y: usize,
+    bytes: usize,
+}
+
+/// Whether a sampling divides position and size of a part.
+fn divides([x, y]: [usize; 2], header: &Header) -> bool {
+    let (at, size) = (header.own_attributes.layer_position, header.layer_size);
+    at.x().rem_euclid(x as i32) == 0
+        && at.y().rem_euclid(y as i32) == 0
+        && size.x() % x == 0
+        && size.y() % y == 0
+}
+
+/// Rows of the part that a block holds.
+fn block_rows(header: &Header, block: &CompressedScanLineBlock) -> Result<Range<usize>, Refusal> {
+    let top = i64::from(block.y_coordinate) - i64::from(header.own_attributes.layer_position.y());
+    let height = header.layer_size.y();
+    let most = header.compression.scan_lines_per_block();
+    let top = usize::try_from(top)
+        .ok()
+        .filter(|y| *y < height && y % most == 0)
+        .ok_or("damaged EXR: a block outside the picture")?;
+    Ok(top..(top + most).min(height))
+}
+
+/// `n` values for each, interpolated linearly to the next; the last goes on.
+fn enlarged(samples: &[f32], n: usize) -> Vec<f32> {
+    let next = samples.iter().skip(1).chain(samples.last());
+    samples
+        .iter()
+        .zip(next)
+        .flat_map(|(&a, &b)| (0..n).map(move |i| a + (b - a) * (i as f32 / n as f32)))
+        .collect()
+}
+
+/// Where the pairs of numbers lie that say how the channels of the first part are sampled.
+fn sampling_offsets(file: &[u8]) -> Option<Vec<usize>> {
+    let mut at = FIRST_ATTRIBUTE;
+    while *file.get(at)? != 0 {
+        let attribute = RawAttribute::read(file, at)?;
+        if attribute.name == b"channels\0" && attribute.kind == b"chlist\0" {
+            return offsets_in_list(file, attribute.value);
+        }
+        at = attribute.end;
+    }
+    None
+}
+
+/// The same in the list of channels: each has a name, some bytes, and its sampling.
+fn offsets_in_list(file: &[u8], mut at: usize) -> Option<Vec<usize>> {
+    let mut offsets = Vec::new();
+    while *file.get(at)? != 0 {
+        let sampling = end_of_text(file, at)? + BEFORE_SAMPLING;
+        offsets.push(sampling);
+        at = sampling + FULL_SAMPLING.len();
+    }
+    Some(offsets)
+}
+
+fn read_pair(file: &[u8], at: usize) -> Option<[u32; 2]> {
+    let x = *file.get(at..)?.first_chunk()?;
+    let y = *file.get(at + 4..)?.first_chunk()?;
+    Some([u32::from_le_bytes(x), u32::from_le_bytes(y)])
+}
+
+/// Turns luminance and differences, the first three of `n` interleaved channels, into red, green and blue of a space.
+pub(super) fn to_rgb(samples: &mut [f32], n: usize, space: &RgbSpace) {
+    let weights = xyz_from_rgb(space);
+    let [wr, wg, wb] = [0, 1, 2].map(|c| weights[(1, c)] as f32);
+    for px in samples.chunks_exact_mut(n) {
+        let y = px[0];
+        let (r, b) = ((px[1] + 1.0) * y, (px[2] + 1.0) * y);
+        let g = (y - wr * r - wb * b) / wg;
+        px[..3].copy_from_slice(&[r, g, b]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colour_is_what_luminance_and_differences_say() {
+        let [r, g, b] = [0.2, 0.5, 0.9];
+        let weights = xyz_from_rgb(&RgbSpace::REC709);
+        let y = (weights[(1, 0)] * r + weights[(1, 1)] * g + weights[(1, 2)] * b) as f32;
+        let mut px = [y, (r as f32 - y) / y, (b as f32 - y) / y, 0.25];
+        to_rgb(&mut px, 4, &RgbSpace::REC709);
+        for (v, expected) in px.iter().zip([r, g, b, 0.25]) {
+            assert!((f64::from(*v) - expected).abs() < 1e-6, "{px:?}");
+        }
+    }
+
+    #[test]
+    fn samples_lie_on_the_first_of_their_pixels() {
+        assert_eq!(enlarged(&[1.0, 3.0], 2), [1.0, 2.0, 3.0, 3.0]);
+        assert_eq!(enlarged(&[1.0, 3.0], 1), [1.0, 3.0]);
+        assert!(enlarged(&[], 2).is_empty());
+    }
+}

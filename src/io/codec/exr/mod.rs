@@ -1,0 +1,23 @@
+//! OpenEXR: scene-linear half or float in named channels, premultiplied alpha, text attributes.
+//!
+//! The header is read and checked first: the decoder allocates what a header asks for, and an allocation that fails
+//! cannot be caught.
+
+mod attributes;
+mod blocks;
+mod chroma;
+mod parts;
+mod read;
+mod runs;
+mod samples;
+mod write;
+
+pub use parts::{ChannelSamples, Part};
+pub use read::Channel;
+pub use write::Compression;
+
+pub(crate) use parts::encode_parts;
+pub(crate) use read::{channels, decode, header};
+pub(crate) use runs::encode_runs;
+pub(crate) use samples::{float_samples, half_samples, to_halves};
+pub(crate) use write::encode;

@@ -1,0 +1,519 @@
+//! Headers and pixels of EXR files.
+
+use super::blocks::{PartReader, SampleOrder};
+use super::chroma::{LUMINANCE_CHROMA, Sampling, to_rgb};
+use crate::color::{ColorMatrix, RgbSpace};
+use crate::io::codec::channels::{ChannelMatch, Choice, Wanted};
+use crate::io::codec::profile::to_rec709;
+use crate::io::codec::raster::{Raster, Samples};
+use crate::io::codec::refusal::Refusal;
+use crate::io::format::Format;
+use crate::io::header::{Header, Notes, Window};
+use crate::io::limits::{Demand, Limits, affordable, at_most};
+use exr::meta::attribute::{AttributeValue, Chromaticities};
+use exr::prelude::{IntegerBounds, MetaData, Vec2};
+use std::borrow::Cow;
+use std::io::{BufReader, Read};
+
+impl From<exr::error::Error> for Refusal {
+    fn from(e: exr::error::Error) -> Self {
+        match e {
+            exr::error::Error::NotSupported(what) => {
+                Self::Unsupported(format!("unsupported EXR: {what}"))
+            }
+            exr::error::Error::Io(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+                Self::Broken("truncated EXR".into())
+            }
+            e => Self::Broken(format!("damaged EXR: {e}")),
+        }
+    }
+}
+
+/// A channel of an EXR file by its full name, cropped or padded to the display window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// `R`, `diffuse.G`, `Z`, ...
+    pub name: String,
+    /// Samples row by row from the top, as many as the picture has pixels.
+    pub samples: Vec<f32>,
+}
+
+/// Every channel of the first part, and the picture's size.
+pub(crate) fn channels(
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<((usize, usize), Vec<Channel>), Refusal> {
+    let file = CheckedFile::new(bytes, limits)?;
+    let part = file.flat_parts().next().ok_or("no part with pixels")?;
+    let names = file.channel_names(part);
+    let (width, height) = window_size(file.window());
+    limits.check_memory(width, height, names.len())?;
+    let picked: Vec<usize> = (0..names.len()).collect();
+    let samples = file
+        .reader(part, &picked, file.window(), SampleOrder::Planar)?
+        .read()?;
+    let channels = names
+        .into_iter()
+        .zip(samples.chunks_exact(width * height))
+        .map(|(name, plane)| Channel {
+            name,
+            samples: plane.to_vec(),
+        });
+    Ok(((width, height), channels.collect()))
+}
+
+/// A file whose headers were checked.
+struct CheckedFile<'a> {
+    bytes: Cow<'a, [u8]>,
+    meta: MetaData,
+    sampling: Option<Sampling>,
+}
+
+impl<'a> CheckedFile<'a> {
+    fn new(bytes: &'a [u8], limits: &Limits) -> Result<Self, Refusal> {
+        let (sampling, bytes) = match Sampling::find(bytes) {
+            Some((sampling, even)) => (Some(sampling), Cow::Owned(even)),
+            None => (None, Cow::Borrowed(bytes)),
+        };
+        let meta = read_meta(&*bytes, bytes.len() as u64, limits)?;
+        if let Some(sampling) = &sampling {
+            let [header] = &meta.headers[..] else {
+                return Err(Refusal::Unsupported(
+                    "unsupported EXR: subsampled channels in one of several parts".into(),
+                ));
+            };
+            sampling.check(header)?;
+        }
+        Ok(Self {
+            bytes,
+            meta,
+            sampling,
+        })
+    }
+
+    /// The parts whose pixels have one sample for each channel.
+    fn flat_parts(&self) -> impl Iterator<Item = usize> {
+        self.meta
+            .headers
+            .iter()
+            .enumerate()
+            .filter(|(_, header)| !header.deep)
+            .map(|(part, _)| part)
+    }
+
+    /// The part that has the wanted channels under the best names, and their indices, each once.
+    fn best_part(&self, wanted: Wanted) -> Result<(usize, Vec<usize>), Refusal> {
+        let choices = self
+            .flat_parts()
+            .map(|part| (part, choose_channels(wanted, &self.channel_names(part))));
+        // Parts without the channels come last: their error is given where no part has them.
+        let best = choices.min_by_key(|(_, choice)| match choice {
+            Ok((quality, _)) => (false, Some(*quality)),
+            Err(_) => (true, None),
+        });
+        let (part, choice) = best.ok_or("no part with pixels")?;
+        let (_, mut picked) = choice?;
+        picked.dedup();
+        Ok((part, picked))
+    }
+
+    fn channel_names(&self, part: usize) -> Vec<String> {
+        self.meta.headers[part]
+            .channels
+            .list
+            .iter()
+            .map(|c| c.name.to_string())
+            .collect()
+    }
+
+    /// What all parts are shown in.
+    fn window(&self) -> IntegerBounds {
+        self.meta.headers[0].shared_attributes.display_window
+    }
+
+    /// The window of a part that is asked for.
+    fn window_of(&self, part: usize, shown: Window) -> IntegerBounds {
+        let header = &self.meta.headers[part];
+        match shown {
+            Window::Display => self.window(),
+            Window::Data => {
+                IntegerBounds::new(header.own_attributes.layer_position, header.layer_size)
+            }
+        }
+    }
+
+    /// The primaries that are named, or ours.
+    fn space(&self) -> RgbSpace {
+        self.meta.headers[0]
+            .shared_attributes
+            .chromaticities
+            .map_or(RgbSpace::REC709, named_space)
+    }
+
+    fn reader<'r>(
+        &'r self,
+        part: usize,
+        picked: &'r [usize],
+        window: IntegerBounds,
+        order: SampleOrder,
+    ) -> Result<PartReader<'r>, String> {
+        let (width, height) = window_size(window);
+        affordable((width * height * picked.len()) as u64 * FLOAT_BYTES)?;
+        Ok(PartReader {
+            bytes: &self.bytes,
+            meta: &self.meta,
+            part,
+            picked,
+            window,
+            order,
+            sampling: self.sampling.as_ref(),
+        })
+    }
+}
+
+fn named_space(named: Chromaticities) -> RgbSpace {
+    RgbSpace {
+        primaries: [named.red, named.green, named.blue].map(xy),
+        white: xy(named.white),
+    }
+}
+
+fn xy(v: Vec2<f32>) -> [f64; 2] {
+    [f64::from(v.x()), f64::from(v.y())]
+}
+
+fn window_size(window: IntegerBounds) -> (usize, usize) {
+    (window.size.x(), window.size.y())
+}
+
+/// The headers alone, checked against the limits: data and display window of every part, and their sum.
+fn read_meta(file: impl Read, file_bytes: u64, limits: &Limits) -> Result<MetaData, Refusal> {
+    let start = BufReader::new(file.take(limits.metadata_bytes));
+    let meta = MetaData::read_from_buffered(start, false);
+    if meta.is_err() && file_bytes > limits.metadata_bytes {
+        at_most(
+            file_bytes,
+            limits.metadata_bytes,
+            "bytes without an end of the header",
+            "metadata_bytes",
+        )?;
+    }
+    let meta = meta?;
+    at_most(meta.headers.len() as u64, limits.parts, "parts", "parts")?;
+    let mut total = 0_u64;
+    for header in &meta.headers {
+        total += checked_part_bytes(header, file_bytes, limits)?;
+    }
+    let most = limits.decoded_bytes;
+    at_most(total, most, "decoded bytes", "decoded_bytes")?;
+    if meta.headers.iter().all(|h| h.deep) {
+        return Err(Refusal::Unsupported(
+            "deep EXR, expected flat pixels".into(),
+        ));
+    }
+    Ok(meta)
+}
+
+/// Decoded bytes of a part within the limits.
+fn checked_part_bytes(
+    header: &exr::meta::header::Header,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<u64, String> {
+    let list = &header.channels.list;
+    let bytes_per_pixel = list
+        .iter()
+        .map(|c| c.sample_type.bytes_per_sample() as u64)
+        .sum();
+    let display_window = header.shared_attributes.display_window;
+    for size in [header.layer_size, display_window.size] {
+        limits.check(Demand {
+            width: size.x() as u64,
+            height: size.y() as u64,
+            channels: list.len() as u64,
+            bytes_per_pixel,
+            file_bytes,
+        })?;
+    }
+    Ok(header.layer_size.area() as u64 * bytes_per_pixel)
+}
+
+/// Bytes of a sample as it is kept.
+const FLOAT_BYTES: u64 = 4;
+
+/// More than the attributes of a file take that says where its channels have fewer samples than pixels.
+const FIRST_BYTES: u64 = 1 << 16;
+
+pub(crate) fn header(
+    mut file: impl Read,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
+    let mut start = Vec::new();
+    file.by_ref()
+        .take(FIRST_BYTES)
+        .read_to_end(&mut start)
+        .map_err(exr::error::Error::from)?;
+    let start = Sampling::find(&start).map_or(start, |(_, even)| even);
+    let meta = read_meta(start.chain(file), file_bytes, limits)?;
+    let first = meta.headers.first().ok_or("no part with pixels")?;
+    let shown = first.shared_attributes.display_window;
+    let (width, height) = window_size(shown);
+    let position = first.own_attributes.layer_position;
+    let list = &first.channels.list;
+    let bytes = list.iter().map(|c| c.sample_type.bytes_per_sample());
+    Ok(Header {
+        format: Format::Exr,
+        width,
+        height,
+        channels: in_default_order(list.iter().map(|c| c.name.to_string()).collect()),
+        bits: 8 * bytes.max().unwrap_or(0) as u32,
+        data_at: [
+            i64::from(position.x()) - i64::from(shown.position.x()),
+            i64::from(position.y()) - i64::from(shown.position.y()),
+        ],
+        data_size: [first.layer_size.x(), first.layer_size.y()],
+        metadata: text_attributes(first),
+        ..Header::default()
+    })
+}
+
+/// `R G B A` first, the rest by name.
+fn in_default_order(mut names: Vec<String>) -> Vec<String> {
+    names.sort_by_key(|name| {
+        let rank = "RGBA".find(name.as_str()).filter(|_| name.len() == 1);
+        (rank.unwrap_or(4), name.clone())
+    });
+    names
+}
+
+fn text_attributes(header: &exr::meta::header::Header) -> Notes {
+    let all = header
+        .own_attributes
+        .other
+        .iter()
+        .chain(&header.shared_attributes.other);
+    let mut notes: Notes = all
+        .filter_map(|(name, value)| match value {
+            AttributeValue::Text(text) => Some((name.to_string(), text.to_string())),
+            _ => None,
+        })
+        .collect();
+    notes.sort();
+    notes
+}
+
+/// The wanted channels of the part that has them under the best names.
+pub(crate) fn decode(
+    bytes: &[u8],
+    limits: &Limits,
+    wanted: Wanted,
+    shown: Window,
+) -> Result<Raster, Refusal> {
+    let file = CheckedFile::new(bytes, limits)?;
+    let (part, picked) = file.best_part(wanted)?;
+    let window = file.window_of(part, shown);
+    let (width, height) = window_size(window);
+    limits.check_memory(width, height, picked.len())?;
+    let all = file.channel_names(part);
+    let mut names: Vec<String> = picked.iter().map(|&i| all[i].clone()).collect();
+    let mut samples = file
+        .reader(part, &picked, window, SampleOrder::Interleaved)?
+        .read()?;
+    if matches!(wanted, Wanted::Color | Wanted::Film) && picked.len() >= 3 {
+        convert_colors(&mut samples, &mut names, &file.space())?;
+    }
+    Ok(Raster {
+        width,
+        height,
+        names,
+        samples: Samples::F32(samples),
+        display_encoded: false,
+        premultiplied: true,
+    })
+}
+
+/// Luminance with its differences where there are those, and what is chosen of other channels elsewhere.
+fn choose_channels(wanted: Wanted, names: &[String]) -> Result<Choice, String> {
+    let chroma = LUMINANCE_CHROMA
+        .into_iter()
+        .map(|name| names.iter().position(|n| n == name))
+        .collect::<Option<Vec<_>>>();
+    match (wanted, chroma) {
+        (Wanted::Color | Wanted::Film, Some(mut picked)) => {
+            picked.extend(names.iter().position(|n| n == "A"));
+            Ok((ChannelMatch::Named, picked))
+        }
+        _ => wanted.choose(names),
+    }
+}
+
+/// Makes the first three channels red, green and blue of Rec. 709.
+fn convert_colors(
+    samples: &mut [f32],
+    names: &mut Vec<String>,
+    space: &RgbSpace,
+) -> Result<(), String> {
+    let n = names.len();
+    if names.starts_with(&LUMINANCE_CHROMA.map(String::from)) {
+        to_rgb(samples, n, space);
+        names.splice(..3, ["R", "G", "B"].map(String::from));
+    }
+    if let Some(matrix) = to_rec709(space)? {
+        convert_primaries(samples, n, &matrix);
+    }
+    Ok(())
+}
+
+/// The first three of `n` interleaved channels in other primaries; alpha stays.
+fn convert_primaries(samples: &mut [f32], n: usize, matrix: &ColorMatrix) {
+    for px in samples.chunks_exact_mut(n) {
+        let color = matrix.apply([px[0], px[1], px[2]]);
+        px[..3].copy_from_slice(&color);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::codec::exr::{Compression, encode, float_samples};
+    use exr::prelude::{AnyChannel, AnyChannels, Encoding, Layer, LayerAttributes, WritableImage};
+    use std::io::Cursor;
+
+    fn notes(n: usize) -> Notes {
+        (0..n)
+            .map(|i| (format!("petcomp:{i}"), format!("value {i}")))
+            .collect()
+    }
+
+    #[test]
+    fn attributes_are_in_the_order_of_their_names() {
+        let file = || {
+            encode(
+                (2, 1),
+                vec![("Z", float_samples(vec![1.0, 2.0]))],
+                Compression::Zip,
+                &notes(12),
+            )
+            .unwrap()
+        };
+        assert_eq!(file(), file());
+        let meta = header(file().as_slice(), 10_000, &Limits::default()).unwrap();
+        assert_eq!(meta.metadata.len(), 12);
+        let text = String::from_utf8_lossy(&file()).into_owned();
+        assert!(text.find("channels").unwrap() < text.find("compression").unwrap());
+        assert!(text.find("petcomp:3").unwrap() < text.find("petcomp:4").unwrap());
+    }
+
+    #[test]
+    fn names_come_in_the_default_order() {
+        let names = ["A", "B", "G", "N.X", "R", "Z"].map(String::from).to_vec();
+        assert_eq!(in_default_order(names), ["R", "G", "B", "A", "N.X", "Z"]);
+    }
+
+    /// ACEScg (0.322761, 0.482919, 0.841329) is Rec. 709 (0.18, 0.5, 0.9), by colour-science.
+    #[test]
+    fn other_primaries_become_ours() {
+        let plane = |name, v: f32| AnyChannel::new(name, float_samples(vec![v]));
+        let list = [
+            plane("R", 0.322_761),
+            plane("G", 0.482_919),
+            plane("B", 0.841_329),
+        ]
+        .into_iter()
+        .collect();
+        let mut image = exr::prelude::Image::from_channels(Vec2(1, 1), AnyChannels::sort(list));
+        let xy = |x, y| Vec2(x, y);
+        image.attributes.chromaticities = Some(Chromaticities {
+            red: xy(0.713, 0.293),
+            green: xy(0.165, 0.830),
+            blue: xy(0.128, 0.044),
+            white: xy(0.32168, 0.33767),
+        });
+        let read = |image: &exr::prelude::Image<_>| {
+            let mut out = Cursor::new(Vec::new());
+            WritableImage::write(image).to_buffered(&mut out).unwrap();
+            decode(
+                out.get_ref(),
+                &Limits::default(),
+                Wanted::Color,
+                Window::Display,
+            )
+        };
+        let Samples::F32(rgb) = read(&image).unwrap().samples else {
+            panic!("not floats")
+        };
+        for (v, expected) in rgb.iter().zip([0.18, 0.5, 0.9]) {
+            assert!((v - expected).abs() < 1e-4, "{rgb:?}");
+        }
+        let third = 1.0 / 3.0;
+        image.attributes.chromaticities = Some(Chromaticities {
+            red: xy(1.0, 0.0),
+            green: xy(0.0, 1.0),
+            blue: xy(0.0, 0.0),
+            white: xy(third, third),
+        });
+        assert!(read(&image).is_ok(), "CIE XYZ");
+        image.attributes.chromaticities = Some(Chromaticities {
+            red: xy(0.0, 0.0),
+            ..image.attributes.chromaticities.unwrap()
+        });
+        image.attributes.chromaticities.as_mut().unwrap().white = xy(0.3, 0.0);
+        assert!(
+            read(&image)
+                .unwrap_err()
+                .to_string()
+                .contains("expected those of a colour space")
+        );
+    }
+
+    #[test]
+    fn a_data_window_is_cut_and_padded_to_the_display_window() {
+        let mut layer = Layer::new(
+            Vec2(2, 2),
+            LayerAttributes::default(),
+            Encoding::UNCOMPRESSED,
+            AnyChannels::sort(
+                [AnyChannel::new(
+                    "Y",
+                    float_samples(vec![1.0, 2.0, 3.0, 4.0]),
+                )]
+                .into_iter()
+                .collect(),
+            ),
+        );
+        layer.attributes.layer_position = Vec2(-1, 1);
+        let mut image = exr::prelude::Image::from_layer(layer);
+        image.attributes.display_window = IntegerBounds::from_dimensions(Vec2(2, 3));
+        let mut out = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut out).unwrap();
+        let raster = decode(
+            out.get_ref(),
+            &Limits::default(),
+            Wanted::Coverage,
+            Window::Display,
+        )
+        .unwrap();
+        assert_eq!((raster.width, raster.height), (2, 3));
+        assert_eq!(
+            raster.samples,
+            Samples::F32(vec![0.0, 0.0, 2.0, 0.0, 4.0, 0.0])
+        );
+        let kept = decode(
+            out.get_ref(),
+            &Limits::default(),
+            Wanted::Coverage,
+            Window::Data,
+        )
+        .unwrap();
+        assert_eq!(
+            (kept.width, kept.height, kept.samples),
+            (2, 2, Samples::F32(vec![1.0, 2.0, 3.0, 4.0]))
+        );
+        let told = header(out.get_ref().as_slice(), 1_000, &Limits::default()).unwrap();
+        assert_eq!(
+            (told.width, told.height, told.data_at, told.data_size),
+            (2, 3, [-1, 1], [2, 2])
+        );
+    }
+}

@@ -1,0 +1,72 @@
+//! EXR files of one part.
+
+use super::attributes::{FIRST_ATTRIBUTE, add_texts, latin_text, sort_attributes};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Vec2,
+    WritableImage,
+};
+use std::io::Cursor;
+
+/// How an EXR is compressed; all of them lossless.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Compression {
+    /// Not at all.
+    None,
+    /// Deflate over 16 rows: small for rendered pictures.
+    #[default]
+    Zip,
+    /// Wavelets: faster and smaller for grainy photos.
+    Piz,
+}
+
+impl Compression {
+    fn method(self) -> exr::prelude::Compression {
+        match self {
+            Self::None => exr::prelude::Compression::Uncompressed,
+            Self::Zip => exr::prelude::Compression::ZIP16,
+            Self::Piz => exr::prelude::Compression::PIZ,
+        }
+    }
+}
+
+/// A whole file; the same input gives the same bytes.
+pub(crate) fn encode(
+    size: (usize, usize),
+    planes: Vec<(&str, FlatSamples)>,
+    compression: Compression,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
+    let mut attributes = LayerAttributes::default();
+    let channels = channel_list(size, planes)?;
+    add_texts(&mut attributes, metadata)?;
+    let encoding = Encoding {
+        compression: compression.method(),
+        ..Encoding::SMALL_LOSSLESS
+    };
+    let layer = Layer::new(Vec2(size.0, size.1), attributes, encoding, channels);
+    let mut out = Cursor::new(Vec::new());
+    Image::from_layer(layer)
+        .write()
+        .to_buffered(&mut out)
+        .map_err(|e| e.to_string())?;
+    let mut bytes = out.into_inner();
+    sort_attributes(&mut bytes, FIRST_ATTRIBUTE).ok_or("header of an unknown kind")?;
+    Ok(bytes)
+}
+
+fn channel_list(
+    (width, height): (usize, usize),
+    planes: Vec<(&str, FlatSamples)>,
+) -> Result<AnyChannels<FlatSamples>, String> {
+    let mut list = SmallVec::new();
+    for (name, samples) in planes {
+        if samples.len() != width * height {
+            return Err(format!(
+                "channel {name}: {} samples, expected {width} x {height}",
+                samples.len()
+            ));
+        }
+        list.push(AnyChannel::new(latin_text(name)?, samples));
+    }
+    Ok(AnyChannels::sort(list))
+}

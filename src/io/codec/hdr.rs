@@ -1,0 +1,254 @@
+//! Radiance RGBE: scene-linear, read only.
+
+use super::orient::Orientation;
+use super::profile::to_rec709;
+use super::raster::{Raster, Samples, default_names};
+use super::refusal::Refusal;
+use crate::color::RgbSpace;
+use crate::io::format::Format;
+use crate::io::header::Header;
+use crate::io::limits::{Demand, Limits, at_most};
+use image::codecs::hdr::HdrDecoder;
+use image::{ImageDecoder, ImageError};
+use std::io::{BufRead, Cursor, Read};
+
+/// The first line that the decoder knows; the same is called `#?RGBE` by others.
+const FIRST_LINE: &[u8] = b"#?RADIANCE\n";
+/// Light in the primaries of the display, or in CIE XYZ.
+const RGBE_LINE: &[u8] = b"FORMAT=32-bit_rle_rgbe\n";
+const XYZE_LINE: &[u8] = b"FORMAT=32-bit_rle_xyze\n";
+/// CIE XYZ as the primaries of light: its white is that of equal energy.
+const XYZ_SPACE: RgbSpace = RgbSpace {
+    primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
+    white: [1.0 / 3.0; 2],
+};
+/// Characters of a line that are shown where it is no size.
+const LONGEST_SHOWN: usize = 40;
+
+/// A file that the decoder reads as one of rows from the top in its own primaries, and what it really is.
+struct OpenedHdr<R: Read> {
+    decoder: HdrDecoder<R>,
+    orientation: Orientation,
+    is_xyz: bool,
+}
+
+fn open(
+    mut file: impl BufRead,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<OpenedHdr<impl Read>, Refusal> {
+    let (mut head, is_xyz) = plain_head(&mut file)?;
+    let ([width, height], orientation) = resolution(&read_line(&mut file)?)?;
+    head.extend(format!("-Y {height} +X {width}\n").into_bytes());
+    let decoder = HdrDecoder::new(Cursor::new(head).chain(file))?;
+    let (width, height) = decoder.dimensions();
+    limits.check(Demand {
+        width: width.into(),
+        height: height.into(),
+        channels: 3,
+        bytes_per_pixel: 12,
+        file_bytes,
+    })?;
+    Ok(OpenedHdr {
+        decoder,
+        orientation,
+        is_xyz,
+    })
+}
+
+/// The lines up to the empty one as the decoder knows them, and whether they say that light is in CIE XYZ.
+fn plain_head(file: &mut impl BufRead) -> Result<(Vec<u8>, bool), Refusal> {
+    read_line(file)?;
+    let (mut head, mut is_xyz) = (FIRST_LINE.to_vec(), false);
+    loop {
+        let line = read_line(file)?;
+        is_xyz |= line == XYZE_LINE;
+        head.extend_from_slice(if line == XYZE_LINE { RGBE_LINE } else { &line });
+        if line == b"\n" {
+            return Ok((head, is_xyz));
+        }
+    }
+}
+
+fn read_line(file: &mut impl BufRead) -> Result<Vec<u8>, Refusal> {
+    let mut line = Vec::new();
+    match file
+        .read_until(b'\n', &mut line)
+        .map_err(ImageError::from)?
+    {
+        0 => Err("truncated HDR (no picture)".into()),
+        _ => Ok(line),
+    }
+}
+
+/// Length and number of the rows that are stored, and how they lie in the picture: the axis and sense of the rows come
+/// first, those of the pixels in a row second; `-Y` goes down.
+fn resolution(line: &[u8]) -> Result<([u32; 2], Orientation), Refusal> {
+    let text = String::from_utf8_lossy(line);
+    parsed_resolution(&text).ok_or_else(|| {
+        // Where the line does not end, all of the pixels would be in the message.
+        let shown: String = text.trim().chars().take(LONGEST_SHOWN).collect();
+        Refusal::Broken(format!(
+            "damaged HDR: size {shown:?}, expected \"-Y 480 +X 640\""
+        ))
+    })
+}
+
+fn parsed_resolution(text: &str) -> Option<([u32; 2], Orientation)> {
+    let [rows, height, columns, width] = text.split_whitespace().collect::<Vec<_>>()[..] else {
+        return None;
+    };
+    let orientation = match (rows, columns) {
+        ("-Y", "+X") => 1,
+        ("-Y", "-X") => 2,
+        ("+Y", "-X") => 3,
+        ("+Y", "+X") => 4,
+        ("+X", "-Y") => 5,
+        ("-X", "-Y") => 6,
+        ("-X", "+Y") => 7,
+        ("+X", "+Y") => 8,
+        _ => return None,
+    };
+    let size = [width.parse().ok()?, height.parse().ok()?];
+    Some((size, Orientation(orientation)))
+}
+
+pub(crate) fn header(
+    file: impl BufRead,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
+    let OpenedHdr {
+        decoder,
+        orientation,
+        ..
+    } = open(file.take(limits.metadata_bytes), file_bytes, limits)?;
+    let (width, height) = decoder.dimensions();
+    let (width, height) = orientation.size((width as usize, height as usize));
+    Ok(Header {
+        format: Format::Hdr,
+        width,
+        height,
+        channels: default_names(3).unwrap_or_default(),
+        bits: 32,
+        metadata: decoder.metadata().custom_attributes,
+        ..Header::default()
+    })
+}
+
+pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
+    check_head_length(bytes, limits)?;
+    let OpenedHdr {
+        decoder,
+        orientation,
+        is_xyz,
+    } = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    let (width, height) = decoder.dimensions();
+    let (width, height) = (width as usize, height as usize);
+    limits.check_memory(width, height, 3)?;
+    let mut data = vec![0_f32; width * height * 3];
+    decoder.read_image(bytemuck::cast_slice_mut(&mut data))?;
+    if let (true, Some(matrix)) = (is_xyz, to_rec709(&XYZ_SPACE)?) {
+        data.chunks_exact_mut(3)
+            .for_each(|px| px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]])));
+    }
+    let raster = Raster {
+        width,
+        height,
+        names: default_names(3).unwrap_or_default(),
+        samples: Samples::F32(data),
+        display_encoded: false,
+        premultiplied: false,
+    };
+    Ok(raster.upright(orientation))
+}
+
+/// The header ends in time: its lines are kept, however many and long they are.
+fn check_head_length(bytes: &[u8], limits: &Limits) -> Result<(), String> {
+    let start = &bytes[..bytes.len().min(limits.metadata_bytes as usize + 1)];
+    match start.windows(2).any(|pair| pair == b"\n\n") {
+        true => Ok(()),
+        false => at_most(
+            start.len() as u64,
+            limits.metadata_bytes,
+            "bytes without an end of the header",
+            "metadata_bytes",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two rows of three pixels as they are stored, exponents such that 128 is 1.
+    fn read(format: &str, size: &str) -> Raster {
+        let pixels = (0..6_u8).flat_map(|i| [128 + i, 128, 128, 129]);
+        let head = format!("#?RGBE\nFORMAT=32-bit_rle_{format}\n\n{size}\n");
+        decode(
+            &head
+                .into_bytes()
+                .into_iter()
+                .chain(pixels)
+                .collect::<Vec<_>>(),
+            &Limits::default(),
+        )
+        .unwrap()
+    }
+
+    fn reds(raster: &Raster) -> Vec<i32> {
+        let Samples::F32(v) = &raster.samples else {
+            panic!("not floats")
+        };
+        v.iter()
+            .step_by(3)
+            .map(|v| (v * 128.0 - 128.0).round() as i32)
+            .collect()
+    }
+
+    #[test]
+    fn a_size_without_an_end_is_shown_in_part() {
+        let file = [b"#?RGBE\n\n-Y 30 +X 40".as_slice(), &[1; 4_000], b"\n"].concat();
+        let Err(Refusal::Broken(what)) = decode(&file, &Limits::default()) else {
+            panic!("read")
+        };
+        assert!(
+            what.starts_with("damaged HDR: size \"-Y 30 +X 40") && what.len() < 300,
+            "{what}"
+        );
+    }
+
+    #[test]
+    fn rows_may_go_any_way() {
+        for (size, shape, expected) in [
+            ("-Y 2 +X 3", (3, 2), [0, 1, 2, 3, 4, 5]),
+            ("-Y 2 -X 3", (3, 2), [2, 1, 0, 5, 4, 3]),
+            ("+Y 2 -X 3", (3, 2), [5, 4, 3, 2, 1, 0]),
+            ("+Y 2 +X 3", (3, 2), [3, 4, 5, 0, 1, 2]),
+            ("+X 2 -Y 3", (2, 3), [0, 3, 1, 4, 2, 5]),
+            ("-X 2 -Y 3", (2, 3), [3, 0, 4, 1, 5, 2]),
+            ("-X 2 +Y 3", (2, 3), [5, 2, 4, 1, 3, 0]),
+            ("+X 2 +Y 3", (2, 3), [2, 5, 1, 4, 0, 3]),
+        ] {
+            let raster = read("rgbe", size);
+            assert_eq!(
+                ((raster.width, raster.height), reds(&raster)),
+                (shape, expected.to_vec()),
+                "{size}"
+            );
+        }
+        assert!(resolution(b"-Y 2 -Y 3").is_err() && resolution(b"-Y 2 +X").is_err());
+    }
+
+    #[test]
+    fn xyz_of_equal_energy_is_white() {
+        let Samples::F32(v) = read("xyze", "-Y 2 +X 3").samples else {
+            panic!("not floats")
+        };
+        assert!(
+            v[..3].iter().all(|v| (v - 1.0).abs() < 1e-5),
+            "{:?}",
+            &v[..3]
+        );
+    }
+}

@@ -1,0 +1,327 @@
+//! JPEG: 8 bits, display-encoded, no alpha. Arithmetic coding and the like are left to OpenImageIO.
+
+use super::raster::{Raster, Samples, default_names};
+use super::refusal::Refusal;
+use crate::image::Image;
+use crate::io::format::Format;
+use crate::io::header::{Header, Notes, lines_of_notes, notes_of_lines};
+use crate::io::limits::{Demand, Limits, at_most};
+use crate::pixel::Srgb8;
+use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
+use image::{ExtendedColorType, ImageDecoder, ImageError};
+use std::io::{Cursor, Read};
+
+// Markers of ISO/IEC 10918-1, table B.1: end of image, start of scan, comment, application segment 2.
+const EOI: u8 = 0xd9;
+const SOS: u8 = 0xda;
+const COM: u8 = 0xfe;
+const APP2: u8 = 0xe2;
+/// First bytes of a segment with a part of a colour profile (ICC.1:2022, B.4); its number and their count follow.
+const ICC_SIGNATURE: &[u8] = b"ICC_PROFILE\0";
+
+impl From<ImageError> for Refusal {
+    fn from(e: ImageError) -> Self {
+        match e {
+            ImageError::Unsupported(_) => Self::Unsupported(e.to_string()),
+            _ => Self::Broken(format!("damaged: {e}")),
+        }
+    }
+}
+
+/// The part of a file in front of its first scan: everything that is known before pixels.
+pub(crate) fn read_before_scan(file: &mut impl Read, limits: &Limits) -> Result<Vec<u8>, Refusal> {
+    let mut bytes = Vec::new();
+    append(&mut bytes, file, 2)?;
+    loop {
+        let at = bytes.len();
+        let marker = append_segment(&mut bytes, file)?;
+        at_most(
+            bytes.len() as u64,
+            limits.metadata_bytes,
+            "bytes in front of the picture",
+            "metadata_bytes",
+        )?;
+        check_kind(marker, bytes.get(at + 4))?;
+        if marker == SOS {
+            return Ok(bytes);
+        }
+    }
+}
+
+/// Reads a marker and its segment behind the bytes that are there; the marker.
+fn append_segment(bytes: &mut Vec<u8>, file: &mut impl Read) -> Result<u8, Refusal> {
+    let at = bytes.len();
+    append(bytes, file, 2)?;
+    // Bytes of padding in front of a marker.
+    while bytes[at + 1] == 0xff {
+        bytes.truncate(at + 1);
+        append(bytes, file, 1)?;
+    }
+    let marker = bytes[at + 1];
+    if bytes[at] != 0xff || marker == EOI {
+        return Err("damaged JPEG: no picture".into());
+    }
+    append(bytes, file, 2)?;
+    let length = u16::from_be_bytes([bytes[at + 2], bytes[at + 3]]);
+    append(bytes, file, usize::from(length).saturating_sub(2))?;
+    Ok(marker)
+}
+
+/// Reads so many more bytes.
+fn append(bytes: &mut Vec<u8>, file: &mut impl Read, count: usize) -> Result<(), Refusal> {
+    let at = bytes.len();
+    bytes.resize(at + count, 0);
+    file.read_exact(&mut bytes[at..])
+        .map_err(|_| "truncated JPEG (no picture)".into())
+}
+
+/// Refuses kinds of JPEG that our decoder does not know, by their frame's marker (ISO/IEC 10918-1, table B.1) and bits.
+fn check_kind(marker: u8, bits: Option<&u8>) -> Result<(), Refusal> {
+    let kind = match (marker, bits) {
+        (0xc0..=0xc2, Some(8)) => return Ok(()),
+        (0xc0..=0xc2, Some(bits)) => format!("{bits} bits a sample, expected 8"),
+        (0xc3, _) => "lossless".into(),
+        (0xc5..=0xc7 | 0xcd..=0xcf, _) => "hierarchical".into(),
+        (0xc9..=0xcb, _) => "arithmetic coding".into(),
+        _ => return Ok(()),
+    };
+    Err(Refusal::Unsupported(format!("unsupported JPEG: {kind}")))
+}
+
+fn open<'a>(
+    bytes: &'a [u8],
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<JpegDecoder<Cursor<&'a [u8]>>, Refusal> {
+    let decoder = JpegDecoder::new(Cursor::new(bytes))?;
+    let (width, height) = decoder.dimensions();
+    let channels = u64::from(decoder.color_type().channel_count());
+    limits.check(Demand {
+        width: width.into(),
+        height: height.into(),
+        channels,
+        bytes_per_pixel: channels,
+        file_bytes,
+    })?;
+    Ok(decoder)
+}
+
+/// `start` is what stands [before the first scan](read_before_scan) at least.
+pub(crate) fn header(start: &[u8], file_bytes: u64, limits: &Limits) -> Result<Header, Refusal> {
+    let decoder = open(start, file_bytes, limits)?;
+    let (width, height) = decoder.dimensions();
+    let comments = segments(start)
+        .filter(|s| s.marker == COM)
+        .map(|s| String::from_utf8_lossy(s.data).into_owned());
+    Ok(Header {
+        format: Format::Jpeg,
+        width: width as usize,
+        height: height as usize,
+        channels: default_names(decoder.color_type().channel_count().into()).unwrap_or_default(),
+        bits: 8,
+        metadata: comments.flat_map(|text| notes_of_lines(&text)).collect(),
+        ..Header::default()
+    })
+}
+
+/// The embedded colour profile, which segments of 64 KiB hold in parts.
+pub(crate) fn profile(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut parts: Vec<(u8, &[u8])> = segments(bytes)
+        .take_while(|s| s.marker != SOS)
+        .filter(|s| s.marker == APP2)
+        .filter_map(profile_part)
+        .collect();
+    parts.sort_by_key(|&(number, _)| number);
+    (!parts.is_empty()).then(|| {
+        parts
+            .into_iter()
+            .flat_map(|(_, part)| part)
+            .copied()
+            .collect()
+    })
+}
+
+/// A part of a colour profile and its number.
+fn profile_part(segment: Segment<'_>) -> Option<(u8, &[u8])> {
+    let numbered = segment.data.strip_prefix(ICC_SIGNATURE)?;
+    let (&[number, _], part) = numbered.split_first_chunk()?;
+    Some((number, part))
+}
+
+/// Decodes a complete file; decoders return a half-grey picture for one that was cut, so that is looked at first.
+pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
+    read_before_scan(&mut &bytes[..], limits)?;
+    if !segments(bytes).any(|s| s.marker == EOI) {
+        return Err("truncated JPEG (no end marker)".into());
+    }
+    let decoder = open(bytes, bytes.len() as u64, limits)?;
+    let (width, height) = decoder.dimensions();
+    let (width, height) = (width as usize, height as usize);
+    let names = default_names(decoder.color_type().channel_count().into())
+        .ok_or("channels of an unknown kind")?;
+    limits.check_memory(width, height, names.len())?;
+    let mut data = vec![0; usize::try_from(decoder.total_bytes()).map_err(|_| "size overflows")?];
+    decoder.read_image(&mut data)?;
+    Ok(Raster {
+        width,
+        height,
+        names,
+        samples: Samples::U8(data),
+        display_encoded: true,
+        premultiplied: false,
+    })
+}
+
+/// A marker segment of a JPEG file.
+struct Segment<'a> {
+    marker: u8,
+    data: &'a [u8],
+}
+
+/// The segments in order, scans skipped; ends early where the file does. An EXIF thumbnail, a JPEG in itself, lies inside
+/// a segment and so does not end the file.
+fn segments(bytes: &[u8]) -> impl Iterator<Item = Segment<'_>> {
+    let mut rest = bytes.get(2..).unwrap_or_default();
+    let mut after_scan = false;
+    std::iter::from_fn(move || {
+        if after_scan {
+            rest = &rest[end_of_scan(rest)..];
+        }
+        let segment;
+        (segment, rest) = split_segment(rest)?;
+        after_scan = segment.marker == SOS;
+        Some(segment)
+    })
+}
+
+/// The first segment and what is behind it; behind the end of the picture is nothing.
+fn split_segment(mut bytes: &[u8]) -> Option<(Segment<'_>, &[u8])> {
+    while bytes.starts_with(&[0xff, 0xff]) {
+        bytes = &bytes[1..];
+    }
+    let (&[0xff, marker], tail) = bytes.split_first_chunk()? else {
+        return None;
+    };
+    if marker == EOI {
+        return Some((Segment { marker, data: &[] }, &[]));
+    }
+    let length = usize::from(u16::from_be_bytes(*tail.first_chunk()?));
+    let data = tail.get(2..length)?;
+    Some((Segment { marker, data }, &tail[length..]))
+}
+
+/// Where the entropy-coded data ends: at a marker that is neither a stuffed byte, a restart nor padding.
+fn end_of_scan(bytes: &[u8]) -> usize {
+    bytes
+        .windows(2)
+        .position(|pair| pair[0] == 0xff && !matches!(pair[1], 0 | 0xff | 0xd0..=0xd7))
+        .unwrap_or(bytes.len())
+}
+
+/// A whole file from 8-bit codes of one or three channels.
+pub(crate) fn encode(
+    (width, height): (usize, usize),
+    codes: &[u8],
+    quality: u8,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
+    let color = if codes.len() == width * height {
+        ExtendedColorType::L8
+    } else {
+        ExtendedColorType::Rgb8
+    };
+    let (width, height) = u32::try_from(width)
+        .ok()
+        .zip(u32::try_from(height).ok())
+        .ok_or("size overflows")?;
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, quality)
+        .encode(codes, width, height, color)
+        .map_err(|e| e.to_string())?;
+    insert_comment(&mut bytes, &metadata.to_vec())?;
+    Ok(bytes)
+}
+
+/// A picture as it comes back from a file of a quality, 1 to 100; nothing for one without pixels.
+pub fn through_jpeg(image: &Image<Srgb8>, quality: u8) -> Option<Image<Srgb8>> {
+    let codes = bytemuck::cast_slice(image.pixels());
+    let file = encode(image.size(), codes, quality, &[]).ok()?;
+    let raster = decode(&file, &Limits::default()).ok()?;
+    let Samples::U8(codes) = raster.samples else {
+        return None;
+    };
+    Some(Image::from_vec(
+        raster.width,
+        raster.height,
+        bytemuck::pod_collect_to_vec(&codes),
+    ))
+}
+
+/// Puts the notes into a comment segment right behind the start marker.
+fn insert_comment(jpeg: &mut Vec<u8>, notes: &Notes) -> Result<(), String> {
+    if notes.is_empty() {
+        return Ok(());
+    }
+    let text = lines_of_notes(notes);
+    let length = u16::try_from(text.len() + 2)
+        .map_err(|_| "metadata of more than 65,533 bytes does not fit a JPEG")?;
+    let segment = [0xff, COM]
+        .into_iter()
+        .chain(length.to_be_bytes())
+        .chain(text.into_bytes());
+    jpeg.splice(2..2, segment);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thumbnail_does_not_end_the_file() {
+        let thumbnail =
+            b"\xff\xd8\xff\xe1\x00\x06\xff\xd8\xff\xd9\xff\xda\x00\x02\x12\xff\x00\x34\xff\xd0\x56";
+        assert!(!segments(thumbnail).any(|s| s.marker == EOI));
+        let whole = [thumbnail.as_slice(), b"\xff\xd9"].concat();
+        assert!(segments(&whole).any(|s| s.marker == EOI));
+    }
+
+    /// The start of a picture of one pixel, with a frame of any kind.
+    fn frame(marker: u8, bits: u8) -> Result<Vec<u8>, Refusal> {
+        let frame = [marker, 0, 11, bits, 0, 1, 0, 1, 1, 1, 0x11, 0];
+        let file = [b"\xff\xd8\xff".as_slice(), &frame, b"\xff\xda\0\x02"];
+        read_before_scan(&mut file.concat().as_slice(), &Limits::default())
+    }
+
+    #[test]
+    fn kinds_that_are_not_ours_are_named_and_not_called_damaged() {
+        assert!(frame(0xc0, 8).is_ok() && frame(0xc1, 8).is_ok() && frame(0xc2, 8).is_ok());
+        for (marker, bits, kind) in [
+            (0xc1, 12, "12 bits a sample, expected 8"),
+            (0xc3, 8, "lossless"),
+            (0xc5, 8, "hierarchical"),
+            (0xc9, 8, "arithmetic coding"),
+            (0xca, 8, "arithmetic coding"),
+        ] {
+            match frame(marker, bits) {
+                Err(Refusal::Unsupported(e)) => assert_eq!(e, format!("unsupported JPEG: {kind}")),
+                other => panic!("{marker:x}: {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn comments_come_back() {
+        let notes = vec![("petcomp:seed".to_string(), "17".to_string())];
+        let bytes = encode((8, 8), &[90; 8 * 8 * 3], 90, &notes).unwrap();
+        let start = read_before_scan(&mut &bytes[..], &Limits::default()).unwrap();
+        assert!(start.len() < bytes.len());
+        assert_eq!(
+            header(&start, bytes.len() as u64, &Limits::default())
+                .unwrap()
+                .metadata,
+            notes
+        );
+        assert!(decode(&bytes, &Limits::default()).is_ok());
+    }
+}

@@ -1,0 +1,303 @@
+//! PNG: 8 or 16 bits, display-encoded as the file says or as sRGB, straight alpha.
+
+use super::codes::{CodedImage, Codes};
+use super::profile::ColorDescription;
+use super::raster::{Raster, Samples, default_names};
+use super::refusal::Refusal;
+use crate::color::RgbSpace;
+use crate::io::format::Format;
+use crate::io::header::{Header, Notes, note};
+use crate::io::limits::{Demand, Limits};
+use crate::quality::Quality;
+use png::{BitDepth, ColorType, Transformations};
+use std::io::{BufRead, Cursor, Seek};
+
+impl From<png::DecodingError> for Refusal {
+    fn from(e: png::DecodingError) -> Self {
+        let cut = matches!(&e, png::DecodingError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof);
+        Self::Broken(if cut {
+            "truncated PNG".into()
+        } else {
+            format!("damaged PNG: {e}")
+        })
+    }
+}
+
+/// The file up to its pixels, checked against the limits.
+fn open<R: BufRead + Seek>(
+    file: R,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<png::Reader<R>, Refusal> {
+    let most = png::Limits {
+        bytes: usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX),
+    };
+    let mut decoder = png::Decoder::new_with_limits(file, most);
+    decoder.set_transformations(Transformations::EXPAND);
+    decoder.read_header_info()?;
+    let reader = decoder.read_info()?;
+    let (color, depth) = reader.output_color_type();
+    let channels = color.samples() as u64;
+    limits.check(Demand {
+        width: u64::from(reader.info().width),
+        height: u64::from(reader.info().height),
+        channels,
+        bytes_per_pixel: channels * if depth == BitDepth::Sixteen { 2 } else { 1 },
+        file_bytes,
+    })?;
+    Ok(reader)
+}
+
+pub(crate) fn header(
+    file: impl BufRead + Seek,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
+    let reader = open(file, file_bytes, limits)?;
+    let (info, (color, depth)) = (reader.info(), reader.output_color_type());
+    Ok(Header {
+        format: Format::Png,
+        width: info.width as usize,
+        height: info.height as usize,
+        channels: default_names(color.samples()).unwrap_or_default(),
+        bits: if depth == BitDepth::Sixteen { 16 } else { 8 },
+        metadata: texts(info),
+        ..Header::default()
+    })
+}
+
+fn texts(info: &png::Info<'_>) -> Notes {
+    let latin = info
+        .uncompressed_latin1_text
+        .iter()
+        .map(|t| note(&t.keyword, &t.text));
+    let utf8 = info
+        .utf8_text
+        .iter()
+        .filter_map(|t| Some(note(&t.keyword, &t.get_text().ok()?)));
+    latin.chain(utf8).collect()
+}
+
+/// What the file says of its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3): code points, a profile,
+/// sRGB, or the exponent and the primaries. None for sRGB, and where it says nothing.
+pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
+    let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
+    let info = reader.info();
+    if let Some(cicp) = info.coding_independent_code_points {
+        return Some(ColorDescription::CodePoints(
+            cicp.color_primaries,
+            cicp.transfer_function,
+        ));
+    }
+    if info.srgb.is_some() {
+        return None;
+    }
+    if let Some(icc) = &info.icc_profile {
+        return Some(ColorDescription::Icc(icc.to_vec()));
+    }
+    let exponent = info
+        .gama_chunk
+        .map(|gamma| SCALED_ONE / f64::from(gamma.into_scaled()));
+    let primaries = info.chrm_chunk.map(named_space);
+    (exponent.is_some() || primaries.is_some()).then_some(ColorDescription::Curve {
+        exponent,
+        primaries,
+    })
+}
+
+/// What `gAMA` and `cHRM` store for 1: both are numbers times 100,000.
+const SCALED_ONE: f64 = 100_000.0;
+
+fn named_space(named: png::SourceChromaticities) -> RgbSpace {
+    RgbSpace {
+        primaries: [named.red, named.green, named.blue].map(xy),
+        white: xy(named.white),
+    }
+}
+
+fn xy((x, y): (png::ScaledFloat, png::ScaledFloat)) -> [f64; 2] {
+    [x, y].map(|v| f64::from(v.into_scaled()) / SCALED_ONE)
+}
+
+pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
+    let mut reader = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    let (color, depth) = reader.output_color_type();
+    let (width, height) = (reader.info().width as usize, reader.info().height as usize);
+    let names = default_names(color.samples()).ok_or("channels of an unknown kind")?;
+    limits.check_memory(width, height, names.len())?;
+    let mut data = vec![0; reader.output_buffer_size().ok_or("size overflows")?];
+    reader.next_frame(&mut data)?;
+    reader.finish()?;
+    let samples = match depth {
+        BitDepth::Sixteen => Samples::U16(
+            data.chunks_exact(2)
+                .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
+                .collect(),
+        ),
+        _ => Samples::U8(data),
+    };
+    Ok(Raster {
+        width,
+        height,
+        names,
+        samples,
+        display_encoded: true,
+        premultiplied: false,
+    })
+}
+
+/// Effort of deflate and of the filters before it; the default takes a few milliseconds for 640 x 480.
+fn compression(effort: Quality) -> png::Compression {
+    match effort {
+        Quality::Draft => png::Compression::Fastest,
+        Quality::Normal => png::Compression::Fast,
+        Quality::Reference => png::Compression::High,
+    }
+}
+
+/// A whole file.
+pub(crate) fn encode(
+    picture: &CodedImage<'_>,
+    effort: Quality,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    write(&mut bytes, picture, effort, metadata).map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+fn write(
+    out: &mut Vec<u8>,
+    picture: &CodedImage<'_>,
+    effort: Quality,
+    metadata: &[(String, String)],
+) -> Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(out, picture.width as u32, picture.height as u32);
+    encoder.set_color(match picture.names.len() {
+        1 => ColorType::Grayscale,
+        3 => ColorType::Rgb,
+        _ => ColorType::Rgba,
+    });
+    encoder.set_compression(compression(effort));
+    if picture.names.len() > 1 {
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    }
+    add_texts(&mut encoder, metadata)?;
+    match &picture.codes {
+        Codes::U8(codes) => {
+            encoder.set_depth(BitDepth::Eight);
+            encoder.write_header()?.write_image_data(codes)
+        }
+        Codes::U16(codes) => {
+            encoder.set_depth(BitDepth::Sixteen);
+            let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_be_bytes()).collect();
+            encoder.write_header()?.write_image_data(&bytes)
+        }
+    }
+}
+
+/// Texts in Latin-1 where that can hold them.
+fn add_texts(
+    encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
+    metadata: &[(String, String)],
+) -> Result<(), png::EncodingError> {
+    for (key, value) in metadata {
+        match value.chars().all(|c| (c as u32) < 256) {
+            true => encoder.add_text_chunk(key.clone(), value.clone())?,
+            false => encoder.add_itxt_chunk(key.clone(), value.clone())?,
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::codec::profile::Profile;
+
+    /// Light of a middle grey code, in a file with what `colors` adds to it.
+    fn light(colors: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>)) -> [f32; 3] {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        colors(&mut encoder);
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&[128])
+            .unwrap();
+        let profile = super::color_description(&bytes, &Limits::default())
+            .map_or(Ok(None), Profile::from_description)
+            .unwrap();
+        let code = 128.0 / 255.0;
+        profile.map_or([crate::color::srgb_to_linear(code); 3], |p| {
+            p.light([code; 3])
+        })
+    }
+
+    #[test]
+    fn gamma_is_applied_and_that_of_screens_is_srgb() {
+        let code = 128.0_f64 / 255.0;
+        for (gama, exponent) in [
+            (100_000, 1.0),
+            (55_556, 1.8),
+            (50_000, 2.0),
+            (220_000, 1.0 / 2.2),
+            (35_000, 1.0 / 0.35),
+        ] {
+            let [r, g, b] = light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama)));
+            let expected = libm::pow(code, exponent) as f32;
+            assert!(
+                (r - expected).abs() < 2e-5 && r == g && g == b,
+                "{gama}: {r}, expected {expected}"
+            );
+        }
+        for gama in [45_455, 45_454, 45_000] {
+            assert_eq!(
+                light(|e| e.set_source_gamma(png::ScaledFloat::from_scaled(gama))),
+                light(|_| ())
+            );
+        }
+    }
+
+    #[test]
+    fn the_word_of_srgb_goes_before_gamma() {
+        let both = light(|e| {
+            e.set_source_gamma(png::ScaledFloat::from_scaled(100_000));
+            e.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        });
+        assert_eq!(both, light(|_| ()));
+    }
+
+    #[test]
+    fn primaries_are_converted() {
+        let chunk = |at: [f32; 8]| {
+            png::SourceChromaticities::new(
+                (at[0], at[1]),
+                (at[2], at[3]),
+                (at[4], at[5]),
+                (at[6], at[7]),
+            )
+        };
+        let p3 = chunk([0.3127, 0.329, 0.68, 0.32, 0.265, 0.69, 0.15, 0.06]);
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_source_chromaticities(p3);
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&[0])
+            .unwrap();
+        let profile = color_description(&bytes, &Limits::default())
+            .map(Profile::from_description)
+            .unwrap()
+            .unwrap()
+            .unwrap();
+        // Display P3 red in Rec. 709.
+        let red = profile.light([1.0, 0.0, 0.0]);
+        for (v, expected) in red.iter().zip([1.224_94, -0.042_06, -0.019_64]) {
+            assert!((v - expected).abs() < 1e-3, "{red:?}");
+        }
+        let same = chunk([0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06]);
+        assert_eq!(light(|e| e.set_source_chromaticities(same)), light(|_| ()));
+    }
+}

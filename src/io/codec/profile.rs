@@ -1,0 +1,408 @@
+//! What files say that their display codes are: colour profiles (ICC), and the curve and primaries that a PNG names.
+//!
+//! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of one grey curve are
+//! applied; others are named in a warning and the codes treated as sRGB.
+//!
+//! # Method
+//! ICC.1:2022: curves to linear light (10.6, 10.18), the matrix of the colorant columns to XYZ under D50 (F.3), Bradford to D65
+//! (E.3), and from there to Rec. 709. Evaluated here, not by the crate that parses the profile, so that the bits are the
+//! same on every machine.
+
+use crate::color::{ColorMatrix, RgbSpace, bradford, rgb_from_rgb, rgb_from_xyz, srgb_to_linear};
+use moxcms::{ColorProfile, DataColorSpace, ToneReprCurve};
+use nalgebra::Matrix3;
+
+/// CIE x, y of the connection space's white (ICC.1:2022, 7.2.16: X 0.9642, Y 1, Z 0.8249).
+const D50_WHITE: [f64; 2] = [0.345_70, 0.358_54];
+/// 16-bit codes, the finest that files have.
+const CODE_COUNT: usize = 1 << 16;
+/// The largest of them.
+const LARGEST_CODE: f32 = 65_535.0;
+/// Curves and matrices that differ by less are sRGB's, written with fewer digits or measured from a table.
+const SRGB_TOLERANCE: f32 = 2e-3;
+/// The exponent of screens: files name it that mean sRGB, in steps of a hundredth and coarser.
+const SCREEN_EXPONENTS: std::ops::RangeInclusive<f64> = 2.16..=2.24;
+/// H.273: the primaries of Rec. 709 with the curve of sRGB, and without any.
+const CODE_POINTS_SRGB: (u8, u8) = (1, 13);
+const CODE_POINTS_LINEAR: (u8, u8) = (1, 8);
+/// Chromaticities that differ by less are the same, written with fewer digits.
+const CHROMATICITY_TOLERANCE: f64 = 1e-3;
+/// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
+const SMALLEST_GAMUT: f64 = 1e-3;
+
+/// What a file says of its colours.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum ColorDescription {
+    /// A colour profile.
+    Icc(Vec<u8>),
+    /// Light is the code raised to an exponent, if that is given, in primaries, if those are.
+    Curve {
+        exponent: Option<f64>,
+        primaries: Option<RgbSpace>,
+    },
+    /// Primaries and transfer function by their numbers in ITU-T H.273.
+    CodePoints(u8, u8),
+}
+
+/// How display codes become light, where a file says so itself.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Profile {
+    /// Linear light of each 16-bit code, for red, green and blue.
+    curves: [Vec<f32>; 3],
+    to_rec709: ColorMatrix,
+}
+
+impl Profile {
+    /// The profile that a file describes, if it is not sRGB.
+    ///
+    /// # Errors
+    /// What is described that cannot be applied.
+    pub(crate) fn from_description(description: ColorDescription) -> Result<Option<Self>, String> {
+        match description {
+            ColorDescription::Icc(bytes) => Self::from_icc(&bytes),
+            ColorDescription::Curve {
+                exponent,
+                primaries,
+            } => Self::from_curve(exponent, primaries),
+            ColorDescription::CodePoints(a, b) if (a, b) == CODE_POINTS_SRGB => Ok(None),
+            ColorDescription::CodePoints(a, b) if (a, b) == CODE_POINTS_LINEAR => {
+                Self::from_curve(Some(1.0), None)
+            }
+            ColorDescription::CodePoints(primaries, transfer) => Err(format!(
+                "code points {primaries}/{transfer} for its colours"
+            )),
+        }
+    }
+
+    fn from_curve(
+        exponent: Option<f64>,
+        primaries: Option<RgbSpace>,
+    ) -> Result<Option<Self>, String> {
+        let exponent = exponent.filter(|e| !SCREEN_EXPONENTS.contains(e));
+        let matrix = primaries.map_or(Ok(None), |space| to_rec709(&space))?;
+        if exponent.is_none() && matrix.is_none() {
+            return Ok(None);
+        }
+        let curve = curve_table(|x| match exponent {
+            Some(exponent) => libm::pow(x, exponent),
+            None => f64::from(srgb_to_linear(x as f32)),
+        });
+        let curve = curve.ok_or("a gamma that is not a number")?;
+        Ok(Some(Self {
+            to_rec709: matrix.unwrap_or_else(|| Matrix3::identity().into()),
+            ..Self::from_grey_curve(&curve)
+        }))
+    }
+
+    /// The same curve for red, green and blue of Rec. 709.
+    fn from_grey_curve(curve: &[f32]) -> Self {
+        Self {
+            curves: std::array::from_fn(|_| curve.to_vec()),
+            to_rec709: Matrix3::identity().into(),
+        }
+    }
+
+    fn from_icc(bytes: &[u8]) -> Result<Option<Self>, String> {
+        let icc = ColorProfile::new_from_slice(bytes).map_err(|_| "a damaged colour profile")?;
+        let profile = match icc.color_space {
+            DataColorSpace::Rgb => Self::from_primaries(&icc),
+            DataColorSpace::Gray => {
+                trc_table(&icc.gray_trc).map(|curve| Self::from_grey_curve(&curve))
+            }
+            other => {
+                return Err(format!(
+                    "a colour profile for {}",
+                    format!("{other:?}").to_uppercase()
+                ));
+            }
+        };
+        let profile = profile.ok_or("a colour profile without primaries and curves")?;
+        Ok((!profile.is_srgb()).then_some(profile))
+    }
+
+    fn from_primaries(icc: &ColorProfile) -> Option<Self> {
+        let columns =
+            [icc.red_colorant, icc.green_colorant, icc.blue_colorant].map(|c| [c.x, c.y, c.z]);
+        let xyz_d50_from_rgb = Matrix3::from_columns(&columns.map(Into::into));
+        let matrix = rgb_from_xyz(&RgbSpace::REC709)
+            * bradford(RgbSpace::REC709.white, D50_WHITE)
+            * xyz_d50_from_rgb;
+        let curves = [
+            trc_table(&icc.red_trc)?,
+            trc_table(&icc.green_trc)?,
+            trc_table(&icc.blue_trc)?,
+        ];
+        matrix.iter().all(|v| v.is_finite()).then(|| Self {
+            curves,
+            to_rec709: matrix.into(),
+        })
+    }
+
+    fn is_srgb(&self) -> bool {
+        let identity = ColorMatrix::from(Matrix3::identity());
+        let same_primaries = self
+            .to_rec709
+            .rows
+            .iter()
+            .flatten()
+            .zip(identity.rows.iter().flatten())
+            .all(|(&v, &w)| is_near(v, w));
+        same_primaries && self.curves.iter().all(|curve| is_srgb_curve(curve))
+    }
+
+    /// Linear Rec. 709 of display values from 0 to 1.
+    #[inline]
+    pub(crate) fn light(&self, display: [f32; 3]) -> [f32; 3] {
+        let light = [0, 1, 2].map(|c: usize| {
+            let code = display[c].clamp(0.0, 1.0) * LARGEST_CODE + 0.5;
+            self.curves[c][code as usize]
+        });
+        self.to_rec709.apply(light)
+    }
+}
+
+fn is_near(v: f32, w: f32) -> bool {
+    (v - w).abs() < SRGB_TOLERANCE
+}
+
+fn is_srgb_curve(light: &[f32]) -> bool {
+    light
+        .iter()
+        .enumerate()
+        .all(|(code, &v)| is_near(v, srgb_to_linear(code as f32 / LARGEST_CODE)))
+}
+
+/// Light of every 16-bit code; none where there is no curve, or one that gives no numbers.
+fn trc_table(curve: &Option<ToneReprCurve>) -> Option<Vec<f32>> {
+    let curve = curve.as_ref()?;
+    curve_table(|x| evaluate(curve, x))
+}
+
+fn curve_table(curve: impl Fn(f64) -> f64) -> Option<Vec<f32>> {
+    let light: Vec<f32> = (0..CODE_COUNT)
+        .map(|code| curve(f64::from(code as u16) / f64::from(LARGEST_CODE)) as f32)
+        .collect();
+    light.iter().all(|v| v.is_finite()).then_some(light)
+}
+
+/// ICC.1:2022, 10.6 (tables, or a gamma of 8.8 bits) and 10.18 (functions of one to seven parameters).
+fn evaluate(curve: &ToneReprCurve, x: f64) -> f64 {
+    match curve {
+        ToneReprCurve::Lut(table) => match table[..] {
+            [] => x,
+            [gamma] => libm::pow(x, f64::from(gamma) / 256.0),
+            _ => interpolated(table, x),
+        },
+        ToneReprCurve::Parametric(parameters) => {
+            let parameters: Vec<f64> = parameters.iter().map(|&v| f64::from(v)).collect();
+            evaluate_parametric(&parameters, x)
+        }
+    }
+}
+
+/// ICC.1:2022, table 68: a power where `x` is at least a bound, and a straight line below it.
+fn evaluate_parametric(parameters: &[f64], x: f64) -> f64 {
+    match *parameters {
+        [g] => libm::pow(x, g),
+        [g, a, b] if x >= -b / a => libm::pow(a * x + b, g),
+        [_, _, _] => 0.0,
+        [g, a, b, c] if x >= -b / a => libm::pow(a * x + b, g) + c,
+        [_, _, _, c] => c,
+        [g, a, b, _, d] if x >= d => libm::pow(a * x + b, g),
+        [_, _, _, c, _] => c * x,
+        [g, a, b, _, d, e, _] if x >= d => libm::pow(a * x + b, g) + e,
+        [_, _, _, c, _, _, f] => c * x + f,
+        _ => f64::NAN,
+    }
+}
+
+fn interpolated(table: &[u16], x: f64) -> f64 {
+    let at = x * (table.len() - 1) as f64;
+    let i = (at as usize).min(table.len() - 2);
+    let (low, high) = (f64::from(table[i]), f64::from(table[i + 1]));
+    (low + (high - low) * (at - i as f64)) / f64::from(LARGEST_CODE)
+}
+
+/// The matrix to the library's primaries from those that a file names; none where they are the same.
+///
+/// # Errors
+/// For primaries and a white that no colour space has.
+pub(crate) fn to_rec709(named: &RgbSpace) -> Result<Option<ColorMatrix>, String> {
+    let (given, ours) = (chromaticities(named), chromaticities(&RgbSpace::REC709));
+    // Primaries may be no colours that can be seen, as those of XYZ and ACES are.
+    let plausible = given.iter().all(|v| v.abs() <= 2.0);
+    if !plausible || gamut_area(named) < SMALLEST_GAMUT || named.white[1] < SMALLEST_GAMUT {
+        return Err(format!(
+            "chromaticities {given:?}, expected those of a colour space"
+        ));
+    }
+    let same = given
+        .iter()
+        .zip(ours)
+        .all(|(v, w)| (v - w).abs() < CHROMATICITY_TOLERANCE);
+    Ok((!same).then(|| rgb_from_rgb(&RgbSpace::REC709, named).into()))
+}
+
+/// CIE x, y of the primaries and of white.
+fn chromaticities(space: &RgbSpace) -> Vec<f64> {
+    space
+        .primaries
+        .into_iter()
+        .chain([space.white])
+        .flatten()
+        .collect()
+}
+
+/// Area of the triangle of primaries in CIE x, y.
+fn gamut_area(space: &RgbSpace) -> f64 {
+    let [r, g, b] = space.primaries;
+    ((g[0] - r[0]) * (b[1] - r[1]) - (b[0] - r[0]) * (g[1] - r[1])).abs() / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(icc: &ColorProfile) -> Option<Profile> {
+        Profile::from_icc(&icc.encode().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn srgb_is_what_was_assumed_anyway() {
+        assert_eq!(parsed(&ColorProfile::new_srgb()), None);
+    }
+
+    /// SMPTE EG 432-1: P3 primaries, D65; Adobe RGB (1998): 4.3.1 and gamma 563/256.
+    #[test]
+    fn other_primaries_become_rec_709() {
+        let p3 = RgbSpace {
+            primaries: [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]],
+            white: [0.3127, 0.3290],
+        };
+        let adobe = RgbSpace {
+            primaries: [[0.64, 0.33], [0.21, 0.71], [0.15, 0.06]],
+            white: [0.3127, 0.3290],
+        };
+        fn gamma(v: f64) -> f64 {
+            libm::pow(v, 563.0 / 256.0)
+        }
+        fn srgb(v: f64) -> f64 {
+            f64::from(srgb_to_linear(v as f32))
+        }
+        let cases = [
+            (ColorProfile::new_display_p3(), p3, srgb as fn(f64) -> f64),
+            (
+                ColorProfile::new_adobe_rgb(),
+                adobe,
+                gamma as fn(f64) -> f64,
+            ),
+        ];
+        for (icc, space, curve) in cases {
+            let profile = parsed(&icc).unwrap();
+            for display in [
+                [0.2, 0.5, 0.9],
+                [1.0, 1.0, 1.0],
+                [0.0, 0.0, 0.0],
+                [0.8, 0.1, 0.3],
+            ] {
+                let light = nalgebra::Vector3::from(display.map(curve));
+                let expected = rgb_from_rgb(&RgbSpace::REC709, &space) * light;
+                let got = profile.light(display.map(|v| v as f32));
+                // Colorants are stored in steps of 1/65536, and some programs round their curves to 1/256.
+                for (v, w) in got.iter().zip(expected.iter()) {
+                    assert!(
+                        (f64::from(*v) - w).abs() < 1e-3,
+                        "{display:?}: {got:?}, expected {expected:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn curves_are_those_of_the_standard() {
+        let at = |curve: ToneReprCurve, x| evaluate(&curve, x);
+        assert_eq!(at(ToneReprCurve::Lut(vec![]), 0.3), 0.3);
+        assert_eq!(at(ToneReprCurve::Lut(vec![512]), 0.5), 0.25);
+        assert_eq!(at(ToneReprCurve::Lut(vec![0, 0, 65_535]), 0.75), 0.5);
+        assert_eq!(at(ToneReprCurve::Lut(vec![0, 65_535]), 1.0), 1.0);
+        assert_eq!(at(ToneReprCurve::Parametric(vec![2.0]), 0.5), 0.25);
+        assert_eq!(
+            at(ToneReprCurve::Parametric(vec![2.0, 1.0, -0.5]), 0.25),
+            0.0
+        );
+        assert_eq!(
+            at(
+                ToneReprCurve::Parametric(vec![2.0, 1.0, 0.0, 0.5, 0.25]),
+                0.125
+            ),
+            0.0625
+        );
+        assert!(trc_table(&Some(ToneReprCurve::Parametric(vec![1.0, 2.0]))).is_none());
+    }
+
+    #[test]
+    fn code_points_other_than_those_of_screens_are_named() {
+        assert_eq!(
+            Profile::from_description(ColorDescription::CodePoints(1, 13)),
+            Ok(None)
+        );
+        assert_eq!(
+            Profile::from_description(ColorDescription::CodePoints(1, 8))
+                .unwrap()
+                .unwrap()
+                .light([0.5; 3])[0],
+            32768.0 / 65535.0
+        );
+        assert_eq!(
+            Profile::from_description(ColorDescription::CodePoints(9, 16)).unwrap_err(),
+            "code points 9/16 for its colours"
+        );
+    }
+
+    /// CIE XYZ of equal energy: its middle is the white of Rec. 709.
+    #[test]
+    fn primaries_without_luminance_are_primaries() {
+        let xyz = RgbSpace {
+            primaries: [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]],
+            white: [1.0 / 3.0; 2],
+        };
+        let matrix = to_rec709(&xyz).unwrap().unwrap();
+        let white = matrix.apply([1.0; 3]);
+        assert!(white.iter().all(|v| (v - 1.0).abs() < 1e-6), "{white:?}");
+        // Y is what Rec. 709 says luminance is, before the white is adapted: green has most of it.
+        let [r, g, b] = matrix.apply([0.0, 1.0, 0.0]);
+        assert!(g > 1.0 && r < 0.0 && b < 0.0, "{r} {g} {b}");
+        assert_eq!(to_rec709(&RgbSpace::REC709), Ok(None));
+        let line = RgbSpace {
+            primaries: [[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]],
+            ..xyz
+        };
+        let black = RgbSpace {
+            white: [0.3, 0.0],
+            ..xyz
+        };
+        let endless = RgbSpace {
+            white: [f64::NAN, 0.3],
+            ..xyz
+        };
+        assert!(
+            [line, black, endless]
+                .iter()
+                .all(|space| to_rec709(space).is_err())
+        );
+    }
+
+    #[test]
+    fn damaged_profiles_are_refused_and_named() {
+        let whole = ColorProfile::new_display_p3().encode().unwrap();
+        for length in (0..whole.len()).step_by(7) {
+            // A cut may spare everything that counts.
+            let _ = Profile::from_icc(&whole[..length]);
+        }
+        assert_eq!(
+            Profile::from_icc(b"profile").unwrap_err(),
+            "a damaged colour profile"
+        );
+    }
+}

@@ -1,0 +1,129 @@
+//! Decoded samples as a file stores them.
+
+use super::orient::Orientation;
+use bytemuck::Pod;
+use half::f16;
+use rayon::prelude::*;
+
+/// Samples of a picture, channels interleaved, rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Samples {
+    U8(Vec<u8>),
+    U16(Vec<u16>),
+    F16(Vec<f16>),
+    F32(Vec<f32>),
+}
+
+impl Samples {
+    pub(crate) fn are_float(&self) -> bool {
+        matches!(self, Self::F16(_) | Self::F32(_))
+    }
+
+    /// Gives the memory of the last samples back.
+    pub(crate) fn shorten(&mut self, count: usize) {
+        match self {
+            Self::U8(v) => shorten(v, count),
+            Self::U16(v) => shorten(v, count),
+            Self::F16(v) => shorten(v, count),
+            Self::F32(v) => shorten(v, count),
+        }
+    }
+}
+
+fn shorten<T>(samples: &mut Vec<T>, count: usize) {
+    samples.truncate(count);
+    samples.shrink_to_fit();
+}
+
+/// What a decoder hands over.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Raster {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Names of the interleaved channels: `R G B A`, `Y`, `Z`, ...
+    pub(crate) names: Vec<String>,
+    pub(crate) samples: Samples,
+    /// Colour samples are sRGB display values.
+    pub(crate) display_encoded: bool,
+    /// Colour samples are already multiplied by alpha.
+    pub(crate) premultiplied: bool,
+}
+
+impl Raster {
+    /// Samples of a row.
+    pub(crate) fn row_samples(&self) -> usize {
+        self.width * self.names.len()
+    }
+
+    /// The picture of one of its channels.
+    pub(crate) fn narrowed(self, channel: usize) -> Self {
+        let count = self.names.len();
+        if count == 1 {
+            return self;
+        }
+        let samples = match &self.samples {
+            Samples::U8(v) => Samples::U8(one_channel(v, count, channel)),
+            Samples::U16(v) => Samples::U16(one_channel(v, count, channel)),
+            Samples::F16(v) => Samples::F16(one_channel(v, count, channel)),
+            Samples::F32(v) => Samples::F32(one_channel(v, count, channel)),
+        };
+        Self {
+            names: vec![self.names[channel].clone()],
+            samples,
+            ..self
+        }
+    }
+
+    /// The picture the way the camera was held.
+    pub(crate) fn upright(self, orientation: Orientation) -> Self {
+        if !orientation.turns() {
+            return self;
+        }
+        let (stored, n) = ((self.width, self.height), self.names.len());
+        let samples = match &self.samples {
+            Samples::U8(v) => Samples::U8(orientation.apply(v, n, stored)),
+            Samples::U16(v) => Samples::U16(orientation.apply(v, n, stored)),
+            Samples::F16(v) => Samples::F16(orientation.apply(v, n, stored)),
+            Samples::F32(v) => Samples::F32(orientation.apply(v, n, stored)),
+        };
+        let (width, height) = orientation.size(stored);
+        Self {
+            width,
+            height,
+            samples,
+            ..self
+        }
+    }
+
+    /// Samples that are infinite or NaN.
+    pub(crate) fn count_not_finite(&self) -> usize {
+        match &self.samples {
+            Samples::F16(v) => v.par_iter().filter(|x| !x.is_finite()).count(),
+            Samples::F32(v) => v.par_iter().filter(|x| !x.is_finite()).count(),
+            Samples::U8(_) | Samples::U16(_) => 0,
+        }
+    }
+}
+
+fn one_channel<T: Pod>(samples: &[T], count: usize, channel: usize) -> Vec<T> {
+    samples.chunks_exact(count).map(|px| px[channel]).collect()
+}
+
+/// Names of the channels of a picture of `count` channels without names of its own.
+pub(crate) fn default_names(count: usize) -> Option<Vec<String>> {
+    let names: &[&str] = match count {
+        1 => &["Y"],
+        2 => &["Y", "A"],
+        3 => &["R", "G", "B"],
+        4 => &["R", "G", "B", "A"],
+        _ => return None,
+    };
+    Some(names.iter().map(|&n| n.into()).collect())
+}
+
+/// The part of `0..shown` that `length` samples from `start` on cover.
+pub(crate) fn overlap(start: i64, length: usize, shown: usize) -> std::ops::Range<usize> {
+    let last = shown as i64;
+    let end = start + length as i64;
+    start.clamp(0, last) as usize..end.clamp(0, last) as usize
+}

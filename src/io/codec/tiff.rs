@@ -1,0 +1,544 @@
+//! TIFF: integers display-encoded, half, float and double scene-linear; grey or RGB, with or without alpha, in strips or
+//! tiles, planes side by side or apart. Other kinds are left to OpenImageIO.
+
+use super::codes::{CodedImage, Codes};
+use super::raster::{Raster, Samples, default_names};
+use super::refusal::Refusal;
+use crate::io::format::Format;
+use crate::io::header::{Header, lines_of_notes, notes_of_lines};
+use crate::io::limits::{Demand, Limits};
+use bytemuck::zeroed_vec;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::encoder::{TiffEncoder, TiffValue, colortype};
+use tiff::tags::{ExtraSamples, Tag};
+use tiff::{ColorType, TiffError};
+
+/// TIFF 6.0, `ExtraSamples`: colours are already multiplied by alpha, or not.
+const ASSOCIATED_ALPHA: u16 = 1;
+const UNASSOCIATED_ALPHA: u16 = 2;
+/// TIFF 6.0, `PlanarConfiguration`: each channel by itself.
+const SEPARATE_PLANES: u16 = 2;
+/// TIFF 6.0, `FillOrder`: the first pixel is in the lowest bit.
+const LOWEST_BIT_FIRST: u16 = 2;
+/// TIFF 6.0, `Compression`.
+const LZW_COMPRESSION: u16 = 5;
+/// TIFF 6.0, `PhotometricInterpretation`: codes are indices into a palette.
+const PALETTE_COLOR: u16 = 3;
+
+impl From<TiffError> for Refusal {
+    fn from(e: TiffError) -> Self {
+        match e {
+            TiffError::UnsupportedError(e) => unsupported(&e),
+            TiffError::IoError(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => {
+                Self::Broken("truncated TIFF".into())
+            }
+            e => Self::Broken(format!(
+                "damaged TIFF: {}",
+                e.to_string().trim_start_matches("format error: ")
+            )),
+        }
+    }
+}
+
+fn unsupported(what: &dyn std::fmt::Display) -> Refusal {
+    Refusal::Unsupported(format!("unsupported TIFF: {what}"))
+}
+
+struct OpenedTiff<R: Read + Seek> {
+    decoder: Decoder<R>,
+    width: usize,
+    height: usize,
+    names: Vec<String>,
+    bits: u8,
+    /// Stored as cyan, magenta, yellow and black.
+    inks: bool,
+}
+
+fn open<R: Read + Seek>(
+    file: R,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<OpenedTiff<R>, Refusal> {
+    let mut most = tiff::decoder::Limits::default();
+    most.decoding_buffer_size = usize::try_from(limits.decoded_bytes).unwrap_or(usize::MAX);
+    most.intermediate_buffer_size = most.decoding_buffer_size;
+    most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
+    let mut decoder = first_picture(file)?.with_limits(most);
+    let (width, height) = decoder.dimensions()?;
+    refuse_missing_palette(&mut decoder)?;
+    let (channels, bits) = stored_channels(&mut decoder)?;
+    limits.check(Demand {
+        width: width.into(),
+        height: height.into(),
+        channels,
+        bytes_per_pixel: channels * u64::from(bits).div_ceil(8),
+        file_bytes,
+    })?;
+    let inks = matches!(decoder.colortype()?, ColorType::CMYK(_));
+    let names = default_names(if inks { 3 } else { channels as usize })
+        .ok_or("channels of an unknown kind")?;
+    Ok(OpenedTiff {
+        decoder,
+        width: width as usize,
+        height: height as usize,
+        names,
+        bits,
+        inks,
+    })
+}
+
+/// Channels of a pixel as it is stored, and bits of each.
+fn stored_channels(decoder: &mut Decoder<impl Read + Seek>) -> Result<(u64, u8), Refusal> {
+    let extra = extra_samples(decoder)?;
+    match decoder.colortype()? {
+        ColorType::Gray(bits) => Ok((1, bits)),
+        ColorType::Multiband {
+            bit_depth,
+            num_samples: 2,
+        } if is_alpha(&extra) => Ok((2, bit_depth)),
+        ColorType::RGB(bits) => Ok((3, bits)),
+        ColorType::RGBA(bits) | ColorType::CMYK(bits) => Ok((4, bits)),
+        other => {
+            let kind = format!("{other:?}").to_lowercase().replace(['(', ')'], " ");
+            Err(unsupported(&kind.trim()))
+        }
+    }
+}
+
+fn extra_samples(decoder: &mut Decoder<impl Read + Seek>) -> Result<Vec<u16>, TiffError> {
+    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?;
+    Ok(extra.unwrap_or_default())
+}
+
+fn is_alpha(extra: &[u16]) -> bool {
+    matches!(extra, [ASSOCIATED_ALPHA | UNASSOCIATED_ALPHA])
+}
+
+/// The file up to its first picture. Tiles under the tags of strips, which old writers left and libtiff reads, are not
+/// known to our decoder: it calls their number wrong, or treats them as strips where that happens to be right.
+fn first_picture<R: Read + Seek>(mut file: R) -> Result<Decoder<R>, Refusal> {
+    let tags = first_tags(&mut file).unwrap_or_default();
+    file.rewind().map_err(TiffError::from)?;
+    if [Tag::TileWidth, Tag::StripOffsets]
+        .iter()
+        .all(|tag| tags.contains(&tag.to_u16()))
+    {
+        return Err(unsupported(&"tiles under the tags of strips"));
+    }
+    let mut decoder = Decoder::new(file)?;
+    if decoder.find_tag_unsigned(Tag::FillOrder)? == Some(LOWEST_BIT_FIRST) {
+        return Err(unsupported(&"pixels from the lowest bit up"));
+    }
+    Ok(decoder)
+}
+
+/// The numbers of the first directory's tags, of a file of either byte order, classic or BigTIFF.
+fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
+    let mut start = [0; 4];
+    file.read_exact(&mut start)?;
+    let (little, big) = (start.starts_with(b"II"), start.contains(&43));
+    // BigTIFF says how long its offsets are, which is 8.
+    let (offset, count, entry) = if big { (8, 8, 20) } else { (4, 2, 12) };
+    if big {
+        read_integer(file, 4, little)?;
+    }
+    let directory = read_integer(file, offset, little)?;
+    file.seek(SeekFrom::Start(directory))?;
+    let entries = read_integer(file, count, little)?.min(u64::from(u16::MAX));
+    (0..entries)
+        .map(|_| {
+            let tag = read_integer(file, 2, little)?;
+            file.seek_relative(entry - 2)?;
+            Ok(tag as u16)
+        })
+        .collect()
+}
+
+/// An integer of at most 8 bytes.
+fn read_integer(file: &mut impl Read, bytes: usize, little: bool) -> std::io::Result<u64> {
+    let mut integer = [0; 8];
+    file.read_exact(&mut integer[..bytes])?;
+    if !little {
+        integer[..bytes].reverse();
+    }
+    Ok(u64::from_le_bytes(integer))
+}
+
+/// OpenImageIO, which reads palettes, makes a black picture where there is none.
+fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(), Refusal> {
+    if decoder.find_tag_unsigned(Tag::PhotometricInterpretation)? != Some(PALETTE_COLOR) {
+        return Ok(());
+    }
+    let bits = decoder
+        .find_tag_unsigned_vec::<u16>(Tag::BitsPerSample)?
+        .unwrap_or_default();
+    let colors = bits
+        .first()
+        .and_then(|&bits| 1_usize.checked_shl(bits.into()))
+        .unwrap_or(0);
+    let entries = decoder
+        .find_tag_unsigned_vec::<u16>(Tag::ColorMap)?
+        .unwrap_or_default()
+        .len();
+    if entries == 3 * colors {
+        return Ok(());
+    }
+    let expected = 3 * colors;
+    Err(format!("damaged TIFF: a palette of {entries} entries, expected {expected}").into())
+}
+
+/// The embedded colour profile.
+pub(crate) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
+    let mut most = tiff::decoder::Limits::default();
+    most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
+    // Of kinds of TIFF too that the decoder cannot read: OpenImageIO hands over their codes.
+    let mut decoder = Decoder::new(Cursor::new(bytes)).ok()?.with_limits(most);
+    decoder.get_tag_u8_vec(Tag::IccProfile).ok()
+}
+
+pub(crate) fn header(
+    file: impl Read + Seek,
+    file_bytes: u64,
+    limits: &Limits,
+) -> Result<Header, Refusal> {
+    let mut file = open(file, file_bytes, limits)?;
+    let text = file
+        .decoder
+        .get_tag_ascii_string(Tag::ImageDescription)
+        .unwrap_or_default();
+    Ok(Header {
+        format: Format::Tiff,
+        width: file.width,
+        height: file.height,
+        channels: file.names,
+        bits: u32::from(file.bits),
+        metadata: notes_of_lines(&text),
+        ..Header::default()
+    })
+}
+
+pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
+    let mut file = open(Cursor::new(bytes), bytes.len() as u64, limits)?;
+    limits.check_memory(file.width, file.height, file.names.len())?;
+    let extra = extra_samples(&mut file.decoder)?;
+    refuse_old_lzw(&mut file.decoder, bytes)?;
+    let mut samples = read_chunks(&mut file)?;
+    if file.inks {
+        samples = light_left_by_inks(samples)?;
+    }
+    let display_encoded = !samples.are_float();
+    Ok(Raster {
+        width: file.width,
+        height: file.height,
+        names: file.names,
+        samples,
+        display_encoded,
+        premultiplied: extra.first() == Some(&ASSOCIATED_ALPHA),
+    })
+}
+
+/// Codes from the lowest bit up, as before 1990: they begin with the code that says so (TIFF 6.0, section 13).
+fn refuse_old_lzw(decoder: &mut Decoder<impl Read + Seek>, bytes: &[u8]) -> Result<(), Refusal> {
+    if decoder.find_tag_unsigned(Tag::Compression)? != Some(LZW_COMPRESSION) {
+        return Ok(());
+    }
+    let strips = decoder
+        .find_tag_unsigned_vec::<u64>(Tag::StripOffsets)?
+        .unwrap_or_default();
+    let first = strips
+        .first()
+        .and_then(|&at| bytes.get(usize::try_from(at).ok()?..)?.first_chunk());
+    match first {
+        Some(&[0, second]) if second & 1 == 1 => Err(unsupported(&"old LZW")),
+        _ => Ok(()),
+    }
+}
+
+/// Where the strips or tiles of a picture lie, and what each of them holds.
+#[derive(Clone, Copy)]
+struct ChunkGrid {
+    /// Of the picture.
+    width: usize,
+    height: usize,
+    /// Channels of the picture as it is stored.
+    channels: usize,
+    /// Each channel has strips or tiles of its own.
+    planes: bool,
+    /// Of a strip or tile.
+    size: (usize, usize),
+}
+
+impl ChunkGrid {
+    fn new(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Self, Refusal> {
+        let (across, down) = file.decoder.chunk_dimensions();
+        let planes = file.decoder.find_tag_unsigned(Tag::PlanarConfiguration)?;
+        Ok(Self {
+            width: file.width,
+            height: file.height,
+            channels: if file.inks { 4 } else { file.names.len() },
+            planes: planes == Some(SEPARATE_PLANES),
+            size: (across as usize, (down as usize).min(file.height)),
+        })
+    }
+
+    fn across(&self) -> usize {
+        self.width.div_ceil(self.size.0)
+    }
+
+    /// Strips or tiles of the picture, or of a plane.
+    fn count(&self) -> usize {
+        self.across() * self.height.div_ceil(self.size.1)
+    }
+
+    /// Strips or tiles of all planes.
+    fn count_all(&self) -> usize {
+        self.count() * if self.planes { self.channels } else { 1 }
+    }
+
+    fn samples(&self) -> usize {
+        self.width * self.height * self.channels
+    }
+
+    /// Puts the samples of a strip or tile, of which `columns` and `rows` are there, into the picture.
+    fn put<T: Copy>(&self, to: &mut [T], from: &[T], index: usize, [columns, rows]: [usize; 2]) {
+        let (plane, place) = (index / self.count(), index % self.count());
+        let (left, top) = (
+            place % self.across() * self.size.0,
+            place / self.across() * self.size.1,
+        );
+        let stored = if self.planes { 1 } else { self.channels };
+        let kept = columns.min(self.width - left);
+        let rows = rows.min(self.height - top);
+        for (y, row) in from.chunks_exact(columns * stored).take(rows).enumerate() {
+            let at = ((top + y) * self.width + left) * self.channels + plane;
+            if self.planes {
+                let to = to[at..].iter_mut().step_by(self.channels);
+                to.zip(&row[..kept]).for_each(|(to, &from)| *to = from);
+            } else {
+                to[at..][..kept * stored].copy_from_slice(&row[..kept * stored]);
+            }
+        }
+    }
+
+    /// The same for samples of any one kind.
+    fn put_samples(
+        &self,
+        to: &mut Samples,
+        from: &Samples,
+        index: usize,
+        size: [usize; 2],
+    ) -> Result<(), Refusal> {
+        match (to, from) {
+            (Samples::U8(to), Samples::U8(from)) => self.put(to, from, index, size),
+            (Samples::U16(to), Samples::U16(from)) => self.put(to, from, index, size),
+            (Samples::F16(to), Samples::F16(from)) => self.put(to, from, index, size),
+            (Samples::F32(to), Samples::F32(from)) => self.put(to, from, index, size),
+            _ => return Err("damaged TIFF: samples of two kinds".into()),
+        }
+        Ok(())
+    }
+}
+
+/// The samples of the picture, strip by strip or tile by tile: the decoder's own way to read all at once leaves columns
+/// black where tiles reach over the border, and knows no planes.
+fn read_chunks(file: &mut OpenedTiff<impl Read + Seek>) -> Result<Samples, Refusal> {
+    if !file.bits.is_multiple_of(8) {
+        return Err(unsupported(&format!("{} bits a sample", file.bits)));
+    }
+    let grid = ChunkGrid::new(file)?;
+    let mut picture: Option<Samples> = None;
+    for index in 0..grid.count_all() {
+        let number = u32::try_from(index).map_err(|_| "damaged TIFF: strips without number")?;
+        let chunk = known_samples(file.decoder.read_chunk(number)?);
+        let (columns, rows) = file.decoder.chunk_data_dimensions(number);
+        let size = [columns as usize, rows as usize];
+        let picture = picture.get_or_insert_with(|| zeros_like(&chunk, grid.samples()));
+        grid.put_samples(picture, &chunk, index, size)?;
+    }
+    picture.ok_or_else(|| "damaged TIFF: no strips".into())
+}
+
+fn zeros_like(samples: &Samples, count: usize) -> Samples {
+    match samples {
+        Samples::U8(_) => Samples::U8(zeroed_vec(count)),
+        Samples::U16(_) => Samples::U16(zeroed_vec(count)),
+        Samples::F16(_) => Samples::F16(zeroed_vec(count)),
+        Samples::F32(_) => Samples::F32(zeroed_vec(count)),
+    }
+}
+
+/// Doubles become floats and integers of other kinds 16 bits: full scale stays full scale, and what is below zero becomes
+/// zero.
+fn known_samples(decoded: DecodingResult) -> Samples {
+    match decoded {
+        DecodingResult::U8(v) => Samples::U8(v),
+        DecodingResult::U16(v) => Samples::U16(v),
+        DecodingResult::F16(v) => Samples::F16(v),
+        DecodingResult::F32(v) => Samples::F32(v),
+        DecodingResult::F64(v) => Samples::F32(v.into_iter().map(|x| x as f32).collect()),
+        DecodingResult::U32(v) => codes_of(v, |x| (x >> 16) as u16),
+        DecodingResult::U64(v) => codes_of(v, |x| (x >> 48) as u16),
+        DecodingResult::I8(v) => codes_of(v, widened_7_bits),
+        DecodingResult::I16(v) => codes_of(v, |x| doubled(x.max(0) as u16)),
+        DecodingResult::I32(v) => codes_of(v, |x| doubled((x.max(0) >> 16) as u16)),
+        DecodingResult::I64(v) => codes_of(v, |x| doubled((x.max(0) >> 48) as u16)),
+    }
+}
+
+fn codes_of<T>(samples: Vec<T>, code: impl Fn(T) -> u16) -> Samples {
+    Samples::U16(samples.into_iter().map(code).collect())
+}
+
+/// 7 bits as 16.
+fn widened_7_bits(x: i8) -> u16 {
+    let x = x.max(0) as u16;
+    doubled(x << 8 | x << 1 | x >> 6)
+}
+
+/// 15 bits as 16, the first of them repeated behind the last: 0 stays 0, full scale full scale.
+fn doubled(x: u16) -> u16 {
+    x << 1 | x >> 14
+}
+
+/// Red, green and blue that cyan, magenta, yellow and black leave of white, display-encoded as the inks were; a colour
+/// profile would be more exact, and is not applied to inks.
+fn light_left_by_inks(inks: Samples) -> Result<Samples, Refusal> {
+    match inks {
+        Samples::U8(v) => Ok(Samples::U8(left_by_inks(&v, u8::MAX.into()))),
+        Samples::U16(v) => Ok(Samples::U16(left_by_inks(&v, u16::MAX.into()))),
+        _ => Err(unsupported(&"inks in float")),
+    }
+}
+
+fn left_by_inks<T: Copy + Into<u64> + TryFrom<u64> + Default>(inks: &[T], full: u64) -> Vec<T> {
+    inks.as_chunks()
+        .0
+        .iter()
+        .flat_map(|&[cyan, magenta, yellow, black]| {
+            [cyan, magenta, yellow].map(|ink| {
+                let product = (full - ink.into()) * (full - black.into());
+                T::try_from((product + full / 2) / full).unwrap_or_default()
+            })
+        })
+        .collect()
+}
+
+/// A whole file of integer codes; alpha is straight.
+pub(crate) fn encode_codes(
+    picture: &CodedImage<'_>,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
+    let (size, n) = ((picture.width, picture.height), picture.names.len());
+    let alpha = (n == 4).then_some(ExtraSamples::UnassociatedAlpha);
+    match (&picture.codes, n) {
+        (Codes::U8(v), 1) => encode::<colortype::Gray8>(size, v, alpha, metadata),
+        (Codes::U8(v), _) => encode::<colortype::RGB8>(size, v, alpha, metadata),
+        (Codes::U16(v), 1) => encode::<colortype::Gray16>(size, v, alpha, metadata),
+        (Codes::U16(v), _) => encode::<colortype::RGB16>(size, v, alpha, metadata),
+    }
+    .map_err(|e| e.to_string())
+}
+
+/// A whole file of scene-linear floats of one, three or four channels; colours are multiplied by alpha.
+pub(crate) fn encode_floats(
+    size: (usize, usize),
+    channels: usize,
+    samples: &[f32],
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, String> {
+    let alpha = (channels > 3).then_some(ExtraSamples::AssociatedAlpha);
+    match channels {
+        1 => encode::<colortype::Gray32Float>(size, samples, alpha, metadata),
+        _ => encode::<colortype::RGB32Float>(size, samples, alpha, metadata),
+    }
+    .map_err(|e| e.to_string())
+}
+
+fn encode<C: colortype::ColorType>(
+    (width, height): (usize, usize),
+    samples: &[C::Inner],
+    alpha: Option<ExtraSamples>,
+    metadata: &[(String, String)],
+) -> Result<Vec<u8>, TiffError>
+where
+    [C::Inner]: TiffValue,
+{
+    let mut out = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut out)?;
+    let mut image = encoder.new_image::<C>(u32::try_from(width)?, u32::try_from(height)?)?;
+    if let Some(alpha) = alpha {
+        image.extra_samples(&[alpha])?;
+    }
+    if !metadata.is_empty() {
+        let mut text = lines_of_notes(&metadata.to_vec());
+        text.retain(|c| c.is_ascii());
+        image
+            .encoder()
+            .write_tag(Tag::ImageDescription, text.as_str())?;
+    }
+    image.write_data(samples)?;
+    Ok(out.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_of_every_kind_have_the_same_full_scale() {
+        let full = Samples::U16(vec![0, 65_535]);
+        for samples in [
+            DecodingResult::U16(vec![0, u16::MAX]),
+            DecodingResult::U32(vec![0, u32::MAX]),
+            DecodingResult::U64(vec![0, u64::MAX]),
+            DecodingResult::I8(vec![-5, i8::MAX]),
+            DecodingResult::I16(vec![-5, i16::MAX]),
+            DecodingResult::I32(vec![-5, i32::MAX]),
+            DecodingResult::I64(vec![-5, i64::MAX]),
+        ] {
+            let name = format!("{samples:?}");
+            assert_eq!(known_samples(samples), full, "{name}");
+        }
+        // Half of the scale.
+        let half = |samples: DecodingResult| match known_samples(samples) {
+            Samples::U16(v) => f64::from(v[0]) / 65_535.0,
+            other => panic!("{other:?}"),
+        };
+        assert!((half(DecodingResult::I8(vec![64])) - 64.0 / 127.0).abs() < 1e-4);
+        assert!((half(DecodingResult::I16(vec![12_345])) - 12_345.0 / 32_767.0).abs() < 2e-5);
+    }
+
+    /// A picture of 5 x 3 whose tiles of 4 x 2 reach over its border, by planes or not.
+    #[test]
+    fn tiles_that_reach_over_the_border_are_cut() {
+        for planes in [false, true] {
+            let grid = ChunkGrid {
+                width: 5,
+                height: 3,
+                channels: 2,
+                planes,
+                size: (4, 2),
+            };
+            assert_eq!(grid.count(), 4);
+            let mut whole = vec![0; 30];
+            for index in 0..if planes { 8 } else { 4 } {
+                let (plane, place) = (index / 4, index % 4);
+                let value = |x: usize, y: usize, c: usize| {
+                    100 * c + 10 * (place / 2 * 2 + y) + place % 2 * 4 + x
+                };
+                let channels = if planes { plane..plane + 1 } else { 0..2 };
+                let tile: Vec<usize> = (0..2)
+                    .flat_map(|y| (0..4).flat_map(move |x| (0..2).map(move |c| (x, y, c))))
+                    .filter(|(_, _, c)| channels.contains(c))
+                    .map(|(x, y, c)| value(x, y, c))
+                    .collect();
+                grid.put(&mut whole, &tile, index, [4, 2]);
+            }
+            let expected: Vec<usize> = (0..3)
+                .flat_map(|y| (0..5).flat_map(move |x| (0..2).map(move |c| 100 * c + 10 * y + x)))
+                .collect();
+            assert_eq!(whole, expected, "planes {planes}");
+        }
+    }
+}

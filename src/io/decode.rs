@@ -1,0 +1,197 @@
+//! Decoders by the kind of file, and OpenImageIO for the kinds that they do not know.
+
+use super::codec::exif::CameraNotes;
+use super::codec::raster::Raster;
+use super::codec::refusal::Refusal;
+use super::codec::{Wanted, exr, hdr, jpeg, png, tiff};
+use super::format::Format;
+use super::header::Header;
+use super::limits::Limits;
+#[cfg(feature = "oiio")]
+use super::options::Fallback;
+use super::options::ReadOptions;
+use super::source::Source;
+#[cfg(feature = "oiio")]
+use super::worker::{self, Request, Response, Sample, Shape};
+use std::io::{BufRead, Cursor, Seek};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Samples by our decoders, or by OpenImageIO where those do not know the kind.
+pub(super) fn decode_raster(
+    source: &Source,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> Result<Raster, Refusal> {
+    match catch_panic(|| decode_here(source, options, wanted)) {
+        Err(Refusal::Unsupported(what)) => decode_elsewhere(source, what, options, wanted),
+        decoded => decoded,
+    }
+}
+
+/// Samples by our decoders.
+fn decode_here(source: &Source, options: &ReadOptions, wanted: Wanted) -> Result<Raster, Refusal> {
+    let limits = &options.limits;
+    match source.format {
+        Format::Exr => exr::decode(&source.bytes, limits, wanted, options.window),
+        Format::Png => png::decode(&source.bytes, limits),
+        Format::Jpeg => jpeg::decode(&source.bytes, limits),
+        Format::Tiff => tiff::decode(&source.bytes, limits),
+        Format::Hdr => hdr::decode(&source.bytes, limits),
+        other => Err(needs_openimageio(other)),
+    }
+}
+
+fn needs_openimageio(format: Format) -> Refusal {
+    Refusal::Unsupported(format!("{} needs OpenImageIO", format.name()))
+}
+
+/// The last defence: a decoder that panics has met a damaged file.
+pub(super) fn catch_panic<T>(f: impl FnOnce() -> Result<T, Refusal>) -> Result<T, Refusal> {
+    catch_unwind(AssertUnwindSafe(f)).unwrap_or_else(|_| Err("damaged: the decoder gave up".into()))
+}
+
+/// What stands in front of the pixels, and no more of the file than that takes.
+pub(super) fn read_file_header<R: BufRead + Seek>(
+    file: &mut R,
+    bytes: u64,
+    format: Format,
+    limits: &Limits,
+) -> Result<(Header, CameraNotes), Refusal> {
+    let header = match format {
+        Format::Exr => exr::header(&mut *file, bytes, limits)?,
+        Format::Hdr => hdr::header(&mut *file, bytes, limits)?,
+        Format::Png => png::header(&mut *file, bytes, limits)?,
+        Format::Tiff => tiff::header(&mut *file, bytes, limits)?,
+        Format::Jpeg => return read_jpeg_header(file, bytes, limits),
+        other => return Err(needs_openimageio(other)),
+    };
+    let notes = match format {
+        Format::Png | Format::Tiff if file.rewind().is_ok() => CameraNotes::read(file),
+        _ => CameraNotes::default(),
+    };
+    Ok((header, notes))
+}
+
+/// A JPEG has both its header and its notes in front of the first scan.
+fn read_jpeg_header(
+    file: &mut impl BufRead,
+    bytes: u64,
+    limits: &Limits,
+) -> Result<(Header, CameraNotes), Refusal> {
+    let start = jpeg::read_before_scan(file, limits)?;
+    let header = jpeg::header(&start, bytes, limits)?;
+    Ok((header, CameraNotes::read(Cursor::new(&start))))
+}
+
+/// What the camera noted; EXR and HDR have no room for it.
+pub(super) fn camera_notes(source: &Source) -> CameraNotes {
+    match source.format {
+        Format::Jpeg | Format::Tiff | Format::Png => {
+            catch_panic(|| Ok(CameraNotes::read(Cursor::new(&source.bytes)))).unwrap_or_default()
+        }
+        _ => CameraNotes::default(),
+    }
+}
+
+/// Another decoder for what ours do not know.
+#[cfg(feature = "oiio")]
+pub(super) fn decode_elsewhere(
+    source: &Source,
+    what: String,
+    options: &ReadOptions,
+    wanted: Wanted,
+) -> Result<Raster, Refusal> {
+    let request = Request::Pixels {
+        wanted,
+        window: options.window,
+    };
+    let response = ask_openimageio(source, what.clone(), options, request);
+    match response.map_err(|e| e.after(&what))? {
+        Response::Raster(raster) => Ok(with_known_alpha(raster, source)),
+        Response::Shape(_) => Err("OpenImageIO gave no pixels".into()),
+    }
+}
+
+/// The meaning of alpha in a TIFF comes from the file's own tag: OpenImageIO treats an unspecified one as associated.
+#[cfg(feature = "oiio")]
+fn with_known_alpha(raster: Raster, source: &Source) -> Raster {
+    let premultiplied = match source.format {
+        Format::Tiff => CameraNotes::has_associated_alpha(&source.bytes),
+        Format::Exr => true,
+        _ => raster.premultiplied,
+    };
+    Raster {
+        premultiplied,
+        ..raster
+    }
+}
+
+/// A header by the other decoder.
+#[cfg(feature = "oiio")]
+pub(super) fn header_elsewhere(
+    source: &Source,
+    what: String,
+    options: &ReadOptions,
+) -> Result<(Header, CameraNotes), Refusal> {
+    let response = ask_openimageio(source, what, options, Request::Header)?;
+    let Response::Shape(shape) = response else {
+        return Err("OpenImageIO gave no header".into());
+    };
+    let Shape {
+        width,
+        height,
+        names,
+        sample,
+        ..
+    } = shape;
+    let header = Header {
+        format: source.format,
+        width,
+        height,
+        channels: names,
+        bits: 8 * Sample::bytes(sample),
+        ..Header::default()
+    };
+    Ok((header, camera_notes(source)))
+}
+
+#[cfg(feature = "oiio")]
+fn ask_openimageio(
+    source: &Source,
+    what: String,
+    options: &ReadOptions,
+    request: Request,
+) -> Result<Response, Refusal> {
+    match options.fallback {
+        Fallback::Nothing => Err(Refusal::Unsupported(what)),
+        Fallback::Worker => worker::ask(source, &options.limits, false, request),
+        Fallback::StrictWorker => worker::ask(source, &options.limits, true, request),
+        Fallback::InProcess(linked) => (linked.0)(source, &options.limits, request),
+    }
+}
+
+/// Without OpenImageIO there is no other decoder.
+#[cfg(not(feature = "oiio"))]
+fn decode_elsewhere(
+    _: &Source,
+    what: String,
+    _: &ReadOptions,
+    _: Wanted,
+) -> Result<Raster, Refusal> {
+    Err(without_openimageio(&what))
+}
+
+/// Without OpenImageIO there is no other decoder.
+#[cfg(not(feature = "oiio"))]
+pub(super) fn header_elsewhere(
+    _: &Source,
+    what: String,
+    _: &ReadOptions,
+) -> Result<(Header, CameraNotes), Refusal> {
+    Err(without_openimageio(&what))
+}
+
+#[cfg(not(feature = "oiio"))]
+fn without_openimageio(what: &str) -> Refusal {
+    Refusal::Unsupported(format!("{what} (petcomp was built without OpenImageIO)"))
+}

@@ -1,0 +1,470 @@
+//! Documents: TOML and JSON in, with the place of a mistake; text out, whole or not at all.
+
+mod duplicate_keys;
+mod mistake;
+mod overrides;
+
+pub(crate) use mistake::suggestion;
+pub use overrides::Override;
+
+use super::fs::{read_regular, write_bytes};
+use super::options::ReadOptions;
+use crate::error::{Error, Result, one_line};
+use duplicate_keys::{check_json, find_invalid_toml};
+use mistake::Mistake;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+use toml::de::DeTable;
+
+/// Reads a TOML document.
+///
+/// # Errors
+/// [`Error::File`] for a file that cannot be read or is not TOML; [`Error::Field`] for a value that does not fit, with
+/// the key that was probably meant where one is unknown.
+pub fn read_toml<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    parse_toml(&read_text(path)?).map_err(|e| e.in_file(path))
+}
+
+/// Reads a TOML document, some of its values replaced.
+///
+/// # Errors
+/// As [`read_toml`]; an override of a value that cannot be there.
+pub fn read_toml_with<T: DeserializeOwned>(
+    path: impl AsRef<Path>,
+    overrides: &[Override],
+) -> Result<T> {
+    let path = path.as_ref();
+    if overrides.is_empty() {
+        return read_toml(path);
+    }
+    let mut document: toml::Table = read_toml(path)?;
+    overrides
+        .iter()
+        .try_for_each(|o| o.apply(&mut document))
+        .map_err(|e| e.in_file(path))?;
+    let text =
+        toml::to_string(&document).map_err(|e| Error::file(path, one_line(&e.to_string())))?;
+    // Lines of that text are not those of the file.
+    parse_toml_lines(&text, |_| None).map_err(|e| e.in_file(path))
+}
+
+/// Settings from overrides alone: all of them lie in the table of that name.
+///
+/// # Errors
+/// An override outside the table or of a value that cannot be there; a key that `T` does not know, with the one that was
+/// probably meant; a value that does not fit.
+pub fn from_overrides<T: DeserializeOwned>(table: &str, overrides: &[Override]) -> Result<T> {
+    let mut document = toml::Table::new();
+    document.insert(table.into(), toml::Table::new().into());
+    overrides.iter().try_for_each(|o| o.apply(&mut document))?;
+    let settings = document
+        .remove(table)
+        .unwrap_or_else(|| toml::Table::new().into());
+    if let Some(key) = document.keys().next() {
+        return Err(Error::value(
+            key,
+            format!("no such table, expected {table}.NAME=VALUE"),
+        ));
+    }
+    from_value(settings, &format!("{table}."))
+}
+
+/// A document from a table in memory.
+///
+/// # Errors
+/// As [`parse_toml`].
+pub(crate) fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
+    from_value(table.into(), "")
+}
+
+/// `outer` is the path of the value, with its dot.
+fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T> {
+    serde_path_to_error::deserialize(value).map_err(|e| {
+        let at = format!("{outer}{}", e.path());
+        let e: toml::de::Error = e.into_inner();
+        Mistake {
+            at: at.trim_end_matches('.').into(),
+            line: None,
+            what: e.message().into(),
+        }
+        .into_error()
+    })
+}
+
+/// Reads a document that says by its extension whether it is JSON (`.json`) or TOML (any other).
+///
+/// # Errors
+/// As [`read_toml`].
+pub fn read_document<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    if is_json(path.as_ref()) {
+        read_json(path)
+    } else {
+        read_toml(path)
+    }
+}
+
+/// Writes a document in the format of its extension: JSON (`.json`) or TOML (any other).
+///
+/// # Errors
+/// As [`write_toml`].
+pub fn write_document<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
+    if is_json(path.as_ref()) {
+        write_json(path, value)
+    } else {
+        write_toml(path, value)
+    }
+}
+
+fn is_json(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+}
+
+/// Reads a JSON document.
+///
+/// # Errors
+/// As [`read_toml`].
+pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    parse_json(&read_text(path)?).map_err(|e| e.in_file(path))
+}
+
+/// Reads a JSON document that holds data, not settings (truth and detections as COCO has them): as large as a picture may
+/// be ([`Limits::file_bytes`](super::Limits::file_bytes)).
+///
+/// # Errors
+/// As [`read_toml`].
+pub fn read_json_data<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T> {
+    let path = path.as_ref();
+    let most = (ReadOptions::default().limits.file_bytes, "file_bytes");
+    let text = utf8(path, read_regular(path, most, "text file")?)?;
+    // Keeping track of the place costs as much as all the rest, and only a mistake has one.
+    serde_json::from_str(&text)
+        .or_else(|_| deserialize_json(&text))
+        .map_err(|e| e.in_file(path))
+}
+
+/// Reads a text file.
+///
+/// # Errors
+/// [`Error::File`] for a file that is missing, not regular, larger than
+/// [`Limits::document_bytes`](super::Limits::document_bytes) or not UTF-8.
+pub fn read_text(path: impl AsRef<Path>) -> Result<String> {
+    let path = path.as_ref();
+    utf8(path, read_bytes(path)?)
+}
+
+/// The bytes of a text file.
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    let limit = ReadOptions::default().limits.document_bytes;
+    read_regular(path, (limit, "document_bytes"), "text file")
+}
+
+fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String> {
+    String::from_utf8(bytes).map_err(|_| Error::file(path, "not text (UTF-8)"))
+}
+
+/// Writes a document as TOML.
+///
+/// # Errors
+/// [`Error::File`] where TOML cannot express it or the file cannot be written.
+pub fn write_toml<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
+    let path = path.as_ref();
+    let text = toml::to_string_pretty(value);
+    write_text(
+        path,
+        &text.map_err(|e| Error::file(path, one_line(&e.to_string())))?,
+    )
+}
+
+/// Writes a document as indented JSON.
+///
+/// # Errors
+/// [`Error::File`] where JSON cannot express it or the file cannot be written.
+pub fn write_json<T: Serialize + ?Sized>(path: impl AsRef<Path>, value: &T) -> Result<()> {
+    let path = path.as_ref();
+    let text = serde_json::to_string_pretty(value).map_err(|e| Error::file(path, e))?;
+    write_text(path, &(text + "\n"))
+}
+
+/// Writes a text file.
+///
+/// # Errors
+/// [`Error::File`] where it cannot be written.
+pub fn write_text(path: impl AsRef<Path>, text: &str) -> Result<()> {
+    write_bytes(path.as_ref(), text.as_bytes())
+}
+
+/// Parses a TOML document in memory.
+///
+/// # Errors
+/// [`Error::Value`] for what is not TOML, a key twice, a number that is not finite, and values that do not fit.
+pub fn parse_toml<T: DeserializeOwned>(text: &str) -> Result<T> {
+    parse_toml_lines(text, |byte| Some(line_of(text, byte)))
+}
+
+/// `line` gives the line of a byte, if that means something to the person who wrote the document.
+fn parse_toml_lines<T: DeserializeOwned>(
+    text: &str,
+    line: impl Fn(usize) -> Option<usize>,
+) -> Result<T> {
+    let document = DeTable::parse(text).map_err(|e| toml_mistake(&e, String::new(), &line))?;
+    if let Some((what, span)) = find_invalid_toml(&document, max_depth()) {
+        return Err(Mistake {
+            at: String::new(),
+            line: line(span.start),
+            what,
+        }
+        .into_error());
+    }
+    serde_path_to_error::deserialize(toml::Deserializer::from(document)).map_err(|e| {
+        let at = e.path().to_string();
+        toml_mistake(e.inner(), at, &line)
+    })
+}
+
+fn toml_mistake(e: &toml::de::Error, at: String, line: impl Fn(usize) -> Option<usize>) -> Error {
+    Mistake {
+        at,
+        line: e.span().and_then(|span| line(span.start)),
+        what: e.message().into(),
+    }
+    .into_error()
+}
+
+/// Parses a JSON document in memory.
+///
+/// # Errors
+/// As [`parse_toml`].
+pub fn parse_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+    check_json(text, max_depth()).map_err(|e| json_mistake(&e, String::new()))?;
+    deserialize_json(text)
+}
+
+fn deserialize_json<T: DeserializeOwned>(text: &str) -> Result<T> {
+    let mut document = serde_json::Deserializer::from_str(text);
+    let value = serde_path_to_error::deserialize(&mut document)
+        .map_err(|e| json_mistake(e.inner(), e.path().to_string()))?;
+    document
+        .end()
+        .map_err(|e| json_mistake(&e, String::new()))?;
+    Ok(value)
+}
+
+fn json_mistake(e: &serde_json::Error, at: String) -> Error {
+    let message = e.to_string();
+    let what = message.split(" at line ").next().unwrap_or_default().into();
+    // A type that reads itself from a tree of values has no lines.
+    let line = Some(e.line()).filter(|&line| line > 0);
+    Mistake { at, line, what }.into_error()
+}
+
+/// Levels that a document may be nested.
+fn max_depth() -> u64 {
+    ReadOptions::default().limits.document_depth
+}
+
+fn line_of(text: &str, byte: usize) -> usize {
+    text.bytes().take(byte).filter(|&b| b == b'\n').count() + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "only read by serde")]
+    struct Recipe {
+        seed: u64,
+        objects: Objects,
+        #[serde(default)]
+        lights: Vec<Objects>,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code, reason = "only read by serde")]
+    struct Objects {
+        count: u32,
+        size_m: Option<f64>,
+    }
+
+    fn toml(text: &str) -> String {
+        parse_toml::<Recipe>(text)
+            .unwrap_err()
+            .in_file("recipe.toml")
+            .to_string()
+    }
+
+    fn json(text: &str) -> String {
+        parse_json::<Recipe>(text)
+            .unwrap_err()
+            .in_file("recipe.json")
+            .to_string()
+    }
+
+    #[test]
+    fn an_unknown_key_is_met_with_the_one_that_was_meant() {
+        let expected = "objects: unknown key \"cuont\", did you mean \"count\"?";
+        assert_eq!(
+            toml("seed = 1\n[objects]\ncuont = 3\n"),
+            format!("recipe.toml: {expected} (line 3)")
+        );
+        assert_eq!(
+            json(r#"{"seed": 1, "objects": {"cuont": 3}}"#),
+            format!("recipe.json: {expected} (line 1)")
+        );
+        assert_eq!(
+            toml("seed = 1\n[objects]\ncount = 3\n[[lights]]\ncount = 1\ncolour = 2"),
+            "recipe.toml: lights[0]: unknown key \"colour\", expected one of count, size_m (line 6)"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_at_the_top_names_its_line() {
+        assert_eq!(
+            toml("\nseeed = 1\n"),
+            "recipe.toml: line 2: unknown key \"seeed\", did you mean \"seed\"?"
+        );
+    }
+
+    #[test]
+    fn a_value_of_the_wrong_kind_is_named_with_its_field() {
+        let expected = "objects.count: invalid type: string \"three\", expected an integer from 0 to 4294967295";
+        assert_eq!(
+            toml("seed = 1\n[objects]\ncount = \"three\""),
+            format!("recipe.toml: {expected} (line 3)")
+        );
+        let json = json("{\"seed\": 1, \"objects\": {\"count\": \"three\"}}");
+        assert_eq!(json, format!("recipe.json: {expected} (line 1)"));
+    }
+
+    #[test]
+    fn no_name_of_a_type_of_rust_is_in_a_message() {
+        assert!(
+            toml("seed = 1\nobjects = 3")
+                .contains("objects: invalid type: integer `3`, expected a table")
+        );
+        assert!(json("[1, 2]").contains("expected"), "{}", json("[1, 2]"));
+        assert!(
+            json("3").ends_with("invalid type: integer `3`, expected a table"),
+            "{}",
+            json("3")
+        );
+        assert!(
+            json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": \"x\"}}")
+                .contains("expected a number")
+        );
+    }
+
+    #[test]
+    fn settings_are_made_of_overrides_alone() {
+        let made = |texts: &[&str]| {
+            let overrides: Result<Vec<Override>> = texts.iter().map(|t| t.parse()).collect();
+            overrides
+                .and_then(|o| from_overrides::<Objects>("key", &o))
+                .map_err(|e| e.to_string())
+        };
+        let objects = made(&["key.count=3", "key.size_m = 0.5"]).unwrap();
+        assert_eq!((objects.count, objects.size_m), (3, Some(0.5)));
+        assert_eq!(
+            made(&["key.cuont=3"]).unwrap_err(),
+            "key: unknown key \"cuont\", did you mean \"count\"?"
+        );
+        assert_eq!(
+            made(&["key.count=x"]).unwrap_err(),
+            "key.count: invalid type: string \"x\", expected an integer from 0 to 4294967295"
+        );
+        assert_eq!(
+            made(&["kye.count=3"]).unwrap_err(),
+            "kye: no such table, expected key.NAME=VALUE"
+        );
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        assert_eq!(
+            toml("seed = 1\n[objects]\n"),
+            "recipe.toml: objects: missing key \"count\" (line 2)"
+        );
+    }
+
+    #[test]
+    fn broken_syntax_is_one_line_with_a_line_number() {
+        let e = toml("seed = 1\nobjects = [");
+        assert!(
+            e.starts_with("recipe.toml: line 2: ") && !e.contains('\n'),
+            "{e}"
+        );
+        let e = json("{\"seed\": 1,\n x}");
+        assert!(
+            e.starts_with("recipe.json: line 2: ") && !e.contains('\n'),
+            "{e}"
+        );
+        assert!(json("{} {}").contains("missing key") || json("{} {}").contains("line"));
+    }
+
+    #[test]
+    fn what_no_document_may_hold_is_named_with_its_line() {
+        let e = json("{\"seed\": 1,\n\"objects\": {\"count\": 3},\n\"seed\": 2}");
+        assert_eq!(e, "recipe.json: line 3: key \"seed\" twice");
+        assert!(toml("seed = 1\nseed = 2").starts_with("recipe.toml: line 2: duplicate key"));
+        let e = toml("seed = 1\n[objects]\ncount = 1\nsize_m = -inf");
+        assert_eq!(e, "recipe.toml: line 4: -inf, expected a finite number");
+        assert!(
+            json("{\"seed\": 1, \"objects\": {\"count\": 1, \"size_m\": 1e999}}")
+                .contains("out of range")
+        );
+        assert!(json("{\"seed\": NaN}").contains("line 1"));
+        let infinite = [
+            "objects.size_m=inf".parse::<Override>(),
+            "a=[1, { b = nan }]".parse(),
+        ];
+        assert!(infinite.into_iter().all(|o| {
+            o.unwrap_err()
+                .to_string()
+                .contains("expected a finite number")
+        }));
+    }
+
+    #[test]
+    fn nesting_without_end_is_an_error_and_not_a_crash() {
+        for depth in [200, 1_000_000] {
+            let e = json(&"[".repeat(depth));
+            assert!(e.contains("nested deeper than 64 levels"), "{e}");
+            let objects = "{\"a\":".repeat(depth);
+            assert!(json(&objects).contains("nested deeper than 64 levels"));
+        }
+        for text in ["[", "{a=", "[["] {
+            let e = toml(&format!("a = {}", text.repeat(100_000)));
+            assert!(e.len() < 300 && !e.contains('\n'), "{e}");
+        }
+        assert!(toml(&format!("[{}a]", "a.".repeat(100_000))).len() < 300);
+    }
+
+    #[test]
+    fn a_document_beyond_the_limit_is_refused_and_data_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.json");
+        write_text(&path, &format!("[{}1]", "1,".repeat(8 << 20))).unwrap();
+        let message = read_json::<Vec<u8>>(&path).unwrap_err().to_string();
+        let expected = "16777219 bytes, over the limit of 16777216 (Limits::document_bytes; --limit document_bytes=N)";
+        assert!(message.ends_with(expected), "{message}");
+        assert_eq!(
+            read_json_data::<Vec<u8>>(&path).unwrap().len(),
+            (8 << 20) + 1
+        );
+    }
+
+    #[test]
+    fn a_missing_document_says_so() {
+        assert_eq!(
+            read_toml::<Recipe>("no/x.toml").unwrap_err().to_string(),
+            "no/x.toml: no such file"
+        );
+    }
+}

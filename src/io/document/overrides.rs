@@ -1,0 +1,151 @@
+//! Single values of a document, given on a command line: `camera.focal_px=2900`, `objects[0].grade.hue_deg=30`.
+
+use crate::error::{Error, Result};
+use std::str::FromStr;
+use toml::Value;
+
+/// One value and its place in a document.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Override {
+    path: String,
+    value: Value,
+}
+
+impl FromStr for Override {
+    type Err = Error;
+
+    /// From `path=value`; the value is TOML (`3`, `[4, 12]`, `"text"`, `true`), and text where it is none of that.
+    fn from_str(text: &str) -> Result<Self> {
+        let Some((path, value)) = text.split_once('=') else {
+            return Err(Error::value(text, "no value, expected KEY=VALUE"));
+        };
+        let path = path.trim().to_owned();
+        let value = parse_value(value);
+        if is_finite(&value) {
+            return Ok(Self { path, value });
+        }
+        let what = format!("{value}, expected a finite number");
+        Err(Error::value(path, what))
+    }
+}
+
+/// TOML, or text.
+fn parse_value(text: &str) -> Value {
+    format!("value = {text}")
+        .parse::<toml::Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value"))
+        .unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+fn is_finite(value: &Value) -> bool {
+    match value {
+        Value::Float(number) => number.is_finite(),
+        Value::Array(list) => list.iter().all(is_finite),
+        Value::Table(table) => table.values().all(is_finite),
+        _ => true,
+    }
+}
+
+impl Override {
+    /// Puts the value into a document; tables on the way are made where they are missing, list entries are not.
+    pub(super) fn apply(&self, document: &mut toml::Table) -> Result<()> {
+        let mut steps = self.path.split('.').flat_map(split_indices);
+        let place = match steps.next() {
+            Some(PathStep::Key(key)) => Ok(entry(document, key)),
+            _ => Err("no key, expected KEY=VALUE"),
+        };
+        let place = steps.fold(place, |here, step| step.down_from(here?));
+        *place.map_err(|what| Error::value(&self.path, what))? = self.value.clone();
+        Ok(())
+    }
+}
+
+/// One level down.
+enum PathStep<'a> {
+    Key(&'a str),
+    Index(usize),
+}
+
+impl PathStep<'_> {
+    fn down_from(self, value: &mut Value) -> std::result::Result<&mut Value, &'static str> {
+        match (value, self) {
+            (Value::Table(table), Self::Key(key)) => Ok(entry(table, key)),
+            (Value::Array(list), Self::Index(i)) => {
+                list.get_mut(i).ok_or("no such entry in the list")
+            }
+            (_, Self::Key(_)) => Err("goes into a value that is not a table"),
+            (_, Self::Index(_)) => Err("goes into a value that is not a list"),
+        }
+    }
+}
+
+/// The value of a key, a table where it is missing.
+fn entry<'t>(table: &'t mut toml::Table, key: &str) -> &'t mut Value {
+    table
+        .entry(key)
+        .or_insert_with(|| Value::Table(toml::Table::new()))
+}
+
+/// `objects[3]` is the key `objects`, then the index 3.
+fn split_indices(part: &str) -> impl Iterator<Item = PathStep<'_>> {
+    let key = part.split('[').next().unwrap_or_default();
+    let indices = part[key.len()..]
+        .split(['[', ']'])
+        .filter_map(|n| n.parse().ok().map(PathStep::Index));
+    std::iter::once(PathStep::Key(key)).chain(indices)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn applied(document: &str, text: &str) -> Result<String> {
+        let mut table: toml::Table = document.parse().expect("valid TOML");
+        text.parse::<Override>()?.apply(&mut table)?;
+        Ok(toml::to_string(&table).expect("was TOML before"))
+    }
+
+    #[test]
+    fn a_value_is_replaced_in_place() {
+        assert_eq!(
+            applied("[a]\nb = 1\nc = 2\n", "a.b=[3, 4]").unwrap(),
+            "[a]\nb = [3, 4]\nc = 2\n"
+        );
+    }
+
+    #[test]
+    fn a_missing_table_is_made() {
+        assert_eq!(
+            applied("", "key.clip_black=0.1").unwrap(),
+            "[key]\nclip_black = 0.1\n"
+        );
+    }
+
+    #[test]
+    fn a_list_entry_is_found_by_its_index() {
+        assert_eq!(
+            applied("[[o]]\nx = 1\n[[o]]\nx = 2\n", "o[1].x=5").unwrap(),
+            "[[o]]\nx = 1\n\n[[o]]\nx = 5\n"
+        );
+        assert!(
+            applied("o = [1]", "o[3]=5")
+                .unwrap_err()
+                .to_string()
+                .contains("no such entry")
+        );
+    }
+
+    #[test]
+    fn a_bare_word_is_text() {
+        assert_eq!(
+            applied("", "profile=robust").unwrap(),
+            "profile = \"robust\"\n"
+        );
+    }
+
+    #[test]
+    fn without_a_value_it_is_refused() {
+        assert!("a.b".parse::<Override>().is_err());
+    }
+}

@@ -1,0 +1,160 @@
+//! Whole files or none: everything is written beside its place, put on the disk, and then moved there.
+
+use super::open::reason;
+use crate::error::{Error, Result};
+use crate::work::{self, Kind};
+use std::fs::Permissions;
+use std::io::{BufWriter, Write};
+use std::path::{Component, Path, PathBuf};
+
+/// Writes a file in one step: readers see the old one or the new one, never a part.
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    work::add(Kind::BytesWritten, bytes.len() as u64);
+    write_through(path, |file| file.write_all(bytes))
+}
+
+/// Writes a file piece by piece: nothing of it is there before `fill` has written all of it.
+///
+/// # Errors
+/// [`Error::File`] with the error of `fill` or of the system.
+pub fn write_through(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> Result<()> {
+    if path.is_dir() {
+        return Err(Error::file(path, "cannot be written: is a folder"));
+    }
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let file = new_beside(folder).map_err(|e| match e.kind() {
+        std::io::ErrorKind::NotFound => Error::file(
+            path,
+            format!("cannot be written: no folder {}", folder.display()),
+        ),
+        _ => not_written(path, &e),
+    })?;
+    fill_and_move(file, path, fill)
+        .and_then(|()| sync_folder(folder))
+        .map_err(|e| not_written(path, &e))
+}
+
+fn not_written(path: &Path, e: &std::io::Error) -> Error {
+    Error::file(path, format!("cannot be written: {}", reason(e)))
+}
+
+/// Fills a new file, puts it on the disk and moves it to its place.
+fn fill_and_move(
+    mut file: tempfile::NamedTempFile,
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let mut buffered = BufWriter::new(&mut file);
+    fill(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
+    // Before it gets its name: after a power cut there is the old file or the new one.
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+/// Puts the names in a folder on the disk.
+#[cfg(unix)]
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    match std::fs::File::open(folder)?.sync_all() {
+        // Some file systems have no such thing.
+        Err(e) if e.kind() == std::io::ErrorKind::InvalidInput => Ok(()),
+        done => done,
+    }
+}
+
+/// Other systems write names by themselves.
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// Brings everything that was written to the file system of a folder to the disk, so that it outlives a power cut.
+///
+/// Where it cannot be done nothing is lost but time: what is not there is made again.
+pub fn sync(folder: impl AsRef<Path>) {
+    #[cfg(target_os = "linux")]
+    if let Err(e) = std::fs::File::open(&folder).and_then(|folder| Ok(rustix::fs::syncfs(folder)?))
+    {
+        log::debug!("{}: syncfs: {e}", folder.as_ref().display());
+    }
+    #[cfg(not(target_os = "linux"))]
+    let _ = folder;
+}
+
+/// A new file that vanishes if it is not moved to its place, readable like any other file of the user.
+fn new_beside(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".petcomp-").suffix(".tmp");
+    #[cfg(unix)]
+    builder.permissions(<Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+/// The relative path from a folder to a file or folder, both absolute.
+pub fn relative(to: &Path, from: &Path) -> PathBuf {
+    let shared = to
+        .components()
+        .zip(from.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(to.components().skip(shared)).collect()
+}
+
+/// Makes a folder, and those above it; one that is there already is fine.
+///
+/// # Errors
+/// [`Error::File`] where a file is in the way or the folder may not be made.
+pub fn create_folder(path: impl AsRef<Path>) -> Result<()> {
+    let path = path.as_ref();
+    if let Some(file) = path.ancestors().find(|p| p.is_file()) {
+        return Err(Error::file(file, "is a file, expected a folder"));
+    }
+    std::fs::create_dir_all(path)
+        .map_err(|e| Error::file(path, format!("cannot be made: {}", reason(&e))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_nothing_behind() {
+        let dir = tempfile::tempdir().unwrap();
+        let place = dir.path().join("folder");
+        create_folder(&place).unwrap();
+        assert!(
+            write_bytes(&place, b"x")
+                .unwrap_err()
+                .to_string()
+                .contains("is a folder")
+        );
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_file_in_the_way_of_a_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("out");
+        write_bytes(&file, b"x").unwrap();
+        let e = create_folder(file.join("labels")).unwrap_err().to_string();
+        assert!(e.ends_with("out: is a file, expected a folder"), "{e}");
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let e = write_bytes(&dir.path().join("no/x.png"), b"x")
+            .unwrap_err()
+            .to_string();
+        assert!(e.contains("no folder"), "{e}");
+    }
+}

@@ -1,0 +1,84 @@
+//! Files of petcomp's own in an output folder: never a link to a file of somebody else's.
+
+use super::open::reason;
+use crate::error::{Error, Result};
+use std::fs::{File, OpenOptions};
+use std::path::Path;
+
+/// Opens a file of petcomp's own in an output folder, to be read and appended to; it is made where it is not there.
+///
+/// # Errors
+/// [`Error::File`] for a link, which would lead to a file of somebody else's, and for anything but a regular file.
+pub(crate) fn open_own(path: &Path) -> Result<File> {
+    refuse_foreign(path)?;
+    let mut options = OpenOptions::new();
+    options.read(true).append(true).create(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, own_flags());
+    let opened = options
+        .open(path)
+        .and_then(|file| Ok((file.metadata()?, file)));
+    match opened {
+        Ok((meta, file)) if meta.is_file() => Ok(file),
+        Ok(_) => Err(foreign(path)),
+        Err(e) => Err(Error::file(path, reason(&e))),
+    }
+}
+
+/// Refuses what lies in the place of a file of petcomp's own and is none.
+///
+/// # Errors
+/// [`Error::File`] for a link and for anything but a regular file.
+pub(crate) fn refuse_foreign(path: &Path) -> Result<()> {
+    match std::fs::symlink_metadata(path) {
+        Ok(meta) if !meta.is_file() => Err(foreign(path)),
+        _ => Ok(()),
+    }
+}
+
+fn foreign(path: &Path) -> Error {
+    Error::file(
+        path,
+        "is a link or no regular file, expected petcomp's own file; take it away",
+    )
+}
+
+/// A link that takes the file's place after it was looked at is not followed, and a FIFO is not waited for.
+#[cfg(unix)]
+fn own_flags() -> i32 {
+    (rustix::fs::OFlags::NOFOLLOW | rustix::fs::OFlags::NONBLOCK).bits() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    #[cfg(unix)]
+    #[test]
+    fn own_files_are_no_links_and_nothing_to_wait_for() {
+        let dir = tempfile::tempdir().unwrap();
+        let [own, link, pipe, victim] =
+            ["own", "link", "pipe", "victim"].map(|name| dir.path().join(name));
+        std::fs::write(&victim, "mine").unwrap();
+        std::os::unix::fs::symlink(&victim, &link).unwrap();
+        rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, 0o600.into()).unwrap();
+        for refused in [&link, &pipe, &dir.path().to_path_buf()] {
+            assert!(
+                open_own(refused)
+                    .unwrap_err()
+                    .to_string()
+                    .contains("is a link or no regular file")
+            );
+        }
+        open_own(&own).unwrap().write_all(b"a").unwrap();
+        open_own(&own).unwrap().write_all(b"b").unwrap();
+        assert_eq!(
+            (
+                std::fs::read(&own).unwrap(),
+                std::fs::read(&victim).unwrap()
+            ),
+            (b"ab".into(), b"mine".into())
+        );
+    }
+}

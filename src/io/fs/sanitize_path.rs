@@ -1,0 +1,240 @@
+//! Names and paths that come out of documents: nothing leads outside of a folder.
+
+use super::open::reason;
+use crate::error::{Error, Result};
+use std::fs::{DirEntry, Metadata};
+use std::path::{Component, Path, PathBuf};
+
+/// Longest name that is made, bytes; file systems allow 255 with what is put in front and behind.
+const LONGEST_NAME: usize = 120;
+/// Names that mean devices to some systems, whatever their ending.
+const DEVICE_NAMES: [&str; 4] = ["con", "prn", "aux", "nul"];
+
+/// A file name out of any text: letters, digits, `.`, `_` and `-`, everything else `_`; neither hidden nor a device.
+pub fn clean_name(text: &str) -> String {
+    let name: String = text.chars().map(plain_char).take(LONGEST_NAME).collect();
+    let stem = name
+        .split('.')
+        .next()
+        .unwrap_or_default()
+        .to_ascii_lowercase();
+    match stem.is_empty() || DEVICE_NAMES.contains(&stem.as_str()) {
+        true => format!("_{name}").chars().take(LONGEST_NAME).collect(),
+        false => name,
+    }
+}
+
+fn plain_char(c: char) -> char {
+    if c.is_ascii_alphanumeric() || "._-".contains(c) {
+        c
+    } else {
+        '_'
+    }
+}
+
+/// A file that a document names: below the folder, by its path at least.
+///
+/// # Errors
+/// [`Error::Value`] for an empty, absolute or climbing (`..`) path.
+pub fn below(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf> {
+    let file = file.as_ref();
+    let mut parts = file.components().peekable();
+    if parts.peek().is_none() || !parts.all(|part| matches!(part, Component::Normal(_))) {
+        let what = format!(
+            "\"{}\", expected a path below the document's folder",
+            file.display()
+        );
+        return Err(Error::value("file", what));
+    }
+    Ok(folder.as_ref().join(file))
+}
+
+/// The file below a folder that a document names: the one way from a path in a document to a file that is read.
+///
+/// Links are followed where they stay in the folder; the folder itself may be one.
+///
+/// # Errors
+/// [`Error::Value`] as [`below`]; [`Error::File`] for a link that leads out of the folder, for a file that is not there, and
+/// for anything but a regular file, which may block or never end.
+pub fn inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<PathBuf> {
+    found_inside(folder.as_ref(), file.as_ref()).map(|(path, _)| path)
+}
+
+/// Length of a file below a folder that a document names.
+///
+/// # Errors
+/// As [`inside`].
+pub(crate) fn length_inside(folder: impl AsRef<Path>, file: impl AsRef<Path>) -> Result<u64> {
+    found_inside(folder.as_ref(), file.as_ref()).map(|(_, meta)| meta.len())
+}
+
+fn found_inside(folder: &Path, file: &Path) -> Result<(PathBuf, Metadata)> {
+    let path = below(folder, file)?;
+    let meta = match without_links(folder, file) {
+        Ok(None) => through_links(folder, &path),
+        found => found,
+    };
+    match meta.map_err(|e| Error::file(&path, reason(&e)))? {
+        Some(meta) if meta.is_file() => Ok((path, meta)),
+        Some(_) => Err(Error::file(path, "not a regular file")),
+        None => {
+            let folder = or_working_folder(folder).display();
+            let what = format!("is a link out of {folder}, expected a file in that folder");
+            Err(Error::file(path, what))
+        }
+    }
+}
+
+/// What a file is; none where one of the steps to it from the folder is a link.
+fn without_links(folder: &Path, file: &Path) -> std::io::Result<Option<Metadata>> {
+    let (mut path, mut last) = (folder.to_path_buf(), None);
+    for step in file.components() {
+        path.push(step);
+        let meta = std::fs::symlink_metadata(&path)?;
+        if meta.is_symlink() {
+            return Ok(None);
+        }
+        last = Some(meta);
+    }
+    Ok(last)
+}
+
+/// What a path with links leads to; none where that is outside of the folder.
+fn through_links(folder: &Path, path: &Path) -> std::io::Result<Option<Metadata>> {
+    let root = or_working_folder(folder).canonicalize()?;
+    let target = path.canonicalize()?;
+    if target.starts_with(root) {
+        std::fs::metadata(target).map(Some)
+    } else {
+        Ok(None)
+    }
+}
+
+/// The empty path is the working folder.
+fn or_working_folder(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    }
+}
+
+/// Refuses an output folder that holds symbolic links to folders, which would lead outside. The folder itself may be one.
+///
+/// # Errors
+/// [`Error::File`] naming the link, or a folder that cannot be looked into.
+pub fn refuse_links(folder: impl AsRef<Path>) -> Result<()> {
+    let folder = folder.as_ref();
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    entries
+        .flatten()
+        .try_for_each(|entry| refuse_linked_entry(folder, &entry))
+}
+
+fn refuse_linked_entry(folder: &Path, entry: &DirEntry) -> Result<()> {
+    let path = entry.path();
+    let kind = entry.file_type().map_err(|e| Error::file(folder, e))?;
+    if kind.is_symlink() && path.is_dir() {
+        return Err(Error::file(
+            path,
+            "is a link to a folder, expected outputs to stay in their own folder",
+        ));
+    }
+    if kind.is_dir() {
+        return refuse_links(path);
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_text_makes_a_harmless_name() {
+        let names = [
+            "../../etc/passwd",
+            "",
+            ".",
+            "..",
+            "a/b",
+            "C:\\x",
+            "nul",
+            "CON.txt",
+            ".hidden",
+            "ä b",
+            "ok-1_2.png",
+        ];
+        let cleaned = names.map(clean_name);
+        assert_eq!(cleaned[0], "_.._.._etc_passwd");
+        assert_eq!(cleaned[10], "ok-1_2.png");
+        for name in &cleaned {
+            assert!(
+                !name.starts_with('.') && !name.is_empty() && !name.contains(['/', '\\']),
+                "{name}"
+            );
+        }
+        assert_eq!(cleaned[6], "_nul");
+        assert_eq!(clean_name(&"x".repeat(1000)).len(), LONGEST_NAME);
+    }
+
+    #[test]
+    fn paths_that_leave_their_folder_are_refused() {
+        assert_eq!(
+            below("labels", "sub/a.jpg").unwrap(),
+            Path::new("labels/sub/a.jpg")
+        );
+        for bad in ["", ".", "../a.jpg", "/etc/passwd", "a/../../b"] {
+            assert!(below("labels", bad).is_err(), "{bad}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_named_file_is_a_regular_one_of_its_folder() {
+        use std::os::unix::fs::symlink;
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("shard");
+        std::fs::create_dir_all(folder.join("sub")).unwrap();
+        std::fs::write(folder.join("sub/a.txt"), "a").unwrap();
+        std::fs::write(dir.path().join("secret.txt"), "b").unwrap();
+        symlink("sub/a.txt", folder.join("near.txt")).unwrap();
+        symlink("../secret.txt", folder.join("far.txt")).unwrap();
+        symlink("..", folder.join("up")).unwrap();
+        symlink(&folder, dir.path().join("alias")).unwrap();
+        symlink("/dev/zero", folder.join("endless")).unwrap();
+        assert!(rustix::fs::mkfifoat(rustix::fs::CWD, folder.join("pipe"), 0o600.into()).is_ok());
+        for good in ["sub/a.txt", "near.txt"] {
+            assert_eq!(inside(&folder, good).unwrap(), folder.join(good));
+            assert!(inside(dir.path().join("alias"), good).is_ok());
+        }
+        let refused = |file: &str| inside(&folder, file).unwrap_err().to_string();
+        for (file, why) in [
+            ("../secret.txt", "expected a path below"),
+            ("far.txt", "is a link out of"),
+            ("up/secret.txt", "is a link out of"),
+            ("endless", "is a link out of"),
+            ("pipe", "not a regular file"),
+            ("sub", "not a regular file"),
+            ("none", "no such file"),
+        ] {
+            assert!(refused(file).contains(why), "{file}: {}", refused(file));
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_inside_an_output_folder_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let elsewhere = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("images")).unwrap();
+        refuse_links(folder.path()).unwrap();
+        std::os::unix::fs::symlink(elsewhere.path(), folder.path().join("images/train")).unwrap();
+        assert!(
+            refuse_links(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("images/train: is a link")
+        );
+    }
+}

@@ -1,0 +1,103 @@
+//! Typed pictures out of files.
+
+use super::codec::FromFile;
+use super::codec::exif::CameraNotes;
+use super::codec::refusal::Refusal;
+#[cfg(feature = "oiio")]
+use super::decode::decode_elsewhere;
+use super::decode::{catch_panic, header_elsewhere, read_file_header};
+use super::header::Header;
+#[cfg(feature = "oiio")]
+use super::options::Fallback;
+use super::options::ReadOptions;
+use super::picture::Picture;
+use super::source::{OpenedSource, Source};
+use crate::error::{Error, Result};
+use crate::image::Image;
+use std::path::Path;
+
+/// Reads a picture as the pixels asked for, with the default [`ReadOptions`].
+///
+/// `LinearRgb` wants an opaque picture: one with alpha below 1 is refused, an alpha of 1 is dropped. `PremulRgba` and
+/// `StraightRgba` get alpha 1 from a file without alpha. `Coverage` is the only channel of a file, or `R`, `G` and `B` where
+/// they are equal and no alpha below 1 is beside them, or `A`; `Depth` the only one, or `Z`, in float.
+///
+/// # Errors
+/// [`Error::File`] for a file that is missing, not regular, not a picture, damaged, beyond the limits, or without the
+/// channels asked for.
+pub fn read<P: FromFile>(path: impl AsRef<Path>) -> Result<Image<P>> {
+    read_with(path, &ReadOptions::default())
+}
+
+/// Reads a picture as [`read`] does, with options of the caller's.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Image<P>> {
+    Picture::decode(path.as_ref(), options, P::WANTED)?.into_image()
+}
+
+/// Reads what a file says about its picture, without the pixels.
+///
+/// # Errors
+/// [`Error::File`] as [`read`].
+pub fn read_header(path: impl AsRef<Path>) -> Result<Header> {
+    let (path, options) = (path.as_ref(), ReadOptions::default());
+    let mut opened = OpenedSource::open(path, &options.limits)?;
+    let OpenedSource {
+        file,
+        bytes,
+        format,
+    } = &mut opened;
+    let decoded = catch_panic(|| read_file_header(file, *bytes, *format, &options.limits));
+    let (mut header, notes) = match decoded {
+        Err(Refusal::Unsupported(what)) => {
+            let source = Source::open(path, &options.limits)?;
+            header_elsewhere(&source, what, &options)
+        }
+        decoded => decoded,
+    }
+    .map_err(|e| Error::file(path, e))?;
+    apply_notes(&mut header, &notes);
+    Ok(header)
+}
+
+/// Adds what the camera noted; the size becomes that of the upright picture.
+fn apply_notes(header: &mut Header, notes: &CameraNotes) {
+    header.cropped = notes.has_other_shape([header.width, header.height]);
+    header.whole = notes.has_same_size([header.width, header.height]);
+    (header.width, header.height) = notes.orientation.size((header.width, header.height));
+    if header.data_size == [0; 2] {
+        header.data_size = [header.width, header.height];
+    }
+    (header.focal_35mm, header.digital_zoom) = (notes.focal_35mm, notes.digital_zoom);
+}
+
+/// Reads a picture by OpenImageIO alone, even one that the Rust decoders could read.
+#[cfg(feature = "oiio")]
+pub(super) fn read_by<P: FromFile>(
+    fallback: Fallback,
+    path: &Path,
+    options: &ReadOptions,
+) -> Result<Image<P>> {
+    let source = Source::open(path, &options.limits)?;
+    let options = ReadOptions {
+        fallback,
+        ..options.clone()
+    };
+    let raster = decode_elsewhere(&source, String::new(), &options, P::WANTED);
+    Picture::from_raster(raster, &source, &options.limits, P::WANTED)?.into_image()
+}
+
+/// Reads a picture through the OpenImageIO worker, even one that the Rust decoders could read: for comparisons.
+///
+/// # Errors
+/// As [`read_with`].
+#[cfg(feature = "oiio")]
+#[doc(hidden)]
+pub fn read_in_worker<P: FromFile>(
+    path: impl AsRef<Path>,
+    options: &ReadOptions,
+) -> Result<Image<P>> {
+    read_by(Fallback::Worker, path.as_ref(), options)
+}

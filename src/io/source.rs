@@ -1,0 +1,108 @@
+//! Picture files as they are opened: by their first bytes, not by their names.
+
+use super::format::Format;
+use super::fs::{open_regular, read_to_end, reason};
+use super::limits::Limits;
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// A whole file in memory, and its kind by its content.
+pub(super) struct Source {
+    pub(super) path: PathBuf,
+    pub(super) bytes: Vec<u8>,
+    pub(super) format: Format,
+}
+
+/// A file that is open at its first byte, and its kind by its content.
+pub(super) struct OpenedSource {
+    pub(super) file: BufReader<File>,
+    pub(super) bytes: u64,
+    pub(super) format: Format,
+}
+
+impl OpenedSource {
+    /// Opens a picture file that is worth decoding: regular, not empty, of a known kind, not larger than allowed.
+    pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
+        let (file, bytes) = open_regular(path, (limits.file_bytes, "file_bytes"), "picture")?;
+        let mut file = BufReader::new(file);
+        let start = file.fill_buf().map_err(|e| Error::file(path, reason(&e)))?;
+        let format = recognized(path, start).map_err(|e| Error::file(path, e))?;
+        Ok(Self {
+            file,
+            bytes,
+            format,
+        })
+    }
+}
+
+impl Source {
+    /// Reads a picture file that is worth decoding.
+    pub(super) fn open(path: &Path, limits: &Limits) -> Result<Self> {
+        let OpenedSource {
+            file,
+            bytes,
+            format,
+        } = OpenedSource::open(path, limits)?;
+        let bytes =
+            read_to_end(file, bytes, limits.file_bytes).map_err(|e| Error::file(path, e))?;
+        Ok(Self {
+            path: path.into(),
+            bytes,
+            format,
+        })
+    }
+}
+
+/// The kinds of file that messages name.
+const EXPECTED_FORMATS: &str = "expected EXR, PNG, JPEG, TIFF or HDR";
+
+/// The kind of a file by its first bytes. Film scans are read only under a name of their own: OpenImageIO has to read
+/// them, and what is called otherwise was not meant to be one.
+fn recognized(path: &Path, start: &[u8]) -> std::result::Result<Format, String> {
+    if start.is_empty() {
+        return Err("empty file (0 bytes), expected a picture".into());
+    }
+    match Format::from_bytes(start) {
+        Some(format @ (Format::Dpx | Format::Cineon))
+            if Format::from_extension(path) != Some(format) =>
+        {
+            let name = format.name();
+            Err(format!("is {name} under another name, {EXPECTED_FORMATS}"))
+        }
+        Some(format) => Ok(format),
+        None => Err(format!(
+            "not a picture petcomp reads (starts with {}), {EXPECTED_FORMATS}",
+            printable_start(start)
+        )),
+    }
+}
+
+/// The first bytes in a form that is safe to print on one line: text, or hexadecimal numbers.
+fn printable_start(bytes: &[u8]) -> String {
+    let head = &bytes[..bytes.len().min(12)];
+    match std::str::from_utf8(head) {
+        Ok(text) if text.chars().all(is_text) => format!("{text:?}"),
+        _ => head[..head.len().min(8)]
+            .iter()
+            .map(|b| format!("{b:02x}"))
+            .collect::<Vec<_>>()
+            .join(" "),
+    }
+}
+
+fn is_text(c: char) -> bool {
+    !c.is_control() || c.is_ascii_whitespace()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_start_prints_on_one_line() {
+        assert_eq!(printable_start(b"hello\nworld, how"), "\"hello\\nworld,\"");
+        assert_eq!(printable_start(b"\x00\x01\xff"), "00 01 ff");
+    }
+}

@@ -1,0 +1,296 @@
+//! OpenImageIO in this process: shapes and samples of files in memory, and pictures to files.
+
+use super::ffi::{self, Layout};
+use super::protocol::{Request, Response, Sample, Shape};
+use crate::color::Curve;
+use crate::io::codec::Wanted;
+use crate::io::codec::codes::Bits;
+use crate::io::codec::raster::{Raster, Samples, overlap};
+use crate::io::codec::refusal::Refusal;
+use crate::io::format::Format;
+use crate::io::header::Window;
+use crate::io::limits::{Demand, Limits};
+use crate::io::source::Source;
+use cxx::UniquePtr;
+use std::ops::Range;
+use std::sync::OnceLock;
+
+/// The OpenImageIO that this library was built with.
+pub(crate) fn version() -> String {
+    ffi::version()
+}
+
+/// Answers a request about a file.
+pub(crate) fn answer(
+    source: &Source,
+    limits: &Limits,
+    request: Request,
+) -> Result<Response, Refusal> {
+    match request {
+        Request::Header => shape(source, limits).map(Response::Shape),
+        Request::Pixels { wanted, window } => {
+            decode(source, limits, wanted, window, |_| ()).map(Response::Raster)
+        }
+    }
+}
+
+/// Once for the process; what went wrong the first time is not tried again.
+pub(crate) fn start() -> Result<(), Refusal> {
+    static STARTED: OnceLock<Result<(), String>> = OnceLock::new();
+    STARTED
+        .get_or_init(|| ffi::start().map_err(|e| e.what().to_owned()))
+        .clone()
+        .map_err(Refusal::Broken)
+}
+
+/// The shape of a picture, without its samples.
+pub(crate) fn shape(source: &Source, limits: &Limits) -> Result<Shape, Refusal> {
+    let (_, layout) = open(source, limits)?;
+    Ok(Shape {
+        width: layout.width as usize,
+        height: layout.height as usize,
+        sample: layout.sample(),
+        names: layout.channels,
+        display_encoded: false,
+    })
+}
+
+/// Samples as the file has them, in the window asked for; `reserve` gets the number of their bytes before they are read.
+pub(crate) fn decode(
+    source: &Source,
+    limits: &Limits,
+    wanted: Wanted,
+    window: Window,
+    reserve: impl FnOnce(u64),
+) -> Result<Raster, Refusal> {
+    let (reader, mut layout) = open(source, limits)?;
+    if window == Window::Data {
+        layout.show_data_window();
+    }
+    let mut picked = wanted.pick(&layout.channels)?;
+    // Grey is picked three times over for colour, but carried once.
+    picked.dedup();
+    limits.check_memory(layout.width as usize, layout.height as usize, picked.len())?;
+    reserve(layout.data_samples() as u64 * u64::from(layout.bytes.unsigned_abs()));
+    let samples = read_samples(&reader, &layout, &picked)?;
+    let (samples, display_encoded) = interpret(samples, source.format, &layout.color_space)?;
+    Ok(Raster {
+        width: layout.width as usize,
+        height: layout.height as usize,
+        names: picked.iter().map(|&i| layout.channels[i].clone()).collect(),
+        samples,
+        display_encoded,
+        premultiplied: false,
+    })
+}
+
+fn open<'a>(
+    source: &'a Source,
+    limits: &Limits,
+) -> Result<(UniquePtr<ffi::Reader<'a>>, Layout), Refusal> {
+    start()?;
+    // Named in messages, and opened by the few readers that know only files.
+    let name = source.path.to_string_lossy();
+    let reader = ffi::open(&name, source.format.name(), &source.bytes).map_err(refused)?;
+    let layout = ffi::layout(&reader).map_err(refused)?;
+    layout.check(source.bytes.len() as u64, limits)?;
+    Ok((reader, layout))
+}
+
+fn refused(e: cxx::Exception) -> Refusal {
+    Refusal::Broken(format!("OpenImageIO: {}", e.what()))
+}
+
+impl Layout {
+    fn check(&self, file_bytes: u64, limits: &Limits) -> Result<(), Refusal> {
+        let channels = self.channels.len() as u64;
+        for (width, height) in [
+            (self.width, self.height),
+            (self.data_width, self.data_height),
+        ] {
+            limits.check(Demand {
+                width: u64::try_from(width).unwrap_or(0),
+                height: u64::try_from(height).unwrap_or(0),
+                channels,
+                bytes_per_pixel: channels * u64::from(self.bytes.unsigned_abs()),
+                file_bytes,
+            })?;
+        }
+        Ok(())
+    }
+
+    fn sample(&self) -> Sample {
+        match (self.bytes, self.half) {
+            (1, _) => Sample::U8,
+            (2, false) => Sample::U16,
+            (2, true) => Sample::F16,
+            _ => Sample::F32,
+        }
+    }
+
+    /// Makes the data window the one that is shown.
+    fn show_data_window(&mut self) {
+        (self.x, self.y) = (0, 0);
+        (self.width, self.height) = (self.data_width, self.data_height);
+    }
+
+    /// Samples of all channels in the data window.
+    fn data_samples(&self) -> usize {
+        (self.data_width * self.data_height) as usize * self.channels.len()
+    }
+
+    /// The data window is the display window.
+    fn shows_all(&self) -> bool {
+        let data = (self.x, self.y, self.data_width, self.data_height);
+        data == (0, 0, self.width, self.height)
+    }
+
+    /// Rows and columns of the display window that have data.
+    fn visible(&self) -> (Range<usize>, Range<usize>) {
+        (
+            overlap(self.y, self.data_height as usize, self.height as usize),
+            overlap(self.x, self.data_width as usize, self.width as usize),
+        )
+    }
+}
+
+fn read_samples(
+    reader: &ffi::Reader<'_>,
+    layout: &Layout,
+    picked: &[usize],
+) -> Result<Samples, Refusal> {
+    Ok(match layout.sample() {
+        Sample::U8 => Samples::U8(windowed(read_data(reader, layout)?, layout, picked)),
+        Sample::U16 => Samples::U16(windowed(read_data(reader, layout)?, layout, picked)),
+        Sample::F16 => Samples::F16(windowed(read_data(reader, layout)?, layout, picked)),
+        Sample::F32 => Samples::F32(windowed(read_data(reader, layout)?, layout, picked)),
+    })
+}
+
+/// The samples of the data window.
+fn read_data<T: bytemuck::Pod>(
+    reader: &ffi::Reader<'_>,
+    layout: &Layout,
+) -> Result<Vec<T>, Refusal> {
+    let mut samples: Vec<T> = bytemuck::zeroed_vec(layout.data_samples());
+    ffi::read(reader, bytemuck::cast_slice_mut(&mut samples)).map_err(refused)?;
+    Ok(samples)
+}
+
+/// The picked channels, cut or padded with zeros from the data window to the display window.
+fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize]) -> Vec<T> {
+    let (width, height) = (layout.width as usize, layout.height as usize);
+    let (columns, stride) = (layout.data_width as usize, layout.channels.len());
+    if layout.shows_all() && picked.iter().copied().eq(0..stride) {
+        return samples;
+    }
+    let mut out = vec![T::default(); width * height * picked.len()];
+    let (ys, xs) = layout.visible();
+    for y in ys {
+        let row = (y as i64 - layout.y) as usize * columns;
+        for x in xs.clone() {
+            let from = (row + (x as i64 - layout.x) as usize) * stride;
+            let to = (y * width + x) * picked.len();
+            for (slot, &channel) in out[to..].iter_mut().zip(picked) {
+                *slot = samples[from + channel];
+            }
+        }
+    }
+    out
+}
+
+/// Samples with their meaning, and whether they are display-encoded: the rule of [`io`](crate::io) for integers and
+/// floats, while film scans name the meaning of their codes themselves.
+fn interpret(samples: Samples, format: Format, space: &str) -> Result<(Samples, bool), Refusal> {
+    let is_integer = !samples.are_float();
+    match (format, space) {
+        (Format::Dpx | Format::Cineon, "Linear" | "linear") => Ok((samples, false)),
+        (Format::Dpx | Format::Cineon, "Rec709") => {
+            let light = decode_curve(samples, Curve::Rec709);
+            Ok((Samples::F32(light), false))
+        }
+        (Format::Dpx | Format::Cineon, "" | "sRGB") => Ok((samples, is_integer)),
+        (Format::Dpx | Format::Cineon, other) => Err(Refusal::Broken(format!(
+            "colour space {other}, expected linear, sRGB or Rec709 (convert it first)"
+        ))),
+        _ => Ok((samples, is_integer)),
+    }
+}
+
+/// Linear light of display values.
+fn decode_curve(samples: Samples, curve: Curve) -> Vec<f32> {
+    match samples {
+        Samples::U8(v) => v
+            .into_iter()
+            .map(|code| curve.decode(f32::from(code) / 255.0))
+            .collect(),
+        Samples::U16(v) => v
+            .into_iter()
+            .map(|code| curve.decode(f32::from(code) / 65_535.0))
+            .collect(),
+        Samples::F16(v) => v
+            .into_iter()
+            .map(|value| curve.decode(value.into()))
+            .collect(),
+        Samples::F32(v) => v.into_iter().map(|value| curve.decode(value)).collect(),
+    }
+}
+
+/// The layout of a picture that is to be written.
+pub(crate) fn written_layout(
+    (width, height): (usize, usize),
+    channels: &[&str],
+    bits: Bits,
+) -> Layout {
+    let (width, height) = (width as i64, height as i64);
+    Layout {
+        width,
+        height,
+        x: 0,
+        y: 0,
+        data_width: width,
+        data_height: height,
+        channels: channels.iter().map(|&name| name.into()).collect(),
+        bytes: match bits {
+            Bits::Eight => 1,
+            Bits::Sixteen => 2,
+            Bits::Half | Bits::Float => 4,
+        },
+        half: bits == Bits::Half,
+        premultiplied: matches!(bits, Bits::Half | Bits::Float),
+        color_space: String::new(),
+    }
+}
+
+/// Writes samples in native byte order.
+pub(crate) fn write_file(
+    path: &str,
+    format: Format,
+    layout: &Layout,
+    samples: &[u8],
+    metadata: &[(String, String)],
+) -> Result<(), Refusal> {
+    let notes: Vec<_> = metadata
+        .iter()
+        .map(|(key, value)| ffi::Note {
+            key: key.clone(),
+            value: value.clone(),
+        })
+        .collect();
+    ffi::write(path, format.name(), layout, samples, &notes).map_err(refused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_thrown_becomes_an_error() {
+        assert_eq!(
+            ffi::throw_an_int().unwrap_err().what(),
+            "unknown C++ exception"
+        );
+        assert!(ffi::open("no such file.png", "png", b"").is_err());
+        assert!(ffi::open("no such file.png", "no such reader", b"").is_err());
+    }
+}

@@ -1,0 +1,507 @@
+//! OpenImageIO in processes of their own: a file that crashes it ends such a process and is named, and programs that
+//! never meet such a file never load it.
+//!
+//! A worker lives as long as this program and answers one request at a time; there are as many as ever asked at once.
+//! One that dies is replaced and the file tried once more, one that takes too long is killed.
+
+use super::protocol::{
+    Greeting, Request, Response, Shape, receive_line, receive_samples, receive_shape, send_request,
+};
+use super::timeout::TimedPipe;
+use crate::error::{Error, Result};
+use crate::io::codec::refusal::Refusal;
+use crate::io::limits::Limits;
+use crate::io::source::Source;
+use std::io::{BufReader, ErrorKind};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, Once, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Name of the worker program, looked for beside the running one.
+const PROGRAM: &str = "petcomp-oiio-worker";
+/// Names the worker program where it lies elsewhere.
+const PROGRAM_VARIABLE: &str = "PETCOMP_OIIO_WORKER";
+/// What of the environment a worker sees: OpenImageIO and OpenColorIO take settings from the rest.
+const ENVIRONMENT: [&str; 1] = ["LD_LIBRARY_PATH"];
+/// Time for loading 260 libraries on a busy machine.
+const START_TIMEOUT: Duration = Duration::from_secs(60);
+/// Pixels that earn a worker a further second.
+const PIXELS_PER_SECOND: u64 = 10_000_000;
+/// How often a file is tried.
+const MAX_ATTEMPTS: usize = 2;
+/// How often a worker is started that ends before it greets: it has seen no file yet, so none is to blame.
+const MAX_STARTS: usize = 3;
+/// A worker that closed its pipes is ending, and is waited for so long before it is killed.
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// The workers of this program that have nothing to do.
+static IDLE: WorkerPool = WorkerPool {
+    idle: Mutex::new(Vec::new()),
+};
+
+/// A worker's response about a file. A strict request is sent to no worker that the system does not sandbox.
+pub(crate) fn ask(
+    source: &Source,
+    limits: &Limits,
+    strict: bool,
+    request: Request,
+) -> std::result::Result<Response, Refusal> {
+    let program = find_program().ok_or_else(|| {
+        format!("needs OpenImageIO, and {PROGRAM} is not beside this program ({PROGRAM_VARIABLE} may name it)")
+    })?;
+    IDLE.ask(&program, source, limits, strict, request)
+}
+
+/// The OpenImageIO that the worker program links, as it reports itself.
+///
+/// # Errors
+/// [`Error::File`] where there is no worker program or it does not start.
+pub fn worker_version() -> Result<String> {
+    let program =
+        find_program().ok_or_else(|| Error::file(PROGRAM, "not found beside this program"))?;
+    let worker =
+        Worker::start(&program, &Limits::default()).map_err(|e| Error::file(&program, e))?;
+    Ok(format!("OpenImageIO {}", worker.greeting.openimageio))
+}
+
+/// Beside the running program; one folder up serves test programs, which cargo puts below the others.
+fn find_program() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os(PROGRAM_VARIABLE) {
+        return Some(named.into());
+    }
+    let own = std::env::current_exe().ok()?;
+    let name = format!("{PROGRAM}{}", std::env::consts::EXE_SUFFIX);
+    own.ancestors()
+        .skip(1)
+        .take(2)
+        .map(|folder| folder.join(&name))
+        .find(|p| p.is_file())
+}
+
+/// Workers that wait for a request.
+struct WorkerPool {
+    idle: Mutex<Vec<Worker>>,
+}
+
+/// Why a worker gave no response.
+#[derive(Debug)]
+enum Failure {
+    /// It ended, or its response was invalid: the next one may do better.
+    Died(String),
+    /// It, and so the file, had its time.
+    TimedOut(Duration),
+}
+
+impl WorkerPool {
+    fn ask(
+        &self,
+        program: &Path,
+        source: &Source,
+        limits: &Limits,
+        strict: bool,
+        request: Request,
+    ) -> std::result::Result<Response, Refusal> {
+        let mut cause = String::new();
+        for attempt in 0..MAX_ATTEMPTS {
+            // The second attempt is for a worker that nothing has happened to yet.
+            let idle = (attempt == 0).then(|| self.take(limits)).flatten();
+            let mut worker = match idle {
+                Some(worker) => worker,
+                None => Worker::start(program, limits)?,
+            };
+            worker.check_sandbox(strict)?;
+            match worker.answer(source, request) {
+                Ok(response) => {
+                    self.give_back(worker);
+                    return response;
+                }
+                Err(Failure::TimedOut(timeout)) => return Err(timed_out(timeout)),
+                Err(Failure::Died(how)) => {
+                    log::debug!("{}: OpenImageIO died on it ({how})", source.path.display());
+                    cause = how;
+                }
+            }
+        }
+        Err(format!("unreadable: OpenImageIO died on it {MAX_ATTEMPTS} times ({cause})").into())
+    }
+
+    /// One that was started with these limits.
+    fn take(&self, limits: &Limits) -> Option<Worker> {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = idle.iter().rposition(|worker| worker.limits == *limits)?;
+        Some(idle.swap_remove(at))
+    }
+
+    fn give_back(&self, worker: Worker) {
+        let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
+        idle.push(worker);
+    }
+}
+
+fn timed_out(timeout: Duration) -> Refusal {
+    let seconds = timeout.as_secs_f64();
+    format!("unreadable: OpenImageIO took longer than {seconds} s (Limits::seconds)").into()
+}
+
+/// A running worker program; killed when it is dropped.
+struct Worker {
+    child: Child,
+    to: TimedPipe,
+    from: BufReader<TimedPipe>,
+    limits: Limits,
+    greeting: Greeting,
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Worker {
+    fn start(program: &Path, limits: &Limits) -> std::result::Result<Self, Refusal> {
+        let mut cause = String::new();
+        for _ in 0..MAX_STARTS {
+            let mut worker =
+                Self::launch(program, limits).map_err(|e| not_started(program, &e.to_string()))?;
+            let Err(e) = worker.receive_greeting() else {
+                return Ok(worker);
+            };
+            cause = worker.cause_of_death(&e);
+            if !is_closed(&e) {
+                break;
+            }
+        }
+        Err(not_started(program, &cause))
+    }
+
+    /// A process that has sent nothing yet.
+    fn launch(program: &Path, limits: &Limits) -> std::io::Result<Self> {
+        let environment = ENVIRONMENT
+            .iter()
+            .filter_map(|name| Some((name, std::env::var_os(name)?)));
+        let mut child = Command::new(program)
+            .arg(serde_json::to_string(limits)?)
+            .env_clear()
+            .envs(environment)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
+        let pipes = child.stdin.take().zip(child.stdout.take());
+        let (stdin, stdout) = pipes.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
+        Ok(Self {
+            child,
+            to: TimedPipe::new(stdin.into())?,
+            from: BufReader::new(TimedPipe::new(stdout.into())?),
+            limits: limits.clone(),
+            greeting: Greeting::default(),
+        })
+    }
+
+    fn receive_greeting(&mut self) -> std::io::Result<()> {
+        self.from.get_mut().deadline = Instant::now() + START_TIMEOUT;
+        self.greeting = receive_line(&mut self.from)?;
+        if self.greeting.petcomp != env!("CARGO_PKG_VERSION") {
+            return Err(std::io::Error::other(format!(
+                "belongs to petcomp {}",
+                self.greeting.petcomp
+            )));
+        }
+        Ok(())
+    }
+
+    /// What the system could not give it is an error where that is asked for, and a warning elsewhere.
+    fn check_sandbox(&self, strict: bool) -> std::result::Result<(), Refusal> {
+        let missing = self.greeting.missing.join("; ");
+        if missing.is_empty() {
+            return Ok(());
+        }
+        if strict {
+            return Err(format!(
+                "needs OpenImageIO, and its worker has no full sandbox here ({missing})"
+            )
+            .into());
+        }
+        warn_once(&missing);
+        Ok(())
+    }
+
+    fn answer(
+        &mut self,
+        source: &Source,
+        request: Request,
+    ) -> std::result::Result<std::result::Result<Response, Refusal>, Failure> {
+        let started = Instant::now();
+        let mut timeout = Duration::from_secs(self.limits.seconds);
+        self.set_deadline(started + timeout);
+        let shape = match self
+            .ask_shape(source, request)
+            .map_err(|e| self.failure(e, timeout))?
+        {
+            Ok(shape) if request != Request::Header => shape,
+            other => return Ok(other.map(Response::Shape)),
+        };
+        timeout += timeout_for_samples(&shape);
+        self.set_deadline(started + timeout);
+        let raster =
+            receive_samples(&mut self.from, shape).map_err(|e| self.failure(e, timeout))?;
+        Ok(Ok(Response::Raster(raster)))
+    }
+
+    fn ask_shape(
+        &mut self,
+        source: &Source,
+        request: Request,
+    ) -> std::io::Result<std::result::Result<Shape, Refusal>> {
+        send_request(&mut self.to, source.format, request, &source.bytes)?;
+        receive_shape(&mut self.from, &self.limits, source.bytes.len() as u64)
+    }
+
+    fn set_deadline(&mut self, deadline: Instant) {
+        self.to.deadline = deadline;
+        self.from.get_mut().deadline = deadline;
+    }
+
+    fn failure(&mut self, e: std::io::Error, timeout: Duration) -> Failure {
+        match e.kind() {
+            ErrorKind::TimedOut => Failure::TimedOut(timeout),
+            _ => Failure::Died(self.cause_of_death(&e)),
+        }
+    }
+
+    /// The signal that ended it, or what else went wrong. It does not run any more.
+    fn cause_of_death(&mut self, e: &std::io::Error) -> String {
+        let status = match is_closed(e) {
+            true => self.wait_for_exit(EXIT_TIMEOUT),
+            false => None,
+        };
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        match status {
+            Some(status) => match status.signal() {
+                Some(signal) => format!("signal {signal}"),
+                None => status.to_string(),
+            },
+            None if is_closed(e) => "closed its pipes and did not exit".into(),
+            None => format!("garbled response: {e}"),
+        }
+    }
+
+    /// How it ended, if it does so in time.
+    fn wait_for_exit(&mut self, timeout: Duration) -> Option<ExitStatus> {
+        let deadline = Instant::now() + timeout;
+        loop {
+            match self.child.try_wait() {
+                Ok(None) if Instant::now() < deadline => {
+                    std::thread::sleep(Duration::from_millis(1))
+                }
+                status => return status.ok().flatten(),
+            }
+        }
+    }
+}
+
+fn not_started(program: &Path, how: &str) -> Refusal {
+    let program = program.display();
+    format!("needs OpenImageIO, and {program} does not start: {how}").into()
+}
+
+/// The other end of a pipe is gone.
+fn is_closed(e: &std::io::Error) -> bool {
+    matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::BrokenPipe)
+}
+
+fn timeout_for_samples(shape: &Shape) -> Duration {
+    Duration::from_secs(
+        (shape.width as u64).saturating_mul(shape.height as u64) / PIXELS_PER_SECOND,
+    )
+}
+
+/// The sandbox that a worker could not have, once.
+fn warn_once(missing: &str) {
+    static WARNED: Once = Once::new();
+    WARNED.call_once(|| log::warn!("the OpenImageIO worker has no full sandbox: {missing}"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::codec::Wanted;
+    use crate::io::codec::raster::{Raster, Samples};
+    use crate::io::format::Format;
+    use crate::io::header::Window;
+    use std::io::Write;
+
+    /// Written by a process of its own: a program that this one had open for writing cannot be started while any other
+    /// test's child, forked at that moment, still holds it open (ETXTBSY).
+    fn write_program(program: &Path, text: &str) {
+        let mut shell = Command::new("/bin/sh");
+        shell
+            .args(["-c", "cat >\"$0\" && chmod 755 \"$0\""])
+            .arg(program)
+            .stdin(Stdio::piped());
+        let mut child = shell.spawn().unwrap();
+        child
+            .stdin
+            .take()
+            .unwrap()
+            .write_all(text.as_bytes())
+            .unwrap();
+        assert!(child.wait().unwrap().success());
+    }
+
+    const GREETING: &str = concat!(
+        r#"echo '{"petcomp":""#,
+        env!("CARGO_PKG_VERSION"),
+        r#"","openimageio":"0","missing":[]}'"#
+    );
+
+    /// A worker that greets and then does what a shell script says.
+    fn asked(script: &str, limits: &Limits) -> std::result::Result<Raster, String> {
+        asked_of(&format!("{GREETING}\n{script}"), limits, false)
+    }
+
+    /// A worker that is a shell script; `$n` counts how many were started in its folder.
+    fn asked_of(
+        script: &str,
+        limits: &Limits,
+        strict: bool,
+    ) -> std::result::Result<Raster, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("worker");
+        let count = folder.path().join("count");
+        let text = format!(
+            "#!/bin/sh\necho x >>{count}\nn=$(wc -l <{count})\n{script}\n",
+            count = count.display()
+        );
+        write_program(&program, &text);
+        let source = Source {
+            path: "a.tif".into(),
+            bytes: vec![0; 3],
+            format: Format::Tiff,
+        };
+        let pool = WorkerPool {
+            idle: Mutex::new(Vec::new()),
+        };
+        let request = Request::Pixels {
+            wanted: Wanted::Coverage,
+            window: Window::Display,
+        };
+        match pool.ask(&program, &source, limits, strict, request) {
+            Ok(Response::Raster(raster)) => Ok(raster),
+            Ok(Response::Shape(shape)) => panic!("{shape:?}"),
+            Err(e) => Err(e.to_string()),
+        }
+    }
+
+    const GREY: &str = r#"echo '{"picture":{"width":2,"height":1,"names":["Y"],"sample":"u8","display_encoded":true}}'; printf ab"#;
+
+    #[test]
+    fn an_answer_is_a_line_and_samples() {
+        let raster = asked(&format!("{GREY}; sleep 5"), &Limits::default()).unwrap();
+        assert_eq!(raster.samples, Samples::U8(b"ab".to_vec()));
+    }
+
+    #[test]
+    fn a_death_is_tried_again_and_the_second_one_named() {
+        let once = format!("[ $n = 1 ] && kill -SEGV $$; {GREY}; sleep 5");
+        assert!(asked(&once, &Limits::default()).is_ok());
+        let e = asked("kill -SEGV $$", &Limits::default()).unwrap_err();
+        assert_eq!(e, "unreadable: OpenImageIO died on it 2 times (signal 11)");
+    }
+
+    #[test]
+    fn a_worker_that_hangs_is_killed() {
+        let limits = Limits {
+            seconds: 0,
+            ..Default::default()
+        };
+        let e = asked("exec sleep 30", &limits).unwrap_err();
+        assert!(e.contains("took longer than 0 s (Limits::seconds)"), "{e}");
+    }
+
+    #[test]
+    fn a_death_before_the_greeting_is_no_fault_of_the_file() {
+        let script = |deaths: usize| {
+            format!("[ $n -le {deaths} ] && kill -ABRT $$\n{GREETING}\n{GREY}; sleep 5")
+        };
+        assert!(asked_of(&script(MAX_STARTS - 1), &Limits::default(), false).is_ok());
+        let e = asked_of(&script(MAX_STARTS), &Limits::default(), false).unwrap_err();
+        assert!(e.ends_with("does not start: signal 6"), "{e}");
+    }
+
+    #[test]
+    fn a_worker_that_closes_its_pipes_and_stays_is_killed() {
+        let start = Instant::now();
+        let e = asked("exec <&- >&- sleep 600", &Limits::default()).unwrap_err();
+        assert!(e.contains("closed its pipes"), "{e}");
+        assert!(
+            start.elapsed() < Duration::from_secs(120),
+            "{:?}",
+            start.elapsed()
+        );
+    }
+
+    #[test]
+    fn a_strict_one_asks_no_worker_without_a_full_sandbox() {
+        let loose = GREETING.replace("[]", "[\"Landlock: not in this kernel\"]");
+        let script = format!("{loose}\n{GREY}; sleep 5");
+        assert!(asked_of(&script, &Limits::default(), false).is_ok());
+        let e = asked_of(&script, &Limits::default(), true).unwrap_err();
+        assert!(
+            e.ends_with("its worker has no full sandbox here (Landlock: not in this kernel)"),
+            "{e}"
+        );
+        assert!(
+            asked_of(
+                &format!("{GREETING}\n{GREY}; sleep 5"),
+                &Limits::default(),
+                true
+            )
+            .is_ok()
+        );
+    }
+
+    #[test]
+    fn nonsense_and_half_an_answer_are_deaths() {
+        let e = asked("echo nonsense; exec sleep 30", &Limits::default()).unwrap_err();
+        assert!(e.contains("garbled response"), "{e}");
+        let half = GREY.replace("printf ab", "printf a");
+        assert!(
+            asked(&half, &Limits::default())
+                .unwrap_err()
+                .contains("exit status: 0")
+        );
+    }
+
+    #[test]
+    fn a_program_that_is_no_worker_is_named() {
+        let source = Source {
+            path: "a.tif".into(),
+            bytes: vec![0; 3],
+            format: Format::Tiff,
+        };
+        let pool = WorkerPool {
+            idle: Mutex::new(Vec::new()),
+        };
+        for program in ["/bin/true", "/bin/echo", "/no/such/program"] {
+            let e = pool
+                .ask(
+                    Path::new(program),
+                    &source,
+                    &Limits::default(),
+                    false,
+                    Request::Header,
+                )
+                .err()
+                .unwrap()
+                .to_string();
+            assert!(e.contains(program) && e.contains("does not start"), "{e}");
+        }
+    }
+}

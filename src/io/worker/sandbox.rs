@@ -1,0 +1,210 @@
+//! What the worker program gives up before it looks at a file: it gets bytes and gives bytes, so it needs nothing else.
+//!
+//! Whatever of this the system cannot do is named, and the worker goes on with the rest.
+
+use crate::io::limits::Limits;
+use rustix::process::{Resource, Rlimit, setrlimit};
+
+/// Address space beyond what is mapped at the start and what a file may ask for: the decoders' own needs.
+const HEADROOM_BYTES: u64 = 256 << 20;
+/// Copies of a picture that exist at a time: in the decoder, as handed over, and cut to its window.
+const PICTURE_COPIES: u64 = 3;
+/// CPU time of one worker, seconds: an honest one is replaced after this, one that spins was killed long before.
+const CPU_SECONDS: u64 = 600;
+/// Open files; it opens none itself.
+const MAX_OPEN_FILES: u64 = 64;
+
+/// Bounds on this process's memory, as far as it needs them for the file in hand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MemoryLimit {
+    /// Mapped when the program had loaded its libraries.
+    at_start: u64,
+    most: u64,
+}
+
+impl MemoryLimit {
+    /// Fixes what may never be exceeded under these limits.
+    pub(super) fn new(limits: &Limits) -> Self {
+        let at_start = mapped_bytes().unwrap_or(ASSUMED_MAPPED_BYTES);
+        let budget = limits
+            .decoded_bytes
+            .saturating_mul(PICTURE_COPIES)
+            .saturating_add(limits.file_bytes);
+        Self {
+            at_start,
+            most: at_start
+                .saturating_add(HEADROOM_BYTES)
+                .saturating_add(budget),
+        }
+    }
+
+    /// Lets a file of so many bytes ask for so many decoded ones.
+    pub(super) fn allow(&self, file_bytes: u64, decoded_bytes: u64) {
+        let budget = decoded_bytes
+            .saturating_mul(PICTURE_COPIES)
+            .saturating_add(file_bytes);
+        let current = self
+            .at_start
+            .saturating_add(HEADROOM_BYTES)
+            .saturating_add(budget)
+            .min(self.most);
+        limit_resource(Resource::As, current, self.most);
+    }
+}
+
+/// Where the system does not report it: what OpenImageIO 2.4 maps on Debian 12.
+const ASSUMED_MAPPED_BYTES: u64 = 768 << 20;
+
+/// Address space in use, by the system's account of it.
+fn mapped_bytes() -> Option<u64> {
+    let pages: u64 = std::fs::read_to_string("/proc/self/statm")
+        .ok()?
+        .split(' ')
+        .next()?
+        .parse()
+        .ok()?;
+    pages.checked_mul(rustix::param::page_size() as u64)
+}
+
+fn limit_resource(resource: Resource, current: u64, maximum: u64) {
+    // Lowering one's own limits is always allowed; a system without one of them has no such danger either.
+    let _ = setrlimit(
+        resource,
+        Rlimit {
+            current: Some(current),
+            maximum: Some(maximum),
+        },
+    );
+}
+
+/// Gives up everything but memory, the pipes that are open, and some CPU time. Returns what the system could not do.
+pub(super) fn enter_sandbox(limits: &Limits) -> (MemoryLimit, Vec<String>) {
+    let memory = MemoryLimit::new(limits);
+    memory.allow(0, 0);
+    limit_resource(Resource::Cpu, CPU_SECONDS, CPU_SECONDS);
+    limit_resource(Resource::Fsize, 0, 0);
+    limit_resource(Resource::Core, 0, 0);
+    limit_resource(Resource::Nofile, MAX_OPEN_FILES, MAX_OPEN_FILES);
+    #[cfg(target_os = "linux")]
+    let missing = linux::restrict();
+    #[cfg(not(target_os = "linux"))]
+    let missing = vec!["Landlock and seccomp: not this system".into()];
+    (memory, missing)
+}
+
+#[cfg(target_os = "linux")]
+mod linux {
+    use landlock::{ABI, Access, AccessFs, AccessNet, Ruleset, RulesetAttr, RulesetStatus, Scope};
+    use seccompiler::{
+        BpfProgram, SeccompAction, SeccompCmpArgLen, SeccompCmpOp, SeccompCondition, SeccompFilter,
+        SeccompRule,
+    };
+    use std::collections::BTreeMap;
+
+    pub(super) fn restrict() -> Vec<String> {
+        let steps = [
+            ("no_new_privs", set_no_new_privileges()),
+            ("Landlock", forbid_files()),
+            ("seccomp", filter_calls()),
+        ];
+        steps
+            .into_iter()
+            .filter_map(|(name, done)| done.err().map(|e| format!("{name}: {e}")))
+            .collect()
+    }
+
+    type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+    fn set_no_new_privileges() -> Outcome {
+        Ok(rustix::thread::set_no_new_privs(true)?)
+    }
+
+    /// No file or folder may be opened, no socket connected, nobody outside signalled: a rule set without a rule.
+    fn forbid_files() -> Outcome {
+        // What a kernel does not know of this is left out.
+        let abi = ABI::V6;
+        let rules = Ruleset::default()
+            .handle_access(AccessFs::from_all(abi))?
+            .handle_access(AccessNet::from_all(abi))?
+            .scope(Scope::from_all(abi))?;
+        match rules.create()?.restrict_self()?.ruleset {
+            RulesetStatus::NotEnforced => Err("not in this kernel".into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// What a decoder that opens nothing calls: its own memory, its pipes, the clock, and its end. And what a thread calls
+    /// before its first line (`rseq`, `set_robust_list`): libraries start theirs when they are loaded, and on a busy machine
+    /// those have not run yet when the filter falls; the C library ends the process where `rseq` is refused.
+    const ALLOWED_CALLS: [i64; 36] = [
+        libc::SYS_read,
+        libc::SYS_readv,
+        libc::SYS_write,
+        libc::SYS_writev,
+        libc::SYS_close,
+        libc::SYS_lseek,
+        libc::SYS_fstat,
+        libc::SYS_fcntl,
+        libc::SYS_ppoll,
+        libc::SYS_brk,
+        libc::SYS_mmap,
+        libc::SYS_munmap,
+        libc::SYS_mprotect,
+        libc::SYS_mremap,
+        libc::SYS_madvise,
+        libc::SYS_futex,
+        libc::SYS_rseq,
+        libc::SYS_set_robust_list,
+        libc::SYS_rt_sigaction,
+        libc::SYS_rt_sigprocmask,
+        libc::SYS_rt_sigreturn,
+        libc::SYS_sigaltstack,
+        libc::SYS_sched_yield,
+        libc::SYS_sched_getaffinity,
+        libc::SYS_nanosleep,
+        libc::SYS_clock_nanosleep,
+        libc::SYS_clock_gettime,
+        libc::SYS_clock_getres,
+        libc::SYS_gettimeofday,
+        libc::SYS_getrandom,
+        libc::SYS_getpid,
+        libc::SYS_gettid,
+        libc::SYS_getrusage,
+        libc::SYS_restart_syscall,
+        libc::SYS_exit,
+        libc::SYS_exit_group,
+    ];
+
+    /// Every other call fails with EPERM, among them all that open, execute, connect, trace and start.
+    fn filter_calls() -> Outcome {
+        let mut rules: BTreeMap<i64, Vec<SeccompRule>> = ALLOWED_CALLS
+            .into_iter()
+            .map(|call| (call, Vec::new()))
+            .collect();
+        // Its own limits, and a signal to itself (abort), are its own business.
+        rules.insert(libc::SYS_prlimit64, vec![first_argument_is(0)?]);
+        rules.insert(
+            libc::SYS_tgkill,
+            vec![first_argument_is(std::process::id().into())?],
+        );
+        let refused = SeccompAction::Errno(libc::EPERM as u32);
+        let filter = SeccompFilter::new(
+            rules,
+            refused,
+            SeccompAction::Allow,
+            std::env::consts::ARCH.try_into()?,
+        )?;
+        let program: BpfProgram = filter.try_into()?;
+        // OpenImageIO's libraries have started threads of their own by now.
+        Ok(seccompiler::apply_filter_all_threads(&program)?)
+    }
+
+    fn first_argument_is(value: u64) -> Result<SeccompRule, seccompiler::BackendError> {
+        SeccompRule::new(vec![SeccompCondition::new(
+            0,
+            SeccompCmpArgLen::Dword,
+            SeccompCmpOp::Eq,
+            value,
+        )?])
+    }
+}

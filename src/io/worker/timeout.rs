@@ -1,0 +1,94 @@
+//! Pipes that are waited for until a deadline.
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read, Result, Write};
+use std::os::fd::{AsFd, OwnedFd};
+use std::time::Instant;
+
+/// Large buffers save turns between the two processes; more than this takes a privilege (`pipe(7)`).
+const PIPE_BYTES: usize = 1 << 20;
+
+/// One end of a pipe. Reading or writing past the deadline fails with [`ErrorKind::TimedOut`].
+pub(super) struct TimedPipe {
+    file: File,
+    pub(super) deadline: Instant,
+}
+
+impl TimedPipe {
+    pub(super) fn new(end: OwnedFd) -> Result<Self> {
+        fcntl_setfl(&end, fcntl_getfl(&end)? | OFlags::NONBLOCK)?;
+        // A smaller pipe is a slower one.
+        #[cfg(target_os = "linux")]
+        let _ = rustix::pipe::fcntl_setpipe_size(&end, PIPE_BYTES);
+        Ok(Self {
+            file: end.into(),
+            deadline: Instant::now(),
+        })
+    }
+
+    fn wait(&self, what: PollFlags) -> Result<()> {
+        let left = self.deadline.saturating_duration_since(Instant::now());
+        let left = Timespec::try_from(left).map_err(|_| Error::from(ErrorKind::InvalidInput))?;
+        match poll(&mut [PollFd::new(&self.file.as_fd(), what)], Some(&left)) {
+            Ok(0) => Err(ErrorKind::TimedOut.into()),
+            Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
+            Err(e) => Err(e.into()),
+        }
+    }
+
+    /// Does it as soon as it can be done.
+    fn when_ready<T>(&self, what: PollFlags, mut act: impl FnMut(&File) -> Result<T>) -> Result<T> {
+        loop {
+            match act(&self.file) {
+                Err(e) if e.kind() == ErrorKind::WouldBlock => self.wait(what)?,
+                done => return done,
+            }
+        }
+    }
+}
+
+impl Read for TimedPipe {
+    fn read(&mut self, buf: &mut [u8]) -> Result<usize> {
+        self.when_ready(PollFlags::IN, |mut file| file.read(buf))
+    }
+}
+
+impl Write for TimedPipe {
+    fn write(&mut self, buf: &[u8]) -> Result<usize> {
+        self.when_ready(PollFlags::OUT, |mut file| file.write(buf))
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn an_empty_pipe_is_waited_for_and_not_for_ever() {
+        let (reader, mut writer) = std::io::pipe().unwrap();
+        let mut pipe = TimedPipe::new(reader.into()).unwrap();
+        pipe.deadline = Instant::now() + Duration::from_millis(20);
+        assert_eq!(pipe.read(&mut [0]).unwrap_err().kind(), ErrorKind::TimedOut);
+        writer.write_all(b"x").unwrap();
+        let mut byte = [0];
+        assert_eq!((pipe.read(&mut byte).unwrap(), byte), (1, *b"x"));
+    }
+
+    #[test]
+    fn a_pipe_that_nobody_reads_is_not_written_for_ever() {
+        let (_reader, writer) = std::io::pipe().unwrap();
+        let mut pipe = TimedPipe::new(writer.into()).unwrap();
+        pipe.deadline = Instant::now() + Duration::from_millis(20);
+        assert_eq!(
+            pipe.write_all(&vec![0; 3 * PIPE_BYTES]).unwrap_err().kind(),
+            ErrorKind::TimedOut
+        );
+    }
+}

@@ -1,0 +1,123 @@
+//! What each method makes of the part of a photo around the object.
+
+use super::{CleanScreen, CutOutOptions, MatteMethod, ObjectRegion};
+use crate::diagnostic::Diagnostic;
+use crate::error::Result;
+use crate::image::{Image, Mask};
+use crate::matte::film::{ColorUncertainty, FilmInput, FilmMatte, solve_film};
+use crate::matte::key::{Keying, Screen};
+use crate::matte::prepared::Prepared;
+use crate::pixel::{Coverage, Film, LinearRgb, PremulRgba};
+
+/// A matte in the region around the object.
+pub(super) struct Matted {
+    pub(super) method: MatteMethod,
+    pub(super) film: Image<Film>,
+    pub(super) transmittance: Image<LinearRgb>,
+    pub(super) uncertainty: Image<f32>,
+    /// Mean matte on the screen outside the object.
+    pub(super) residual_matte: f32,
+    pub(super) color_uncertainty: Option<ColorUncertainty>,
+    pub(super) diagnostics: Vec<Diagnostic>,
+}
+
+impl Matted {
+    /// Applies the method of the options.
+    pub(super) fn new(
+        prepared: &Prepared<'_>,
+        screen: &CleanScreen,
+        region: &ObjectRegion,
+        opts: &CutOutOptions,
+    ) -> Result<Self> {
+        match opts.method.unwrap_or_default() {
+            MatteMethod::Physical => Self::physical(prepared, screen, region, opts),
+            MatteMethod::Key => Self::keyed(prepared, screen, region, opts),
+            MatteMethod::Outline => {
+                let cutout = region
+                    .photo
+                    .zip_map(&region.cut, |p, m| p.opaque().masked(m));
+                Ok(Self::grey(MatteMethod::Outline, cutout, 0.0))
+            }
+        }
+    }
+
+    fn physical(
+        prepared: &Prepared<'_>,
+        screen: &CleanScreen,
+        region: &ObjectRegion,
+        opts: &CutOutOptions,
+    ) -> Result<Self> {
+        let object = FilmInput {
+            photo: &region.photo,
+            plate: &screen.plate.crop(region.around),
+            inside: &region.cut,
+            screen: screen.color,
+            longer_side: prepared.longer_side(),
+        };
+        let FilmMatte {
+            film,
+            transmittance,
+            uncertainty,
+            color_uncertainty,
+            diagnostics,
+            ..
+        } = solve_film(object, &opts.film)?;
+        // Film is empty outside the cut.
+        Ok(Self {
+            method: MatteMethod::Physical,
+            film,
+            transmittance,
+            uncertainty,
+            residual_matte: 0.0,
+            color_uncertainty: Some(color_uncertainty),
+            diagnostics,
+        })
+    }
+
+    fn keyed(
+        prepared: &Prepared<'_>,
+        screen: &CleanScreen,
+        region: &ObjectRegion,
+        opts: &CutOutOptions,
+    ) -> Result<Self> {
+        let keyed = Keying::new(prepared.photo, Screen::Plate(&screen.plate.image))
+            .run(&opts.key)
+            .map_err(|e| e.within("key"))?;
+        let cutout = keyed.cutout.crop(region.around);
+        Ok(Self::grey(
+            MatteMethod::Key,
+            cutout.zip_map(&region.cut, |p, m| p.masked(m)),
+            mean_matte(&keyed.matte, &screen.background),
+        ))
+    }
+
+    /// A cut-out of one alpha for all channels, which is used as the transmittance as well.
+    fn grey(method: MatteMethod, image: Image<PremulRgba>, residual_matte: f32) -> Self {
+        Self {
+            method,
+            film: image.map(Film::from),
+            transmittance: image.map(|p| LinearRgb::grey(1.0 - p.a)),
+            uncertainty: Image::new(image.width(), image.height()),
+            residual_matte,
+            color_uncertainty: None,
+            diagnostics: Vec::new(),
+        }
+    }
+}
+
+/// Mean of a matte where a mask is set; 0 where it is empty.
+fn mean_matte(matte: &Image<Coverage>, set: &Mask) -> f32 {
+    let chosen = matte
+        .pixels()
+        .iter()
+        .zip(set.pixels())
+        .filter(|(_, inside)| **inside);
+    let (sum, count) = chosen.fold((0.0, 0u64), |(sum, count), (m, _)| {
+        (sum + f64::from(m.0), count + 1)
+    });
+    if count == 0 {
+        0.0
+    } else {
+        (sum / count as f64) as f32
+    }
+}

@@ -1,0 +1,58 @@
+//! The object's pixels: its interior, bare screen within it, and what share of it some pixels are.
+
+use crate::filter;
+use crate::image::{Image, Mask};
+use crate::pixel::Coverage;
+
+/// Coverage from which on a pixel is wholly inside: what 8 bits and a blur's rounding leave of 1.
+pub(in crate::matte) const OPAQUE: f32 = 0.99;
+/// Width of the object's rim, where bare screen shines in, as a share of the photo's longer side.
+const RIM_WIDTH: f64 = 0.01;
+/// The same in small photos, pixels.
+const MIN_RIM_PX: f64 = 2.0;
+/// Bare screen is its plate in some shade: so far from that, as a share of the plate's strongest channel, it may be.
+const MAX_SCREEN_DEVIATION: f32 = 0.06;
+
+/// The object without its rim; `longer_side` is that of the whole photo, pixels.
+pub(super) fn interior(inside: &Image<Coverage>, longer_side: usize) -> Mask {
+    let rim_px = (RIM_WIDTH * longer_side as f64).max(MIN_RIM_PX);
+    filter::erode(&inside.map(|c| c.0 >= OPAQUE), rim_px)
+}
+
+/// A pixel is the screen in some shade.
+pub(super) fn is_screen(pixel: [f32; 3], screen: [f32; 3]) -> bool {
+    let shade = dot(pixel, screen) / dot(screen, screen).max(f32::MIN_POSITIVE);
+    let strongest = screen.into_iter().fold(0.0, f32::max);
+    (0..3).all(|c| (pixel[c] - shade * screen[c]).abs() <= MAX_SCREEN_DEVIATION * strongest)
+}
+
+/// Sum of the products of three channels.
+#[inline(always)]
+pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Area of the object, pixels.
+fn area(inside: &Image<Coverage>) -> f64 {
+    inside.pixels().iter().map(|c| f64::from(c.0)).sum()
+}
+
+/// Side of a square of the object's area, pixels.
+pub(super) fn side_px(inside: &Image<Coverage>) -> f32 {
+    area(inside).sqrt() as f32
+}
+
+/// The share of the object's area that a set of pixels has.
+pub(super) fn share(set: impl Iterator<Item = bool>, inside: &Image<Coverage>) -> f32 {
+    let object = area(inside);
+    let chosen: f64 = set
+        .zip(inside.pixels())
+        .filter(|(set, _)| *set)
+        .map(|(_, c)| f64::from(c.0))
+        .sum();
+    if object > 0.0 {
+        (chosen / object) as f32
+    } else {
+        0.0
+    }
+}

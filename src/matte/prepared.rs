@@ -1,0 +1,130 @@
+//! A photo as the stages of a cut-out take it: checked, reduced and square-rooted once.
+
+use crate::error::{Error, Result};
+use crate::filter;
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use std::borrow::Cow;
+
+/// Least longer side of a picture that is searched, pixels.
+pub(super) const MIN_SEARCH_SIZE_PX: usize = 32;
+/// Shortest side that can hold an object and its background, pixels.
+const MIN_PHOTO_SIDE_PX: usize = 16;
+/// A photo with a shorter longer side than this is enlarged for the search: bands and gaps of a few pixels are wide beside
+/// an object of 20.
+const SMALL_PHOTO_PX: usize = 128;
+/// Longer side, at least, that it is enlarged to.
+const ENLARGED_PHOTO_PX: usize = 256;
+
+/// A photo that can be segmented, and what is derived from it alone.
+pub(super) struct Prepared<'a> {
+    /// Scene-linear and finite.
+    pub(super) photo: &'a Image<LinearRgb>,
+    /// The picture that is searched for the object: the photo itself, or a copy at another resolution.
+    pub(super) small: Cow<'a, Image<LinearRgb>>,
+    /// Square roots of the photo, in which shot noise is the same everywhere.
+    pub(super) sqrt: Image<LinearRgb>,
+}
+
+impl<'a> Prepared<'a> {
+    /// Checks a photo and reduces it to a longer side of `working_size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Photo`] for a photo that is too small or has a pixel that is not finite.
+    pub(super) fn new(photo: &'a Image<LinearRgb>, working_size: usize) -> Result<Self> {
+        check_size(photo)?;
+        check_finite(photo)?;
+        Ok(Self {
+            photo,
+            small: at_working_size(photo, working_size),
+            sqrt: photo.map(|p| p.map(|v| v.max(0.0).sqrt())),
+        })
+    }
+
+    /// Longer side of the photo, pixels.
+    pub(super) fn longer_side(&self) -> usize {
+        longer_side(self.photo)
+    }
+}
+
+/// Refuses a photo with a pixel that is not finite.
+pub(super) fn check_finite(photo: &Image<LinearRgb>) -> Result<()> {
+    match photo.pixels().iter().position(|p| !p.is_finite()) {
+        Some(i) => Err(refused(format!(
+            "pixel ({}, {}) is not a finite number",
+            i % photo.width(),
+            i / photo.width()
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn check_size(photo: &Image<LinearRgb>) -> Result<()> {
+    let (w, h) = photo.size();
+    if w.min(h) < MIN_PHOTO_SIDE_PX {
+        return Err(refused(format!(
+            "the photo is {w} x {h} pixels, expected at least {MIN_PHOTO_SIDE_PX} x {MIN_PHOTO_SIDE_PX}"
+        )));
+    }
+    Ok(())
+}
+
+/// The error for a photo that cannot be cut out.
+pub(super) fn refused(what: impl Into<String>) -> Error {
+    Error::Photo { what: what.into() }
+}
+
+/// Longer side of a picture, pixels.
+pub(super) fn longer_side<P: Copy>(image: &Image<P>) -> usize {
+    image.width().max(image.height())
+}
+
+/// The photo, or a copy whose longer side is `working_size`; a small photo enlarged.
+fn at_working_size(photo: &Image<LinearRgb>, working_size: usize) -> Cow<'_, Image<LinearRgb>> {
+    let longer = longer_side(photo);
+    let (w, h) = photo.size();
+    if longer < SMALL_PHOTO_PX.min(working_size) {
+        let times = ENLARGED_PHOTO_PX.div_ceil(longer);
+        return Cow::Owned(filter::resize(photo, times * w, times * h));
+    }
+    if longer <= working_size {
+        return Cow::Borrowed(photo);
+    }
+    let [w, h] = [w, h].map(|side| {
+        (side * working_size)
+            .div_ceil(longer)
+            .max(MIN_SEARCH_SIZE_PX)
+    });
+    Cow::Owned(filter::resize(photo, w, h))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(w: usize, h: usize) -> Image<LinearRgb> {
+        Image::filled(w, h, LinearRgb::grey(0.25))
+    }
+
+    #[test]
+    fn a_photo_of_the_search_size_is_not_copied() {
+        let photo = grey(640, 300);
+        let prepared = Prepared::new(&photo, 640).unwrap();
+        assert!(matches!(prepared.small, Cow::Borrowed(small) if std::ptr::eq(small, &photo)));
+        assert_eq!(prepared.sqrt[(3, 5)], LinearRgb::grey(0.5));
+    }
+
+    #[test]
+    fn large_photos_are_reduced_and_small_ones_enlarged() {
+        let size = |w, h| Prepared::new(&grey(w, h), 640).unwrap().small.size();
+        assert_eq!((size(1000, 500), size(100, 50)), ((640, 320), (300, 150)));
+    }
+
+    #[test]
+    fn a_pixel_that_is_not_finite_is_named() {
+        let mut photo = grey(40, 30);
+        photo[(7, 9)].g = f32::NAN;
+        let error = Prepared::new(&photo, 640).err().map(|e| e.to_string());
+        assert!(error.is_some_and(|e| e.contains("pixel (7, 9)")));
+    }
+}

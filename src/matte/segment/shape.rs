@@ -1,0 +1,95 @@
+//! Outline and hull of an object in the photo, from what a search in a smaller picture found.
+
+use super::choose::ChosenSearch;
+use super::confidence::Confidence;
+use super::{blur, hull, snap};
+use crate::filter;
+use crate::geom::Point2;
+use crate::image::Mask;
+use crate::matte::Outline;
+use crate::matte::prepared::Prepared;
+
+/// Blur that turns the cracks between pixels into a line, pixels of the search.
+const CRACK_BLUR_PX: f32 = 0.7;
+/// By how much the hull of the edges is drawn in before it widens that of the outline, pixels of the search: edges are
+/// accurate to a pixel; tips that are too thin to enclose anything reach farther than that.
+const TIP_INSET_PX: f64 = 1.0;
+
+/// Pixels of the photo for a pixel of the picture that was searched, in x and y.
+#[derive(Clone, Copy)]
+pub(super) struct PixelScale([f64; 2]);
+
+impl PixelScale {
+    fn new(photo: (usize, usize), searched: (usize, usize)) -> Self {
+        Self([
+            photo.0 as f64 / searched.0 as f64,
+            photo.1 as f64 / searched.1 as f64,
+        ])
+    }
+
+    fn to_photo(self, p: Point2<f64>) -> Point2<f64> {
+        Point2::new(p.x * self.0[0], p.y * self.0[1])
+    }
+
+    /// The larger of the two.
+    pub(super) fn reduction(self) -> f64 {
+        self.0[0].max(self.0[1])
+    }
+}
+
+/// An object's lines, in pixels of the photo.
+pub(super) struct ObjectShape {
+    pub(super) outline: Outline,
+    pub(super) hull: Vec<Point2<f64>>,
+    pub(super) scale: PixelScale,
+}
+
+impl ObjectShape {
+    /// The outline around the object's area, moved to where the photo changes, and the hull of it and of its thin tips.
+    pub(super) fn new(prepared: &Prepared<'_>, chosen: &ChosenSearch<'_>, area: &Mask) -> Self {
+        let scale = PixelScale::new(prepared.photo.size(), area.size());
+        let blurred = filter::gaussian_blur(&area.to_coverage(), CRACK_BLUR_PX);
+        let rough = Outline::around(&blurred).map(|p| scale.to_photo(p));
+        let outline = snap::snapped(&rough, &prepared.sqrt, scale.reduction());
+        let tips: Vec<_> = inset(&chosen.pass.hull, TIP_INSET_PX)
+            .into_iter()
+            .map(|p| scale.to_photo(p))
+            .collect();
+        let rings = outline.rings.iter().cloned().chain([tips]).collect();
+        Self {
+            hull: Outline { rings }.hull(),
+            outline,
+            scale,
+        }
+    }
+
+    /// The confidence of a search, with what the outline itself adds to it.
+    pub(super) fn confidence(&self, prepared: &Prepared<'_>, search: Confidence) -> Confidence {
+        let reduction = self.scale.reduction();
+        // A photo that was enlarged for the search has no finer pixels than its own.
+        let pixel = reduction.max(1.0);
+        Confidence {
+            blur_px: blur::edge_blur_px(&self.outline, &prepared.sqrt, pixel),
+            width_px: self.outline.width() / pixel,
+            stray_px: hull::growth(&self.outline.hull(), &self.hull) / reduction,
+            ..search
+        }
+    }
+}
+
+/// A convex polygon's corners moved towards its middle.
+fn inset(hull: &[Point2<f64>], by: f64) -> Vec<Point2<f64>> {
+    let middle = hull.iter().fold(Point2::origin(), |sum, p| {
+        sum + p.coords / hull.len() as f64
+    });
+    hull.iter().map(|p| moved_towards(*p, middle, by)).collect()
+}
+
+fn moved_towards(p: Point2<f64>, goal: Point2<f64>, by: f64) -> Point2<f64> {
+    let way = goal - p;
+    if way.norm() > by {
+        p + way * (by / way.norm())
+    } else {
+        goal
+    }
+}

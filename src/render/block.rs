@@ -1,0 +1,76 @@
+//! Rectangles of pixels, which a picture is rendered in.
+
+use crate::geom::Vector3;
+use std::ops::Range;
+
+/// A rectangle of pixels.
+#[derive(Clone, Debug)]
+pub(super) struct PixelBlock {
+    /// Columns.
+    pub(super) x: Range<usize>,
+    /// Rows.
+    pub(super) y: Range<usize>,
+}
+
+impl PixelBlock {
+    /// A picture cut into squares of a side, row by row; smaller ones at its ends.
+    pub(super) fn tiles_of(width: usize, height: usize, side: usize) -> Vec<Self> {
+        pieces_of(height, side)
+            .flat_map(|y| pieces_of(width, side).map(move |x| Self { x, y: y.clone() }))
+            .collect()
+    }
+
+    /// Number of pixels.
+    pub(super) fn len(&self) -> usize {
+        self.x.len() * self.y.len()
+    }
+
+    /// Centres of the four corner pixels, as `(x, y, 1)`.
+    pub(super) fn corners(&self) -> [Vector3<f64>; 4] {
+        let [left, right] = outermost_centers(&self.x);
+        let [top, bottom] = outermost_centers(&self.y);
+        [[left, top], [right, top], [left, bottom], [right, bottom]]
+            .map(|[x, y]| Vector3::new(x, y, 1.0))
+    }
+
+    /// Two halves across the longer side.
+    pub(super) fn halves(&self) -> [Self; 2] {
+        if self.x.len() >= self.y.len() {
+            halves_of(&self.x).map(|x| Self {
+                x,
+                y: self.y.clone(),
+            })
+        } else {
+            halves_of(&self.y).map(|y| Self {
+                x: self.x.clone(),
+                y,
+            })
+        }
+    }
+}
+
+fn pieces_of(len: usize, side: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..len)
+        .step_by(side)
+        .map(move |start| start..(start + side).min(len))
+}
+
+fn outermost_centers(range: &Range<usize>) -> [f64; 2] {
+    [range.start as f64 + 0.5, range.end as f64 - 0.5]
+}
+
+fn halves_of(range: &Range<usize>) -> [Range<usize>; 2] {
+    let middle = range.start + range.len() / 2;
+    [range.start..middle, middle..range.end]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let tiles = PixelBlock::tiles_of(37, 17, 32);
+        assert_eq!(tiles.iter().map(PixelBlock::len).sum::<usize>(), 37 * 17);
+    }
+}

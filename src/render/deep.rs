@@ -1,0 +1,240 @@
+//! A shot becomes deep samples, fast.
+
+use crate::asset::Texture;
+use crate::deep::DeepImage;
+use crate::image::Image;
+use crate::pixel::LinearRgb;
+use crate::render::RenderOptions;
+use crate::render::block::PixelBlock;
+use crate::render::half_plane::quad_sides;
+use crate::render::irradiance::{IrradianceMap, irradiance_maps};
+use crate::render::lattice::Lattice;
+use crate::render::layers::{Layer, LayerStack, RenderedTile, SampleGrid, ShadowCatcher};
+use crate::render::pixel_filter::{filter_quantiles, residual_sigma};
+use crate::render::receiver::{LightingContext, ReceiverIrradiance};
+use crate::render::texture::BakedTexture;
+use crate::render::view::{
+    CameraView, ProjectedPlane, ScenePlane, rows_and_columns, visible_planes,
+};
+use crate::scene::{Card, Shot};
+use crate::work::{self, Kind};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Side of the blocks that the picture is put together from.
+const TILE_SIDE_PX: usize = 32;
+
+/// Sub-samples a side from which on a sharper level of detail pays.
+const DENSE_SUBSAMPLES: usize = 4;
+
+/// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
+///
+/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are not, and
+/// numbers in `options` are brought into the range that works. Ask [`check`](super::check) about shots from outside.
+///
+/// # Method
+/// Everything is planar, so each map between two planes seen from a point is a homography. Irradiance is smooth: it is
+/// computed once per receiver on a lattice in the picture, as a sum over Gauss nodes of the lights and fixed directions
+/// of the environment, each seen through the product of `1 - alpha` of the cards in between. Textures are sharp: they are
+/// read at the quantiles of the pixel filter, from the mip level whose own blur makes up for what those leave over. Cards
+/// are ordered by depth block by block; blocks in which they cross are split.
+pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    let options = options.clamped();
+    let view = CameraView::from_camera(&shot.camera);
+    let offsets = filter_quantiles(options.subsamples);
+    let planes = visible_planes(shot);
+    let context = LightingContext::new(shot, &planes, &view, options);
+    let cards: Vec<_> = planes
+        .par_iter()
+        .map(|(card, plane)| ProjectedCard::new(card, plane, &view, &offsets))
+        .collect();
+    let receivers = receivers(&context, &cards);
+    let mut maps = irradiance_maps(&receivers);
+    let catcher = ShadowCatcher {
+        plane: ProjectedPlane::new(&context.occluders.surface, &view),
+        share: maps.pop().flatten(),
+    };
+    let stack = LayerStack {
+        layers: lit_layers(cards, &receivers, maps),
+        catcher,
+        samples: sample_grid(&view, &context.fine, offsets, &options),
+        exposure: shot.exposure,
+        tinted: context.occluders.tinted,
+    };
+    let tiles = PixelBlock::tiles_of(view.width, view.height, TILE_SIDE_PX);
+    let rendered: Vec<_> = tiles
+        .into_par_iter()
+        .map(|tile| stack.render_tile(tile))
+        .collect();
+    assemble_tiles(&view, &rendered)
+}
+
+/// The same without any light: what objects cover and hide, and how far away they are.
+///
+/// All that labels are made from, at a part of the cost; the same bits as [`render`] gives for it.
+pub fn render_coverage(shot: &Shot, options: &RenderOptions) -> DeepImage {
+    let dark = Shot {
+        lights: Vec::new(),
+        ambient: LinearRgb::BLACK,
+        environment: None,
+        plate: None,
+        ..shot.clone()
+    };
+    render(&dark, options)
+}
+
+/// The cards as receivers of light, then the surface; none for what is not seen.
+fn receivers(
+    context: &LightingContext<'_>,
+    cards: &[Option<ProjectedCard<'_>>],
+) -> Vec<Option<ReceiverIrradiance>> {
+    (0..=cards.len())
+        .into_par_iter()
+        .map(|k| match cards.get(k) {
+            Some(card) => context.card(k, card.as_ref()?.texture.grid.reach),
+            None => context.surface(),
+        })
+        .collect()
+}
+
+/// The layers of the cards that are seen and have a receiver, each with the light on it.
+fn lit_layers(
+    cards: Vec<Option<ProjectedCard<'_>>>,
+    receivers: &[Option<ReceiverIrradiance>],
+    maps: Vec<Option<IrradianceMap>>,
+) -> Vec<Layer> {
+    cards
+        .into_iter()
+        .zip(receivers.iter().zip(maps))
+        .filter_map(|(card, (receiver, light))| {
+            let card = receiver.as_ref().and(card)?;
+            Some(card.into_layer(light))
+        })
+        .collect()
+}
+
+/// Where light is looked up: for each pixel, or for each sub-sample where nodes are closer than pixels.
+fn sample_grid(
+    view: &CameraView,
+    lattice: &Lattice,
+    offsets: Vec<f64>,
+    options: &RenderOptions,
+) -> SampleGrid {
+    let per_subsample = options.cell_px < 1.0;
+    let looked_up: &[f64] = if per_subsample { &offsets } else { &[0.0] };
+    SampleGrid {
+        columns: lattice.positions_of(view.width, looked_up),
+        rows: lattice.positions_of(view.height, looked_up),
+        per_subsample,
+        offsets,
+    }
+}
+
+/// A card in the picture, before it is lit.
+struct ProjectedCard<'a> {
+    card: &'a Card,
+    plane: ProjectedPlane,
+    texture: BakedTexture,
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl<'a> ProjectedCard<'a> {
+    /// None for a card that is edge-on or outside the picture.
+    fn new(card: &'a Card, plane: &ScenePlane, view: &CameraView, offsets: &[f64]) -> Option<Self> {
+        let projected = ProjectedPlane::new(plane, view)?;
+        let (rows, columns) = rows_and_columns(plane, [0.0; 2], view);
+        if rows.is_empty() || columns.is_empty() {
+            return None;
+        }
+        work::add(Kind::Bakes, 1);
+        let (projected, texture) = visible_side(card, plane, projected, view);
+        let level = detail_level(texture, plane, &projected, view, offsets);
+        let texture = BakedTexture::new(texture, &card.grade, level);
+        let (rows, columns) = rows_and_columns(plane, texture.grid.reach, view);
+        Some(Self {
+            card,
+            plane: projected,
+            texture,
+            columns,
+            rows,
+        })
+    }
+
+    fn into_layer(self, light: Option<IrradianceMap>) -> Layer {
+        let plane = self.plane;
+        Layer {
+            id: self.card.id,
+            plane,
+            sides: quad_sides(&plane.u, &plane.v, &plane.w, self.texture.grid.reach),
+            texture: self.texture,
+            light,
+            columns: self.columns,
+            rows: self.rows,
+        }
+    }
+}
+
+/// The side of a card that is turned to the camera, and how it lies in the picture.
+fn visible_side<'a>(
+    card: &'a Card,
+    plane: &ScenePlane,
+    projected: ProjectedPlane,
+    view: &CameraView,
+) -> (ProjectedPlane, &'a Texture) {
+    let from_behind = plane.normal.dot(&(view.eye - plane.center)) < 0.0;
+    match &card.back {
+        Some(back) if from_behind => {
+            let mirrored = ProjectedPlane {
+                u: projected.w - projected.u,
+                ..projected
+            };
+            (mirrored, back)
+        }
+        _ => (projected, &card.texture),
+    }
+}
+
+/// Level of detail by matching variance: what sub-samples leave of the pixel's window, the texture's own filter covers.
+///
+/// A level read bilinearly has variance `4^level / 4` texels.
+fn detail_level(
+    texture: &Texture,
+    plane: &ScenePlane,
+    projected: &ProjectedPlane,
+    view: &CameraView,
+    offsets: &[f64],
+) -> f64 {
+    let (width, height) = texture.size();
+    let texels = (width * height) as f64;
+    let per_pixel = projected.cell_metres(view, &plane.center)
+        * (texels / (plane.size[0] * plane.size[1])).sqrt();
+    let dense = if offsets.len() >= DENSE_SUBSAMPLES {
+        0.25
+    } else {
+        0.0
+    };
+    let level = libm::log2(2.0 * residual_sigma(offsets) * per_pixel) - dense;
+    // A NaN from a card that fills the horizon reads the full texture.
+    level.clamp(0.0, 32.0).max(0.0)
+}
+
+/// Puts the tiles' pixels in order.
+fn assemble_tiles(view: &CameraView, tiles: &[RenderedTile]) -> DeepImage {
+    let samples = tiles.iter().flat_map(|tile| &tile.samples.samples).copied();
+    let tints = tiles.iter().flat_map(|tile| &tile.samples.tints).copied();
+    DeepImage::from_samples(assemble_shadow(view, tiles), samples, tints)
+}
+
+/// The factor on the plate, 1 where no tile has one.
+fn assemble_shadow(view: &CameraView, tiles: &[RenderedTile]) -> Image<LinearRgb> {
+    let mut shadow = Image::filled(view.width, view.height, LinearRgb::WHITE);
+    for tile in tiles {
+        let Some(values) = &tile.shadow else { continue };
+        let PixelBlock { x, y } = &tile.block;
+        for (y, row) in y.clone().zip(values.chunks_exact(x.len())) {
+            shadow.row_mut(y)[x.clone()].copy_from_slice(row);
+        }
+    }
+    shadow
+}

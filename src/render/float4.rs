@@ -1,0 +1,82 @@
+//! Four numbers that are worked on together, as one vector register.
+
+use crate::pixel::{LinearRgb, PremulRgba};
+
+/// Red, green, blue and a fourth: alpha of a texel, 1 of a light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(16))]
+pub(super) struct Float4(pub(super) [f32; 4]);
+
+impl Float4 {
+    pub(super) const ZERO: Self = Self([0.0; 4]);
+    pub(super) const ONE: Self = Self([1.0; 4]);
+
+    #[inline(always)]
+    pub(super) fn rgb(self) -> LinearRgb {
+        LinearRgb::new(self.0[0], self.0[1], self.0[2])
+    }
+
+    #[inline(always)]
+    pub(super) fn alpha(self) -> f32 {
+        self.0[3]
+    }
+
+    #[inline(always)]
+    pub(super) fn add_scaled(self, weight: f32, o: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + weight * o.0[i]))
+    }
+
+    #[inline(always)]
+    pub(super) fn times(self, o: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] * o.0[i]))
+    }
+
+    /// `self + a * b`, number by number.
+    #[inline(always)]
+    pub(super) fn add_product(self, a: Self, b: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] + a.0[i] * b.0[i]))
+    }
+
+    /// `1 - self`, number by number.
+    #[inline(always)]
+    pub(super) fn complement(self) -> Self {
+        Self(self.0.map(|v| 1.0 - v))
+    }
+
+    /// The same with another fourth number.
+    #[inline(always)]
+    pub(super) fn with_fourth(self, fourth: f32) -> Self {
+        Self([self.0[0], self.0[1], self.0[2], fourth])
+    }
+
+    /// `self` at 0, `o` at 1; exactly the value where both are the same.
+    #[inline(always)]
+    pub(super) fn lerp(self, o: Self, t: f32) -> Self {
+        Self(std::array::from_fn(|i| {
+            self.0[i] + t * (o.0[i] - self.0[i])
+        }))
+    }
+
+    /// Between four corners of a cell.
+    #[inline(always)]
+    pub(super) fn bilinear(top: [Self; 2], bottom: [Self; 2], fx: f32, fy: f32) -> Self {
+        top[0]
+            .lerp(top[1], fx)
+            .lerp(bottom[0].lerp(bottom[1], fx), fy)
+    }
+}
+
+impl From<LinearRgb> for Float4 {
+    /// With nothing as the fourth.
+    #[inline(always)]
+    fn from(c: LinearRgb) -> Self {
+        Self([c.r, c.g, c.b, 0.0])
+    }
+}
+
+impl From<PremulRgba> for Float4 {
+    #[inline(always)]
+    fn from(p: PremulRgba) -> Self {
+        Self([p.r, p.g, p.b, p.a])
+    }
+}

@@ -1,0 +1,209 @@
+//! Where light comes from, as a list of points and directions.
+
+use crate::geom::Vector3;
+use crate::light;
+use crate::pixel::{LinearRgb, Mix};
+use crate::render::RenderOptions;
+use crate::scene::{AreaLight, Shot};
+use nalgebra::{Matrix3, Vector4};
+use std::f64::consts::PI;
+
+/// A point (`at.w = 1`) or a direction (`at.w = 0`) that light comes from, in homogeneous coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightSample {
+    /// Where.
+    pub(super) at: Vector4<f64>,
+    /// Side of the square of light that it stands for: metres, or radians of a direction.
+    pub(super) width: f64,
+    /// What it does to a receiver that sees it.
+    pub(super) kind: SampleKind,
+}
+
+/// How a light sample lights a receiver.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum SampleKind {
+    /// A piece of a light's face: unit normal and area.
+    Face {
+        /// Which way it shines.
+        normal: Vector3<f64>,
+        /// Square metres.
+        area: f64,
+    },
+    /// A share of the hemisphere: cosine times solid angle.
+    Sky {
+        /// Steradians times cosine.
+        share: f64,
+    },
+}
+
+/// Light samples of one colour.
+#[derive(Clone, Debug)]
+pub(super) struct LightGroup {
+    /// Radiance of each.
+    pub(super) radiance: LinearRgb,
+    /// Its points or directions.
+    pub(super) samples: Vec<LightSample>,
+}
+
+/// All that lights a receiver.
+#[derive(Clone, Debug)]
+pub(super) struct LightSamples {
+    /// Area lights, in their order.
+    pub(super) faces: Vec<LightGroup>,
+    /// What is all around: the constant environment, then the pieces of the map.
+    pub(super) sky: Vec<LightGroup>,
+}
+
+impl LightSamples {
+    /// What lights a receiver with this unit normal, in the plane through `point`.
+    pub(super) fn above(
+        shot: &Shot,
+        options: &RenderOptions,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+    ) -> Self {
+        let (count, point) = (options.light_samples, (*point).into());
+        let faces = shot
+            .lights
+            .iter()
+            .map(|l| LightGroup::area_light(l, light::nodes_above(l, count, point, normal)));
+        let shining = shot.environment.iter().filter(|map| map.strength != 0.0);
+        let pieces =
+            shining.flat_map(|map| light::sky_pieces(map, options.ambient_samples, normal));
+        let ambient = LightGroup::ambient(shot.ambient, options.ambient_samples, normal);
+        Self::from_parts(faces, ambient, pieces)
+    }
+
+    /// The same for a plain quadrature: whole lights, and the map in even rectangles.
+    pub(super) fn plain(
+        shot: &Shot,
+        options: &RenderOptions,
+        normal: &Vector3<f64>,
+    ) -> Vec<LightGroup> {
+        let faces = shot
+            .lights
+            .iter()
+            .map(|l| LightGroup::area_light(l, light::nodes(l, options.light_samples)));
+        let pieces = shot
+            .environment
+            .iter()
+            .flat_map(|map| light::sky_cells(map, options.ambient_samples, normal));
+        let ambient = LightGroup::ambient(shot.ambient, options.ambient_samples, normal);
+        let Self { faces, sky } = Self::from_parts(faces, ambient, pieces);
+        faces.into_iter().chain(sky).collect()
+    }
+
+    /// Leaves out what is black.
+    fn from_parts(
+        faces: impl Iterator<Item = LightGroup>,
+        ambient: LightGroup,
+        pieces: impl Iterator<Item = light::SkyPiece>,
+    ) -> Self {
+        let sky = std::iter::once(ambient).chain(pieces.map(LightGroup::sky_piece));
+        Self {
+            faces: faces.filter(LightGroup::is_lit).collect(),
+            sky: sky.filter(LightGroup::is_lit).collect(),
+        }
+    }
+
+    /// Irradiance of the sky where nothing is in its way.
+    pub(super) fn open_sky(&self) -> LinearRgb {
+        self.sky.iter().fold(LinearRgb::BLACK, |sum, group| {
+            sum.add_scaled(group.sky_share(), group.radiance)
+        })
+    }
+}
+
+impl LightGroup {
+    fn area_light(light: &AreaLight, nodes: Vec<light::Node>) -> Self {
+        let normal = light::frame(light).normal;
+        let samples = nodes.into_iter().map(|node| LightSample {
+            at: node.point.to_homogeneous(),
+            width: node.area.sqrt(),
+            kind: SampleKind::Face {
+                normal,
+                area: node.area,
+            },
+        });
+        Self {
+            radiance: light::radiance(light),
+            samples: samples.collect(),
+        }
+    }
+
+    /// A constant environment, from directions around a normal.
+    fn ambient(radiance: LinearRgb, count: usize, normal: &Vector3<f64>) -> Self {
+        let world_from_hemisphere = hemisphere_frame(normal);
+        let share = PI / count as f64;
+        let samples = light::ambient_directions(count)
+            .into_iter()
+            .map(|d| LightSample {
+                at: (world_from_hemisphere * d).to_homogeneous(),
+                width: (share / d.z).sqrt(),
+                kind: SampleKind::Sky { share },
+            });
+        Self {
+            radiance,
+            samples: samples.collect(),
+        }
+    }
+
+    /// A piece of a map: a group by itself, since each has a colour of its own.
+    fn sky_piece(piece: light::SkyPiece) -> Self {
+        Self {
+            radiance: piece.irradiance,
+            samples: vec![LightSample {
+                at: piece.direction.to_homogeneous(),
+                width: piece.width,
+                kind: SampleKind::Sky { share: 1.0 },
+            }],
+        }
+    }
+
+    fn is_lit(&self) -> bool {
+        self.radiance != LinearRgb::BLACK
+    }
+
+    fn sky_share(&self) -> f32 {
+        self.samples.iter().map(LightSample::sky_share).sum::<f64>() as f32
+    }
+}
+
+/// Axes of a frame whose `z` is `normal`.
+fn hemisphere_frame(normal: &Vector3<f64>) -> Matrix3<f64> {
+    let helper = if normal.x.abs() < 0.6 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let x = helper.cross(normal).normalize();
+    Matrix3::from_columns(&[x, normal.cross(&x), *normal])
+}
+
+impl LightSample {
+    /// Cosine times solid angle of a piece of the sky.
+    fn sky_share(&self) -> f64 {
+        if let SampleKind::Sky { share } = self.kind {
+            share
+        } else {
+            0.0
+        }
+    }
+
+    /// Cosines, distance and area at a point with unit normal: irradiance by unit radiance; 0 below a horizon.
+    pub(super) fn irradiance(&self, point: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+        match self.kind {
+            SampleKind::Sky { share } => share,
+            SampleKind::Face { normal: face, area } => {
+                let to = self.at.xyz() - point;
+                let r2 = to.norm_squared();
+                let cosines = normal.dot(&to).max(0.0) * (-face.dot(&to)).max(0.0);
+                if r2 > 0.0 {
+                    cosines / (r2 * r2) * area
+                } else {
+                    0.0
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! What stops light in a shot.
+
+use crate::asset::Texture;
+use crate::geom::Vector3;
+use crate::render::opacity::OpacityMips;
+use crate::render::view::ScenePlane;
+use crate::scene::{Card, Grade};
+use std::sync::Arc;
+
+/// A card as something that stops light.
+#[derive(Debug)]
+pub(super) struct Occluder<'a> {
+    /// Where it lies.
+    pub(super) plane: ScenePlane,
+    front: Arc<OpacityMips<'a>>,
+    /// None where it is the front seen through.
+    back: Option<Arc<OpacityMips<'a>>>,
+}
+
+/// Everything that stops light: cards, and the surface for what comes from below.
+#[derive(Debug)]
+pub(super) struct Occluders<'a> {
+    /// In the order of the cards.
+    pub(super) cards: Vec<Occluder<'a>>,
+    /// The plane `z = 0` as far as it reaches.
+    pub(super) surface: ScenePlane,
+    /// Some card is film: what gets through differs from channel to channel.
+    pub(super) tinted: bool,
+}
+
+impl<'a> Occluders<'a> {
+    /// What stops light in a shot; cards of one texture share its opacity.
+    pub(super) fn new(cards: &[(&'a Card, ScenePlane)], surface: ScenePlane) -> Self {
+        let mut known = Vec::new();
+        let cards: Vec<_> = cards
+            .iter()
+            .map(|&(card, plane)| Occluder::new(card, plane, &mut known))
+            .collect();
+        Self {
+            cards,
+            surface,
+            tinted: known.iter().any(|mips| mips.is_film()),
+        }
+    }
+}
+
+impl<'a> Occluder<'a> {
+    fn new(card: &'a Card, plane: ScenePlane, known: &mut Vec<Arc<OpacityMips<'a>>>) -> Self {
+        Self {
+            plane,
+            front: shared_mips(&card.texture, &card.grade, known),
+            back: card
+                .back
+                .as_ref()
+                .map(|back| shared_mips(back, &card.grade, known)),
+        }
+    }
+
+    /// What a receiver sees of it, `toward` being the side of the light on its normal; and whether that is its back.
+    ///
+    /// A receiver sees the side that is turned away from the light.
+    pub(super) fn side_facing(&self, toward: f64) -> (&OpacityMips<'a>, bool) {
+        match &self.back {
+            Some(back) if toward > 0.0 => (back, true),
+            _ => (&self.front, false),
+        }
+    }
+
+    /// Some corner of it is more than `margin` above a plane, `normal . p = offset`.
+    pub(super) fn is_above(&self, normal: &Vector3<f64>, offset: f64, margin: f64) -> bool {
+        let corners = self.plane.corners();
+        corners.iter().any(|c| normal.dot(c) - offset > margin)
+    }
+}
+
+fn shared_mips<'a>(
+    texture: &'a Texture,
+    grade: &Grade,
+    known: &mut Vec<Arc<OpacityMips<'a>>>,
+) -> Arc<OpacityMips<'a>> {
+    if let Some(same) = known.iter().find(|mips| mips.serves(texture, grade)) {
+        return same.clone();
+    }
+    let mips = Arc::new(OpacityMips::new(texture, *grade));
+    known.push(mips.clone());
+    mips
+}

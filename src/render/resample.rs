@@ -1,0 +1,154 @@
+//! A level of a pyramid made up to two times smaller, with a transparent border.
+
+use crate::image::Image;
+use crate::render::float4::Float4;
+use crate::render::texel_grid::BORDER_TEXELS;
+
+/// A level of detail, and how much smaller the picture is to be.
+#[derive(Clone, Copy)]
+pub(super) struct DetailLevel {
+    level: usize,
+    /// Texels of the level that make one, along each side: 1 up to 2.
+    step: f64,
+}
+
+/// Texels with their border, row by row.
+pub(super) struct BorderedTexels {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) texels: Vec<Float4>,
+}
+
+impl DetailLevel {
+    /// A level that need not be an integer: the one before it, averaged further.
+    pub(super) fn new(level: f64) -> Self {
+        Self {
+            level: level as usize,
+            step: libm::exp2(level.fract()),
+        }
+    }
+
+    /// Reads a picture from its pyramid.
+    pub(super) fn resample<'a, P: Copy + 'a>(
+        &self,
+        level: impl Fn(usize) -> &'a Image<P>,
+        texel: impl Fn(P) -> Float4,
+    ) -> BorderedTexels {
+        let image = level(self.level);
+        let columns = downsample_axis(image.width(), self.step);
+        let rows = downsample_axis(image.height(), self.step);
+        let (width, height) = (
+            columns.len() + 2 * BORDER_TEXELS,
+            rows.len() + 2 * BORDER_TEXELS,
+        );
+        let mut texels = vec![Float4::ZERO; width * height];
+        let mut rows_of_level = RowAverages::new(image, texel);
+        let lines = texels.chunks_exact_mut(width).skip(BORDER_TEXELS);
+        for (row, line) in rows.iter().zip(lines) {
+            let average = rows_of_level.average(row);
+            for (column, out) in columns.iter().zip(&mut line[BORDER_TEXELS..]) {
+                *out = column.weighted().fold(Float4::ZERO, |s, (x, weight)| {
+                    s.add_scaled(weight, average[x])
+                });
+            }
+        }
+        BorderedTexels {
+            width,
+            height,
+            texels,
+        }
+    }
+}
+
+/// Rows of a picture, averaged.
+struct RowAverages<'a, P, F> {
+    image: &'a Image<P>,
+    texel: F,
+    line: Vec<Float4>,
+    sum: Vec<Float4>,
+}
+
+impl<'a, P: Copy, F: Fn(P) -> Float4> RowAverages<'a, P, F> {
+    fn new(image: &'a Image<P>, texel: F) -> Self {
+        Self {
+            image,
+            texel,
+            line: vec![Float4::ZERO; image.width()],
+            sum: vec![Float4::ZERO; image.width()],
+        }
+    }
+
+    fn average(&mut self, rows: &TexelWeights) -> &[Float4] {
+        self.sum.fill(Float4::ZERO);
+        for (y, weight) in rows.weighted() {
+            for (t, &p) in self.line.iter_mut().zip(self.image.row(y)) {
+                *t = (self.texel)(p);
+            }
+            for (s, t) in self.sum.iter_mut().zip(&self.line) {
+                *s = s.add_scaled(weight, *t);
+            }
+        }
+        &self.sum
+    }
+}
+
+/// Up to three texels in a row and their weights, which add up to 1 (less at the end, where the picture ends).
+struct TexelWeights {
+    first: usize,
+    weights: [f32; 3],
+    count: usize,
+}
+
+/// What each texel of a smaller picture takes from a larger one, along one side: averages over `step` texels (1 up to 2).
+fn downsample_axis(len: usize, step: f64) -> Vec<TexelWeights> {
+    let count = (len as f64 / step).ceil() as usize;
+    (0..count)
+        .map(|k| TexelWeights::new(k as f64 * step, (k + 1) as f64 * step, len))
+        .collect()
+}
+
+impl TexelWeights {
+    fn new(start: f64, end: f64, len: usize) -> Self {
+        let first = (start as usize).min(len - 1);
+        let count = ((end.ceil() as usize).min(len) - first).min(3);
+        let weights = [0, 1, 2].map(|n| {
+            let at = (first + n) as f64;
+            (((at + 1.0).min(end) - at.max(start)).max(0.0) / (end - start)) as f32
+        });
+        Self {
+            first,
+            weights,
+            count,
+        }
+    }
+
+    #[inline(always)]
+    fn weighted(&self) -> impl Iterator<Item = (usize, f32)> {
+        self.weights
+            .into_iter()
+            .take(self.count)
+            .enumerate()
+            .map(|(n, weight)| (self.first + n, weight))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_add_up_but_for_the_end() {
+        for (len, step) in [(7, 1.0), (7, 1.3), (10, 1.999), (1, 1.5)] {
+            let axis = downsample_axis(len, step);
+            let mut taken = vec![0.0; len];
+            axis.iter()
+                .flat_map(TexelWeights::weighted)
+                .for_each(|(x, w)| taken[x] += f64::from(w) * step);
+            assert!(
+                taken.iter().all(|t| (t - 1.0).abs() < 1e-6),
+                "{len}, {step}: every texel is used once"
+            );
+            assert!(axis.len() == (len as f64 / step).ceil() as usize);
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! A light sample as one receiver sees it, with the shadows in between.
+
+use crate::render::light_samples::{LightGroup, LightSample, SampleKind};
+use crate::render::occluders::Occluders;
+use crate::render::shadow::{ProjectedShadow, ShadowProjection, ShadowedReceiver};
+
+/// One light sample as one receiver sees it.
+#[derive(Debug)]
+pub(super) struct ShadowRay {
+    sample: LightSample,
+    /// Of the sample over the receiver's plane, metres (a cosine for a direction).
+    height: f64,
+    /// What may be in its way.
+    pub(super) shadows: Vec<ProjectedShadow>,
+}
+
+/// The rays to a group of light samples that reach a receiver from above, with what may be in their way.
+pub(super) fn shadow_rays(
+    occluders: &Occluders<'_>,
+    receiver: &ShadowedReceiver<'_>,
+    group: &LightGroup,
+) -> Vec<ShadowRay> {
+    let above = receiver.cards_above(occluders);
+    group
+        .samples
+        .iter()
+        .filter_map(|sample| ShadowRay::new(occluders, &above, receiver, sample))
+        .collect()
+}
+
+impl ShadowRay {
+    /// None for a sample that is not above the receiver; `above` are the cards that are.
+    fn new(
+        occluders: &Occluders<'_>,
+        above: &[usize],
+        receiver: &ShadowedReceiver<'_>,
+        sample: &LightSample,
+    ) -> Option<Self> {
+        let projection = ShadowProjection::new(receiver, sample)?;
+        let surface = projection
+            .comes_from_below()
+            .then(|| projection.project_surface(&occluders.surface));
+        let cards = above
+            .iter()
+            .filter_map(|&k| projection.project_card(&occluders.cards[k]));
+        Some(Self {
+            sample: *sample,
+            height: projection.height,
+            shadows: surface.into_iter().chain(cards).collect(),
+        })
+    }
+
+    /// It comes from an area light, not from the sky.
+    pub(super) fn is_face(&self) -> bool {
+        matches!(self.sample.kind, SampleKind::Face { .. })
+    }
+
+    /// For the receiver it was made for.
+    pub(super) fn unit_irradiance(&self) -> UnitIrradiance {
+        match self.sample.kind {
+            SampleKind::Sky { share } => UnitIrradiance::Even(share as f32),
+            // All points of a plane see a light from the same height.
+            SampleKind::Face { normal, area } => UnitIrradiance::Face {
+                at: self.sample.at.xyz().map(|c| c as f32).into(),
+                normal: normal.map(|c| c as f32).into(),
+                scale: (area * self.height) as f32,
+            },
+        }
+    }
+}
+
+/// Irradiance by unit radiance of one light sample, at any point of a plane.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum UnitIrradiance {
+    /// The same everywhere.
+    Even(f32),
+    /// By a piece of a light's face.
+    Face {
+        /// Where it is.
+        at: [f32; 3],
+        /// Unit normal.
+        normal: [f32; 3],
+        /// Area times height over the plane.
+        scale: f32,
+    },
+}
+
+impl UnitIrradiance {
+    /// Cosines over squared distance times area, at points of the plane.
+    pub(super) fn fill(&self, [x, y, z]: [&[f32]; 3], out: &mut [f32]) {
+        match *self {
+            Self::Even(share) => out.fill(share),
+            Self::Face { at, normal, scale } => fill_face(at, normal, scale, [x, y, z], out),
+        }
+    }
+}
+
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512bw+avx512vl+avx2",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
+fn fill_face(at: [f32; 3], normal: [f32; 3], scale: f32, [x, y, z]: [&[f32]; 3], out: &mut [f32]) {
+    for (((e, &x), &y), &z) in out.iter_mut().zip(x).zip(y).zip(z) {
+        let (x, y, z) = (x - at[0], y - at[1], z - at[2]);
+        let r2 = x * x + y * y + z * z;
+        let face = (normal[0] * x + normal[1] * y + normal[2] * z).max(0.0);
+        *e = scale * face / (r2 * r2).max(f32::MIN_POSITIVE);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
+    use crate::image::Image;
+    use crate::pixel::{LinearRgb, ObjectId, PremulRgba};
+    use crate::render::RenderOptions;
+    use crate::render::light_samples::LightSamples;
+    use crate::render::view::{
+        CameraView, LatticeArea, ProjectedPlane, ScenePlane, visible_planes,
+    };
+    use crate::scene::{AreaLight, Card, Grade, LightShape, Shot};
+    use std::sync::Arc;
+
+    fn camera() -> Camera {
+        let down = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 2.6);
+        Camera {
+            image: [200, 150],
+            focal_px: Vector2::new(240.0, 240.0),
+            principal_px: Point2::new(100.0, 75.0),
+            camera_from_world: Pose::from_parts(Vector3::new(0.0, 0.0, 1.0).into(), down),
+        }
+    }
+
+    fn light() -> AreaLight {
+        AreaLight {
+            shape: LightShape::Rectangle,
+            position: [0.4, 0.3, 0.8],
+            target: [0.0; 3],
+            size: [0.3; 2],
+            power: 9.0,
+            color: LinearRgb::WHITE,
+        }
+    }
+
+    /// A card of odd size, turned in every way.
+    fn shot(tilt: f64) -> Shot {
+        let turn = UnitQuaternion::from_euler_angles(tilt, 0.2, 0.7);
+        let card = Card {
+            id: ObjectId(1),
+            class: 0,
+            quad: Quad {
+                world_from_card: Pose::from_parts(Vector3::new(0.02, 0.0, 0.12).into(), turn),
+                size: [0.3, 0.2],
+            },
+            texture: Image::filled(301, 203, PremulRgba::new(0.5, 0.5, 0.5, 1.0)).into(),
+            back: None,
+            outline_uv: Arc::new([]),
+            grade: Grade::default(),
+        };
+        Shot::new(camera())
+            .with_light(light())
+            .with_ambient(LinearRgb::WHITE)
+            .with_card(card)
+    }
+
+    #[test]
+    fn the_inside_of_an_opaque_card_is_as_dark_as_if_it_were_read() {
+        for tilt in [0.0, 0.3, 1.2] {
+            let shot = shot(tilt);
+            let view = CameraView::from_camera(&shot.camera);
+            let occluders = Occluders::new(
+                &visible_planes(&shot),
+                ScenePlane::shadow_catcher(shot.catcher),
+            );
+            let seen = ProjectedPlane::new(&occluders.surface, &view).unwrap();
+            let LightSamples { faces, sky } = LightSamples::above(
+                &shot,
+                &RenderOptions::default(),
+                &occluders.surface.center,
+                &seen.normal,
+            );
+            let receiver = ShadowedReceiver {
+                plane: &seen,
+                area: &view.whole_area(),
+                view: &view,
+                own: None,
+                cell_m: 0.0,
+            };
+            let (mut edges, mut all) = (0, 0);
+            // Fine and coarse levels of the texture.
+            for (group, cell) in faces
+                .iter()
+                .chain(&sky)
+                .flat_map(|group| [(group, 1e-4), (group, 5e-3)])
+            {
+                let receiver = ShadowedReceiver {
+                    cell_m: cell,
+                    ..receiver
+                };
+                let shadows = shadow_rays(&occluders, &receiver, group)
+                    .into_iter()
+                    .flat_map(|ray| ray.shadows);
+                for mut shadow in shadows {
+                    for j in shadow.rows.clone() {
+                        let nodes = shadow.nodes(j, &(0..view.width));
+                        let inside = shadow.inside;
+                        let [mut quick, mut read] =
+                            [vec![1.0; nodes.len()], vec![1.0; nodes.len()]];
+                        edges += shadow.attenuate(0, j, &nodes, &mut quick).edges;
+                        shadow.inside = None;
+                        all += shadow.attenuate(0, j, &nodes, &mut read).see_through;
+                        shadow.inside = inside;
+                        assert_eq!(quick, read, "tilt {tilt}, row {j}");
+                    }
+                }
+            }
+            assert!(all > 10_000 && edges < all / 3, "{edges} of {all} read");
+        }
+    }
+
+    #[test]
+    fn shadows_that_miss_the_receiver_are_left_out() {
+        let shot = shot(0.0);
+        let view = CameraView::from_camera(&shot.camera);
+        let occluders = Occluders::new(
+            &visible_planes(&shot),
+            ScenePlane::shadow_catcher(shot.catcher),
+        );
+        let seen = ProjectedPlane::new(&occluders.surface, &view).unwrap();
+        let groups = LightSamples::above(
+            &shot,
+            &RenderOptions::default(),
+            &occluders.surface.center,
+            &seen.normal,
+        )
+        .faces;
+        let shadows = |area: LatticeArea| {
+            let receiver = ShadowedReceiver {
+                plane: &seen,
+                area: &area,
+                view: &view,
+                own: None,
+                cell_m: 1e-3,
+            };
+            let rays = shadow_rays(&occluders, &receiver, &groups[0]);
+            rays.iter().map(|ray| ray.shadows.len()).sum::<usize>()
+        };
+        assert_eq!(shadows((0..2, 0..2)), 0);
+        assert!(shadows(view.whole_area()) > 0);
+    }
+}
