@@ -22,9 +22,9 @@ pub struct DatasetCounts {
     pub labelled: u64,
     /// Objects that something lies over, labelled or not.
     pub obstructed: u64,
-    /// Objects in which others lie over each other in a circle: none of them is on top.
+    /// Objects in cyclic overlap: none of them is on top.
     pub knotted: u64,
-    /// Scenes that were drawn and thrown away.
+    /// Scenes that were drawn and rejected.
     pub retries: u64,
     /// The same by class, in order.
     pub classes: Vec<ClassCount>,

@@ -108,13 +108,13 @@ pub struct Sample {
     pub deep: DeepImage,
     /// What is where in it.
     pub labels: Labels,
-    /// What was drawn: objects still in the air, exposure still open.
+    /// What was drawn: objects not settled yet, exposure still open.
     pub drawn: Scene,
     /// What that became, with nothing left open.
     pub scene: Scene,
-    /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
+    /// Seed that the scene was drawn with: the dataset's own, unless scenes were rejected.
     pub scene_seed: u64,
-    /// Why each scene that was drawn before this one was thrown away.
+    /// Why each scene that was drawn before this one was rejected.
     pub rejected: Vec<String>,
     /// Every draw that the scene was made with, in order.
     pub draws: Vec<Drawn>,

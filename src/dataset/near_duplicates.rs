@@ -26,7 +26,7 @@ pub struct NearDuplicate {
 pub const NEAR_DUPLICATE_RMS: f64 = 2.0;
 
 /// Sides of the small copies, pixels.
-const SMALL: [usize; 2] = [32, 24];
+const THUMBNAIL_PX: [usize; 2] = [32, 24];
 
 /// The small grey copy of a picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -37,7 +37,7 @@ impl Thumbnail {
         let grey =
             |[r, g, b]: [u8; 3]| ((u16::from(r) + 2 * u16::from(g) + u16::from(b)) / 4) as u8;
         Self(
-            to_srgb8(&resize(picture, SMALL[0], SMALL[1]))
+            to_srgb8(&resize(picture, THUMBNAIL_PX[0], THUMBNAIL_PX[1]))
                 .pixels()
                 .iter()
                 .map(|p| grey([p.r, p.g, p.b]))

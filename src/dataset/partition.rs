@@ -1,15 +1,15 @@
-//! Partition images out for training and validation, and what leaks from one to the other.
+//! Partitioning images for training and validation, and what leaks from one to the other.
 
 use crate::dataset::listing::{Listing, record_of};
 use crate::dataset::near_duplicates::{NearDuplicate, near_pairs};
 use crate::error::{Error, Result};
-use crate::scene::Draws;
+use crate::scene::{Draws, Scene};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// How images are shared out.
+/// How images are partitioned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Partition {
     /// The first ones for training, the last for validation, as the paper does with series of photos; so many between
@@ -42,6 +42,24 @@ impl Group {
         match self {
             Self::Background => "background",
             Self::Selection => "selection",
+        }
+    }
+}
+
+impl Group {
+    /// What a scene has in common with the others of its group.
+    fn of(self, scene: &Scene) -> String {
+        match self {
+            Self::Background => scene.plate.clone(),
+            Self::Selection => {
+                let mut photos: Vec<String> = scene
+                    .objects
+                    .iter()
+                    .map(|object| format!("{}/{}", object.asset, object.photo))
+                    .collect();
+                photos.sort();
+                photos.join(" ")
+            }
         }
     }
 }
@@ -83,24 +101,18 @@ impl Listing {
             ));
         }
         let all = self.series();
-        let train = (all.len() as f64 * ratio).round() as usize;
-        let parts = match how {
-            Partition::Consecutive { guard } => [
-                all[..train].to_vec(),
-                all[train.saturating_add(guard).min(all.len())..].to_vec(),
-            ],
-            Partition::Random => {
-                let own = |i: usize| i.to_string();
-                grouped(
-                    &all,
-                    &(0..all.len()).map(own).collect::<Vec<_>>(),
-                    train,
-                    seed,
-                )
+        let count = (all.len() as f64 * ratio).round() as usize;
+        let [train, val] = match how {
+            Partition::Consecutive { guard } => {
+                let first_val = count.saturating_add(guard).min(all.len());
+                [all[..count].to_vec(), all[first_val..].to_vec()]
             }
-            Partition::Grouped(group) => grouped(&all, &groups(&all, group)?, train, seed),
+            Partition::Random => {
+                let each_alone: Vec<String> = (0..all.len()).map(|i| i.to_string()).collect();
+                grouped(&all, &each_alone, count, seed)
+            }
+            Partition::Grouped(group) => grouped(&all, &groups(&all, group)?, count, seed),
         };
-        let [train, val] = parts;
         Ok(Self {
             train,
             val,
@@ -130,35 +142,31 @@ impl Listing {
 
 /// The group of each image.
 fn groups(images: &[PathBuf], group: Group) -> Result<Vec<String>> {
-    let of = |image: &PathBuf| -> Result<String> {
-        let scene = record_of(image)?.drawn;
-        Ok(match group {
-            Group::Background => scene.plate,
-            Group::Selection => {
-                let mut things: Vec<_> = scene
-                    .objects
-                    .iter()
-                    .map(|o| format!("{}/{}", o.asset, o.photo))
-                    .collect();
-                things.sort();
-                things.join(" ")
-            }
-        })
-    };
-    images.par_iter().map(of).collect()
+    images
+        .par_iter()
+        .map(|image| Ok(group.of(&record_of(image)?.drawn)))
+        .collect()
 }
 
-/// Groups in an order of chance go to validation until it has its share; the rest is for training.
+/// Groups in a random order go to validation until it has its share; the rest is for training.
 fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [Vec<PathBuf>; 2] {
+    let val = groups_for_validation(groups, images.len() - train, seed);
+    let mut parts = [Vec::new(), Vec::new()];
+    for (image, group) in images.iter().zip(groups) {
+        parts[usize::from(val.contains(group.as_str()))].push(image.clone());
+    }
+    parts
+}
+
+/// Groups in a random order, until they have about so many images.
+fn groups_for_validation(groups: &[String], wanted: usize, seed: u64) -> BTreeSet<&str> {
     let mut sizes: BTreeMap<&str, usize> = BTreeMap::new();
-    groups
-        .iter()
-        .for_each(|group| *sizes.entry(group).or_default() += 1);
+    for group in groups {
+        *sizes.entry(group).or_default() += 1;
+    }
     let mut order: Vec<(&str, usize)> = sizes.into_iter().collect();
     order.sort_by_key(|(group, _)| Draws::new(seed, 0).bits(&format!("split.{group}")));
-    let wanted = images.len() - train;
-    let mut val = BTreeSet::new();
-    let mut taken = 0;
+    let (mut val, mut taken) = (BTreeSet::new(), 0);
     for (group, size) in order {
         // A group is taken when the share comes closer by it.
         if taken < wanted && (taken + size).abs_diff(wanted) <= wanted - taken {
@@ -166,14 +174,7 @@ fn grouped(images: &[PathBuf], groups: &[String], train: usize, seed: u64) -> [V
             val.insert(group);
         }
     }
-    let of = |want: bool| {
-        let pairs = images.iter().zip(groups);
-        pairs
-            .filter(|(_, group)| val.contains(group.as_str()) == want)
-            .map(|(image, _)| image.clone())
-            .collect()
-    };
-    [of(false), of(true)]
+    val
 }
 
 #[cfg(test)]

@@ -39,8 +39,8 @@ pub struct Pipeline {
 /// Nobody stops a pipeline by itself.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
-/// Scenes that will not settle are drawn again this often.
-const REDRAWS: usize = 8;
+/// Scenes that do not settle are resampled this often.
+const MAX_RESAMPLES: usize = 8;
 
 impl Pipeline {
     /// Opens the folders that a config names.
@@ -180,7 +180,7 @@ impl Pipeline {
         })
     }
 
-    /// Scene `k` as the recipe draws it: objects still in the air, exposure still open.
+    /// Scene `k` as the recipe draws it: objects not settled yet, exposure still open.
     ///
     /// # Errors
     /// As [`Recipe::scene`](crate::scene::Recipe::scene).
@@ -218,9 +218,9 @@ impl Pipeline {
                     });
                 }
                 Err(Error::Unsettled { what })
-                    if rejected.len() < REDRAWS && !allowance.is_spent() =>
+                    if rejected.len() < MAX_RESAMPLES && !allowance.is_spent() =>
                 {
-                    log::info!("scene {k} is drawn again: {what}");
+                    log::info!("scene {k} is resampled: {what}");
                     rejected.push(what);
                 }
                 Err(error) => return Err(error),
@@ -352,7 +352,7 @@ impl Pipeline {
     }
 }
 
-/// The seed of the `n`-th try of scene `k`: the first is the dataset's own.
+/// The seed of the `n`-th attempt at scene `k`: the first is the dataset's own.
 fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
     match n {
         0 => seed,

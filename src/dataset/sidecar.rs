@@ -24,7 +24,7 @@ pub struct SampleRecord {
     pub recipe_hash: String,
     /// Seed of the dataset.
     pub seed: u64,
-    /// Seed that the scene was drawn with: the dataset's own, unless scenes were thrown away.
+    /// Seed that the scene was drawn with: the dataset's own, unless scenes were rejected.
     pub scene_seed: u64,
     /// Number of the sample.
     pub index: u64,
@@ -34,15 +34,15 @@ pub struct SampleRecord {
     pub labelled: Vec<ObjectId>,
     /// Objects that nothing lies over, by the topmost rule.
     pub topmost: Vec<ObjectId>,
-    /// Objects that lie over each other in a circle.
+    /// Objects in cyclic overlap.
     pub knotted: Vec<ObjectId>,
-    /// Why each scene that was drawn before this one was thrown away.
+    /// Why each scene that was drawn before this one was rejected.
     pub rejected: Vec<String>,
     /// Every drawn value by the name of its draw.
     pub draws: BTreeMap<String, f64>,
     /// What is where in the picture.
     pub labels: Labels,
-    /// What the draws gave: objects still in the air, exposure still open.
+    /// What the draws gave: objects not settled yet, exposure still open.
     pub drawn: Scene,
     /// What the picture was made from: camera, resting poses, lights, exposure.
     pub scene: Scene,
