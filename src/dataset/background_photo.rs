@@ -68,33 +68,25 @@ impl BackgroundPhoto {
         let taken = labelled.label.image_size();
         let kept = middle_part(taken, image);
         let camera = cropped(seen.camera, kept).resized(image);
-        let background = Background {
-            name: labelled.name.clone(),
-            size: seen.size,
-            camera: CameraSource::Known(camera),
-        };
-        let folder = labelled.source.parent().unwrap_or(Path::new(""));
-        let inside = |e: Error| e.within("image").in_file(&labelled.source);
-        let photo = io::inside(folder, &labelled.label.image.file).map_err(inside)?;
+        let photo = photo_path(labelled)?;
         camera::check_distance(&seen.camera).map_err(|e| e.in_file(&labelled.source))?;
-        let (label, notes, plate) = (labelled.source.clone(), Vec::new(), OnceLock::new());
-        let mut place = Self {
-            background,
-            label,
+        let mut background = Self {
+            background: Background {
+                name: labelled.name.clone(),
+                size: seen.size,
+                camera: CameraSource::Known(camera),
+            },
+            label: labelled.source.clone(),
             photo,
-            notes,
+            notes: seen.warnings.iter().map(ToString::to_string).collect(),
             taken,
             kept,
             image,
-            plate,
+            plate: OnceLock::new(),
         };
-        place.notes = seen
-            .warnings
-            .iter()
-            .map(ToString::to_string)
-            .chain(place.shape_note())
-            .collect();
-        Ok(place)
+        let shape_note = background.shape_note();
+        background.notes.extend(shape_note);
+        Ok(background)
     }
 
     /// The part of the photo that pictures show.

@@ -50,32 +50,23 @@ impl Writer for Layers {
 
     fn write(&self, folder: &Path, entry: &Entry<'_>) -> Result<Vec<PathBuf>> {
         let (path, sample) = (entry.path(KIND, "exr"), entry.sample);
-        let names: Vec<_> = sample
-            .labels
-            .objects
+        let objects = &sample.labels.objects;
+        let names: Vec<_> = objects
             .iter()
             .map(|o| (o.id, name(o.id, o.class, entry.classes)))
             .collect();
         let ids = Cryptomatte::new(&sample.deep, "CryptoObject", &names);
-        let mut planes = picture(entry);
-        planes.extend(ids.channels);
+        let mut channels = picture(entry);
+        channels.extend(ids.channels);
         if self.cards {
-            planes.extend(
-                sample
-                    .labels
-                    .objects
-                    .iter()
-                    .flat_map(|object| card(&sample.deep, object.id)),
-            );
+            channels.extend(objects.iter().flat_map(|o| card(&sample.deep, o.id)));
         }
-        let borrowed: Vec<_> = planes
+        let borrowed: Vec<_> = channels
             .iter()
-            .map(|(name, plane)| (name.as_str(), plane.as_slice()))
+            .map(|(name, values)| (name.as_str(), values.as_slice()))
             .collect();
         let mut notes = ids.metadata;
-        notes.push(("petcomp:recipe".into(), entry.recipe_hash.into()));
-        notes.push(("petcomp:seed".into(), entry.seed.to_string()));
-        notes.push(("petcomp:sample".into(), entry.k.to_string()));
+        notes.extend(provenance(entry));
         write_channels(folder.join(&path), sample.frame.size(), &borrowed, &notes)?;
         Ok(vec![path])
     }
@@ -87,6 +78,15 @@ fn name(id: ObjectId, class: u32, classes: &[String]) -> String {
         .cloned()
         .unwrap_or_else(|| class.to_string());
     format!("object{:03}_{class}", id.0)
+}
+
+/// What the file says of where it comes from.
+fn provenance(entry: &Entry<'_>) -> [(String, String); 3] {
+    [
+        ("petcomp:recipe".into(), entry.recipe_hash.into()),
+        ("petcomp:seed".into(), entry.seed.to_string()),
+        ("petcomp:sample".into(), entry.k.to_string()),
+    ]
 }
 
 /// The picture, its depth and its shadows.

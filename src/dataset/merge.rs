@@ -95,26 +95,15 @@ impl ShardedDataset {
             return Err(Error::value("shards", "none, expected their folders"));
         };
         let (of, count) = (share.shard.of, share.count);
-        let mut places = BTreeMap::new();
-        for (i, (document, share)) in opened.iter().enumerate() {
-            let folder = &folders[i];
+        for (folder, (document, share)) in folders.iter().zip(&opened) {
             check_same_dataset((first, of, count), (document, share), folder)?;
-            if let Some(twin) = places.insert(share.shard.index, i) {
-                let (shard, twin) = (share.shard, folders[twin].display());
-                return Err(Error::file(
-                    folder,
-                    format!("is shard {shard}, as {twin} is"),
-                ));
-            }
         }
-        if let Some(index) = (1..=of).find(|index| !places.contains_key(index)) {
-            let what = format!("shard {index}/{of} is missing");
-            return Err(Error::value("shards", what));
-        }
+        let shares: Vec<Shard> = opened.iter().map(|(_, share)| share.shard).collect();
+        check_complete(folders, &shares, of)?;
         Ok(Self {
             document: first.as_object().cloned().unwrap_or_default(),
             count,
-            shares: opened.iter().map(|(_, share)| share.shard).collect(),
+            shares,
         })
     }
 
@@ -136,6 +125,24 @@ impl ShardedDataset {
     fn shard_of<'a>(&self, k: u64, folders: &'a [PathBuf]) -> Option<&'a Path> {
         let place = self.shares.iter().position(|share| share.contains(k))?;
         Some(&folders[place])
+    }
+}
+
+/// Fails where a shard is there twice or not at all.
+fn check_complete(folders: &[PathBuf], shares: &[Shard], of: u64) -> Result<()> {
+    let mut places = BTreeMap::new();
+    for (i, shard) in shares.iter().enumerate() {
+        if let Some(twin) = places.insert(shard.index, i) {
+            let what = format!("is shard {shard}, as {} is", folders[twin].display());
+            return Err(Error::file(&folders[i], what));
+        }
+    }
+    match (1..=of).find(|index| !places.contains_key(index)) {
+        None => Ok(()),
+        Some(index) => Err(Error::value(
+            "shards",
+            format!("shard {index}/{of} is missing"),
+        )),
     }
 }
 

@@ -16,36 +16,36 @@ pub(super) fn read_rows(
     text: &str,
     class_count: Option<usize>,
 ) -> (Vec<LabelRow>, Vec<Finding>) {
-    let rows: Vec<(usize, Vec<&str>)> = text
-        .lines()
-        .enumerate()
-        .map(|(i, line)| (i + 1, line.split_whitespace().collect()))
-        .filter(|(_, row): &(_, Vec<_>)| !row.is_empty())
-        .collect();
+    let rows = split_rows(text);
     let format = RowFormat {
         outlines: rows.iter().any(|(_, row)| row.len() > MAX_BOX_COLUMNS),
         class_count,
     };
     let (mut good, mut findings) = (Vec::new(), Vec::new());
     let mut known: Vec<Vec<f64>> = Vec::new();
-    for (i, row) in rows {
-        match format.parse(&row) {
-            Err(message) => {
-                findings.push(Finding::in_line(path, i, Code::BadLabelRow, message));
-            }
-            Ok(values) if known.contains(&values) => findings.push(Finding::in_line(
-                path,
-                i,
-                Code::DuplicateLabelRow,
-                "the same row stands above",
-            )),
-            Ok(values) => {
+    for (line, row) in rows {
+        let (code, message) = match format.parse(&row) {
+            Ok(values) if !known.contains(&values) => {
                 good.extend(class_count.map(|_| format.label(&values)));
                 known.push(values);
+                continue;
             }
-        }
+            Ok(_) => (Code::DuplicateLabelRow, "the same row stands above".into()),
+            Err(message) => (Code::BadLabelRow, message),
+        };
+        findings.push(Finding::in_line(path, line, code, message));
     }
     (good, findings)
+}
+
+/// The columns of each row that is not empty, with its line.
+fn split_rows(text: &str) -> Vec<(usize, Vec<&str>)> {
+    text.lines()
+        .map(|line| line.split_whitespace().collect::<Vec<_>>())
+        .enumerate()
+        .filter(|(_, row)| !row.is_empty())
+        .map(|(i, row)| (i + 1, row))
+        .collect()
 }
 
 /// What the rows of a file must look like.

@@ -408,29 +408,24 @@ pub fn factors_table(runs: &[Run], options: &EvalReportOptions) -> Table {
     if tags.factors.is_empty() {
         return table;
     }
-    let definitions = [Definition::Yolov5, Definition::Coco];
-    let matches: Vec<[Matches; 2]> = runs
-        .iter()
-        .map(|run| definitions.map(|d| Matches::new(&run.sheets, d)))
-        .collect();
+    let matches: Vec<[Matches; 2]> = runs.iter().map(match_both).collect();
     for (i, factor) in tags.factors.iter().enumerate() {
         for level in tags.levels(i) {
             for (run, matches) in runs.iter().zip(&matches) {
                 let weights = level_weights(run, tags, i, level);
                 let images = weights.iter().filter(|weight| **weight > 0).count();
                 let [yolov5, coco] = matches.each_ref().map(|m| share(m.map(&weights)));
-                table.push([
-                    &run.name,
-                    factor,
-                    level,
-                    &images.to_string(),
-                    &yolov5,
-                    &coco,
-                ]);
+                let images = images.to_string();
+                table.push([&run.name, factor, level, &images, &yolov5, &coco]);
             }
         }
     }
     table
+}
+
+/// The detections of a run matched by both definitions.
+fn match_both(run: &Run) -> [Matches; 2] {
+    [Definition::Yolov5, Definition::Coco].map(|d| Matches::new(&run.sheets, d))
 }
 
 /// 1 for each image at a level of a factor, 0 for the others.

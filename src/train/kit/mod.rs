@@ -92,14 +92,7 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     let counts = [real.train.len() as u64, synthetic.train.len() as u64];
     let weights = options.balance.weights(counts[0], counts[1])?;
     io::create_folder(folder)?;
-    for (name, images) in [
-        ("real_train", &real.train),
-        ("real_val", &real.val),
-        ("synthetic_train", &synthetic.train),
-        ("synthetic_val", &synthetic.val),
-    ] {
-        write_list(&folder.join(format!("{name}.txt")), images)?;
-    }
+    write_lists(folder, &real, &synthetic)?;
     for variant in &VARIANTS {
         let path = folder.join(format!("{}.yaml", variant.name));
         io::write_text(path, &variant.yaml(&real.classes))?;
@@ -112,6 +105,19 @@ pub fn write(folder: &Path, options: &KitOptions) -> Result<()> {
     io::write_text(folder.join("hyp.yaml"), HYP_YAML)?;
     io::write_text(folder.join("balanced.py"), BALANCED_PY)?;
     io::write_text(folder.join("commands.sh"), &commands(options, counts))
+}
+
+/// A list of the images of each part of both datasets.
+fn write_lists(folder: &Path, real: &YoloSet, synthetic: &YoloSet) -> Result<()> {
+    for (name, images) in [
+        ("real_train", &real.train),
+        ("real_val", &real.val),
+        ("synthetic_train", &synthetic.train),
+        ("synthetic_val", &synthetic.val),
+    ] {
+        write_list(&folder.join(format!("{name}.txt")), images)?;
+    }
+    Ok(())
 }
 
 /// Fails where the two datasets name other classes.
