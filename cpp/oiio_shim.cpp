@@ -21,8 +21,8 @@ using OIIO::Filesystem::IOProxy;
 const char *const FORMATS[] = {"openexr", "png", "jpeg", "tiff", "hdr", "dpx", "cineon"};
 
 // The library's own words, which can be missing.
-[[noreturn]] void fail(std::string said, const char *otherwise) {
-    throw std::runtime_error(said.empty() ? otherwise : said);
+[[noreturn]] void fail(std::string message, const char *otherwise) {
+    throw std::runtime_error(message.empty() ? otherwise : message);
 }
 
 // Bytes and halves stay as they are, other integers become 16 bits of the same full scale, everything else float.

@@ -1,4 +1,4 @@
-//! How much work a picture may take, and who may stop it.
+//! How much work a picture may take, and a flag that stops it.
 #![cfg_attr(
     not(feature = "settle"),
     allow(dead_code, reason = "only falls take work")
@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Nobody stops it.
-static NEVER: AtomicBool = AtomicBool::new(false);
+/// A flag that nobody raises.
+static NEVER_STOPPED: AtomicBool = AtomicBool::new(false);
 
 /// What is left of the work that one picture may take, and a flag that ends it.
 ///
@@ -27,7 +27,7 @@ impl Allowance<'static> {
         Self {
             most,
             left: Cell::new(most),
-            stop: &NEVER,
+            stop: &NEVER_STOPPED,
         }
     }
 }
@@ -95,10 +95,10 @@ mod tests {
         let allowance = Allowance::new(10);
         assert!(allowance.take(4).is_ok() && allowance.taken() == 4);
         assert!(allowance.take(6).is_ok() && allowance.is_spent());
-        let told = allowance.take(1).unwrap_err().to_string();
+        let message = allowance.take(1).unwrap_err().to_string();
         assert!(
-            told.starts_with("settle: no rest within the work of one picture, 10 "),
-            "{told}"
+            message.starts_with("settle: no rest within the work of one picture, 10 "),
+            "{message}"
         );
     }
 

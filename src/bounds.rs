@@ -35,8 +35,8 @@ pub(crate) const MOST_PIXELS: u64 = 64 << 20;
 
 /// Millimetres and centimetres in a metre, with their names.
 const SMALLER_UNITS: [(f64, &str); 2] = [(1000.0, "millimetre"), (100.0, "centimetre")];
-/// From so many on a length that should be in metres is rather in millimetres than in centimetres.
-const RATHER_MILLIMETRES: f64 = 100.0;
+/// From so many on a length that should be in metres is more likely in millimetres than in centimetres.
+const MIN_LIKELY_MILLIMETRES: f64 = 100.0;
 
 impl Bounds {
     /// From `lowest` to `highest`; `why` ends a message, and may be empty where the range is the quantity's own.
@@ -87,7 +87,7 @@ impl Bounds {
     /// The unit in which a value that is too large for metres would be within bounds.
     pub(crate) fn unit_meant(&self, value: f64) -> Option<&'static str> {
         let [millimetres, centimetres] = SMALLER_UNITS;
-        let first = if value >= RATHER_MILLIMETRES {
+        let first = if value >= MIN_LIKELY_MILLIMETRES {
             millimetres
         } else {
             centimetres
@@ -131,7 +131,7 @@ pub(crate) fn number(value: f64) -> String {
 mod tests {
     use super::*;
 
-    fn told(bounds: Bounds, value: f64) -> String {
+    fn checked(bounds: Bounds, value: f64) -> String {
         bounds
             .check("x", value)
             .map_or_else(|e| e.to_string(), |()| "fine".into())
@@ -140,14 +140,14 @@ mod tests {
     #[test]
     fn both_ends_belong_to_bounds_and_no_number_does_not() {
         let bounds = Bounds::new(1.0, 16.0, "a reason");
-        assert_eq!([1.0, 16.0].map(|v| told(bounds, v)), ["fine"; 2]);
-        assert_eq!(told(bounds, 0.0), "x: 0, expected 1 to 16 (a reason)");
+        assert_eq!([1.0, 16.0].map(|v| checked(bounds, v)), ["fine"; 2]);
+        assert_eq!(checked(bounds, 0.0), "x: 0, expected 1 to 16 (a reason)");
         assert_eq!(
-            told(bounds, f64::NAN),
+            checked(bounds, f64::NAN),
             "x: NaN, expected 1 to 16 (a reason)"
         );
         assert_eq!(
-            told(Bounds::new(1e-5, 1e9, ""), 1e-300),
+            checked(Bounds::new(1e-5, 1e9, ""), 1e-300),
             "x: 1e-300, expected 1e-5 to 1e9"
         );
     }
@@ -156,17 +156,17 @@ mod tests {
     fn a_length_in_another_unit_is_asked_about() {
         let object = Bounds::metres(0.005, 5.0, "");
         assert_eq!(
-            told(object, 229.0),
+            checked(object, 229.0),
             "x: 229, expected 0.005 to 5 m; is it in millimetres?"
         );
         assert_eq!(
-            told(object, 22.9),
+            checked(object, 22.9),
             "x: 22.9, expected 0.005 to 5 m; is it in centimetres?"
         );
-        assert_eq!(told(object, 1e308), "x: 1e308, expected 0.005 to 5 m");
-        assert_eq!(told(object, 0.001), "x: 0.001, expected 0.005 to 5 m");
+        assert_eq!(checked(object, 1e308), "x: 1e308, expected 0.005 to 5 m");
+        assert_eq!(checked(object, 0.001), "x: 0.001, expected 0.005 to 5 m");
         assert_eq!(
-            told(Bounds::new(0.0, 5.0, ""), 229.0),
+            checked(Bounds::new(0.0, 5.0, ""), 229.0),
             "x: 229, expected 0 to 5"
         );
     }

@@ -1,14 +1,16 @@
 //! Lines, boxes and text on display-encoded pictures.
 
-use crate::geom::BBox;
-use crate::geom::Point2;
+use crate::geom::{BBox, Point2};
 use crate::image::Image;
 use crate::pixel::Srgb8;
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+use noto_sans_mono_bitmap::{
+    FontWeight, RasterHeight, RasterizedChar, get_raster, get_raster_width,
+};
+use std::ops::Range;
 
-/// Colours of classes: Okabe and Ito, "Color Universal Design" (2008), told apart with every kind of colour vision; in an
+/// Colours of classes: Okabe and Ito, "Color Universal Design" (2008), distinct for every kind of colour vision; in an
 /// order in which the first ones stand out most on photos.
-const PALETTE: [Srgb8; 7] = [
+const CLASS_PALETTE: [Srgb8; 7] = [
     rgb(0xE6, 0x9F, 0x00),
     rgb(0x56, 0xB4, 0xE9),
     rgb(0x00, 0x9E, 0x73),
@@ -31,7 +33,7 @@ pub(crate) const fn rgb(r: u8, g: u8, b: u8) -> Srgb8 {
 
 /// The colour of a class; the palette starts over after its last.
 pub(crate) fn class_color(class: u32) -> Srgb8 {
-    PALETTE[class as usize % PALETTE.len()]
+    CLASS_PALETTE[class as usize % CLASS_PALETTE.len()]
 }
 
 /// Black or white, whichever is easier to read on a colour.
@@ -55,12 +57,16 @@ fn blend(canvas: &mut Image<Srgb8>, x: isize, y: isize, color: Srgb8, alpha: f32
         return;
     }
     let under = canvas[(x, y)];
-    let mix = |a: u8, b: u8| (f32::from(a) + alpha * (f32::from(b) - f32::from(a)) + 0.5) as u8;
     canvas[(x, y)] = rgb(
-        mix(under.r, color.r),
-        mix(under.g, color.g),
-        mix(under.b, color.b),
+        mixed(under.r, color.r, alpha),
+        mixed(under.g, color.g, alpha),
+        mixed(under.b, color.b, alpha),
     );
+}
+
+#[inline]
+fn mixed(under: u8, over: u8, alpha: f32) -> u8 {
+    (f32::from(under) + alpha * (f32::from(over) - f32::from(under)) + 0.5) as u8
 }
 
 /// A filled rectangle; what lies outside the canvas is left out.
@@ -88,10 +94,9 @@ pub(crate) fn paste(canvas: &mut Image<Srgb8>, [x, y]: [usize; 2], picture: &Ima
 
 /// The border of a box, `thick` whole pixels wide and inside the canvas, with a halo of one pixel on either side.
 pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: isize) {
-    let limit = [canvas.width() as f64, canvas.height() as f64];
-    let whole = |v: f64, most: f64| libm::round(v.clamp(0.0, most)) as isize;
-    let (x0, y0) = (whole(b.x0, limit[0]), whole(b.y0, limit[1]));
-    let (x1, y1) = (whole(b.x1, limit[0]), whole(b.y1, limit[1]));
+    let (w, h) = canvas.size();
+    let [x0, x1] = [b.x0, b.x1].map(|x| libm::round(x.clamp(0.0, w as f64)) as isize);
+    let [y0, y1] = [b.y0, b.y1].map(|y| libm::round(y.clamp(0.0, h as f64)) as isize);
     for y in y0 - 1..=y1 {
         for x in x0 - 1..=x1 {
             // Pixels from the border's outer edge, inwards; -1 is the halo outside.
@@ -108,35 +113,48 @@ pub(crate) fn border(canvas: &mut Image<Srgb8>, b: &BBox, color: Srgb8, thick: i
 pub(crate) fn outline(canvas: &mut Image<Srgb8>, ring: &[Point2<f64>], color: Srgb8) {
     for (radius, color, alpha) in [(1.5, HALO, HALO_ALPHA), (0.5, color, 1.0)] {
         for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-            segment(canvas, *a, *b, radius, |canvas, x, y, cover| {
-                blend(canvas, x, y, color, alpha * cover)
-            });
+            for (x, y, coverage) in Segment::new(*a, *b, radius).pixels(canvas.size()) {
+                blend(canvas, x, y, color, alpha * coverage);
+            }
         }
     }
 }
 
-/// Calls `dot` with the coverage of each pixel near a line of half width `radius`.
-fn segment(
-    canvas: &mut Image<Srgb8>,
-    a: Point2<f64>,
-    b: Point2<f64>,
+/// A line of half width `radius`.
+struct Segment {
+    from: Point2<f64>,
+    to: Point2<f64>,
     radius: f64,
-    mut dot: impl FnMut(&mut Image<Srgb8>, isize, isize, f32),
-) {
-    let reach = radius + 1.0;
-    let clamp = |v: f64, most: usize| v.clamp(0.0, most as f64) as isize;
-    let (w, h) = canvas.size();
-    let along = b - a;
-    for y in clamp(a.y.min(b.y) - reach, h)..clamp(a.y.max(b.y) + reach + 1.0, h) {
-        for x in clamp(a.x.min(b.x) - reach, w)..clamp(a.x.max(b.x) + reach + 1.0, w) {
-            let p = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
-            let t =
-                ((p - a).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            let cover = (radius + 0.5 - (p - (a + along * t)).norm()).clamp(0.0, 1.0);
-            if cover > 0.0 {
-                dot(canvas, x, y, cover as f32);
-            }
-        }
+}
+
+impl Segment {
+    fn new(from: Point2<f64>, to: Point2<f64>, radius: f64) -> Self {
+        Self { from, to, radius }
+    }
+
+    /// The pixels of a canvas that it touches, row by row, and which share of each it covers.
+    fn pixels(&self, (w, h): (usize, usize)) -> impl Iterator<Item = (isize, isize, f32)> {
+        let columns = self.pixel_range(self.from.x, self.to.x, w);
+        self.pixel_range(self.from.y, self.to.y, h)
+            .flat_map(move |y| columns.clone().map(move |x| (x, y)))
+            .map(|(x, y)| (x, y, self.coverage(x, y)))
+            .filter(|(.., coverage)| *coverage > 0.0)
+    }
+
+    /// Columns or rows that it may touch.
+    fn pixel_range(&self, a: f64, b: f64, length: usize) -> Range<isize> {
+        let reach = self.radius + 1.0;
+        let clamp = |v: f64| v.clamp(0.0, length as f64) as isize;
+        clamp(a.min(b) - reach)..clamp(a.max(b) + reach + 1.0)
+    }
+
+    /// A ramp over one pixel by the distance of its middle from the line.
+    fn coverage(&self, x: isize, y: isize) -> f32 {
+        let p = Point2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let along = self.to - self.from;
+        let share = (p - self.from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+        let nearest = self.from + along * share.clamp(0.0, 1.0);
+        (self.radius + 0.5 - (p - nearest).norm()).clamp(0.0, 1.0) as f32
     }
 }
 
@@ -157,6 +175,11 @@ impl TextSize {
         }
     }
 
+    /// A letter of the font; none beyond ASCII.
+    fn glyph(self, letter: char) -> Option<RasterizedChar> {
+        get_raster(letter, FontWeight::Regular, self.raster())
+    }
+
     /// Height of a line, pixels.
     pub(crate) fn height(self) -> usize {
         self.raster().val()
@@ -175,21 +198,26 @@ pub(crate) fn wrapped(text: &str, width: usize, size: TextSize) -> Vec<String> {
     for word in text.split_whitespace() {
         let letters: Vec<char> = word.chars().collect();
         for (i, part) in letters.chunks(room).enumerate() {
-            let last = lines.last_mut().filter(|line| {
-                let used = line.chars().count();
-                i == 0 && used + usize::from(used > 0) + part.len() <= room
-            });
-            match last {
-                Some(line) if line.is_empty() => line.extend(part),
-                Some(line) => {
-                    line.push(' ');
-                    line.extend(part);
-                }
-                None => lines.push(part.iter().collect()),
+            let last = lines.last_mut().filter(|_| i == 0);
+            if !last.is_some_and(|line| append_word(line, part, room)) {
+                lines.push(part.iter().collect());
             }
         }
     }
     lines
+}
+
+/// Appends a word to a line; `false` where there is no room for it.
+fn append_word(line: &mut String, word: &[char], room: usize) -> bool {
+    let used = line.chars().count();
+    if used + usize::from(used > 0) + word.len() > room {
+        return false;
+    }
+    if used > 0 {
+        line.push(' ');
+    }
+    line.extend(word);
+    true
 }
 
 /// A line of text with its top left corner at a point; characters beyond ASCII become `?`.
@@ -202,14 +230,12 @@ pub(crate) fn text(
 ) {
     let advance = get_raster_width(FontWeight::Regular, size.raster()) as isize;
     for (i, letter) in line.chars().enumerate() {
-        let glyph = |c| get_raster(c, FontWeight::Regular, size.raster());
-        let Some(glyph) = glyph(letter).or_else(|| glyph('?')) else {
-            continue;
-        };
-        for (v, row) in glyph.rows().enumerate() {
+        let glyph = size.glyph(letter).or_else(|| size.glyph('?'));
+        let left = x + i as isize * advance;
+        for (v, row) in glyph.iter().flat_map(|glyph| glyph.rows().enumerate()) {
             for (u, &ink) in row.iter().enumerate().filter(|&(_, &ink)| ink > 0) {
-                let at = [x + i as isize * advance + u as isize, y + v as isize];
-                blend(canvas, at[0], at[1], color, f32::from(ink) / 255.0);
+                let at = (left + u as isize, y + v as isize);
+                blend(canvas, at.0, at.1, color, f32::from(ink) / 255.0);
             }
         }
     }
@@ -284,12 +310,11 @@ mod tests {
 
     #[test]
     fn a_line_of_one_pixel_carries_one_pixel_of_ink_per_pixel_of_length() {
-        let mut canvas = Image::filled(40, 40, rgb(0, 0, 0));
         let (a, b) = (Point2::new(5.3, 8.1), Point2::new(33.2, 29.0));
-        let mut ink = 0.0;
-        segment(&mut canvas, a, b, 0.5, |_, _, _, cover| {
-            ink += f64::from(cover)
-        });
+        let ink: f64 = Segment::new(a, b, 0.5)
+            .pixels((40, 40))
+            .map(|(.., coverage)| f64::from(coverage))
+            .sum();
         // A ramp from full to nothing over one pixel on either side integrates to a width of 1; the two round ends add
         // about one more.
         let length = (b - a).norm();

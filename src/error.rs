@@ -64,7 +64,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// A [`Error::File`] from anything that says what is wrong; the system's numbers of errors are left out.
+    /// A [`Error::File`] from any message; the system's numbers of errors are left out.
     pub fn file(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
         Self::File {
             path: path.as_ref().into(),
@@ -80,7 +80,7 @@ impl Error {
         }
     }
 
-    /// The same error, its field path told from one level further out: `count` within `scene` is `scene.count`.
+    /// The same error, its field path from one level further out: `count` within `scene` is `scene.count`.
     pub fn within(self, outer: &str) -> Self {
         match self {
             Self::Value { at, what } => Self::Value {
@@ -91,7 +91,7 @@ impl Error {
         }
     }
 
-    /// The same error, told of the document that the value stands in.
+    /// The same error, with the document that the value stands in.
     pub fn in_file(self, path: impl AsRef<Path>) -> Self {
         let path = path.as_ref().to_path_buf();
         match self {
@@ -105,10 +105,10 @@ impl Error {
     }
 }
 
-/// What the system says of an error without its number, in our spelling: `no such file or directory`.
-fn without_number(said: &str) -> String {
-    let Some((front, rest)) = said.split_once(" (os error ") else {
-        return said.into();
+/// The system's message without its number, in our spelling: `no such file or directory`.
+fn without_number(message: &str) -> String {
+    let Some((front, rest)) = message.split_once(" (os error ") else {
+        return message.into();
     };
     let behind = rest.split_once(')').map_or("", |(_, behind)| behind);
     // The system's own words are the last of the message, and the only ones that begin with a capital.

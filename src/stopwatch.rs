@@ -1,9 +1,9 @@
-//! Where the time of a job goes, told in the log: `petcomp -vv asset add ...` shows it.
+//! Where the time of a job goes, for the log: `petcomp -vv asset add ...` shows it.
 
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// Takes the time of a job's stages, one after the other. What it tells decides nothing.
+/// Takes the time of a job's stages, one after the other. It decides nothing.
 pub(crate) struct Stopwatch {
     stages: Vec<(&'static str, Duration)>,
     last: Instant,
@@ -24,7 +24,7 @@ impl Stopwatch {
         self.last = now;
     }
 
-    /// Tells what the stages of a job took.
+    /// Logs what the stages of a job took.
     pub(crate) fn log(&self, job: impl fmt::Display) {
         log::debug!("{job}: {self}");
     }
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stages_are_told_with_their_shares() {
+    fn stages_are_shown_with_their_shares() {
         let stages = vec![
             ("read", Duration::from_millis(30)),
             ("write", Duration::from_millis(90)),

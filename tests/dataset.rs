@@ -37,6 +37,8 @@ fn scene(k: u64) -> Scene {
         exposure: Exposure::default(),
         cast: Default::default(),
         finish: Default::default(),
+        files: None,
+        settings: Default::default(),
     }
 }
 

@@ -12,7 +12,7 @@ use petcomp::filter::Pyramid;
 use petcomp::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use petcomp::io::exr::read_channels;
 use petcomp::label::{LabelOptions, label};
-use petcomp::scene::{CameraSource, Card, Exposure, Finish, Grade, LightTint, Surface};
+use petcomp::scene::{CameraSource, Card, Exposure, Grade, LightTint, PostProcess, Surface};
 use petcomp::{Image, LinearRgb, ObjectId, PremulRgba, Result, Scene, Shot, composite, io, render};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -103,7 +103,9 @@ fn sample(k: u64) -> Result<Sample> {
         environment: None,
         exposure: Exposure::default(),
         cast: LightTint::default(),
-        finish: Finish::default(),
+        finish: PostProcess::default(),
+        files: None,
+        settings: Default::default(),
     };
     Ok(Sample {
         frame,

@@ -4,7 +4,9 @@ use geo::Contains;
 use petcomp::camera::Camera;
 use petcomp::geom::BBox;
 use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
-use petcomp::label::{AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, knotted, label};
+use petcomp::label::{
+    AmodalBox, DepthRange, LabelOptions, Labels, ObjectLabel, cyclic_overlaps, label,
+};
 use petcomp::scene::{Card, Grade};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Image, LinearRgb, ObjectId, PremulRgba, Shot};
@@ -319,7 +321,7 @@ fn three_cards_that_lie_over_each_other_in_a_circle_are_a_knot() {
         "{:?}",
         found.objects
     );
-    assert_eq!(knotted(&found.objects), [1, 2, 3].map(ObjectId));
+    assert_eq!(cyclic_overlaps(&found.objects), [1, 2, 3].map(ObjectId));
 }
 
 #[test]
@@ -335,7 +337,7 @@ fn a_stack_is_no_knot() {
     });
     let found = labels(&shot(stack), &LabelOptions::default());
     assert_eq!(found.objects[0].covered_by, [ObjectId(2), ObjectId(3)]);
-    assert!(found.objects[2].is_topmost() && knotted(&found.objects).is_empty());
+    assert!(found.objects[2].is_topmost() && cyclic_overlaps(&found.objects).is_empty());
 }
 
 #[test]

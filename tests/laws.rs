@@ -4,9 +4,10 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use petcomp::Scene;
 use petcomp::scene::{
-    Background, CameraSource, Choice, Object, Placement, Range, Recipe, SettleOptions, Surface,
+    AssetVariant, Background, CameraSource, Object, Placement, Range, Recipe, SettleOptions,
+    Surface,
 };
-use petcomp::settle::{self, Allowance, Verdict};
+use petcomp::settle::{self, Allowance, SettleVerdict};
 use proptest::prelude::*;
 use rayon::prelude::*;
 
@@ -23,10 +24,10 @@ fn tray() -> Background {
 }
 
 /// Crushed bottles: 16 to 28 cm long, 6 to 10 cm wide, 4 to 20 mm thick.
-fn stock() -> Vec<Choice> {
+fn catalog() -> Vec<AssetVariant> {
     let choice = |i: usize| {
         let step = i as f64 / 19.0;
-        Choice {
+        AssetVariant {
             asset: format!("b{i}"),
             photo_sizes: vec![
                 [0.16 + 0.12 * step, 0.1 - 0.04 * step],
@@ -49,8 +50,8 @@ fn recipe(objects: Range) -> Recipe {
 
 fn scene(objects: Range, seed: u64, k: u64) -> Scene {
     recipe(objects)
-        .scene(seed, k, &[tray()], &stock())
-        .expect("the stock fits the tray")
+        .scene(seed, k, &[tray()], &catalog())
+        .expect("the catalog fits the tray")
 }
 
 fn settled(scene: Scene) -> Scene {
@@ -248,7 +249,7 @@ fn nothing_at_rest_lies_in_another() {
     }
 }
 
-/// A tray whose sides are so many times the longest card of the stock, and that times `narrow`.
+/// A tray whose sides are so many times the longest card of the catalog, and that times `narrow`.
 fn tight(times: f64, narrow: f64) -> Background {
     let longest = 0.28 * recipe(Range::fixed(1.0)).scale.max;
     Background {
@@ -285,8 +286,8 @@ fn ends_in_tight_trays(scenes: u64) -> [usize; 2] {
             [1.0, 0.8, 0.68, 0.5][(k % 4) as usize],
         );
         let before = recipe(Range::new(5.0, 15.0))
-            .scene(7, k, &[tray], &stock())
-            .expect("the stock fits the tray");
+            .scene(7, k, &[tray], &catalog())
+            .expect("the catalog fits the tray");
         let end = settle::settle(before.clone(), &SettleOptions::default())
             .expect("a scene that can be right");
         let hangs = |rest: &Scene| {
@@ -294,7 +295,7 @@ fn ends_in_tight_trays(scenes: u64) -> [usize; 2] {
                 .expect("a scene")
                 .is_empty()
         };
-        let rested = end.verdict == Verdict::Rested;
+        let rested = end.verdict == SettleVerdict::Rested;
         [
             usize::from(rested && (heaped_up(&end.scene) || hangs(&end.scene))),
             usize::from(!rested),
@@ -332,7 +333,10 @@ fn ordinary_heaps_take_a_small_share_of_the_work_of_a_picture() {
         let allowance = Allowance::new(options.most_work);
         let fall =
             settle::settle_within(scene(Range::fixed(objects), 5, k), &options, 0, &allowance);
-        assert_eq!(fall.expect("there is work left").0.verdict, Verdict::Rested);
+        assert_eq!(
+            fall.expect("there is work left").0.verdict,
+            SettleVerdict::Rested
+        );
         allowance.taken() as f64 / options.most_work as f64
     };
     for k in 0..4 {
@@ -351,7 +355,7 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
         },
     ];
     let told = recipe(Range::fixed(5.0))
-        .check_room(&trays, &stock())
+        .check_room(&trays, &catalog())
         .unwrap_err()
         .to_string();
     assert_eq!(
@@ -361,12 +365,12 @@ fn a_tray_smaller_than_the_longest_card_is_refused_with_both_named() {
     );
     assert!(
         recipe(Range::fixed(5.0))
-            .check_room(&[tight(1.0, 0.5)], &stock())
+            .check_room(&[tight(1.0, 0.5)], &catalog())
             .is_ok()
     );
     assert!(
         recipe(Range::fixed(0.0))
-            .check_room(&trays, &stock())
+            .check_room(&trays, &catalog())
             .is_ok()
     );
 }
@@ -390,7 +394,10 @@ fn of_ten_thousand_drops_none_escapes() {
         .collect();
     let mut overlaps: Vec<f64> = all.iter().map(|end| end.2).collect();
     overlaps.sort_by(f64::total_cmp);
-    let bad = all.iter().filter(|end| end.0 != Verdict::Rested).count();
+    let bad = all
+        .iter()
+        .filter(|end| end.0 != SettleVerdict::Rested)
+        .count();
     let cards: usize = all.iter().map(|end| end.3).sum();
     println!("{} drops of {cards} cards: {bad} without rest", all.len());
     for tries in 1..=options.attempts {
@@ -412,7 +419,7 @@ fn of_ten_thousand_drops_none_escapes() {
     let escapes = all
         .iter()
         .flat_map(|end| end.1.iter().chain([&end.0]))
-        .filter(|v| matches!(v, Verdict::Escaped(_)));
+        .filter(|v| matches!(v, SettleVerdict::Escaped(_)));
     assert_eq!(escapes.count(), 0);
     // 3 of 10,000 gain more than 1 % of their energy in a step at each of eight tries: told, and drawn again by a dataset.
     assert!(bad <= 10, "{bad}");

@@ -59,13 +59,10 @@ pub fn build(
     manifest.write(folder)?;
     Ok(Built {
         photos: photos.len(),
-        lengths: photos
-            .iter()
-            .map(|photo| [photo.record.object_m[0], photo.record.error_m])
-            .collect(),
+        lengths: photos.iter().map(length_and_error).collect(),
         needs_review: photos.iter().filter_map(review_line).collect(),
         refused,
-        library: Library::of_manifest(folder, manifest, photos)?,
+        library: Library::from_manifest(folder, manifest, photos)?,
     })
 }
 
@@ -112,6 +109,10 @@ fn insert_all(
         }
     }
     Ok((photos, refused))
+}
+
+fn length_and_error(photo: &Photo) -> [f64; 2] {
+    [photo.record.object_m[0], photo.record.error_m]
 }
 
 /// Why a person should review a cut-out, after the name of its file.

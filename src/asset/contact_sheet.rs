@@ -52,14 +52,9 @@ pub fn contact_sheet(library: &Library) -> Image<Srgb8> {
 
 /// Strips in rows from the top left, each row as high as its highest.
 fn in_columns(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
-    let rows: Vec<(&[Image<Srgb8>], usize)> = strips
+    let rows: Vec<_> = strips
         .chunks(COLUMNS)
-        .map(|row| {
-            (
-                row,
-                row.iter().map(Image::height).max().unwrap_or(0) + GAP_PX,
-            )
-        })
+        .map(|row| (row, row_height(row)))
         .collect();
     let columns = COLUMNS.min(strips.len().max(1));
     let column_width = STRIP_WIDTH_PX + 2 * GAP_PX;
@@ -78,24 +73,31 @@ fn in_columns(strips: &[Image<Srgb8>]) -> Image<Srgb8> {
     sheet
 }
 
+fn row_height(strips: &[Image<Srgb8>]) -> usize {
+    strips.iter().map(Image::height).max().unwrap_or(0) + GAP_PX
+}
+
 /// One cut-out over all backgrounds under lines of text.
 fn strip(photo: &Photo) -> Image<Srgb8> {
     let cutout = small(&photo.texture);
     let (w, h) = cutout.size();
     let lines = lines_of(&photo.record);
-    let line_height = TextSize::Small.height();
-    let text_height = lines.len() * line_height + GAP_PX / 2;
+    let text_height = lines.len() * TextSize::Small.height() + GAP_PX / 2;
     let mut canvas = Image::filled(STRIP_WIDTH_PX, text_height + h, PAPER);
-    for (i, (line, ink)) in lines.iter().enumerate() {
-        let at = [0, (i * line_height) as isize];
-        draw::text(&mut canvas, at, line, *ink, TextSize::Small);
-    }
+    write_lines(&mut canvas, &lines);
     for (i, background) in BACKGROUNDS.iter().enumerate() {
         let over = Image::from_fn(w, h, |x, y| cutout[(x, y)].over_color(background(x, y)));
         let at = [i * (CUT_OUT_SIDE_PX + GAP_PX), text_height];
         draw::paste(&mut canvas, at, &to_srgb8(&over));
     }
     canvas
+}
+
+fn write_lines(canvas: &mut Image<Srgb8>, lines: &[(String, Srgb8)]) {
+    for (i, (line, ink)) in lines.iter().enumerate() {
+        let at = [0, (i * TextSize::Small.height()) as isize];
+        draw::text(canvas, at, line, *ink, TextSize::Small);
+    }
 }
 
 /// What is written over a cut-out: its size, and why it needs a review.

@@ -9,11 +9,14 @@ use super::measure::Measured;
 use super::rectified::RectifiedPhoto;
 use super::scale::Scale;
 use super::screen_source::EmptyScreens;
-use crate::diagnostic::{Code, Diagnostic};
+use crate::diagnostic::Code;
 use crate::error::{Error, Result};
+use crate::image::Image;
 use crate::io;
 use crate::matte::{ColorUncertainty, CutOut, CutOutOptions, cut_out_on};
+use crate::pixel::LinearRgb;
 use crate::stopwatch::Stopwatch;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// Cuts the object out of a photo and adds it to an asset folder, which is made if it is not there.
@@ -68,17 +71,9 @@ impl CutOutWriter<'_> {
     pub(super) fn write(&self, entry: &PhotoEntry) -> Result<Photo> {
         let mut watch = Stopwatch::start();
         let photo = read_rectified(entry).map_err(|e| with_name(e, &entry.file))?;
-        let empty = self
-            .empty_screens
-            .get(&entry.screen)?
-            .map(|empty| photo.same_view(empty))
-            .transpose()?;
+        let empty = self.empty_screen(entry, &photo)?;
         watch.lap("read");
-        let options = CutOutOptions {
-            screen: entry.screen.color().or(self.options.screen),
-            ..self.options.clone()
-        };
-        let cut = cut_out_on(&photo.photo, empty.as_deref(), &options)
+        let cut = cut_out_on(&photo.photo, empty.as_deref(), &self.options_for(entry))
             .map_err(|e| with_name(e, &entry.file))?;
         watch.lap("cut out");
         log_diagnostics(&cut, &entry.file);
@@ -91,6 +86,23 @@ impl CutOutWriter<'_> {
         watch.lap("write");
         watch.log(entry.file.display());
         Ok(Photo::new(film, record))
+    }
+
+    /// The empty screen as the photo shows it, where there is a photo of it.
+    fn empty_screen(
+        &self,
+        entry: &PhotoEntry,
+        photo: &RectifiedPhoto,
+    ) -> Result<Option<Cow<'_, Image<LinearRgb>>>> {
+        let empty = self.empty_screens.get(&entry.screen)?;
+        empty.map(|empty| photo.same_view(empty)).transpose()
+    }
+
+    fn options_for(&self, entry: &PhotoEntry) -> CutOutOptions {
+        CutOutOptions {
+            screen: entry.screen.color().or(self.options.screen),
+            ..self.options.clone()
+        }
     }
 }
 
@@ -142,11 +154,8 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
     let (w, h) = cut.film.size();
     let size_m = [w as f64, h as f64].map(|px| px / measured.px_per_metre);
     let outline_px = cut.hull.iter().map(files::rounded).collect();
-    let file = entry.cut_out_file();
-    let diagnostics = cut
-        .diagnostics
-        .iter()
-        .filter(|d| Diagnostic::needs_review(d))
+    let to_review = cut.diagnostics.iter().filter(|d| d.needs_review());
+    let diagnostics = to_review
         .cloned()
         .chain(measured.size_mismatch)
         .chain(photo.diagnostic());
@@ -162,6 +171,11 @@ fn record(cut: &CutOut, entry: &PhotoEntry, photo: &RectifiedPhoto) -> Result<Ph
         color_confidence: cut.color_uncertainty.map(ColorUncertainty::confidence),
         truncated: cut.segmentation.touches.contains(&true),
         diagnostics: diagnostics.collect(),
-        ..PhotoRecord::new(file, measured.px_per_metre, size_m, outline_px)
+        ..PhotoRecord::new(
+            entry.cut_out_file(),
+            measured.px_per_metre,
+            size_m,
+            outline_px,
+        )
     })
 }

@@ -34,8 +34,8 @@ impl<'a> CoonsPatch<'a> {
 
     fn at(&self, x: usize, y: usize) -> LinearRgb {
         let (source, [left, right], [top, bottom]) = (self.source, self.columns, self.rows);
-        let s = (x - left) as f32 / (right - left).max(1) as f32;
-        let t = (y - top) as f32 / (bottom - top).max(1) as f32;
+        let s = share(x, self.columns);
+        let t = share(y, self.rows);
         let across = mix(source[(left, y)], source[(right, y)], s);
         let down = mix(source[(x, top)], source[(x, bottom)], t);
         let upper = mix(source[(left, top)], source[(right, top)], s);
@@ -52,6 +52,11 @@ fn around(start: usize, length: usize, end: usize) -> [usize; 2] {
         start.saturating_sub(1),
         (start + length).min(end.saturating_sub(1)),
     ]
+}
+
+/// How far a place is from one to another, 0 to 1.
+fn share(at: usize, [first, last]: [usize; 2]) -> f32 {
+    (at - first) as f32 / (last - first).max(1) as f32
 }
 
 fn mix(a: LinearRgb, b: LinearRgb, share: f32) -> LinearRgb {

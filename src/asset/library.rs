@@ -50,7 +50,7 @@ impl Library {
     pub fn open_some(folder: impl AsRef<Path>, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let mut manifest = Manifest::read(&folder)?;
         manifest.assets.retain(|asset| wanted(&asset.name));
-        Self::of_manifest(folder.as_ref(), manifest, Vec::new())
+        Self::from_manifest(folder.as_ref(), manifest, Vec::new())
     }
 
     /// The same with photos that were just [added](super::add_photo), which need not be read.
@@ -59,42 +59,31 @@ impl Library {
     /// As [`open`](Self::open).
     pub fn open_with(folder: impl AsRef<Path>, added: Vec<Photo>) -> Result<Self> {
         let manifest = Manifest::read(&folder)?;
-        Self::of_manifest(folder.as_ref(), manifest, added)
+        Self::from_manifest(folder.as_ref(), manifest, added)
     }
 
     /// The library of a manifest that was read or written just now, with photos that need not be read.
-    pub(super) fn of_manifest(
+    pub(super) fn from_manifest(
         folder: &Path,
         manifest: Manifest,
         added: Vec<Photo>,
     ) -> Result<Self> {
         let records: Vec<(String, &PhotoRecord)> = places_and_records(&manifest).collect();
-        let photos = records.par_iter().map(|(at, record)| {
-            let added = added.iter().find(|photo| photo.record == **record);
-            added.map_or_else(|| load(folder, record, at), |photo| Ok(photo.clone()))
-        });
-        let photos: Vec<Result<Photo>> = photos.collect();
+        let photos: Vec<Result<Photo>> = records
+            .par_iter()
+            .map(|(at, record)| {
+                let added = added.iter().find(|photo| photo.record == **record);
+                added.map_or_else(|| load(folder, record, at), |photo| Ok(photo.clone()))
+            })
+            .collect();
         let mut photos = photos.into_iter();
-        let mut assets = Vec::with_capacity(manifest.assets.len());
-        for Asset {
-            name,
-            class,
-            thickness,
-            mass,
-            photos: records,
-        } in manifest.assets
-        {
-            assets.push(Asset {
-                name,
-                class,
-                thickness,
-                mass,
-                photos: photos.by_ref().take(records.len()).collect::<Result<_>>()?,
-            });
-        }
+        let assets = manifest.assets.into_iter().map(|asset| {
+            let count = asset.photos.len();
+            Ok(asset.with_photos(photos.by_ref().take(count).collect::<Result<_>>()?))
+        });
         Ok(Self {
+            assets: assets.collect::<Result<_>>()?,
             classes: manifest.classes,
-            assets,
         })
     }
 

@@ -111,6 +111,19 @@ fn coded_or_plain<'de, D: Deserializer<'de>>(
     Ok(diagnostics.collect())
 }
 
+impl<P> Asset<P> {
+    /// The same object with its photos in another form.
+    pub(super) fn with_photos<Q>(self, photos: Vec<Q>) -> Asset<Q> {
+        Asset {
+            name: self.name,
+            class: self.class,
+            thickness: self.thickness,
+            mass: self.mass,
+            photos,
+        }
+    }
+}
+
 fn full_confidence() -> f64 {
     1.0
 }

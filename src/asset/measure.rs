@@ -37,8 +37,7 @@ impl Measured {
             Scale::PxPerMetre(scale) => scale * cut.scale,
             Scale::Screen(..) | Scale::Marker(_) => screen.px_per_metre * cut.scale,
             Scale::Length(length) => tight[0] / length,
-            // Least squares over both sides.
-            Scale::Size([l, w]) => (tight[0] * l + tight[1] * w) / (l * l + w * w),
+            Scale::Size(size) => least_squares_scale(tight, size),
         };
         let error_px = outline_error_px(cut, tight);
         let metres = |px: f64| px / px_per_metre;
@@ -49,6 +48,11 @@ impl Measured {
             size_mismatch: size_mismatch(tight, error_px, scale),
         }
     }
+}
+
+/// The scale that fits both sides best.
+fn least_squares_scale(tight: [f64; 2], [l, w]: [f64; 2]) -> f64 {
+    (tight[0] * l + tight[1] * w) / (l * l + w * w)
 }
 
 /// Standard error of the length of an outline, and how far its tips may lie beyond it, pixels of the cut-out.

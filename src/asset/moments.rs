@@ -1,19 +1,20 @@
 //! Light of a panorama summed over rectangles, and the panorama cut into few of them.
 
-use crate::asset::{Panorama, uv_to_direction};
+use super::equirectangular::{sample, uv_to_direction};
 use crate::geom::Vector3;
+use crate::image::Image;
 use crate::pixel::LinearRgb;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// Columns and rows that light is summed in: 1.4 degrees. What is smaller, as a sun, keeps its exact direction.
-const GRID: [usize; 2] = [256, 128];
+const GRID_CELLS: [usize; 2] = [256, 128];
 
 /// Most pieces that a panorama is cut into.
-const MOST_PIECES: usize = 1024;
+const MAX_PIECES: usize = 1024;
 
 /// Share of a piece's light that counts wherever it comes from: upright receivers see the sides and the ground too.
-const FROM_ANYWHERE: f64 = 0.25;
+const ANY_DIRECTION_SHARE: f64 = 0.25;
 
 /// Light of a part of the sky.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -75,17 +76,17 @@ impl Moments {
         }
     }
 
-    fn of(radiance: LinearRgb, direction: &Vector3<f64>, solid_angle: f64) -> Self {
+    fn from_radiance(radiance: LinearRgb, direction: &Vector3<f64>, solid_angle: f64) -> Self {
         let flux = <[f32; 3]>::from(radiance).map(|v| direction * (f64::from(v) * solid_angle));
         let light = f64::from(radiance.luminance()) * solid_angle;
         Self {
             flux,
             light,
-            weight: light * (direction.z.max(0.0) + FROM_ANYWHERE),
+            weight: light * (direction.z.max(0.0) + ANY_DIRECTION_SHARE),
         }
     }
 
-    /// What a shadow gets wrong that takes all this light to come from one direction: as an edge that is off by the
+    /// What a shadow gets wrong that treats all this light as coming from one direction: as an edge that is off by the
     /// width of the light, of the light's strength, squared and summed.
     fn error(&self) -> f64 {
         self.weight * self.weight * self.width()
@@ -94,7 +95,7 @@ impl Moments {
 
 /// A panorama's light, ready to be asked for over any rectangle, and its cuts.
 #[derive(Debug)]
-pub(super) struct Sums {
+pub(super) struct LightSums {
     /// Light above and left of each grid corner.
     corners: Vec<Moments>,
     /// Light of each grid cell over the horizon, for exact irradiance: direction-weighted.
@@ -105,24 +106,15 @@ pub(super) struct Sums {
     cuts: Vec<usize>,
 }
 
-impl Sums {
-    pub(super) fn of(panorama: &Panorama) -> Self {
-        let rows: Vec<Vec<Moments>> = (0..GRID[1])
+impl LightSums {
+    pub(super) fn new(panorama: &Image<LinearRgb>) -> Self {
+        let rows: Vec<Vec<Moments>> = (0..GRID_CELLS[1])
             .into_par_iter()
-            .map(|j| row(panorama, j))
+            .map(|j| grid_row(panorama, j))
             .collect();
-        let stride = GRID[0] + 1;
-        let mut corners = vec![Moments::default(); stride * (GRID[1] + 1)];
-        for (j, row) in rows.iter().enumerate() {
-            let mut sum = Moments::default();
-            for (i, cell) in row.iter().enumerate() {
-                sum = sum.plus(cell, 1.0);
-                corners[(j + 1) * stride + i + 1] = corners[j * stride + i + 1].plus(&sum, 1.0);
-            }
-        }
         let mut sums = Self {
-            corners,
-            cells: coarse(&rows),
+            corners: summed_area_table(&rows),
+            cells: coarse_cells(&rows),
             pieces: Vec::new(),
             cuts: Vec::new(),
         };
@@ -131,7 +123,7 @@ impl Sums {
     }
 
     fn piece(&self, columns: [usize; 2], rows: [usize; 2]) -> Piece {
-        let at = |i: usize, j: usize| &self.corners[j * (GRID[0] + 1) + i];
+        let at = |i: usize, j: usize| &self.corners[j * (GRID_CELLS[0] + 1) + i];
         let [x0, x1] = columns;
         let [y0, y1] = rows;
         let moments = at(x1, y1)
@@ -147,18 +139,13 @@ impl Sums {
 
     /// Cuts the piece with the largest error where that leaves the least, again and again.
     fn cut(&mut self) {
-        let half = GRID[1] / 2;
-        self.pieces = [[0, half], [half, GRID[1]]]
-            .map(|rows| self.piece([0, GRID[0]], rows))
+        let half = GRID_CELLS[1] / 2;
+        self.pieces = [[0, half], [half, GRID_CELLS[1]]]
+            .map(|rows| self.piece([0, GRID_CELLS[0]], rows))
             .to_vec();
         let mut open = vec![true; 2];
-        while self.cuts.len() + 2 < MOST_PIECES {
-            let candidates = (0..self.pieces.len()).filter(|&k| open[k]);
-            let worst = candidates.max_by(|&a, &b| {
-                let error = |k: usize| self.pieces[k].moments.error();
-                error(a).total_cmp(&error(b)).then(b.cmp(&a))
-            });
-            let Some(worst) = worst.filter(|&k| self.pieces[k].moments.error() > 0.0) else {
+        while self.cuts.len() + 2 < MAX_PIECES {
+            let Some(worst) = self.worst_piece(&open) else {
                 return;
             };
             open[worst] = false;
@@ -169,6 +156,15 @@ impl Sums {
             self.pieces.extend(halves);
             open.extend([true; 2]);
         }
+    }
+
+    /// The first of the open pieces with the largest error; none where there is no error.
+    fn worst_piece(&self, open: &[bool]) -> Option<usize> {
+        let error = |k: usize| self.pieces[k].moments.error();
+        (0..self.pieces.len())
+            .filter(|&k| open[k])
+            .max_by(|&a, &b| error(a).total_cmp(&error(b)).then(b.cmp(&a)))
+            .filter(|&k| error(k) > 0.0)
     }
 
     /// The cut across either axis that leaves the least error; none for a single cell.
@@ -186,10 +182,9 @@ impl Sums {
                 self.piece(piece.columns, [y, y1]),
             ]
         });
-        let left = |halves: &[Piece; 2]| halves.iter().map(|p| p.moments.error()).sum::<f64>();
         across
             .chain(along)
-            .min_by(|a, b| left(a).total_cmp(&left(b)))
+            .min_by(|a, b| total_error(a).total_cmp(&total_error(b)))
     }
 
     /// At most `count` pieces, together the whole panorama.
@@ -206,12 +201,17 @@ impl Sums {
 
     /// The panorama in even rectangles, `per_side` rows of twice as many.
     pub(super) fn even(&self, per_side: usize) -> Vec<Piece> {
-        let rows = per_side.clamp(1, GRID[1]);
+        let rows = per_side.clamp(1, GRID_CELLS[1]);
         let columns = 2 * rows;
         let cut = |k: usize, n: usize, all: usize| k * all / n;
         let span = |k: usize, n: usize, all: usize| [cut(k, n, all), cut(k + 1, n, all)];
         let row = |j: usize| {
-            (0..columns).map(move |i| (span(i, columns, GRID[0]), span(j, rows, GRID[1])))
+            (0..columns).map(move |i| {
+                (
+                    span(i, columns, GRID_CELLS[0]),
+                    span(j, rows, GRID_CELLS[1]),
+                )
+            })
         };
         (0..rows)
             .flat_map(row)
@@ -230,39 +230,63 @@ impl Sums {
     }
 }
 
+fn total_error(halves: &[Piece; 2]) -> f64 {
+    halves.iter().map(|p| p.moments.error()).sum()
+}
+
+/// Light above and left of each grid corner.
+fn summed_area_table(rows: &[Vec<Moments>]) -> Vec<Moments> {
+    let stride = GRID_CELLS[0] + 1;
+    let mut corners = vec![Moments::default(); stride * (GRID_CELLS[1] + 1)];
+    for (j, row) in rows.iter().enumerate() {
+        let mut sum = Moments::default();
+        for (i, cell) in row.iter().enumerate() {
+            sum = sum.plus(cell, 1.0);
+            corners[(j + 1) * stride + i + 1] = corners[j * stride + i + 1].plus(&sum, 1.0);
+        }
+    }
+    corners
+}
+
 /// Cells of a row of the grid, each the sum over places inside that are denser than the panorama's texels.
-fn row(panorama: &Panorama, j: usize) -> Vec<Moments> {
-    let (width, height) = panorama.image().size();
-    let [across, down] = [2 * width.div_ceil(GRID[0]), 2 * height.div_ceil(GRID[1])];
-    let mut cells = vec![Moments::default(); GRID[0]];
+fn grid_row(panorama: &Image<LinearRgb>, j: usize) -> Vec<Moments> {
+    let (width, height) = panorama.size();
+    let across = 2 * width.div_ceil(GRID_CELLS[0]);
+    let down = 2 * height.div_ceil(GRID_CELLS[1]);
+    let mut cells = vec![Moments::default(); GRID_CELLS[0]];
     for t in 0..down {
-        let v = |t: f64| (j as f64 + t / down as f64) / GRID[1] as f64;
+        let v = |t: f64| (j as f64 + t / down as f64) / GRID_CELLS[1] as f64;
         let band = libm::cos(PI * v(t as f64)) - libm::cos(PI * v(t as f64 + 1.0));
-        let solid_angle = band * TAU / (GRID[0] * across) as f64;
+        let solid_angle = band * TAU / (GRID_CELLS[0] * across) as f64;
+        let v = v(t as f64 + 0.5);
         for (i, cell) in cells.iter_mut().enumerate() {
             for s in 0..across {
-                let uv = [
-                    (i as f64 + (s as f64 + 0.5) / across as f64) / GRID[0] as f64,
-                    v(t as f64 + 0.5),
-                ];
-                *cell = cell.plus(
-                    &Moments::of(panorama.at(uv), &uv_to_direction(uv), solid_angle),
-                    1.0,
-                );
+                let u = (i as f64 + (s as f64 + 0.5) / across as f64) / GRID_CELLS[0] as f64;
+                let sample = sample_light(panorama, [u, v], solid_angle);
+                *cell = cell.plus(&sample, 1.0);
             }
         }
     }
     cells
 }
 
-/// Grid cells a side that a coarse cell sums: 5.6 degrees are fine enough for the horizon that cuts them.
-const COARSE: usize = 4;
+#[inline]
+fn sample_light(panorama: &Image<LinearRgb>, uv: [f64; 2], solid_angle: f64) -> Moments {
+    Moments::from_radiance(sample(panorama, uv), &uv_to_direction(uv), solid_angle)
+}
 
-fn coarse(rows: &[Vec<Moments>]) -> Vec<Moments> {
-    let mut cells = vec![Moments::default(); (GRID[0] / COARSE) * (GRID[1] / COARSE)];
+/// Grid cells a side that a coarse cell sums: 5.6 degrees are fine enough for the horizon that cuts them.
+const COARSE_CELL_SIDE: usize = 4;
+
+fn coarse_cells(rows: &[Vec<Moments>]) -> Vec<Moments> {
+    let mut cells = vec![
+        Moments::default();
+        (GRID_CELLS[0] / COARSE_CELL_SIDE) * (GRID_CELLS[1] / COARSE_CELL_SIDE)
+    ];
     for (j, row) in rows.iter().enumerate() {
         for (i, cell) in row.iter().enumerate() {
-            let sum = &mut cells[(j / COARSE) * (GRID[0] / COARSE) + i / COARSE];
+            let sum = &mut cells[(j / COARSE_CELL_SIDE) * (GRID_CELLS[0] / COARSE_CELL_SIDE)
+                + i / COARSE_CELL_SIDE];
             *sum = sum.plus(cell, 1.0);
         }
     }
@@ -271,8 +295,8 @@ fn coarse(rows: &[Vec<Moments>]) -> Vec<Moments> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Panorama;
     use super::*;
-    use crate::image::Image;
 
     fn constant() -> Panorama {
         Panorama::new(Image::filled(64, 32, LinearRgb::new(1.0, 2.0, 0.5))).unwrap()

@@ -1,12 +1,12 @@
 //! A picture of everything around: an equirectangular environment map.
 
-use super::moments::{Piece, Sums};
+use super::equirectangular::{direction_to_uv, sample};
+use super::moments::{LightSums, Piece};
 use crate::error::{Error, Result};
 use crate::geom::Vector3;
 use crate::image::Image;
 use crate::io;
-use crate::pixel::{LinearRgb, Mix};
-use std::f64::consts::{PI, TAU};
+use crate::pixel::LinearRgb;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -17,7 +17,7 @@ use std::sync::OnceLock;
 pub struct Panorama {
     image: Image<LinearRgb>,
     /// Made when light is first asked for.
-    sums: OnceLock<Sums>,
+    sums: OnceLock<LightSums>,
 }
 
 impl Panorama {
@@ -32,8 +32,7 @@ impl Panorama {
                 "0 pixels, expected at least one",
             ));
         }
-        let is_light = |c: &LinearRgb| c.is_finite() && c.r >= 0.0 && c.g >= 0.0 && c.b >= 0.0;
-        if let Some(i) = image.pixels().iter().position(|c| !is_light(c)) {
+        if let Some(i) = image.pixels().iter().position(|c| !is_radiance(c)) {
             let (x, y) = (i % image.width(), i / image.width());
             let what = format!(
                 "{:?} at ({x}, {y}), expected numbers of at least 0",
@@ -66,27 +65,7 @@ impl Panorama {
     /// # Method
     /// Bilinear between texel centres, around in `u`, the outermost row going on in `v`.
     pub fn radiance(&self, direction: &Vector3<f64>) -> LinearRgb {
-        self.at(direction_to_uv(direction))
-    }
-
-    /// Radiance at a place of the picture.
-    pub(super) fn at(&self, [u, v]: [f64; 2]) -> LinearRgb {
-        let (width, height) = self.image.size();
-        let x = u * width as f64 - 0.5;
-        let y = (v * height as f64 - 0.5).clamp(0.0, height as f64 - 1.0);
-        let (left, top) = (x.floor(), y.floor());
-        let column = |i: f64| i.rem_euclid(width as f64) as usize % width;
-        let (columns, rows) = (
-            [column(left), column(left + 1.0)],
-            [top as usize, (top as usize + 1).min(height - 1)],
-        );
-        let (s, t) = ((x - left) as f32, (y - top) as f32);
-        let corner = |i: usize, j: usize| self.image[(columns[i], rows[j])];
-        LinearRgb::BLACK
-            .add_scaled((1.0 - s) * (1.0 - t), corner(0, 0))
-            .add_scaled(s * (1.0 - t), corner(1, 0))
-            .add_scaled((1.0 - s) * t, corner(0, 1))
-            .add_scaled(s * t, corner(1, 1))
+        sample(&self.image, direction_to_uv(direction))
     }
 
     /// The panorama cut into at most `count` (at least 2) rectangles, small where light is strong and uneven.
@@ -111,32 +90,23 @@ impl Panorama {
         self.sums().irradiance(normal)
     }
 
-    fn sums(&self) -> &Sums {
+    fn sums(&self) -> &LightSums {
         if let Some(sums) = self.sums.get() {
             return sums;
         }
         // Summed before the cell is locked: the work is parallel, and a thread that waits may come back here.
-        let sums = Sums::of(self);
+        let sums = LightSums::new(&self.image);
         self.sums.get_or_init(|| sums)
     }
 }
 
-/// Where a direction (of any length but 0) lies in an equirectangular picture, 0 to 1, right and down.
-pub fn direction_to_uv(direction: &Vector3<f64>) -> [f64; 2] {
-    let u = 0.5 - libm::atan2(direction.y, direction.x) / TAU;
-    let v = libm::atan2(direction.xy().norm(), direction.z) / PI;
-    [u, v]
-}
-
-/// The unit direction that a place in an equirectangular picture shows.
-pub fn uv_to_direction([u, v]: [f64; 2]) -> Vector3<f64> {
-    let (sin, cos) = libm::sincos((0.5 - u) * TAU);
-    let (radius, z) = libm::sincos(v * PI);
-    Vector3::new(radius * cos, radius * sin, z)
+fn is_radiance(c: &LinearRgb) -> bool {
+    c.is_finite() && c.r >= 0.0 && c.g >= 0.0 && c.b >= 0.0
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::uv_to_direction;
     use super::*;
 
     #[test]

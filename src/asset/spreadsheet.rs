@@ -14,8 +14,8 @@ pub(super) struct Row {
 }
 
 /// Columns that hold words, and those that hold numbers.
-const WORDS: [&str; 4] = ["file", "asset", "class", "screen"];
-const NUMBERS: [&str; 6] = [
+const WORD_COLUMNS: [&str; 4] = ["file", "asset", "class", "screen"];
+const NUMBER_COLUMNS: [&str; 6] = [
     "px_per_metre",
     "length",
     "width",
@@ -24,9 +24,9 @@ const NUMBERS: [&str; 6] = [
     "marker_size",
 ];
 /// A column that holds two numbers with an x between them.
-const SIZE: &str = "screen_size";
+const SIZE_COLUMN: &str = "screen_size";
 /// What else a column may be called.
-const ALIASES: [(&str, &str); 2] = [("px_per_meter", "px_per_metre"), ("photo", "file")];
+const COLUMN_ALIASES: [(&str, &str); 2] = [("px_per_meter", "px_per_metre"), ("photo", "file")];
 /// What may separate cells; of equally many the first.
 const SEPARATORS: [u8; 3] = [b',', b';', b'\t'];
 
@@ -43,30 +43,74 @@ pub(super) fn rows(bytes: &[u8]) -> Result<Vec<Row>> {
         .delimiter(separator)
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let columns = reader
-        .headers()
-        .map_err(|e| broken(&e))?
-        .iter()
-        .map(column)
-        .collect::<Result<Vec<_>>>()?;
+    let headers = reader.headers().map_err(|e| csv_error(&e))?;
+    let sheet = Columns {
+        names: headers.iter().map(column_name).collect::<Result<_>>()?,
+        has_decimal_commas: separator != b',',
+    };
     let mut rows = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|e| broken(&e))?;
-        let line = record.position().map_or(0, csv::Position::line);
-        let mut cells = toml::Table::new();
-        for (name, cell) in columns
-            .iter()
-            .zip(&record)
-            .filter(|(_, cell)| !cell.is_empty())
-        {
-            let value = value(name, cell, separator).map_err(|e| in_line(e, line))?;
-            cells.insert((*name).into(), value);
-        }
-        if !cells.is_empty() {
-            rows.push(Row { line, cells });
+        let row = sheet.row(&record.map_err(|e| csv_error(&e))?)?;
+        if !row.cells.is_empty() {
+            rows.push(row);
         }
     }
     Ok(rows)
+}
+
+/// What stands in the columns of a spreadsheet.
+struct Columns {
+    names: Vec<&'static str>,
+    /// A comma in a number cannot separate cells: it may stand for the decimal point.
+    has_decimal_commas: bool,
+}
+
+impl Columns {
+    fn row(&self, record: &csv::StringRecord) -> Result<Row> {
+        let line = record.position().map_or(0, csv::Position::line);
+        let mut cells = toml::Table::new();
+        let filled = self.names.iter().zip(record);
+        for (name, cell) in filled.filter(|(_, cell)| !cell.is_empty()) {
+            let value = self.value(name, cell).map_err(|e| in_line(e, line))?;
+            cells.insert((*name).into(), value);
+        }
+        Ok(Row { line, cells })
+    }
+
+    fn value(&self, column: &str, cell: &str) -> Result<toml::Value> {
+        if WORD_COLUMNS.contains(&column) {
+            return Ok(cell.into());
+        }
+        let (value, expected) = if column == SIZE_COLUMN {
+            (self.size(cell), "a size such as 0.60x0.40")
+        } else {
+            (self.number(cell), "a number such as 0.265")
+        };
+        value.ok_or_else(|| Error::value(column, format!("\"{cell}\", expected {expected}")))
+    }
+
+    /// Two numbers with an x between them.
+    fn size(&self, cell: &str) -> Option<toml::Value> {
+        let (width, height) = cell.split_once(['x', 'X'])?;
+        let sides = [width, height].map(|side| self.number(side.trim()));
+        let [Some(width), Some(height)] = sides else {
+            return None;
+        };
+        Some(vec![width, height].into())
+    }
+
+    fn number(&self, cell: &str) -> Option<toml::Value> {
+        // Between commas a comma in a number may as well separate thousands.
+        let has_decimal_comma =
+            self.has_decimal_commas && !cell.contains('.') && cell.matches(',').count() == 1;
+        let number = if has_decimal_comma {
+            cell.replace(',', ".")
+        } else {
+            cell.to_owned()
+        };
+        let number: f64 = number.parse().ok()?;
+        number.is_finite().then(|| number.into())
+    }
 }
 
 /// UTF-8, or the code of Western European Windows, in which spreadsheets write `ü` by default.
@@ -97,34 +141,25 @@ fn separator(header: &str) -> u8 {
 }
 
 /// The name of a column, however it is written.
-fn column(header: &str) -> Result<&'static str> {
+fn column_name(header: &str) -> Result<&'static str> {
     let plain = header.to_lowercase().replace([' ', '-'], "_");
-    let named = ALIASES
+    let name = COLUMN_ALIASES
         .iter()
         .find(|(alias, _)| *alias == plain)
         .map_or(plain.as_str(), |(_, name)| name);
-    let known: Vec<&'static str> = WORDS
-        .iter()
-        .chain(&NUMBERS)
-        .chain(&[SIZE])
-        .copied()
-        .collect();
+    let known = [&WORD_COLUMNS[..], &NUMBER_COLUMNS, &[SIZE_COLUMN]].concat();
     known
         .iter()
-        .find(|name| **name == named)
+        .find(|known| **known == name)
         .copied()
         .ok_or_else(|| {
-            Error::value(
-                "line 1",
-                format!(
-                    "unknown column \"{header}\", {}",
-                    io::suggestion(named, &known)
-                ),
-            )
+            let suggestion = io::suggestion(name, &known);
+            let what = format!("unknown column \"{header}\", {suggestion}");
+            Error::value("line 1", what)
         })
 }
 
-/// The same error, told of a line of the file.
+/// The same error, of a line of the file.
 pub(super) fn in_line(error: Error, line: u64) -> Error {
     match error {
         Error::Value { at, what } if at == "document" => Error::value(format!("line {line}"), what),
@@ -133,41 +168,7 @@ pub(super) fn in_line(error: Error, line: u64) -> Error {
     }
 }
 
-fn value(column: &str, cell: &str, separator: u8) -> Result<toml::Value> {
-    if WORDS.contains(&column) {
-        return Ok(cell.into());
-    }
-    if column == SIZE {
-        let sides = cell
-            .split(['x', 'X'])
-            .map(|side| value(NUMBERS[0], side.trim(), separator));
-        let sides: Option<Vec<toml::Value>> = sides.map(Result::ok).collect();
-        let sides = sides.filter(|sides| sides.len() == 2);
-        return sides
-            .map(toml::Value::from)
-            .ok_or_else(|| wrong(column, cell, "a size such as 0.60x0.40"));
-    }
-    // Between commas a comma in a number may as well separate thousands.
-    let decimal_comma = separator != b',' && !cell.contains('.') && cell.matches(',').count() == 1;
-    let number = if decimal_comma {
-        cell.replace(',', ".")
-    } else {
-        cell.to_owned()
-    };
-    let found = number
-        .parse::<f64>()
-        .ok()
-        .filter(|number| number.is_finite());
-    found
-        .map(toml::Value::from)
-        .ok_or_else(|| wrong(column, cell, "a number such as 0.265"))
-}
-
-fn wrong(column: &str, cell: &str, expected: &str) -> Error {
-    Error::value(column, format!("\"{cell}\", expected {expected}"))
-}
-
-fn broken(error: &csv::Error) -> Error {
+fn csv_error(error: &csv::Error) -> Error {
     let line = error
         .position()
         .map_or_else(|| "document".to_owned(), |at| format!("line {}", at.line()));

@@ -4,14 +4,14 @@ use crate::deep::DeepImage;
 use crate::filter::gaussian_blur;
 use crate::image::Image;
 use crate::pixel::{LinearRgb, Mix, PremulRgba};
-use crate::scene::{Finish, Noise};
+use crate::scene::{Noise, PostProcess};
 use crate::work::{self, Kind};
 use std::f64::consts::TAU;
 
 /// Standard deviation of the blur that sharpening removes.
 const SHARPENING_SIGMA_PX: f32 = 1.0;
 
-/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`Finish::default`] gives the same bits.
+/// Finishes a frame of deep samples over `plate`; scene-linear, premultiplied. [`PostProcess::default`] gives the same bits.
 ///
 /// Cards get the noise that a photograph of them would have, and no pixel more than that: what is seen of the plate
 /// already has its own, so that a pixel without card or shadow keeps its bits. Exposure, white balance and sharpening
@@ -24,7 +24,7 @@ pub fn finish(
     frame: Image<PremulRgba>,
     deep: &DeepImage,
     plate: Option<&Image<LinearRgb>>,
-    finish: &Finish,
+    finish: &PostProcess,
 ) -> Image<PremulRgba> {
     let noisy = match finish.noise {
         Noise::Known { shot, read } if shot > 0.0 || read > 0.0 => SensorNoise {
@@ -43,7 +43,7 @@ pub fn finish(
 }
 
 /// Exposure and white balance.
-fn apply_gain(frame: Image<PremulRgba>, finish: &Finish) -> Image<PremulRgba> {
+fn apply_gain(frame: Image<PremulRgba>, finish: &PostProcess) -> Image<PremulRgba> {
     // An infinite gain would make NaN of black.
     let gain = finish
         .white_balance
@@ -83,6 +83,23 @@ struct ExposedValue {
     plate: f32,
 }
 
+/// Factor on the plate at a pixel, and the plate; black where there is none.
+#[inline(always)]
+fn seen_plate(
+    deep: &DeepImage,
+    plate: Option<&Image<LinearRgb>>,
+    at: (usize, usize),
+    pixel: PremulRgba,
+) -> ([f32; 3], [f32; 3]) {
+    match plate {
+        Some(plate) => {
+            let passes = deep.flat(at.0, at.1).transmittance() * deep.shadow()[at];
+            (passes.into(), plate[at].into())
+        }
+        None => ([1.0 - pixel.a; 3], [0.0; 3]),
+    }
+}
+
 impl SensorNoise {
     fn add_to(
         &self,
@@ -93,15 +110,9 @@ impl SensorNoise {
         work::add(Kind::NoisyPixels, frame.pixels().len() as u64);
         Image::from_fn(frame.width(), frame.height(), |x, y| {
             let p = frame[(x, y)];
-            let (passes, behind): ([f32; 3], [f32; 3]) = match plate {
-                Some(plate) => {
-                    let passes = deep.flat(x, y).transmittance() * deep.shadow()[(x, y)];
-                    (passes.into(), plate[(x, y)].into())
-                }
-                None => ([1.0 - p.a; 3], [0.0; 3]),
-            };
-            let value: [f32; 3] = p.color().into();
+            let (passes, behind) = seen_plate(deep, plate, (x, y), p);
             let index = 3 * (y * frame.width() + x) as u64;
+            let value: [f32; 3] = p.color().into();
             let noisy: [f32; 3] = std::array::from_fn(|c| {
                 let exposed = ExposedValue {
                     value: value[c],
@@ -177,7 +188,7 @@ mod tests {
         )
     }
 
-    fn finished(change: Finish) -> (Image<PremulRgba>, Image<PremulRgba>) {
+    fn finished(change: PostProcess) -> (Image<PremulRgba>, Image<PremulRgba>) {
         let deep = deep(64);
         let plate = Image::from_fn(64, 64, |x, y| {
             LinearRgb::grey(0.1 + 0.01 * ((x + y) % 7) as f32)
@@ -188,7 +199,7 @@ mod tests {
 
     #[test]
     fn nothing_asked_leaves_every_bit() {
-        let (before, after) = finished(Finish::default());
+        let (before, after) = finished(PostProcess::default());
         assert_eq!(before, after);
     }
 
@@ -198,10 +209,10 @@ mod tests {
             shot: 0.002,
             read: 0.01,
         };
-        let (before, after) = finished(Finish {
+        let (before, after) = finished(PostProcess {
             noise,
             noise_seed: 5,
-            ..Finish::default()
+            ..PostProcess::default()
         });
         let differences = |columns: std::ops::Range<usize>| -> Vec<f64> {
             let pixels = (0..64).flat_map(|y| columns.clone().map(move |x| (x, y)));
@@ -228,13 +239,13 @@ mod tests {
     #[test]
     fn another_seed_is_another_noise() {
         let of = |noise_seed| {
-            finished(Finish {
+            finished(PostProcess {
                 noise: Noise::Known {
                     shot: 0.0,
                     read: 0.01,
                 },
                 noise_seed,
-                ..Finish::default()
+                ..PostProcess::default()
             })
             .1
         };
@@ -245,10 +256,10 @@ mod tests {
     #[test]
     fn a_stop_doubles_and_balance_scales_each_channel() {
         let white_balance = LinearRgb::new(0.5, 1.0, 2.0);
-        let (before, after) = finished(Finish {
+        let (before, after) = finished(PostProcess {
             exposure_ev: 1.0,
             white_balance,
-            ..Finish::default()
+            ..PostProcess::default()
         });
         let (p, q) = (before[(3, 9)], after[(3, 9)]);
         assert_eq!([q.r, q.g, q.b, q.a], [p.r, 2.0 * p.g, 4.0 * p.b, 1.0]);
@@ -256,9 +267,9 @@ mod tests {
 
     #[test]
     fn sharpening_leaves_flat_parts_and_lifts_edges() {
-        let (before, after) = finished(Finish {
+        let (before, after) = finished(PostProcess {
             sharpening: 1.0,
-            ..Finish::default()
+            ..PostProcess::default()
         });
         assert!((after[(50, 30)].g - before[(50, 30)].g).abs() < 1e-6);
         assert!(after[(32, 30)].g > before[(32, 30)].g + 0.05);

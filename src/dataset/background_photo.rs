@@ -195,7 +195,14 @@ fn warn_of_shapes(places: &[BackgroundPhoto]) {
     );
 }
 
-/// The largest middle_part part of a photo that has the shape of the picture.
+/// The photo that a label names, in the label's folder.
+fn photo_path(labelled: &LabelledPhoto) -> Result<PathBuf> {
+    let folder = labelled.source.parent().unwrap_or(Path::new(""));
+    io::inside(folder, &labelled.label.image.file)
+        .map_err(|e| e.within("image").in_file(&labelled.source))
+}
+
+/// The largest middle part of a photo that has the shape of the picture.
 fn middle_part(photo: [u32; 2], image: [u32; 2]) -> Roi {
     let [w, h] = photo.map(u64::from);
     let [iw, ih] = image.map(u64::from);

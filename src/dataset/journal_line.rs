@@ -8,7 +8,7 @@ use crate::dataset::folder::{IDENTITY, JOURNAL};
 use crate::dataset::{Entry, Part, Written};
 use crate::error::{Error, Result};
 use crate::io::{self, Checksum};
-use crate::label::knotted;
+use crate::label::cyclic_overlaps;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ impl JournalLine {
             part: entry.part,
             classes: count_by_class(entry),
             obstructed: objects.iter().filter(|object| !object.is_topmost()).count() as u32,
-            knotted: knotted(objects).len() as u32,
+            knotted: cyclic_overlaps(objects).len() as u32,
             retries: entry.sample.rejected.len() as u32,
             files: files
                 .iter()

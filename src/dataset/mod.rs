@@ -43,6 +43,7 @@ mod pictures;
 mod pipeline;
 mod quality;
 mod run;
+mod scene_config;
 mod shard;
 mod sidecar;
 mod split;

@@ -17,7 +17,7 @@ use crate::light;
 use crate::pixel::{LinearRgb, PremulRgba};
 use crate::render::{self};
 use crate::scene::{
-    Background, CameraSource, Choice, Drawn, Draws, Look, Scene, Shot, locate, stock,
+    Appearance, AssetVariant, Background, CameraSource, Drawn, Draws, Scene, Shot, catalog, locate,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub struct Pipeline {
     library: Library,
     places: Vec<BackgroundPhoto>,
     backgrounds: Vec<Background>,
-    stock: Vec<Choice>,
+    catalog: Vec<AssetVariant>,
     surroundings: EnvironmentMaps,
     /// Turns true when no picture is to be finished any more.
     stop: &'static AtomicBool,
@@ -57,7 +57,8 @@ impl Pipeline {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn with_library(config: DatasetConfig, library: Library) -> Result<Self> {
-        let pipeline = Self::new(config, library)?;
+        let places = open_backgrounds(&config)?;
+        let pipeline = Self::new(config, library, places)?;
         pipeline
             .places
             .iter()
@@ -96,35 +97,27 @@ impl Pipeline {
     pub fn open_for(config: DatasetConfig, scene: &Scene) -> Result<Self> {
         let is_named = |name: &str| scene.objects.iter().any(|object| object.asset == name);
         let library = Library::open_some(&config.assets, is_named)?;
-        Self::new(config, library)
+        let places = if scene.plate.is_empty() {
+            Vec::new()
+        } else {
+            open_backgrounds(&config)?
+        };
+        Self::new(config, library, places)
     }
 
-    fn new(config: DatasetConfig, library: Library) -> Result<Self> {
-        let (image, surface_size, force) = (
-            config.scene.image,
-            config.surface_size,
-            config.force_cameras,
-        );
-        let places = BackgroundPhoto::all(
-            &config.backgrounds,
-            BackgroundOptions {
-                image,
-                surface_size,
-                force,
-            },
-        )?;
+    fn new(config: DatasetConfig, library: Library, places: Vec<BackgroundPhoto>) -> Result<Self> {
         let backgrounds = places
             .iter()
             .map(|place| place.background.clone())
             .collect();
-        let stock = stock(&library);
+        let catalog = catalog(&library);
         let surroundings = EnvironmentMaps::of(&config);
         Ok(Self {
             config,
             library,
             places,
             backgrounds,
-            stock,
+            catalog,
             surroundings,
             stop: &NEVER,
         })
@@ -153,7 +146,7 @@ impl Pipeline {
     pub fn plan(&self, count: u64, seed: u64, folder: impl Into<PathBuf>) -> Result<Plan> {
         self.config
             .scene
-            .check_room(&self.backgrounds, &self.stock)
+            .check_room(&self.backgrounds, &self.catalog)
             .map_err(|e| e.within("scene"))?;
         let (folder, labels) = (folder.into(), &self.config.labels);
         let mut inputs = Inputs::kept(&folder);
@@ -195,7 +188,7 @@ impl Pipeline {
     pub fn explain(&self, seed: u64, k: u64) -> Result<(Scene, Vec<Drawn>)> {
         self.config
             .scene
-            .explained(seed, k, &self.backgrounds, &self.stock)
+            .explained(seed, k, &self.backgrounds, &self.catalog)
     }
 
     /// Sample `k`: a pure function of what was opened, `seed` and `k`.
@@ -304,7 +297,7 @@ impl Pipeline {
             scene = light::match_plate(scene, plate);
         }
         let shot = scene.resolve(
-            |object| Look::of(&self.library, object),
+            |object| Appearance::from_library(&self.library, object),
             plate,
             self.panorama(&scene)?,
         )?;
@@ -352,7 +345,17 @@ impl Pipeline {
     }
 }
 
-/// The seed of the `n`-th attempt at scene `k`: the first is the dataset's own.
+/// The labelled photos that a config names.
+fn open_backgrounds(config: &DatasetConfig) -> Result<Vec<BackgroundPhoto>> {
+    let options = BackgroundOptions {
+        image: config.scene.image,
+        surface_size: config.surface_size,
+        force: config.force_cameras,
+    };
+    BackgroundPhoto::all(&config.backgrounds, options)
+}
+
+/// The seed of the `n`-th try of scene `k`: the first is the dataset's own.
 fn redraw_seed(seed: u64, k: u64, n: usize) -> u64 {
     match n {
         0 => seed,

@@ -3,7 +3,7 @@
 use crate::dataset::{Entry, Part, Sample, Writer};
 use crate::error::Result;
 use crate::io;
-use crate::label::{Labels, knotted};
+use crate::label::{Labels, cyclic_overlaps};
 use crate::pixel::ObjectId;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -93,7 +93,7 @@ impl SampleRecord {
                 .filter(|object| object.is_topmost())
                 .map(|object| object.id)
                 .collect(),
-            knotted: knotted(&labels.objects),
+            knotted: cyclic_overlaps(&labels.objects),
             rejected: rejected.clone(),
             draws: draws
                 .iter()

@@ -61,7 +61,7 @@ impl Format {
         }
     }
 
-    /// The usual name, as OpenImageIO spells its reader.
+    /// Its name, as OpenImageIO spells its reader.
     pub fn name(self) -> &'static str {
         match self {
             Self::Exr => "openexr",

@@ -1,4 +1,4 @@
-//! What a file says about its picture before the pixels.
+//! The description of a picture in front of its pixels.
 
 use super::format::Format;
 
@@ -13,7 +13,7 @@ pub enum Window {
     Data,
 }
 
-/// What a picture file says about itself; reading it decodes no pixel.
+/// How a picture file describes itself; reading it decodes no pixel.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {

@@ -40,7 +40,7 @@
 //!   a mistake is named with its line.
 //!
 //! Not guaranteed: that decoders have no mistakes ([`oiio::read`] and [`Fallback::InProcess`] let OpenImageIO's into this process,
-//! and Debian does not repair them), that a kernel without Landlock or seccomp has an equal sandbox (one warning says so;
+//! and Debian does not repair them), that a kernel without Landlock or seccomp has an equal sandbox (one warning reports it;
 //! [`Fallback::StrictWorker`] refuses), that the stages behind reading fit into any memory, or anything against a person with an account on the machine. Half-grey
 //! pictures out of JPEGs that are damaged in the middle, with their end in place, cannot be distinguished from real ones.
 
@@ -95,7 +95,7 @@ pub use worker::serve as serve_worker;
 #[cfg(feature = "oiio")]
 pub use worker::worker_version;
 
-pub(crate) use document::{from_table, read_bytes, suggestion};
+pub(crate) use document::{from_table, from_table_with, read_bytes, suggestion};
 pub(crate) use fs::{length_inside, open_own, refuse_foreign};
 #[cfg(feature = "fuzzing")]
 pub(crate) use fuzz::header_of;

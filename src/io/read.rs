@@ -37,7 +37,7 @@ pub fn read_with<P: FromFile>(path: impl AsRef<Path>, options: &ReadOptions) -> 
     Picture::decode(path.as_ref(), options, P::WANTED)?.into_image()
 }
 
-/// Reads what a file says about its picture, without the pixels.
+/// Reads the description of a picture in a file, without the pixels.
 ///
 /// # Errors
 /// [`Error::File`] as [`read`].

@@ -20,13 +20,16 @@ pub struct Border {
 
 /// The borders of all objects, in order of id, simplified as [`trace::polygons`] are.
 pub fn borders(labels: &Labels, tolerance_px: f64) -> Vec<Border> {
-    let border = |object: &crate::label::ObjectLabel| Border {
-        id: object.id,
-        class: object.class,
-        amodal: trace::polygons(&object.amodal_mask, tolerance_px),
-        visible: trace::polygons(&object.visible_mask, tolerance_px),
-    };
-    labels.objects.iter().map(border).collect()
+    labels
+        .objects
+        .iter()
+        .map(|object| Border {
+            id: object.id,
+            class: object.class,
+            amodal: trace::polygons(&object.amodal_mask, tolerance_px),
+            visible: trace::polygons(&object.visible_mask, tolerance_px),
+        })
+        .collect()
 }
 
 #[cfg(test)]

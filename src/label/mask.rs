@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// inside, and so on. In files: `{ size = [height, width], counts = "..." }`, COCO's compressed text. The default is the
 /// mask of a picture without pixels.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "rle::Text", into = "rle::Text")]
+#[serde(try_from = "rle::MaskText", into = "rle::MaskText")]
 pub struct RleMask {
     size: [u32; 2],
     runs: Vec<u32>,
@@ -57,7 +57,7 @@ impl RleMask {
 
     /// Number of pixels inside.
     pub fn area(&self) -> u64 {
-        self.inside().map(|(_, n)| n).sum()
+        self.inside().map(|(_, length)| length).sum()
     }
 
     /// No pixel is inside.
@@ -67,24 +67,9 @@ impl RleMask {
 
     /// The box around the pixels inside, whole pixels; empty for an empty mask.
     pub fn bounds(&self) -> BBox {
-        let h = u64::from(self.size[1]);
-        let around = |(start, n): (u64, u64)| {
-            let (first, last) = (start / h, (start + n - 1) / h);
-            // A run that turns into the next column touches the picture's lower and upper edge.
-            let rows = if first == last {
-                [start % h, (start + n - 1) % h + 1]
-            } else {
-                [0, h]
-            };
-            BBox {
-                x0: first as f64,
-                y0: rows[0] as f64,
-                x1: (last + 1) as f64,
-                y1: rows[1] as f64,
-            }
-        };
+        let height = u64::from(self.size[1]);
         self.inside()
-            .map(around)
+            .map(|(start, length)| bounds_of_run(start, start + length - 1, height))
             .reduce(BBox::hull)
             .unwrap_or_default()
     }
@@ -106,6 +91,23 @@ impl RleMask {
             (start, u64::from(n))
         });
         runs.skip(1).step_by(2)
+    }
+}
+
+/// The box around the pixels from one to another, counted down the columns.
+fn bounds_of_run(first: u64, last: u64, height: u64) -> BBox {
+    let [left, right] = [first, last].map(|i| i / height);
+    // A run that turns into the next column touches the picture's lower and upper edge.
+    let [top, bottom] = if left == right {
+        [first % height, last % height + 1]
+    } else {
+        [0, height]
+    };
+    BBox {
+        x0: left as f64,
+        y0: top as f64,
+        x1: (right + 1) as f64,
+        y1: bottom as f64,
     }
 }
 

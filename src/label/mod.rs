@@ -18,7 +18,7 @@ pub use border::{Border, borders};
 pub(crate) use gallery::clipped;
 pub use mask::RleMask;
 pub use overlay::overlay;
-pub use topmost::knotted;
+pub use topmost::cyclic_overlaps;
 pub use visibility::DepthRange;
 
 use crate::camera::Camera;
@@ -28,7 +28,7 @@ use crate::pixel::ObjectId;
 use crate::scene::{Card, Shot};
 use geo::MultiPolygon;
 use serde::{Deserialize, Serialize};
-use visibility::Seen;
+use visibility::ObjectVisibility;
 
 /// Everything known of the objects in one picture.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -120,7 +120,7 @@ pub fn outline_of(card: &Card, camera: &Camera) -> Vec<Vec<Point2<f64>>> {
 struct Silhouette<'a> {
     card: &'a Card,
     region: MultiPolygon<f64>,
-    seen: Seen,
+    visibility: ObjectVisibility,
 }
 
 /// Labels the picture `deep` of `shot`: every object with a box in the picture, in order of id.
@@ -134,53 +134,69 @@ pub fn label(deep: &DeepImage, shot: &Shot, options: &LabelOptions) -> Labels {
         (image[0] as usize, image[1] as usize),
         "deep picture and camera differ"
     );
+    let objects: Vec<_> = silhouettes(deep, shot, options)
+        .filter(|s| !s.amodal_box(options.amodal).is_empty())
+        .collect();
+    let occluders = topmost::occluders(&objects, &shot.camera, options.overlap_iou);
+    let labels = objects
+        .into_iter()
+        .zip(occluders)
+        .map(|(object, covered_by)| object.into_label(options.amodal, covered_by));
+    Labels {
+        image,
+        objects: labels.collect(),
+    }
+}
+
+/// All cards of a shot as its camera sees them, in order of id.
+fn silhouettes<'a>(
+    deep: &DeepImage,
+    shot: &'a Shot,
+    options: &LabelOptions,
+) -> impl Iterator<Item = Silhouette<'a>> {
     let mut cards: Vec<&Card> = shot.cards.iter().collect();
     cards.sort_by_key(|card| card.id);
     let ids: Vec<_> = cards.iter().map(|card| card.id).collect();
-    let seen = visibility::fold(deep, &ids, options);
-    let regions = cards.iter().map(|card| outline::region(card, &shot.camera));
-    let all = cards
-        .iter()
-        .zip(regions)
-        .zip(seen)
-        .map(|((&card, region), seen)| Silhouette { card, region, seen });
-    let touching: Vec<_> = all
-        .filter(|s| !s.amodal_box(options.amodal).is_empty())
-        .collect();
-    let covers = topmost::covers(&touching, &shot.camera, options.overlap_iou);
-    let objects = touching
+    let visibilities = visibility::fold_samples(deep, &ids, options);
+    cards
         .into_iter()
-        .zip(covers)
-        .map(|(s, covered_by)| s.into_label(options.amodal, covered_by));
-    Labels {
-        image,
-        objects: objects.collect(),
-    }
+        .zip(visibilities)
+        .map(|(card, visibility)| Silhouette {
+            card,
+            region: outline::region(card, &shot.camera),
+            visibility,
+        })
 }
 
 impl Silhouette<'_> {
     fn amodal_box(&self, around: AmodalBox) -> BBox {
         match around {
-            AmodalBox::Mask => self.seen.amodal.bounds(),
+            AmodalBox::Mask => self.visibility.amodal.bounds(),
             AmodalBox::Outline => outline::bounds(&self.region),
         }
     }
 
     fn into_label(self, amodal: AmodalBox, covered_by: Vec<ObjectId>) -> ObjectLabel {
-        let [visible, whole] =
-            [&self.seen.visible, &self.seen.amodal].map(|mask| mask.area() as f64);
+        let amodal_box = self.amodal_box(amodal);
+        let seen = self.visibility;
         ObjectLabel {
             id: self.card.id,
             class: self.card.class,
             outline_px: outline::rings(&self.region),
-            amodal_box: self.amodal_box(amodal),
-            visible_box: self.seen.visible.bounds(),
-            visible_fraction: self.seen.fraction,
-            visible_pixel_fraction: if whole > 0.0 { visible / whole } else { 0.0 },
-            amodal_mask: self.seen.amodal,
-            visible_mask: self.seen.visible,
-            depth: self.seen.depth,
+            amodal_box,
+            visible_box: seen.visible.bounds(),
+            visible_fraction: seen.fraction,
+            visible_pixel_fraction: area_fraction(&seen.visible, &seen.amodal),
+            amodal_mask: seen.amodal,
+            visible_mask: seen.visible,
+            depth: seen.depth,
             covered_by,
         }
     }
+}
+
+/// Pixels of a mask over those of another one; 0 where that is empty.
+fn area_fraction(part: &RleMask, whole: &RleMask) -> f64 {
+    let [part, whole] = [part, whole].map(|mask| mask.area() as f64);
+    if whole > 0.0 { part / whole } else { 0.0 }
 }

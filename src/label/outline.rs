@@ -14,11 +14,11 @@ use geo::bool_ops::FillRule;
 use geo::{Area, BooleanOps, BoundingRect, Coord, LineString, MapCoords, MultiPolygon, Polygon};
 
 /// Least distance from the camera that is projected, metres: closer than any lens focuses, far above rounding.
-const NEAR: f64 = 1e-4;
+const NEAR_PLANE_M: f64 = 1e-4;
 
 /// Parts of an outline smaller than this are rounding, square pixels: `geo` snaps to a grid of 2^-30 of the extent, which
 /// along the sides of a picture of 32,768 pixels makes slivers of a hundredth of this.
-const SLIVER_PX: f64 = 1e-2;
+const SLIVER_AREA_PX2: f64 = 1e-2;
 
 /// The part of the picture that lies inside a card's outline; empty where the card is out of sight or edge-on.
 pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
@@ -30,35 +30,38 @@ pub(crate) fn region(card: &Card, camera: &Camera) -> MultiPolygon<f64> {
     let outline = Polygon::new(LineString(px), Vec::new());
     let parts = outline.intersection_with_fill_rule(&picture(camera), FillRule::NonZero);
     let [w, h] = camera.image.map(f64::from);
-    let inside = |c: Coord<f64>| Coord {
-        x: c.x.clamp(0.0, w),
-        y: c.y.clamp(0.0, h),
-    };
-    parts
-        .into_iter()
-        .filter(|part| part.unsigned_area() > SLIVER_PX)
-        .map(|part| part.map_coords(inside))
+    without_slivers(parts)
+        .map(|part| {
+            part.map_coords(|c| Coord {
+                x: c.x.clamp(0.0, w),
+                y: c.y.clamp(0.0, h),
+            })
+        })
         .collect()
 }
 
 /// What two outlines share, slivers left out.
 pub(crate) fn overlap(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>) -> MultiPolygon<f64> {
-    a.intersection(b)
+    without_slivers(a.intersection(b)).collect()
+}
+
+fn without_slivers(region: MultiPolygon<f64>) -> impl Iterator<Item = Polygon<f64>> {
+    region
         .into_iter()
-        .filter(|part| part.unsigned_area() > SLIVER_PX)
-        .collect()
+        .filter(|part| part.unsigned_area() > SLIVER_AREA_PX2)
 }
 
 /// The outer rings of a region, each without a repeated last point.
 pub(crate) fn rings(region: &MultiPolygon<f64>) -> Vec<Vec<Point2<f64>>> {
-    let ring = |part: &Polygon<f64>| {
-        let coords = &part.exterior().0;
-        coords[..coords.len().saturating_sub(1)]
-            .iter()
-            .map(|c| Point2::new(c.x, c.y))
-            .collect()
-    };
-    region.iter().map(ring).collect()
+    region.iter().map(outer_ring).collect()
+}
+
+fn outer_ring(part: &Polygon<f64>) -> Vec<Point2<f64>> {
+    let coords = &part.exterior().0;
+    coords[..coords.len().saturating_sub(1)]
+        .iter()
+        .map(|c| Point2::new(c.x, c.y))
+        .collect()
 }
 
 /// The smallest box around a region.
@@ -73,14 +76,16 @@ pub(crate) fn bounds(region: &MultiPolygon<f64>) -> BBox {
 }
 
 fn in_camera(card: &Card, camera: &Camera) -> Vec<Vector3<f64>> {
-    let point = |uv: &Point2<f64>| (camera.camera_from_world * card.quad.point(uv.x, uv.y)).coords;
-    card.outline_uv.iter().map(point).collect()
+    card.outline_uv
+        .iter()
+        .map(|uv| (camera.camera_from_world * card.quad.point(uv.x, uv.y)).coords)
+        .collect()
 }
 
 fn clip_to_view(outline: Vec<Vector3<f64>>, camera: &Camera) -> Vec<Vector3<f64>> {
     let [w, h] = camera.image.map(f64::from);
     let (f, c) = (camera.focal_px, camera.principal_px);
-    let far_enough = clip(outline, |p| p.z - NEAR);
+    let far_enough = clip(outline, |p| p.z - NEAR_PLANE_M);
     let right_of_left = clip(far_enough, |p| f.x * p.x + c.x * p.z);
     let left_of_right = clip(right_of_left, |p| (w - c.x) * p.z - f.x * p.x);
     let below_top = clip(left_of_right, |p| f.y * p.y + c.y * p.z);

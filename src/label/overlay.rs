@@ -19,11 +19,8 @@ pub fn overlay(frame: &Image<PremulRgba>, labels: &Labels, classes: &[String]) -
     draw_labels(&mut canvas, labels, ObjectLabel::is_topmost);
     for object in labels.objects.iter().filter(|o| o.is_topmost()) {
         let name = classes.get(object.class as usize).cloned();
-        tag(
-            &mut canvas,
-            object,
-            &name.unwrap_or_else(|| object.class.to_string()),
-        );
+        let name = name.unwrap_or_else(|| object.class.to_string());
+        draw_tag(&mut canvas, object, &name);
     }
     canvas
 }
@@ -34,33 +31,30 @@ pub(crate) fn draw_labels(
     labels: &Labels,
     boxed: impl Fn(&ObjectLabel) -> bool,
 ) {
-    let [kx, ky] = [
-        canvas.width() as f64 / f64::from(labels.image[0].max(1)),
-        canvas.height() as f64 / f64::from(labels.image[1].max(1)),
-    ];
-    for ring in labels
-        .objects
-        .iter()
-        .filter(|o| !boxed(o))
-        .flat_map(|o| &o.outline_px)
-    {
-        let ring: Vec<_> = ring.iter().map(|p| [p.x * kx, p.y * ky].into()).collect();
+    let scale_x = canvas.width() as f64 / f64::from(labels.image[0].max(1));
+    let scale_y = canvas.height() as f64 / f64::from(labels.image[1].max(1));
+    let (boxed, outlined): (Vec<_>, Vec<_>) = labels.objects.iter().partition(|o| boxed(o));
+    for ring in outlined.into_iter().flat_map(|o| &o.outline_px) {
+        let ring: Vec<_> = ring
+            .iter()
+            .map(|p| [p.x * scale_x, p.y * scale_y].into())
+            .collect();
         draw::outline(canvas, &ring, UNLABELLED);
     }
-    for object in labels.objects.iter().filter(|o| boxed(o)) {
+    for object in boxed {
         let b = object.amodal_box;
         let b = BBox {
-            x0: b.x0 * kx,
-            y0: b.y0 * ky,
-            x1: b.x1 * kx,
-            y1: b.y1 * ky,
+            x0: b.x0 * scale_x,
+            y0: b.y0 * scale_y,
+            x1: b.x1 * scale_x,
+            y1: b.y1 * scale_y,
         };
         draw::border(canvas, &b, draw::class_color(object.class), 1);
     }
 }
 
 /// A name on the box's upper edge; below the edge where there is no room above it.
-fn tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
+fn draw_tag(canvas: &mut Image<Srgb8>, object: &ObjectLabel, name: &str) {
     let size = TextSize::Small;
     let [w, h] = [size.width(name) + 6, size.height()];
     let (left, top) = (object.amodal_box.x0 as isize, object.amodal_box.y0 as isize);

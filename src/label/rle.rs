@@ -11,27 +11,27 @@ use crate::label::RleMask;
 use serde::{Deserialize, Serialize};
 
 /// Code of the character for the group 0.
-const ZERO: u8 = b'0';
+const GROUP_ZERO: u8 = b'0';
 
 /// Bits in a group.
-const GROUP: u32 = 5;
+const GROUP_BITS: u32 = 5;
 
 /// Set in a group that another follows.
-const MORE: u8 = 1 << GROUP;
+const MORE_FLAG: u8 = 1 << GROUP_BITS;
 
 /// Set in a last group of a negative number.
-const SIGN: u8 = 1 << (GROUP - 1);
+const SIGN_FLAG: u8 = 1 << (GROUP_BITS - 1);
 
 /// A mask in a file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Text {
+pub(crate) struct MaskText {
     /// Height and width: COCO's order.
     size: [u32; 2],
     counts: String,
 }
 
-impl From<RleMask> for Text {
+impl From<RleMask> for MaskText {
     fn from(mask: RleMask) -> Self {
         let [w, h] = mask.size();
         Self {
@@ -41,10 +41,10 @@ impl From<RleMask> for Text {
     }
 }
 
-impl TryFrom<Text> for RleMask {
+impl TryFrom<MaskText> for RleMask {
     type Error = String;
 
-    fn try_from(text: Text) -> Result<Self, String> {
+    fn try_from(text: MaskText) -> Result<Self, String> {
         let [h, w] = text.size;
         if w.max(h) > LONGEST_SIDE_PX || u64::from(w) * u64::from(h) > MOST_PIXELS {
             return Err(format!(
@@ -63,18 +63,18 @@ pub(crate) fn encode(runs: &[u32]) -> String {
     let mut text = String::new();
     for (i, &run) in runs.iter().enumerate() {
         let before = if i > 2 { runs[i - 2] } else { 0 };
-        push(&mut text, i64::from(run) - i64::from(before));
+        push_number(&mut text, i64::from(run) - i64::from(before));
     }
     text
 }
 
-fn push(text: &mut String, mut number: i64) {
+fn push_number(text: &mut String, mut number: i64) {
     loop {
-        let group = (number as u8) & (MORE - 1);
-        number >>= GROUP;
-        let is_last = number == if group & SIGN == 0 { 0 } else { -1 };
+        let group = (number as u8) & (MORE_FLAG - 1);
+        number >>= GROUP_BITS;
+        let is_last = number == if group & SIGN_FLAG == 0 { 0 } else { -1 };
         text.push(char::from(
-            ZERO + if is_last { group } else { group | MORE },
+            GROUP_ZERO + if is_last { group } else { group | MORE_FLAG },
         ));
         if is_last {
             return;
@@ -87,7 +87,7 @@ pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
     let mut runs: Vec<u32> = Vec::new();
     let mut bytes = text.bytes();
     while let Some(first) = bytes.next() {
-        let number = pull(first, &mut bytes)?;
+        let number = pull_number(first, &mut bytes)?;
         let before = if runs.len() > 2 {
             runs[runs.len() - 2]
         } else {
@@ -98,21 +98,23 @@ pub(crate) fn decode(text: &str) -> Option<Vec<u32>> {
     Some(runs)
 }
 
-fn pull(first: u8, rest: &mut impl Iterator<Item = u8>) -> Option<i64> {
+fn pull_number(first: u8, rest: &mut impl Iterator<Item = u8>) -> Option<i64> {
     let (mut number, mut shift, mut byte) = (0, 0, first);
     loop {
-        let group = byte.checked_sub(ZERO).filter(|&group| group < 2 * MORE)?;
-        number |= i64::from(group & (MORE - 1)) << shift;
-        shift += GROUP;
-        if group & MORE == 0 {
-            return Some(if group & SIGN == 0 {
+        let group = byte
+            .checked_sub(GROUP_ZERO)
+            .filter(|&group| group < 2 * MORE_FLAG)?;
+        number |= i64::from(group & (MORE_FLAG - 1)) << shift;
+        shift += GROUP_BITS;
+        if group & MORE_FLAG == 0 {
+            return Some(if group & SIGN_FLAG == 0 {
                 number
             } else {
                 number | -1 << shift
             });
         }
         // A difference of two runs has 33 bits: seven groups.
-        byte = rest.next().filter(|_| shift < 7 * GROUP)?;
+        byte = rest.next().filter(|_| shift < 7 * GROUP_BITS)?;
     }
 }
 

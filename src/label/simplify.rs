@@ -7,7 +7,8 @@
 //! the new one than the tolerance. A corner stays while the triangle of it and its two neighbours holds another corner,
 //! its sides included, or its ring has three corners left. A line that crossed the new one would have to end in that
 //! triangle or cross one of the two lines that it replaces: so rings that did not cross never do, none turns over, none vanishes,
-//! and what lies in a hole stays there. (`geo` simplifies one polygon of several at a time, and by area.)
+//! and what lies in a hole stays there. (`docs/design.md` says what `geo`, which simplifies one polygon at a time, makes of the
+//! same rings.)
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -20,117 +21,175 @@ pub(super) fn simplified(rings: Vec<Ring>, tolerance_px: f64) -> Vec<Ring> {
     if tolerance_px <= 0.0 {
         return rings;
     }
-    let mut border = Border::of(&rings);
-    // A cost is not negative, and then its bits are in its order; what costs the same goes in the order of the border.
-    let mut open: BinaryHeap<_> = (0..border.corners.len())
-        .map(|at| Reverse((border.cost(at).to_bits(), at)))
+    let mut corners = CornerLinks::new(&rings);
+    // What costs the same goes in the order of the rings.
+    let mut open: BinaryHeap<_> = (0..corners.positions.len())
+        .map(|at| Reverse(corners.candidate(at)))
         .collect();
-    while let Some(Reverse((cost, at))) = open.pop() {
-        let is_old = !border.kept[at] || border.cost(at).to_bits() != cost;
-        if is_old || f64::from_bits(cost) > tolerance_px || !border.may_drop(at) {
+    while let Some(Reverse(candidate)) = open.pop() {
+        let at = candidate.corner;
+        let is_outdated = !corners.kept[at] || corners.candidate(at) != candidate;
+        if is_outdated || candidate.cost() > tolerance_px || !corners.may_drop(at) {
             continue;
         }
-        let beside = border.drop(at);
-        open.extend(beside.map(|at| Reverse((border.cost(at).to_bits(), at))));
+        let neighbours = corners.drop(at);
+        open.extend(neighbours.map(|at| Reverse(corners.candidate(at))));
     }
-    border.rings()
+    corners.rings()
+}
+
+/// A corner and what dropping it costs, cheapest first.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Candidate {
+    /// A cost is not negative, and then its bits are in its order.
+    cost_bits: u64,
+    corner: usize,
+}
+
+impl Candidate {
+    fn cost(self) -> f64 {
+        f64::from_bits(self.cost_bits)
+    }
 }
 
 /// All corners of all rings, and which are left.
-struct Border {
-    corners: Ring,
+struct CornerLinks {
+    positions: Ring,
     kept: Vec<bool>,
     /// The corners before and after each, of those that are left.
     before: Vec<usize>,
     after: Vec<usize>,
-    /// First corner of each corner's ring, and of each ring how many it had; at the first corner, how many are left.
-    first: Vec<usize>,
-    length: Vec<usize>,
-    left: Vec<usize>,
+    /// The ring of each corner.
+    ring_of: Vec<usize>,
+    rings: Vec<RingSpan>,
     /// Corners by the row that they are in.
     rows: Vec<Vec<usize>>,
 }
 
-impl Border {
-    fn of(rings: &[Ring]) -> Self {
-        let corners = rings.concat();
-        let count = corners.len();
-        let bottom = corners.iter().map(|c| c[1] as usize).max().unwrap_or(0);
-        let mut rows = vec![Vec::new(); bottom + 1];
-        corners
-            .iter()
-            .enumerate()
-            .for_each(|(i, c)| rows[c[1] as usize].push(i));
-        let (mut before, mut after, mut first, mut length) = (vec![], vec![], vec![], vec![]);
+/// The corners of a ring: where they begin, how many there were, and how many are left.
+struct RingSpan {
+    first: usize,
+    length: usize,
+    left: usize,
+}
+
+impl RingSpan {
+    /// The corner after another one, of all that there were.
+    fn follower(&self, at: usize) -> usize {
+        self.first + (at + 1 - self.first) % self.length
+    }
+
+    fn leader(&self, at: usize) -> usize {
+        self.first + (at + self.length - 1 - self.first) % self.length
+    }
+}
+
+impl CornerLinks {
+    fn new(rings: &[Ring]) -> Self {
+        let positions = rings.concat();
+        let mut links = Self {
+            kept: vec![true; positions.len()],
+            before: Vec::with_capacity(positions.len()),
+            after: Vec::with_capacity(positions.len()),
+            ring_of: Vec::with_capacity(positions.len()),
+            rings: Vec::with_capacity(rings.len()),
+            rows: by_row(&positions),
+            positions,
+        };
         for ring in rings {
-            let (start, n) = (first.len(), ring.len());
-            before.extend((0..n).map(|i| start + (i + n - 1) % n));
-            after.extend((0..n).map(|i| start + (i + 1) % n));
-            first.extend(std::iter::repeat_n(start, n));
-            length.extend(std::iter::repeat_n(n, n));
+            links.append(ring.len());
         }
-        Self {
-            corners,
-            kept: vec![true; count],
-            before,
-            after,
+        links
+    }
+
+    /// Links the corners of the next ring.
+    fn append(&mut self, length: usize) {
+        let first = self.ring_of.len();
+        let span = RingSpan {
             first,
-            left: length.clone(),
             length,
-            rows,
+            left: length,
+        };
+        for at in first..first + length {
+            self.before.push(span.leader(at));
+            self.after.push(span.follower(at));
+            self.ring_of.push(self.rings.len());
+        }
+        self.rings.push(span);
+    }
+
+    fn candidate(&self, corner: usize) -> Candidate {
+        Candidate {
+            cost_bits: self.cost(corner).to_bits(),
+            corner,
         }
     }
 
-    /// The farthest corner of the first border, between the neighbours of a corner, from the line between those.
+    /// The farthest corner that there was, between the neighbours of a corner, from the line between those.
     fn cost(&self, at: usize) -> f64 {
         let (a, b) = (self.before[at], self.after[at]);
-        let (first, length) = (self.first[at], self.length[at]);
-        let follower = |i: &usize| Some(first + (i + 1 - first) % length);
-        let between = std::iter::successors(follower(&a), follower).take_while(|i| *i != b);
-        between
-            .map(|i| distance(self.corners[i], [self.corners[a], self.corners[b]]))
-            .fold(0.0, f64::max)
+        let line = [self.positions[a], self.positions[b]];
+        let ring = &self.rings[self.ring_of[at]];
+        let (mut passed, mut farthest) = (ring.follower(a), 0.0);
+        while passed != b {
+            farthest = f64::max(farthest, distance(self.positions[passed], line));
+            passed = ring.follower(passed);
+        }
+        farthest
     }
 
     /// Whether the line between its neighbours crosses nothing.
     fn may_drop(&self, at: usize) -> bool {
+        if self.rings[self.ring_of[at]].left <= 3 {
+            return false;
+        }
         let own = [self.before[at], at, self.after[at]];
-        let triangle = own.map(|i| self.corners[i]);
-        let span = |axis: usize| {
-            triangle
-                .iter()
-                .fold([f64::INFINITY, 0.0_f64], |[low, high], c| {
-                    [low.min(c[axis]), high.max(c[axis])]
-                })
-        };
-        let [[left, right], [top, bottom]] = [span(0), span(1)];
-        let near = self.rows[top as usize..=bottom as usize].iter().flatten();
-        let mut near = near.filter(|i| (left..=right).contains(&self.corners[**i][0]));
-        self.left[self.first[at]] > 3
-            && near.all(|i| !self.kept[*i] || own.contains(i) || !holds(triangle, self.corners[*i]))
+        let triangle = own.map(|i| self.positions[i]);
+        let [left, right] = extent(triangle.map(|c| c[0]));
+        let [top, bottom] = extent(triangle.map(|c| c[1]));
+        let in_rows = self.rows[top as usize..=bottom as usize].iter().flatten();
+        !in_rows
+            .filter(|i| (left..=right).contains(&self.positions[**i][0]))
+            .any(|i| self.kept[*i] && !own.contains(i) && holds(triangle, self.positions[*i]))
     }
 
-    /// Drops a corner and tells those beside it.
+    /// Drops a corner and returns those beside it.
     fn drop(&mut self, at: usize) -> [usize; 2] {
         let (a, b) = (self.before[at], self.after[at]);
         (self.after[a], self.before[b], self.kept[at]) = (b, a, false);
-        self.left[self.first[at]] -= 1;
+        self.rings[self.ring_of[at]].left -= 1;
         [a, b]
     }
 
     fn rings(&self) -> Vec<Ring> {
-        let starts = (0..self.corners.len()).filter(|i| self.first[*i] == *i);
-        let ring = |start: usize| {
-            (start..start + self.length[start])
+        let kept = |ring: &RingSpan| {
+            (ring.first..ring.first + ring.length)
                 .filter(|i| self.kept[*i])
-                .map(|i| self.corners[i])
+                .map(|i| self.positions[i])
                 .collect()
         };
-        starts.map(ring).collect()
+        self.rings.iter().map(kept).collect()
     }
 }
 
-/// Twice the signed area of a triangle: exact for whole numbers.
+fn by_row(positions: &[[f64; 2]]) -> Vec<Vec<usize>> {
+    let bottom = positions.iter().map(|c| c[1] as usize).max().unwrap_or(0);
+    let mut rows = vec![Vec::new(); bottom + 1];
+    for (i, position) in positions.iter().enumerate() {
+        rows[position[1] as usize].push(i);
+    }
+    rows
+}
+
+/// Least and greatest of coordinates of at least 0.
+fn extent(values: [f64; 3]) -> [f64; 2] {
+    [
+        values.into_iter().fold(f64::INFINITY, f64::min),
+        values.into_iter().fold(0.0, f64::max),
+    ]
+}
+
+/// Twice the signed area of a triangle: exact for integers.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }

@@ -20,36 +20,39 @@ use std::collections::BTreeSet;
 ///
 /// Two objects are a pair when the intersection over union of their outlines is above `iou`. Of two cards at exactly the
 /// same depth, the one given first lies over the other.
-pub(crate) fn covers(objects: &[Silhouette<'_>], camera: &Camera, iou: f64) -> Vec<Vec<ObjectId>> {
+pub(crate) fn occluders(
+    objects: &[Silhouette<'_>],
+    camera: &Camera,
+    iou: f64,
+) -> Vec<Vec<ObjectId>> {
     let boxes: Vec<_> = objects.iter().map(|o| bounds(&o.region)).collect();
-    let mut over = vec![Vec::new(); objects.len()];
+    let mut occluders = vec![Vec::new(); objects.len()];
     for j in 0..objects.len() {
-        for i in 0..j {
-            if !boxes[i].overlaps(&boxes[j]) {
+        for i in (0..j).filter(|i| boxes[*i].overlaps(&boxes[j])) {
+            let (first, second) = (&objects[i], &objects[j]);
+            let Some(center) = overlap_center(&first.region, &second.region, iou) else {
                 continue;
-            }
-            if let Some(center) = meeting(&objects[i].region, &objects[j].region, iou) {
-                let near = |k: usize| nearness(objects[k].card, camera, center);
-                let first_is_nearer = near(i) >= near(j);
-                let (above, below) = if first_is_nearer { (i, j) } else { (j, i) };
-                over[below].push(objects[above].card.id);
-            }
+            };
+            let first_is_nearer = inverse_depth(first.card, camera, center)
+                >= inverse_depth(second.card, camera, center);
+            let (above, below) = if first_is_nearer { (i, j) } else { (j, i) };
+            occluders[below].push(objects[above].card.id);
         }
     }
-    over
+    occluders
 }
 
-/// The objects that lie in a knot: each lies, through others, over itself (A over B over C over A).
-pub fn knotted(objects: &[ObjectLabel]) -> Vec<ObjectId> {
+/// The objects of cyclic overlaps: each lies, through others, over itself (A over B over C over A).
+pub fn cyclic_overlaps(objects: &[ObjectLabel]) -> Vec<ObjectId> {
     objects
         .iter()
         .map(|o| o.id)
-        .filter(|&id| above(objects, id).contains(&id))
+        .filter(|&id| all_above(objects, id).contains(&id))
         .collect()
 }
 
 /// All that lies over an object, directly or through others.
-fn above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
+fn all_above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
     let mut found = BTreeSet::new();
     let mut next = vec![id];
     while let Some(below) = next.pop() {
@@ -64,7 +67,7 @@ fn above(objects: &[ObjectLabel], id: ObjectId) -> BTreeSet<ObjectId> {
 }
 
 /// Centroid of the overlap of a pair; none where they are no pair.
-fn meeting(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>, iou: f64) -> Option<Point2<f64>> {
+fn overlap_center(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>, iou: f64) -> Option<Point2<f64>> {
     let shared = overlap(a, b);
     let area = shared.unsigned_area();
     let union = a.unsigned_area() + b.unsigned_area() - area;
@@ -73,7 +76,7 @@ fn meeting(a: &MultiPolygon<f64>, b: &MultiPolygon<f64>, iou: f64) -> Option<Poi
 }
 
 /// Inverse depth of a card's plane at a pixel position, 1/metres; larger is nearer.
-fn nearness(card: &Card, camera: &Camera, px: Point2<f64>) -> f64 {
+fn inverse_depth(card: &Card, camera: &Camera, px: Point2<f64>) -> f64 {
     let plane = card.quad.plane();
     let ray = camera.ray(px);
     let distance = plane.offset - plane.normal.dot(&ray.origin.coords);
@@ -97,11 +100,11 @@ mod tests {
     fn what_lies_between_two_circles_is_in_none() {
         // 1 over 2 over 3 over 1; 4 under that circle; 5 over 6 over 5 under 4.
         let all = objects(&[&[3], &[1], &[2], &[1], &[4, 6], &[5]]);
-        assert_eq!(knotted(&all), [1, 2, 3, 5, 6].map(ObjectId));
+        assert_eq!(cyclic_overlaps(&all), [1, 2, 3, 5, 6].map(ObjectId));
     }
 
     #[test]
     fn a_stack_has_no_knot_even_if_an_object_above_is_not_in_the_picture() {
-        assert!(knotted(&objects(&[&[2, 3], &[3, 99], &[]])).is_empty());
+        assert!(cyclic_overlaps(&objects(&[&[2, 3], &[3, 99], &[]])).is_empty());
     }
 }

@@ -29,7 +29,7 @@ pub fn polygons(mask: &RleMask, tolerance_px: f64) -> Vec<Vec<Point2<f64>>> {
 pub fn polygon(mask: &RleMask, tolerance_px: f64) -> Vec<Point2<f64>> {
     let mut parts = parts(mask, tolerance_px).into_iter();
     let first = parts.next().unwrap_or_default();
-    points(parts.fold(first, join))
+    points(parts.fold(first, join_part))
 }
 
 fn points(ring: Ring) -> Vec<Point2<f64>> {
@@ -38,10 +38,13 @@ fn points(ring: Ring) -> Vec<Point2<f64>> {
 
 fn parts(mask: &RleMask, tolerance_px: f64) -> Vec<Ring> {
     let rings = simplified(Grid::new(mask).rings(), tolerance_px);
-    let (mut parts, mut holes): (Vec<_>, Vec<_>) = rings.into_iter().partition(|r| area2(r) > 0.0);
+    let (mut parts, mut holes): (Vec<_>, Vec<_>) =
+        rings.into_iter().partition(|r| doubled_area(r) > 0.0);
     // What lies left of a hole is then joined before it.
-    holes.sort_by(|a, b| in_order(&leftmost(a).1, &leftmost(b).1));
-    holes.into_iter().for_each(|hole| cut_to(&mut parts, hole));
+    holes.sort_by(|a, b| left_to_right(&leftmost(a).1, &leftmost(b).1));
+    for hole in holes {
+        join_hole(&mut parts, hole);
+    }
     parts
 }
 
@@ -68,21 +71,25 @@ impl Grid {
             leaving: vec![0; (columns * rows) as usize],
         };
         for (x, y) in mask.pixels() {
-            let (x, y) = (i64::from(x), i64::from(y));
-            [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]]
-                .into_iter()
-                .zip(0..4)
-                .for_each(|(at, d)| grid.meet(at, d));
+            grid.add_pixel(i64::from(x), i64::from(y));
         }
         grid
     }
 
-    /// A side of a pixel, leaving `at` in direction `d`: border, unless the pixel beyond it has taken the way back.
-    fn meet(&mut self, at: [i64; 2], d: usize) {
+    /// The four sides of a pixel, clockwise.
+    fn add_pixel(&mut self, x: i64, y: i64) {
+        let corners = [[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1]];
+        for (direction, corner) in corners.into_iter().enumerate() {
+            self.add_side(corner, direction);
+        }
+    }
+
+    /// A side of a pixel, leaving `at` in direction `d`: border, unless the pixel beyond it has taken the opposite side.
+    fn add_side(&mut self, at: [i64; 2], d: usize) {
         let end = self.index(step(at, d));
-        let back = 1 << ((d + 2) % 4);
-        if self.leaving[end] & back != 0 {
-            self.leaving[end] &= !back;
+        let opposite = 1 << ((d + 2) % 4);
+        if self.leaving[end] & opposite != 0 {
+            self.leaving[end] &= !opposite;
         } else {
             let start = self.index(at);
             self.leaving[start] |= 1 << d;
@@ -118,20 +125,21 @@ impl Grid {
             self.leaving[here] &= !(1 << d);
             (at, came) = (step(at, d), d);
             // Another ring may pass through the same corner: this one comes back from below, to turn right.
-            let leaving = if at == start && d == 3 {
-                0
-            } else {
-                self.leaving[self.index(at)]
-            };
-            match [1, 0, 3]
-                .map(|turn| (d + turn) % 4)
-                .into_iter()
-                .find(|&d| leaving & 1 << d != 0)
-            {
+            let is_closed = at == start && d == 3;
+            match self.next_direction(at, d).filter(|_| !is_closed) {
                 Some(next) => d = next,
                 None => return ring,
             }
         }
+    }
+
+    /// Where the border goes on from a corner that it came to in direction `d`: right, straight on or left.
+    fn next_direction(&self, at: [i64; 2], d: usize) -> Option<usize> {
+        let leaving = self.leaving[self.index(at)];
+        [1, 0, 3]
+            .map(|turn| (d + turn) % 4)
+            .into_iter()
+            .find(|d| leaving & 1 << d != 0)
     }
 }
 
@@ -140,7 +148,7 @@ fn step([x, y]: [i64; 2], d: usize) -> [i64; 2] {
 }
 
 /// Twice the area; negative for a hole.
-fn area2(ring: &Ring) -> f64 {
+fn doubled_area(ring: &Ring) -> f64 {
     ring.iter()
         .zip(ring.iter().cycle().skip(1))
         .map(|(a, b)| a[0] * b[1] - b[0] * a[1])
@@ -148,7 +156,7 @@ fn area2(ring: &Ring) -> f64 {
 }
 
 /// From left to right, then from above.
-fn in_order(a: &[f64; 2], b: &[f64; 2]) -> std::cmp::Ordering {
+fn left_to_right(a: &[f64; 2], b: &[f64; 2]) -> std::cmp::Ordering {
     a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
 }
 
@@ -157,51 +165,69 @@ fn leftmost(ring: &Ring) -> (usize, [f64; 2]) {
     ring.iter()
         .copied()
         .enumerate()
-        .min_by(|a, b| in_order(&a.1, &b.1))
+        .min_by(|a, b| left_to_right(&a.1, &b.1))
         .unwrap_or_default()
 }
 
 /// Joins a hole to the ring whose border is next to its left.
-fn cut_to(parts: &mut [Ring], hole: Ring) {
-    let (first, [x, y]) = leftmost(&hole);
-    let mut nearest: Option<(f64, usize, usize)> = None;
-    for (p, part) in parts.iter().enumerate() {
-        for (i, (a, b)) in part.iter().zip(part.iter().cycle().skip(1)).enumerate() {
+fn join_hole(parts: &mut [Ring], hole: Ring) {
+    let (first, leftmost) = leftmost(&hole);
+    let Some(border) = next_border_to_the_left(parts, leftmost) else {
+        return;
+    };
+    let from = [border.x, leftmost[1]];
+    let around = hole.iter().cycle().skip(first).take(hole.len() + 1);
+    let slit: Ring = std::iter::once(from)
+        .chain(around.copied())
+        .chain([from])
+        .collect();
+    let part = &mut parts[border.part];
+    part.splice(border.corner + 1..border.corner + 1, slit);
+    part.dedup();
+}
+
+/// Where the row through a point meets an edge that has the inside to its right.
+struct BorderCrossing {
+    x: f64,
+    part: usize,
+    /// The corner that the edge begins at.
+    corner: usize,
+}
+
+fn next_border_to_the_left(parts: &[Ring], [x, y]: [f64; 2]) -> Option<BorderCrossing> {
+    let mut nearest: Option<BorderCrossing> = None;
+    for (part, ring) in parts.iter().enumerate() {
+        for (corner, (a, b)) in ring.iter().zip(ring.iter().cycle().skip(1)).enumerate() {
             // Edges that go up have the inside to their right.
             let goes_up = b[1] <= y && y < a[1];
-            let across = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
-            if goes_up && across < x && nearest.is_none_or(|(at, ..)| at < across) {
-                nearest = Some((across, p, i));
+            let crossing = a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
+            if goes_up && crossing < x && nearest.as_ref().is_none_or(|n| n.x < crossing) {
+                nearest = Some(BorderCrossing {
+                    x: crossing,
+                    part,
+                    corner,
+                });
             }
         }
     }
-    if let Some((at, p, i)) = nearest {
-        let around = hole
-            .iter()
-            .cycle()
-            .skip(first)
-            .take(hole.len() + 1)
-            .copied();
-        let slit: Ring = std::iter::once([at, y])
-            .chain(around)
-            .chain([[at, y]])
-            .collect();
-        parts[p].splice(i + 1..i + 1, slit);
-        parts[p].dedup();
-    }
+    nearest
 }
 
 /// Joins a part to the corner that is nearest to its first.
-fn join(mut whole: Ring, part: Ring) -> Ring {
+fn join_part(mut whole: Ring, part: Ring) -> Ring {
     let Some(&first) = part.first() else {
         return whole;
     };
-    let distance = |i: usize| (whole[i][0] - first[0]).powi(2) + (whole[i][1] - first[1]).powi(2);
-    if let Some(i) = (0..whole.len()).min_by(|&i, &k| distance(i).total_cmp(&distance(k))) {
+    if let Some(i) = nearest_corner(&whole, first) {
         let slit: Ring = part.iter().copied().chain([first, whole[i]]).collect();
         whole.splice(i + 1..i + 1, slit);
     }
     whole
+}
+
+fn nearest_corner(ring: &Ring, [x, y]: [f64; 2]) -> Option<usize> {
+    let distance2 = |corner: &[f64; 2]| (corner[0] - x).powi(2) + (corner[1] - y).powi(2);
+    (0..ring.len()).min_by(|&i, &k| distance2(&ring[i]).total_cmp(&distance2(&ring[k])))
 }
 
 #[cfg(test)]
@@ -280,14 +306,14 @@ mod tests {
             let fewer = simplified(rings.clone(), tolerance);
             prop_assert_eq!(rings.len(), fewer.len());
             for (ring, fewer) in rings.iter().zip(&fewer) {
-                prop_assert!(fewer.len() >= 3 && area2(ring) * area2(fewer) > 0.0);
+                prop_assert!(fewer.len() >= 3 && doubled_area(ring) * doubled_area(fewer) > 0.0);
                 let off = |p: &[f64; 2]| sides(fewer).into_iter().map(|s| distance(*p, s)).fold(f64::INFINITY, f64::min);
                 prop_assert!(ring.iter().all(|p| off(p) <= tolerance + 1e-9));
             }
             let all: Vec<_> = fewer.iter().flat_map(sides).collect();
             prop_assert!(all.iter().enumerate().all(|(i, a)| all[..i].iter().all(|b| !cross(*a, *b))));
             let whole = polygon(&mask, tolerance);
-            let sum: f64 = fewer.iter().map(area2).sum();
+            let sum: f64 = fewer.iter().map(doubled_area).sum();
             prop_assert!((2.0 * area(&whole) - sum).abs() < 1e-9, "slits have no area");
             let parts = polygons(&mask, tolerance);
             for (x, y) in (0..12).flat_map(|x| (0..9).map(move |y| (x, y))) {

@@ -7,9 +7,9 @@ use crate::pixel::ObjectId;
 use crate::work::{self, Kind};
 use serde::{Deserialize, Serialize};
 
-/// What the deep samples tell of one object.
+/// What the deep samples say of one object.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct ObjectVisibility {
     /// The pixels that the object covers, as if alone.
     pub(crate) amodal: RleMask,
     /// The pixels in which it is seen.
@@ -32,22 +32,26 @@ pub struct DepthRange {
 }
 
 /// Sums and masks of one object while the fold runs.
-struct Tally {
+struct VisibilityTally {
     amodal: Bits,
     visible: Bits,
     /// Coverage, the seen part of it, and coverage times depth, summed over pixels.
-    sums: [f64; 3],
+    alpha: f64,
+    visible_alpha: f64,
+    alpha_depth: f64,
     near: f64,
     far: f64,
 }
 
-impl Tally {
+impl VisibilityTally {
     fn new(size: [u32; 2]) -> Self {
         let none = Bits::new(size);
         Self {
             amodal: none.clone(),
             visible: none,
-            sums: [0.0; 3],
+            alpha: 0.0,
+            visible_alpha: 0.0,
+            alpha_depth: 0.0,
             near: f64::INFINITY,
             far: 0.0,
         }
@@ -56,9 +60,9 @@ impl Tally {
     #[inline]
     fn add(&mut self, x: usize, y: usize, sample: &DeepSample, threshold: f32) {
         let (alpha, depth) = (f64::from(sample.alpha), f64::from(sample.depth.0));
-        self.sums[0] += alpha;
-        self.sums[1] += f64::from(sample.visible);
-        self.sums[2] += alpha * depth;
+        self.alpha += alpha;
+        self.visible_alpha += f64::from(sample.visible);
+        self.alpha_depth += alpha * depth;
         self.near = self.near.min(depth);
         self.far = self.far.max(depth);
         if sample.alpha > threshold {
@@ -69,26 +73,23 @@ impl Tally {
         }
     }
 
-    fn seen(self) -> Seen {
-        let [alpha, visible, depth] = self.sums;
-        let (amodal, seen) = (self.amodal.mask(), self.visible.mask());
-        if alpha <= 0.0 {
-            return Seen {
-                amodal,
-                visible: seen,
-                ..Seen::default()
-            };
-        }
-        let depth = DepthRange {
-            near: self.near,
-            mean: depth / alpha,
-            far: self.far,
+    fn finish(self) -> ObjectVisibility {
+        let masks = ObjectVisibility {
+            amodal: self.amodal.mask(),
+            visible: self.visible.mask(),
+            ..ObjectVisibility::default()
         };
-        Seen {
-            amodal,
-            visible: seen,
-            fraction: (visible / alpha).clamp(0.0, 1.0),
-            depth,
+        if self.alpha <= 0.0 {
+            return masks;
+        }
+        ObjectVisibility {
+            fraction: (self.visible_alpha / self.alpha).clamp(0.0, 1.0),
+            depth: DepthRange {
+                near: self.near,
+                mean: self.alpha_depth / self.alpha,
+                far: self.far,
+            },
+            ..masks
         }
     }
 }
@@ -96,13 +97,17 @@ impl Tally {
 /// Folds the samples of each object of `ids`, which are in ascending order; one entry per id.
 ///
 /// Sums run in `f64`, row by row, so they are the same at any thread count.
-pub(crate) fn fold(deep: &DeepImage, ids: &[ObjectId], options: &LabelOptions) -> Vec<Seen> {
+pub(crate) fn fold_samples(
+    deep: &DeepImage,
+    ids: &[ObjectId],
+    options: &LabelOptions,
+) -> Vec<ObjectVisibility> {
     let size = [deep.width() as u32, deep.height() as u32];
-    let mut tallies: Vec<_> = ids.iter().map(|_| Tally::new(size)).collect();
-    let mut looked_at = 0;
+    let mut tallies: Vec<_> = ids.iter().map(|_| VisibilityTally::new(size)).collect();
+    let mut sample_count = 0;
     for y in 0..deep.height() {
         for x in 0..deep.width() {
-            looked_at += deep.at(x, y).len();
+            sample_count += deep.at(x, y).len();
             for sample in deep.at(x, y) {
                 let Ok(i) = ids.binary_search(&sample.object) else {
                     continue;
@@ -112,8 +117,8 @@ pub(crate) fn fold(deep: &DeepImage, ids: &[ObjectId], options: &LabelOptions) -
         }
     }
     work::add_all([
-        (Kind::LabelSamples, looked_at as u64),
+        (Kind::LabelSamples, sample_count as u64),
         (Kind::Masks, 2 * ids.len() as u64),
     ]);
-    tallies.into_iter().map(Tally::seen).collect()
+    tallies.into_iter().map(VisibilityTally::finish).collect()
 }

@@ -100,6 +100,8 @@ mod tests {
             exposure,
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

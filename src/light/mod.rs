@@ -1,8 +1,28 @@
 //! Light: area lights, ambient, and the exposure that makes rendered light match a plate.
 //!
-//! A light is asked three things: how bright it is ([`radiance`]), where it is sampled ([`nodes`]) and, where nothing is
+//! There are three questions to a light: how bright it is ([`radiance`]), where it is sampled ([`nodes`]) and, where nothing is
 //! in the way, what it does in closed form ([`polygon_irradiance`], [`irradiance`]). [`match_plate`] is the stage: it
 //! turns what a scene leaves to its plate (exposure, colour of the light, noise) into numbers.
+//!
+//! ```
+//! use petcomp::LinearRgb;
+//! use petcomp::geom::{Point3, Vector3};
+//! use petcomp::light::irradiance;
+//! use petcomp::scene::{AreaLight, LightShape};
+//! use std::f64::consts::PI;
+//!
+//! let lamp = AreaLight {
+//!     shape: LightShape::Ellipse,
+//!     position: [0.0, 0.0, 10.0],
+//!     target: [0.0; 3],
+//!     size: [0.1; 2],
+//!     power: 10.0,
+//!     color: LinearRgb::WHITE,
+//! };
+//! // So far away it is a point: power over pi times the squared distance.
+//! let e = irradiance(&lamp, Point3::origin(), Vector3::z());
+//! assert!((f64::from(e.g) - 10.0 / PI / 100.0).abs() < 1e-5);
+//! ```
 
 mod ambient;
 mod area;

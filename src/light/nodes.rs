@@ -90,13 +90,7 @@ pub(crate) fn nodes_above(
 ) -> Vec<Node> {
     let frame = frame(light);
     let half = side_lengths(light).map(|s| 0.5 * s);
-    let horizon = LightHorizon {
-        middle: normal.dot(&(frame.center - point)),
-        rise: [
-            half[0] * normal.dot(&frame.x),
-            half[1] * normal.dot(&frame.y),
-        ],
-    };
+    let horizon = LightHorizon::new(&frame, half, point, normal);
     let left = match light.shape {
         LightShape::Rectangle if horizon.cuts_square() => horizon.strips(per_side.max(1)),
         LightShape::Ellipse if horizon.cuts_disk() => horizon.chords(per_side.max(1)),
@@ -118,6 +112,16 @@ struct LightHorizon {
 }
 
 impl LightHorizon {
+    fn new(frame: &LightFrame, half: [f64; 2], point: Point3<f64>, normal: &Vector3<f64>) -> Self {
+        Self {
+            middle: normal.dot(&(frame.center - point)),
+            rise: [
+                half[0] * normal.dot(&frame.x),
+                half[1] * normal.dot(&frame.y),
+            ],
+        }
+    }
+
     fn cuts_square(&self) -> bool {
         let [a, b] = self.rise.map(f64::abs);
         self.middle.abs() < a + b

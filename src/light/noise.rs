@@ -72,26 +72,47 @@ fn group_noise(group: &[(f32, f32)]) -> [f64; 2] {
 
 /// The line of least squares through variances over means, neither part of it negative.
 fn fit_noise(groups: &[[f64; 2]]) -> Noise {
-    let n = groups.len() as f64;
-    let x: f64 = groups.iter().map(|g| g[0]).sum();
-    let y: f64 = groups.iter().map(|g| g[1]).sum();
-    let xx: f64 = groups.iter().map(|g| g[0] * g[0]).sum();
-    let xy: f64 = groups.iter().map(|g| g[0] * g[1]).sum();
-    let spread = n * xx - x * x;
-    let slope = if spread > 0.0 {
-        (n * xy - x * y) / spread
-    } else {
-        0.0
-    };
-    let offset = (y - slope * x) / n;
+    let sums = FitSums::new(groups);
+    let slope = sums.slope();
+    let offset = (sums.y - slope * sums.x) / sums.n;
     let (shot, dark) = match (slope > 0.0, offset > 0.0) {
         (true, true) => (slope, offset),
-        (true, false) => (xy / xx.max(f64::MIN_POSITIVE), 0.0),
-        (false, _) => (0.0, y / n),
+        (true, false) => (sums.xy / sums.xx.max(f64::MIN_POSITIVE), 0.0),
+        (false, _) => (0.0, sums.y / sums.n),
     };
     Noise::Known {
         shot,
         read: dark.sqrt(),
+    }
+}
+
+/// Sums of a linear regression of variance (y) over mean (x).
+struct FitSums {
+    n: f64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+}
+
+impl FitSums {
+    fn new(groups: &[[f64; 2]]) -> Self {
+        Self {
+            n: groups.len() as f64,
+            x: groups.iter().map(|g| g[0]).sum(),
+            y: groups.iter().map(|g| g[1]).sum(),
+            xx: groups.iter().map(|g| g[0] * g[0]).sum(),
+            xy: groups.iter().map(|g| g[0] * g[1]).sum(),
+        }
+    }
+
+    fn slope(&self) -> f64 {
+        let spread = self.n * self.xx - self.x * self.x;
+        if spread > 0.0 {
+            (self.n * self.xy - self.x * self.y) / spread
+        } else {
+            0.0
+        }
     }
 }
 

@@ -47,19 +47,8 @@ fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) 
     work::add(Kind::MapPieces, pieces.len() as u64);
     // In the frame of the picture, which the map is turned against.
     let local = turned(normal, map.rotation);
-    let mut seen: Vec<_> = pieces
-        .iter()
-        .filter_map(|piece| VisiblePiece::over_horizon(piece, &local))
-        .collect();
     let whole = map.panorama.irradiance(&local);
-    if seen.is_empty() && whole.iter().any(|&e| e > 0.0) {
-        // A sun has taken all the cuts, on the other side: what little there is here is one piece.
-        seen.push(VisiblePiece {
-            direction: local,
-            irradiance: whole,
-            width: HALF_SKY_WIDTH,
-        });
-    }
+    let seen = visible_pieces(pieces, &local, whole);
     let scale = irradiance_scale(&seen, whole, f64::from(map.strength));
     seen.into_iter()
         .map(|piece| SkyPiece {
@@ -68,6 +57,27 @@ fn scaled_pieces(map: &EnvironmentMap, pieces: &[Piece], normal: &Vector3<f64>) 
             width: piece.width,
         })
         .collect()
+}
+
+/// The pieces over a horizon; one piece for all of its light where a map gives some and none of its pieces does.
+fn visible_pieces(
+    pieces: &[Piece],
+    normal: &Vector3<f64>,
+    irradiance: [f64; 3],
+) -> Vec<VisiblePiece> {
+    let mut seen: Vec<_> = pieces
+        .iter()
+        .filter_map(|piece| VisiblePiece::over_horizon(piece, normal))
+        .collect();
+    if seen.is_empty() && irradiance.iter().any(|&e| e > 0.0) {
+        // A sun has taken all the cuts, on the other side: what little there is here is one piece.
+        seen.push(VisiblePiece {
+            direction: *normal,
+            irradiance,
+            width: HALF_SKY_WIDTH,
+        });
+    }
+    seen
 }
 
 /// Factors that make pieces add up to the irradiance of the whole map times its strength.

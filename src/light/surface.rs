@@ -12,15 +12,7 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
     let CameraSource::Known(camera) = scene.camera else {
         return None;
     };
-    let [w, h] = scene.surface.size.map(|side| 0.5 * side);
-    let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
-    let seen: Vec<LinearRgb> = places
-        .filter(|&(x, y)| {
-            surface_point(&camera, x, y).is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
-        })
-        .map(|at| plate[at])
-        .filter(|c| c.is_finite())
-        .collect();
+    let seen = surface_pixels(&camera, scene.surface.size, plate);
     if seen.is_empty() {
         return None;
     }
@@ -29,6 +21,19 @@ pub fn surface_color(scene: &Scene, plate: &Image<LinearRgb>) -> Option<LinearRg
         median_of(&seen, |c| c.g),
         median_of(&seen, |c| c.b),
     ))
+}
+
+/// The finite pixels of a plate that show a surface of this size.
+fn surface_pixels(camera: &Camera, size: [f64; 2], plate: &Image<LinearRgb>) -> Vec<LinearRgb> {
+    let [w, h] = size.map(|side| 0.5 * side);
+    let places = (0..plate.height()).flat_map(|y| (0..plate.width()).map(move |x| (x, y)));
+    places
+        .filter(|&(x, y)| {
+            surface_point(camera, x, y).is_some_and(|p| p.x.abs() <= w && p.y.abs() <= h)
+        })
+        .map(|at| plate[at])
+        .filter(|c| c.is_finite())
+        .collect()
 }
 
 /// The point of the plane `z = 0` that a pixel shows.
@@ -97,6 +102,8 @@ pub(super) mod tests {
             exposure: Exposure::Ev(0.0),
             cast,
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

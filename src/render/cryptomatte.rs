@@ -28,7 +28,7 @@ pub struct Cryptomatte {
 }
 
 impl Cryptomatte {
-    /// The layer of the objects in a picture; `names` says how each is called, and who is not in it is left out.
+    /// The layer of the objects in a picture; `names` says how each is called, and objects without a name are left out.
     ///
     /// Coverage is what is seen of an object. Where more than six objects share a pixel, those with least are left out.
     pub fn new(deep: &DeepImage, layer: &str, names: &[(ObjectId, String)]) -> Self {
@@ -36,16 +36,7 @@ impl Cryptomatte {
             .iter()
             .map(|(object, name)| (*object, id_of_name(name)))
             .collect();
-        let count = CHANNEL_SETS * SET_CHANNELS.len();
-        let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); count];
-        for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
-            let ranks = ranked_objects(deep.at(x, y), &ids, count / 2);
-            for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
-                pair[0].push(id);
-                pair[1].push(coverage);
-            }
-        }
-        let channels = planes
+        let channels = rank_planes(deep, &ids)
             .into_iter()
             .enumerate()
             .map(|(i, plane)| (channel_name(layer, i), plane))
@@ -55,6 +46,20 @@ impl Cryptomatte {
             metadata: layer_metadata(layer, names),
         }
     }
+}
+
+/// Samples of each channel, row by row: id and coverage of each rank in turn.
+fn rank_planes(deep: &DeepImage, ids: &[(ObjectId, f32)]) -> Vec<Vec<f32>> {
+    let count = CHANNEL_SETS * SET_CHANNELS.len();
+    let mut planes = vec![Vec::with_capacity(deep.width() * deep.height()); count];
+    for (x, y) in (0..deep.height()).flat_map(|y| (0..deep.width()).map(move |x| (x, y))) {
+        let ranks = ranked_objects(deep.at(x, y), ids, count / 2);
+        for (pair, (id, coverage)) in planes.chunks_exact_mut(2).zip(ranks) {
+            pair[0].push(id);
+            pair[1].push(coverage);
+        }
+    }
+    planes
 }
 
 /// Ids and visible coverage of a pixel's objects, the most visible first; as many as there are ranks.

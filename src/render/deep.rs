@@ -29,7 +29,7 @@ const DENSE_SUBSAMPLES: usize = 4;
 
 /// Renders a shot: per pixel and card, its light and its coverage; per pixel, what shadows leave of the plate.
 ///
-/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are not, and
+/// Same bits for any number of threads and any order of the cards. Never fails: cards that cannot be seen are left out, and
 /// numbers in `options` are brought into the range that works. Ask [`check`](super::check) about shots from outside.
 ///
 /// # Method
@@ -41,32 +41,37 @@ const DENSE_SUBSAMPLES: usize = 4;
 pub fn render(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let options = options.clamped();
     let view = CameraView::from_camera(&shot.camera);
-    let offsets = filter_quantiles(options.subsamples);
-    let planes = visible_planes(shot);
-    let context = LightingContext::new(shot, &planes, &view, options);
-    let cards: Vec<_> = planes
-        .par_iter()
-        .map(|(card, plane)| ProjectedCard::new(card, plane, &view, &offsets))
-        .collect();
-    let receivers = receivers(&context, &cards);
-    let mut maps = irradiance_maps(&receivers);
-    let catcher = ShadowCatcher {
-        plane: ProjectedPlane::new(&context.occluders.surface, &view),
-        share: maps.pop().flatten(),
-    };
-    let stack = LayerStack {
-        layers: lit_layers(cards, &receivers, maps),
-        catcher,
-        samples: sample_grid(&view, &context.fine, offsets, &options),
-        exposure: shot.exposure,
-        tinted: context.occluders.tinted,
-    };
     let tiles = PixelBlock::tiles_of(view.width, view.height, TILE_SIDE_PX);
+    let stack = layer_stack(shot, &view, &options);
     let rendered: Vec<_> = tiles
         .into_par_iter()
         .map(|tile| stack.render_tile(tile))
         .collect();
     assemble_tiles(&view, &rendered)
+}
+
+/// Everything that tiles are rendered from: textures at their level of detail, and the light on them.
+fn layer_stack(shot: &Shot, view: &CameraView, options: &RenderOptions) -> LayerStack {
+    let offsets = filter_quantiles(options.subsamples);
+    let planes = visible_planes(shot);
+    let context = LightingContext::new(shot, &planes, view, *options);
+    let cards: Vec<_> = planes
+        .par_iter()
+        .map(|(card, plane)| ProjectedCard::new(card, plane, view, &offsets))
+        .collect();
+    let receivers = receivers(&context, &cards);
+    let mut maps = irradiance_maps(&receivers);
+    let catcher = ShadowCatcher {
+        plane: ProjectedPlane::new(&context.occluders.surface, view),
+        share: maps.pop().flatten(),
+    };
+    LayerStack {
+        layers: lit_layers(cards, &receivers, maps),
+        catcher,
+        samples: sample_grid(view, &context.fine, offsets, options),
+        exposure: shot.exposure,
+        tinted: context.occluders.tinted,
+    }
 }
 
 /// The same without any light: what objects cover and hide, and how far away they are.

@@ -1,10 +1,5 @@
 //! A card's own colours.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "several arrays in step, which vectorises"
-)]
-
 use crate::pixel::LinearRgb;
 use crate::render::float4::Float4;
 use crate::render::texel_grid::SIMD_LANES;

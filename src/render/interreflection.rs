@@ -58,17 +58,13 @@ impl BounceMap {
     /// None without cards.
     fn new(shot: &Shot) -> Option<Self> {
         let cards = visible_planes(shot);
-        let corners: Vec<_> = cards
-            .iter()
-            .flat_map(|(_, plane)| plane.corners())
-            .collect();
-        let (left, width) = extent(&corners, 0)?;
-        let (bottom, height) = extent(&corners, 1)?;
+        let (left, width) = extent(&cards, 0)?;
+        let (bottom, height) = extent(&cards, 1)?;
         let step = GRID_STEP_M.max(width.max(height) / MAX_GRID_STEPS);
         let [columns, rows] = [width, height].map(|length| (length / step) as usize + 1);
         let back = Image::from_fn(columns, rows, |i, j| {
-            let point = Vector3::new(left + i as f64 * step, bottom + j as f64 * step, 0.0);
-            light_from_above(&cards, &point)
+            let (x, y) = (left + i as f64 * step, bottom + j as f64 * step);
+            light_from_above(&cards, &Vector3::new(x, y, 0.0))
         });
         Some(Self {
             corner: [left, bottom],
@@ -83,10 +79,14 @@ impl BounceMap {
     }
 }
 
-/// Low end and length of points along an axis, with room for the blur.
-fn extent(points: &[Vector3<f64>], axis: usize) -> Option<(f64, f64)> {
-    let low = points.iter().map(|p| p[axis]).reduce(f64::min)? - 3.0 * BOUNCE_SPREAD_M;
-    let high = points.iter().map(|p| p[axis]).reduce(f64::max)? + 3.0 * BOUNCE_SPREAD_M;
+/// Low end and length of cards along an axis, with room for the blur.
+fn extent(cards: &[(&Card, ScenePlane)], axis: usize) -> Option<(f64, f64)> {
+    let ends = cards
+        .iter()
+        .flat_map(|(_, plane)| plane.corners())
+        .map(|corner| corner[axis]);
+    let low = ends.clone().reduce(f64::min)? - 3.0 * BOUNCE_SPREAD_M;
+    let high = ends.reduce(f64::max)? + 3.0 * BOUNCE_SPREAD_M;
     Some((low, high - low))
 }
 

@@ -109,17 +109,24 @@ fn fill_combined_row(
     lit.fine.gather_row(j, &asked, buffers);
     soft.enlarge_row(j, &asked, &mut buffers.coarse);
     let out = &mut out[asked.start - lit.fine.columns.start..][..asked.len()];
-    let first = coarser_nodes(asked.start)[0];
     let sums = buffers.open.iter().zip(&buffers.hidden);
     for (i, (out, (open, hidden))) in out.iter_mut().zip(sums).enumerate() {
-        let [a, b] = coarser_nodes(asked.start + i).map(|n| buffers.coarse[n - first]);
-        let hidden = hidden.add_scaled(1.0, a.lerp(b, 0.5));
+        let soft = between_coarse(&buffers.coarse, asked.start, i);
+        let hidden = hidden.add_scaled(1.0, soft);
         *out = if lit.relative {
             remaining_share(open, &hidden)
         } else {
             remaining_light(open, &hidden)
         };
     }
+}
+
+/// The value of a coarser row at the `i`-th node from `start`; the row begins at the node around `start`.
+#[inline(always)]
+fn between_coarse(coarse: &[Float4], start: usize, i: usize) -> Float4 {
+    let first = coarser_nodes(start)[0];
+    let [a, b] = coarser_nodes(start + i).map(|n| coarse[n - first]);
+    a.lerp(b, 0.5)
 }
 
 /// What is left of open irradiance.

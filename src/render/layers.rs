@@ -255,30 +255,42 @@ impl LayerStack {
         through: &mut Transmittance,
         row: &mut LayerRow,
     ) {
-        let offsets = &self.samples.offsets;
-        let r = offsets.len();
         row.start(block.x.len(), self.tinted);
-        for (sy, offset_y) in offsets.iter().enumerate() {
+        for (sy, offset_y) in self.samples.offsets.iter().enumerate() {
             let line = LayerLine::new(layer, block.x.start, y as f64 + 0.5 + offset_y);
-            for (sx, offset_x) in offsets.iter().enumerate() {
-                let pixels = line.pixels(0.5 + *offset_x as f32, block.x.len());
-                if pixels.is_empty() {
-                    continue;
-                }
-                row.touched = range_union(row.touched.clone(), pixels.clone());
-                if self.samples.per_subsample {
-                    self.light_subsamples(layer, block, [sx, y * r + sy], &pixels, row);
-                }
-                row.read += pixels.len();
-                let run = SubsampleRun {
-                    line: &line.starting_at(0.5 + *offset_x as f32 + pixels.start as f32),
-                    plane: sy * r + sx,
-                    y: y - block.y.start,
-                    pixels,
-                };
-                through.pass_layer(&layer.texture, run, row);
+            for sx in 0..self.samples.offsets.len() {
+                self.sample_line(layer, block, (&line, y), [sx, sy], through, row);
             }
         }
+    }
+
+    /// One sub-sample of every pixel of a row that the layer touches.
+    fn sample_line(
+        &self,
+        layer: &Layer,
+        block: &PixelBlock,
+        (line, y): (&LayerLine, usize),
+        [sx, sy]: [usize; 2],
+        through: &mut Transmittance,
+        row: &mut LayerRow,
+    ) {
+        let (offset, r) = (self.samples.offsets[sx] as f32, self.samples.offsets.len());
+        let pixels = line.pixels(0.5 + offset, block.x.len());
+        if pixels.is_empty() {
+            return;
+        }
+        row.touched = range_union(row.touched.clone(), pixels.clone());
+        if self.samples.per_subsample {
+            self.light_subsamples(layer, block, [sx, y * r + sy], &pixels, row);
+        }
+        row.read += pixels.len();
+        let run = SubsampleRun {
+            line: &line.starting_at(0.5 + offset + pixels.start as f32),
+            plane: sy * r + sx,
+            y: y - block.y.start,
+            pixels,
+        };
+        through.pass_layer(&layer.texture, run, row);
     }
 
     /// Looks up the light at one sub-sample of some pixels: the column inside its pixel, the row inside the picture.
@@ -313,12 +325,7 @@ impl LayerStack {
         for i in row.touched.clone().filter(|&i| row.alpha[i] > 0.0) {
             let x = block.x.start + i;
             let light = self.pixel_light(layer, [x, y], row.light[i], &mut row.lit);
-            let hidden = if self.tinted {
-                row.hidden[i].rgb()
-            } else {
-                LinearRgb::grey(row.light[i].alpha())
-            };
-            let hidden = hidden.scale(weight);
+            let hidden = row.hidden_by(i, self.tinted).scale(weight);
             let alpha = (row.alpha[i] * weight).min(1.0);
             let sample = DeepSample {
                 object: layer.id,
@@ -373,19 +380,29 @@ impl LayerStack {
         };
         let edges = quad_sides(&plane.u, &plane.v, &plane.w, [0.0; 2]);
         for y in part.y.clone() {
-            let Some(row) = tile.shadow_row(part, y) else {
-                return;
-            };
-            let spans = CatcherSpans::new(&self.samples, &edges, y);
-            for (i, shadow) in row.iter_mut().enumerate() {
-                let x = part.x.start + i;
-                *shadow = if spans.hold_pixel(x) && !self.samples.per_subsample {
-                    self.share_at(map, x, y).rgb()
-                } else {
-                    let through = through.of_pixel(i, y - part.y.start);
-                    self.mean_share(map, [x, y], &spans, through)
-                };
+            if let Some(row) = tile.shadow_row(part, y) {
+                let spans = CatcherSpans::new(&self.samples, &edges, y);
+                self.shade_row(map, part, (&spans, y), through, row);
             }
+        }
+    }
+
+    fn shade_row(
+        &self,
+        map: &IrradianceMap,
+        part: &PixelBlock,
+        (spans, y): (&CatcherSpans, usize),
+        through: &Transmittance,
+        row: &mut [LinearRgb],
+    ) {
+        for (i, shadow) in row.iter_mut().enumerate() {
+            let x = part.x.start + i;
+            *shadow = if spans.hold_pixel(x) && !self.samples.per_subsample {
+                self.share_at(map, x, y).rgb()
+            } else {
+                let through = through.of_pixel(i, y - part.y.start);
+                self.mean_share(map, [x, y], spans, through)
+            };
         }
     }
 

@@ -9,6 +9,22 @@
 //! are seen through the product of `1 - alpha` of the cards in between; the plate is multiplied by the ratio of shadowed
 //! to unshadowed irradiance of the surface `z = 0`; a pixel is the average under a Blackman-Harris window three pixels
 //! wide.
+//!
+//! ```
+//! use petcomp::geom::{Pose, Quad};
+//! use petcomp::render::{RenderOptions, render};
+//! use petcomp::scene::Card;
+//! use petcomp::{Camera, Image, LinearRgb, ObjectId, PremulRgba, Shot};
+//!
+//! let quad = Quad { world_from_card: Pose::translation(0.0, 0.0, 0.05), size: [0.2, 0.1] };
+//! let half = Image::filled(8, 8, PremulRgba::new(0.25, 0.25, 0.25, 0.5));
+//! let shot = Shot::new(Camera::looking_down(1.0, 80.0, [64, 48]))
+//!     .with_card(Card::new(ObjectId(1), quad, half))
+//!     .with_ambient(LinearRgb::WHITE);
+//! let deep = render(&shot, &RenderOptions::default());
+//! let sample = deep.at(32, 24)[0];
+//! assert!((sample.alpha - 0.5).abs() < 1e-5 && (sample.depth.0 - 0.95).abs() < 1e-5);
+//! ```
 
 mod block;
 mod check;

@@ -329,15 +329,7 @@ impl Receiver {
         asked: &Range<usize>,
         buffers: &mut RowBuffers,
     ) {
-        let n = asked.len();
-        refill(
-            &mut buffers.group,
-            if group.has_faces() { n } else { 0 },
-            0.0,
-        );
-        for lost in buffers.lost.iter_mut().take(self.channels) {
-            refill(lost, n, 0.0);
-        }
+        buffers.start_group(asked.len(), group.has_faces(), self.channels);
         let touched = group
             .rays
             .iter()
@@ -345,11 +337,7 @@ impl Receiver {
             .reduce(range_union);
         add_open(&mut buffers.open, &buffers.group, group.radiance.into());
         if let Some(touched) = touched.filter(|t| !t.is_empty()) {
-            let lost = [0, 1, 2].map(|c: usize| {
-                let channel = &buffers.lost[c.min(self.channels - 1)];
-                &channel[touched.clone()]
-            });
-            add_hidden(&mut buffers.hidden[touched.clone()], lost, group.radiance);
+            buffers.add_hidden_light(touched, self.channels, group.radiance);
         }
     }
 
@@ -377,10 +365,9 @@ impl Receiver {
         buffers.counts.shadow += all.len();
         for channel in 0..self.channels {
             buffers.fill_through(ray, channel, j, &all);
-            let (lost, strength) = (&mut buffers.lost[channel], &buffers.ray);
             add_lost(
-                &mut lost[here.clone()],
-                &strength[here.clone()],
+                &mut buffers.lost[channel][here.clone()],
+                &buffers.ray[here.clone()],
                 &buffers.through[channel],
             );
         }
@@ -405,6 +392,20 @@ impl Receiver {
 }
 
 impl RowBuffers {
+    /// Empties what is added up for one group.
+    fn start_group(&mut self, n: usize, has_faces: bool, channels: usize) {
+        refill(&mut self.group, if has_faces { n } else { 0 }, 0.0);
+        for lost in self.lost.iter_mut().take(channels) {
+            refill(lost, n, 0.0);
+        }
+    }
+
+    /// Adds what a group loses at some nodes to what is hidden there.
+    fn add_hidden_light(&mut self, nodes: Range<usize>, channels: usize, radiance: LinearRgb) {
+        let lost = [0, 1, 2].map(|c: usize| &self.lost[c.min(channels - 1)][nodes.clone()]);
+        add_hidden(&mut self.hidden[nodes.clone()], lost, radiance);
+    }
+
     /// Adds the open irradiance of a piece of an area light to its group.
     fn add_face(&mut self, ray: &ShadowRay) {
         let [x, y, z] = &self.position;

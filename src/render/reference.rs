@@ -24,23 +24,26 @@ pub fn render_reference(shot: &Shot, options: &RenderOptions) -> DeepImage {
     let world = ReferenceWorld::new(shot, &options);
     let offsets = filter_quantiles(options.subsamples);
     let (width, height) = (world.view.width, world.view.height);
-    let (lists, shadow): (Vec<Vec<ReferenceSample>>, Vec<_>) = (0..width * height)
+    let (lists, shadow): (Vec<_>, Vec<_>) = (0..width * height)
         .into_par_iter()
         .map(|i| {
             let (column, row) = (i % width, i / width);
             world.render_pixel(column as f64 + 0.5, row as f64 + 0.5, &offsets)
         })
         .unzip();
-    let tints = lists
-        .iter()
-        .flatten()
-        .filter(|_| world.tinted)
-        .map(|sample| sample.hidden)
-        .collect();
+    let tints = if world.tinted {
+        lists.iter().flatten().map(|sample| sample.hidden).collect()
+    } else {
+        Vec::new()
+    };
+    deep_image(Image::from_vec(width, height, shadow), lists).with_tints(tints)
+}
+
+fn deep_image(shadow: Image<LinearRgb>, lists: Vec<Vec<ReferenceSample>>) -> DeepImage {
     let samples = lists
         .into_iter()
         .map(|list| list.into_iter().map(|sample| sample.deep).collect());
-    DeepImage::from_pixels(Image::from_vec(width, height, shadow), samples).with_tints(tints)
+    DeepImage::from_pixels(shadow, samples)
 }
 
 /// A deep sample and what it hides per channel.
@@ -64,6 +67,13 @@ struct ReferenceWorld<'a> {
     surface: Option<ProjectedPlane>,
     surface_lights: Vec<LightGroup>,
     tinted: bool,
+}
+
+/// Where a camera ray meets a card.
+struct CardHit {
+    uv: [f64; 2],
+    depth: f64,
+    normal: Vector3<f64>,
 }
 
 /// Irradiance without and with the cards in the way.
@@ -149,24 +159,17 @@ impl<'a> ReferenceWorld<'a> {
         let mut through = LinearRgb::WHITE;
         for (&(k, _), sample) in order.iter().zip(samples) {
             let card = &self.cards[k];
-            let Some(projected) = &card.projected else {
+            let Some(hit) = card.intersect_px(x, y) else {
                 continue;
             };
-            let Some((uv, depth)) = projected.intersect_px(x, y) else {
-                continue;
-            };
-            let film = card.texel(uv, &self.view.eye);
+            let film = card.texel(hit.uv, &self.view.eye);
             sample.deep.alpha += weight * channel_mean(film.opacity);
             sample.hidden = sample.hidden.add_scaled(weight, through * film.opacity);
-            let point = self.view.point_at(x, y, depth);
-            let e = self
-                .irradiance(&point, &projected.normal, &card.lights, Some(k))
-                .shadowed;
-            let light = through * film.color * e;
-            sample.deep.light = sample
-                .deep
-                .light
-                .add_scaled(weight * self.shot.exposure / PI, light);
+            let point = self.view.point_at(x, y, hit.depth);
+            let e = self.irradiance(&point, &hit.normal, &card.lights, Some(k));
+            let light = through * film.color * e.shadowed;
+            let weight = weight * self.shot.exposure / PI;
+            sample.deep.light = sample.deep.light.add_scaled(weight, light);
             through = through * film.transmittance();
         }
         through
@@ -283,6 +286,16 @@ impl<'a> ReferenceCard<'a> {
             projected.height / w
         } else {
             f64::from(f32::MAX)
+        })
+    }
+
+    fn intersect_px(&self, x: f64, y: f64) -> Option<CardHit> {
+        let projected = self.projected.as_ref()?;
+        let (uv, depth) = projected.intersect_px(x, y)?;
+        Some(CardHit {
+            uv,
+            depth,
+            normal: projected.normal,
         })
     }
 

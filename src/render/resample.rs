@@ -37,26 +37,37 @@ impl DetailLevel {
         let image = level(self.level);
         let columns = downsample_axis(image.width(), self.step);
         let rows = downsample_axis(image.height(), self.step);
-        let (width, height) = (
-            columns.len() + 2 * BORDER_TEXELS,
-            rows.len() + 2 * BORDER_TEXELS,
-        );
-        let mut texels = vec![Float4::ZERO; width * height];
-        let mut rows_of_level = RowAverages::new(image, texel);
-        let lines = texels.chunks_exact_mut(width).skip(BORDER_TEXELS);
-        for (row, line) in rows.iter().zip(lines) {
-            let average = rows_of_level.average(row);
-            for (column, out) in columns.iter().zip(&mut line[BORDER_TEXELS..]) {
+        let mut out = BorderedTexels::transparent(columns.len(), rows.len());
+        let mut averages = RowAverages::new(image, texel);
+        for (row, line) in rows.iter().zip(out.inner_lines()) {
+            let average = averages.average(row);
+            for (column, out) in columns.iter().zip(line) {
                 *out = column.weighted().fold(Float4::ZERO, |s, (x, weight)| {
                     s.add_scaled(weight, average[x])
                 });
             }
         }
-        BorderedTexels {
+        out
+    }
+}
+
+impl BorderedTexels {
+    /// Room for this many columns and rows inside of the border.
+    fn transparent(columns: usize, rows: usize) -> Self {
+        let (width, height) = (columns + 2 * BORDER_TEXELS, rows + 2 * BORDER_TEXELS);
+        Self {
             width,
             height,
-            texels,
+            texels: vec![Float4::ZERO; width * height],
         }
+    }
+
+    /// Rows from the first inside of the border on, without the border on their left.
+    fn inner_lines(&mut self) -> impl Iterator<Item = &mut [Float4]> {
+        self.texels
+            .chunks_exact_mut(self.width)
+            .skip(BORDER_TEXELS)
+            .map(|line| &mut line[BORDER_TEXELS..])
     }
 }
 

@@ -6,6 +6,7 @@ use crate::render::light_samples::LightSample;
 use crate::render::occluders::{Occluder, Occluders};
 use crate::render::opacity::OpacityLevel;
 use crate::render::ranges::{integer_range, ranges_meet};
+use crate::render::texel_grid::TexelLine;
 use crate::render::view::{CameraView, LatticeArea, ProjectedPlane, ScenePlane, texture_rows};
 use std::ops::Range;
 use std::sync::Arc;
@@ -173,6 +174,20 @@ impl<'a> ShadowProjection<'a> {
 
     /// The shadow of the surface, which stops what comes from below it.
     pub(super) fn project_surface(&self, surface: &ScenePlane) -> ProjectedShadow {
+        ProjectedShadow {
+            rows: 0..self.receiver.view.height,
+            columns: 0..self.receiver.view.width,
+            sides: self.surface_sides(surface),
+            u: Vector3::zeros(),
+            v: Vector3::zeros(),
+            w: Vector3::zeros(),
+            opacity: None,
+            inside: None,
+        }
+    }
+
+    /// Where the way to the light crosses the surface inside of its sides.
+    fn surface_sides(&self, surface: &ScenePlane) -> Vec<Vector3<f64>> {
         let (point, depth) = (&self.receiver.plane.point, &self.receiver.plane.w);
         let direction = self.sample.at.xyz();
         let height = point.transpose() * Vector3::z() / -direction.z;
@@ -184,16 +199,7 @@ impl<'a> ShadowProjection<'a> {
                 sides.extend([depth * (0.5 * size) - row, depth * (0.5 * size) + row]);
             }
         }
-        ProjectedShadow {
-            rows: 0..self.receiver.view.height,
-            columns: 0..self.receiver.view.width,
-            sides,
-            u: Vector3::zeros(),
-            v: Vector3::zeros(),
-            w: Vector3::zeros(),
-            opacity: None,
-            inside: None,
-        }
+        sides
     }
 
     /// The light comes from below the surface.
@@ -267,8 +273,7 @@ impl ProjectedShadow {
             through.fill(0.0);
             return TexelReads::default();
         };
-        let first = Vector3::new(nodes.start as f64, j as f64, 1.0);
-        let line = [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32));
+        let line = self.texel_line(j, nodes);
         let Some(dark) = self.dark_nodes(j, nodes) else {
             opacity.attenuate(channel, &line, 0, through);
             return TexelReads {
@@ -283,6 +288,12 @@ impl ProjectedShadow {
             see_through: 0,
             edges: nodes.len() - dark.len(),
         }
+    }
+
+    /// Positions among the texels along a row, from the first of the nodes on.
+    fn texel_line(&self, j: usize, nodes: &Range<usize>) -> TexelLine {
+        let first = Vector3::new(nodes.start as f64, j as f64, 1.0);
+        [self.u, self.v, self.w].map(|row| (row.dot(&first) as f32, row.x as f32))
     }
 
     /// Where an opaque card surely lets nothing through, counted from the first of the nodes.

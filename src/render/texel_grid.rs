@@ -1,7 +1,5 @@
 //! Where a texture's texels lie, and how a line of positions falls between them.
 
-#![expect(clippy::manual_clamp, reason = "turns NaN into 0")]
-
 use crate::geom::Vector3;
 
 /// Transparent texels around a texture: what positions reach beyond its outermost ones, and one to read on.

@@ -2,6 +2,7 @@
 
 #![expect(clippy::manual_clamp, reason = "turns NaN into 0")]
 
+use crate::pixel::LinearRgb;
 use crate::render::block::PixelBlock;
 use crate::render::float4::Float4;
 use crate::render::grade::channel_mean;
@@ -77,6 +78,16 @@ impl LayerRow {
         self.hidden.resize(if tinted { n } else { 0 }, Float4::ZERO);
         self.alpha.clear();
         self.alpha.resize(n, 0.0);
+    }
+
+    /// What pixel `i` of the layer hides of all behind it, per channel, added up over sub-samples.
+    #[inline(always)]
+    pub(super) fn hidden_by(&self, i: usize, tinted: bool) -> LinearRgb {
+        if tinted {
+            self.hidden[i].rgb()
+        } else {
+            LinearRgb::grey(self.light[i].alpha())
+        }
     }
 
     /// Looks up the light on a layer at one sub-sample of each pixel.

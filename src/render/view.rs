@@ -33,20 +33,22 @@ impl ScenePlane {
     pub(super) fn from_card(card: &Card) -> Option<Self> {
         let pose = &card.quad.world_from_card;
         let [w, h] = card.quad.size;
-        let center = pose.translation.vector;
-        let solid = w > 0.0 && h > 0.0 && w * h > GEOMETRY_EPSILON && (w * h).is_finite();
-        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
-        let placed = axes
-            .iter()
-            .chain([&center])
-            .all(|v| v.iter().all(|c| c.is_finite()));
-        (solid && placed).then_some(Self {
-            center,
-            x: axes[0],
-            y: axes[1],
-            normal: axes[2],
+        let has_area = w > 0.0 && h > 0.0 && w * h > GEOMETRY_EPSILON && (w * h).is_finite();
+        let [x, y, normal] =
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| pose.rotation * axis);
+        let plane = Self {
+            center: pose.translation.vector,
+            x,
+            y,
+            normal,
             size: [w, h],
-        })
+        };
+        (has_area && plane.is_finite()).then_some(plane)
+    }
+
+    fn is_finite(&self) -> bool {
+        let vectors = [&self.x, &self.y, &self.normal, &self.center];
+        vectors.iter().all(|v| v.iter().all(|c| c.is_finite()))
     }
 
     /// The plane `z = 0` as far as it receives shadows.

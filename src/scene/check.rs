@@ -1,16 +1,18 @@
-//! Is a scene possible? Asked once, before any work.
+//! Is a scene possible? Checked once, before any work.
 
 use crate::bounds::{Bounds, LONGEST_SIDE_PX, MASS, MOST_PIXELS};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::geom::UnitQuaternion;
+use crate::geom::{Pose, UnitQuaternion};
 use crate::pixel::LinearRgb;
 use crate::scene::bounds::{
-    ALBEDO, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MOST_LIGHTS, MOST_OBJECTS, PHOTO_SIDE,
+    ALBEDO, CAST_SHARE, EV, FOCAL, FRICTION, GRADE, LENGTH, MAX_LIGHTS, MAX_OBJECTS, PHOTO_SIDE,
     PIXEL, PLACE, RADIANCE, SHARE, TURN,
 };
-use crate::scene::hull::turn;
-use crate::scene::{AreaLight, CameraSource, Exposure, LightTint, Object, Placement, Scene};
+use crate::scene::hull::doubled_corner_area;
+use crate::scene::{
+    AreaLight, CameraSource, Exposure, Grade, LightTint, Object, Placement, Scene, Surface,
+};
 use std::fmt::{Debug, Display};
 
 /// How far the norm of a quaternion may be from 1: what six written decimals leave.
@@ -18,35 +20,26 @@ const UNIT_TOLERANCE: f64 = 1e-5;
 /// How far a corner may be outside its card, as a share of the card: the same decimals.
 const OUTLINE_TOLERANCE: f64 = 1e-5;
 /// Most corners of an outline: contacts are sought between all of them.
-const MOST_OUTLINE: usize = 256;
+const MAX_OUTLINE_CORNERS: usize = 256;
 
 impl Scene {
-    /// Fails on the first value that cannot be right, by its path: `objects[3].size: [0.0, 0.1], expected within 1e-9 to
-    /// 1000000 (metres)`.
+    /// Fails on the first impossible value, by its path: `objects[3].size: [0.0, 0.1], expected within
+    /// 1e-9 to 1000000 (metres)`.
     pub fn check(&self) -> Result<()> {
         check_image(self.image)?;
-        within(&self.surface.size, "surface.size", &LENGTH)?;
-        FRICTION.check("surface.friction", self.surface.friction)?;
-        SHARE.check("surface.restitution", self.surface.restitution)?;
+        check_surface(&self.surface)?;
         check_camera(&self.camera)?;
-        check_count(self.objects.len(), "objects", MOST_OBJECTS)?;
-        each(&self.objects, "objects", check_object)?;
-        check_count(self.lights.len(), "lights", MOST_LIGHTS)?;
-        each(&self.lights, "lights", check_light)?;
+        check_count(self.objects.len(), "objects", MAX_OBJECTS)?;
+        check_each(&self.objects, "objects", check_object)?;
+        check_count(self.lights.len(), "lights", MAX_LIGHTS)?;
+        check_each(&self.lights, "lights", check_light)?;
         check_color(self.ambient, "ambient")?;
-        self.environment
-            .as_ref()
-            .map_or(Ok(()), |map| map.check("environment"))?;
+        if let Some(map) = &self.environment {
+            map.check("environment")?;
+        }
         check_cast(&self.cast)?;
         self.finish.check("finish")?;
-        match self.exposure {
-            Exposure::Ev(ev) => EV.check("exposure.ev", ev),
-            Exposure::MatchPlate { gain_ev } => EV.check("exposure.match_plate.gain_ev", gain_ev),
-            Exposure::MatchSurface { albedo, gain_ev } => {
-                ALBEDO.check("exposure.match_surface.albedo", albedo)?;
-                EV.check("exposure.match_surface.gain_ev", gain_ev)
-            }
-        }
+        check_exposure(self.exposure)
     }
 }
 
@@ -58,7 +51,12 @@ fn expect(claim: bool, at: &str, found: impl Debug, expected: impl Display) -> R
     }
 }
 
-fn each<T>(items: &[T], name: &str, check: impl Fn(&T, &str) -> Result<()>) -> Result<()> {
+/// Checks every item of a list by its path: `lights[2]`.
+pub(super) fn check_each<T>(
+    items: &[T],
+    name: &str,
+    check: impl Fn(&T, &str) -> Result<()>,
+) -> Result<()> {
     items
         .iter()
         .enumerate()
@@ -66,7 +64,7 @@ fn each<T>(items: &[T], name: &str, check: impl Fn(&T, &str) -> Result<()>) -> R
 }
 
 /// All of some numbers within bounds.
-fn within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
+fn check_within(numbers: &[f64], at: &str, bounds: &Bounds) -> Result<()> {
     expect(
         numbers.iter().all(|&x| bounds.contains(x)),
         at,
@@ -80,12 +78,8 @@ pub(super) fn check_image(image: [u32; 2]) -> Result<()> {
     let [w, h] = image;
     expect(w > 0 && h > 0, "image", image, "two numbers above 0")?;
     let fits = w.max(h) <= LONGEST_SIDE_PX && u64::from(w) * u64::from(h) <= MOST_PIXELS;
-    expect(
-        fits,
-        "image",
-        image,
-        format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all"),
-    )
+    let expected = format_args!("at most {LONGEST_SIDE_PX} a side and {MOST_PIXELS} in all");
+    expect(fits, "image", image, expected)
 }
 
 /// No more of something than scenes may have.
@@ -93,12 +87,18 @@ pub(super) fn check_count(count: usize, at: &str, most: usize) -> Result<()> {
     expect(count <= most, at, count, format_args!("at most {most}"))
 }
 
-fn check_color(color: LinearRgb, at: &str) -> Result<()> {
-    let channels: [f32; 3] = color.into();
-    within(&channels.map(f64::from), at, &RADIANCE)
+fn check_surface(surface: &Surface) -> Result<()> {
+    check_within(&surface.size, "surface.size", &LENGTH)?;
+    FRICTION.check("surface.friction", surface.friction)?;
+    SHARE.check("surface.restitution", surface.restitution)
 }
 
-fn check_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
+fn check_color(color: LinearRgb, at: &str) -> Result<()> {
+    let channels: [f32; 3] = color.into();
+    check_within(&channels.map(f64::from), at, &RADIANCE)
+}
+
+fn check_rotation(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
     let norm = rotation.as_ref().norm();
     if (norm - 1.0).abs() <= UNIT_TOLERANCE {
         return Ok(());
@@ -109,10 +109,27 @@ fn check_unit(rotation: &UnitQuaternion<f64>, at: &str) -> Result<()> {
     ))
 }
 
+fn check_pose(pose: &Pose, at: &str) -> Result<()> {
+    let translation = pose.translation.vector;
+    check_within(translation.as_slice(), &format!("{at}.translation"), &PLACE)?;
+    check_rotation(&pose.rotation, &format!("{at}.rotation"))
+}
+
 pub(super) fn check_cast(cast: &LightTint) -> Result<()> {
     match *cast {
         LightTint::Known(color) => check_color(color, "cast.known"),
         LightTint::MatchSurface { share } => CAST_SHARE.check("cast.match_surface.share", share),
+    }
+}
+
+fn check_exposure(exposure: Exposure) -> Result<()> {
+    match exposure {
+        Exposure::Ev(ev) => EV.check("exposure.ev", ev),
+        Exposure::MatchPlate { gain_ev } => EV.check("exposure.match_plate.gain_ev", gain_ev),
+        Exposure::MatchSurface { albedo, gain_ev } => {
+            ALBEDO.check("exposure.match_surface.albedo", albedo)?;
+            EV.check("exposure.match_surface.gain_ev", gain_ev)
+        }
     }
 }
 
@@ -124,30 +141,23 @@ fn check_camera(camera: &CameraSource) -> Result<()> {
             photo,
             focal_px,
         } => {
-            let at = |field: &str| format!("camera.rectangle.{field}");
-            within(corners_px.as_flattened(), &at("corners_px"), &PIXEL)?;
-            within(&photo.map(f64::from), &at("photo"), &PHOTO_SIDE)?;
-            focal_px.map_or(Ok(()), |f| FOCAL.check(&at("focal_px"), f))
+            let corners = corners_px.as_flattened();
+            check_within(corners, "camera.rectangle.corners_px", &PIXEL)?;
+            let sides = photo.map(f64::from);
+            check_within(&sides, "camera.rectangle.photo", &PHOTO_SIDE)?;
+            focal_px.map_or(Ok(()), |f| FOCAL.check("camera.rectangle.focal_px", f))
         }
     }
 }
 
 fn check_known_camera(camera: &Camera) -> Result<()> {
-    let at = |field: &str| format!("camera.known.{field}");
-    within(&camera.image.map(f64::from), &at("image"), &PHOTO_SIDE)?;
-    within(camera.focal_px.as_slice(), &at("focal_px"), &FOCAL)?;
-    within(
-        camera.principal_px.coords.as_slice(),
-        &at("principal_px"),
-        &PIXEL,
-    )?;
-    let pose = &camera.camera_from_world;
-    within(
-        pose.translation.vector.as_slice(),
-        &at("camera_from_world.translation"),
-        &PLACE,
-    )?;
-    check_unit(&pose.rotation, &at("camera_from_world.rotation"))
+    let image = camera.image.map(f64::from);
+    check_within(&image, "camera.known.image", &PHOTO_SIDE)?;
+    let focal = camera.focal_px.as_slice();
+    check_within(focal, "camera.known.focal_px", &FOCAL)?;
+    let principal = camera.principal_px.coords.as_slice();
+    check_within(principal, "camera.known.principal_px", &PIXEL)?;
+    check_pose(&camera.camera_from_world, "camera.known.camera_from_world")
 }
 
 fn check_object(object: &Object, at: &str) -> Result<()> {
@@ -158,43 +168,45 @@ fn check_object(object: &Object, at: &str) -> Result<()> {
         &object.asset,
         "the name of an asset",
     )?;
-    within(&object.size, &field("size"), &LENGTH)?;
+    check_within(&object.size, &field("size"), &LENGTH)?;
     LENGTH.check(&field("thickness"), object.thickness)?;
     check_outline(&object.outline, object.size, &field("outline"))?;
     MASS.check(&field("mass"), object.mass)?;
-    TURN.check(&field("grade.hue_deg"), object.grade.hue_deg.into())?;
-    GRADE.check(&field("grade.saturation"), object.grade.saturation.into())?;
-    GRADE.check(&field("grade.value"), object.grade.value.into())?;
-    match &object.placement {
-        Placement::At(pose) => {
-            within(
-                pose.translation.vector.as_slice(),
-                &field("placement.at.translation"),
-                &PLACE,
-            )?;
-            check_unit(&pose.rotation, &field("placement.at.rotation"))
-        }
+    check_grade(&object.grade, &field("grade"))?;
+    check_placement(&object.placement, &field("placement"))
+}
+
+fn check_grade(grade: &Grade, at: &str) -> Result<()> {
+    TURN.check(&format!("{at}.hue_deg"), grade.hue_deg.into())?;
+    GRADE.check(&format!("{at}.saturation"), grade.saturation.into())?;
+    GRADE.check(&format!("{at}.value"), grade.value.into())
+}
+
+fn check_placement(placement: &Placement, at: &str) -> Result<()> {
+    match placement {
+        Placement::At(pose) => check_pose(pose, &format!("{at}.at")),
         Placement::Drop {
             above,
             height,
             rotation,
         } => {
-            within(above, &field("placement.drop.above"), &PLACE)?;
-            LENGTH.check(&field("placement.drop.height"), *height)?;
-            check_unit(rotation, &field("placement.drop.rotation"))
+            check_within(above, &format!("{at}.drop.above"), &PLACE)?;
+            LENGTH.check(&format!("{at}.drop.height"), *height)?;
+            check_rotation(rotation, &format!("{at}.drop.rotation"))
         }
     }
 }
 
 /// A convex polygon inside its card, or nothing.
 fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
-    check_count(outline.len(), at, MOST_OUTLINE)?;
-    let inside =
-        |p: &[f64; 2]| (0..2).all(|axis| p[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE));
-    let around = outline.len() != 1 && outline.len() != 2 && outline.iter().all(inside);
-    let left = (0..outline.len()).all(|i| turn(outline, i) > 0.0);
+    check_count(outline.len(), at, MAX_OUTLINE_CORNERS)?;
+    let is_polygon = outline.len() != 1 && outline.len() != 2;
+    let is_inside = outline.iter().all(|corner| {
+        (0..2).all(|axis| corner[axis].abs() <= size[axis] * (0.5 + OUTLINE_TOLERANCE))
+    });
+    let is_convex = (0..outline.len()).all(|i| doubled_corner_area(outline, i) > 0.0);
     expect(
-        around && left,
+        is_polygon && is_inside && is_convex,
         at,
         outline,
         "the corners of a convex polygon on the card, counter-clockwise",
@@ -203,15 +215,15 @@ fn check_outline(outline: &[[f64; 2]], size: [f64; 2], at: &str) -> Result<()> {
 
 fn check_light(light: &AreaLight, at: &str) -> Result<()> {
     let field = |name: &str| format!("{at}.{name}");
-    within(&light.position, &field("position"), &PLACE)?;
-    within(&light.target, &field("target"), &PLACE)?;
+    check_within(&light.position, &field("position"), &PLACE)?;
+    check_within(&light.target, &field("target"), &PLACE)?;
     expect(
         light.position != light.target,
         &field("target"),
         light.target,
         "another point than its position",
     )?;
-    within(&light.size, &field("size"), &LENGTH)?;
+    check_within(&light.size, &field("size"), &LENGTH)?;
     RADIANCE.check(&field("power"), light.power)?;
     check_color(light.color, &field("color"))
 }
@@ -269,6 +281,8 @@ mod tests {
             exposure: Exposure::MatchPlate { gain_ev: 0.25 },
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::fmt;
 
-/// Source of every random number of one scene: a draw is a pure function of `(seed, k, path)`.
+/// Variation of every random number of one scene: a draw is a pure function of `(seed, k, path)`.
 ///
-/// No draw depends on how many were made before it, so a new object or a changed range re-rolls nothing else.
+/// No draw depends on how many were made before it, so a new object or a changed range changes no
+/// other draw.
 ///
 /// # Method
 /// ChaCha with 8 rounds, whose 32-byte key is the seed, the index `k` (both little-endian `u64`) and the 128-bit FNV-1a
@@ -23,18 +24,18 @@ pub struct Draws<'a> {
     log: Option<&'a DrawLog>,
 }
 
-/// Every draw made with it, in order: where a scene's numbers came from.
+/// Every draw that was logged, in order: where a scene's numbers came from.
 #[derive(Clone, Debug, Default)]
 pub struct DrawLog(RefCell<Vec<Drawn>>);
 
-/// A draw and what came out.
+/// A draw and its value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drawn {
     /// Its name: `objects[2].grade.hue_deg`.
     pub path: String,
     /// What it was drawn from.
     pub from: Distribution,
-    /// What came out; of a choice, its place in the list, from 0.
+    /// The value; of a choice, its place in the list, from 0.
     pub value: f64,
 }
 
@@ -44,19 +45,20 @@ pub struct Drawn {
 pub enum Distribution {
     /// Numbers from the first to the second.
     Uniform([f64; 2]),
-    /// Whole numbers from the first to the second, both included.
+    /// Integers from the first to the second, both included.
     Whole([f64; 2]),
-    /// The places in a list of so many.
+    /// The places in a list of this length.
     Choice(usize),
 }
 
 impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Uniform([min, max]) if min == max => write!(f, "fixed"),
+            Self::Uniform([min, max]) | Self::Whole([min, max]) if min == max => {
+                write!(f, "fixed")
+            }
             Self::Uniform([min, max]) => write!(f, "uniform [{min}, {max}]"),
-            Self::Whole([min, max]) if min == max => write!(f, "fixed"),
-            Self::Whole([min, max]) => write!(f, "whole [{min}, {max}]"),
+            Self::Whole([min, max]) => write!(f, "integer [{min}, {max}]"),
             Self::Choice(of) => write!(f, "one of {of}"),
         }
     }
@@ -130,10 +132,10 @@ impl<'a> Draws<'a> {
 
 /// FNV-1a, 128 bits; constants of Fowler, Noll and Vo.
 fn fnv1a_128(bytes: &[u8]) -> u128 {
-    const OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
-    const PRIME: u128 = (1 << 88) + 0x13b;
-    bytes.iter().fold(OFFSET, |hash, &byte| {
-        (hash ^ u128::from(byte)).wrapping_mul(PRIME)
+    const FNV_OFFSET: u128 = 0x6c62_272e_07bb_0142_62b8_2175_6295_c58d;
+    const FNV_PRIME: u128 = (1 << 88) + 0x13b;
+    bytes.iter().fold(FNV_OFFSET, |hash, &byte| {
+        (hash ^ u128::from(byte)).wrapping_mul(FNV_PRIME)
     })
 }
 

@@ -28,12 +28,12 @@ fn one() -> f64 {
 }
 
 impl Environment {
-    /// It gives light, so its picture is needed.
+    /// Whether it gives light, so that its picture is needed.
     pub fn shines(&self) -> bool {
         self.strength > 0.0
     }
 
-    /// Fails on the first value that cannot be right.
+    /// Fails on the first impossible value.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         if self.file.is_empty() {
             return Err(Error::value(

@@ -1,5 +1,6 @@
 //! How dropped objects come to rest: the options of the `settle` stage, which a recipe carries.
 
+use crate::bounds::Bounds;
 use crate::error::{Error, Result};
 use crate::geom::{UnitQuaternion, Vector3};
 use crate::scene::Object;
@@ -24,20 +25,20 @@ pub struct SettleOptions {
     /// Deepest overlap of two bodies at rest that is accepted, as a share of the typical card's longer side.
     /// Default: 0.0025 (0.5 mm for 200 mm).
     pub max_overlap: f64,
-    /// Most energy, potential and kinetic, that may appear from nothing between two steps, as a share of the drop's;
-    /// more is [`Verdict::Exploded`](crate::settle::Verdict::Exploded). Default: 0.01.
+    /// Largest rise of energy, potential and kinetic, between two steps, as a share of the drop's;
+    /// more is [`SettleVerdict::Exploded`](crate::settle::SettleVerdict::Exploded). Default: 0.01.
     pub max_energy_rise: f64,
     /// Longest fall, seconds of a world in which the typical card is 200 mm long, 0.01 to 600. Default: 30.
     pub time_limit: f64,
-    /// Tries before giving up, 1 to 100; each starts from heights of its own. Default: 8.
+    /// Attempts before giving up, 1 to 100; each starts from heights of its own. Default: 8.
     pub attempts: u32,
-    /// Time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps end wrong. Default: 1/480.
+    /// Time step in the same seconds, 0.0001 to 0.0042: with longer ones half of the heaps fail. Default: 1/480.
     pub step: f64,
     /// Iterations of the contact solver in each step, 1 to 100. Default: 4.
     pub iterations: u32,
     /// Times in a step that a body may be stopped at what it would fly through, 0 to 100. Default: 1.
     pub ccd: u32,
-    /// Most work for one picture, all tries and redraws together, before it is refused: objects and pairs of objects near to
+    /// Most work for one picture, all attempts and redraws together, before it is refused: objects and pairs of objects near to
     /// each other, summed over time steps, 1 to 1e12. Heaps of 30 take 0.2 million, of 100 some 2 million, of 200 up to 40
     /// million, of 300 up to 80 million; what is laid flat takes less than one. Default: 100 million.
     pub most_work: u64,
@@ -79,9 +80,16 @@ impl SettleOptions {
         Vector3::new(w, h, object.thickness.max(self.thinnest * w.max(h))) / 2.0
     }
 
-    /// Fails on the first option that cannot be right.
+    /// Fails on the first impossible option.
     pub fn check(&self) -> Result<()> {
-        let bounds = [
+        for (name, value, bounds) in self.bounded_values() {
+            bounds.check(&format!("settle.{name}"), value)?;
+        }
+        self.check_gravity()
+    }
+
+    fn bounded_values(&self) -> [(&str, f64, Bounds); 9] {
+        [
             ("thinnest", self.thinnest, THINNEST),
             ("max_overlap", self.max_overlap, OVERLAP),
             ("max_energy_rise", self.max_energy_rise, ENERGY),
@@ -91,10 +99,10 @@ impl SettleOptions {
             ("iterations", self.iterations.into(), ITERATIONS),
             ("ccd", self.ccd.into(), CCD),
             ("most_work", self.most_work as f64, WORK),
-        ];
-        bounds.iter().try_for_each(|(name, value, bounds)| {
-            bounds.check(&format!("settle.{name}"), *value)
-        })?;
+        ]
+    }
+
+    fn check_gravity(&self) -> Result<()> {
         let [x, y, z] = self.gravity;
         if !(z < 0.0 && [x, y, z].iter().all(|g| g.is_finite())) {
             return Err(Error::value(

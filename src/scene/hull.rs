@@ -3,27 +3,25 @@
 use crate::geom::Point2;
 
 /// Most corners of a prism: those of an octagon lose little of a bottle's hull.
-pub(super) const MOST_CORNERS: usize = 8;
+pub(super) const MAX_CORNERS: usize = 8;
+/// Twice the area of a corner's triangle below which it is straight, as a share of the card's area.
+const MIN_CORNER_AREA_RATIO: f64 = 1e-6;
 
-/// Corners of a convex outline in texture coordinates (right and down, 0 to 1) as those of a prism on a card of this
-/// size, counter-clockwise with y up, metres; empty where the outline has no area.
+/// Corners of a convex outline in texture coordinates (right and down, 0 to 1) as those of a prism on
+/// a card of this size, counter-clockwise with y up, metres; empty where the outline has no area.
 ///
 /// # Method
-/// The corner whose loss takes the least area goes first, until [`MOST_CORNERS`] are left (Visvalingam and Whyatt 1993);
-/// what is left lies inside the outline, so a prism never touches what its outline does not.
-pub(super) fn prism(outline_uv: &[Point2<f64>], [w, h]: [f64; 2]) -> Vec<[f64; 2]> {
-    let on_card = |p: &Point2<f64>| {
-        [
-            (p.x.clamp(0.0, 1.0) - 0.5) * w,
-            (0.5 - p.y.clamp(0.0, 1.0)) * h,
-        ]
-    };
-    let mut ring: Vec<[f64; 2]> = outline_uv.iter().map(on_card).collect();
+/// The corner whose loss takes the least area goes first, until [`MAX_CORNERS`] are left (Visvalingam
+/// and Whyatt 1993); what is left lies inside the outline, so a prism never touches what its outline
+/// does not.
+pub(super) fn prism_outline(outline_uv: &[Point2<f64>], size: [f64; 2]) -> Vec<[f64; 2]> {
+    let mut ring: Vec<[f64; 2]> = outline_uv.iter().map(|p| on_card(p, size)).collect();
     if doubled_area(&ring) < 0.0 {
         ring.reverse();
     }
+    let [w, h] = size;
     while let Some((least, area)) = least_corner(&ring) {
-        if ring.len() <= MOST_CORNERS && area > LEAST_CORNER * w * h {
+        if ring.len() <= MAX_CORNERS && area > MIN_CORNER_AREA_RATIO * w * h {
             break;
         }
         ring.remove(least);
@@ -31,18 +29,23 @@ pub(super) fn prism(outline_uv: &[Point2<f64>], [w, h]: [f64; 2]) -> Vec<[f64; 2
     if ring.len() < 3 { Vec::new() } else { ring }
 }
 
-/// Twice the area of a corner's triangle below which it is straight, as a share of the card's area.
-const LEAST_CORNER: f64 = 1e-6;
+/// A point of the texture in the plane of its card, metres.
+fn on_card(p: &Point2<f64>, [w, h]: [f64; 2]) -> [f64; 2] {
+    [
+        (p.x.clamp(0.0, 1.0) - 0.5) * w,
+        (0.5 - p.y.clamp(0.0, 1.0)) * h,
+    ]
+}
 
 /// The corner whose triangle with its neighbours is least, and twice the area of that.
 fn least_corner(ring: &[[f64; 2]]) -> Option<(usize, f64)> {
     (0..ring.len())
-        .map(|i| (i, turn(ring, i)))
+        .map(|i| (i, doubled_corner_area(ring, i)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Twice the area of the triangle of a corner and its neighbours; above 0 where the ring turns left.
-pub(super) fn turn(ring: &[[f64; 2]], i: usize) -> f64 {
+pub(super) fn doubled_corner_area(ring: &[[f64; 2]], i: usize) -> f64 {
     let [a, b, c] = [i + ring.len() - 1, i, i + 1].map(|i| ring[i % ring.len()]);
     (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 }
@@ -76,15 +79,18 @@ mod tests {
     #[test]
     fn a_prism_turns_left_at_each_of_its_few_corners() {
         for outline in [circle(40, true), circle(40, false), circle(5, true)] {
-            let ring = prism(&outline, [0.2, 0.08]);
-            assert_eq!(ring.len(), outline.len().min(MOST_CORNERS));
-            assert!((0..ring.len()).all(|i| turn(&ring, i) > 0.0), "{ring:?}");
+            let ring = prism_outline(&outline, [0.2, 0.08]);
+            assert_eq!(ring.len(), outline.len().min(MAX_CORNERS));
+            assert!(
+                (0..ring.len()).all(|i| doubled_corner_area(&ring, i) > 0.0),
+                "{ring:?}"
+            );
         }
     }
 
     #[test]
     fn an_octagon_in_an_ellipse_keeps_nine_tenths_of_its_area() {
-        let area = doubled_area(&prism(&circle(40, true), [0.2, 0.08])) / 2.0;
+        let area = doubled_area(&prism_outline(&circle(40, true), [0.2, 0.08])) / 2.0;
         let whole = std::f64::consts::PI * 0.1 * 0.04;
         // A regular octagon has 2 sqrt 2 / pi of its circle.
         assert!((0.85..=0.901).contains(&(area / whole)), "{}", area / whole);
@@ -101,8 +107,8 @@ mod tests {
             p(1.0, 1.0),
             p(0.0, 1.0),
         ];
-        assert_eq!(prism(&square, [2.0, 2.0]).len(), 4);
-        assert!(prism(&[], [1.0, 1.0]).is_empty());
-        assert!(prism(&[p(0.0, 0.0), p(0.5, 0.5), p(1.0, 1.0)], [1.0, 1.0]).is_empty());
+        assert_eq!(prism_outline(&square, [2.0, 2.0]).len(), 4);
+        assert!(prism_outline(&[], [1.0, 1.0]).is_empty());
+        assert!(prism_outline(&[p(0.0, 0.0), p(0.5, 0.5), p(1.0, 1.0)], [1.0, 1.0]).is_empty());
     }
 }

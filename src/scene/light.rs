@@ -1,4 +1,4 @@
-//! Lights and exposure as a scene tells them.
+//! Lights and exposure as a scene gives them.
 
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ pub struct AreaLight {
     /// Power, watts.
     pub power: f64,
     /// Colour, scene-linear. Default: white.
-    #[serde(default = "white")]
+    #[serde(default = "default_color")]
     pub color: LinearRgb,
 }
 
@@ -68,7 +68,7 @@ pub enum LightTint {
     Known(LinearRgb),
     /// Found by the `light` stage: that of the surface in the plate, to the power of `share`.
     MatchSurface {
-        /// 0 keeps white light, 1 takes the surface for grey.
+        /// 0 keeps white light, 1 treats the surface as grey.
         share: f64,
     },
 }
@@ -80,7 +80,7 @@ impl Default for LightTint {
 }
 
 impl LightTint {
-    /// Nothing is changed.
+    /// Whether it changes nothing.
     pub fn is_white(&self) -> bool {
         *self == Self::default()
     }
@@ -92,6 +92,6 @@ impl Default for Exposure {
     }
 }
 
-fn white() -> LinearRgb {
+fn default_color() -> LinearRgb {
     LinearRgb::WHITE
 }

@@ -1,6 +1,6 @@
 //! The pipeline stage: a scene's camera becomes known.
 
-use crate::camera::{Label, SolveOptions, solve};
+use crate::camera::{Camera, Label, SolveOptions, solve};
 use crate::error::Result;
 use crate::scene::{CameraSource, Scene};
 
@@ -21,14 +21,19 @@ pub fn locate(scene: Scene) -> Result<Scene> {
     };
     let mut label = Label::new(photo, corners_px, scene.surface.size);
     label.camera.focal_px = focal_px;
-    let solution = solve(&label, &SolveOptions::default())?.fitting()?;
-    for warning in &solution.warnings {
-        log::info!("{}: {warning}", scene.plate);
-    }
+    let camera = solve_camera(&label, &scene.plate)?.resized(scene.image);
     Ok(Scene {
-        camera: CameraSource::Known(solution.camera.resized(scene.image)),
+        camera: CameraSource::Known(camera),
         ..scene
     })
+}
+
+fn solve_camera(label: &Label, plate: &str) -> Result<Camera> {
+    let solution = solve(label, &SolveOptions::default())?.fitting()?;
+    for warning in &solution.warnings {
+        log::info!("{plate}: {warning}");
+    }
+    Ok(solution.camera)
 }
 
 #[cfg(test)]
@@ -60,6 +65,8 @@ mod tests {
             exposure: Exposure::default(),
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

@@ -1,48 +1,80 @@
-//! Scene: everything an author says of one picture, unknowns included.
+//! Scene: everything that is known of one picture, unknowns included.
 //!
 //! A [`Scene`] is plain data that reads and writes as TOML or JSON; any generator may write one and enter the pipeline
 //! here. What is not known yet is an enum variant ([`CameraSource::Rectangle`], [`Placement::Drop`],
 //! [`Exposure::MatchPlate`]); the stages `camera`, `settle` and `light` each turn their own unknown into the known one
 //! and leave the rest alone. [`Scene::resolve`] gives a [`Shot`], which has no unknowns. A [`Recipe`] draws scenes.
+//!
+//! # Examples
+//! A scene is drawn from a recipe, and is a pure function of it, the seed and the number:
+//! ```
+//! use petcomp::scene::{AssetVariant, Background, CameraSource, Recipe};
+//!
+//! let recipe: Recipe = toml::from_str("objects = 3\ngrade = { hue_deg = 0 }")?;
+//! let tray = Background {
+//!     name: "tray".into(),
+//!     size: [0.6, 0.4],
+//!     camera: CameraSource::Rectangle {
+//!         corners_px: [[20.0, 40.0], [620.0, 40.0], [620.0, 440.0], [20.0, 440.0]],
+//!         photo: [640, 480],
+//!         focal_px: None,
+//!     },
+//! };
+//! let bottle = AssetVariant {
+//!     asset: "bottle".into(),
+//!     photo_sizes: vec![[0.2, 0.07]],
+//!     photo_outlines: vec![],
+//!     thickness: 0.005,
+//!     mass: 0.03,
+//! };
+//! let (backgrounds, catalog) = ([tray], [bottle]);
+//! let scene = recipe.scene(7, 0, &backgrounds, &catalog)?;
+//! assert_eq!(scene.objects.len(), 3);
+//! assert_eq!(scene, recipe.scene(7, 0, &backgrounds, &catalog)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub(crate) mod bounds;
+mod catalog;
 mod check;
 pub mod cycles;
 mod draw;
 mod environment;
 mod fall;
-mod finish;
+mod files;
 mod hull;
 mod light;
-mod limit;
 mod locate;
 mod placement;
+mod post_process;
 mod range;
 mod recipe;
 mod resolve;
 mod shot;
 mod stack;
-mod stock;
+mod take;
 mod variation;
 
+pub use catalog::{AssetVariant, Background, catalog};
 pub use draw::{Distribution, DrawLog, Drawn, Draws};
 pub(crate) use environment::turned;
 pub use environment::{Environment, EnvironmentMap, EnvironmentRanges};
 pub use fall::{SettleMode, SettleOptions};
 #[cfg(feature = "settle")]
 pub(crate) use fall::{half_extent, level};
-pub use finish::{Finish, FinishRanges, Noise, white_balance};
+pub(crate) use files::relative_to_file;
+pub use files::{SceneFiles, SceneSettings};
 pub use light::{AreaLight, Exposure, LightShape, LightTint};
-pub use limit::Limit;
 pub use locate::locate;
 pub use placement::{Grade, Object, Placement};
+pub use post_process::{Noise, PostProcess, PostProcessRanges, white_balance};
 pub use range::Range;
-pub use recipe::{Background, Choice, Collider, GradeRanges, LightRanges, Recipe, Selections};
-pub use resolve::{CATCHER, Look};
+pub use recipe::{Collider, GradeRanges, LightRanges, Recipe, Selections};
+pub use resolve::{Appearance, CATCHER_RATIO};
 pub use shot::{Card, Shot};
-pub use stack::Start;
-pub use stock::stock;
-pub use variation::{Ablation, Source};
+pub use stack::DropRanges;
+pub use take::Take;
+pub use variation::{Ablation, Variation};
 
 use crate::camera::Camera;
 use crate::pixel::LinearRgb;
@@ -80,8 +112,14 @@ pub struct Scene {
     #[serde(default, skip_serializing_if = "LightTint::is_white")]
     pub cast: LightTint,
     /// What happens to the finished frame.
-    #[serde(default, skip_serializing_if = "Finish::is_nothing")]
-    pub finish: Finish,
+    #[serde(default, skip_serializing_if = "PostProcess::is_identity")]
+    pub finish: PostProcess,
+    /// Where the files that it names lie; without it a recipe says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub files: Option<SceneFiles>,
+    /// How its picture and labels are made, where no recipe is given.
+    #[serde(default, skip_serializing_if = "SceneSettings::is_empty")]
+    pub settings: SceneSettings,
 }
 
 impl Scene {
@@ -94,7 +132,7 @@ impl Scene {
             environment: None,
             exposure: Exposure::Ev(0.0),
             cast: LightTint::default(),
-            finish: Finish::default(),
+            finish: PostProcess::default(),
             ..self
         }
     }
@@ -107,8 +145,8 @@ pub struct Surface {
     /// Width (along x) and height (along y), metres.
     pub size: [f64; 2],
     /// Coefficient of friction of everything that touches here, the cards among themselves too; the walls over the edges,
-    /// which nobody sees, are smooth. Default: 0.5.
-    #[serde(default = "Surface::usual_friction")]
+    /// which are invisible, are smooth. Default: 0.5.
+    #[serde(default = "Surface::default_friction")]
     pub friction: f64,
     /// Share of the speed that a bounce gives back, 0 to 1. Default: 0.
     #[serde(default)]
@@ -116,17 +154,17 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// A surface of this width and height (metres), with the usual friction and no bounce.
+    /// A surface of this width and height (metres), with the default friction and no bounce.
     pub const fn new(size: [f64; 2]) -> Self {
         Self {
             size,
-            friction: Self::usual_friction(),
+            friction: Self::default_friction(),
             restitution: 0.0,
         }
     }
 
     /// Between plastics, and between plastic and wood: 0.2 to 0.6 in tables.
-    const fn usual_friction() -> f64 {
+    const fn default_friction() -> f64 {
         0.5
     }
 }

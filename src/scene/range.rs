@@ -1,4 +1,4 @@
-//! What a recipe says instead of a number.
+//! A range of numbers, as recipes have it in place of a number.
 
 use crate::bounds::{Bounds, number};
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// In files `[min, max]`, or one number for a quantity that does not vary.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Written", into = "Written")]
+#[serde(from = "RangeInFile", into = "RangeInFile")]
 pub struct Range {
     /// Smallest value.
     pub min: f64,
@@ -19,21 +19,21 @@ pub struct Range {
 
 #[derive(Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected a number or [min, max]")]
-enum Written {
+enum RangeInFile {
     Fixed(f64),
     Between([f64; 2]),
 }
 
-impl From<Written> for Range {
-    fn from(written: Written) -> Self {
+impl From<RangeInFile> for Range {
+    fn from(written: RangeInFile) -> Self {
         match written {
-            Written::Fixed(x) => Self::fixed(x),
-            Written::Between([min, max]) => Self::new(min, max),
+            RangeInFile::Fixed(x) => Self::fixed(x),
+            RangeInFile::Between([min, max]) => Self::new(min, max),
         }
     }
 }
 
-impl From<Range> for Written {
+impl From<Range> for RangeInFile {
     fn from(range: Range) -> Self {
         if range.min == range.max {
             Self::Fixed(range.min)
@@ -54,7 +54,7 @@ impl Range {
         Self { min: x, max: x }
     }
 
-    /// Its middle: what it is where it is not to vary.
+    /// Its middle: the value where it is not to vary.
     pub fn middle(&self) -> Self {
         Self::fixed((self.min + self.max) / 2.0)
     }
@@ -66,7 +66,7 @@ impl Range {
         value
     }
 
-    /// The whole number at a path, every one of `min..=max` equally likely.
+    /// The integer at a path, every one of `min..=max` equally likely.
     pub fn draw_count(&self, draws: &Draws, path: &str) -> usize {
         let count = self.min as usize + draws.below(path, (self.max - self.min) as usize + 1);
         draws.note(
@@ -87,16 +87,12 @@ impl Range {
             return Ok(());
         }
         let found = format!("[{}, {}]", number(min), number(max));
-        Err(Error::value(
-            at,
-            format!(
-                "{found}, expected [min, max] within {bounds}{}",
-                bounds.question(max)
-            ),
-        ))
+        let question = bounds.question(max);
+        let what = format!("{found}, expected [min, max] within {bounds}{question}");
+        Err(Error::value(at, what))
     }
 
-    /// Fails unless both ends are whole numbers within bounds.
+    /// Fails unless both ends are integers within bounds.
     pub(crate) fn check_count(&self, at: &str, bounds: &Bounds) -> Result<()> {
         self.check(at, bounds)?;
         if self.min.fract() == 0.0 && self.max.fract() == 0.0 {
@@ -104,7 +100,7 @@ impl Range {
         }
         Err(Error::value(
             at,
-            format!("[{}, {}], expected whole numbers", self.min, self.max),
+            format!("[{}, {}], expected integers", self.min, self.max),
         ))
     }
 }
@@ -172,7 +168,7 @@ mod tests {
         );
         assert!(Range::fixed(f64::NAN).check("scale", &scale).is_err());
         let said = told(Range::new(1.0, 2.5).check_count("objects", &scale));
-        assert_eq!(said, "objects: [1, 2.5], expected whole numbers");
+        assert_eq!(said, "objects: [1, 2.5], expected integers");
         let gap = Range::new(5.0, 20.0).check("gap", &Bounds::metres(0.0, 1.0, ""));
         assert_eq!(
             told(gap),

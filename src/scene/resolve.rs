@@ -12,12 +12,13 @@ use crate::scene::{
 };
 use std::sync::Arc;
 
-/// Shadows fall on the plane of the surface as far as this many times its sides: the extent of the reference scenes.
-pub const CATCHER: f64 = 3.0;
+/// Extent of the plane that shadows fall on, as a multiple of the surface's sides: that of the
+/// reference scenes.
+pub const CATCHER_RATIO: f64 = 3.0;
 
 /// What an object looks like: all that a shot needs from its asset.
 #[derive(Clone, Debug)]
-pub struct Look {
+pub struct Appearance {
     /// Index into the class list.
     pub class: u32,
     /// The cut-out, premultiplied, scene-linear.
@@ -31,17 +32,19 @@ pub struct Look {
 impl Scene {
     /// The shot that this scene describes, once nothing is unknown in it.
     ///
-    /// `look` finds an object's asset and photo, or nothing; for a library that is [`Look::of`]. `plate` is the background at the picture's
-    /// size; none leaves it transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id `i + 1`; the shadow catcher is the plane of the
-    /// labelled surface, [`CATCHER`] times as large.
+    /// `look` finds an object's asset and photo, or nothing; for a library that is
+    /// [`Appearance::from_library`]. `plate` is the background at the picture's size; none leaves it
+    /// transparent. `panorama` is the picture that the scene's environment names. Object `i` gets id
+    /// `i + 1`; the shadow catcher is the plane of the labelled surface, [`CATCHER_RATIO`] times as
+    /// large.
     ///
     /// # Errors
-    /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an impossible value
-    /// ([`check`](Self::check)); an asset or photo that `look` does not find; a plate of another size; an environment
-    /// without its picture.
+    /// The first unknown that is left (`objects[3].placement: still falling; settle it first`); an
+    /// impossible value ([`check`](Self::check)); an asset or photo that `look` does not find; a plate
+    /// of another size; an environment without its picture.
     pub fn resolve(
         &self,
-        look: impl Fn(&Object) -> Option<Look>,
+        look: impl Fn(&Object) -> Option<Appearance>,
         plate: Option<Arc<Image<LinearRgb>>>,
         panorama: Option<Arc<Panorama>>,
     ) -> Result<Shot> {
@@ -52,63 +55,62 @@ impl Scene {
         if let Some(plate) = &plate {
             self.check_plate(plate)?;
         }
-        let card = |(i, object): (usize, &Object)| {
-            let world_from_card = at_rest(i, object)?;
-            let look = look(object).ok_or_else(|| missing(i, object))?;
-            Ok(Card {
-                id: ObjectId(id(i)?),
-                class: look.class,
-                quad: Quad {
-                    world_from_card,
-                    size: object.size,
-                },
-                texture: look.texture,
-                back: look.back,
-                outline_uv: look.outline_uv,
-                grade: object.grade,
-            })
-        };
-        let cards = self
-            .objects
-            .iter()
-            .enumerate()
-            .map(card)
-            .collect::<Result<_>>()?;
         Ok(Shot {
             camera,
             plate,
-            catcher: self.surface.size.map(|side| CATCHER * side),
-            cards,
-            lights: self
-                .lights
-                .iter()
-                .map(|light| AreaLight {
-                    color: light.color * cast,
-                    ..*light
-                })
-                .collect(),
+            catcher: self.surface.size.map(|side| CATCHER_RATIO * side),
+            cards: self.cards(look)?,
+            lights: self.tinted_lights(cast),
             ambient: self.ambient * cast,
             environment: self.environment_map(panorama)?,
             exposure,
         })
     }
 
+    fn cards(&self, look: impl Fn(&Object) -> Option<Appearance>) -> Result<Vec<Card>> {
+        let numbered = self.objects.iter().enumerate();
+        numbered
+            .map(|(i, object)| {
+                let world_from_card = rest_pose(i, object)?;
+                let look = look(object).ok_or_else(|| unknown_asset(i, object))?;
+                Ok(Card {
+                    id: ObjectId(object_id(i)?),
+                    class: look.class,
+                    quad: Quad {
+                        world_from_card,
+                        size: object.size,
+                    },
+                    texture: look.texture,
+                    back: look.back,
+                    outline_uv: look.outline_uv,
+                    grade: object.grade,
+                })
+            })
+            .collect()
+    }
+
+    fn tinted_lights(&self, tint: LinearRgb) -> Vec<AreaLight> {
+        let tinted = |light: &AreaLight| AreaLight {
+            color: light.color * tint,
+            ..*light
+        };
+        self.lights.iter().map(tinted).collect()
+    }
+
     fn environment_map(&self, panorama: Option<Arc<Panorama>>) -> Result<Option<EnvironmentMap>> {
         let Some(named) = self.environment.as_ref().filter(|named| named.shines()) else {
             return Ok(None);
         };
-        let missing = || {
+        let panorama = panorama.ok_or_else(|| {
             Error::value(
                 "environment.file",
-                format!("\"{}\", but its picture is not at hand", named.file),
+                format!("\"{}\", but its picture was not given", named.file),
             )
-        };
-        let panorama = panorama.ok_or_else(missing)?;
-        let (rotation, strength) = (named.rotation_deg.to_radians(), named.strength as f32);
+        })?;
         Ok(Some(EnvironmentMap {
             panorama,
-            rotation,
-            strength,
+            rotation: named.rotation_deg.to_radians(),
+            strength: named.strength as f32,
         }))
     }
 
@@ -157,20 +159,18 @@ impl Scene {
 
     fn check_plate(&self, plate: &Image<LinearRgb>) -> Result<()> {
         let (w, h) = plate.size();
-        if (w, h) == (self.image[0] as usize, self.image[1] as usize) {
+        let [width, height] = self.image;
+        if (w, h) == (width as usize, height as usize) {
             return Ok(());
         }
         Err(Error::value(
             "plate",
-            format!(
-                "{w} x {h} pixels, expected {} x {}",
-                self.image[0], self.image[1]
-            ),
+            format!("{w} x {h} pixels, expected {width} x {height}"),
         ))
     }
 }
 
-fn at_rest(i: usize, object: &Object) -> Result<Pose> {
+fn rest_pose(i: usize, object: &Object) -> Result<Pose> {
     match object.placement {
         Placement::At(pose) => Ok(pose),
         Placement::Drop { .. } => Err(Error::value(
@@ -180,7 +180,7 @@ fn at_rest(i: usize, object: &Object) -> Result<Pose> {
     }
 }
 
-fn missing(i: usize, object: &Object) -> Error {
+fn unknown_asset(i: usize, object: &Object) -> Error {
     let what = format!(
         "\"{}\", photo {}, expected one that the library has",
         object.asset, object.photo
@@ -188,7 +188,7 @@ fn missing(i: usize, object: &Object) -> Error {
     Error::value(format!("objects[{i}].asset"), what)
 }
 
-fn id<T: TryFrom<usize>>(i: usize) -> Result<T> {
+fn object_id<T: TryFrom<usize>>(i: usize) -> Result<T> {
     T::try_from(i + 1).map_err(|_| Error::value(format!("objects[{i}]"), "more objects than ids"))
 }
 
@@ -232,13 +232,15 @@ mod tests {
             exposure: Exposure::Ev(1.0),
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 
-    fn look(object: &Object) -> Option<Look> {
+    fn look(object: &Object) -> Option<Appearance> {
         let texture = Texture::from(Image::filled(2, 2, PremulRgba::default()));
         let outline_uv: Arc<[Point2<f64>]> = Arc::from([Point2::new(0.0, 0.0)]);
-        (object.asset == "b1").then_some(Look {
+        (object.asset == "b1").then_some(Appearance {
             class: 3,
             texture,
             back: None,
@@ -261,7 +263,7 @@ mod tests {
         );
         assert_eq!(
             (shot.exposure, shot.catcher, shot.cards[0].class),
-            (2.0, [0.4, 0.3].map(|side| CATCHER * side), 3)
+            (2.0, [0.4, 0.3].map(|side| CATCHER_RATIO * side), 3)
         );
     }
 

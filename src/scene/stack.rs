@@ -8,15 +8,15 @@ use crate::scene::{Draws, Object, Placement, Range, SettleOptions, Surface};
 use nalgebra::Unit;
 use serde::{Deserialize, Serialize};
 
-/// Times that a card which does not fit between the walls is turned anew.
-const TURNS: u32 = 64;
-/// What a card may be longer than the way between walls, as a share: rounding.
-const ROUNDING: f64 = 1e-12;
+/// Times that the direction of a card is drawn until it fits between the walls.
+const MAX_YAW_DRAWS: u32 = 64;
+/// How much longer than the space between the walls a card may be, as a share: rounding.
+const FIT_TOLERANCE: f64 = 1e-12;
 
 /// How objects start: each over the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Start {
+pub struct DropRanges {
     /// Position along the surface's width: -1 at the left wall, 1 at the right one, 0 in the middle. Default: `[-1, 1]`.
     pub x: Range,
     /// Position along the surface's height: -1 at the lower wall, 1 at the upper one. Default: `[-1, 1]`.
@@ -31,7 +31,7 @@ pub struct Start {
     pub gap: Range,
 }
 
-impl Default for Start {
+impl Default for DropRanges {
     fn default() -> Self {
         Self {
             x: Range::new(-1.0, 1.0),
@@ -44,7 +44,7 @@ impl Default for Start {
     }
 }
 
-impl Start {
+impl DropRanges {
     /// What an object has before it is stacked.
     pub(super) fn unplaced() -> Placement {
         Placement::Drop {
@@ -65,19 +65,22 @@ impl Start {
 }
 
 /// The column over a surface that objects are stacked in.
-pub(super) struct Column<'a> {
-    /// Name of the place, for messages.
-    pub(super) place: &'a str,
+pub(super) struct DropColumn<'a> {
+    /// Name of the background, for messages.
+    pub(super) background: &'a str,
     pub(super) surface: Surface,
-    pub(super) start: &'a Start,
+    pub(super) start: &'a DropRanges,
     pub(super) options: &'a SettleOptions,
     pub(super) draws: &'a Draws<'a>,
 }
 
-impl Column<'_> {
-    /// Places objects one over the other: between the walls over the edges of the surface, with a gap under each.
+impl DropColumn<'_> {
+    /// Places objects one over the other: between the walls over the edges of the surface, with a gap
+    /// under each.
     ///
-    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents as they are turned.
+    /// Gaps are between the bodies that fall ([`SettleOptions::half_body`]), by their true extents as
+    /// they are turned.
+    ///
     /// # Errors
     /// An object that fits between the walls in no direction.
     pub(super) fn stack(&self, objects: &mut [Object]) -> Result<()> {
@@ -85,21 +88,15 @@ impl Column<'_> {
         for (i, object) in objects.iter_mut().enumerate() {
             let path = format!("objects[{i}].start");
             let half = self.options.half_body(object);
-            let fitting = self.fitting_rotation(&half, &path);
-            let rotation = fitting.ok_or_else(|| {
-                Error::value(
-                    format!("objects[{i}].size"),
-                    too_large(&object.asset, object.size, self.place, self.surface.size),
-                )
+            let rotation = self.fitting_rotation(&half, &path).ok_or_else(|| {
+                Error::value(format!("objects[{i}].size"), self.fit_problem(object))
             })?;
             let extent = half_extent(&rotation, &half);
-            let x = self.start.x.draw(self.draws, &format!("{path}.x"));
-            let y = self.start.y.draw(self.draws, &format!("{path}.y"));
-            let [free_x, free_y] = free(self.surface.size, &extent);
-            let height = top + self.start.gap.draw(self.draws, &format!("{path}.gap")) + extent.z;
+            let above = self.draw_position(&extent, &path);
+            let height = top + self.draw(&self.start.gap, &path, "gap") + extent.z;
             top = height + extent.z;
             object.placement = Placement::Drop {
-                above: [x * free_x, y * free_y],
+                above,
                 height,
                 rotation,
             };
@@ -107,43 +104,60 @@ impl Column<'_> {
         Ok(())
     }
 
-    /// The first turn drawn with which the body fits between the walls, tilted as it starts and level as it may end: what
-    /// starts across a room that is too narrow for it never lies down there. Where none does, one that fits level.
-    fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
-        let mut drawn = (0..TURNS).map(|turn| self.rotation(path, turn));
-        let fits = |rotation: &UnitQuaternion<f64>| fits(self.surface.size, half, rotation);
-        drawn
-            .find(|rotation| fits(rotation) && fits(&level(rotation)))
-            .or_else(|| {
-                let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
-                (!turns.is_empty())
-                    .then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
-            })
+    fn draw(&self, range: &Range, path: &str, name: &str) -> f64 {
+        range.draw(self.draws, &format!("{path}.{name}"))
     }
 
-    /// First a turn about the vertical, the `turn`-th drawn for this object, then the tilt.
-    fn rotation(&self, path: &str, turn: u32) -> UnitQuaternion<f64> {
-        let radians = |range: &Range, name: &str| {
-            range
-                .draw(self.draws, &format!("{path}.{name}"))
-                .to_radians()
-        };
-        let yaw_name = if turn == 0 {
+    /// A point of the surface over which a body of this half extent is between the walls.
+    fn draw_position(&self, extent: &Vector3<f64>, path: &str) -> [f64; 2] {
+        let x = self.draw(&self.start.x, path, "x");
+        let y = self.draw(&self.start.y, path, "y");
+        let [free_x, free_y] = free_offsets(self.surface.size, extent);
+        [x * free_x, y * free_y]
+    }
+
+    fn fit_problem(&self, object: &Object) -> String {
+        let room = self.surface.size;
+        too_large(&object.asset, object.size, self.background, room)
+    }
+
+    /// The first rotation drawn with which the body fits between the walls, tilted as it starts and
+    /// level as it may end: what starts across a room that is too narrow for it never lies down there.
+    /// Where none does, one that fits level.
+    fn fitting_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
+        let room = self.surface.size;
+        (0..MAX_YAW_DRAWS)
+            .map(|number| self.draw_rotation(path, number))
+            .find(|rotation| fits(room, half, rotation) && fits(room, half, &level(rotation)))
+            .or_else(|| self.draw_level_rotation(half, path))
+    }
+
+    /// One of the level rotations with which the body fits, if there is any.
+    fn draw_level_rotation(&self, half: &Vector3<f64>, path: &str) -> Option<UnitQuaternion<f64>> {
+        let turns: Vec<_> = self.start.level_turns(self.surface.size, half).collect();
+        (!turns.is_empty()).then(|| turns[self.draws.choose(&format!("{path}.turn"), turns.len())])
+    }
+
+    /// First a turn about the vertical, drawn for this object for the `number`-th time, then the tilt.
+    fn draw_rotation(&self, path: &str, number: u32) -> UnitQuaternion<f64> {
+        let yaw_name = if number == 0 {
             "yaw_deg".into()
         } else {
-            format!("yaw_deg#{turn}")
+            format!("yaw_deg#{number}")
         };
-        let yaw = UnitQuaternion::from_axis_angle(
-            &Vector3::z_axis(),
-            radians(&self.start.yaw_deg, &yaw_name),
-        );
-        let towards = radians(&self.start.tilt_axis_deg, "tilt_axis_deg");
+        let yaw = self.draw(&self.start.yaw_deg, path, &yaw_name).to_radians();
+        let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw);
+        let towards = self.draw(&self.start.tilt_axis_deg, path, "tilt_axis_deg");
+        let towards = towards.to_radians();
         let axis = Unit::new_unchecked(Vector3::new(libm::cos(towards), libm::sin(towards), 0.0));
-        UnitQuaternion::from_axis_angle(&axis, radians(&self.start.tilt_deg, "tilt_deg")) * yaw
+        let tilt = self
+            .draw(&self.start.tilt_deg, path, "tilt_deg")
+            .to_radians();
+        UnitQuaternion::from_axis_angle(&axis, tilt) * yaw
     }
 }
 
-impl Start {
+impl DropRanges {
     /// Whether a card of this size, as thick as it may be, fits between walls in some direction that it may start in.
     pub(super) fn has_room(&self, surface: [f64; 2], [w, h]: [f64; 2]) -> bool {
         self.level_turns(surface, &(Vector3::new(w, h, 0.0) / 2.0))
@@ -151,7 +165,8 @@ impl Start {
             .is_some()
     }
 
-    /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the range.
+    /// Turns of a level body that fits between the walls so: of whole degrees, and the ends of the
+    /// range.
     fn level_turns(
         &self,
         surface: [f64; 2],
@@ -161,36 +176,37 @@ impl Start {
         let whole = (0..360)
             .map(move |i| min.ceil() + f64::from(i))
             .take_while(move |degrees| *degrees < max);
-        let turn = |degrees: f64| {
-            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
-        };
         [min, max]
             .into_iter()
             .chain(whole)
-            .map(turn)
+            .map(level_turn)
             .filter(move |rotation| fits(surface, half, rotation))
     }
 }
 
+fn level_turn(degrees: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), degrees.to_radians())
+}
+
 /// How far from the middle an object of this half extent may be, in both directions.
-fn free(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
+fn free_offsets(surface: [f64; 2], extent: &Vector3<f64>) -> [f64; 2] {
     [0, 1].map(|axis| surface[axis] / 2.0 - extent[axis])
 }
 
 /// Whether a body turned so fits between the walls.
 fn fits(surface: [f64; 2], half: &Vector3<f64>, rotation: &UnitQuaternion<f64>) -> bool {
-    let free = free(surface, &half_extent(rotation, half));
+    let free = free_offsets(surface, &half_extent(rotation, half));
     free.iter()
         .zip(surface)
-        .all(|(free, side)| *free >= -ROUNDING * side)
+        .all(|(free, side)| *free >= -FIT_TOLERANCE * side)
 }
 
-/// What is wrong with a card that fits nowhere.
-pub(super) fn too_large(asset: &str, card: [f64; 2], place: &str, room: [f64; 2]) -> String {
+/// The message for a card that fits nowhere.
+pub(super) fn too_large(asset: &str, card: [f64; 2], background: &str, room: [f64; 2]) -> String {
+    let ([w, h], [room_w, room_h]) = (card, room);
     format!(
-        "\"{asset}\", {:.3} x {:.3} m, does not fit between the walls of \"{place}\", {:.3} x {:.3} m: expected a smaller \
-         object (scene.scale) or a larger surface",
-        card[0], card[1], room[0], room[1]
+        "\"{asset}\", {w:.3} x {h:.3} m, does not fit between the walls of \"{background}\", \
+         {room_w:.3} x {room_h:.3} m: expected a smaller object (scene.scale) or a larger surface"
     )
 }
 
@@ -200,7 +216,7 @@ mod tests {
     use crate::scene::Grade;
 
     fn cards(n: usize, size: [f64; 2]) -> Vec<Object> {
-        let placement = Start::unplaced();
+        let placement = DropRanges::unplaced();
         let card = |i: usize| Object {
             asset: format!("b{i}"),
             photo: 0,
@@ -215,10 +231,10 @@ mod tests {
         (0..n).map(card).collect()
     }
 
-    fn stacked(k: u64, start: &Start, mut objects: Vec<Object>) -> Result<Vec<Object>> {
+    fn stacked(k: u64, start: &DropRanges, mut objects: Vec<Object>) -> Result<Vec<Object>> {
         let (surface, options) = (Surface::new([0.4, 0.3]), SettleOptions::default());
-        Column {
-            place: "tray",
+        DropColumn {
+            background: "tray",
             surface,
             start,
             options: &options,
@@ -249,9 +265,9 @@ mod tests {
     #[test]
     fn every_card_starts_wholly_above_the_one_before_it() {
         for k in 0..50 {
-            let tilted = Start {
+            let tilted = DropRanges {
                 tilt_deg: Range::new(0.0, 90.0),
-                ..Start::default()
+                ..DropRanges::default()
             };
             let objects = stacked(k, &tilted, cards(12, [0.2, 0.08])).unwrap();
             let mut top = 0.0;
@@ -270,7 +286,7 @@ mod tests {
     #[test]
     fn every_card_starts_between_the_walls() {
         for k in 0..200 {
-            for corner in stacked(k, &Start::default(), cards(5, [0.25, 0.2]))
+            for corner in stacked(k, &DropRanges::default(), cards(5, [0.25, 0.2]))
                 .unwrap()
                 .iter()
                 .flat_map(corners)
@@ -286,13 +302,13 @@ mod tests {
     #[test]
     fn a_card_that_fits_one_way_only_is_turned_until_it_fits() {
         for k in 0..50 {
-            stacked(k, &Start::default(), cards(3, [0.39, 0.1])).unwrap();
+            stacked(k, &DropRanges::default(), cards(3, [0.39, 0.1])).unwrap();
         }
     }
 
     #[test]
     fn a_card_that_fits_no_way_is_told() {
-        let told = stacked(0, &Start::default(), cards(2, [0.5, 0.31]))
+        let told = stacked(0, &DropRanges::default(), cards(2, [0.5, 0.31]))
             .unwrap_err()
             .to_string();
         let expected = "objects[0].size: \"b0\", 0.500 x 0.310 m, does not fit between the walls of \"tray\", 0.400 x 0.300 m: \
@@ -314,7 +330,7 @@ mod tests {
     #[test]
     fn a_card_longer_than_the_room_is_wide_does_not_start_across_it() {
         for k in 0..200 {
-            for object in stacked(k, &Start::default(), cards(5, [0.31, 0.1])).unwrap() {
+            for object in stacked(k, &DropRanges::default(), cards(5, [0.31, 0.1])).unwrap() {
                 let half = lying(&object);
                 assert!(
                     half.x <= 0.2 + 1e-12 && half.y <= 0.15 + 1e-12,
@@ -328,7 +344,7 @@ mod tests {
     fn a_card_as_long_as_the_room_starts_level_and_along_it() {
         for k in 0..20 {
             // So wide that it does not fit along the diagonal, which a narrow one does.
-            let objects = stacked(k, &Start::default(), cards(3, [0.4, 0.28])).unwrap();
+            let objects = stacked(k, &DropRanges::default(), cards(3, [0.4, 0.28])).unwrap();
             objects
                 .iter()
                 .for_each(|object| assert!((lying(object).x - 0.2).abs() < 1e-12));
@@ -337,9 +353,9 @@ mod tests {
                 .flat_map(corners)
                 .for_each(|c| assert!(c.x.abs() <= 0.2 + 1e-12, "scene {k}: {c}"));
         }
-        let one_way = Start {
+        let one_way = DropRanges {
             yaw_deg: Range::fixed(30.0),
-            ..Start::default()
+            ..DropRanges::default()
         };
         assert!(stacked(0, &one_way, cards(1, [0.4, 0.28])).is_err());
         assert!(

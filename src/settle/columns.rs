@@ -1,7 +1,8 @@
-//! Falls of what cannot touch, apart from each other.
+//! Falls of objects that cannot touch, separate from each other.
 //!
-//! Cards in columns of their own fall in worlds of their own; a card that has a column to itself needs none. That is
-//! checked afterwards: where the rooms that two columns passed through overlap, they fall again, together.
+//! Cards in columns of their own fall in worlds of their own; a card that has a column to itself
+//! needs none. That is checked afterwards: where the spaces that two columns swept overlap, they
+//! fall again, together.
 
 use super::level;
 use super::world::{Drop, Fall};
@@ -9,7 +10,7 @@ use crate::error::Result;
 use crate::scene::{Scene, SettleOptions};
 
 /// Objects that fall together, and how that ended.
-struct Column {
+struct FallenColumn {
     members: Vec<usize>,
     fall: Fall,
 }
@@ -19,74 +20,85 @@ struct Column {
 /// # Errors
 /// As [`Drop::fall`].
 pub(super) fn fall(drop: &Drop) -> Result<Fall> {
-    let columns = level::columns(drop.scene, drop.options);
-    let mut columns: Vec<Column> = columns
+    let mut columns: Vec<FallenColumn> = level::columns(drop.scene, drop.options)
         .into_iter()
-        .map(|members| Column::of(drop, members))
+        .map(|members| FallenColumn::drop_members(drop, members))
         .collect::<Result<_>>()?;
-    while let Some((i, j)) = first_that_meet(&columns) {
+    while let Some((i, j)) = first_colliding_pair(&columns) {
         let mut members = columns.swap_remove(j).members;
         members.append(&mut columns[i].members);
         members.sort_unstable();
-        columns[i] = Column::of(drop, members)?;
+        columns[i] = FallenColumn::drop_members(drop, members)?;
     }
-    Ok(together(columns))
+    Ok(merge_columns(columns))
 }
 
-impl Column {
-    fn of(drop: &Drop, members: Vec<usize>) -> Result<Self> {
-        let closed = match members[..] {
-            [i] => alone(drop.scene, drop.options, i),
+impl FallenColumn {
+    fn drop_members(drop: &Drop, members: Vec<usize>) -> Result<Self> {
+        let closed_form = match members[..] {
+            [i] => fall_alone(drop.scene, drop.options, i),
             _ => None,
         };
-        let fall = closed.map_or_else(|| drop.fall(&members), Ok)?;
-        Ok(Self { fall, members })
+        let fall = closed_form.map_or_else(|| drop.fall(&members), Ok)?;
+        Ok(Self { members, fall })
     }
 }
 
-fn alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> {
-    let pose = level::alone(scene, options, i)?;
-    let reach = options.half_body(&scene.objects[i]).norm();
-    let [x, y] = [pose.translation.x, pose.translation.y];
-    let swept = [x, y].map(|at| [at - reach, at + reach]);
+/// The fall of a card that can touch nothing; none where it may.
+fn fall_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Fall> {
+    let pose = level::rest_alone(scene, options, i)?;
+    let radius = options.half_body(&scene.objects[i]).norm();
+    let center = [pose.translation.x, pose.translation.y];
     Some(Fall {
         poses: vec![pose],
         rests: true,
-        swept,
+        swept: center.map(|at| [at - radius, at + radius]),
         ..Fall::default()
     })
 }
 
-/// The first two columns whose rooms overlap, in order. What is not a number overlaps all.
-fn first_that_meet(columns: &[Column]) -> Option<(usize, usize)> {
-    let apart = |a: &Fall, b: &Fall| {
-        (0..2).any(|i| a.swept[i][1] < b.swept[i][0] || b.swept[i][1] < a.swept[i][0])
-    };
+/// The first two columns, in order, whose swept spaces overlap; NaN overlaps everything.
+fn first_colliding_pair(columns: &[FallenColumn]) -> Option<(usize, usize)> {
     let mut pairs = (0..columns.len()).flat_map(|i| (i + 1..columns.len()).map(move |j| (i, j)));
-    pairs.find(|&(i, j)| !apart(&columns[i].fall, &columns[j].fall))
+    pairs.find(|&(i, j)| !are_apart(&columns[i].fall, &columns[j].fall))
 }
 
-fn together(columns: Vec<Column>) -> Fall {
+fn are_apart(a: &Fall, b: &Fall) -> bool {
+    (0..2).any(|i| a.swept[i][1] < b.swept[i][0] || b.swept[i][1] < a.swept[i][0])
+}
+
+fn merge_columns(columns: Vec<FallenColumn>) -> Fall {
     let mut all = Fall {
         rests: true,
         ..Fall::default()
     };
     let mut poses = Vec::new();
-    for Column { members, fall } in columns {
-        poses.extend(members.into_iter().zip(fall.poses));
-        all.rests &= fall.rests;
-        all.seconds = all.seconds.max(fall.seconds);
-        all.energy_rise = all.energy_rise.max(fall.energy_rise);
-        all.samples.extend(fall.samples);
+    for FallenColumn { members, mut fall } in columns {
+        poses.extend(members.into_iter().zip(std::mem::take(&mut fall.poses)));
+        all.absorb(fall);
     }
     poses.sort_by_key(|(i, _)| *i);
     all.poses = poses.into_iter().map(|(_, pose)| pose).collect();
-    all.samples.sort_by(|a, b| {
-        a.seconds
-            .total_cmp(&b.seconds)
-            .then(a.object.cmp(&b.object))
-    });
+    all.sort_samples();
     all
+}
+
+impl Fall {
+    /// Takes in how another fall went, apart from its poses.
+    fn absorb(&mut self, other: Self) {
+        self.rests &= other.rests;
+        self.seconds = self.seconds.max(other.seconds);
+        self.energy_rise = self.energy_rise.max(other.energy_rise);
+        self.samples.extend(other.samples);
+    }
+
+    /// By time, then by id.
+    fn sort_samples(&mut self) {
+        self.samples.sort_by(|a, b| {
+            let by_time = a.seconds.total_cmp(&b.seconds);
+            by_time.then(a.object.cmp(&b.object))
+        });
+    }
 }
 
 #[cfg(test)]
@@ -107,7 +119,7 @@ mod tests {
             options,
             heights,
             sample_every: 0,
-            finer: 0,
+            halvings: 0,
             allowance,
         }
     }

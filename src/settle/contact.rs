@@ -4,6 +4,9 @@ use super::overlap::{Solid, Touch};
 use crate::geom::Vector3;
 use nalgebra::Vector2;
 
+/// Direction cosine up to which `x` is far enough from a direction to span the plane across it.
+const MAX_HELPER_COSINE: f64 = 0.6;
+
 /// A point where a body is pushed.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
@@ -11,15 +14,16 @@ pub(super) struct Contact {
     pub(super) body: usize,
     /// The body that pushes back; none where it is the floor or a wall.
     pub(super) by: Option<usize>,
-    /// Where.
+    /// Position, metres.
     pub(super) point: Vector3<f64>,
     /// Unit vector that it is pushed along.
     pub(super) normal: Vector3<f64>,
-    /// Nothing slides along it for free: anything but a wall.
+    /// Whether there is friction: everywhere but at a wall.
     pub(super) rough: bool,
 }
 
-/// All contacts of bodies that fell: with the room, and of the pairs that touch; what is nearer than `reach` (metres) does.
+/// All contacts of bodies that fell: with the room, and of the pairs that touch. What is nearer than
+/// `reach` (metres) touches.
 pub(super) fn contacts(
     solids: &[Solid],
     touching: &[Touch],
@@ -27,27 +31,28 @@ pub(super) fn contacts(
     reach: f64,
 ) -> Vec<Contact> {
     let fell = (0..solids.len()).filter(|&i| solids[i].falls);
-    let with_room = fell.flat_map(|i| with_room(i, &solids[i], surface, reach));
-    with_room
-        .chain(
-            touching
-                .iter()
-                .flat_map(|touch| of_pair(solids, touch, reach)),
-        )
-        .collect()
+    let with_room = fell.flat_map(|i| room_contacts(i, &solids[i], surface, reach));
+    let with_bodies = touching
+        .iter()
+        .flat_map(|touch| pair_contacts(solids, touch, reach));
+    with_room.chain(with_bodies).collect()
 }
 
-/// Contacts with the floor and the walls.
-fn with_room(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> Vec<Contact> {
+/// The floor and the walls over a surface: normals into the room, and their distances along them.
+fn room_planes(surface: [f64; 2]) -> [(Vector3<f64>, f64); 5] {
     let [x, y] = surface.map(|side| side / 2.0);
-    let planes = [
+    [
         (Vector3::z(), 0.0),
         (Vector3::x(), -x),
         (-Vector3::x(), -x),
         (Vector3::y(), -y),
         (-Vector3::y(), -y),
-    ];
-    let at = |(normal, plane): (Vector3<f64>, f64)| {
+    ]
+}
+
+/// Contacts with the floor and the walls.
+fn room_contacts(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> Vec<Contact> {
+    let at_plane = |(normal, plane): (Vector3<f64>, f64)| {
         let touching = solid
             .corners()
             .filter(move |corner| corner.dot(&normal) - plane < reach);
@@ -59,38 +64,45 @@ fn with_room(body: usize, solid: &Solid, surface: [f64; 2], reach: f64) -> Vec<C
             rough: normal.z > 0.0,
         })
     };
-    planes.into_iter().flat_map(at).collect()
+    room_planes(surface)
+        .into_iter()
+        .flat_map(at_plane)
+        .collect()
 }
 
-/// Contacts of two bodies: the corners of what their faces, edges or corners that are turned to each other share.
-fn of_pair(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
-    let Touch {
-        pair: [i, j],
-        towards,
-        ..
-    } = *touch;
-    let (a, b) = (&solids[i], &solids[j]);
-    let (u, v) = across(&towards);
-    let [near_a, near_b] =
-        [(a, towards), (b, -towards)].map(|(solid, towards)| nearest(solid, &towards, reach));
+/// Contacts of two bodies, of which the higher one is pushed.
+fn pair_contacts(solids: &[Solid], touch: &Touch, reach: f64) -> Vec<Contact> {
+    let [body, by] = touch.pair;
+    let points = shared_points(&solids[body], &solids[by], &touch.towards, reach);
+    points
+        .into_iter()
+        .map(|point| Contact {
+            body,
+            by: Some(by),
+            point,
+            normal: -touch.towards,
+            rough: true,
+        })
+        .collect()
+}
+
+/// The corners of what the faces, edges or corners of two bodies that are turned to each other
+/// share, halfway between the bodies; `towards` is the direction from the first to the second.
+fn shared_points(a: &Solid, b: &Solid, towards: &Vector3<f64>, reach: f64) -> Vec<Vector3<f64>> {
+    let near_a = NearestCorners::new(a, towards, reach);
+    let near_b = NearestCorners::new(b, &-towards, reach);
     let height = (near_a.height - near_b.height) / 2.0;
-    let [ring_a, ring_b] = [near_a, near_b]
-        .map(|near| hull(near.corners.iter().map(|p| [p.dot(&u), p.dot(&v)].into())));
-    let shared = shared(&ring_a, &ring_b, reach);
-    let point = |p: Vector2<f64>| u * p.x + v * p.y + towards * height;
-    let contact = |p| Contact {
-        body: i,
-        by: Some(j),
-        point: point(p),
-        normal: -towards,
-        rough: true,
-    };
-    shared.into_iter().map(contact).collect()
+    let (u, v) = perpendicular_axes(towards);
+    let shared = shared_corners(&near_a.ring(&u, &v), &near_b.ring(&u, &v), reach);
+    shared
+        .into_iter()
+        .map(|p| u * p.x + v * p.y + towards * height)
+        .collect()
 }
 
 /// Two unit vectors across another one.
-pub(super) fn across(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let helper = if direction.x.abs() < 0.6 {
+pub(super) fn perpendicular_axes(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let helper = if direction.x.abs() < MAX_HELPER_COSINE {
         Vector3::x()
     } else {
         Vector3::y()
@@ -99,25 +111,32 @@ pub(super) fn across(direction: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (u, direction.cross(&u))
 }
 
-/// What of a body lies farthest in a direction.
-struct Nearest {
+/// The corners of a body that lie farthest in a direction.
+struct NearestCorners {
     /// How far that is.
     height: f64,
     corners: Vec<Vector3<f64>>,
 }
 
-/// The corners that lie farthest in a direction, to `reach`.
-fn nearest(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Nearest {
-    let height = solid
-        .corners()
-        .map(|corner| corner.dot(towards))
-        .fold(f64::NEG_INFINITY, f64::max);
-    Nearest {
-        height,
-        corners: solid
+impl NearestCorners {
+    /// Those of a body, to within `reach`.
+    fn new(solid: &Solid, towards: &Vector3<f64>, reach: f64) -> Self {
+        let height = solid
             .corners()
-            .filter(|corner| corner.dot(towards) > height - reach)
-            .collect(),
+            .map(|corner| corner.dot(towards))
+            .fold(f64::NEG_INFINITY, f64::max);
+        let near = solid
+            .corners()
+            .filter(|corner| corner.dot(towards) > height - reach);
+        Self {
+            height,
+            corners: near.collect(),
+        }
+    }
+
+    /// Their convex hull in the plane of two axes.
+    fn ring(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Vec<Vector2<f64>> {
+        convex_hull(self.corners.iter().map(|p| [p.dot(u), p.dot(v)].into()))
     }
 }
 
@@ -130,32 +149,34 @@ fn turn(a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>) -> f64 {
 ///
 /// # Method
 /// Andrew 1979: the lower and the upper chain of the points in order of x.
-fn hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
+fn convex_hull(points: impl Iterator<Item = Vector2<f64>>) -> Vec<Vector2<f64>> {
     let mut points: Vec<Vector2<f64>> = points.collect();
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
     if points.len() < 3 {
         return points;
     }
-    let chain = |points: &mut dyn Iterator<Item = &Vector2<f64>>| {
-        let mut chain: Vec<Vector2<f64>> = Vec::new();
-        for p in points {
-            while chain.len() > 1
-                && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], p) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(*p);
+    let lower = hull_chain(points.iter());
+    [lower, hull_chain(points.iter().rev())].concat()
+}
+
+/// The chain of a hull along sorted points, without its last one, where the other chain begins.
+fn hull_chain<'a>(points: impl Iterator<Item = &'a Vector2<f64>>) -> Vec<Vector2<f64>> {
+    let mut chain: Vec<Vector2<f64>> = Vec::new();
+    for p in points {
+        while let [.., a, b] = chain[..]
+            && turn(&a, &b, p) <= 0.0
+        {
+            chain.pop();
         }
-        chain.pop();
-        chain
-    };
-    let lower = chain(&mut points.iter());
-    [lower, chain(&mut points.iter().rev())].concat()
+        chain.push(*p);
+    }
+    chain.pop();
+    chain
 }
 
 /// Corners of what two convex rings share, each widened by `reach`.
-fn shared(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vector2<f64>> {
+fn shared_corners(a: &[Vector2<f64>], b: &[Vector2<f64>], reach: f64) -> Vec<Vector2<f64>> {
     let of_a = a.iter().filter(|p| is_near(p, b, reach));
     let of_b = b.iter().filter(|p| is_near(p, a, reach));
     let crossings = sides(a).flat_map(|s| sides(b).filter_map(move |t| crossing(s, t)));
@@ -175,11 +196,14 @@ fn sides(ring: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> {
 /// Whether a point lies in a ring, or outside by `reach` at most.
 fn is_near(p: &Vector2<f64>, ring: &[Vector2<f64>], reach: f64) -> bool {
     let inside = ring.len() > 2 && sides(ring).all(|[a, b]| turn(&a, &b, p) >= 0.0);
-    let beside = |[a, b]: [Vector2<f64>; 2]| {
-        let along = (b - a).dot(&(p - a)) / (b - a).norm_squared();
-        (a + (b - a) * along.clamp(0.0, 1.0) - p).norm() <= reach
-    };
-    inside || sides(ring).any(beside) || ring.iter().any(|corner| (corner - p).norm() <= reach)
+    inside
+        || sides(ring).any(|side| distance_to_side(p, side) <= reach)
+        || ring.iter().any(|corner| (corner - p).norm() <= reach)
+}
+
+fn distance_to_side(p: &Vector2<f64>, [a, b]: [Vector2<f64>; 2]) -> f64 {
+    let along = (b - a).dot(&(p - a)) / (b - a).norm_squared();
+    (a + (b - a) * along.clamp(0.0, 1.0) - p).norm()
 }
 
 /// Where two sides cross.
@@ -193,8 +217,8 @@ fn crossing([a, b]: [Vector2<f64>; 2], [c, d]: [Vector2<f64>; 2]) -> Option<Vect
 mod tests {
     use super::*;
     use crate::geom::{Pose, UnitQuaternion};
-    use crate::settle::overlap::touching;
-    use crate::settle::rectangle;
+    use crate::settle::bodies::rectangle;
+    use crate::settle::overlap::touching_pairs;
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     const ROOM: [f64; 2] = [1.0, 1.0];
@@ -213,7 +237,7 @@ mod tests {
     }
 
     fn all(solids: &[Solid]) -> Vec<Contact> {
-        contacts(solids, &touching(solids, REACH), ROOM, REACH)
+        contacts(solids, &touching_pairs(solids, REACH), ROOM, REACH)
     }
 
     /// Contacts of two plates with each other, the second over the first.
@@ -324,7 +348,7 @@ mod tests {
 
     #[test]
     fn a_hull_goes_round_once_and_leaves_out_what_is_inside() {
-        let of = |points: &[[f64; 2]]| hull(points.iter().map(|&p| p.into())).len();
+        let of = |points: &[[f64; 2]]| convex_hull(points.iter().map(|&p| p.into())).len();
         assert_eq!(
             of(&[
                 [0.0, 0.0],

@@ -1,20 +1,17 @@
-//! Symmetric matrices of which only what lies near the diagonal is not zero.
+//! Symmetric matrices that are zero away from the diagonal.
 
 /// The lower half of a symmetric matrix: of each row what lies from its first entry to the diagonal.
 #[derive(Clone, Debug)]
-pub(super) struct Envelope {
+pub(super) struct EnvelopeMatrix {
     first: Vec<usize>,
     rows: Vec<Vec<f64>>,
 }
 
-impl Envelope {
+impl EnvelopeMatrix {
     /// Zeros, with room from each row's first entry.
-    pub(super) fn new(first: Vec<usize>) -> Self {
-        let rows = first
-            .iter()
-            .enumerate()
-            .map(|(i, first)| vec![0.0; i + 1 - first])
-            .collect();
+    pub(super) fn zeros(first: Vec<usize>) -> Self {
+        let lengths = first.iter().enumerate().map(|(i, first)| i + 1 - first);
+        let rows = lengths.map(|length| vec![0.0; length]).collect();
         Self { first, rows }
     }
 
@@ -30,19 +27,28 @@ impl Envelope {
     pub(super) fn solve(mut self, mut b: Vec<f64>) -> Vec<f64> {
         for i in 0..self.rows.len() {
             self.factor_row(i);
-            let (from, diagonal) = (self.first[i], self.rows[i][i - self.first[i]]);
-            b[i] = (b[i] - dot(&self.rows[i][..i - from], &b[from..i])) / diagonal;
+            self.substitute_forward(i, &mut b);
         }
         for i in (0..self.rows.len()).rev() {
-            let (from, row) = (self.first[i], &self.rows[i]);
-            b[i] /= row[i - from];
-            let x = b[i];
-            b[from..i]
-                .iter_mut()
-                .zip(row)
-                .for_each(|(b, entry)| *b -= entry * x);
+            self.substitute_backward(i, &mut b);
         }
         b
+    }
+
+    fn substitute_forward(&self, i: usize, b: &mut [f64]) {
+        let from = self.first[i];
+        let (entries, diagonal) = self.rows[i].split_at(i - from);
+        b[i] = (b[i] - dot(entries, &b[from..i])) / diagonal[0];
+    }
+
+    fn substitute_backward(&self, i: usize, b: &mut [f64]) {
+        let from = self.first[i];
+        let (entries, diagonal) = self.rows[i].split_at(i - from);
+        b[i] /= diagonal[0];
+        let x = b[i];
+        for (b, entry) in b[from..i].iter_mut().zip(entries) {
+            *b -= entry * x;
+        }
     }
 
     fn factor_row(&mut self, i: usize) {
@@ -50,33 +56,29 @@ impl Envelope {
         let (above, rest) = self.rows.split_at_mut(i);
         let row = &mut rest[0];
         for j in from..i {
-            let start = from.max(self.first[j]);
+            let first = self.first[j];
+            let start = from.max(first);
             let known = dot(
                 &row[start - from..j - from],
-                &above[j][start - self.first[j]..j - self.first[j]],
+                &above[j][start - first..j - first],
             );
-            row[j - from] = (row[j - from] - known) / above[j][j - self.first[j]];
+            row[j - from] = (row[j - from] - known) / above[j][j - first];
         }
         let (entries, diagonal) = row.split_at_mut(i - from);
-        diagonal[0] = (diagonal[0] - dot(entries, entries))
-            .max(f64::MIN_POSITIVE)
-            .sqrt();
+        let square = diagonal[0] - dot(entries, entries);
+        diagonal[0] = square.max(f64::MIN_POSITIVE).sqrt();
     }
 }
 
 /// In four sums, which processors add at once.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
-    let (fours, rest) = (a.chunks_exact(4).zip(b.chunks_exact(4)), a.len() / 4 * 4);
-    for (a, b) in fours {
+    for (a, b) in a.chunks_exact(4).zip(b.chunks_exact(4)) {
         (0..4).for_each(|k| sums[k] += a[k] * b[k]);
     }
-    sums.iter().sum::<f64>()
-        + a[rest..]
-            .iter()
-            .zip(&b[rest..])
-            .map(|(a, b)| a * b)
-            .sum::<f64>()
+    let whole = a.len() / 4 * 4;
+    let rest = a[whole..].iter().zip(&b[whole..]);
+    sums.iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
 }
 
 #[cfg(test)]
@@ -92,7 +94,7 @@ mod tests {
         let first: Vec<usize> = (0..n)
             .map(|i| draws.below(&format!("first[{i}]"), i + 1))
             .collect();
-        let mut a = Envelope::new(first.clone());
+        let mut a = EnvelopeMatrix::zeros(first.clone());
         let mut whole = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in first[i]..=i {

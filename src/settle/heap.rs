@@ -1,11 +1,23 @@
 //! Heaps to measure the stage on.
 
 use crate::error::Result;
-use crate::scene::{Background, CameraSource, Choice, Range, Recipe, Scene, Start};
+use crate::scene::{AssetVariant, Background, CameraSource, Range, Recipe, Scene};
+
+/// Assets in the catalog that heaps are drawn from.
+const CATALOG_SIZE: usize = 20;
 
 /// Cards of 200 x 70 and 190 x 80 mm, 2 to 11 mm thick, over a surface of 0.6 x 0.4 m: scene `k`.
 pub fn heap(k: u64, cards: usize) -> Result<Scene> {
-    let tray = Background {
+    let recipe = Recipe {
+        objects: Range::fixed(cards as f64),
+        ..Recipe::default()
+    };
+    let catalog: Vec<AssetVariant> = (0..CATALOG_SIZE).map(bottle).collect();
+    recipe.scene(0, k, &[tray()], &catalog)
+}
+
+fn tray() -> Background {
+    Background {
         name: "tray".into(),
         size: [0.6, 0.4],
         camera: CameraSource::Rectangle {
@@ -13,20 +25,18 @@ pub fn heap(k: u64, cards: usize) -> Result<Scene> {
             photo: [60, 40],
             focal_px: None,
         },
-    };
-    let choice = |i: usize| Choice {
+    }
+}
+
+/// One of ten thicknesses and masses.
+fn bottle(i: usize) -> AssetVariant {
+    AssetVariant {
         asset: format!("b{i}"),
         photo_sizes: vec![[0.2, 0.07], [0.19, 0.08]],
         photo_outlines: vec![],
         thickness: 0.002 + 0.001 * (i % 10) as f64,
         mass: 0.02 + 0.002 * (i % 10) as f64,
-    };
-    let recipe = Recipe {
-        objects: Range::fixed(cards as f64),
-        start: Start::default(),
-        ..Recipe::default()
-    };
-    recipe.scene(0, k, &[tray], &(0..20).map(choice).collect::<Vec<_>>())
+    }
 }
 
 /// An octagon that touches the middle half of each side of its card.

@@ -1,60 +1,68 @@
 //! Rest without physics: cards that lie level.
 //!
-//! A card that falls alone onto the bare surface ends level where it began, turned as it was; that needs no
-//! simulation. The same closed form, each card on top of the highest one it meets, is the `flat` mode.
+//! A card that falls alone onto the bare surface ends level where it began, turned as it was; that
+//! needs no simulation. The same closed form, each card on top of the highest one it meets, is the
+//! `flat` mode.
 
-use super::overlap::{Solid, depth, past_walls};
-use super::{rectangle, solids};
+use super::bodies::{rectangle, solids};
+use super::overlap::{Solid, falling_from_lowest, overlap_depth, past_walls};
 use crate::allowance::Allowance;
 use crate::error::Result;
 use crate::geom::{Pose, UnitQuaternion};
 use crate::scene::{Object, Placement, Scene, SettleOptions, level};
 
-/// Where a card comes to rest that falls alone onto the bare surface, clear of the walls and of all that already lies
-/// there; none if it may touch anything.
-pub(super) fn alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Pose> {
-    let bodies = leveled(scene, options);
+/// Where a card comes to rest that falls alone onto the bare surface, clear of the walls and of all
+/// that already lies there; none if it may touch anything.
+pub(super) fn rest_alone(scene: &Scene, options: &SettleOptions, i: usize) -> Option<Pose> {
+    let bodies = leveled_solids(scene, options);
     let straight_down = options.gravity[..2] == [0.0; 2];
     let meets = bodies
         .iter()
-        .any(|other| !other.falls && reach_each_other(&bodies[i], other));
+        .any(|other| !other.falls && can_touch(&bodies[i], other));
     let squeezed = past_walls(&bodies[i], scene.surface.size)
         .iter()
         .any(|&d| d > 0.0);
-    (straight_down && !meets && !squeezed).then(|| rested_on(&bodies[i], 0.0))
+    (straight_down && !meets && !squeezed).then(|| rest_on(&bodies[i], 0.0))
 }
 
-/// The falling objects, in groups that stand in columns of their own: however they turn in place, no card can touch one
-/// of another group.
+/// The falling objects, in groups that stand in columns of their own: however they turn in place, no
+/// card can touch one of another group.
 pub(super) fn columns(scene: &Scene, options: &SettleOptions) -> Vec<Vec<usize>> {
-    let bodies = leveled(scene, options);
+    let bodies = leveled_solids(scene, options);
     let mut columns: Vec<Vec<usize>> = Vec::new();
     for i in (0..bodies.len()).filter(|&i| bodies[i].falls) {
-        let meets = |column: &Vec<usize>| {
-            column
-                .iter()
-                .any(|&j| reach_each_other(&bodies[i], &bodies[j]))
-        };
-        let (joined, mut apart): (Vec<_>, Vec<_>) = columns.into_iter().partition(meets);
-        let mut column: Vec<usize> = joined.into_iter().flatten().chain([i]).collect();
-        column.sort_unstable();
-        apart.push(column);
-        columns = apart;
+        columns = with_member(columns, i, |j| can_touch(&bodies[i], &bodies[j]));
     }
     columns.sort();
     columns
 }
 
-/// Whether two bodies may touch, seen from above, however they turn in place.
-fn reach_each_other(a: &Solid, b: &Solid) -> bool {
+/// The columns with one more member, those that it meets joined into one.
+fn with_member(
+    columns: Vec<Vec<usize>>,
+    i: usize,
+    meets: impl Fn(usize) -> bool,
+) -> Vec<Vec<usize>> {
+    let (joined, mut apart): (Vec<_>, Vec<_>) = columns
+        .into_iter()
+        .partition(|column: &Vec<usize>| column.iter().any(|&j| meets(j)));
+    let mut column: Vec<usize> = joined.into_iter().flatten().chain([i]).collect();
+    column.sort_unstable();
+    apart.push(column);
+    apart
+}
+
+/// Whether two bodies can touch, as seen from above, however they turn in place.
+fn can_touch(a: &Solid, b: &Solid) -> bool {
     (a.center() - b.center()).xy().norm() < a.half.norm() + b.half.norm()
 }
 
-/// Everything level on the surface, in the order of the heights it starts from, each on top of the highest it meets.
+/// Everything level on the surface, in the order of the heights it starts from, each on top of the
+/// highest it meets.
 ///
-/// Cards that already are at rest count as the upright boxes around them. A card that reaches through a wall is moved in.
-///
-/// The poses of the objects that fall, in their order. Work is each object and each that it is laid on or beside.
+/// Cards that already are at rest are treated as the upright boxes around them. A card that reaches
+/// through a wall is moved in. The result is the poses of the objects that fall, in their order. Work
+/// is each object and each that it is laid on or beside.
 ///
 /// # Errors
 /// [`Allowance::take`].
@@ -63,50 +71,46 @@ pub(super) fn flat(
     options: &SettleOptions,
     allowance: &Allowance,
 ) -> Result<Vec<Pose>> {
-    let mut bodies = leveled(scene, options);
-    let mut lying: Vec<Solid> = bodies
-        .iter()
-        .filter(|solid| !solid.falls)
-        .map(upright_box)
-        .collect();
-    let mut order: Vec<usize> = (0..bodies.len()).filter(|&i| bodies[i].falls).collect();
-    order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
-    for i in order {
+    let mut bodies = leveled_solids(scene, options);
+    let at_rest = bodies.iter().filter(|solid| !solid.falls);
+    let mut lying: Vec<Solid> = at_rest.map(upright_box).collect();
+    for i in falling_from_lowest(&bodies) {
         allowance.take(1 + lying.len() as u64)?;
-        let solid = moved_in(&bodies[i], scene.surface.size);
-        let below = lying.iter().filter(|other| footprints_meet(&solid, other));
-        let bottom = below
-            .map(|other| other.center().z + other.half.z)
-            .fold(0.0, f64::max);
-        bodies[i].world_from_body = rested_on(&solid, bottom);
+        let solid = moved_inside(&bodies[i], scene.surface.size);
+        bodies[i].world_from_body = rest_on(&solid, top_below(&solid, &lying));
         lying.push(bodies[i].clone());
     }
-    Ok(bodies
-        .iter()
-        .filter(|solid| solid.falls)
-        .map(|solid| solid.world_from_body)
-        .collect())
+    let fallen = bodies.iter().filter(|solid| solid.falls);
+    Ok(fallen.map(|solid| solid.world_from_body).collect())
+}
+
+/// Height of the highest body that lies under one; 0 is the surface.
+fn top_below(solid: &Solid, lying: &[Solid]) -> f64 {
+    let below = lying.iter().filter(|other| footprints_meet(solid, other));
+    below
+        .map(|other| other.center().z + other.half.z)
+        .fold(0.0, f64::max)
 }
 
 /// The bodies, those that fall turned level where they start.
-fn leveled(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
-    let pose = |object: &Object| match object.placement {
+fn leveled_solids(scene: &Scene, options: &SettleOptions) -> Vec<Solid> {
+    let poses: Vec<Pose> = scene.objects.iter().map(leveled_pose).collect();
+    solids(scene, options, &poses)
+}
+
+fn leveled_pose(object: &Object) -> Pose {
+    match object.placement {
         Placement::At(pose) => pose,
         Placement::Drop {
             above: [x, y],
             height,
             rotation,
         } => Pose::from_parts([x, y, height].into(), level(&rotation)),
-    };
-    solids(
-        scene,
-        options,
-        &scene.objects.iter().map(pose).collect::<Vec<_>>(),
-    )
+    }
 }
 
-/// The pose with its underside at this height; that of a card at rest as it is.
-fn rested_on(solid: &Solid, bottom: f64) -> Pose {
+/// The pose with its underside at this height; that of a card at rest is unchanged.
+fn rest_on(solid: &Solid, bottom: f64) -> Pose {
     let mut pose = solid.world_from_body;
     if solid.falls {
         pose.translation.z = bottom + solid.half.z;
@@ -114,7 +118,7 @@ fn rested_on(solid: &Solid, bottom: f64) -> Pose {
     pose
 }
 
-fn moved_in(solid: &Solid, surface: [f64; 2]) -> Solid {
+fn moved_inside(solid: &Solid, surface: [f64; 2]) -> Solid {
     let mut moved = solid.clone();
     for (axis, past) in past_walls(solid, surface).into_iter().enumerate() {
         let at = &mut moved.world_from_body.translation.vector[axis];
@@ -133,25 +137,27 @@ fn upright_box(solid: &Solid) -> Solid {
 
 /// Whether two level bodies overlap as seen from above.
 fn footprints_meet(a: &Solid, b: &Solid) -> bool {
-    let grounded = |solid: &Solid| {
-        let mut down = solid.clone();
-        down.world_from_body.translation.z = 0.0;
-        down
-    };
-    depth(&grounded(a), &grounded(b)) > 0.0
+    overlap_depth(&grounded(a), &grounded(b)) > 0.0
+}
+
+/// A body brought to the height of the surface.
+fn grounded(solid: &Solid) -> Solid {
+    let mut down = solid.clone();
+    down.world_from_body.translation.z = 0.0;
+    down
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geom::Vector3;
-    use crate::settle::overlap::{deepest, touching};
+    use crate::settle::overlap::{deepest, touching_pairs};
     use crate::settle::tests::{dropped, falling};
 
     #[test]
     fn a_card_alone_rests_level_where_it_fell() {
         let scene = falling(&[([0.05, -0.02], 0.3)]);
-        let pose = alone(&scene, &SettleOptions::default(), 0).unwrap();
+        let pose = rest_alone(&scene, &SettleOptions::default(), 0).unwrap();
         let half = SettleOptions::default().half_body(&scene.objects[0]).z;
         assert!((pose.translation.vector - Vector3::new(0.05, -0.02, half)).norm() < 1e-15);
     }
@@ -179,14 +185,16 @@ mod tests {
             SettleOptions::default(),
         );
         // Its middle is over the surface, but it would reach through a wall.
-        assert!(alone(&scene, &options, 0).is_none() && alone(&scene, &options, 1).is_some());
+        assert!(
+            rest_alone(&scene, &options, 0).is_none() && rest_alone(&scene, &options, 1).is_some()
+        );
         let tilted = SettleOptions {
             gravity: [1.0, 0.0, -9.0],
             ..options
         };
-        assert!(alone(&scene, &tilted, 1).is_none());
+        assert!(rest_alone(&scene, &tilted, 1).is_none());
         scene.objects[0].placement = Placement::At(Pose::translation(-0.2, 0.0, 0.01));
-        assert!(alone(&scene, &options, 1).is_none());
+        assert!(rest_alone(&scene, &options, 1).is_none());
     }
 
     #[test]
@@ -201,7 +209,7 @@ mod tests {
                 &flat(&scene, &options, &allowance).unwrap(),
             );
             assert!(allowance.is_spent());
-            assert!(deepest(&lying, &touching(&lying, 0.0), scene.surface.size) < 1e-12);
+            assert!(deepest(&lying, &touching_pairs(&lying, 0.0), scene.surface.size) < 1e-12);
             for (i, solid) in lying.iter().enumerate() {
                 assert!(((solid.world_from_body * Vector3::z()).z.abs() - 1.0).abs() < 1e-12);
                 let bottom = solid.center().z - solid.half.z;

@@ -1,15 +1,41 @@
 //! Settle: dropped objects come to rest on the surface and on each other.
 //!
-//! [`settle`] turns every [`Placement::Drop`] into a [`Placement::At`] and leaves the rest of the scene alone; a scene in
-//! which nothing falls comes back as it is and no physics world is built. Objects fall as thin boxes
-//! ([`SettleOptions::half_body`]) or as convex prisms ([`Object::outline`]), between walls that stand on the edges of the
-//! surface, are smooth and have no top. A card lies in the *middle* plane of its body. Objects that already are at rest are obstacles that
-//! do not move; a card that can touch nothing needs no physics.
+//! [`settle`] turns every [`Placement::Drop`] into a [`Placement::At`] and leaves the rest of the
+//! scene alone; a scene in which nothing falls comes back unchanged and no physics world is built.
+//! Objects fall as thin boxes ([`SettleOptions::half_body`]) or as convex prisms
+//! ([`Object::outline`]), between smooth walls that stand on the edges of the surface and have no
+//! top. A card lies in the *middle* plane of its body. Objects that are at rest already are
+//! obstacles that do not move; a card that can touch nothing needs no physics.
 //!
-//! The result is judged by tests of its own, which share nothing with the physics engine, for overlap and for what holds
-//! each body up, and by its energy; a bad end is tried again from other heights, with shorter steps where bodies sank into
-//! each other. Same scene, same bits: on every machine, at any thread count. Work is counted, and ends ([`Allowance`]).
+//! The result is judged by tests that share nothing with the physics engine: for overlap, for what
+//! supports each body, and by its energy. A failed attempt is repeated from other heights, with
+//! shorter steps where bodies sank into each other. Same scene, same bits: on every machine, at any
+//! thread count. Work is counted and bounded ([`Allowance`]).
+//!
+//! # Examples
+//! A card dropped alone comes to rest flat on the surface, at half its thickness:
+//! ```
+//! use petcomp::scene::{Placement, Scene, SettleOptions};
+//!
+//! let scene: Scene = toml::from_str(
+//!     "image = [640, 480]
+//!     camera = { rectangle = { corners_px = [[20, 40], [620, 40], [620, 440], [20, 440]], photo = [640, 480] } }
+//!     surface = { size = [0.6, 0.4] }
+//!     [[objects]]
+//!     asset = 'bottle'
+//!     size = [0.2, 0.08]
+//!     thickness = 0.005
+//!     mass = 0.03
+//!     placement = { drop = { above = [0.1, 0.0], height = 0.2, rotation = [0, 0, 0, 1] } }",
+//! )?;
+//! let rest = petcomp::settle::settle(scene, &SettleOptions::default())?.into_scene()?;
+//! let Placement::At(pose) = rest.objects[0].placement else { unreachable!() };
+//! assert!((pose.translation.z - 0.0025).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod attempt;
+mod bodies;
 mod columns;
 mod contact;
 mod envelope;
@@ -23,88 +49,118 @@ mod world;
 
 pub use crate::scene::{SettleMode, SettleOptions};
 #[doc(hidden)]
+pub use bodies::typical_length;
+#[doc(hidden)]
 pub use heap::{heap, octagon};
 pub use preview::preview;
-pub use trace::{Sample, csv as trace_csv};
-#[doc(hidden)]
-pub use world::typical_length;
+pub use trace::{MotionSample, csv as trace_csv};
 
 pub use crate::allowance::Allowance;
 use crate::error::{Error, Result};
-use crate::geom::Pose;
-use crate::scene::{Draws, Object, Placement, Scene};
-use overlap::{Solid, Touch};
-use world::{Drop, Fall};
+use crate::scene::{Placement, Scene};
+use attempt::AttemptSeries;
+use bodies::{is_dropped, solids_at_rest, touch_distance};
 
-/// What came of a fall.
+/// The result of dropping a scene's objects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settled {
-    /// The scene at rest; as it was given unless the verdict is [`Verdict::Rested`].
+    /// The scene at rest; as it was given unless the verdict is [`SettleVerdict::Rested`].
     pub scene: Scene,
-    /// How the last try ended.
-    pub verdict: Verdict,
-    /// How the tries before the last one ended; none of them is [`Verdict::Rested`].
-    pub rejected: Vec<Verdict>,
+    /// How the last attempt ended.
+    pub verdict: SettleVerdict,
+    /// How the attempts before the last one ended; none of them is [`SettleVerdict::Rested`].
+    pub rejected: Vec<SettleVerdict>,
     /// Length of the last fall, seconds.
     pub seconds: f64,
     /// Deepest overlap of a dropped body with another body, the floor or a wall at the end, metres.
     pub overlap: f64,
-    /// Most energy that appeared between two steps of the last fall, as a share of what the drop gave away; a drop by less
-    /// than a quarter of a card counts as one by that.
+    /// Largest energy gain between two steps of the last fall, as a share of the energy that the
+    /// drop released; a drop by less than a quarter of a card is treated as one by that much.
     pub energy_rise: f64,
 }
 
 /// How a fall ended.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Verdict {
-    /// Everything lies still, inside the walls, overlapping by no more than is accepted.
+pub enum SettleVerdict {
+    /// Everything lies still, inside the walls, with no more than the accepted overlap.
     Rested,
     /// Something still moved at the time limit.
     TimedOut,
-    /// The centres of these objects (their ids: index + 1) left the walls, the floor, or the numbers.
+    /// The centres of these objects (their ids: index + 1) left the walls or the floor, or are not
+    /// finite.
     Escaped(Vec<usize>),
     /// Bodies overlap by this depth, metres.
     Penetrating(f64),
-    /// Energy appeared between two steps, this share of what the drop gave away: the steps were too long to believe it.
+    /// The energy rose between two steps by this share of what the drop released: the steps were
+    /// too long for the result to be trusted.
     Exploded(f64),
-    /// These objects (their ids) hang in the air: no forces at what they touch hold them, walls being smooth.
+    /// These objects (their ids) are unsupported: no forces at their contacts, with smooth walls,
+    /// hold them in place.
     Hanging(Vec<usize>),
 }
 
 impl Settled {
     /// The scene at rest.
+    ///
     /// # Errors
     /// [`Error::Unsettled`] for every other verdict.
     pub fn into_scene(self) -> Result<Scene> {
-        let what = match self.verdict {
-            Verdict::Rested => return Ok(self.scene),
-            Verdict::TimedOut => format!("something still moves after {:.1} s", self.seconds),
-            Verdict::Escaped(ids) => format!("objects {ids:?} left the surface"),
-            Verdict::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
-            Verdict::Hanging(ids) => format!("objects {ids:?} hang in the air"),
-            Verdict::Exploded(share) => format!(
-                "energy rose by {:.1} % of the drop's in a step",
+        let attempts = self.rejected.len() + 1;
+        match self.verdict {
+            SettleVerdict::Rested => Ok(self.scene),
+            failure => Err(Error::Unsettled {
+                what: format!(
+                    "{}, after {attempts} attempts",
+                    failure.reason(self.seconds)
+                ),
+            }),
+        }
+    }
+
+    /// A scene in which nothing falls.
+    fn unchanged(scene: Scene) -> Self {
+        Self {
+            scene,
+            verdict: SettleVerdict::Rested,
+            rejected: Vec::new(),
+            seconds: 0.0,
+            overlap: 0.0,
+            energy_rise: 0.0,
+        }
+    }
+}
+
+impl SettleVerdict {
+    /// What happened in a fall of this length, in words.
+    fn reason(&self, seconds: f64) -> String {
+        match self {
+            Self::Rested => "everything is at rest".into(),
+            Self::TimedOut => format!("something still moves after {seconds:.1} s"),
+            Self::Escaped(ids) => format!("objects {ids:?} left the surface"),
+            Self::Penetrating(depth) => format!("bodies overlap by {:.2} mm", depth * 1e3),
+            Self::Hanging(ids) => format!("objects {ids:?} are unsupported"),
+            Self::Exploded(share) => format!(
+                "energy rose by {:.1} % of the drop's in one step",
                 share * 100.0
             ),
-        };
-        Err(Error::Unsettled {
-            what: format!("{what}, after {} tries", self.rejected.len() + 1),
-        })
+        }
     }
 }
 
 /// Lets the dropped objects of a scene come to rest.
 ///
-/// A bad end is part of the result, not an error; [`Settled::into_scene`] makes it one.
+/// A failed fall is part of the result, not an error; [`Settled::into_scene`] makes it one.
+///
 /// # Errors
-/// A scene ([`Scene::check`]) or an option that cannot be right; an object that starts outside the walls; more work than
-/// [`SettleOptions::most_work`].
+/// An impossible scene ([`Scene::check`]) or option; an object that starts outside the walls; more
+/// work than [`SettleOptions::most_work`].
 pub fn settle(scene: Scene, options: &SettleOptions) -> Result<Settled> {
     Ok(settle_traced(scene, options, 0)?.0)
 }
 
-/// Lets the dropped objects of a scene come to rest, and tells how the last fall went: a sample of every object in each
-/// `every` steps, ordered by time, then by id; none for `every` 0 and for what needs no simulation.
+/// Lets the dropped objects of a scene come to rest, and records the last fall: a sample of every
+/// object in each `every` steps, ordered by time, then by id; none for `every` 0 and for what needs
+/// no simulation.
 ///
 /// # Errors
 /// As [`settle`].
@@ -112,12 +168,9 @@ pub fn settle_traced(
     scene: Scene,
     options: &SettleOptions,
     every: usize,
-) -> Result<(Settled, Vec<Sample>)> {
+) -> Result<(Settled, Vec<MotionSample>)> {
     settle_within(scene, options, every, &Allowance::new(options.most_work))
 }
-
-/// Times that tries may halve the step of those before.
-const FINEST: u32 = 3;
 
 /// As [`settle_traced`], within an allowance that may be shared with other scenes and stopped.
 ///
@@ -128,98 +181,39 @@ pub fn settle_within(
     options: &SettleOptions,
     every: usize,
     allowance: &Allowance,
-) -> Result<(Settled, Vec<Sample>)> {
+) -> Result<(Settled, Vec<MotionSample>)> {
     scene.check()?;
     options.check()?;
     check_starts(&scene)?;
-    let mut rejected = Vec::new();
     if !scene.objects.iter().any(is_dropped) {
-        let (verdict, seconds, overlap, energy_rise) = (Verdict::Rested, 0.0, 0.0, 0.0);
-        return Ok((
-            Settled {
-                scene,
-                verdict,
-                rejected,
-                seconds,
-                overlap,
-                energy_rise,
-            },
-            Vec::new(),
-        ));
+        return Ok((Settled::unchanged(scene), Vec::new()));
     }
-    let mut finer = 0;
-    loop {
-        let heights = start_heights(&scene, rejected.len());
-        let drop = Drop {
-            scene: &scene,
-            options,
-            heights: &heights,
-            sample_every: every,
-            finer,
-            allowance,
-        };
-        let Fall {
-            poses,
-            rests,
-            seconds,
-            energy_rise,
-            samples,
-            ..
-        } = match options.mode {
-            SettleMode::Fall => columns::fall(&drop)?,
-            SettleMode::Flat => Fall {
-                poses: level::flat(&scene, options, allowance)?,
-                rests: true,
-                ..Fall::default()
-            },
-        };
-        let end = with_poses(scene.clone(), &poses);
-        let (verdict, overlap) = judge(&scene, &end, options, rests, energy_rise);
-        let last = verdict == Verdict::Rested
-            || seconds == 0.0
-            || rejected.len() + 1 >= options.attempts as usize;
-        if last {
-            log::debug!(
-                "settle: {verdict:?} at try {}, {} of work",
-                rejected.len() + 1,
-                allowance.taken()
-            );
-            let scene = if verdict == Verdict::Rested {
-                end
-            } else {
-                scene
-            };
-            return Ok((
-                Settled {
-                    scene,
-                    verdict,
-                    rejected,
-                    seconds,
-                    overlap,
-                    energy_rise,
-                },
-                samples,
-            ));
-        }
-        log::debug!(
-            "settle: try {} ended badly: {verdict:?}",
-            rejected.len() + 1
-        );
-        // What has sunk in needs stiffer contacts, which shorter steps bear; what has gained energy met too hard in one step,
-        // and would again from most heights.
-        let sank = overlap.is_finite() && overlap > most_overlap(&scene, options);
-        finer = (finer + u32::from(sank || matches!(verdict, Verdict::Exploded(_)))).min(FINEST);
-        rejected.push(verdict);
-    }
+    let series = AttemptSeries {
+        scene: &scene,
+        options,
+        sample_every: every,
+        allowance,
+    };
+    let (last, rejected) = series.run()?;
+    let settled = Settled {
+        scene: last.rested.unwrap_or(scene),
+        verdict: last.verdict,
+        rejected,
+        seconds: last.seconds,
+        overlap: last.overlap,
+        energy_rise: last.energy_rise,
+    };
+    Ok((settled, last.samples))
 }
 
-/// Ids (index + 1) of objects that hang in the air at the end of a fall: no forces at what they touch hold them where they
-/// are, walls being smooth.
+/// Ids (index + 1) of objects that are unsupported at the end of a fall: no forces at their
+/// contacts hold them where they are, walls being smooth.
 ///
-/// `before` says which objects fell; the others stand where their author put them and hold what lies on them. None where
-/// they were laid without physics ([`SettleMode::Flat`]).
+/// `before` says which objects fell; the others stand where their author put them and support what
+/// lies on them. None where they were laid without physics ([`SettleMode::Flat`]).
+///
 /// # Errors
-/// A scene or an option that cannot be right; scenes with different numbers of objects.
+/// An impossible scene or option; scenes with different numbers of objects.
 pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result<Vec<usize>> {
     before.check()?;
     after.check()?;
@@ -232,18 +226,11 @@ pub fn hanging(before: &Scene, after: &Scene, options: &SettleOptions) -> Result
         return Ok(Vec::new());
     }
     let bodies = solids_at_rest(before, after, options);
-    Ok(support::hanging(
-        before,
-        options,
-        &bodies,
-        &overlap::touching(&bodies, reach(before)),
-    ))
+    let touching = overlap::touching_pairs(&bodies, touch_distance(before));
+    Ok(support::unsupported(before, options, &bodies, &touching))
 }
 
-fn is_dropped(object: &Object) -> bool {
-    matches!(object.placement, Placement::Drop { .. })
-}
-
+/// Fails on the first object that starts outside the walls.
 fn check_starts(scene: &Scene) -> Result<()> {
     let [w, h] = scene.surface.size;
     for (i, object) in scene.objects.iter().enumerate() {
@@ -251,162 +238,21 @@ fn check_starts(scene: &Scene) -> Result<()> {
             continue;
         };
         if x.abs() > w / 2.0 || y.abs() > h / 2.0 {
-            let what =
-                format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin");
             return Err(Error::value(
                 format!("objects[{i}].placement.drop.above"),
-                what,
+                format!("[{x}, {y}], expected over the surface of {w} x {h} m around the origin"),
             ));
         }
     }
     Ok(())
 }
 
-/// Seed of the heights that are tried after those of the scene.
-const RETRY_SEED: u64 = 0x5e771e;
-/// Most that one card of a stack is raised in another try, as a share of the typical card's length.
-const MOST_RAISE: f64 = 0.1;
-
-/// Heights that a try starts from: first those of the scene; then each object, from the lowest up, is raised by some more
-/// than the one below it, so that what starts apart in height stays apart.
-fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
-    let height = |object: &Object| match object.placement {
-        Placement::Drop { height, .. } => height,
-        Placement::At(pose) => pose.translation.z,
-    };
-    let mut heights: Vec<f64> = scene.objects.iter().map(height).collect();
-    if attempt == 0 {
-        return heights;
-    }
-    let (draws, most) = (
-        Draws::new(RETRY_SEED, attempt as u64),
-        MOST_RAISE * world::typical_length(scene),
-    );
-    let mut order: Vec<usize> = (0..heights.len()).collect();
-    order.sort_by(|&a, &b| heights[a].total_cmp(&heights[b]));
-    let mut raise = 0.0;
-    for i in order {
-        raise += most * draws.unit(&format!("objects[{i}].raise"));
-        heights[i] += raise;
-    }
-    heights
-}
-
-/// The scene with these poses for the objects that fall, in their order.
-fn with_poses(mut scene: Scene, poses: &[Pose]) -> Scene {
-    let falling = scene
-        .objects
-        .iter_mut()
-        .filter(|object| matches!(object.placement, Placement::Drop { .. }));
-    falling
-        .zip(poses)
-        .for_each(|(object, pose)| object.placement = Placement::At(*pose));
-    scene
-}
-
-/// Gap below which bodies at rest touch, as a share of the typical card's longer side: 3 mm for 200 mm. They keep 0.4 mm;
-/// what the engine has put to sleep on its way to a support may lack some more.
-const REACH: f64 = 0.015;
-
-/// The same, metres.
-fn reach(scene: &Scene) -> f64 {
-    REACH * world::typical_length(scene)
-}
-
-/// Deepest overlap that is accepted, metres.
-fn most_overlap(scene: &Scene, options: &SettleOptions) -> f64 {
-    options.max_overlap * world::typical_length(scene)
-}
-
-/// The verdict on a fall, and the deepest overlap at its end.
-fn judge(
-    start: &Scene,
-    end: &Scene,
-    options: &SettleOptions,
-    rests: bool,
-    energy_rise: f64,
-) -> (Verdict, f64) {
-    let bodies = solids_at_rest(start, end, options);
-    let escaped = overlap::outside(&bodies, end.surface.size);
-    if !escaped.is_empty() {
-        return (Verdict::Escaped(escaped), f64::INFINITY);
-    }
-    let touching = overlap::touching(&bodies, reach(start));
-    let depth = overlap::deepest(&bodies, &touching, end.surface.size);
-    let verdict = if !rests {
-        Verdict::TimedOut
-    } else if depth > most_overlap(start, options) {
-        Verdict::Penetrating(depth)
-    } else if energy_rise > options.max_energy_rise {
-        Verdict::Exploded(energy_rise)
-    } else {
-        supported(start, options, &bodies, &touching)
-    };
-    (verdict, depth)
-}
-
-/// Whether bodies that lie still are held by what they lie on. Nothing is asked of what was laid without physics.
-fn supported(
-    start: &Scene,
-    options: &SettleOptions,
-    bodies: &[Solid],
-    touching: &[Touch],
-) -> Verdict {
-    if options.mode == SettleMode::Flat {
-        return Verdict::Rested;
-    }
-    let hanging = support::hanging(start, options, bodies, touching);
-    if hanging.is_empty() {
-        Verdict::Rested
-    } else {
-        Verdict::Hanging(hanging)
-    }
-}
-
-/// The bodies at the end of a fall; those fell that fall at its start.
-fn solids_at_rest(start: &Scene, end: &Scene, options: &SettleOptions) -> Vec<Solid> {
-    let pose = |object: &Object| match object.placement {
-        Placement::At(pose) => pose,
-        Placement::Drop {
-            above: [x, y],
-            height,
-            rotation,
-        } => Pose::from_parts([x, y, height].into(), rotation),
-    };
-    solids(
-        start,
-        options,
-        &end.objects.iter().map(pose).collect::<Vec<_>>(),
-    )
-}
-
-/// The bodies that stand for the objects at these poses, one for each object.
-fn solids(scene: &Scene, options: &SettleOptions, poses: &[Pose]) -> Vec<Solid> {
-    let solid = |(object, pose): (&Object, &Pose)| {
-        let half = options.half_body(object);
-        Solid {
-            world_from_body: *pose,
-            half,
-            outline: if object.outline.is_empty() {
-                rectangle(half.x, half.y)
-            } else {
-                object.outline.clone()
-            },
-            falls: matches!(object.placement, Placement::Drop { .. }),
-        }
-    };
-    scene.objects.iter().zip(poses).map(solid).collect()
-}
-
-/// Corners of a rectangle of these half lengths, counter-clockwise.
-fn rectangle(x: f64, y: f64) -> Vec<[f64; 2]> {
-    vec![[-x, -y], [x, -y], [x, y], [-x, y]]
-}
-
 #[cfg(test)]
 mod tests {
+    use super::attempt::start_heights;
+    use super::world::Drop;
     use super::*;
-    use crate::geom::{UnitQuaternion, Vector3};
+    use crate::geom::{Pose, UnitQuaternion, Vector3};
 
     use std::f64::consts::FRAC_PI_6;
 
@@ -431,7 +277,7 @@ mod tests {
 
     fn settled(scene: Scene) -> Settled {
         let settled = settle(scene, &SettleOptions::default()).unwrap();
-        assert_eq!(settled.verdict, Verdict::Rested);
+        assert_eq!(settled.verdict, SettleVerdict::Rested);
         settled
     }
 
@@ -470,7 +316,7 @@ mod tests {
             options: &options,
             heights: &[0.1],
             sample_every: 0,
-            finer: 0,
+            halvings: 0,
             allowance: &allowance,
         };
         let (closed, fall) = (
@@ -553,13 +399,13 @@ mod tests {
         let settled = settle(scene.clone(), &options).unwrap();
         assert_eq!(
             (&settled.verdict, &settled.scene),
-            (&Verdict::TimedOut, &scene)
+            (&SettleVerdict::TimedOut, &scene)
         );
-        assert_eq!(settled.rejected, vec![Verdict::TimedOut; 3]);
+        assert_eq!(settled.rejected, vec![SettleVerdict::TimedOut; 3]);
         let told = settled.into_scene().unwrap_err().to_string();
         assert_eq!(
             told,
-            "settle: something still moves after 0.1 s, after 4 tries"
+            "settle: something still moves after 0.1 s, after 4 attempts"
         );
     }
 
@@ -587,7 +433,7 @@ mod tests {
                 },
             )
             .unwrap();
-            assert_eq!(rest.verdict, Verdict::Rested);
+            assert_eq!(rest.verdict, SettleVerdict::Rested);
             pose(&rest, 0).translation.x + 0.15
         };
         let steep = libm::tan(FRAC_PI_6);
@@ -647,9 +493,10 @@ mod tests {
     #[test]
     fn a_trace_ends_where_the_cards_rest_and_its_energy_falls() {
         let (rest, samples) = settle_traced(dropped(1, 6), &SettleOptions::default(), 8).unwrap();
-        assert_eq!(rest.verdict, Verdict::Rested);
-        let energy = |part: &[Sample]| part.iter().map(|s| s.kinetic + s.potential).sum::<f64>();
-        let steps: Vec<&[Sample]> = samples.chunks(6).collect();
+        assert_eq!(rest.verdict, SettleVerdict::Rested);
+        let energy =
+            |part: &[MotionSample]| part.iter().map(|s| s.kinetic + s.potential).sum::<f64>();
+        let steps: Vec<&[MotionSample]> = samples.chunks(6).collect();
         assert!(
             steps
                 .iter()
@@ -763,11 +610,11 @@ mod tests {
         };
         let rest = settle(heap(), &options).unwrap();
         assert!(
-            matches!(rest.rejected[..], [Verdict::Penetrating(_), ..]),
+            matches!(rest.rejected[..], [SettleVerdict::Penetrating(_), ..]),
             "{:?}",
             rest.rejected
         );
-        assert_eq!(rest.verdict, Verdict::Rested);
+        assert_eq!(rest.verdict, SettleVerdict::Rested);
     }
 
     #[test]
@@ -813,7 +660,7 @@ mod tests {
         assert!(
             matches!(
                 settled.verdict,
-                Verdict::Penetrating(_) | Verdict::Escaped(_)
+                SettleVerdict::Penetrating(_) | SettleVerdict::Escaped(_)
             ),
             "{:?}",
             settled.verdict

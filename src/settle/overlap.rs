@@ -1,7 +1,12 @@
-//! Do bodies overlap, and how deep? In `f64`, independent of the physics engine, to judge its result.
+//! Do bodies overlap, and how deep? In `f64`, independent of the physics engine, to judge its
+//! result.
 
 use crate::geom::{Pose, Vector3};
 use crate::scene::half_extent;
+
+/// Sine of the angle up to which edges are treated as parallel: their normal would be noise, and
+/// other directions decide.
+const PARALLEL_SINE: f64 = 1e-6;
 
 /// A body in the world: a convex prism, whose height is along its own `z`.
 #[derive(Clone, Debug)]
@@ -29,10 +34,10 @@ impl Solid {
     /// All corners, in the world.
     pub(super) fn corners(&self) -> impl Iterator<Item = Vector3<f64>> {
         let [x, y, z] = self.axes();
-        let of = move |&[a, b]: &[f64; 2]| self.center() + x * a + y * b;
-        self.outline
-            .iter()
-            .flat_map(move |corner| [of(corner) + z * self.half.z, of(corner) - z * self.half.z])
+        self.outline.iter().flat_map(move |&[a, b]| {
+            let middle = self.center() + x * a + y * b;
+            [middle + z * self.half.z, middle - z * self.half.z]
+        })
     }
 
     /// Half lengths of the upright box around the box of its card.
@@ -40,34 +45,29 @@ impl Solid {
         half_extent(&self.world_from_body.rotation, &self.half)
     }
 
-    /// Its shadow on a direction: from where to where.
-    fn shadow(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> [f64; 2] {
+    /// Its projection onto a direction: from where to where.
+    fn projection(&self, axes: &[Vector3<f64>; 3], direction: &Vector3<f64>) -> [f64; 2] {
         let [x, y, z] = axes.map(|axis| axis.dot(direction));
         let at = self.center().dot(direction);
-        let along = self
-            .outline
-            .iter()
-            .map(|corner| corner[0] * x + corner[1] * y);
-        let [low, high] = along.fold([f64::INFINITY, -f64::INFINITY], |[l, h], v| {
-            [l.min(v), h.max(v)]
+        let along = self.outline.iter().map(|[a, b]| a * x + b * y);
+        let [low, high] = along.fold([f64::INFINITY, -f64::INFINITY], |[low, high], v| {
+            [low.min(v), high.max(v)]
         });
-        [
-            at + low - self.half.z * z.abs(),
-            at + high + self.half.z * z.abs(),
-        ]
+        let half_height = self.half.z * z.abs();
+        [at + low - half_height, at + high + half_height]
     }
 
-    /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in the world.
-    fn edges(&self, axes: &[Vector3<f64>; 3]) -> Vec<Vector3<f64>> {
+    /// Unit directions of the edges of its base, each once for opposite sides that are parallel; in
+    /// the world.
+    fn base_edges(&self, axes: &[Vector3<f64>; 3]) -> Vec<Vector3<f64>> {
         let next = self.outline.iter().cycle().skip(1);
-        let sides = self
-            .outline
-            .iter()
-            .zip(next)
-            .map(|(a, b)| axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1]));
-        let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len());
-        for side in sides.map(|side| side.normalize()) {
-            if edges.iter().all(|edge| edge.cross(&side).norm() > PARALLEL) {
+        let mut edges: Vec<Vector3<f64>> = Vec::with_capacity(self.outline.len() + 1);
+        for (a, b) in self.outline.iter().zip(next) {
+            let side = (axes[0] * (b[0] - a[0]) + axes[1] * (b[1] - a[1])).normalize();
+            if edges
+                .iter()
+                .all(|edge| edge.cross(&side).norm() > PARALLEL_SINE)
+            {
                 edges.push(side);
             }
         }
@@ -75,19 +75,24 @@ impl Solid {
     }
 }
 
-/// Sine of the angle between edges that count as parallel: their normal would be noise, and other directions decide.
-const PARALLEL: f64 = 1e-6;
+/// Indices of the bodies that fall, from the lowest to the highest.
+pub(super) fn falling_from_lowest(solids: &[Solid]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..solids.len()).filter(|&i| solids[i].falls).collect();
+    order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
+    order
+}
 
 /// Ids (index + 1) of dropped bodies whose centre is not over the surface, below it, or not finite.
-pub(super) fn outside(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
-    let inside = |c: Vector3<f64>| {
-        c.x.abs() <= surface[0] / 2.0 && c.y.abs() <= surface[1] / 2.0 && c.z >= 0.0
-    };
-    let ids = solids
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| s.falls && !inside(s.center()));
-    ids.map(|(i, _)| i + 1).collect()
+pub(super) fn escaped_ids(solids: &[Solid], surface: [f64; 2]) -> Vec<usize> {
+    let numbered = solids.iter().enumerate();
+    numbered
+        .filter(|(_, solid)| solid.falls && !is_inside(&solid.center(), surface))
+        .map(|(i, _)| i + 1)
+        .collect()
+}
+
+fn is_inside(center: &Vector3<f64>, surface: [f64; 2]) -> bool {
+    center.x.abs() <= surface[0] / 2.0 && center.y.abs() <= surface[1] / 2.0 && center.z >= 0.0
 }
 
 /// Two bodies that are near to each other, one of which was dropped.
@@ -102,42 +107,43 @@ pub(super) struct Touch {
 }
 
 /// All pairs of bodies that are apart by less than `reach`, metres.
-pub(super) fn touching(solids: &[Solid], reach: f64) -> Vec<Touch> {
+pub(super) fn touching_pairs(solids: &[Solid], reach: f64) -> Vec<Touch> {
     let pairs = (1..solids.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
-    let pairs = pairs.filter(|[i, j]| solids[*i].falls || solids[*j].falls);
-    let touch = |pair: [usize; 2]| {
-        gap(&solids[pair[0]], &solids[pair[1]], reach).map(|(gap, towards)| Touch {
-            pair,
-            gap,
-            towards,
+    pairs
+        .filter(|&[i, j]| solids[i].falls || solids[j].falls)
+        .filter_map(|pair @ [i, j]| {
+            let (gap, towards) = separation(&solids[i], &solids[j], reach)?;
+            Some(Touch { pair, gap, towards })
         })
-    };
-    pairs.filter_map(touch).collect()
+        .collect()
 }
 
-/// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over the surface's edges,
-/// metres; 0 when nothing overlaps.
+/// Deepest overlap of a dropped body with any other, with the floor `z = 0` or with the walls over
+/// the surface's edges, metres; 0 when nothing overlaps.
 pub(super) fn deepest(solids: &[Solid], touching: &[Touch], surface: [f64; 2]) -> f64 {
-    let falling = solids.iter().filter(|s| s.falls);
-    let edges = falling
-        .map(|s| depth_in_room(s, surface))
+    let in_room = solids
+        .iter()
+        .filter(|solid| solid.falls)
+        .map(|solid| depth_in_room(solid, surface))
         .fold(0.0, f64::max);
     touching
         .iter()
         .map(|touch| -touch.gap)
-        .fold(edges, f64::max)
+        .fold(in_room, f64::max)
 }
 
 /// How far a body reaches through the floor or a wall, whichever is most; 0 inside.
 fn depth_in_room(solid: &Solid, surface: [f64; 2]) -> f64 {
     let axes = solid.axes();
-    let [bottom, _] = solid.shadow(&axes, &Vector3::z());
-    let past =
-        [(Vector3::x(), surface[0]), (Vector3::y(), surface[1])].map(|(direction, length)| {
-            let [low, high] = solid.shadow(&axes, &direction);
-            high.max(-low) - length / 2.0
-        });
-    past.into_iter().fold((-bottom).max(0.0), f64::max)
+    let [bottom, _] = solid.projection(&axes, &Vector3::z());
+    let past_wall = |direction: Vector3<f64>, length: f64| {
+        let [low, high] = solid.projection(&axes, &direction);
+        high.max(-low) - length / 2.0
+    };
+    (-bottom)
+        .max(0.0)
+        .max(past_wall(Vector3::x(), surface[0]))
+        .max(past_wall(Vector3::y(), surface[1]))
 }
 
 /// How far the box of a card reaches beyond the walls along x and along y; negative inside.
@@ -147,59 +153,94 @@ pub(super) fn past_walls(solid: &Solid, surface: [f64; 2]) -> [f64; 2] {
 }
 
 /// Shortest way to move one body out of another, metres; 0 when they are apart.
-pub(super) fn depth(a: &Solid, b: &Solid) -> f64 {
-    gap(a, b, 0.0).map_or(0.0, |(gap, _)| -gap)
+pub(super) fn overlap_depth(a: &Solid, b: &Solid) -> f64 {
+    separation(a, b, 0.0).map_or(0.0, |(gap, _)| -gap)
 }
 
-/// How far two bodies are apart, metres, negative where they overlap, and the unit direction from the first to the second
-/// that this is measured along; none where they are apart by `reach` or more.
+/// How far two bodies are apart, metres, negative where they overlap, and the unit direction from
+/// the first to the second that this is measured along; none where they are apart by `reach` or
+/// more.
 ///
 /// # Method
-/// Separating axes: two convex bodies are apart if and only if their shadows are, on one of these directions: the faces'
-/// normals and the cross products of their edges ([Gottschalk, Lin and Manocha 1996]; 15 for two boxes). The greatest
-/// gap between shadows is that of the bodies: the depth of an overlap, and a lower bound of a distance.
+/// Separating axes: two convex bodies are apart if and only if their projections are, on one of
+/// these directions: the faces' normals and the cross products of their edges ([Gottschalk, Lin and
+/// Manocha 1996]; 15 for two boxes). The greatest gap between projections is that of the bodies: the
+/// depth of an overlap, and a lower bound of a distance.
 ///
 /// [Gottschalk, Lin and Manocha 1996]: https://doi.org/10.1145/237170.237244
-pub(super) fn gap(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
+fn separation(a: &Solid, b: &Solid, reach: f64) -> Option<(f64, Vector3<f64>)> {
     let apart = b.center() - a.center();
     if apart.norm() >= a.half.norm() + b.half.norm() + reach {
         return None;
     }
-    let (of_a, of_b) = (a.axes(), b.axes());
-    let (mut edges_a, mut edges_b) = (a.edges(&of_a), b.edges(&of_b));
-    let sides_a = edges_a.iter().map(|edge| edge.cross(&of_a[2]));
-    let sides_b = edges_b.iter().map(|edge| edge.cross(&of_b[2]));
-    let faces: Vec<Vector3<f64>> = [of_a[2], of_b[2]]
-        .into_iter()
-        .chain(sides_a)
-        .chain(sides_b)
-        .collect();
-    edges_a.push(of_a[2]);
-    edges_b.push(of_b[2]);
-    let pairs = edges_a
-        .iter()
-        .flat_map(|e| edges_b.iter().map(move |f| e.cross(f)));
-    let directions = faces
-        .iter()
-        .copied()
-        .chain(pairs.filter_map(|d| d.try_normalize(PARALLEL)));
+    let (of_a, of_b) = (PrismDirections::new(a), PrismDirections::new(b));
     let mut widest = (f64::NEG_INFINITY, Vector3::z());
-    for direction in directions {
-        let ([low_a, high_a], [low_b, high_b]) =
-            (a.shadow(&of_a, &direction), b.shadow(&of_b, &direction));
-        let (ahead, behind) = (low_b - high_a, low_a - high_b);
-        if ahead.max(behind) > widest.0 {
-            widest = if ahead > behind {
-                (ahead, direction)
-            } else {
-                (behind, -direction)
-            };
-        }
+    for direction in of_a.separating(&of_b) {
+        let [low_a, high_a] = a.projection(&of_a.axes, &direction);
+        let [low_b, high_b] = b.projection(&of_b.axes, &direction);
+        widest = wider_gap(widest, [low_b - high_a, low_a - high_b], direction);
         if widest.0 >= reach {
             return None;
         }
     }
     Some(widest)
+}
+
+/// The widest gap so far, or one of those ahead and behind along a direction.
+#[inline]
+fn wider_gap(
+    widest: (f64, Vector3<f64>),
+    [ahead, behind]: [f64; 2],
+    direction: Vector3<f64>,
+) -> (f64, Vector3<f64>) {
+    if ahead.max(behind) > widest.0 {
+        if ahead > behind {
+            (ahead, direction)
+        } else {
+            (behind, -direction)
+        }
+    } else {
+        widest
+    }
+}
+
+/// Directions of a prism in the world.
+struct PrismDirections {
+    axes: [Vector3<f64>; 3],
+    /// Those of the base, then that of the height.
+    edges: Vec<Vector3<f64>>,
+}
+
+impl PrismDirections {
+    fn new(solid: &Solid) -> Self {
+        let axes = solid.axes();
+        let mut edges = solid.base_edges(&axes);
+        edges.push(axes[2]);
+        Self { axes, edges }
+    }
+
+    fn up(&self) -> Vector3<f64> {
+        self.axes[2]
+    }
+
+    fn side_normals(&self) -> impl Iterator<Item = Vector3<f64>> {
+        let base = &self.edges[..self.edges.len() - 1];
+        base.iter().map(|edge| edge.cross(&self.up()))
+    }
+
+    /// The directions that two prisms can be apart along: normals of faces, then normals of pairs of
+    /// edges.
+    fn separating(&self, other: &Self) -> impl Iterator<Item = Vector3<f64>> {
+        let faces = [self.up(), other.up()]
+            .into_iter()
+            .chain(self.side_normals())
+            .chain(other.side_normals());
+        let crossed = self
+            .edges
+            .iter()
+            .flat_map(|a| other.edges.iter().map(move |b| a.cross(b)));
+        faces.chain(crossed.filter_map(|normal| normal.try_normalize(PARALLEL_SINE)))
+    }
 }
 
 #[cfg(test)]
@@ -228,9 +269,9 @@ mod tests {
             solid(0.0, 0.0, 0.003, [0.0; 3], half),
             solid(0.02, 0.01, 0.0085, [0.0, 0.0, 0.4], half),
         );
-        assert!((depth(&a, &b) - 0.0005).abs() < 1e-15);
+        assert!((overlap_depth(&a, &b) - 0.0005).abs() < 1e-15);
         let above = solid(0.02, 0.01, 0.0091, [0.0, 0.0, 0.4], half);
-        assert_eq!(depth(&a, &above), 0.0);
+        assert_eq!(overlap_depth(&a, &above), 0.0);
     }
 
     #[test]
@@ -248,8 +289,8 @@ mod tests {
                 half,
             )
         };
-        assert_eq!(depth(&under, &over(1e-3)), 0.0);
-        assert!((depth(&under, &over(-1e-3)) - 1e-3).abs() < 1e-12);
+        assert_eq!(overlap_depth(&under, &over(1e-3)), 0.0);
+        assert!((overlap_depth(&under, &over(-1e-3)) - 1e-3).abs() < 1e-12);
     }
 
     /// Brute force: does any point of a fine grid in `a` lie in `b`?
@@ -290,7 +331,7 @@ mod tests {
                 [3.0 * u("d"), 3.0 * u("e"), 3.0 * u("f")],
                 [0.8, 0.4, 0.1],
             );
-            let depth = depth(&a, &b);
+            let depth = overlap_depth(&a, &b);
             let shared = shares_a_point(&a, &b) || shares_a_point(&b, &a);
             // A shared point proves an overlap; a deep overlap (twice the grid's step) must share a point.
             assert!(!shared || depth > 0.0, "case {case}");
@@ -304,14 +345,16 @@ mod tests {
     fn moving_out_by_the_depth_parts_boxes() {
         let a = solid(0.0, 0.0, 0.0, [0.1, 0.2, 0.3], [0.1, 0.05, 0.01]);
         let b = solid(0.03, 0.01, 0.012, [-0.2, 0.1, 1.0], [0.1, 0.05, 0.01]);
-        let d = depth(&a, &b);
+        let d = overlap_depth(&a, &b);
         assert!(d > 0.0);
         let up = a.axes()[2];
         let moved = |k: f64| Solid {
             world_from_body: Pose::translation(up.x * k, up.y * k, up.z * k) * b.world_from_body,
             ..b.clone()
         };
-        assert!(depth(&a, &moved(0.1)) == 0.0 && depth(&a, &moved(-d / 2.0)) >= d / 2.0);
+        assert!(
+            overlap_depth(&a, &moved(0.1)) == 0.0 && overlap_depth(&a, &moved(-d / 2.0)) >= d / 2.0
+        );
     }
 
     /// The closed form: how far a corner of a triangle reaches into a box depends on its slope.
@@ -323,14 +366,16 @@ mod tests {
         };
         let card = solid(0.0, 0.0, 0.0, [0.0; 3], [0.1, 0.04, 0.003]);
         let post = |x: f64, y: f64| solid(x, y, 0.0, [0.0; 3], [0.01, 0.01, 0.003]);
-        assert!(depth(&card, &post(0.1, 0.04)) > 0.0);
-        assert_eq!(depth(&triangle(0.0), &post(0.1, 0.04)), 0.0);
-        assert_eq!(depth(&triangle(0.0), &post(0.02, 0.02)), 0.0);
+        assert!(overlap_depth(&card, &post(0.1, 0.04)) > 0.0);
+        assert_eq!(overlap_depth(&triangle(0.0), &post(0.1, 0.04)), 0.0);
+        assert_eq!(overlap_depth(&triangle(0.0), &post(0.02, 0.02)), 0.0);
         // The slanted side is x / 0.2 + y / 0.08 = 0; the post's corner (x - 0.01, y - 0.01) lies behind it.
         let behind = |x: f64, y: f64| {
             -((x - 0.01) / 0.2 + (y - 0.01) / 0.08) / (1.0_f64 / 0.2).hypot(1.0 / 0.08)
         };
-        assert!((depth(&triangle(0.0), &post(0.01, 0.009)) - behind(0.01, 0.009)).abs() < 1e-12);
+        assert!(
+            (overlap_depth(&triangle(0.0), &post(0.01, 0.009)) - behind(0.01, 0.009)).abs() < 1e-12
+        );
         // Through the left wall by 0.05, with its vertical side.
         assert!((deepest(&[triangle(-0.15)], &[], [0.4, 0.3]) - 0.05).abs() < 1e-12);
     }
@@ -357,7 +402,7 @@ mod tests {
         let lost = solid(f64::NAN, 0.0, 0.1, [0.0; 3], [0.1; 3]);
         let gone = solid(0.0, 9.0, 0.1, [0.0; 3], [0.1; 3]);
         assert_eq!(
-            outside(
+            escaped_ids(
                 &[gone, solid(0.0, 0.0, 0.1, [0.0; 3], [0.1; 3]), lost],
                 [0.4, 0.3]
             ),

@@ -1,88 +1,126 @@
-//! A picture of where everything lies, from above and from the side: no textures, to see a fall at a glance.
+//! A picture of where everything lies, from above and from the side: no textures, to see a fall at a
+//! glance.
 
+use super::bodies::solids_at_rest;
 use super::overlap::Solid;
-use super::{SettleOptions, solids_at_rest};
 use crate::draw::{TextSize, class_color, ink_on, outline, rgb, text};
 use crate::geom::{Point2, Point3};
 use crate::image::Image;
 use crate::pixel::Srgb8;
-use crate::scene::Scene;
+use crate::scene::{Scene, SettleOptions};
 
-/// Width of the picture, and room around each view, pixels.
-const WIDTH: usize = 640;
-const MARGIN: f64 = 24.0;
-const PAPER: Srgb8 = rgb(0xff, 0xff, 0xff);
-const WALLS: Srgb8 = rgb(0x60, 0x60, 0x60);
+/// Width of the picture, pixels.
+const WIDTH_PX: usize = 640;
+/// Space around each view, pixels.
+const MARGIN_PX: f64 = 24.0;
+/// The surface's width over the least height of the front view.
+const MAX_ASPECT_RATIO: f64 = 20.0;
+const PAPER_COLOR: Srgb8 = rgb(0xff, 0xff, 0xff);
+const WALL_COLOR: Srgb8 = rgb(0x60, 0x60, 0x60);
 
-/// The bodies of a scene as lines, display-encoded, 640 pixels wide: above, seen from above (`+y` up); below, seen from
-/// the front (`+z` up), to the same scale. What still falls is shown where it starts. Numbers are ids.
+/// The bodies of a scene as lines, display-encoded, 640 pixels wide: at the top, seen from above
+/// (`+y` up); below, seen from the front (`+z` up), to the same scale. What still falls is shown
+/// where it starts. Numbers are ids.
 pub fn preview(scene: &Scene, options: &SettleOptions) -> Image<Srgb8> {
-    let [w, h] = scene.surface.size;
-    let scale = (WIDTH as f64 - 2.0 * MARGIN) / w;
     let bodies = solids_at_rest(scene, scene, options);
-    let top = bodies
-        .iter()
-        .map(|body| body.center().z + body.extent().z)
-        .fold(w / 20.0, f64::max);
-    let (from_above, from_front) = (h * scale + 2.0 * MARGIN, top * scale + MARGIN);
-    let mut canvas = Image::filled(WIDTH, (from_above + from_front).ceil() as usize, PAPER);
-    let above = |p: Point3<f64>| {
-        Point2::new(
-            MARGIN + (p.x + w / 2.0) * scale,
-            MARGIN + (h / 2.0 - p.y) * scale,
-        )
-    };
-    let front = |p: Point3<f64>| {
-        Point2::new(
-            MARGIN + (p.x + w / 2.0) * scale,
-            from_above + (top - p.z) * scale,
-        )
-    };
-    let corner = |x: f64, y: f64, z: f64| Point3::new(x * w / 2.0, y * h / 2.0, z);
-    outline(
-        &mut canvas,
-        &[(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-            .map(|(x, y)| above(corner(x, y, 0.0))),
-        WALLS,
-    );
-    let room =
-        [(-1.0, 0.0), (1.0, 0.0), (1.0, top), (-1.0, top)].map(|(x, z)| front(corner(x, 0.0, z)));
-    outline(&mut canvas, &room, WALLS);
+    let views = Views::new(scene.surface.size, &bodies);
+    let mut canvas = Image::filled(WIDTH_PX, views.height_px(), PAPER_COLOR);
+    views.draw_room(&mut canvas);
     let mut order: Vec<usize> = (0..bodies.len()).collect();
     order.sort_by(|&a, &b| bodies[a].center().z.total_cmp(&bodies[b].center().z));
     for i in order {
-        let color = class_color(i as u32);
-        faces(&bodies[i]).iter().for_each(|ring| {
-            outline(
-                &mut canvas,
-                &ring.iter().map(|p| above(*p)).collect::<Vec<_>>(),
-                color,
-            )
-        });
-        faces(&bodies[i]).iter().for_each(|ring| {
-            outline(
-                &mut canvas,
-                &ring.iter().map(|p| front(*p)).collect::<Vec<_>>(),
-                color,
-            )
-        });
-        let at = above(bodies[i].center().into());
-        text(
-            &mut canvas,
-            [at.x as isize, at.y as isize],
-            &(i + 1).to_string(),
-            ink_on(PAPER),
-            TextSize::Small,
-        );
+        views.draw_body(&mut canvas, i, &bodies[i]);
     }
     canvas
+}
+
+/// The view from above, and below it the view from the front.
+struct Views {
+    /// Of the surface, metres.
+    size: [f64; 2],
+    /// Height of the highest point in the front view, metres.
+    top: f64,
+    /// Pixels in a metre.
+    scale: f64,
+    /// Height of the view from above, pixels.
+    above_height: f64,
+}
+
+impl Views {
+    fn new([w, h]: [f64; 2], bodies: &[Solid]) -> Self {
+        let scale = (WIDTH_PX as f64 - 2.0 * MARGIN_PX) / w;
+        let top = bodies
+            .iter()
+            .map(|body| body.center().z + body.extent().z)
+            .fold(w / MAX_ASPECT_RATIO, f64::max);
+        Self {
+            size: [w, h],
+            top,
+            scale,
+            above_height: h * scale + 2.0 * MARGIN_PX,
+        }
+    }
+
+    fn height_px(&self) -> usize {
+        let front_height = self.top * self.scale + MARGIN_PX;
+        (self.above_height + front_height).ceil() as usize
+    }
+
+    fn column_px(&self, x: f64) -> f64 {
+        MARGIN_PX + (x + self.size[0] / 2.0) * self.scale
+    }
+
+    fn seen_from_above(&self, p: Point3<f64>) -> Point2<f64> {
+        let row = MARGIN_PX + (self.size[1] / 2.0 - p.y) * self.scale;
+        Point2::new(self.column_px(p.x), row)
+    }
+
+    fn seen_from_front(&self, p: Point3<f64>) -> Point2<f64> {
+        let row = self.above_height + (self.top - p.z) * self.scale;
+        Point2::new(self.column_px(p.x), row)
+    }
+
+    /// The edges of the surface, and the floor with the walls.
+    fn draw_room(&self, canvas: &mut Image<Srgb8>) {
+        let [x, y] = self.size.map(|side| side / 2.0);
+        let edges = [(-x, -y), (x, -y), (x, y), (-x, y)]
+            .map(|(x, y)| self.seen_from_above(Point3::new(x, y, 0.0)));
+        let walls = [(-x, 0.0), (x, 0.0), (x, self.top), (-x, self.top)]
+            .map(|(x, z)| self.seen_from_front(Point3::new(x, 0.0, z)));
+        outline(canvas, &edges, WALL_COLOR);
+        outline(canvas, &walls, WALL_COLOR);
+    }
+
+    fn draw_body(&self, canvas: &mut Image<Srgb8>, index: usize, body: &Solid) {
+        let color = class_color(index as u32);
+        draw_faces(canvas, body, color, |p| self.seen_from_above(p));
+        draw_faces(canvas, body, color, |p| self.seen_from_front(p));
+        let at = self.seen_from_above(body.center().into());
+        let at = [at.x as isize, at.y as isize];
+        let id = (index + 1).to_string();
+        text(canvas, at, &id, ink_on(PAPER_COLOR), TextSize::Small);
+    }
+}
+
+fn draw_faces(
+    canvas: &mut Image<Srgb8>,
+    body: &Solid,
+    color: Srgb8,
+    project: impl Fn(Point3<f64>) -> Point2<f64>,
+) {
+    for face in faces(body) {
+        let ring: Vec<_> = face.into_iter().map(&project).collect();
+        outline(canvas, &ring, color);
+    }
 }
 
 /// The upper and the lower face of a body.
 fn faces(body: &Solid) -> [Vec<Point3<f64>>; 2] {
     [body.half.z, -body.half.z].map(|z| {
-        let corner = |&[x, y]: &[f64; 2]| body.world_from_body * Point3::new(x, y, z);
-        body.outline.iter().map(corner).collect()
+        let corners = body.outline.iter();
+        corners
+            .map(|&[x, y]| body.world_from_body * Point3::new(x, y, z))
+            .collect()
     })
 }
 
@@ -100,9 +138,10 @@ mod tests {
                 .iter_mut()
                 .for_each(|object| object.size = [0.1, 0.05]);
             let picture = preview(&scene, &SettleOptions::default());
-            assert_eq!(picture.width(), WIDTH);
+            assert_eq!(picture.width(), WIDTH_PX);
             let colored = |p: &&Srgb8| p.r != p.g || p.g != p.b;
-            let above = (0.4 / 0.6 * (WIDTH as f64 - 2.0 * MARGIN) + 2.0 * MARGIN) as usize;
+            let above =
+                (0.4 / 0.6 * (WIDTH_PX as f64 - 2.0 * MARGIN_PX) + 2.0 * MARGIN_PX) as usize;
             let seen = |rows: std::ops::Range<usize>| {
                 rows.map(|y| picture.row(y).iter().filter(colored).count())
                     .sum::<usize>()

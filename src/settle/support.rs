@@ -1,251 +1,309 @@
 //! Does everything lie on something, down to the floor?
 //!
-//! At rest is what forces can hold: pushes at the contacts, with friction, that balance the weight of every body and its
-//! moments. Walls are smooth, so they may prop a card whose lower edge stands on something, and hold none in the air:
-//! nothing but a chain of contacts down to the floor bears a weight, and only where the centre of mass is over it.
+//! At rest is what forces can hold: pushes at the contacts, with friction, that balance the weight of
+//! every body and its moments. Walls are smooth, so they may prop up a card whose lower edge stands
+//! on something, and carry none in the air: nothing but a chain of contacts down to the floor bears a
+//! weight, and only where the centre of mass is over it.
 //!
 //! # Method
-//! Each contact becomes stiff springs that only push: along the edges of its cone of friction, a pyramid. Each body hangs
-//! on a spring of its own that is softer by [`STIFF`]. What the contacts can hold hardly moves; what they cannot is left to
-//! the soft spring and moves by up to its weight over that spring: a share of it that is 1 for a body in free fall. The
-//! energy of such springs is convex and made of pieces of parabolas: Newton's method finds its minimum in a few steps.
+//! Each contact becomes stiff springs that only push: along the edges of its cone of friction, a
+//! pyramid. Each body hangs on a spring of its own that is softer by [`CONTACT_STIFFNESS`]. What the
+//! contacts can hold hardly moves; what they cannot is left to the soft spring and moves by up to its
+//! weight over that spring: a share of it that is 1 for a body in free fall. The energy of such
+//! springs is convex and made of pieces of parabolas: Newton's method finds its minimum in a few
+//! steps.
 
-use super::contact::{Contact, across, contacts};
-use super::envelope::Envelope;
-use super::overlap::{Solid, Touch};
-use super::{reach, typical_length};
+use super::bodies::{touch_distance, typical_length};
+use super::contact::{Contact, contacts, perpendicular_axes};
+use super::envelope::EnvelopeMatrix;
+use super::overlap::{Solid, Touch, falling_from_lowest};
 use crate::geom::Vector3;
 use crate::scene::{Scene, SettleOptions};
 
-/// Friction counts so many times: asked is what falls, not what would creep.
-const GRIP: f64 = 2.0;
-/// Share of its weight from which on a body that no contact holds up hangs in the air. A card whose centre of mass is beyond
-/// what it lies on by a thirtieth of its length has as much; of 1,994 heaps at rest one had more, 1,985 none to four digits.
-const HANGS: f64 = 0.1;
+/// Factor on friction: what falls is to be found, not what would creep.
+const FRICTION_FACTOR: f64 = 2.0;
+/// Share of its weight above which a body that no contact supports counts as hanging. A card whose
+/// centre of mass is beyond what it lies on by a thirtieth of its length has as much; of 1,994 heaps
+/// at rest one had more, 1,985 none to four digits.
+const UNSUPPORTED_SHARE: f64 = 0.1;
 /// Stiffness of a contact over that of a body's own spring.
-const STIFF: f64 = 1e6;
-/// Steps of Newton's method: at most, and the share of the energy that one must gain for another.
-const STEPS: usize = 40;
-const GAIN: f64 = 1e-6;
-/// Radius of gyration that turns are measured by, as a share of the typical card's longer side: that of a rod.
-const GYRATION: f64 = 0.3;
+const CONTACT_STIFFNESS: f64 = 1e6;
+/// Most steps of Newton's method.
+const MAX_NEWTON_STEPS: usize = 40;
+/// Most times that a step of Newton's method is halved.
+const MAX_HALVINGS: usize = 30;
+/// Share of the energy that one step must gain for another to follow.
+const MIN_ENERGY_GAIN: f64 = 1e-6;
+/// Radius of gyration that rotations are measured by, as a share of the typical card's longer side:
+/// that of a rod.
+const GYRATION_RATIO: f64 = 0.3;
 
-/// Ids (index + 1) of the bodies that fell and that nothing holds where they are; `touching` are the pairs of bodies nearer
-/// than [`reach`].
-pub(super) fn hanging(
+/// Ids (index + 1) of the bodies that fell and that nothing holds where they are; `touching` are the
+/// pairs of bodies nearer than [`touch_distance`].
+pub(super) fn unsupported(
     scene: &Scene,
     options: &SettleOptions,
     solids: &[Solid],
     touching: &[Touch],
 ) -> Vec<usize> {
-    let contacts = contacts(solids, touching, scene.surface.size, reach(scene));
-    let held = Held::of(scene, options, solids, &contacts, typical_length(scene));
-    let moved = held.rest();
-    let mut ids: Vec<usize> = held
+    let contacts = contacts(solids, touching, scene.surface.size, touch_distance(scene));
+    let model = SpringModel::new(scene, options, solids, &contacts);
+    let moved = model.displacement_at_rest();
+    let mut ids: Vec<usize> = model
         .order
         .iter()
-        .zip(moved.chunks(DOF))
-        .filter(|(_, y)| norm(y) > HANGS)
+        .zip(moved.chunks(DOF_COUNT))
+        .filter(|(_, y)| norm(y) > UNSUPPORTED_SHARE)
         .map(|(i, _)| i + 1)
         .collect();
     ids.sort_unstable();
     ids
 }
 
-/// Ways that a body can move in: along three axes and about them.
-const DOF: usize = 6;
+/// Degrees of freedom of a body: along three axes and about them.
+const DOF_COUNT: usize = 6;
 
-/// A push of one body on another, or on what does not move, for each way that they move in.
+/// A generalised force: along three axes and about them.
+type Wrench = [f64; DOF_COUNT];
+
+/// A push of one body on another, or on what does not move.
 struct Spring {
-    ends: [Option<(usize, [f64; DOF])>; 2],
+    ends: [Option<SpringEnd>; 2],
+}
+
+/// Where a spring pushes.
+struct SpringEnd {
+    /// Place of the body in the model's order.
+    slot: usize,
+    wrench: Wrench,
 }
 
 /// Bodies on springs; lengths are in typical cards, masses in the mean one, forces in its weight.
-struct Held {
-    /// Index of each body that fell, from the lowest to the highest, which keeps what touches together.
+struct SpringModel {
+    /// Index of each body that fell, from the lowest to the highest, which keeps what touches
+    /// together.
     order: Vec<usize>,
     masses: Vec<f64>,
     weights: Vec<f64>,
     springs: Vec<Spring>,
 }
 
-impl Held {
-    fn of(
-        scene: &Scene,
-        options: &SettleOptions,
-        solids: &[Solid],
-        contacts: &[Contact],
-        typical: f64,
-    ) -> Self {
-        let mut order: Vec<usize> = (0..solids.len()).filter(|&i| solids[i].falls).collect();
-        order.sort_by(|&a, &b| solids[a].center().z.total_cmp(&solids[b].center().z));
-        let mut slots = vec![None; solids.len()];
-        order
-            .iter()
-            .enumerate()
-            .for_each(|(slot, &i)| slots[i] = Some(slot));
-        let mean =
-            order.iter().map(|&i| scene.objects[i].mass).sum::<f64>() / order.len().max(1) as f64;
-        let masses: Vec<f64> = order
-            .iter()
-            .flat_map(|&i| [scene.objects[i].mass / mean; DOF])
-            .collect();
-        let down = Vector3::from(options.gravity).normalize();
-        let weights = masses
-            .chunks(DOF)
-            .flat_map(|m| [m[0] * down.x, m[0] * down.y, m[0] * down.z, 0.0, 0.0, 0.0]);
-        let centers: Vec<Vector3<f64>> = solids.iter().map(center_of_mass).collect();
-        let spring = |contact: &Contact, force: Vector3<f64>| {
-            let end = |body: Option<usize>, force: Vector3<f64>| {
-                let (body, slot) = body.and_then(|body| Some((body, slots[body]?)))?;
-                let turn = (contact.point - centers[body]).cross(&force) / (GYRATION * typical);
-                Some((slot, [force.x, force.y, force.z, turn.x, turn.y, turn.z]))
-            };
-            Spring {
-                ends: [end(Some(contact.body), force), end(contact.by, -force)],
-            }
-        };
-        let cone = |contact| pyramid(contact, GRIP * scene.surface.friction);
-        let springs = contacts
-            .iter()
-            .flat_map(|contact| cone(contact).into_iter().map(move |force| (contact, force)));
-        let springs = springs
-            .map(|(contact, force)| spring(contact, force))
-            .collect();
+impl SpringModel {
+    fn new(scene: &Scene, options: &SettleOptions, solids: &[Solid], contacts: &[Contact]) -> Self {
+        let order = falling_from_lowest(solids);
+        let masses = relative_masses(scene, &order);
+        let geometry = SpringGeometry::new(solids, &order, typical_length(scene));
+        let friction = FRICTION_FACTOR * scene.surface.friction;
+        let springs = contacts.iter().flat_map(|contact| {
+            let forces = friction_pyramid(contact, friction).into_iter();
+            forces.map(|force| geometry.spring(contact, force))
+        });
         Self {
-            weights: weights.collect(),
-            order,
+            springs: springs.collect(),
+            weights: weights_along(options.gravity, &masses),
             masses,
-            springs,
+            order,
         }
     }
 
-    /// How far each body moves, in each way.
-    fn rest(&self) -> Vec<f64> {
-        let mut y = self.newton(&vec![true; self.springs.len()]);
-        let mut energy = self.energy(&y);
-        if energy > 0.0 {
-            (y, energy) = (vec![0.0; y.len()], 0.0);
-        }
-        for _ in 0..STEPS {
+    /// How far each body moves, in each degree of freedom.
+    fn displacement_at_rest(&self) -> Vec<f64> {
+        let (mut y, mut energy) = self.start();
+        for _ in 0..MAX_NEWTON_STEPS {
             let pressed: Vec<bool> = self
                 .springs
                 .iter()
                 .map(|spring| spring.stretch(&y) < 0.0)
                 .collect();
-            let to = self.newton(&pressed);
-            let Some((better, less)) = self.towards(&y, &to, energy) else {
+            let to = self.quadratic_minimum(&pressed);
+            let Some((better, less)) = self.line_search(&y, &to, energy) else {
                 break;
             };
             let gain = energy - less;
             (y, energy) = (better, less);
-            if gain <= GAIN * energy.abs() {
+            if gain <= MIN_ENERGY_GAIN * energy.abs() {
                 break;
             }
         }
         y
     }
 
+    /// The minimum with all springs pressed, or no displacement where that has less energy.
+    fn start(&self) -> (Vec<f64>, f64) {
+        let y = self.quadratic_minimum(&vec![true; self.springs.len()]);
+        let energy = self.energy(&y);
+        if energy > 0.0 {
+            (vec![0.0; y.len()], 0.0)
+        } else {
+            (y, energy)
+        }
+    }
+
     /// The minimum if just these springs pushed, and pulled.
-    fn newton(&self, pressed: &[bool]) -> Vec<f64> {
-        let mut matrix = Envelope::new(self.envelope());
-        self.masses
-            .iter()
-            .enumerate()
-            .for_each(|(i, mass)| matrix.add(i, i, *mass));
-        for (spring, _) in self
-            .springs
-            .iter()
-            .zip(pressed)
-            .filter(|(_, pressed)| **pressed)
-        {
-            spring.stiffen(&mut matrix);
+    fn quadratic_minimum(&self, pressed: &[bool]) -> Vec<f64> {
+        let mut matrix = EnvelopeMatrix::zeros(self.first_entries());
+        for (i, mass) in self.masses.iter().enumerate() {
+            matrix.add(i, i, *mass);
+        }
+        for (spring, pressed) in self.springs.iter().zip(pressed) {
+            if *pressed {
+                spring.add_stiffness(&mut matrix);
+            }
         }
         matrix.solve(self.weights.clone())
     }
 
     /// First entry of each row of the matrix: of the lowest body that the row's body touches.
-    fn envelope(&self) -> Vec<usize> {
+    fn first_entries(&self) -> Vec<usize> {
         let mut first: Vec<usize> = (0..self.order.len()).collect();
-        for [a, b] in self
-            .springs
-            .iter()
-            .filter_map(|spring| Some([spring.ends[0].as_ref()?.0, spring.ends[1].as_ref()?.0]))
-        {
+        for [a, b] in self.springs.iter().filter_map(Spring::coupled_slots) {
             let (low, high) = (a.min(b), a.max(b));
             first[high] = first[high].min(low);
         }
         first
             .into_iter()
-            .flat_map(|slot| [DOF * slot; DOF])
+            .flat_map(|slot| [DOF_COUNT * slot; DOF_COUNT])
             .collect()
     }
 
     fn energy(&self, y: &[f64]) -> f64 {
-        let own = self
+        let own: f64 = self
             .masses
             .iter()
             .zip(&self.weights)
             .zip(y)
             .map(|((m, w), y)| (0.5 * m * y - w) * y)
-            .sum::<f64>();
-        own + 0.5
-            * STIFF
-            * self
-                .springs
-                .iter()
-                .map(|spring| spring.stretch(y).min(0.0).powi(2))
-                .sum::<f64>()
+            .sum();
+        let compressed = self
+            .springs
+            .iter()
+            .map(|spring| spring.stretch(y).min(0.0).powi(2));
+        own + 0.5 * CONTACT_STIFFNESS * compressed.sum::<f64>()
     }
 
-    /// The first place of less energy on the way, halving it; none where there is none.
-    fn towards(&self, from: &[f64], to: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
-        let shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0)).take(HALVINGS);
-        let place = |share: f64| {
-            from.iter()
-                .zip(to)
-                .map(|(a, b)| a + share * (b - a))
-                .collect::<Vec<_>>()
-        };
+    /// The first point of less energy on the way, halving it; none where there is none.
+    fn line_search(&self, from: &[f64], to: &[f64], energy: f64) -> Option<(Vec<f64>, f64)> {
+        let shares = std::iter::successors(Some(1.0), |share| Some(share / 2.0));
         shares
-            .map(place)
+            .take(MAX_HALVINGS)
+            .map(|share| interpolate(from, to, share))
             .map(|y| (self.energy(&y), y))
             .find(|(less, _)| *less < energy)
             .map(|(less, y)| (y, less))
     }
 }
 
-/// Times that a step of Newton's method is halved.
-const HALVINGS: usize = 30;
+fn interpolate(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
+    let pairs = from.iter().zip(to);
+    pairs.map(|(a, b)| a + share * (b - a)).collect()
+}
+
+/// Mass of each body over their mean, for each degree of freedom.
+fn relative_masses(scene: &Scene, order: &[usize]) -> Vec<f64> {
+    let total: f64 = order.iter().map(|&i| scene.objects[i].mass).sum();
+    let mean = total / order.len().max(1) as f64;
+    order
+        .iter()
+        .flat_map(|&i| [scene.objects[i].mass / mean; DOF_COUNT])
+        .collect()
+}
+
+/// The pull of gravity in each degree of freedom.
+fn weights_along(gravity: [f64; 3], masses: &[f64]) -> Vec<f64> {
+    let down = Vector3::from(gravity).normalize();
+    masses
+        .chunks(DOF_COUNT)
+        .flat_map(|m| [m[0] * down.x, m[0] * down.y, m[0] * down.z, 0.0, 0.0, 0.0])
+        .collect()
+}
+
+/// What it takes to turn contacts into springs.
+struct SpringGeometry {
+    /// Place of each body in the model's order; none for those that stand.
+    slots: Vec<Option<usize>>,
+    centers_of_mass: Vec<Vector3<f64>>,
+    /// Length that moments are divided by, metres.
+    gyration: f64,
+}
+
+impl SpringGeometry {
+    fn new(solids: &[Solid], order: &[usize], typical_length: f64) -> Self {
+        let mut slots = vec![None; solids.len()];
+        for (slot, &i) in order.iter().enumerate() {
+            slots[i] = Some(slot);
+        }
+        Self {
+            slots,
+            centers_of_mass: solids.iter().map(center_of_mass).collect(),
+            gyration: GYRATION_RATIO * typical_length,
+        }
+    }
+
+    fn spring(&self, contact: &Contact, force: Vector3<f64>) -> Spring {
+        let pushed = self.spring_end(contact.body, &contact.point, &force);
+        let pushing = contact
+            .by
+            .and_then(|body| self.spring_end(body, &contact.point, &-force));
+        Spring {
+            ends: [pushed, pushing],
+        }
+    }
+
+    fn spring_end(
+        &self,
+        body: usize,
+        point: &Vector3<f64>,
+        force: &Vector3<f64>,
+    ) -> Option<SpringEnd> {
+        let slot = self.slots[body]?;
+        let moment = (point - self.centers_of_mass[body]).cross(force) / self.gyration;
+        let wrench = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+        Some(SpringEnd { slot, wrench })
+    }
+}
 
 impl Spring {
     /// How far its ends move apart.
     fn stretch(&self, y: &[f64]) -> f64 {
-        let along = |(slot, push): &(usize, [f64; DOF])| {
-            y[DOF * slot..]
-                .iter()
-                .zip(push)
-                .map(|(y, p)| y * p)
-                .sum::<f64>()
-        };
-        self.ends.iter().flatten().map(along).sum()
+        self.ends.iter().flatten().map(|end| end.advance(y)).sum()
     }
 
-    fn stiffen(&self, matrix: &mut Envelope) {
-        for (row, of_row) in self.ends.iter().flatten() {
-            for (column, of_column) in self
-                .ends
-                .iter()
-                .flatten()
-                .filter(|(column, _)| column <= row)
-            {
-                for (i, a) in of_row.iter().enumerate() {
-                    let end = if row == column { i + 1 } else { DOF };
-                    let line = of_column[..end].iter().enumerate();
-                    line.for_each(|(j, b)| {
-                        matrix.add(DOF * row + i, DOF * column + j, STIFF * a * b)
-                    });
+    /// The places of its two bodies, where both fell.
+    fn coupled_slots(&self) -> Option<[usize; 2]> {
+        let [a, b] = &self.ends;
+        Some([a.as_ref()?.slot, b.as_ref()?.slot])
+    }
+
+    fn add_stiffness(&self, matrix: &mut EnvelopeMatrix) {
+        for row in self.ends.iter().flatten() {
+            for column in self.ends.iter().flatten() {
+                if column.slot <= row.slot {
+                    row.couple(column, matrix);
                 }
+            }
+        }
+    }
+}
+
+impl SpringEnd {
+    /// How far its body moves along its push.
+    fn advance(&self, y: &[f64]) -> f64 {
+        let own = y[DOF_COUNT * self.slot..].iter();
+        own.zip(&self.wrench).map(|(y, push)| y * push).sum()
+    }
+
+    /// Adds the block of the matrix in the rows of this end and the columns of another, up to the
+    /// diagonal.
+    fn couple(&self, other: &Self, matrix: &mut EnvelopeMatrix) {
+        let (row, column) = (DOF_COUNT * self.slot, DOF_COUNT * other.slot);
+        for (i, a) in self.wrench.iter().enumerate() {
+            let end = if self.slot == other.slot {
+                i + 1
+            } else {
+                DOF_COUNT
+            };
+            for (j, b) in other.wrench[..end].iter().enumerate() {
+                matrix.add(row + i, column + j, CONTACT_STIFFNESS * a * b);
             }
         }
     }
@@ -256,14 +314,13 @@ fn norm(y: &[f64]) -> f64 {
 }
 
 /// Directions of the edges of a contact's cone of friction, the normal part of each 1.
-fn pyramid(contact: &Contact, friction: f64) -> Vec<Vector3<f64>> {
+fn friction_pyramid(contact: &Contact, friction: f64) -> Vec<Vector3<f64>> {
     if !contact.rough || friction == 0.0 {
         return vec![contact.normal];
     }
-    let (u, v) = across(&contact.normal);
-    let slope = |a: f64, b: f64| contact.normal + (u * a + v * b) * friction;
+    let (u, v) = perpendicular_axes(&contact.normal);
     [[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]]
-        .map(|[a, b]| slope(a, b))
+        .map(|[a, b]| contact.normal + (u * a + v * b) * friction)
         .into()
 }
 
@@ -275,24 +332,18 @@ fn center_of_mass(solid: &Solid) -> Vector3<f64> {
 /// Centre of mass of a flat convex ring.
 fn centroid(ring: &[[f64; 2]]) -> [f64; 2] {
     let next = ring.iter().cycle().skip(1);
-    let [area, x, y] = ring
-        .iter()
-        .zip(next)
-        .fold([0.0; 3], |[area, x, y], (a, b)| {
-            let cross = a[0] * b[1] - a[1] * b[0];
-            [
-                area + cross,
-                x + cross * (a[0] + b[0]),
-                y + cross * (a[1] + b[1]),
-            ]
-        });
-    [x, y].map(|moment| {
-        if area > 0.0 {
-            moment / (3.0 * area)
-        } else {
-            0.0
-        }
-    })
+    let (mut area, mut x, mut y) = (0.0, 0.0, 0.0);
+    for (a, b) in ring.iter().zip(next) {
+        let cross = a[0] * b[1] - a[1] * b[0];
+        area += cross;
+        x += cross * (a[0] + b[0]);
+        y += cross * (a[1] + b[1]);
+    }
+    if area > 0.0 {
+        [x, y].map(|moment| moment / (3.0 * area))
+    } else {
+        [0.0; 2]
+    }
 }
 
 #[cfg(test)]

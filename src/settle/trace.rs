@@ -1,10 +1,10 @@
-//! The motion of a fall, to be looked at.
+//! The motion of a fall, for inspection.
 
 use crate::geom::Pose;
 
 /// One object at one time of a fall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct MotionSample {
     /// Since the start, seconds.
     pub seconds: f64,
     /// Id: index + 1.
@@ -21,26 +21,22 @@ pub struct Sample {
     pub potential: f64,
 }
 
-/// Samples as comma-separated values, titles first: SI units, rotation as a quaternion.
-pub fn csv(samples: &[Sample]) -> String {
-    let head = "seconds,object,x,y,z,qw,qx,qy,qz,speed,spin,kinetic,potential\n";
-    let line = |s: &Sample| {
-        let (t, q) = (s.pose.translation, s.pose.rotation);
-        let numbers = [
-            t.x,
-            t.y,
-            t.z,
-            q.w,
-            q.i,
-            q.j,
-            q.k,
-            s.speed,
-            s.spin,
-            s.kinetic,
-            s.potential,
-        ];
-        let cells: String = numbers.iter().map(|x| format!(",{x:.7}")).collect();
-        format!("{:.6},{}{cells}\n", s.seconds, s.object)
-    };
-    head.to_owned() + &samples.iter().map(line).collect::<String>()
+const CSV_HEADER: &str = "seconds,object,x,y,z,qw,qx,qy,qz,speed,spin,kinetic,potential\n";
+
+/// Samples as comma-separated values with a header: SI units, rotation as a quaternion.
+pub fn csv(samples: &[MotionSample]) -> String {
+    let lines: String = samples.iter().map(csv_line).collect();
+    CSV_HEADER.to_owned() + &lines
+}
+
+fn csv_line(sample: &MotionSample) -> String {
+    let (t, q) = (sample.pose.translation, sample.pose.rotation);
+    let pose = [t.x, t.y, t.z, q.w, q.i, q.j, q.k];
+    let motion = [sample.speed, sample.spin, sample.kinetic, sample.potential];
+    let cells: String = pose
+        .iter()
+        .chain(&motion)
+        .map(|x| format!(",{x:.7}"))
+        .collect();
+    format!("{:.6},{}{cells}\n", sample.seconds, sample.object)
 }

@@ -2,7 +2,7 @@
 
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use petcomp::Scene;
-use petcomp::scene::{Background, CameraSource, Choice, Range, Recipe, SettleOptions};
+use petcomp::scene::{AssetVariant, Background, CameraSource, Range, Recipe, SettleOptions};
 use petcomp::settle;
 
 fn scene(cards: u32, k: u64) -> Scene {
@@ -15,7 +15,7 @@ fn scene(cards: u32, k: u64) -> Scene {
             focal_px: None,
         },
     };
-    let bottle = Choice {
+    let bottle = AssetVariant {
         asset: "b".into(),
         photo_sizes: vec![[0.2, 0.08]],
         photo_outlines: vec![],

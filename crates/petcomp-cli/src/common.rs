@@ -5,7 +5,7 @@ use clap::builder::RangedU64ValueParser;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use petcomp::dataset::{DatasetConfig, Pipeline};
 use petcomp::io::{Fallback, LimitOverride, Limits, Override, ReadOptions};
-use petcomp::{Diagnostic, Result, Severity, io, printable};
+use petcomp::{Diagnostic, Result, Scene, Severity, io, printable};
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal, Write as _};
 use std::ops::RangeInclusive;
@@ -217,6 +217,34 @@ impl RecipeArgs {
     /// Opens the folders that the recipe names.
     pub(crate) fn pipeline(&self) -> anyhow::Result<Pipeline> {
         Ok(Pipeline::open(self.config()?)?)
+    }
+}
+
+/// A scene file, and where the files that it names are.
+#[derive(clap::Args)]
+pub(crate) struct SceneArgs {
+    /// Scene, TOML or JSON; what is unknown in it is solved first
+    #[arg(value_name = "SCENE")]
+    pub(crate) path: PathBuf,
+    /// Recipe file (TOML) that names the folders of assets and backgrounds; by default the scene's own `[files]` does
+    #[arg(value_name = "RECIPE")]
+    recipe: Option<PathBuf>,
+    /// Replace a value of the recipe or of the scene's settings: render.subsamples=8
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+}
+
+impl SceneArgs {
+    pub(crate) fn read(&self) -> anyhow::Result<Scene> {
+        Ok(io::read_document(&self.path)?)
+    }
+
+    /// The recipe's config or, without a recipe, that which the scene brings.
+    pub(crate) fn config_for(&self, scene: &Scene) -> anyhow::Result<DatasetConfig> {
+        Ok(match &self.recipe {
+            Some(recipe) => DatasetConfig::read(recipe, &self.overrides)?,
+            None => DatasetConfig::for_scene(scene, &self.path, &self.overrides)?,
+        })
     }
 }
 

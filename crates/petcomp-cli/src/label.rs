@@ -1,16 +1,14 @@
 //! `petcomp label`: scene -> outlines, boxes, visibility.
 
-use crate::common::{Common, RecipeArgs};
+use crate::common::{Common, SceneArgs};
 use petcomp::dataset::Pipeline;
-use petcomp::{Scene, io, label};
+use petcomp::{io, label};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Scene, TOML or JSON; what is unknown in it is found out first
-    scene: PathBuf,
     #[command(flatten)]
-    recipe: RecipeArgs,
+    scene: SceneArgs,
     /// Labels to write, JSON
     #[arg(short, long, value_name = "LABELS")]
     output: PathBuf,
@@ -23,12 +21,22 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let scene: Scene = io::read_document(&args.scene)?;
-    let pipeline = Pipeline::open_for(args.recipe.config()?, &scene)?;
+    let scene = args.scene.read()?;
+    // Labels alone need no photo.
+    let scene = if args.overlay.is_some() {
+        scene
+    } else {
+        scene.unlit()
+    };
+    let pipeline = Pipeline::open_for(args.scene.config_for(&scene)?, &scene)?;
     let labels = match &args.overlay {
-        None => pipeline.label(scene).map_err(|e| e.in_file(&args.scene))?,
+        None => pipeline
+            .label(scene)
+            .map_err(|e| e.in_file(&args.scene.path))?,
         Some(path) => {
-            let sample = pipeline.take(scene).map_err(|e| e.in_file(&args.scene))?;
+            let sample = pipeline
+                .take(scene)
+                .map_err(|e| e.in_file(&args.scene.path))?;
             io::write(
                 path,
                 &label::overlay(&sample.frame, &sample.labels, &pipeline.library().classes),

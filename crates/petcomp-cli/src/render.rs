@@ -1,22 +1,20 @@
 //! `petcomp render`: scene -> picture.
 
-use crate::common::{Common, RecipeArgs};
+use crate::common::{Common, SceneArgs};
 use anyhow::bail;
 use petcomp::composite::{self, Aov};
 use petcomp::io::exr::write_parts;
-use petcomp::{Image, LinearRgb, PremulRgba, Quality, Scene, io};
+use petcomp::{Image, LinearRgb, PremulRgba, Quality, io};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Scene, TOML or JSON; what is unknown in it is found out first
-    scene: PathBuf,
     #[command(flatten)]
-    recipe: RecipeArgs,
+    scene: SceneArgs,
     /// Picture to write: .png, .jpg, or .exr for scene-linear values with alpha
     #[arg(short, long, value_name = "PICTURE")]
     output: PathBuf,
-    /// draft, normal or reference: how finely everything is computed; by default what the recipe says
+    /// draft, normal or reference: how finely everything is computed; by default as the recipe or the scene's settings say
     #[arg(long)]
     quality: Option<Quality>,
     /// Parts of a multi-part .exr: beauty,coverage,shadow,id,depth,position,uv,cryptomatte,layers
@@ -25,21 +23,21 @@ pub(crate) struct Args {
     /// Also write the picture as it is displayed
     #[arg(long, value_name = "PNG")]
     preview: Option<PathBuf>,
-    /// Also write the scene with everything found out
+    /// Also write the scene with everything solved, to be rendered without a recipe
     #[arg(long, value_name = "SCENE")]
     resolved: Option<PathBuf>,
 }
 
 pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
-    let scene: Scene = io::read_document(&args.scene)?;
-    let mut config = args.recipe.config()?;
+    let scene = args.scene.read()?;
+    let mut config = args.scene.config_for(&scene)?;
     if let Some(quality) = args.quality {
         config = quality.config(config);
     }
     let pipeline = petcomp::dataset::Pipeline::open_for(config, &scene)?;
     let (scene, shot) = pipeline
         .resolve(scene)
-        .map_err(|e| e.in_file(&args.scene))?;
+        .map_err(|e| e.in_file(&args.scene.path))?;
     let (deep, frame) = pipeline.shoot(&scene, &shot);
     match args.aov.as_slice() {
         [] => write(&args.output, &frame)?,
@@ -58,6 +56,7 @@ pub(crate) fn run(args: &Args, common: &Common) -> anyhow::Result<()> {
         io::write(path, &displayed(&frame))?;
     }
     if let Some(path) = &args.resolved {
+        let scene = pipeline.config().with_files(scene.clone(), path)?;
         io::write_document(path, &scene)?;
     }
     let (w, h) = frame.size();

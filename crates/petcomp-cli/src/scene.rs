@@ -21,7 +21,7 @@ pub(crate) enum Command {
 
 #[derive(clap::Args)]
 pub(crate) struct Export {
-    /// Scene, TOML or JSON; what is unknown in it is found out first
+    /// Scene, TOML or JSON; what is unknown in it is solved first
     scene: PathBuf,
     #[command(flatten)]
     recipe: RecipeArgs,
@@ -57,7 +57,9 @@ pub(crate) struct Draw {
 pub(crate) fn run(command: &Command, common: &Common) -> anyhow::Result<()> {
     match command {
         Command::Draw(args) => {
-            let scene = args.recipe.pipeline()?.draw(args.seed, args.index)?;
+            let pipeline = args.recipe.pipeline()?;
+            let scene = pipeline.draw(args.seed, args.index)?;
+            let scene = pipeline.config().with_files(scene, &args.output)?;
             io::write_document(&args.output, &scene)?;
             common.say(format_args!(
                 "{}: {} objects over {}",

@@ -604,6 +604,66 @@ fn an_environment_map_lies_beside_its_recipe() {
 }
 
 #[test]
+fn a_scene_is_rendered_without_its_recipe() {
+    let desk = Desk::new();
+    desk.ok(&[
+        "demo",
+        "--samples",
+        &sample(""),
+        "-n",
+        "1",
+        "-q",
+        "-o",
+        "demo",
+    ]);
+    let sky = petcomp::Image::filled(8, 4, petcomp::LinearRgb::new(0.2, 0.4, 0.9));
+    petcomp::io::write(desk.path("demo/sky.exr"), &sky).unwrap();
+    std::fs::create_dir_all(desk.path("far/off")).unwrap();
+    let set = [
+        "--set",
+        "scene.environment.files=[\"sky.exr\"]",
+        "--set",
+        "render.subsamples=3",
+        "--set",
+        "scene.settle.max_overlap=0.002",
+    ];
+    let with_set = |args: &[&str]| desk.ok(&[args, &set].concat());
+    let scene = "far/off/scene.toml";
+    with_set(&["scene", "draw", "demo/recipe.toml", "-k", "2", "-o", scene]);
+    with_set(&["render", scene, "demo/recipe.toml", "-o", "recipe.png"]);
+    with_set(&["label", scene, "demo/recipe.toml", "-o", "recipe.json"]);
+
+    desk.ok(&[
+        "render",
+        scene,
+        "-o",
+        "alone.png",
+        "--resolved",
+        "resolved.json",
+    ]);
+    desk.ok(&["label", scene, "-o", "alone.json"]);
+    desk.ok(&["settle", scene, "-o", "rest.json"]);
+    desk.ok(&["render", "rest.json", "-o", "rest.png"]);
+    desk.ok(&["render", "resolved.json", "-o", "resolved.png"]);
+    let bytes = |name: &str| std::fs::read(desk.path(name)).unwrap();
+    for name in ["alone.png", "rest.png", "resolved.png"] {
+        assert!(bytes(name) == bytes("recipe.png"), "{name} differs");
+    }
+    assert!(bytes("alone.json") == bytes("recipe.json"));
+
+    // What is missing is named.
+    let text = std::fs::read_to_string(desk.path(scene)).unwrap();
+    let bare = text.split("[files]").next().unwrap();
+    desk.write("far/off/bare.toml", bare);
+    let refused = desk.refused(&["render", "far/off/bare.toml", "-o", "no.png"]);
+    assert!(
+        refused
+            .contains("far/off/bare.toml: files: missing, expected a table that names the folders"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn a_summary_tells_what_is_there_and_is_a_result() {
     let desk = Desk::new();
     desk.ok(&[

@@ -104,7 +104,7 @@ fn beside_jpeg(ways: &[Way], stored: &[Stored]) -> String {
             .position(|way| way.curve == curve && way.setting == setting)
             .map(|i| &stored[i])
     };
-    let (Some(png), Some(jpeg)) = (of(PNG, "fast"), of("JPEG", "95")) else {
+    let (Some(png), Some(jpeg)) = (of(PNG, "normal"), of("JPEG", "95")) else {
         return String::new();
     };
     format!(
@@ -181,7 +181,7 @@ impl Way {
         let is = |curve, setting| self.curve == curve && self.setting == setting;
         Point::new(self.curve, self.setting.clone(), cost, error).used_where(|quality| {
             let with_exr = quality.pictures(Default::default()).exr;
-            is(PNG, "fast") || with_exr && is(HALF, "ZIP")
+            is(PNG, "normal") || with_exr && is(HALF, "ZIP")
         })
     }
 }
@@ -242,12 +242,12 @@ mod tests {
             way.store(&ramp, folder.path()).unwrap().error
         };
         assert_eq!(error("EXR, float", "ZIP"), 0.0);
-        assert!(error(HALF, "ZIP") < 1e-3 && error("PNG, 16 bits", "fast") < 1e-4);
+        assert!(error(HALF, "ZIP") < 1e-3 && error("PNG, 16 bits", "normal") < 1e-4);
         // A code of sRGB spans at most 0.0098 of light.
         assert!(
-            (1e-4..0.0098 / 2.0).contains(&error(PNG, "fast")),
+            (1e-4..0.0098 / 2.0).contains(&error(PNG, "normal")),
             "{}",
-            error(PNG, "fast")
+            error(PNG, "normal")
         );
         assert!(error("JPEG", "50") > error("JPEG", "95"));
     }

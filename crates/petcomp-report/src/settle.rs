@@ -17,7 +17,7 @@ use super::clock::cpu_seconds;
 use petcomp::geom::UnitQuaternion;
 use petcomp::plot::{Axis, Chart, Table};
 use petcomp::scene::{Object, Placement, Scene, SettleOptions};
-use petcomp::settle::{Settled, Verdict, heap, settle};
+use petcomp::settle::{SettleVerdict, Settled, heap, settle};
 use petcomp::{Error, Result, io};
 use serde::Serialize;
 use std::path::Path;
@@ -129,7 +129,7 @@ fn row(options: &SettleOptions, heaps: &[Scene]) -> Result<Row> {
         heaps: ends.len(),
         rested: ends
             .iter()
-            .filter(|end| end.verdict == Verdict::Rested)
+            .filter(|end| end.verdict == SettleVerdict::Rested)
             .count(),
         overlap_mm: median_and_worst(ends.iter().map(|end| end.overlap * 1e3)),
         energy_percent: median_and_worst(ends.iter().map(|end| end.energy_rise * 100.0)),

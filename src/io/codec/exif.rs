@@ -43,7 +43,7 @@ impl CameraNotes {
         }
     }
 
-    /// A TIFF says that its colours are multiplied by alpha (TIFF 6.0, `ExtraSamples` = 1).
+    /// A TIFF declares that its colours are multiplied by alpha (TIFF 6.0, `ExtraSamples` = 1).
     #[cfg(feature = "oiio")]
     pub(crate) fn has_associated_alpha(tiff: &[u8]) -> bool {
         const EXTRA_SAMPLES: Tag = Tag(exif::Context::Tiff, 338);
@@ -58,7 +58,7 @@ impl CameraNotes {
         let size = positive(exif, Tag::PixelXDimension)
             .zip(positive(exif, Tag::PixelYDimension))
             .map(|(w, h)| [w, h]);
-        // A ratio of 0 says that there was none.
+        // A ratio of 0 means that there was none.
         let digital_zoom =
             rational(exif, Tag::DigitalZoomRatio).is_some_and(|zoom| zoom > 0.0 && zoom != 1.0);
         let focal_35mm = positive(exif, Tag::FocalLengthIn35mmFilm)

@@ -56,7 +56,7 @@ fn open(
     })
 }
 
-/// The lines up to the empty one as the decoder knows them, and whether they say that light is in CIE XYZ.
+/// The lines up to the empty one as the decoder knows them, and whether light is in CIE XYZ by them.
 fn plain_head(file: &mut impl BufRead) -> Result<(Vec<u8>, bool), Refusal> {
     read_line(file)?;
     let (mut head, mut is_xyz) = (FIRST_LINE.to_vec(), false);
@@ -148,9 +148,8 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     limits.check_memory(width, height, 3)?;
     let mut data = vec![0_f32; width * height * 3];
     decoder.read_image(bytemuck::cast_slice_mut(&mut data))?;
-    if let (true, Some(matrix)) = (is_xyz, to_rec709(&XYZ_SPACE)?) {
-        data.chunks_exact_mut(3)
-            .for_each(|px| px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]])));
+    if is_xyz {
+        convert_xyz(&mut data)?;
     }
     let raster = Raster {
         width,
@@ -161,6 +160,16 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
         premultiplied: false,
     };
     Ok(raster.upright(orientation))
+}
+
+/// CIE XYZ as light of Rec. 709.
+fn convert_xyz(samples: &mut [f32]) -> Result<(), String> {
+    if let Some(matrix) = to_rec709(&XYZ_SPACE)? {
+        for px in samples.chunks_exact_mut(3) {
+            px.copy_from_slice(&matrix.apply([px[0], px[1], px[2]]));
+        }
+    }
+    Ok(())
 }
 
 /// The header ends in time: its lines are kept, however many and long they are.

@@ -1,7 +1,7 @@
 //! Pixels made from the samples of a file: the one place where samples get their meaning.
 //!
 //! The rule: integer samples are display-encoded sRGB and their alpha is straight, float samples are scene-linear, unless
-//! the file says otherwise. A matte or a depth is never display-encoded.
+//! the file states otherwise. A matte or a depth is never display-encoded.
 
 use super::channels::Wanted;
 use super::profile::Profile;
@@ -96,7 +96,7 @@ impl FromFile for Depth {
 
 /// Colour and transmittance of a pixel, from the channels at these indices.
 #[inline(always)]
-fn film_pixel<T: Sample>(px: &[T], [r, g, b, tr, tg, tb]: [usize; 6]) -> Film {
+fn film_pixel<T: FileSample>(px: &[T], [r, g, b, tr, tg, tb]: [usize; 6]) -> Film {
     Film::new(
         [r, g, b].map(|i| px[i].into()).into(),
         [tr, tg, tb].map(|i| px[i].into()).into(),
@@ -144,7 +144,7 @@ impl Colored for LinearRgb {
 }
 
 /// A sample of a file, as a number and as a display code.
-trait Sample: Copy + Send + Sync + Into<f32> {
+trait FileSample: Copy + Send + Sync + Into<f32> {
     /// The sample that stands for 1.
     const FULL_SCALE: f32;
 
@@ -158,7 +158,7 @@ trait Sample: Copy + Send + Sync + Into<f32> {
     }
 }
 
-impl Sample for u8 {
+impl FileSample for u8 {
     const FULL_SCALE: f32 = 255.0;
     #[inline(always)]
     fn decode_srgb([r, g, b]: [Self; 3]) -> [f32; 3] {
@@ -166,7 +166,7 @@ impl Sample for u8 {
     }
 }
 
-impl Sample for u16 {
+impl FileSample for u16 {
     const FULL_SCALE: f32 = 65_535.0;
     #[inline(always)]
     fn decode_srgb(codes: [Self; 3]) -> [f32; 3] {
@@ -174,7 +174,7 @@ impl Sample for u16 {
     }
 }
 
-impl Sample for f16 {
+impl FileSample for f16 {
     const FULL_SCALE: f32 = 1.0;
     #[inline(always)]
     fn decode_srgb(display: [Self; 3]) -> [f32; 3] {
@@ -182,7 +182,7 @@ impl Sample for f16 {
     }
 }
 
-impl Sample for f32 {
+impl FileSample for f32 {
     const FULL_SCALE: f32 = 1.0;
     #[inline(always)]
     fn decode_srgb(display: [Self; 3]) -> [f32; 3] {
@@ -207,17 +207,17 @@ impl ColorChannels {
     }
 
     #[inline(always)]
-    fn codes<T: Sample>(&self, px: &[T]) -> [T; 3] {
+    fn codes<T: FileSample>(&self, px: &[T]) -> [T; 3] {
         self.color.map(|i| px[i])
     }
 
     #[inline(always)]
-    fn normalized<T: Sample>(&self, px: &[T]) -> [f32; 3] {
+    fn normalized<T: FileSample>(&self, px: &[T]) -> [f32; 3] {
         self.color.map(|i| px[i].normalized())
     }
 
     #[inline(always)]
-    fn alpha<T: Sample>(&self, px: &[T]) -> f32 {
+    fn alpha<T: FileSample>(&self, px: &[T]) -> f32 {
         self.alpha.map_or(1.0, |i| px[i].normalized())
     }
 }
@@ -300,7 +300,7 @@ impl SampleRows<'_> {
     }
 
     /// Colours by the file's profile, or as sRGB.
-    fn decode_colors<T: Sample, P: Colored>(
+    fn decode_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],
         pixels: &mut [P],
@@ -321,7 +321,7 @@ impl SampleRows<'_> {
     }
 
     /// Colours in the form that the file has them; `decode` takes its display codes, `light` display values.
-    fn convert_colors<T: Sample, P: Colored>(
+    fn convert_colors<T: FileSample, P: Colored>(
         &self,
         samples: &[T],
         pixels: &mut [P],
@@ -457,10 +457,9 @@ impl Raster {
         let row = self.row_samples();
         let mut pixels: Vec<P> = zeroed_vec(width * height);
         let mut rows = height..height;
+        let band_rows = (BAND_PIXELS / width.max(1)).max(1);
         while rows.start > 0 {
-            rows = rows
-                .start
-                .saturating_sub((BAND_PIXELS / width.max(1)).max(1))..rows.start;
+            rows = rows.start.saturating_sub(band_rows)..rows.start;
             let band = &mut pixels[rows.start * width..rows.end * width];
             P::fill(&self.rows(profile, rows.clone()), band)?;
             self.samples.shorten(rows.start * row);

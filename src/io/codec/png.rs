@@ -1,4 +1,4 @@
-//! PNG: 8 or 16 bits, display-encoded as the file says or as sRGB, straight alpha.
+//! PNG: 8 or 16 bits, display-encoded as the file describes or as sRGB, straight alpha.
 
 use super::codes::{CodedImage, Codes};
 use super::profile::ColorDescription;
@@ -78,8 +78,8 @@ fn texts(info: &png::Info<'_>) -> Notes {
     latin.chain(utf8).collect()
 }
 
-/// What the file says of its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3): code points, a profile,
-/// sRGB, or the exponent and the primaries. None for sRGB, and where it says nothing.
+/// How the file describes its colours, by the chunk that takes precedence (PNG 3rd edition, 4.3): code points, a profile,
+/// sRGB, or the exponent and the primaries. None for sRGB, and without a description.
 pub(crate) fn color_description(bytes: &[u8], limits: &Limits) -> Option<ColorDescription> {
     let reader = open(Cursor::new(bytes), bytes.len() as u64, limits).ok()?;
     let info = reader.info();
@@ -129,11 +129,7 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
     reader.next_frame(&mut data)?;
     reader.finish()?;
     let samples = match depth {
-        BitDepth::Sixteen => Samples::U16(
-            data.chunks_exact(2)
-                .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
-                .collect(),
-        ),
+        BitDepth::Sixteen => Samples::U16(big_endian_codes(&data)),
         _ => Samples::U8(data),
     };
     Ok(Raster {
@@ -144,6 +140,13 @@ pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Raster, Refusal> {
         display_encoded: true,
         premultiplied: false,
     })
+}
+
+fn big_endian_codes(bytes: &[u8]) -> Vec<u16> {
+    bytes
+        .chunks_exact(2)
+        .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
+        .collect()
 }
 
 /// Effort of deflate and of the filters before it; the default takes a few milliseconds for 640 x 480.
@@ -173,11 +176,7 @@ fn write(
     metadata: &[(String, String)],
 ) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, picture.width as u32, picture.height as u32);
-    encoder.set_color(match picture.names.len() {
-        1 => ColorType::Grayscale,
-        3 => ColorType::Rgb,
-        _ => ColorType::Rgba,
-    });
+    encoder.set_color(color_type(picture.names.len()));
     encoder.set_compression(compression(effort));
     if picture.names.len() > 1 {
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
@@ -193,6 +192,14 @@ fn write(
             let bytes: Vec<u8> = codes.iter().flat_map(|code| code.to_be_bytes()).collect();
             encoder.write_header()?.write_image_data(&bytes)
         }
+    }
+}
+
+fn color_type(channels: usize) -> ColorType {
+    match channels {
+        1 => ColorType::Grayscale,
+        3 => ColorType::Rgb,
+        _ => ColorType::Rgba,
     }
 }
 

@@ -1,4 +1,4 @@
-//! What files say that their display codes are: colour profiles (ICC), and the curve and primaries that a PNG names.
+//! How files describe their display codes: colour profiles (ICC), and the curve and primaries that a PNG names.
 //!
 //! Profiles of three primaries and three curves (sRGB, Display P3, Adobe RGB, ProPhoto, ...) and of one grey curve are
 //! applied; others are named in a warning and the codes treated as sRGB.
@@ -30,7 +30,7 @@ const CHROMATICITY_TOLERANCE: f64 = 1e-3;
 /// A triangle of primaries with less area (in x, y) holds no colours; Rec. 709 has 0.11.
 const SMALLEST_GAMUT: f64 = 1e-3;
 
-/// What a file says of its colours.
+/// How a file describes its colours.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ColorDescription {
     /// A colour profile.
@@ -44,7 +44,7 @@ pub(crate) enum ColorDescription {
     CodePoints(u8, u8),
 }
 
-/// How display codes become light, where a file says so itself.
+/// How display codes become light, where a file describes it itself.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Profile {
     /// Linear light of each 16-bit code, for red, green and blue.

@@ -60,10 +60,9 @@ fn open<R: Read + Seek>(
     file_bytes: u64,
     limits: &Limits,
 ) -> Result<OpenedTiff<R>, Refusal> {
-    let mut most = tiff::decoder::Limits::default();
+    let mut most = metadata_limits(limits);
     most.decoding_buffer_size = usize::try_from(limits.decoded_bytes).unwrap_or(usize::MAX);
     most.intermediate_buffer_size = most.decoding_buffer_size;
-    most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
     let mut decoder = first_picture(file)?.with_limits(most);
     let (width, height) = decoder.dimensions()?;
     refuse_missing_palette(&mut decoder)?;
@@ -86,6 +85,13 @@ fn open<R: Read + Seek>(
         bits,
         inks,
     })
+}
+
+/// The decoder's own limits, with ours on metadata.
+fn metadata_limits(limits: &Limits) -> tiff::decoder::Limits {
+    let mut most = tiff::decoder::Limits::default();
+    most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
+    most
 }
 
 /// Channels of a pixel as it is stored, and bits of each.
@@ -138,7 +144,7 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
     let mut start = [0; 4];
     file.read_exact(&mut start)?;
     let (little, big) = (start.starts_with(b"II"), start.contains(&43));
-    // BigTIFF says how long its offsets are, which is 8.
+    // Bytes of an offset, of a count and of an entry; BigTIFF states how long its offsets are, which is 8.
     let (offset, count, entry) = if big { (8, 8, 20) } else { (4, 2, 12) };
     if big {
         read_integer(file, 4, little)?;
@@ -146,13 +152,12 @@ fn first_tags(file: &mut (impl Read + Seek)) -> std::io::Result<Vec<u16>> {
     let directory = read_integer(file, offset, little)?;
     file.seek(SeekFrom::Start(directory))?;
     let entries = read_integer(file, count, little)?.min(u64::from(u16::MAX));
-    (0..entries)
-        .map(|_| {
-            let tag = read_integer(file, 2, little)?;
-            file.seek_relative(entry - 2)?;
-            Ok(tag as u16)
-        })
-        .collect()
+    let mut tags = Vec::new();
+    for _ in 0..entries {
+        tags.push(read_integer(file, 2, little)? as u16);
+        file.seek_relative(entry - 2)?;
+    }
+    Ok(tags)
 }
 
 /// An integer of at most 8 bytes.
@@ -190,10 +195,10 @@ fn refuse_missing_palette(decoder: &mut Decoder<impl Read + Seek>) -> Result<(),
 
 /// The embedded colour profile.
 pub(crate) fn profile(bytes: &[u8], limits: &Limits) -> Option<Vec<u8>> {
-    let mut most = tiff::decoder::Limits::default();
-    most.ifd_value_size = usize::try_from(limits.metadata_bytes).unwrap_or(usize::MAX);
     // Of kinds of TIFF too that the decoder cannot read: OpenImageIO hands over their codes.
-    let mut decoder = Decoder::new(Cursor::new(bytes)).ok()?.with_limits(most);
+    let mut decoder = Decoder::new(Cursor::new(bytes))
+        .ok()?
+        .with_limits(metadata_limits(limits));
     decoder.get_tag_u8_vec(Tag::IccProfile).ok()
 }
 
@@ -300,13 +305,18 @@ impl ChunkGrid {
         self.width * self.height * self.channels
     }
 
+    /// The first pixel of a strip or tile of a plane.
+    fn corner(&self, index: usize) -> (usize, usize) {
+        (
+            index % self.across() * self.size.0,
+            index / self.across() * self.size.1,
+        )
+    }
+
     /// Puts the samples of a strip or tile, of which `columns` and `rows` are there, into the picture.
     fn put<T: Copy>(&self, to: &mut [T], from: &[T], index: usize, [columns, rows]: [usize; 2]) {
-        let (plane, place) = (index / self.count(), index % self.count());
-        let (left, top) = (
-            place % self.across() * self.size.0,
-            place / self.across() * self.size.1,
-        );
+        let plane = index / self.count();
+        let (left, top) = self.corner(index % self.count());
         let stored = if self.planes { 1 } else { self.channels };
         let kept = columns.min(self.width - left);
         let rows = rows.min(self.height - top);
@@ -380,9 +390,9 @@ fn known_samples(decoded: DecodingResult) -> Samples {
         DecodingResult::U32(v) => codes_of(v, |x| (x >> 16) as u16),
         DecodingResult::U64(v) => codes_of(v, |x| (x >> 48) as u16),
         DecodingResult::I8(v) => codes_of(v, widened_7_bits),
-        DecodingResult::I16(v) => codes_of(v, |x| doubled(x.max(0) as u16)),
-        DecodingResult::I32(v) => codes_of(v, |x| doubled((x.max(0) >> 16) as u16)),
-        DecodingResult::I64(v) => codes_of(v, |x| doubled((x.max(0) >> 48) as u16)),
+        DecodingResult::I16(v) => codes_of(v, |x| widened_15_bits(x.into(), 0)),
+        DecodingResult::I32(v) => codes_of(v, |x| widened_15_bits(x.into(), 16)),
+        DecodingResult::I64(v) => codes_of(v, |x| widened_15_bits(x, 48)),
     }
 }
 
@@ -394,6 +404,11 @@ fn codes_of<T>(samples: Vec<T>, code: impl Fn(T) -> u16) -> Samples {
 fn widened_7_bits(x: i8) -> u16 {
     let x = x.max(0) as u16;
     doubled(x << 8 | x << 1 | x >> 6)
+}
+
+/// The first 15 bits of a signed integer as 16.
+fn widened_15_bits(x: i64, further_bits: u32) -> u16 {
+    doubled((x.max(0) >> further_bits) as u16)
 }
 
 /// 15 bits as 16, the first of them repeated behind the last: 0 stays 0, full scale full scale.

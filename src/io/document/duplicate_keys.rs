@@ -185,15 +185,15 @@ mod tests {
                 check_json(json, 3).is_ok() && found(toml, 3).is_none(),
                 "{toml}"
             );
-            let told =
+            let expected =
                 "nested deeper than 2 levels (Limits::document_depth; --limit document_depth=N)";
             assert!(
                 check_json(json, 2)
                     .unwrap_err()
                     .to_string()
-                    .starts_with(told)
+                    .starts_with(expected)
             );
-            assert_eq!(found(toml, 2).as_deref(), Some(told));
+            assert_eq!(found(toml, 2).as_deref(), Some(expected));
         }
     }
 }

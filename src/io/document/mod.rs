@@ -79,7 +79,18 @@ pub(crate) fn from_table<T: DeserializeOwned>(table: toml::Table) -> Result<T> {
     from_value(table.into(), "")
 }
 
-/// `outer` is the path of the value, with its dot.
+/// A document from a table in memory, some of its values replaced.
+///
+/// # Errors
+/// As [`parse_toml`]; an override that leads nowhere.
+pub(crate) fn from_table_with<T: DeserializeOwned>(
+    mut table: toml::Table,
+    overrides: &[Override],
+) -> Result<T> {
+    overrides.iter().try_for_each(|o| o.apply(&mut table))?;
+    from_table(table)
+}
+
 fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T> {
     serde_path_to_error::deserialize(value).map_err(|e| {
         let at = format!("{outer}{}", e.path());
@@ -93,7 +104,7 @@ fn from_value<T: DeserializeOwned>(value: toml::Value, outer: &str) -> Result<T>
     })
 }
 
-/// Reads a document that says by its extension whether it is JSON (`.json`) or TOML (any other).
+/// Reads a document whose extension shows whether it is JSON (`.json`) or TOML (any other).
 ///
 /// # Errors
 /// As [`read_toml`].

@@ -189,10 +189,10 @@ fn windowed<T: Copy + Default>(samples: Vec<T>, layout: &Layout, picked: &[usize
     for y in ys {
         let row = (y as i64 - layout.y) as usize * columns;
         for x in xs.clone() {
-            let from = (row + (x as i64 - layout.x) as usize) * stride;
+            let pixel = &samples[(row + (x as i64 - layout.x) as usize) * stride..][..stride];
             let to = (y * width + x) * picked.len();
             for (slot, &channel) in out[to..].iter_mut().zip(picked) {
-                *slot = samples[from + channel];
+                *slot = pixel[channel];
             }
         }
     }

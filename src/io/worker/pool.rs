@@ -181,17 +181,7 @@ impl Worker {
 
     /// A process that has sent nothing yet.
     fn launch(program: &Path, limits: &Limits) -> std::io::Result<Self> {
-        let environment = ENVIRONMENT
-            .iter()
-            .filter_map(|name| Some((name, std::env::var_os(name)?)));
-        let mut child = Command::new(program)
-            .arg(serde_json::to_string(limits)?)
-            .env_clear()
-            .envs(environment)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()?;
+        let mut child = spawn_program(program, limits)?;
         let pipes = child.stdin.take().zip(child.stdout.take());
         let (stdin, stdout) = pipes.ok_or_else(|| std::io::Error::other("no pipe to it"))?;
         Ok(Self {
@@ -304,6 +294,20 @@ impl Worker {
             }
         }
     }
+}
+
+fn spawn_program(program: &Path, limits: &Limits) -> std::io::Result<Child> {
+    let environment = ENVIRONMENT
+        .iter()
+        .filter_map(|name| Some((name, std::env::var_os(name)?)));
+    Command::new(program)
+        .arg(serde_json::to_string(limits)?)
+        .env_clear()
+        .envs(environment)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
 }
 
 fn not_started(program: &Path, how: &str) -> Refusal {

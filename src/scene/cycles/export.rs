@@ -1,25 +1,27 @@
 //! A shot as a folder for the reference renderer.
 
 use super::file::{
-    Camera, Environment, File, Ground, Light, Picture, Quad, Render, Shape, Side, Size, Tray,
+    CyclesCamera, CyclesEnvironment, CyclesFile, CyclesGround, CyclesLight, CyclesPicture,
+    CyclesQuad, CyclesRender, CyclesShape, CyclesSide, CyclesSize, CyclesTray,
 };
 use crate::asset::Texture;
+use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::geom::{Pose, Vector3};
+use crate::geom::Vector3;
 use crate::image::Image;
 use crate::io::{self, Bits, WriteOptions};
 use crate::pixel::LinearRgb;
-use crate::scene::{AreaLight, Card, EnvironmentMap, LightShape, Shot};
-use nalgebra::Matrix4;
+use crate::scene::{AreaLight, Card, LightShape, Shot};
+use nalgebra::SMatrix;
 use std::path::Path;
 
 /// The script that renders the folder, written beside the scene.
 pub const SCRIPT: &str = "scene_reference.py";
 const SCRIPT_TEXT: &str = include_str!("../../../golden/render/scene_reference.py");
-/// Samples that the scene asks for: noise of about 1e-3.
-const SAMPLES: u32 = 1024;
-/// A surface without end, as far as a program that wants a number is concerned, metres.
-const FAR: f64 = 1000.0;
+/// Samples of a pixel that the scene asks for: noise of about 1e-3.
+const SAMPLES_PER_PIXEL: u32 = 1024;
+/// Side of an endless surface for a program that needs a number, metres.
+const ENDLESS_SIDE_M: f64 = 1000.0;
 
 /// Writes `scene.json`, its plate, textures and environment (float EXR), and the script that renders them in Blender.
 ///
@@ -31,41 +33,50 @@ const FAR: f64 = 1000.0;
 pub fn export(shot: &Shot, size: [f64; 2], folder: impl AsRef<Path>) -> Result<()> {
     let folder = folder.as_ref();
     io::create_folder(folder)?;
-    let plate = shot
-        .plate
-        .as_ref()
-        .map(|plate| picture(folder, "plate.exr", plate))
-        .transpose()?;
-    let file = File {
-        render: Render {
-            width: shot.camera.image[0],
-            height: shot.camera.image[1],
-            samples: SAMPLES,
-            max_bounces: 0,
-        },
-        camera: camera(&shot.camera),
-        tray: Tray { size },
-        plate: plate.map(|path| Picture { path }),
-        quads: shot
-            .cards
-            .iter()
-            .map(|card| quad(folder, card))
-            .collect::<Result<_>>()?,
-        lights: shot
-            .lights
-            .iter()
-            .map(|l| light(l, shot.exposure))
-            .collect(),
-        environment: Some(environment(folder, shot)?),
-        ground: Some(Ground {
-            extent: shot.catcher.map(|side| side.min(FAR)),
-        }),
-    };
-    io::write_json(folder.join("scene.json"), &file)?;
+    io::write_json(folder.join("scene.json"), &scene_file(shot, size, folder)?)?;
     io::write_text(folder.join(SCRIPT), SCRIPT_TEXT)
 }
 
-fn picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result<String> {
+/// What `scene.json` holds, its pictures written.
+fn scene_file(shot: &Shot, size: [f64; 2], folder: &Path) -> Result<CyclesFile> {
+    let cards = shot.cards.iter();
+    let lights = shot.lights.iter();
+    Ok(CyclesFile {
+        render: render_settings(shot.camera.image),
+        camera: cycles_camera(&shot.camera),
+        tray: CyclesTray { size },
+        plate: write_plate(folder, shot)?,
+        quads: cards
+            .map(|card| write_card(folder, card))
+            .collect::<Result<_>>()?,
+        lights: lights
+            .map(|light| cycles_light(light, shot.exposure))
+            .collect(),
+        environment: Some(write_environment(folder, shot)?),
+        ground: Some(CyclesGround {
+            extent: shot.catcher.map(|side| side.min(ENDLESS_SIDE_M)),
+        }),
+    })
+}
+
+fn render_settings([width, height]: [u32; 2]) -> CyclesRender {
+    CyclesRender {
+        width,
+        height,
+        samples: SAMPLES_PER_PIXEL,
+        max_bounces: 0,
+    }
+}
+
+fn write_plate(folder: &Path, shot: &Shot) -> Result<Option<CyclesPicture>> {
+    let Some(plate) = &shot.plate else {
+        return Ok(None);
+    };
+    let path = write_picture(folder, "plate.exr", plate)?;
+    Ok(Some(CyclesPicture { path }))
+}
+
+fn write_picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result<String> {
     let options = WriteOptions {
         bits: Some(Bits::Float),
         ..Default::default()
@@ -74,35 +85,30 @@ fn picture<P: io::ToFile>(folder: &Path, name: &str, image: &Image<P>) -> Result
     Ok(name.into())
 }
 
-fn camera(camera: &crate::Camera) -> Camera {
-    let rows =
-        |m: nalgebra::Matrix3<f64>| std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]));
+fn cycles_camera(camera: &Camera) -> CyclesCamera {
     let pose = &camera.camera_from_world;
-    Camera {
-        K: rows(camera.intrinsics()),
-        R: rows(*pose.rotation.to_rotation_matrix().matrix()),
+    CyclesCamera {
+        K: matrix_rows(camera.intrinsics()),
+        R: matrix_rows(*pose.rotation.to_rotation_matrix().matrix()),
         t: pose.translation.vector.into(),
         resolution: Some(camera.image),
     }
 }
 
-fn quad(folder: &Path, card: &Card) -> Result<Quad> {
+fn write_card(folder: &Path, card: &Card) -> Result<CyclesQuad> {
     let id = card.id.0;
     if !(1..=u32::from(u16::MAX)).contains(&id) {
-        return Err(Error::value(
-            "cards",
-            format!("id {id}, expected 1 to {}", u16::MAX),
-        ));
+        let what = format!("id {id}, expected 1 to {}", u16::MAX);
+        return Err(Error::value("cards", what));
     }
-    Ok(Quad {
+    let back = card.back.as_ref();
+    Ok(CyclesQuad {
         id,
         size: card.quad.size,
-        pose: matrix(&card.quad.world_from_card),
-        front: side(folder, &format!("card_{id}"), &card.texture)?,
-        back: card
-            .back
-            .as_ref()
-            .map(|back| side(folder, &format!("card_{id}_back"), back))
+        pose: matrix_rows(card.quad.world_from_card.to_homogeneous()),
+        front: write_side(folder, &format!("card_{id}"), &card.texture)?,
+        back: back
+            .map(|back| write_side(folder, &format!("card_{id}_back"), back))
             .transpose()?,
         hue_shift: card.grade.hue_deg,
         saturation: card.grade.saturation,
@@ -110,73 +116,74 @@ fn quad(folder: &Path, card: &Card) -> Result<Quad> {
     })
 }
 
-fn matrix(pose: &Pose) -> [[f64; 4]; 4] {
-    let m: Matrix4<f64> = pose.to_homogeneous();
+fn matrix_rows<const N: usize>(m: SMatrix<f64, N, N>) -> [[f64; N]; N] {
     std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))
 }
 
-fn side(folder: &Path, name: &str, texture: &Texture) -> Result<Side> {
+fn write_side(folder: &Path, name: &str, texture: &Texture) -> Result<CyclesSide> {
+    let (color, opacity) = (format!("{name}.exr"), format!("{name}_opacity.exr"));
     match texture {
-        Texture::Rgba(pyramid) => Ok(Side {
-            texture: picture(folder, &format!("{name}.exr"), pyramid.base())?,
+        Texture::Rgba(pyramid) => Ok(CyclesSide {
+            texture: write_picture(folder, &color, pyramid.base())?,
             film: None,
         }),
-        Texture::Film(pyramid) => Ok(Side {
-            texture: picture(
-                folder,
-                &format!("{name}.exr"),
-                &pyramid.base().map(|film| film.to_rgba()),
-            )?,
-            film: Some(picture(
-                folder,
-                &format!("{name}_opacity.exr"),
-                &pyramid.base().map(|film| film.opacity),
-            )?),
-        }),
+        Texture::Film(pyramid) => {
+            let film = pyramid.base();
+            Ok(CyclesSide {
+                texture: write_picture(folder, &color, &film.map(|film| film.to_rgba()))?,
+                film: Some(write_picture(
+                    folder,
+                    &opacity,
+                    &film.map(|film| film.opacity),
+                )?),
+            })
+        }
     }
 }
 
-fn light(light: &AreaLight, exposure: f32) -> Light {
-    let apart = (Vector3::from(light.target) - Vector3::from(light.position)).norm() > 0.0;
-    let [x, y, z] = light.position;
-    Light {
+fn cycles_light(light: &AreaLight, exposure: f32) -> CyclesLight {
+    CyclesLight {
         shape: match light.shape {
-            LightShape::Rectangle => Shape::Rectangle,
-            LightShape::Ellipse => Shape::Ellipse,
+            LightShape::Rectangle => CyclesShape::Rectangle,
+            LightShape::Ellipse => CyclesShape::Ellipse,
         },
-        size: Size::Two(light.size),
+        size: CyclesSize::Two(light.size),
         power: light.power * f64::from(exposure),
         color: light.color,
         position: light.position,
-        // A light whose target is its own position shines straight down.
-        target: if apart { light.target } else { [x, y, z - 1.0] },
+        target: light_target(light),
+    }
+}
+
+/// A light whose target is its own position shines straight down.
+fn light_target(light: &AreaLight) -> [f64; 3] {
+    let way = Vector3::from(light.target) - Vector3::from(light.position);
+    let [x, y, z] = light.position;
+    if way.norm() > 0.0 {
+        light.target
+    } else {
+        [x, y, z - 1.0]
     }
 }
 
 /// One environment for the constant one and the picture.
-fn environment(folder: &Path, shot: &Shot) -> Result<Environment> {
-    let Some(EnvironmentMap {
-        panorama,
-        rotation,
-        strength,
-    }) = &shot.environment
-    else {
-        let color = Some(shot.ambient.scale(shot.exposure));
-        return Ok(Environment {
-            color,
+fn write_environment(folder: &Path, shot: &Shot) -> Result<CyclesEnvironment> {
+    let Some(map) = &shot.environment else {
+        return Ok(CyclesEnvironment {
+            color: Some(shot.ambient.scale(shot.exposure)),
             path: None,
             strength: 1.0,
             rotation_z: 0.0,
         });
     };
-    let both = panorama
+    let both = map
+        .panorama
         .image()
-        .map(|c: LinearRgb| (c.scale(*strength) + shot.ambient).scale(shot.exposure));
-    let path = Some(picture(folder, "environment.exr", &both)?);
-    Ok(Environment {
+        .map(|c: LinearRgb| (c.scale(map.strength) + shot.ambient).scale(shot.exposure));
+    Ok(CyclesEnvironment {
         color: None,
-        path,
+        path: Some(write_picture(folder, "environment.exr", &both)?),
         strength: 1.0,
-        rotation_z: rotation.to_degrees(),
+        rotation_z: map.rotation.to_degrees(),
     })
 }

@@ -3,25 +3,25 @@
 use crate::pixel::LinearRgb;
 use serde::{Deserialize, Serialize};
 
-/// The whole file. Keys that only Blender needs (physics, material) are passed over.
+/// The whole file. Keys that only Blender needs (physics, material) are ignored.
 #[derive(Serialize, Deserialize)]
-pub(super) struct File {
-    pub(super) render: Render,
-    pub(super) camera: Camera,
-    pub(super) tray: Tray,
+pub(super) struct CyclesFile {
+    pub(super) render: CyclesRender,
+    pub(super) camera: CyclesCamera,
+    pub(super) tray: CyclesTray,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) plate: Option<Picture>,
-    pub(super) quads: Vec<Quad>,
+    pub(super) plate: Option<CyclesPicture>,
+    pub(super) quads: Vec<CyclesQuad>,
     #[serde(default)]
-    pub(super) lights: Vec<Light>,
+    pub(super) lights: Vec<CyclesLight>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) environment: Option<Environment>,
+    pub(super) environment: Option<CyclesEnvironment>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) ground: Option<Ground>,
+    pub(super) ground: Option<CyclesGround>,
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Render {
+pub(super) struct CyclesRender {
     pub(super) width: u32,
     pub(super) height: u32,
     #[serde(default)]
@@ -32,7 +32,7 @@ pub(super) struct Render {
 
 #[derive(Serialize, Deserialize)]
 #[expect(non_snake_case, reason = "the keys of the file")]
-pub(super) struct Camera {
+pub(super) struct CyclesCamera {
     pub(super) K: [[f64; 3]; 3],
     pub(super) R: [[f64; 3]; 3],
     pub(super) t: [f64; 3],
@@ -41,30 +41,30 @@ pub(super) struct Camera {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Tray {
+pub(super) struct CyclesTray {
     pub(super) size: [f64; 2],
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Ground {
+pub(super) struct CyclesGround {
     pub(super) extent: [f64; 2],
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Picture {
+pub(super) struct CyclesPicture {
     pub(super) path: String,
 }
 
 /// A card; `texture` is premultiplied, or what a film adds where there is `film`: its opacity per channel.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Quad {
+pub(super) struct CyclesQuad {
     pub(super) id: u32,
     pub(super) size: [f64; 2],
     pub(super) pose: [[f64; 4]; 4],
     #[serde(flatten)]
-    pub(super) front: Side,
+    pub(super) front: CyclesSide,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(super) back: Option<Side>,
+    pub(super) back: Option<CyclesSide>,
     #[serde(default)]
     pub(super) hue_shift: f32,
     #[serde(default = "one")]
@@ -74,17 +74,17 @@ pub(super) struct Quad {
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Side {
+pub(super) struct CyclesSide {
     pub(super) texture: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) film: Option<String>,
 }
 
 #[derive(Serialize, Deserialize)]
-pub(super) struct Light {
+pub(super) struct CyclesLight {
     #[serde(default)]
-    pub(super) shape: Shape,
-    pub(super) size: Size,
+    pub(super) shape: CyclesShape,
+    pub(super) size: CyclesSize,
     pub(super) power: f64,
     #[serde(default = "white")]
     pub(super) color: LinearRgb,
@@ -95,7 +95,7 @@ pub(super) struct Light {
 
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Shape {
+pub(super) enum CyclesShape {
     #[default]
     Rectangle,
     Square,
@@ -105,14 +105,14 @@ pub(super) enum Shape {
 
 #[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(untagged)]
-pub(super) enum Size {
+pub(super) enum CyclesSize {
     One(f64),
     Two([f64; 2]),
 }
 
 /// A constant colour, or a picture; degrees.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Environment {
+pub(super) struct CyclesEnvironment {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) color: Option<LinearRgb>,
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -1,58 +1,47 @@
 //! A shot from a file of the reference renderer.
 
-use super::file::{Environment, File, Light, Quad, Shape, Side, Size};
-use crate::Camera;
+use super::file::{
+    CyclesEnvironment, CyclesFile, CyclesLight, CyclesQuad, CyclesShape, CyclesSide, CyclesSize,
+};
 use crate::asset::{Panorama, Texture};
+use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
+use crate::geom::{Point2, Pose, Quad, UnitQuaternion, Vector2, Vector3};
 use crate::image::Image;
 use crate::io;
 use crate::pixel::{Film, LinearRgb, Mix, ObjectId, PremulRgba};
-use crate::scene::resolve::CATCHER;
-use crate::scene::{AreaLight, Card, EnvironmentMap, Grade, LightShape, Shot};
+use crate::scene::{AreaLight, CATCHER_RATIO, Card, EnvironmentMap, Grade, LightShape, Shot};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// The shot that a scene file of the reference renderer tells, at the file's own size or another.
+/// The shot that a scene file of the reference renderer describes, at the file's own size or another.
 ///
-/// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is averaged over the pixels
-/// of the picture, as the script does.
+/// Every quad has its pose, and its texture is a premultiplied scene-linear EXR. The plate is averaged
+/// over the pixels of the picture, as the script does.
 ///
 /// # Errors
 /// A file that cannot be read or misses a key; a picture that it names and that cannot be read.
 pub fn import(path: impl AsRef<Path>, size: Option<[u32; 2]>) -> Result<Shot> {
     let path = path.as_ref();
-    let file: File = io::read_json(path)?;
-    let files = &Files::of(path)?;
-    let camera = camera(&file).resized(size.unwrap_or([file.render.width, file.render.height]));
-    let mut shot = Shot::new(camera);
+    let file: CyclesFile = io::read_json(path)?;
+    let folder = PictureFolder::for_scene(path)?;
+    let size = size.unwrap_or([file.render.width, file.render.height]);
+    let mut shot = Shot::new(known_camera(&file).resized(size));
     if let Some(plate) = &file.plate {
-        let photo: Image<PremulRgba> = io::read(files.find(&plate.path)?)?;
-        shot = shot.with_plate(Arc::new(averaged(
-            &photo.map(PremulRgba::color),
-            camera.image,
-        )));
+        shot = shot.with_plate(Arc::new(folder.read_plate(&plate.path, size)?));
     }
-    shot.catcher = file
-        .ground
-        .map_or(file.tray.size.map(|side| CATCHER * side), |ground| {
-            ground.extent
-        });
-    shot.lights = file.lights.iter().map(light).collect();
-    shot.cards = file
-        .quads
-        .iter()
-        .map(|q| card(files, q))
-        .collect::<Result<_>>()?;
+    shot.catcher = catcher_size(&file);
+    shot.lights = file.lights.iter().map(area_light).collect();
+    shot.cards = folder.read_cards(&file.quads)?;
     if let Some(around) = &file.environment {
         shot.ambient = around.color.unwrap_or_default().scale(around.strength);
-        shot.environment = map(files, around)?;
+        shot.environment = folder.read_environment(around)?;
     }
     Ok(shot)
 }
 
 /// The pictures of a scene: they lie in its folder or, where scenes share them, in the folder beside it.
-struct Files {
+struct PictureFolder {
     /// The scene's file.
     scene: PathBuf,
     /// The folder that holds the scene's own.
@@ -61,8 +50,8 @@ struct Files {
     own: PathBuf,
 }
 
-impl Files {
-    fn of(scene: &Path) -> Result<Self> {
+impl PictureFolder {
+    fn for_scene(scene: &Path) -> Result<Self> {
         let whole = std::path::absolute(scene).map_err(|e| Error::file(scene, e))?;
         let folder = whole.parent().unwrap_or(&whole);
         let root = folder.parent().unwrap_or(folder).to_path_buf();
@@ -75,149 +64,167 @@ impl Files {
 
     /// The picture of a name: at most one step up.
     fn find(&self, name: &str) -> Result<PathBuf> {
-        let outside = || {
-            let what = format!(
-                "\"{name}\", expected a path below the scene's folder or the one that holds it"
-            );
-            Error::value("path", what).in_file(&self.scene)
-        };
         let mut place = self.own.clone();
         for step in Path::new(name).components() {
             match step {
                 Component::Normal(step) => place.push(step),
                 Component::CurDir => {}
                 Component::ParentDir if place.pop() => {}
-                _ => return Err(outside()),
+                _ => return Err(self.outside(name)),
             }
         }
         io::inside(&self.root, place).map_err(|e| e.in_file(&self.scene))
     }
+
+    fn outside(&self, name: &str) -> Error {
+        let what = format!(
+            "\"{name}\", expected a path below the scene's folder or the one that holds it"
+        );
+        Error::value("path", what).in_file(&self.scene)
+    }
+
+    fn read_plate(&self, name: &str, size: [u32; 2]) -> Result<Image<LinearRgb>> {
+        let photo: Image<PremulRgba> = io::read(self.find(name)?)?;
+        Ok(averaged(&photo.map(PremulRgba::color), size))
+    }
+
+    fn read_cards(&self, quads: &[CyclesQuad]) -> Result<Vec<Card>> {
+        quads.iter().map(|quad| self.read_card(quad)).collect()
+    }
+
+    fn read_card(&self, quad: &CyclesQuad) -> Result<Card> {
+        let placed = Quad {
+            world_from_card: world_from_card(&quad.pose),
+            size: quad.size,
+        };
+        let back = quad.back.as_ref();
+        Ok(Card {
+            back: back.map(|back| self.read_texture(back)).transpose()?,
+            grade: Grade {
+                hue_deg: quad.hue_shift,
+                saturation: quad.saturation,
+                value: quad.value,
+            },
+            ..Card::new(ObjectId(quad.id), placed, self.read_texture(&quad.front)?)
+        })
+    }
+
+    fn read_texture(&self, side: &CyclesSide) -> Result<Texture> {
+        let color: Image<PremulRgba> = io::read(self.find(&side.texture)?)?;
+        let Some(film) = &side.film else {
+            return Ok(color.into());
+        };
+        let film = self.find(film)?;
+        let opacity: Image<PremulRgba> = io::read(&film)?;
+        let (size, expected) = (opacity.size(), color.size());
+        if size != expected {
+            let what = format!("{size:?} pixels, but its colour has {expected:?}");
+            return Err(Error::file(film, what));
+        }
+        Ok(color.zip_map(&opacity, film_pixel).into())
+    }
+
+    fn read_environment(&self, around: &CyclesEnvironment) -> Result<Option<EnvironmentMap>> {
+        let Some(path) = &around.path else {
+            return Ok(None);
+        };
+        let path = self.find(path)?;
+        let photo: Image<PremulRgba> = io::read(&path)?;
+        let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))?;
+        Ok(Some(EnvironmentMap {
+            panorama: Arc::new(panorama),
+            rotation: around.rotation_z.to_radians(),
+            strength: around.strength,
+        }))
+    }
 }
 
-fn camera(file: &File) -> Camera {
+/// Width and height of the part of the floor that receives shadows, metres.
+fn catcher_size(file: &CyclesFile) -> [f64; 2] {
+    match &file.ground {
+        Some(ground) => ground.extent,
+        None => file.tray.size.map(|side| CATCHER_RATIO * side),
+    }
+}
+
+fn film_pixel(color: PremulRgba, opacity: PremulRgba) -> Film {
+    Film {
+        color: color.color(),
+        opacity: opacity.color(),
+    }
+}
+
+fn known_camera(file: &CyclesFile) -> Camera {
     let c = &file.camera;
+    let pose = Pose::from_parts(Vector3::from(c.t).into(), rotation_from_rows(c.R));
     Camera {
         image: c
             .resolution
             .unwrap_or([file.render.width, file.render.height]),
         focal_px: Vector2::new(c.K[0][0], c.K[1][1]),
         principal_px: Point2::new(c.K[0][2], c.K[1][2]),
-        camera_from_world: Pose::from_parts(Vector3::from(c.t).into(), rotation(c.R)),
+        camera_from_world: pose,
     }
 }
 
-fn rotation(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
+fn world_from_card(pose: &[[f64; 4]; 4]) -> Pose {
+    let axes = std::array::from_fn(|i| std::array::from_fn(|j| pose[i][j]));
+    let at = Vector3::new(pose[0][3], pose[1][3], pose[2][3]);
+    Pose::from_parts(at.into(), rotation_from_rows(axes))
+}
+
+fn rotation_from_rows(rows: [[f64; 3]; 3]) -> UnitQuaternion<f64> {
     let matrix = nalgebra::Matrix3::from_fn(|i, j| rows[i][j]);
     UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(matrix))
 }
 
-fn light(l: &Light) -> AreaLight {
+fn area_light(light: &CyclesLight) -> AreaLight {
     AreaLight {
-        shape: match l.shape {
-            Shape::Rectangle | Shape::Square => LightShape::Rectangle,
-            Shape::Disk | Shape::Ellipse => LightShape::Ellipse,
+        shape: match light.shape {
+            CyclesShape::Rectangle | CyclesShape::Square => LightShape::Rectangle,
+            CyclesShape::Disk | CyclesShape::Ellipse => LightShape::Ellipse,
         },
-        position: l.position,
-        target: l.target,
-        size: match l.size {
-            Size::One(side) => [side; 2],
-            Size::Two(sides) => sides,
+        position: light.position,
+        target: light.target,
+        size: match light.size {
+            CyclesSize::One(side) => [side; 2],
+            CyclesSize::Two(sides) => sides,
         },
-        power: l.power,
-        color: l.color,
+        power: light.power,
+        color: light.color,
     }
 }
 
-fn card(files: &Files, q: &Quad) -> Result<Card> {
-    let axes = std::array::from_fn(|i| std::array::from_fn(|j| q.pose[i][j]));
-    let at = Vector3::new(q.pose[0][3], q.pose[1][3], q.pose[2][3]);
-    Ok(Card {
-        id: ObjectId(q.id),
-        class: 0,
-        quad: crate::geom::Quad {
-            world_from_card: Pose::from_parts(at.into(), rotation(axes)),
-            size: q.size,
-        },
-        texture: texture(files, &q.front)?,
-        back: q
-            .back
-            .as_ref()
-            .map(|back| texture(files, back))
-            .transpose()?,
-        outline_uv: [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
-            .map(Point2::from)
-            .into(),
-        grade: Grade {
-            hue_deg: q.hue_shift,
-            saturation: q.saturation,
-            value: q.value,
-        },
-    })
-}
-
-fn texture(files: &Files, side: &Side) -> Result<Texture> {
-    let color: Image<PremulRgba> = io::read(files.find(&side.texture)?)?;
-    let Some(film) = &side.film else {
-        return Ok(color.into());
-    };
-    let film = files.find(film)?;
-    let opacity: Image<PremulRgba> = io::read(&film)?;
-    if opacity.size() != color.size() {
-        let what = format!(
-            "{:?} pixels, but its colour has {:?}",
-            opacity.size(),
-            color.size()
-        );
-        return Err(Error::file(film, what));
-    }
-    Ok(color
-        .zip_map(&opacity, |c, o| Film {
-            color: c.color(),
-            opacity: o.color(),
-        })
-        .into())
-}
-
-fn map(files: &Files, around: &Environment) -> Result<Option<EnvironmentMap>> {
-    let Some(path) = &around.path else {
-        return Ok(None);
-    };
-    let path = files.find(path)?;
-    let photo: Image<PremulRgba> = io::read(&path)?;
-    let panorama = Panorama::new(photo.map(PremulRgba::color)).map_err(|e| e.in_file(path))?;
-    let rotation = around.rotation_z.to_radians();
-    Ok(Some(EnvironmentMap {
-        panorama: Arc::new(panorama),
-        rotation,
-        strength: around.strength,
-    }))
-}
-
-/// Each pixel the mean over the part of the photo that it covers, whether that is more than one of its pixels or less.
+/// Each pixel the mean over the part of the photo that it covers, whether that is more than one of its
+/// pixels or less.
 fn averaged(photo: &Image<LinearRgb>, [width, height]: [u32; 2]) -> Image<LinearRgb> {
     let (width, height) = (width as usize, height as usize);
     if photo.size() == (width, height) {
         return photo.clone();
     }
-    let columns: Vec<_> = (0..width)
-        .map(|x| covered(x, width, photo.width()))
-        .collect();
-    let rows: Vec<_> = (0..height)
-        .map(|y| covered(y, height, photo.height()))
-        .collect();
+    let columns = covered_shares(width, photo.width());
+    let rows = covered_shares(height, photo.height());
     Image::from_fn(width, height, |x, y| {
-        rows[y].iter().fold(LinearRgb::BLACK, |sum, &(j, v)| {
-            columns[x]
-                .iter()
-                .fold(sum, |sum, &(i, u)| sum.add_scaled(u * v, photo[(i, j)]))
-        })
+        let mut sum = LinearRgb::BLACK;
+        for &(j, v) in &rows[y] {
+            for &(i, u) in &columns[x] {
+                sum = sum.add_scaled(u * v, photo[(i, j)]);
+            }
+        }
+        sum
     })
 }
 
-/// The samples that the `k`-th of `n` equal parts of a line of `len` covers, and their shares of it.
-fn covered(k: usize, n: usize, len: usize) -> Vec<(usize, f32)> {
+/// The samples that each of `n` equal parts of a line of `len` covers, and their shares of it.
+fn covered_shares(n: usize, len: usize) -> Vec<Vec<(usize, f32)>> {
     let scale = len as f64 / n as f64;
-    let (start, end) = (k as f64 * scale, (k + 1) as f64 * scale);
+    (0..n)
+        .map(|k| shares_between(k as f64 * scale, (k + 1) as f64 * scale, scale, len))
+        .collect()
+}
+
+/// The samples of a line of `len` from one place to another, and their shares of `scale`.
+fn shares_between(start: f64, end: f64, scale: f64, len: usize) -> Vec<(usize, f32)> {
     let share = |i: usize| (end.min((i + 1) as f64) - start.max(i as f64)) / scale;
     (start as usize..len)
         .map(|i| (i, share(i) as f32))
@@ -240,7 +247,7 @@ mod tests {
         for name in ["set/textures/a.exr", "set/case/b.exr", "secret.exr"] {
             std::fs::write(at(name), "").unwrap();
         }
-        let files = Files::of(&at("set/case/scene.json")).unwrap();
+        let files = PictureFolder::for_scene(&at("set/case/scene.json")).unwrap();
         assert!(files.find("../textures/a.exr").is_ok() && files.find("b.exr").is_ok());
         for outside in [
             "../../secret.exr",

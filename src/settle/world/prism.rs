@@ -4,69 +4,76 @@ use crate::geom::Vector3;
 use crate::scene::Object;
 use rapier3d::prelude::{ColliderBuilder, Vector};
 
-/// The colliders of an object, `half` and `length` in the world's units: a box, or the parts of a prism; together as heavy as `mass`.
+/// The colliders of an object, `half` and `length` in the world's units: a box, or the parts of a
+/// prism; together of this `mass`.
 ///
 /// # Method
-/// The engine makes contacts with four corners of a face and not more, so a plate with more corners would rest on
-/// a part of itself. A prism is therefore cut across into prisms of four corners, which move as one body.
+/// The engine makes contacts with four corners of a face and not more, so a plate with more corners
+/// would rest on a part of itself. A prism is therefore cut across into prisms of four corners, which
+/// move as one body.
 pub(super) fn colliders(
     object: &Object,
     half: &Vector3<f64>,
     length: f64,
     mass: f64,
 ) -> Vec<ColliderBuilder> {
-    let ring: Vec<[f64; 2]> = object
-        .outline
-        .iter()
-        .map(|corner| corner.map(|x| x * length))
-        .collect();
-    let parts: Option<Vec<ColliderBuilder>> = quarters(&ring)
-        .iter()
-        .map(|part| plate(part, half.z))
-        .collect();
-    let area = area(&ring);
-    match parts {
-        Some(parts) if area > 0.0 => {
-            let density = mass / (area * 2.0 * half.z);
-            parts
-                .into_iter()
-                .map(|part| part.density(density as f32))
-                .collect()
-        }
-        _ => vec![
-            ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32).mass(mass as f32),
-        ],
-    }
+    let corners = object.outline.iter();
+    let ring: Vec<[f64; 2]> = corners.map(|corner| corner.map(|x| x * length)).collect();
+    prism_parts(&ring, half.z, mass).unwrap_or_else(|| vec![cuboid(half).mass(mass as f32)])
 }
 
-/// A convex ring cut across into rings of four corners, one of three at the end where they are odd; nothing of nothing.
+fn cuboid(half: &Vector3<f64>) -> ColliderBuilder {
+    ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)
+}
+
+/// The parts of a prism; none where it has no area or one of its parts is too thin a shape.
+fn prism_parts(ring: &[[f64; 2]], half_height: f64, mass: f64) -> Option<Vec<ColliderBuilder>> {
+    let parts: Vec<ColliderBuilder> = quarters(ring)
+        .iter()
+        .map(|part| plate(part, half_height))
+        .collect::<Option<_>>()?;
+    let area = ring_area(ring);
+    (area > 0.0).then(|| {
+        let density = mass / (area * 2.0 * half_height);
+        parts
+            .into_iter()
+            .map(|part| part.density(density as f32))
+            .collect()
+    })
+}
+
+/// A convex ring cut across into rings of four corners, one of three at the end where they are odd;
+/// nothing of nothing.
 fn quarters(ring: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
     let n = ring.len();
-    // Side i to i + 1 against the side that mirrors it, as far as the two do not meet.
-    let cut = |i: usize| {
-        let mut part = vec![ring[i], ring[i + 1], ring[n - 2 - i], ring[n - 1 - i]];
-        part.dedup();
-        part
-    };
-    (0..n.saturating_sub(1) / 2).map(cut).collect()
+    (0..n.saturating_sub(1) / 2)
+        .map(|i| {
+            // Side i to i + 1 against the side that mirrors it, as far as the two do not meet.
+            let mut part = vec![ring[i], ring[i + 1], ring[n - 2 - i], ring[n - 1 - i]];
+            part.dedup();
+            part
+        })
+        .collect()
 }
 
-fn area(ring: &[[f64; 2]]) -> f64 {
+fn ring_area(ring: &[[f64; 2]]) -> f64 {
     let next = ring.iter().cycle().skip(1);
-    ring.iter()
+    let crosses = ring
+        .iter()
         .zip(next)
-        .map(|(a, b)| a[0] * b[1] - a[1] * b[0])
-        .sum::<f64>()
-        / 2.0
+        .map(|(a, b)| a[0] * b[1] - a[1] * b[0]);
+    crosses.sum::<f64>() / 2.0
 }
 
 /// A plate of this outline; none where the engine finds it too thin a shape.
-fn plate(ring: &[[f64; 2]], half: f64) -> Option<ColliderBuilder> {
-    let at = |z: f64| {
-        ring.iter()
-            .map(move |&[x, y]| Vector::new(x as f32, y as f32, z as f32))
-    };
-    let corners: Vec<Vector> = at(half).chain(at(-half)).collect();
+fn plate(ring: &[[f64; 2]], half_height: f64) -> Option<ColliderBuilder> {
+    let corners: Vec<Vector> = [half_height, -half_height]
+        .into_iter()
+        .flat_map(|z| {
+            ring.iter()
+                .map(move |&[x, y]| Vector::new(x as f32, y as f32, z as f32))
+        })
+        .collect();
     ColliderBuilder::convex_hull(&corners)
 }
 
@@ -88,11 +95,11 @@ mod tests {
             assert!(
                 parts
                     .iter()
-                    .all(|part| (3..=4).contains(&part.len()) && area(part) > 0.0),
+                    .all(|part| (3..=4).contains(&part.len()) && ring_area(part) > 0.0),
                 "{n}: {parts:?}"
             );
-            let sum: f64 = parts.iter().map(|part| area(part)).sum();
-            assert!((sum - area(&circle(n))).abs() < 1e-15, "{n}");
+            let sum: f64 = parts.iter().map(|part| ring_area(part)).sum();
+            assert!((sum - ring_area(&circle(n))).abs() < 1e-15, "{n}");
         }
         assert!(quarters(&[]).is_empty());
     }

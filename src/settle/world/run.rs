@@ -1,39 +1,40 @@
 //! From the start of a fall to rest.
 //!
 //! # Method
-//! At rest is what the engine has put to sleep (every body slower than 1 cm/s and 0.5 rad/s for 0.5 s), and what only
-//! trembles: no end of a card has moved by [`TREMBLE`] for [`STILL`] and the bodies together have less kinetic energy than if all
-//! of them moved at [`SLOW`]. A thin card between others may vibrate for ever by hundredths of a millimetre, driven by the contact
-//! solver; damping does not stop it.
+//! At rest is what the engine has put to sleep (every body slower than 1 cm/s and 0.5 rad/s for
+//! 0.5 s), and what only trembles: no end of a card has moved by [`REST_MOTION_M`] for
+//! [`REST_TIME_S`] and the bodies together have less kinetic energy than if all of them moved at
+//! [`REST_SPEED_M_PER_S`]. A thin card between others may vibrate for ever by hundredths of a
+//! millimetre, driven by the contact solver; damping does not stop it.
 
-use super::units::Units;
-use super::{CARD, Fall, MASS};
+use super::units::WorldUnits;
+use super::{CARD_LENGTH_M, CARD_MASS_KG, Fall, GRAVITY_M_PER_S2};
 use crate::allowance::Allowance;
 use crate::error::Result;
-use crate::settle::trace::Sample;
+use crate::settle::trace::MotionSample;
 use crate::work::{self, Kind};
-use rapier3d::prelude::{PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle};
+use rapier3d::prelude::{Aabb, PhysicsWorld, Pose as RapierPose, RigidBody, RigidBodyHandle};
 
-/// Movement of a card that still counts as rest, metres in the world.
-const TREMBLE: f32 = 0.0002;
+/// Motion of a card that still counts as rest, metres in the world.
+const REST_MOTION_M: f32 = 0.0002;
 /// How long it must last, seconds in the world.
-const STILL: f64 = 0.5;
-/// Speed in the world, m/s.
-const SLOW: f64 = 0.01;
-/// Mean height in the world, metres, a quarter of a card: a drop by less counts as one by this. Contacts may push bodies
-/// apart at 0.2 m/s, which is 2 mm of height, and that is no explosion.
-const LEAST_DROP: f64 = 0.05;
+const REST_TIME_S: f64 = 0.5;
+/// Mean speed that still counts as rest, m/s in the world.
+const REST_SPEED_M_PER_S: f64 = 0.01;
+/// Mean height in the world, metres, a quarter of a card: a drop by less is treated as one by this.
+/// Contacts may push bodies apart at 0.2 m/s, which is 2 mm of height, and that is no explosion.
+const MIN_DROP_M: f64 = 0.05;
 
 /// A world in motion.
-pub(super) struct Run<'a> {
+pub(super) struct FallRun<'a> {
     pub(super) world: PhysicsWorld,
     pub(super) bodies: Vec<RigidBodyHandle>,
     /// Of the objects that fall, in the order of `bodies`.
     pub(super) ids: Vec<usize>,
-    pub(super) units: Units,
+    pub(super) units: WorldUnits,
     pub(super) pace: Pace,
     /// Work of a step, for each body and pair.
-    pub(super) effort: u64,
+    pub(super) work_per_pair: u64,
     pub(super) allowance: &'a Allowance<'a>,
 }
 
@@ -45,110 +46,136 @@ pub(super) struct Pace {
     pub(super) sample_every: usize,
 }
 
-impl Run<'_> {
+impl FallRun<'_> {
     /// Steps until everything rests or the time is over.
-    pub(super) fn until_rest(mut self) -> Result<Fall> {
-        let Pace {
-            step: dt,
-            time_limit,
-            ..
-        } = self.pace;
-        let steps = (time_limit / dt).ceil() as usize;
-        let (mut stillness, mut energy, mut fall) =
-            (Stillness::default(), Energy::of(&self), Fall::default());
-        fall.swept = [[f64::INFINITY, -f64::INFINITY]; 2];
-        self.sample(&mut fall, 0);
+    pub(super) fn run_to_rest(mut self) -> Result<Fall> {
+        let steps = (self.pace.time_limit / self.pace.step).ceil() as usize;
+        let mut record = FallRecord::new(&self);
         for step in 1..=steps {
-            self.allowance.take(self.work_of_step())?;
             // Nothing is active before the first step.
-            self.world.step();
-            work::add(Kind::PhysicsSteps, 1);
-            let now = step as f64 * dt;
-            let kinetic = energy.follow(&self);
-            self.sweep(&mut fall.swept);
-            self.sample(&mut fall, step);
-            fall.seconds = now / self.units.time;
-            let asleep = self.world.islands.active_bodies().count() == 0;
-            if asleep || (stillness.lasts(&self, now) && kinetic < self.trembling_energy()) {
-                fall.rests = self.world.quarantine().is_empty();
+            self.step_world()?;
+            let comes_to_rest = record.add_step(&self, step);
+            if comes_to_rest {
+                record.fall.rests = self.world.quarantine().is_empty();
                 break;
             }
         }
-        fall.energy_rise = energy.rise();
-        fall.poses = self
-            .moving()
-            .map(|body| self.units.to_scene(body.position()))
-            .collect();
-        Ok(fall)
+        Ok(record.finish(&self))
     }
 
-    fn work_of_step(&self) -> u64 {
-        (self.bodies.len()
-            + self
-                .world
-                .narrow_phase
-                .contact_graph()
-                .raw_graph()
-                .raw_edges()
-                .len()) as u64
-            * self.effort
+    fn step_world(&mut self) -> Result<()> {
+        self.allowance.take(self.step_work())?;
+        self.world.step();
+        work::add(Kind::PhysicsSteps, 1);
+        Ok(())
     }
 
-    fn moving(&self) -> impl Iterator<Item = &RigidBody> {
+    fn step_work(&self) -> u64 {
+        let contacts = self.world.narrow_phase.contact_graph();
+        let pairs = contacts.raw_graph().raw_edges().len();
+        (self.bodies.len() + pairs) as u64 * self.work_per_pair
+    }
+
+    fn is_asleep(&self) -> bool {
+        self.world.islands.active_bodies().count() == 0
+    }
+
+    fn moving_bodies(&self) -> impl Iterator<Item = &RigidBody> {
         self.bodies.iter().map(|body| &self.world.bodies[*body])
     }
 
     fn trembling_energy(&self) -> f64 {
-        self.moving()
-            .map(|body| f64::from(body.mass()) * SLOW * SLOW / 2.0)
+        self.moving_bodies()
+            .map(|body| f64::from(body.mass()) * REST_SPEED_M_PER_S * REST_SPEED_M_PER_S / 2.0)
             .sum()
     }
 
-    fn sweep(&self, swept: &mut [[f64; 2]; 2]) {
-        for collider in self.moving().flat_map(|body| body.colliders()) {
+    fn extend_swept(&self, swept: &mut [[f64; 2]; 2]) {
+        for collider in self.moving_bodies().flat_map(|body| body.colliders()) {
             let around = self.world.colliders[*collider].compute_aabb();
-            let (least, most) = (around.mins, around.maxs);
-            for (axis, [low, high]) in [[least.x, most.x], [least.y, most.y]]
-                .into_iter()
-                .enumerate()
-            {
-                let [l, h] = &mut swept[axis];
-                *l = l.min(f64::from(low) / self.units.length);
-                *h = h.max(f64::from(high) / self.units.length);
+            for (extent, [low, high]) in swept.iter_mut().zip(horizontal_extents(&around)) {
+                extent[0] = extent[0].min(f64::from(low) / self.units.length);
+                extent[1] = extent[1].max(f64::from(high) / self.units.length);
             }
         }
     }
 
-    fn sample(&self, fall: &mut Fall, step: usize) {
-        let Pace {
-            step: dt,
-            sample_every,
-            ..
-        } = self.pace;
-        if sample_every == 0 || !step.is_multiple_of(sample_every) {
+    fn record_samples(&self, fall: &mut Fall, step: usize) {
+        let every = self.pace.sample_every;
+        if every == 0 || !step.is_multiple_of(every) {
             return;
         }
-        let seconds = step as f64 * dt / self.units.time;
+        let seconds = step as f64 * self.pace.step / self.units.time;
+        let bodies = self.ids.iter().zip(self.moving_bodies());
+        let samples = bodies.map(|(&id, body)| self.motion_sample(id, body, seconds));
+        fall.samples.extend(samples);
+    }
+
+    fn motion_sample(&self, object: usize, body: &RigidBody, seconds: f64) -> MotionSample {
         let (per_length, per_time) = (1.0 / self.units.length, self.units.time);
-        fall.samples.extend(
-            self.ids
-                .iter()
-                .zip(self.moving())
-                .map(|(&object, body)| Sample {
-                    seconds,
-                    object,
-                    pose: self.units.to_scene(body.position()),
-                    speed: f64::from(body.linvel().length()) * per_length * per_time,
-                    spin: f64::from(body.angvel().length()) * per_time,
-                    kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
-                    potential: potential(body, &self.world) / self.units.energy(),
-                }),
-        );
+        MotionSample {
+            seconds,
+            object,
+            pose: self.units.to_scene(body.position()),
+            speed: f64::from(body.linvel().length()) * per_length * per_time,
+            spin: f64::from(body.angvel().length()) * per_time,
+            kinetic: f64::from(body.kinetic_energy()) / self.units.energy(),
+            potential: potential_energy(body, &self.world) / self.units.energy(),
+        }
     }
 }
 
+/// What is recorded of a fall while it lasts.
+struct FallRecord {
+    stillness: Stillness,
+    energy: EnergyTrack,
+    fall: Fall,
+}
+
+impl FallRecord {
+    fn new(run: &FallRun) -> Self {
+        let mut fall = Fall {
+            swept: [[f64::INFINITY, -f64::INFINITY]; 2],
+            ..Fall::default()
+        };
+        run.record_samples(&mut fall, 0);
+        Self {
+            stillness: Stillness::default(),
+            energy: EnergyTrack::new(run),
+            fall,
+        }
+    }
+
+    /// Takes in the state after a step; returns whether everything is at rest.
+    fn add_step(&mut self, run: &FallRun, step: usize) -> bool {
+        let now = step as f64 * run.pace.step;
+        let kinetic = self.energy.update(run);
+        run.extend_swept(&mut self.fall.swept);
+        run.record_samples(&mut self.fall, step);
+        self.fall.seconds = now / run.units.time;
+        run.is_asleep() || (self.stillness.lasts(run, now) && kinetic < run.trembling_energy())
+    }
+
+    fn finish(mut self, run: &FallRun) -> Fall {
+        self.fall.energy_rise = self.energy.relative_rise();
+        self.fall.poses = run
+            .moving_bodies()
+            .map(|body| run.units.to_scene(body.position()))
+            .collect();
+        self.fall
+    }
+}
+
+/// Least and greatest x, and y.
+fn horizontal_extents(around: &Aabb) -> [[f32; 2]; 2] {
+    [
+        [around.mins.x, around.maxs.x],
+        [around.mins.y, around.maxs.y],
+    ]
+}
+
 /// `-m g . x` of the centre of mass, joules in the world.
-fn potential(body: &RigidBody, world: &PhysicsWorld) -> f64 {
+fn potential_energy(body: &RigidBody, world: &PhysicsWorld) -> f64 {
     let center = body
         .mass_properties()
         .local_mprops
@@ -159,47 +186,49 @@ fn potential(body: &RigidBody, world: &PhysicsWorld) -> f64 {
         * (product(g.x, center.x) + product(g.y, center.y) + product(g.z, center.z))
 }
 
-/// The energy of a fall.
-struct Energy {
+/// The energy over a fall, joules in the world.
+struct EnergyTrack {
     start: f64,
     last: f64,
-    most_rise: f64,
-    /// That of [`LEAST_DROP`].
-    least: f64,
+    max_rise: f64,
+    /// That of [`MIN_DROP_M`].
+    min_drop: f64,
 }
 
-impl Energy {
-    fn of(run: &Run) -> Self {
-        let start = run.moving().map(|body| potential(body, &run.world)).sum();
-        let weight = run.moving().count() as f64 * MASS * super::GRAVITY;
+impl EnergyTrack {
+    fn new(run: &FallRun) -> Self {
+        let start = potential_of_all(run);
+        let weight = run.moving_bodies().count() as f64 * CARD_MASS_KG * GRAVITY_M_PER_S2;
         Self {
             start,
             last: start,
-            most_rise: 0.0,
-            least: weight * LEAST_DROP,
+            max_rise: 0.0,
+            min_drop: weight * MIN_DROP_M,
         }
     }
 
-    /// Looks at the energy after a step; returns the kinetic one, joules in the world.
-    fn follow(&mut self, run: &Run) -> f64 {
-        let kinetic = run
-            .moving()
+    /// Takes in the energy after a step; returns the kinetic one.
+    fn update(&mut self, run: &FallRun) -> f64 {
+        let kinetic: f64 = run
+            .moving_bodies()
             .map(|body| f64::from(body.kinetic_energy()))
-            .sum::<f64>();
-        let now = kinetic
-            + run
-                .moving()
-                .map(|body| potential(body, &run.world))
-                .sum::<f64>();
-        self.most_rise = self.most_rise.max(now - self.last);
+            .sum();
+        let now = kinetic + potential_of_all(run);
+        self.max_rise = self.max_rise.max(now - self.last);
         self.last = now;
         kinetic
     }
 
-    /// The greatest rise between two steps as a share of what the drop gave away.
-    fn rise(&self) -> f64 {
-        self.most_rise / (self.start - self.last).max(self.least)
+    /// The greatest rise between two steps as a share of what the drop released.
+    fn relative_rise(&self) -> f64 {
+        self.max_rise / (self.start - self.last).max(self.min_drop)
     }
+}
+
+fn potential_of_all(run: &FallRun) -> f64 {
+    run.moving_bodies()
+        .map(|body| potential_energy(body, &run.world))
+        .sum()
 }
 
 /// Since when, and where, nothing has moved.
@@ -210,26 +239,26 @@ struct Stillness {
 }
 
 impl Stillness {
-    /// Whether no end of a card has moved by [`TREMBLE`] for the time of [`STILL`].
-    fn lasts(&mut self, run: &Run, now: f64) -> bool {
-        let poses = || run.moving().map(|body| *body.position());
-        let known = self.poses.len() == run.bodies.len();
-        let still = known
-            && poses()
+    /// Whether no end of a card has moved by [`REST_MOTION_M`] for [`REST_TIME_S`].
+    fn lasts(&mut self, run: &FallRun, now: f64) -> bool {
+        let still = self.poses.len() == run.bodies.len()
+            && run
+                .moving_bodies()
                 .zip(&self.poses)
-                .all(|(a, b)| moved(&a, b) < TREMBLE);
+                .all(|(body, pose)| motion_between(body.position(), pose) < REST_MOTION_M);
         if !still {
-            (self.poses, self.since) = (poses().collect(), now);
+            self.poses = run.moving_bodies().map(|body| *body.position()).collect();
+            self.since = now;
         }
-        still && now - self.since >= STILL
+        still && now - self.since >= REST_TIME_S
     }
 }
 
-/// How far the end of a card has moved, at most: its middle, and half a card times the angle (twice the difference of
-/// the quaternions).
-fn moved(a: &RapierPose, b: &RapierPose) -> f32 {
+/// How far the end of a card has moved, at most: its middle, and half a card times the angle (twice
+/// the difference of the quaternions).
+fn motion_between(a: &RapierPose, b: &RapierPose) -> f32 {
     let turned = (a.rotation - b.rotation)
         .length()
         .min((a.rotation + b.rotation).length());
-    (a.translation - b.translation).length() + CARD as f32 * turned
+    (a.translation - b.translation).length() + CARD_LENGTH_M as f32 * turned
 }

@@ -481,7 +481,7 @@ fn dataset_folder(world: &World) {
 fn sound_labels(labels: &Labels) {
     if labels.objects.len() < 10 {
         label::borders(labels, 1.0);
-        label::knotted(&labels.objects);
+        label::cyclic_overlaps(&labels.objects);
     }
 }
 

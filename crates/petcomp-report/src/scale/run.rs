@@ -14,7 +14,7 @@ use petcomp::geom::{Point2, Pose, UnitQuaternion, Vector2, Vector3};
 use petcomp::label::{LabelOptions, label};
 use petcomp::render::{RenderOptions, render};
 use petcomp::scene::{
-    CameraSource, Exposure, Grade, Look, Object, Placement, Scene, Shot, Surface,
+    Appearance, CameraSource, Exposure, Grade, Object, Placement, Scene, Shot, Surface,
 };
 use petcomp::settle::{SettleOptions, heap, settle};
 use petcomp::{Error, Image, LinearRgb, PremulRgba, Result, composite, work};
@@ -117,7 +117,7 @@ impl World {
             .into();
         let look = |object: &Object| {
             let texture = textures[object.photo % CUT_OUTS].clone();
-            Some(Look {
+            Some(Appearance {
                 class: 0,
                 texture,
                 back: None,
@@ -213,6 +213,8 @@ fn scene(case: &Case) -> Scene {
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
         finish: Default::default(),
+        files: None,
+        settings: Default::default(),
     }
 }
 

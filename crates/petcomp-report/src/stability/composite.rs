@@ -7,7 +7,7 @@ use petcomp::Result;
 use petcomp::composite::{finish, frame};
 use petcomp::label::{LabelOptions, label};
 use petcomp::render::{RenderOptions, render};
-use petcomp::scene::{Finish, Shot};
+use petcomp::scene::{PostProcess, Shot};
 use petcomp::{DeepImage, DeepSample};
 use petcomp::{Depth, Film, LinearRgb, ObjectId, PremulRgba};
 use std::sync::Arc;
@@ -89,7 +89,7 @@ fn everything_off() -> Case {
                 frame(&deep, Some(&plate)),
                 &deep,
                 Some(&plate),
-                &Finish::default(),
+                &PostProcess::default(),
             );
             let pixels = out
                 .pixels()
@@ -222,9 +222,9 @@ fn exposed(ev: f64) -> Case {
             let values = [0.0, 1e-4, 1.0];
             let picture =
                 Image::from_vec(3, 1, values.map(|v| LinearRgb::grey(v).opaque()).to_vec());
-            let change = Finish {
+            let change = PostProcess {
                 exposure_ev: ev,
-                ..Finish::default()
+                ..PostProcess::default()
             };
             let out = finish(picture, &row(vec![vec![]; 3]), None, &change);
             let found = [0, 1, 2].map(|x| out[(x, 0)].g);
@@ -246,9 +246,9 @@ fn sharpened() -> Case {
             let picture = Image::from_fn(33, 33, |x, y| {
                 LinearRgb::grey(if (x, y) == (16, 16) { 1e5 } else { 1e-4 }).opaque()
             });
-            let change = Finish {
+            let change = PostProcess {
                 sharpening: 2.0,
-                ..Finish::default()
+                ..PostProcess::default()
             };
             let out = finish(picture, &row(vec![]), None, &change);
             let [least, most] = [f32::min, f32::max]

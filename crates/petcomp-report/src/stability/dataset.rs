@@ -402,7 +402,7 @@ fn tray() -> Background {
 fn negatives() -> Case {
     Case::new(
         "recipe of empty scenes alone",
-        "negatives = 1, and objects = 0, 20 scenes of each, without stock",
+        "negatives = 1, and objects = 0, 20 scenes of each, without a catalog",
         "no object in any: 0",
         || {
             let none = Recipe {
@@ -468,7 +468,7 @@ fn seeds() -> Case {
 fn recipes() -> Vec<Case> {
     vec![
         refused("recipe without a background", "background", &[], |_| ()),
-        refused("recipe without stock", "no asset", &[tray()], |_| ()),
+        refused("recipe without a catalog", "no asset", &[tray()], |_| ()),
         refused("pictures of 0 x 48", "image", &[tray()], |recipe| {
             recipe.image = [0, 48]
         }),

@@ -4,7 +4,7 @@ use super::{Case, Outcome};
 use petcomp::Result;
 use petcomp::geom::{UnitQuaternion, Vector3};
 use petcomp::scene::{Object, Placement, Scene, SettleOptions};
-use petcomp::settle::{Settled, Verdict, heap, octagon, settle, typical_length};
+use petcomp::settle::{SettleVerdict, Settled, heap, octagon, settle, typical_length};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 
 /// More cards than this take seconds.
@@ -13,7 +13,7 @@ const MANY: usize = 100;
 /// What is promised of the end of a fall.
 #[derive(Clone, Copy)]
 enum Promise {
-    /// [`Verdict::Rested`].
+    /// [`SettleVerdict::Rested`].
     Rests,
     /// Any other verdict, or an error: the scene or its options cannot be right.
     IsRefused,
@@ -132,7 +132,7 @@ impl Promise {
                 return Outcome::new(error, matches!(promise, Self::IsRefused));
             }
         };
-        let rested = end.verdict == Verdict::Rested;
+        let rested = end.verdict == SettleVerdict::Rested;
         let passed = match self {
             Self::Rests => rested,
             Self::IsRefused => !rested,
@@ -145,12 +145,12 @@ impl Promise {
 /// The end of a fall in words and numbers; `typical` is the length of a card, metres.
 fn told(end: &Settled, typical: f64) -> String {
     let verdict = match &end.verdict {
-        Verdict::Rested => "rests".into(),
-        Verdict::TimedOut => "still moves".into(),
-        Verdict::Escaped(ids) => format!("{} escaped", ids.len()),
-        Verdict::Penetrating(_) => "sinks in".into(),
-        Verdict::Exploded(_) => "gains energy".into(),
-        Verdict::Hanging(ids) => format!("{} hang in the air", ids.len()),
+        SettleVerdict::Rested => "rests".into(),
+        SettleVerdict::TimedOut => "still moves".into(),
+        SettleVerdict::Escaped(ids) => format!("{} escaped", ids.len()),
+        SettleVerdict::Penetrating(_) => "sinks in".into(),
+        SettleVerdict::Exploded(_) => "gains energy".into(),
+        SettleVerdict::Hanging(ids) => format!("{} hang in the air", ids.len()),
     };
     let [overlap, rise] = [end.overlap / typical, end.energy_rise].map(|share| share * 100.0);
     let tries = end.rejected.len() + 1;

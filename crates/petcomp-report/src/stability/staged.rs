@@ -115,6 +115,8 @@ pub(super) fn scene(camera: Camera) -> Scene {
         exposure: Exposure::Ev(0.0),
         cast: Default::default(),
         finish: Default::default(),
+        files: None,
+        settings: Default::default(),
     }
 }
 

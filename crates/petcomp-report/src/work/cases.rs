@@ -2,7 +2,7 @@
 
 use super::world::{FILM, OPAQUE, World, dropped, made_of};
 use petcomp::LinearRgb;
-use petcomp::scene::{Finish, Noise, Scene};
+use petcomp::scene::{Noise, PostProcess, Scene};
 use petcomp::work::Kind;
 use petcomp::work::Kind::*;
 
@@ -70,13 +70,13 @@ pub(super) fn cases(world: &World) -> Vec<Case> {
     };
     let picture =
         |name, about, scene, used: &[&[Kind]]| case(name, about, scene, Asked::Picture, used);
-    let finish = Finish {
+    let finish = PostProcess {
         noise: Noise::Known {
             shot: 1e-3,
             read: 1e-3,
         },
         sharpening: 0.5,
-        ..Finish::default()
+        ..PostProcess::default()
     };
     let unlit = |scene| Scene {
         lights: vec![],

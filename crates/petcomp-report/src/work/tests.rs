@@ -4,7 +4,7 @@ use super::world::dropped;
 use super::*;
 use petcomp::LinearRgb;
 use petcomp::dataset::{DatasetConfig, Progress};
-use petcomp::scene::{AreaLight, Finish, Noise, Scene};
+use petcomp::scene::{AreaLight, Noise, PostProcess, Scene};
 use petcomp::work::Kind::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -120,25 +120,25 @@ fn idle_switches_leave_every_byte_and_cost_nothing() {
         ),
         (
             "noise of variance 0",
-            finish(Finish {
+            finish(PostProcess {
                 noise: quiet,
                 noise_seed: 7,
-                ..Finish::default()
+                ..PostProcess::default()
             }),
         ),
         (
             "sharpening by 0",
-            finish(Finish {
+            finish(PostProcess {
                 sharpening: 0.0,
-                ..Finish::default()
+                ..PostProcess::default()
             }),
         ),
         (
             "0 stops and even white",
-            finish(Finish {
+            finish(PostProcess {
                 exposure_ev: 0.0,
                 white_balance: LinearRgb::WHITE,
-                ..Finish::default()
+                ..PostProcess::default()
             }),
         ),
     ];

@@ -122,6 +122,8 @@ impl World {
             exposure: Exposure::Ev(0.0),
             cast: Default::default(),
             finish: Default::default(),
+            files: None,
+            settings: Default::default(),
         }
     }
 

@@ -101,7 +101,7 @@ impl Sampling {
         lines
     }
 
-    /// The bytes of a block, which the decoder takes for pixels that have as many bytes each.
+    /// The bytes of a block, declared to the decoder as pixels of as many bytes each.
     fn decompress(
         &self,
         header: &Header,
@@ -202,7 +202,7 @@ fn enlarged(samples: &[f32], n: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Where the pairs of numbers lie that say how the channels of the first part are sampled.
+/// Offsets of the sampling of each channel of the first part.
 fn sampling_offsets(file: &[u8]) -> Option<Vec<usize>> {
     let mut at = FIRST_ATTRIBUTE;
     while *file.get(at)? != 0 {

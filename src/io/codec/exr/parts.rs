@@ -97,7 +97,7 @@ fn part_layer(
     ))
 }
 
-/// The byte of the version that says what kind of file it is, and its bit for several parts.
+/// The byte of the version that holds the kind of file, and its bit for several parts.
 const FLAGS_BYTE: usize = 5;
 const SEVERAL_PARTS_FLAG: u8 = 0x10;
 
@@ -180,10 +180,10 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_cannot_be_are_told() {
-        let told = |size, parts: &[Part]| encode_parts(size, parts).unwrap_err();
-        assert!(told((3, 1), &parts()).contains("beauty: channel R: 2 samples, expected 3 x 1"));
-        assert!(told((2, 1), &[parts()[0].clone(), parts()[0].clone()]).contains("two parts"));
-        assert!(told((2, 1), &[]).contains("0 parts"));
+    fn parts_that_cannot_be_are_refused() {
+        let refused = |size, parts: &[Part]| encode_parts(size, parts).unwrap_err();
+        assert!(refused((3, 1), &parts()).contains("beauty: channel R: 2 samples, expected 3 x 1"));
+        assert!(refused((2, 1), &[parts()[0].clone(), parts()[0].clone()]).contains("two parts"));
+        assert!(refused((2, 1), &[]).contains("0 parts"));
     }
 }

@@ -126,6 +126,11 @@ impl<'a> CheckedFile<'a> {
             .collect()
     }
 
+    fn picked_names(&self, part: usize, picked: &[usize]) -> Vec<String> {
+        let list = &self.meta.headers[part].channels.list;
+        picked.iter().map(|&i| list[i].name.to_string()).collect()
+    }
+
     /// What all parts are shown in.
     fn window(&self) -> IntegerBounds {
         self.meta.headers[0].shared_attributes.display_window
@@ -241,7 +246,7 @@ fn checked_part_bytes(
 /// Bytes of a sample as it is kept.
 const FLOAT_BYTES: u64 = 4;
 
-/// More than the attributes of a file take that says where its channels have fewer samples than pixels.
+/// More than the attributes take of a file whose channels have fewer samples than pixels.
 const FIRST_BYTES: u64 = 1 << 16;
 
 pub(crate) fn header(
@@ -257,9 +262,7 @@ pub(crate) fn header(
     let start = Sampling::find(&start).map_or(start, |(_, even)| even);
     let meta = read_meta(start.chain(file), file_bytes, limits)?;
     let first = meta.headers.first().ok_or("no part with pixels")?;
-    let shown = first.shared_attributes.display_window;
-    let (width, height) = window_size(shown);
-    let position = first.own_attributes.layer_position;
+    let (width, height) = window_size(first.shared_attributes.display_window);
     let list = &first.channels.list;
     let bytes = list.iter().map(|c| c.sample_type.bytes_per_sample());
     Ok(Header {
@@ -268,14 +271,21 @@ pub(crate) fn header(
         height,
         channels: in_default_order(list.iter().map(|c| c.name.to_string()).collect()),
         bits: 8 * bytes.max().unwrap_or(0) as u32,
-        data_at: [
-            i64::from(position.x()) - i64::from(shown.position.x()),
-            i64::from(position.y()) - i64::from(shown.position.y()),
-        ],
+        data_at: data_offset(first),
         data_size: [first.layer_size.x(), first.layer_size.y()],
         metadata: text_attributes(first),
         ..Header::default()
     })
+}
+
+/// Column and row of the first stored pixel in the display window.
+fn data_offset(header: &exr::meta::header::Header) -> [i64; 2] {
+    let stored = header.own_attributes.layer_position;
+    let shown = header.shared_attributes.display_window.position;
+    [
+        i64::from(stored.x()) - i64::from(shown.x()),
+        i64::from(stored.y()) - i64::from(shown.y()),
+    ]
 }
 
 /// `R G B A` first, the rest by name.
@@ -315,8 +325,7 @@ pub(crate) fn decode(
     let window = file.window_of(part, shown);
     let (width, height) = window_size(window);
     limits.check_memory(width, height, picked.len())?;
-    let all = file.channel_names(part);
-    let mut names: Vec<String> = picked.iter().map(|&i| all[i].clone()).collect();
+    let mut names = file.picked_names(part, &picked);
     let mut samples = file
         .reader(part, &picked, window, SampleOrder::Interleaved)?
         .read()?;

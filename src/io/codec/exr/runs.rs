@@ -36,14 +36,7 @@ pub(crate) fn encode_runs(
     metadata: &[(String, String)],
 ) -> Result<Vec<u8>, String> {
     channels.sort_by_key(|(name, _)| *name);
-    for (name, samples) in &channels {
-        if samples.len() != width * height {
-            return Err(format!(
-                "channel {name}: {} samples, expected {width} x {height}",
-                samples.len()
-            ));
-        }
-    }
+    check_lengths((width, height), &channels)?;
     let header = half_header((width, height), &channels, metadata)?;
     let first_rows: Vec<usize> = (0..height).step_by(BLOCK_ROWS).collect();
     let chunks = first_rows
@@ -56,6 +49,21 @@ pub(crate) fn encode_runs(
     let mut bytes = written(header, chunks)?;
     sort_attributes(&mut bytes, FIRST_ATTRIBUTE).ok_or("header of an unknown kind")?;
     Ok(bytes)
+}
+
+fn check_lengths(
+    (width, height): (usize, usize),
+    channels: &[(&str, Vec<f16>)],
+) -> Result<(), String> {
+    for (name, samples) in channels {
+        if samples.len() != width * height {
+            let count = samples.len();
+            return Err(format!(
+                "channel {name}: {count} samples, expected {width} x {height}"
+            ));
+        }
+    }
+    Ok(())
 }
 
 fn half_header(

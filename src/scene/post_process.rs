@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 /// Exposure, white balance, noise and sharpening of the whole frame, plate included; the default leaves every bit alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Finish {
-    /// Brighter or darker by so many stops. Default: 0.
+pub struct PostProcess {
+    /// Brighter or darker by this many stops. Default: 0.
     pub exposure_ev: f64,
     /// Factor on each channel. Default: 1, 1, 1.
     pub white_balance: LinearRgb,
@@ -23,7 +23,7 @@ pub struct Finish {
     pub sharpening: f64,
 }
 
-impl Default for Finish {
+impl Default for PostProcess {
     fn default() -> Self {
         Self {
             exposure_ev: 0.0,
@@ -42,7 +42,7 @@ pub enum Noise {
     /// None.
     #[default]
     None,
-    /// As much as is told.
+    /// This much.
     Known {
         /// Variance per value: photon noise.
         shot: f64,
@@ -53,9 +53,9 @@ pub enum Noise {
     MatchPlate,
 }
 
-impl Finish {
-    /// Nothing is to be done.
-    pub fn is_nothing(&self) -> bool {
+impl PostProcess {
+    /// Whether it leaves the frame alone.
+    pub fn is_identity(&self) -> bool {
         let Self {
             exposure_ev,
             white_balance,
@@ -69,7 +69,7 @@ impl Finish {
             && sharpening == 0.0
     }
 
-    /// Fails on the first value that cannot be right.
+    /// Fails on the first impossible value.
     pub(super) fn check(&self, at: &str) -> Result<()> {
         let field = |name: &str| format!("{at}.{name}");
         EV.check(&field("exposure_ev"), self.exposure_ev)?;
@@ -79,21 +79,27 @@ impl Finish {
             return Err(Error::value(field("white_balance"), what));
         }
         SHARPENING.check(&field("sharpening"), self.sharpening)?;
-        let Noise::Known { shot, read } = self.noise else {
+        self.noise.check(&field("noise"))
+    }
+}
+
+impl Noise {
+    fn check(&self, at: &str) -> Result<()> {
+        let Self::Known { shot, read } = *self else {
             return Ok(());
         };
-        NOISE.check(&field("noise.known.shot"), shot)?;
-        NOISE.check(&field("noise.known.read"), read)
+        NOISE.check(&format!("{at}.known.shot"), shot)?;
+        NOISE.check(&format!("{at}.known.read"), read)
     }
 }
 
 /// What the finish of a scene is drawn from; every default leaves the frame alone.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct FinishRanges {
+pub struct PostProcessRanges {
     /// Stops. Default: 0.
     pub exposure_ev: Range,
-    /// Temperature of the light that the camera takes for white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
+    /// Temperature of the light that the camera treats as white, kelvin: below 6504 the frame becomes bluer. Default: 6504.
     pub white_k: Range,
     /// Noise of rendered cards. Default: `"none"`.
     pub noise: Noise,
@@ -104,7 +110,7 @@ pub struct FinishRanges {
 /// Temperature of the white of Rec. 709, kelvin: nothing is changed there.
 pub(super) const NEUTRAL_K: f64 = 6504.0;
 
-impl Default for FinishRanges {
+impl Default for PostProcessRanges {
     fn default() -> Self {
         Self {
             exposure_ev: Range::fixed(0.0),
@@ -115,9 +121,9 @@ impl Default for FinishRanges {
     }
 }
 
-impl FinishRanges {
-    pub(super) fn draw(&self, draws: &Draws) -> Finish {
-        Finish {
+impl PostProcessRanges {
+    pub(super) fn draw(&self, draws: &Draws) -> PostProcess {
+        PostProcess {
             exposure_ev: self.exposure_ev.draw(draws, "finish.exposure_ev"),
             white_balance: white_balance(self.white_k.draw(draws, "finish.white_k")),
             noise: self.noise,
@@ -134,22 +140,26 @@ impl FinishRanges {
         self.exposure_ev.check("finish.exposure_ev", &EV)?;
         self.white_k.check("finish.white_k", &KELVIN)?;
         self.sharpening.check("finish.sharpening", &SHARPENING)?;
-        Finish {
-            noise: self.noise,
-            ..Finish::default()
-        }
-        .check("finish")
+        self.noise.check("finish.noise")
     }
 }
 
-/// Gains that turn light of a temperature into what light of 6504 K looks like, green left alone.
+/// Gains that make light of a temperature look like light of 6504 K, green left alone.
 pub fn white_balance(white_k: f64) -> LinearRgb {
     if white_k == NEUTRAL_K {
         return LinearRgb::WHITE;
     }
     let (wanted, seen) = (planckian(NEUTRAL_K), planckian(white_k));
-    let gain = |w: f32, s: f32| (w / wanted.g) / (s / seen.g).max(f32::MIN_POSITIVE);
-    LinearRgb::new(gain(wanted.r, seen.r), 1.0, gain(wanted.b, seen.b))
+    LinearRgb::new(
+        relative_gain([wanted.r, wanted.g], [seen.r, seen.g]),
+        1.0,
+        relative_gain([wanted.b, wanted.g], [seen.b, seen.g]),
+    )
+}
+
+/// The gain of a channel, each beside its green.
+fn relative_gain([wanted, wanted_green]: [f32; 2], [seen, seen_green]: [f32; 2]) -> f32 {
+    (wanted / wanted_green) / (seen / seen_green).max(f32::MIN_POSITIVE)
 }
 
 #[cfg(test)]
@@ -158,9 +168,9 @@ mod tests {
 
     #[test]
     fn defaults_do_nothing_and_draw_nothing() {
-        let finish = FinishRanges::default().draw(&Draws::new(3, 4));
-        assert_eq!(finish, Finish::default());
-        assert!(finish.is_nothing());
+        let finish = PostProcessRanges::default().draw(&Draws::new(3, 4));
+        assert_eq!(finish, PostProcess::default());
+        assert!(finish.is_identity());
     }
 
     #[test]
@@ -177,18 +187,18 @@ mod tests {
 
     #[test]
     fn what_cannot_be_right_is_told() {
-        let told = |f: Finish| f.check("finish").unwrap_err().to_string();
-        let good = Finish::default();
+        let told = |f: PostProcess| f.check("finish").unwrap_err().to_string();
+        let good = PostProcess::default();
         assert!(good.check("finish").is_ok());
         assert!(
-            told(Finish {
+            told(PostProcess {
                 exposure_ev: f64::NAN,
                 ..good
             })
             .starts_with("finish.exposure_ev: NaN")
         );
         assert!(
-            told(Finish {
+            told(PostProcess {
                 white_balance: LinearRgb::BLACK,
                 ..good
             })
@@ -198,8 +208,8 @@ mod tests {
             shot: -1.0,
             read: 0.0,
         };
-        assert!(told(Finish { noise, ..good }).starts_with("finish.noise.known.shot: -1,"));
-        let read: Finish = toml::from_str("noise = 'match_plate'").unwrap();
+        assert!(told(PostProcess { noise, ..good }).starts_with("finish.noise.known.shot: -1,"));
+        let read: PostProcess = toml::from_str("noise = 'match_plate'").unwrap();
         assert_eq!(read.noise, Noise::MatchPlate);
     }
 }

@@ -1,0 +1,280 @@
+//! The config that a scene file brings by itself, and what it takes to bring one.
+
+use crate::dataset::DatasetConfig;
+use crate::error::{Error, Result};
+use crate::io;
+use crate::scene::{Scene, SceneFiles, SceneSettings, relative_to_file};
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Keys of a recipe that decide how the picture and the labels of a given scene are made.
+const SCENE_KEYS: [&str; 5] = [
+    "render",
+    "labels",
+    "scene.settle",
+    "surface_size",
+    "force_cameras",
+];
+
+impl DatasetConfig {
+    /// The config that a scene read from `path` brings by itself, some of its values replaced: its
+    /// [`files`](Scene::files) and [`settings`](Scene::settings), and nothing else but defaults.
+    ///
+    /// # Errors
+    /// A scene that does not name the folders that it needs; settings that no recipe can have.
+    pub fn for_scene(
+        scene: &Scene,
+        path: impl AsRef<Path>,
+        overrides: &[io::Override],
+    ) -> Result<Self> {
+        let path = path.as_ref();
+        let mut config = Self::from_settings(&scene.settings, overrides)
+            .and_then(|config| config.with_scene_folders(scene, path))
+            .map_err(|e| e.in_file(path))?;
+        config.scene.image = scene.image;
+        Ok(config)
+    }
+
+    /// The defaults with the settings of a scene.
+    ///
+    /// # Errors
+    /// Settings that no recipe can have.
+    pub fn from_settings(settings: &SceneSettings, overrides: &[io::Override]) -> Result<Self> {
+        let config: Self = io::from_table_with(settings.to_table(), overrides)
+            .map_err(|e| e.within("settings"))?;
+        config.check().map_err(|e| e.within("settings"))?;
+        Ok(config)
+    }
+
+    fn with_scene_folders(mut self, scene: &Scene, path: &Path) -> Result<Self> {
+        let Some(files) = &scene.files else {
+            return Err(Error::value(
+                "files",
+                "missing, expected a table that names the folders of assets and backgrounds, or a \
+                 recipe beside the scene",
+            ));
+        };
+        let folder = path.parent().unwrap_or(Path::new(""));
+        self.assets = folder.join(required(&files.assets, "assets", "the assets")?);
+        self.backgrounds = PathBuf::new();
+        if !scene.plate.is_empty() {
+            let backgrounds = required(
+                &files.backgrounds,
+                "backgrounds",
+                &format!("the photo \"{}\" and its label", scene.plate),
+            )?;
+            self.backgrounds = folder.join(backgrounds);
+        }
+        self.folder = folder.into();
+        if let Some(environments) = &files.environments {
+            self.folder = folder.join(environments);
+            let maps = scene.environment.iter();
+            self.scene.environment.files = maps.map(|map| map.file.clone()).collect();
+        }
+        Ok(self)
+    }
+
+    /// A scene of this config with all that it takes to render it from a file at `path` alone.
+    ///
+    /// # Errors
+    /// Without a working folder.
+    pub fn with_files(&self, scene: Scene, path: impl AsRef<Path>) -> Result<Scene> {
+        let path = path.as_ref();
+        let named = |folder: &Path| relative_to_file(folder, path).map(Some);
+        let mut files = SceneFiles {
+            assets: named(&self.assets)?,
+            ..SceneFiles::default()
+        };
+        if !scene.plate.is_empty() {
+            files.backgrounds = named(&self.backgrounds)?;
+        }
+        if scene.environment.is_some() {
+            files.environments = named(&self.folder)?;
+        }
+        Ok(Scene {
+            files: Some(files),
+            settings: self.scene_settings()?,
+            ..scene
+        })
+    }
+
+    /// The values of [`SCENE_KEYS`] that differ from the defaults.
+    fn scene_settings(&self) -> Result<SceneSettings> {
+        let (own, defaults) = (as_table(self)?, as_table(&Self::default())?);
+        let mut settings = Table::new();
+        for key in SCENE_KEYS {
+            if let Some(value) = difference(find(&own, key), find(&defaults, key)) {
+                insert(&mut settings, key, value);
+            }
+        }
+        Ok(SceneSettings::from_table(settings))
+    }
+}
+
+fn required<'a>(folder: &'a Option<PathBuf>, key: &str, content: &str) -> Result<&'a Path> {
+    folder.as_deref().ok_or_else(|| {
+        Error::value(
+            format!("files.{key}"),
+            format!("missing, expected the folder of {content}"),
+        )
+    })
+}
+
+fn as_table(config: &DatasetConfig) -> Result<Table> {
+    Table::try_from(config).map_err(|e| Error::value("settings", e.to_string()))
+}
+
+/// The value at a path of keys.
+fn find<'a>(table: &'a Table, path: &str) -> Option<&'a Value> {
+    let (first, rest) = path.split_once('.').unwrap_or((path, ""));
+    match table.get(first) {
+        Some(Value::Table(inner)) if !rest.is_empty() => find(inner, rest),
+        value => value,
+    }
+}
+
+/// Puts a value at a path of keys.
+fn insert(table: &mut Table, path: &str, value: Value) {
+    match path.split_once('.') {
+        None => {
+            table.insert(path.into(), value);
+        }
+        Some((first, rest)) => {
+            let inner = table
+                .entry(first)
+                .or_insert_with(|| Value::Table(Table::new()));
+            if let Value::Table(inner) = inner {
+                insert(inner, rest, value);
+            }
+        }
+    }
+}
+
+/// What of a value differs from its default; of a table only the keys that do.
+fn difference(value: Option<&Value>, default: Option<&Value>) -> Option<Value> {
+    match (value?, default) {
+        (Value::Table(own), Some(Value::Table(defaults))) => {
+            let different = own.iter().filter_map(|(key, value)| {
+                difference(Some(value), defaults.get(key)).map(|value| (key.clone(), value))
+            });
+            let table: Table = different.collect();
+            (!table.is_empty()).then_some(Value::Table(table))
+        }
+        (value, default) if Some(value) == default => None,
+        (value, _) => Some(value.clone()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pixel::LinearRgb;
+    use crate::scene::{CameraSource, Environment, Surface};
+
+    fn scene() -> Scene {
+        Scene {
+            image: [64, 48],
+            plate: "tray".into(),
+            camera: CameraSource::Rectangle {
+                corners_px: [[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]],
+                photo: [10, 10],
+                focal_px: None,
+            },
+            surface: Surface::new([0.4, 0.3]),
+            objects: vec![],
+            lights: vec![],
+            ambient: LinearRgb::BLACK,
+            environment: None,
+            exposure: Default::default(),
+            cast: Default::default(),
+            finish: Default::default(),
+            files: None,
+            settings: Default::default(),
+        }
+    }
+
+    #[test]
+    fn a_scene_brings_the_setup_that_it_was_written_with() {
+        let mut config = DatasetConfig {
+            assets: "job/assets".into(),
+            backgrounds: "photos".into(),
+            folder: "job".into(),
+            ..DatasetConfig::default()
+        };
+        config.render.subsamples += 1;
+        config.scene.settle.attempts = 3;
+        config.scene.image = [64, 48];
+        let map = Environment {
+            file: "../sky.exr".into(),
+            rotation_deg: 0.0,
+            strength: 1.0,
+        };
+        config.scene.environment.files = vec![map.file.clone()];
+        let scene = Scene {
+            environment: Some(map),
+            ..scene()
+        };
+        let written = config.with_files(scene, "out/scene.toml").unwrap();
+        let text = toml::to_string(&written).unwrap();
+        let read: Scene = toml::from_str(&text).unwrap();
+        assert_eq!(read, written, "{text}");
+        let brought = DatasetConfig::for_scene(&read, "out/scene.toml", &[]).unwrap();
+        let expected = DatasetConfig {
+            assets: "out/../job/assets".into(),
+            backgrounds: "out/../photos".into(),
+            folder: "out/../job".into(),
+            ..config
+        };
+        assert_eq!(brought, expected);
+    }
+
+    #[test]
+    fn defaults_are_not_written() {
+        assert!(
+            DatasetConfig::default()
+                .scene_settings()
+                .unwrap()
+                .is_empty()
+        );
+        let text = toml::to_string(&scene()).unwrap();
+        assert!(
+            !text.contains("settings") && !text.contains("files"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_missing_folder_is_named() {
+        let error = |scene: &Scene| {
+            DatasetConfig::for_scene(scene, "scene.toml", &[])
+                .unwrap_err()
+                .to_string()
+        };
+        let bare = error(&scene());
+        assert!(
+            bare.starts_with("scene.toml: files: missing, expected a table"),
+            "{bare}"
+        );
+        let assets = SceneFiles {
+            assets: Some("assets".into()),
+            ..SceneFiles::default()
+        };
+        let no_photo = error(&Scene {
+            files: Some(assets),
+            ..scene()
+        });
+        assert_eq!(
+            no_photo,
+            "scene.toml: files.backgrounds: missing, expected the folder of the photo \"tray\" and its label"
+        );
+        let wrong: Scene = toml::from_str(
+            &(toml::to_string(&scene()).unwrap() + "[settings.render]\nsubsamples = 0\n"),
+        )
+        .unwrap();
+        assert!(
+            error(&wrong).starts_with("scene.toml: settings.render.subsamples: 0"),
+            "{}",
+            error(&wrong)
+        );
+    }
+}

@@ -1,0 +1,69 @@
+//! What recipes and shots can choose from: the assets of a library, and labelled backgrounds.
+
+use crate::asset::{Asset, Library, Photo};
+use crate::scene::hull::prism_outline;
+use crate::scene::{Appearance, CameraSource, Object};
+
+/// An asset as a recipe sees it: what may be chosen, without its pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssetVariant {
+    /// Name of the asset.
+    pub asset: String,
+    /// Width and height of the card of each of its photos, metres; at least one.
+    pub photo_sizes: Vec<[f64; 2]>,
+    /// Corners of the object's hull in each photo, as in [`Object::outline`]; empty where they are not known.
+    pub photo_outlines: Vec<Vec<[f64; 2]>>,
+    /// Thickness, metres.
+    pub thickness: f64,
+    /// Mass, kilograms.
+    pub mass: f64,
+}
+
+/// A labelled photo of the place, as a recipe sees it: without its pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Background {
+    /// Name, kept as [`Scene::plate`](crate::scene::Scene::plate).
+    pub name: String,
+    /// Width and height of the labelled rectangle, metres.
+    pub size: [f64; 2],
+    /// The camera that took it, or what that can be found from.
+    pub camera: CameraSource,
+}
+
+/// The assets of a library as a recipe sees them, in the library's order.
+pub fn catalog(library: &Library) -> Vec<AssetVariant> {
+    library.assets.iter().map(AssetVariant::from).collect()
+}
+
+impl From<&Asset<Photo>> for AssetVariant {
+    fn from(asset: &Asset<Photo>) -> Self {
+        let photos = || asset.photos.iter();
+        Self {
+            asset: asset.name.clone(),
+            photo_sizes: photos().map(Photo::size).collect(),
+            photo_outlines: photos()
+                .map(|photo| prism_outline(&photo.outline_uv, photo.size()))
+                .collect(),
+            thickness: asset.thickness,
+            mass: asset.mass,
+        }
+    }
+}
+
+impl Appearance {
+    /// What an object looks like by a library; none where it lacks the asset or the photo.
+    pub fn from_library(library: &Library, object: &Object) -> Option<Self> {
+        let asset = library.find(&object.asset)?;
+        let photo = asset.photos.get(object.photo)?;
+        let back = match object.back {
+            Some(i) => Some(asset.photos.get(i)?.texture.clone()),
+            None => None,
+        };
+        Some(Self {
+            class: library.class_number(asset),
+            texture: photo.texture.clone(),
+            back,
+            outline_uv: photo.outline_uv.clone(),
+        })
+    }
+}

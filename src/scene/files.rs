@@ -1,0 +1,97 @@
+//! What a scene needs beside its own file: folders, and settings that its picture is made with.
+
+use crate::error::{Error, Result};
+use crate::io;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Where the files of a scene lie, relative to the scene's own file: with it a scene is rendered
+/// without its recipe.
+///
+/// As in a recipe, the folders may lie anywhere.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SceneFiles {
+    /// Folder of the assets that objects name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assets: Option<PathBuf>,
+    /// Folder of the photo that the plate names, and of its label.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub backgrounds: Option<PathBuf>,
+    /// Folder that the name of the environment map is relative to. Default: that of the scene's file,
+    /// in which the map must then lie.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub environments: Option<PathBuf>,
+}
+
+impl SceneFiles {
+    /// The same as they are named in another scene file.
+    ///
+    /// # Errors
+    /// Without a working folder.
+    pub fn moved(&self, from: &Path, to: &Path) -> Result<Self> {
+        let folder = from.parent().unwrap_or(Path::new(""));
+        let moved = |path: &Option<PathBuf>| {
+            path.as_ref()
+                .map(|path| relative_to_file(&folder.join(path), to))
+                .transpose()
+        };
+        Ok(Self {
+            assets: moved(&self.assets)?,
+            backgrounds: moved(&self.backgrounds)?,
+            environments: moved(&self.environments)?,
+        })
+    }
+}
+
+/// A path as it is named in a file.
+pub(crate) fn relative_to_file(path: &Path, file: &Path) -> Result<PathBuf> {
+    let absolute = |path: &Path| std::path::absolute(path).map_err(|e| Error::file(path, e));
+    let file = absolute(file)?;
+    let folder = file.parent().unwrap_or(&file);
+    Ok(io::relative(&absolute(path)?, folder))
+}
+
+/// Values of a recipe that a scene's picture and labels are made with, by the recipe's keys
+/// (`render.subsamples`); what is not in it has the recipe's default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct SceneSettings(toml::Table);
+
+impl SceneSettings {
+    /// Whether everything has its default.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn from_table(table: toml::Table) -> Self {
+        Self(table)
+    }
+
+    pub(crate) fn to_table(&self) -> toml::Table {
+        self.0.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_found_from_another_folder_too() {
+        let files = SceneFiles {
+            assets: Some("../assets".into()),
+            backgrounds: Some("photos".into()),
+            environments: None,
+        };
+        let moved = files
+            .moved(Path::new("job/scenes/a.toml"), Path::new("out/deep/b.json"))
+            .unwrap();
+        let expected = SceneFiles {
+            assets: Some("../../job/assets".into()),
+            backgrounds: Some("../../job/scenes/photos".into()),
+            environments: None,
+        };
+        assert_eq!(moved, expected);
+    }
+}

@@ -1,0 +1,214 @@
+//! Recipe: the distributions that scenes are drawn from.
+
+mod compose;
+mod narrow;
+mod ranges;
+mod selection;
+
+pub use ranges::{GradeRanges, LightRanges};
+pub use selection::{Collider, Selections};
+
+use crate::bounds::Bounds;
+use crate::error::{Error, Result};
+use crate::scene::bounds::{ALBEDO, EV, FRICTION, MAX_LIGHTS, MAX_OBJECTS, RADIANCE, SCALE, SHARE};
+use crate::scene::check::{check_cast, check_count, check_each, check_image};
+use crate::scene::stack::too_large;
+use crate::scene::{
+    AssetVariant, Background, DrawLog, Drawn, DropRanges, EnvironmentRanges, LightTint,
+    PostProcessRanges, Range, Scene, SettleOptions, Surface, Take, Variation,
+};
+use compose::SceneNumber;
+use serde::{Deserialize, Serialize};
+
+const OBJECT_COUNT: Bounds = Bounds::new(0.0, MAX_OBJECTS as f64, "what comes to rest in a heap");
+
+/// What scenes are drawn from; every [`Range`] is a uniform distribution named by its path in this document.
+///
+/// Every field has a default, so a file only holds what differs from it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Recipe {
+    /// Width and height of the pictures, pixels. Default: `[640, 480]`.
+    pub image: [u32; 2],
+    /// Sources of variation that are switched off; all other draws stay as they are. Default: none.
+    pub off: Vec<Variation>,
+    /// Labelled backgrounds that are used, each a viewpoint: all, or the first ones. Default: `"all"`.
+    pub viewpoints: Take,
+    /// Photos of each asset that are used: all, or the first ones. Default: `"all"`.
+    pub photos: Take,
+    /// Objects in a scene. Default: `[4, 12]`.
+    pub objects: Range,
+    /// Share of the scenes that stay empty: pictures of the place alone, 0 to 1. Default: 0.
+    pub negatives: f64,
+    /// How many different choices of objects there are. Default: `"unique"`, a new one for every scene.
+    pub selections: Selections,
+    /// Factor on an object's size and thickness, its mass following. Default: `[0.9, 1.1]`.
+    pub scale: Range,
+    /// How objects start.
+    pub start: DropRanges,
+    /// Change of an object's colours.
+    pub grade: GradeRanges,
+    /// Lights; `lights = []` makes scenes without shadows. Default: one.
+    pub lights: Vec<LightRanges>,
+    /// Irradiance of the constant environment on the surface, as a share of what the lights give at its centre; the
+    /// radiance itself when there is no light. Default: `[0.3, 0.8]`.
+    pub ambient: Range,
+    /// Light from a picture of the surroundings, on top of `ambient`.
+    pub environment: EnvironmentRanges,
+    /// Brighter or darker than the plate, EV. Default: `[-0.3, 0.3]`.
+    pub gain_ev: Range,
+    /// Coefficient of friction in a scene, [`Surface::friction`]. Default: 0.5.
+    pub friction: Range,
+    /// Share of the speed that a bounce gives back, [`Surface::restitution`]. Default: 0.
+    pub restitution: Range,
+    /// What falls in place of a cut-out. Default: `box`.
+    pub collider: Collider,
+    /// Share of light that the surface reflects, where it is known: the exposure is then matched to the surface instead of
+    /// the plate's white. Default: not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface_albedo: Option<f64>,
+    /// Colour of the light: `{ match_surface = { share = 0.5 } }` takes half of the surface's. Default: white.
+    pub cast: LightTint,
+    /// What happens to the finished frame. Default: nothing.
+    pub finish: PostProcessRanges,
+    /// How objects come to rest.
+    pub settle: SettleOptions,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Self {
+            image: [640, 480],
+            off: Vec::new(),
+            viewpoints: Take::All,
+            photos: Take::All,
+            objects: Range::new(4.0, 12.0),
+            negatives: 0.0,
+            selections: Selections::Unique,
+            scale: Range::new(0.9, 1.1),
+            start: DropRanges::default(),
+            grade: GradeRanges::default(),
+            lights: vec![LightRanges::default()],
+            ambient: Range::new(0.3, 0.8),
+            environment: EnvironmentRanges::default(),
+            gain_ev: Range::new(-0.3, 0.3),
+            friction: Range::fixed(Surface::new([0.0; 2]).friction),
+            restitution: Range::fixed(0.0),
+            collider: Collider::Box,
+            surface_albedo: None,
+            cast: LightTint::default(),
+            finish: PostProcessRanges::default(),
+            settle: SettleOptions::default(),
+        }
+    }
+}
+
+impl Recipe {
+    /// Scene `k`: a pure function of the recipe, `seed` and `k`, the backgrounds and the catalog (both
+    /// in their order).
+    ///
+    /// Objects are dropped: they start in a stack over the surface, without overlap, within its walls.
+    /// The camera and the exposure are left for the stages that know the photo.
+    ///
+    /// # Method
+    /// Every number is drawn by its own path ([`Draws`](crate::scene::Draws)), so that one more object
+    /// or another range changes no other draw. Objects are drawn without repetition until the catalog
+    /// is used up, then again from all of it.
+    ///
+    /// # Errors
+    /// An impossible range; no background; an empty catalog while objects are asked for; a card that
+    /// fits the surface in no direction.
+    pub fn scene(
+        &self,
+        seed: u64,
+        k: u64,
+        backgrounds: &[Background],
+        catalog: &[AssetVariant],
+    ) -> Result<Scene> {
+        self.explained(seed, k, backgrounds, catalog)
+            .map(|(scene, _)| scene)
+    }
+
+    /// Scene `k` and every draw that it was made with, in order.
+    ///
+    /// # Errors
+    /// As [`scene`](Self::scene).
+    pub fn explained(
+        &self,
+        seed: u64,
+        k: u64,
+        backgrounds: &[Background],
+        catalog: &[AssetVariant],
+    ) -> Result<(Scene, Vec<Drawn>)> {
+        let log = DrawLog::default();
+        let recipe = self.narrowed();
+        recipe.check()?;
+        let number = SceneNumber { seed, k };
+        let backgrounds = recipe.viewpoints.slice_of(backgrounds);
+        let scene = recipe.compose(number, &log, backgrounds, catalog)?;
+        Ok((scene, log.into_draws()))
+    }
+
+    /// Fails on the first asset that at its largest fits between the walls of some background in no
+    /// direction: a scene with both would be refused, however late it comes.
+    pub fn check_room(&self, backgrounds: &[Background], catalog: &[AssetVariant]) -> Result<()> {
+        let recipe = self.narrowed();
+        if recipe.objects.max < 1.0 {
+            return Ok(());
+        }
+        for background in recipe.viewpoints.slice_of(backgrounds) {
+            for variant in catalog {
+                recipe.check_fit(background, variant)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Fails if a photo of an asset at its largest fits between the walls of a background in no
+    /// direction.
+    fn check_fit(&self, background: &Background, variant: &AssetVariant) -> Result<()> {
+        for size in self.photos.slice_of(&variant.photo_sizes) {
+            let largest = size.map(|side| side * self.scale.max);
+            if !self.start.has_room(background.size, largest) {
+                let room = background.size;
+                let what = too_large(&variant.asset, largest, &background.name, room);
+                return Err(Error::value("objects", what));
+            }
+        }
+        Ok(())
+    }
+
+    /// Fails on the first impossible value.
+    pub fn check(&self) -> Result<()> {
+        check_image(self.image)?;
+        self.check_objects()?;
+        self.check_light()?;
+        self.friction.check("friction", &FRICTION)?;
+        self.restitution.check("restitution", &SHARE)?;
+        if let Some(albedo) = self.surface_albedo {
+            ALBEDO.check("surface_albedo", albedo)?;
+        }
+        check_cast(&self.cast)?;
+        self.finish.check()?;
+        self.settle.check()
+    }
+
+    fn check_objects(&self) -> Result<()> {
+        self.objects.check_count("objects", &OBJECT_COUNT)?;
+        SHARE.check("negatives", self.negatives)?;
+        self.scale.check("scale", &SCALE)?;
+        self.start.check()?;
+        self.grade.check("grade")
+    }
+
+    fn check_light(&self) -> Result<()> {
+        check_count(self.lights.len(), "lights", MAX_LIGHTS)?;
+        check_each(&self.lights, "lights", LightRanges::check)?;
+        self.ambient.check("ambient", &RADIANCE)?;
+        self.environment.check()?;
+        self.gain_ev.check("gain_ev", &EV)
+    }
+}
+
+#[cfg(test)]
+mod tests;

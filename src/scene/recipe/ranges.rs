@@ -1,0 +1,142 @@
+//! Ranges of an object's colours and of a light.
+
+use crate::color::planckian;
+use crate::error::Result;
+use crate::pixel::LinearRgb;
+use crate::scene::bounds::{GRADE, KELVIN, LIGHT_HEIGHT, LIGHT_OFFSET, LIGHT_SIZE, RADIANCE, TURN};
+use crate::scene::{AreaLight, Draws, LightShape, Range};
+use serde::{Deserialize, Serialize};
+
+/// Change of an object's colours, see [`Grade`](crate::scene::Grade).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GradeRanges {
+    /// Degrees. Default: `[-20, 20]`.
+    pub hue_deg: Range,
+    /// Factor. Default: `[0.8, 1.2]`.
+    pub saturation: Range,
+    /// Factor. Default: `[0.8, 1.2]`.
+    pub value: Range,
+}
+
+/// An area light that faces the centre of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LightRanges {
+    /// Outline. Default: `ellipse`.
+    pub shape: LightShape,
+    /// Height over the surface, metres. Default: `[0.8, 1.6]`.
+    pub height: Range,
+    /// Distance from the vertical through the surface's centre, metres. Default: `[0.0, 0.8]`.
+    pub offset: Range,
+    /// Direction of that offset, degrees from `+x` towards `+y`. Default: `[-180, 180]`.
+    pub azimuth_deg: Range,
+    /// Side length or diameter, metres: softness. Default: `[0.05, 0.6]`.
+    pub size: Range,
+    /// Power, watts; it cancels out when one light is matched to the plate. Default: `10`.
+    pub power: Range,
+    /// Red, green and blue, scene-linear. Default: `[1, 1, 1]`.
+    pub color: [Range; 3],
+    /// Colour temperature, kelvin, 1667 to 25 000, on top of `color`; power keeps its luminance. Default: that of white.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_k: Option<Range>,
+}
+
+impl Default for GradeRanges {
+    fn default() -> Self {
+        Self {
+            hue_deg: Range::new(-20.0, 20.0),
+            saturation: Range::new(0.8, 1.2),
+            value: Range::new(0.8, 1.2),
+        }
+    }
+}
+
+impl Default for LightRanges {
+    fn default() -> Self {
+        Self {
+            shape: LightShape::Ellipse,
+            height: Range::new(0.8, 1.6),
+            offset: Range::new(0.0, 0.8),
+            azimuth_deg: Range::new(-180.0, 180.0),
+            size: Range::new(0.05, 0.6),
+            power: Range::fixed(10.0),
+            color: [Range::fixed(1.0); 3],
+            temperature_k: None,
+        }
+    }
+}
+
+impl GradeRanges {
+    /// Colours as they are in the photo.
+    pub const UNCHANGED: Self = Self {
+        hue_deg: Range::fixed(0.0),
+        saturation: Range::fixed(1.0),
+        value: Range::fixed(1.0),
+    };
+
+    pub(super) fn check(&self, at: &str) -> Result<()> {
+        self.hue_deg.check(&format!("{at}.hue_deg"), &TURN)?;
+        self.saturation.check(&format!("{at}.saturation"), &GRADE)?;
+        self.value.check(&format!("{at}.value"), &GRADE)
+    }
+}
+
+impl LightRanges {
+    pub(super) fn draw(&self, draws: &Draws, path: &str) -> AreaLight {
+        let draw = |range: &Range, name: &str| range.draw(draws, &format!("{path}.{name}"));
+        let offset = draw(&self.offset, "offset");
+        let azimuth = draw(&self.azimuth_deg, "azimuth_deg").to_radians();
+        let color = self.draw_color(draws, path);
+        AreaLight {
+            shape: self.shape,
+            position: [
+                offset * libm::cos(azimuth),
+                offset * libm::sin(azimuth),
+                draw(&self.height, "height"),
+            ],
+            target: [0.0; 3],
+            size: [draw(&self.size, "size"); 2],
+            power: draw(&self.power, "power"),
+            color,
+        }
+    }
+
+    fn draw_color(&self, draws: &Draws, path: &str) -> LinearRgb {
+        let tint =
+            [0, 1, 2].map(|c| self.color[c].draw(draws, &format!("{path}.color[{c}]")) as f32);
+        let glow = self.temperature_k.map_or(LinearRgb::WHITE, |range| {
+            planckian(range.draw(draws, &format!("{path}.temperature_k")))
+        });
+        LinearRgb::from(tint) * glow
+    }
+
+    /// The light at the middle of its ranges, its size still varying.
+    pub(super) fn at_middle(&self) -> Self {
+        Self {
+            height: self.height.middle(),
+            offset: self.offset.middle(),
+            azimuth_deg: self.azimuth_deg.middle(),
+            power: self.power.middle(),
+            color: self.color.map(|range| range.middle()),
+            ..*self
+        }
+    }
+
+    pub(super) fn check(&self, at: &str) -> Result<()> {
+        let ranges = [
+            ("height", &self.height, &LIGHT_HEIGHT),
+            ("offset", &self.offset, &LIGHT_OFFSET),
+            ("azimuth_deg", &self.azimuth_deg, &TURN),
+            ("size", &self.size, &LIGHT_SIZE),
+            ("power", &self.power, &RADIANCE),
+        ];
+        for (name, range, bounds) in ranges {
+            range.check(&format!("{at}.{name}"), bounds)?;
+        }
+        if let Some(range) = &self.temperature_k {
+            range.check(&format!("{at}.temperature_k"), &KELVIN)?;
+        }
+        (0..3).try_for_each(|c| self.color[c].check(&format!("{at}.color[{c}]"), &RADIANCE))
+    }
+}

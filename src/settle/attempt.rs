@@ -1,0 +1,184 @@
+//! Attempts at letting a scene come to rest: from which heights, with which steps, and how each
+//! ended.
+
+use super::bodies::{max_overlap, solids_at_rest, touch_distance, typical_length};
+use super::overlap::{self, Solid, Touch};
+use super::trace::MotionSample;
+use super::world::{Drop, Fall};
+use super::{SettleVerdict, columns, level, support};
+use crate::allowance::Allowance;
+use crate::error::Result;
+use crate::geom::Pose;
+use crate::scene::{Draws, Object, Placement, Scene, SettleMode, SettleOptions};
+
+/// Most times that attempts halve the step of the first one.
+const MAX_STEP_HALVINGS: u32 = 3;
+/// Seed of the heights that attempts after the first start from.
+const RETRY_SEED: u64 = 0x5e771e;
+/// Most that one card of a stack is raised in another attempt, as a share of the typical card's
+/// length.
+const MAX_RAISE_RATIO: f64 = 0.1;
+
+/// The attempts at one scene.
+pub(super) struct AttemptSeries<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) options: &'a SettleOptions,
+    /// Steps between samples of the motion; none where it is 0.
+    pub(super) sample_every: usize,
+    pub(super) allowance: &'a Allowance<'a>,
+}
+
+/// How one attempt ended.
+pub(super) struct Attempt {
+    pub(super) verdict: SettleVerdict,
+    /// The scene at its end, if it rested.
+    pub(super) rested: Option<Scene>,
+    pub(super) overlap: f64,
+    pub(super) seconds: f64,
+    pub(super) energy_rise: f64,
+    pub(super) samples: Vec<MotionSample>,
+}
+
+impl AttemptSeries<'_> {
+    /// The last attempt, and the verdicts on those before it.
+    pub(super) fn run(&self) -> Result<(Attempt, Vec<SettleVerdict>)> {
+        let mut rejected = Vec::new();
+        let mut halvings = 0;
+        loop {
+            let attempt = self.attempt(rejected.len(), halvings)?;
+            log::debug!(
+                "settle: attempt {}: {:?}, {} of work",
+                rejected.len() + 1,
+                attempt.verdict,
+                self.allowance.taken()
+            );
+            if self.is_final(&attempt, rejected.len() + 1) {
+                return Ok((attempt, rejected));
+            }
+            halvings += u32::from(self.needs_shorter_steps(&attempt));
+            halvings = halvings.min(MAX_STEP_HALVINGS);
+            rejected.push(attempt.verdict);
+        }
+    }
+
+    /// One fall, with a verdict on it.
+    fn attempt(&self, number: usize, halvings: u32) -> Result<Attempt> {
+        let fall = self.fall(number, halvings)?;
+        let end = with_poses(self.scene.clone(), &fall.poses);
+        let (verdict, overlap) = self.judge(&end, fall.rests, fall.energy_rise);
+        Ok(Attempt {
+            rested: (verdict == SettleVerdict::Rested).then_some(end),
+            verdict,
+            overlap,
+            seconds: fall.seconds,
+            energy_rise: fall.energy_rise,
+            samples: fall.samples,
+        })
+    }
+
+    fn fall(&self, number: usize, halvings: u32) -> Result<Fall> {
+        match self.options.mode {
+            SettleMode::Fall => columns::fall(&Drop {
+                scene: self.scene,
+                options: self.options,
+                heights: &start_heights(self.scene, number),
+                sample_every: self.sample_every,
+                halvings,
+                allowance: self.allowance,
+            }),
+            SettleMode::Flat => Ok(Fall {
+                poses: level::flat(self.scene, self.options, self.allowance)?,
+                rests: true,
+                ..Fall::default()
+            }),
+        }
+    }
+
+    /// Whether no other attempt follows: it rested, needed no simulation, or was the last allowed.
+    fn is_final(&self, attempt: &Attempt, count: usize) -> bool {
+        attempt.verdict == SettleVerdict::Rested
+            || attempt.seconds == 0.0
+            || count >= self.options.attempts as usize
+    }
+
+    /// Bodies that have sunk in need stiffer contacts, which shorter steps bear; those that have
+    /// gained energy hit too hard in one step, and would again from most heights.
+    fn needs_shorter_steps(&self, attempt: &Attempt) -> bool {
+        let sank =
+            attempt.overlap.is_finite() && attempt.overlap > max_overlap(self.scene, self.options);
+        sank || matches!(attempt.verdict, SettleVerdict::Exploded(_))
+    }
+
+    /// The verdict on a fall, and the deepest overlap at its end.
+    fn judge(&self, end: &Scene, rests: bool, energy_rise: f64) -> (SettleVerdict, f64) {
+        let bodies = solids_at_rest(self.scene, end, self.options);
+        let escaped = overlap::escaped_ids(&bodies, end.surface.size);
+        if !escaped.is_empty() {
+            return (SettleVerdict::Escaped(escaped), f64::INFINITY);
+        }
+        let touching = overlap::touching_pairs(&bodies, touch_distance(self.scene));
+        let depth = overlap::deepest(&bodies, &touching, end.surface.size);
+        let verdict = if !rests {
+            SettleVerdict::TimedOut
+        } else if depth > max_overlap(self.scene, self.options) {
+            SettleVerdict::Penetrating(depth)
+        } else if energy_rise > self.options.max_energy_rise {
+            SettleVerdict::Exploded(energy_rise)
+        } else {
+            self.judge_support(&bodies, &touching)
+        };
+        (verdict, depth)
+    }
+
+    /// Whether bodies that lie still are supported. What was laid without physics always is.
+    fn judge_support(&self, bodies: &[Solid], touching: &[Touch]) -> SettleVerdict {
+        if self.options.mode == SettleMode::Flat {
+            return SettleVerdict::Rested;
+        }
+        let unsupported = support::unsupported(self.scene, self.options, bodies, touching);
+        if unsupported.is_empty() {
+            SettleVerdict::Rested
+        } else {
+            SettleVerdict::Hanging(unsupported)
+        }
+    }
+}
+
+/// The heights that an attempt starts from: first those of the scene; then each object, from the
+/// lowest up, is raised by somewhat more than the one below it, so that what starts apart in height
+/// stays apart.
+pub(super) fn start_heights(scene: &Scene, attempt: usize) -> Vec<f64> {
+    let mut heights: Vec<f64> = scene.objects.iter().map(own_height).collect();
+    if attempt == 0 {
+        return heights;
+    }
+    let draws = Draws::new(RETRY_SEED, attempt as u64);
+    let max_raise = MAX_RAISE_RATIO * typical_length(scene);
+    let mut order: Vec<usize> = (0..heights.len()).collect();
+    order.sort_by(|&a, &b| heights[a].total_cmp(&heights[b]));
+    let mut raise = 0.0;
+    for i in order {
+        raise += max_raise * draws.unit(&format!("objects[{i}].raise"));
+        heights[i] += raise;
+    }
+    heights
+}
+
+fn own_height(object: &Object) -> f64 {
+    match object.placement {
+        Placement::Drop { height, .. } => height,
+        Placement::At(pose) => pose.translation.z,
+    }
+}
+
+/// The scene with these poses for the objects that fall, in their order.
+fn with_poses(mut scene: Scene, poses: &[Pose]) -> Scene {
+    let falling = scene
+        .objects
+        .iter_mut()
+        .filter(|object| matches!(object.placement, Placement::Drop { .. }));
+    for (object, pose) in falling.zip(poses) {
+        object.placement = Placement::At(*pose);
+    }
+    scene
+}
